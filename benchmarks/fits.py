@@ -11,11 +11,11 @@ from table import Row, duration, times
 from timing import Timing, in_turns, one_core
 
 from swashplate import Drive
+from swashplate.drive import ALL_COLUMNS, PUMP_COLUMNS, made_ready
 from swashplate.equations.marching.observation import Observation, ObservedRecord
 from swashplate.equations.marching.record import record_of
 from swashplate.maneuvers import source_tests
 from swashplate.parameters.definitions import columns_of
-from swashplate.simulation.residuals import ALL_COLUMNS, PUMP_COLUMNS, made_ready
 
 Array = NDArray[np.float64]
 

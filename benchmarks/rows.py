@@ -12,13 +12,12 @@ from table import Row, duration, times
 from timing import Timing, cores_used, in_turns, one_core
 
 from swashplate import Drive, Serial, SquaredError, maneuvers
+from swashplate.drive import PUMP_COLUMNS, instance_of, made_ready
 from swashplate.equations.marching.observation import Observation, ObservedRecord
 from swashplate.equations.marching.part import Stored
 from swashplate.equations.marching.pieces import addresses, run_once
 from swashplate.equations.marching.record import record_of
 from swashplate.equations.marching.run import arrays_of, march_of
-from swashplate.simulation.instance import instance_of
-from swashplate.simulation.residuals import PUMP_COLUMNS, made_ready
 
 Array = NDArray[np.float64]
 

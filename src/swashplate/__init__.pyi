@@ -15,7 +15,14 @@ from .__about__ import __version__ as __version__
 from .campaign.campaign import Campaign as Campaign
 from .campaign.experiment import Channel as Channel
 from .campaign.experiment import Experiment as Experiment
+from .drive import Batch as Batch
 from .drive import Drive as Drive
+from .drive import Limit as Limit
+from .drive import Sample as Sample
+from .drive import Sensitivities as Sensitivities
+from .drive import Simulation as Simulation
+from .drive import SquaredError as SquaredError
+from .drive import simulate_many as simulate_many
 from .equations.marching.use import Stepper as Stepper
 from .errors import DomainError as DomainError
 from .errors import FileError as FileError
@@ -41,10 +48,3 @@ from .linear import OperatingPoint as OperatingPoint
 from .parameters.parameter_set import Pair as Pair
 from .parameters.parameter_set import Parameter as Parameter
 from .parameters.parameter_set import ParameterSet as ParameterSet
-from .simulation.batch import Batch as Batch
-from .simulation.batch import SquaredError as SquaredError
-from .simulation.batch import simulate_many as simulate_many
-from .simulation.residuals import Sensitivities as Sensitivities
-from .simulation.result import Limit as Limit
-from .simulation.result import Simulation as Simulation
-from .simulation.run import Sample as Sample

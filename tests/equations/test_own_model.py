@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from swashplate import DomainError, InputError
+from swashplate.drive import simulate_many
 from swashplate.equations import (
     Model,
     Tap,
@@ -22,7 +23,6 @@ from swashplate.equations import (
 )
 from swashplate.errors import EquationError
 from swashplate.models.drive import pump_drive
-from swashplate.simulation.batch import simulate_many
 
 
 class Valve(NamedTuple):

@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
+from tests.drive.experiments import ALL
 from tests.equations.tangents import marched
-from tests.simulation.experiments import ALL
 
 from swashplate import Drive
 from swashplate.equations.fields import floats_of
-from swashplate.simulation.instance import instance_of, path_of
-from swashplate.simulation.residuals import SWITCHES
+from swashplate.drive import instance_of, path_of
+from swashplate.parameters import SWITCHES
 
 RATE, SIZE = 512.0, 300
 COULOMB = ("C_plus", "C_minus")

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from swashplate import Drive, export
+from swashplate.drive import Sample
 from swashplate.models.drive import pump_drive
-from swashplate.simulation.run import Sample
 
 fmpy = pytest.importorskip("fmpy")
 from fmpy.fmi1 import FMICallException  # noqa: E402

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from tests.simulation.experiments import ALL
+from tests.drive.experiments import ALL
 
 from swashplate import Drive, Simulation
 

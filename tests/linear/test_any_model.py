@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from swashplate import DomainError, Drive, InputError
+from swashplate.drive import instance_of
 from swashplate.equations import instance_of as instance_of_model
 from swashplate.equations.declaration import equation
 from swashplate.equations.marching.part import Stored
 from swashplate.equations.marching.run import Instance, Part, marched
 from swashplate.equations.model import Model, Tap, discretised, join
 from swashplate.linear import LinearModel, linearize
-from swashplate.simulation.instance import instance_of
 
 H = 0.01
 

@@ -12,10 +12,10 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from swashplate import Drive
+from swashplate.drive import step_limit
 from swashplate.equations.model import Window
 from swashplate.models import channel as single
 from swashplate.models.channel import Channel, Filter
-from swashplate.simulation.instance import step_limit
 
 Array = NDArray[np.float64]
 RATES = (200.0, 512.0, 600.0, 1000.0, 2000.0)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal, cast, get_args, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.drive import Drive
+from swashplate.drive import Drive, instance_of
 from swashplate.equations.declaration import interpreted
 from swashplate.equations.marching.record import SOURCE_RATE
 from swashplate.equations.marching.run import Instance, Part, called
@@ -18,7 +18,6 @@ from swashplate.models.displacement_control import PumpOptions, pressure_limits
 from swashplate.models.pump import PumpState
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.results import GivenAxes, Result, Tabular, figures
-from swashplate.simulation.instance import instance_of
 from swashplate.tables import UNIT, Cell, Column, Table, plain
 from swashplate.units import display_unit
 

@@ -11,15 +11,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from swashplate.analysis.capability import farthest_stop
 from swashplate.analysis.outcomes import checked_speed, rms_difference
-from swashplate.drive import Drive, Given
+from swashplate.drive import Drive, Given, Limit, Simulation, simulate_drive
 from swashplate.equations.marching.record import SOURCE_RATE
 from swashplate.equations.marching.run import Start
 from swashplate.errors import DomainError, ParameterError, SwashplateError
 from swashplate.parameters.definitions import columns_of
 from swashplate.parameters.parameter_set import Change
 from swashplate.results import Result, Tabular, figures
-from swashplate.simulation.result import Limit, Simulation
-from swashplate.simulation.run import simulate_drive
 from swashplate.tables import Column, Table, listed, quantity, share_cell
 
 if TYPE_CHECKING:

@@ -19,13 +19,12 @@ from swashplate.analysis.outcomes import (
     outcome_matrix,
 )
 from swashplate.analysis.outcomes import trial as trial_of
-from swashplate.drive import Drive
+from swashplate.drive import Drive, Simulation
 from swashplate.errors import DomainError, InputError, ParameterError
 from swashplate.maneuvers import Maneuver
 from swashplate.parameters.definitions import CATALOGUE, COLUMNS, REFINEMENTS, columns_of
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.results import GivenAxes, Result, figures
-from swashplate.simulation.result import Simulation
 from swashplate.tables import UNIT, Column, Table, listed, quantity
 from swashplate.units import of_shaft
 

@@ -19,12 +19,12 @@ if TYPE_CHECKING:
     from swashplate.analysis.whatif import Range
     from swashplate.campaign import Campaign, Experiment
     from swashplate.cli.options import Sampling
-    from swashplate.drive import Drive
+    from swashplate.drive import Drive, Simulation
+    from swashplate.drive.simulation import Array
     from swashplate.identification.model_setup import ModelSetup
     from swashplate.identification.setup import Setup
     from swashplate.maneuvers import Maneuver
     from swashplate.parameters.parameter_set import Change, ParameterSet
-    from swashplate.simulation.result import Array, Simulation
 
 _NUMBER = r"[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|inf\b|nan\b)"
 _VALUE = re.compile(rf"\s*({_NUMBER})(?:/({_NUMBER}))?\s*((?:1/)?[^\W\d_].*|°.*)?")
@@ -375,8 +375,8 @@ def simulated(drive: Drive, command: str, options: Sampling) -> tuple[str, Simul
 
 def _measured(log: str, options: Sampling) -> dict[str, Any]:
     """Inputs beside the voltage by name: a column of a log, or a number."""
+    from swashplate.drive import MEASURED
     from swashplate.logs import read_series
-    from swashplate.simulation.result import MEASURED
 
     found = dict[str, Any]()
     for word in options.measured or ():

@@ -30,8 +30,8 @@ from swashplate.crane.outcome import Outcome
 from swashplate.crane.rope import GRAVITY
 from swashplate.crane.spectral import linear_response
 from swashplate.crane.study import NONE, Case, Controllers, Study
+from swashplate.drive import Limit
 from swashplate.errors import InputError
-from swashplate.simulation.result import Limit
 from swashplate.tables import count
 
 SEAWAYS = 120

@@ -32,8 +32,8 @@ from swashplate.crane.result import PUMPS, CraneRun, limit_table
 from swashplate.crane.spectral import LinearResponse
 from swashplate.crane.study import NONE, Study, assumed_words
 from swashplate.crane.transfer_functions import CRANE_SHIP, Hull
+from swashplate.drive import Limit
 from swashplate.results import GivenAxes, Tabular, figures
-from swashplate.simulation.result import Limit
 from swashplate.tables import Column, Table, count, listed
 
 if TYPE_CHECKING:

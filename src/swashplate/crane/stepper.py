@@ -27,13 +27,12 @@ from swashplate.crane.rope import (
     too_fast,
 )
 from swashplate.crane.signals import ROWS, Signals, columns_of
-from swashplate.drive import Drive
+from swashplate.drive import Drive, instance_of
 from swashplate.equations import CompiledStep, Machine, compiled_step
 from swashplate.equations.marching.run import marched
 from swashplate.equations.marching.stepping import stored_of
 from swashplate.errors import DomainError, InputError
 from swashplate.parameters.rules import FULL_VOLTAGE
-from swashplate.simulation.instance import instance_of
 
 Array = NDArray[np.float64]
 Actuation = Literal["ideal", "volts", "inverse", "direct"]

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.drive import Drive
+from swashplate.drive import RANGES, Drive, Sample, check_filter_stability, instance_of, models_of
 from swashplate.equations.fields import declared_by
 from swashplate.equations.marching.record import SOURCE_RATE, check_rate
 from swashplate.equations.marching.run import Instance
@@ -28,8 +28,6 @@ from swashplate.models.card import stable_step
 from swashplate.models.displacement_control import steep_stops
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
-from swashplate.simulation.instance import check_filter_stability, instance_of, models_of
-from swashplate.simulation.run import RANGES, Sample
 from swashplate.tables import write_text
 
 Array = NDArray[np.float64]

@@ -15,7 +15,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate import maneuvers
-from swashplate.drive import Drive
+from swashplate.drive import (
+    PATHS,
+    UNITS,
+    Drive,
+    Named,
+    card_of,
+    card_options,
+    check_filter_stability,
+)
 from swashplate.equations.declaration import interpreted
 from swashplate.equations.derivatives import derive
 from swashplate.equations.marching.derivatives import jacobian
@@ -37,8 +45,6 @@ from swashplate.models.full_order import PlantOptions, PlantSignals
 from swashplate.models.machine import Machine, fastest_rate, relief_pressures
 from swashplate.parameters.parameter_set import Change
 from swashplate.results import Result, Tabular, figures
-from swashplate.simulation.instance import PATHS, card_of, card_options, check_filter_stability
-from swashplate.simulation.result import UNITS, Named
 from swashplate.tables import UNIT, Cell, Column, Table
 from swashplate.units import PLATE_RATE, SHAFT_ANGLE
 
@@ -46,8 +52,8 @@ if TYPE_CHECKING:
     import polars
     from matplotlib.figure import Figure
 
+    from swashplate.drive import Simulation
     from swashplate.maneuvers import Maneuver
-    from swashplate.simulation.result import Simulation
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.int8]

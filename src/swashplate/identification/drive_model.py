@@ -17,6 +17,17 @@ from swashplate.campaign.amplifier import CURRENTS as CURRENTS
 from swashplate.campaign.experiment import APART, RISE, Channel, Edge, Experiment, InputSignal
 from swashplate.campaign.samples import signed_by_command
 from swashplate.campaign.schema import SIGNALS as SIGNALS
+from swashplate.drive import (
+    PRESSURE,
+    START,
+    Limit,
+    Ready,
+    Simulation,
+    at_every_rate,
+    check_voltage,
+    made_ready,
+    simulate_drive,
+)
 from swashplate.equations.marching.observation import Observation, ObservedRecord, Own
 from swashplate.equations.marching.record import (
     SLOWEST,
@@ -34,10 +45,6 @@ from swashplate.identification.unknowns import Prior, Unknown, Unknowns, zero_na
 from swashplate.parameters.definitions import is_column
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.results import Result
-from swashplate.simulation.instance import PRESSURE, START, at_every_rate
-from swashplate.simulation.residuals import Ready, made_ready
-from swashplate.simulation.result import Limit, Simulation
-from swashplate.simulation.run import check_voltage, simulate_drive
 
 Array = NDArray[np.float64]
 Part = Literal["card", "pump", "chain"]

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.campaign.experiment import Edge, Experiment
+from swashplate.drive import Ready
 from swashplate.equations import Model as Equations
 from swashplate.equations import instance_of, parameter_paths, state_paths
 from swashplate.equations.fields import made
@@ -20,7 +21,6 @@ from swashplate.equations.marching.observation import Observation, ObservedRecor
 from swashplate.equations.marching.record import Record, even_rate, on_grid
 from swashplate.errors import DomainError, InputError
 from swashplate.results import Result, short
-from swashplate.simulation.residuals import Ready
 
 Array = NDArray[np.float64]
 INSTANT_STEP = 1e-5

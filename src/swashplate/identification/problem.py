@@ -40,7 +40,7 @@ from swashplate.tables import count
 if TYPE_CHECKING:
     from concurrent.futures import ThreadPoolExecutor
 
-    from swashplate.simulation.residuals import Ready
+    from swashplate.drive import Ready
 
 Array = NDArray[np.float64]
 Part = TypeVar("Part")

@@ -14,6 +14,15 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from swashplate.drive.instance import (
+    card_of,
+    check_filter_stability,
+    instance_of,
+    models_of,
+    without_ripple,
+)
+from swashplate.drive.march import steady_states
+from swashplate.drive.simulation import UNITS
 from swashplate.equations.declaration import interpreted
 from swashplate.equations.fields import is_real
 from swashplate.equations.marching.record import (
@@ -33,15 +42,6 @@ from swashplate.models.refinements import dither_factor, friction_width
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.results import Result
-from swashplate.simulation.instance import (
-    card_of,
-    check_filter_stability,
-    instance_of,
-    models_of,
-    without_ripple,
-)
-from swashplate.simulation.result import UNITS
-from swashplate.simulation.run import steady_states
 from swashplate.tables import UNIT, Cell, Column, Table
 from swashplate.units import display_unit
 

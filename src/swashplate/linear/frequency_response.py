@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, cast, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from swashplate.drive.instance import check_filter_stability, instance_of, without_ripple
+from swashplate.drive.simulation import UNITS
 from swashplate.equations.fields import is_real
 from swashplate.equations.marching.march import output_of
 from swashplate.equations.marching.record import FASTEST, SOURCE_RATE, check_rate
@@ -23,8 +25,6 @@ from swashplate.models.displacement_control import Pump
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.results import GivenAxes, Tabular, figures
-from swashplate.simulation.instance import check_filter_stability, instance_of, without_ripple
-from swashplate.simulation.result import UNITS
 from swashplate.tables import Column, Table
 
 if TYPE_CHECKING:

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from swashplate.drive.simulation import UNITS
 from swashplate.errors import DomainError, InputError
-from swashplate.simulation.result import UNITS
 from swashplate.tables import Form, ending, write_text
 
 if TYPE_CHECKING:

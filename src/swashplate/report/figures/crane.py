@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 
 from swashplate.crane import Crane, CraneRun, Followable, Hull, Seaway, Sweep
 from swashplate.crane.confidence import rms_of
+from swashplate.drive import Limit
 from swashplate.errors import InputError
 from swashplate.report import style
 from swashplate.report.lines import SHADES, draw, fit_time, shade_handle, stretches
 from swashplate.results import GivenAxes
-from swashplate.simulation.result import Limit
 from swashplate.tables import count
 
 Array = NDArray[np.float64]

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, MultipleLocator, NullFormatter, NullLocator
 from numpy.typing import NDArray
 
+from swashplate.drive import UNITS
 from swashplate.errors import InputError
 from swashplate.full_order import SIGNAL_UNITS
 from swashplate.linear import FrequencyResponse, LinearDrive
@@ -25,7 +26,6 @@ from swashplate.report.style import (
     write,
 )
 from swashplate.results import GivenAxes
-from swashplate.simulation.result import UNITS
 from swashplate.units import display_unit
 
 Array = NDArray[np.float64]

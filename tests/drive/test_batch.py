@@ -21,12 +21,12 @@ from swashplate import (
     Threads,
     simulate_many,
 )
+from swashplate.drive import batch as batches
+from swashplate.drive import instance_of
 from swashplate.equations import Model, Tap, equation, simulate
 from swashplate.equations.marching.lanes import lanes_of
 from swashplate.models.displacement_control import PumpOptions
 from swashplate.models.drive import pump_drive
-from swashplate.simulation import batch as batches
-from swashplate.simulation.instance import instance_of
 
 RATE, COUNT = 100.0, 37
 COMMAND = np.sin(np.arange(400) / 25.0) + 0.3

@@ -10,6 +10,20 @@ from typing import TYPE_CHECKING, NamedTuple, TypedDict, Unpack, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from swashplate.drive.instance import (
+    at_every_rate,
+    check_filter_stability,
+    instance_of,
+    with_equation,
+)
+from swashplate.drive.march import (
+    Sample,
+    drive_records,
+    drive_stepper,
+    simulate_drive,
+    steady_states,
+)
+from swashplate.drive.simulation import Simulation
 from swashplate.equations.marching.record import SOURCE_RATE, Interpolation, check_rate
 from swashplate.equations.marching.run import Start
 from swashplate.equations.marching.stepping import CompiledStep, stored_of
@@ -22,23 +36,11 @@ from swashplate.parameters.files import dump_set, load_preset, load_set, preset_
 from swashplate.parameters.parameter_set import Change, Parameter, ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.results import Result
-from swashplate.simulation.instance import (
-    at_every_rate,
-    check_filter_stability,
-    instance_of,
-    with_equation,
-)
-from swashplate.simulation.result import Simulation
-from swashplate.simulation.run import (
-    Sample,
-    drive_records,
-    drive_stepper,
-    simulate_drive,
-    steady_states,
-)
 from swashplate.units import in_si
 
 if TYPE_CHECKING:
+    from swashplate.drive.batch import Batch, SquaredError
+    from swashplate.drive.derivatives import Sensitivities
     from swashplate.executors import Executor
     from swashplate.linear import (
         Coulomb,
@@ -46,8 +48,6 @@ if TYPE_CHECKING:
         Input,
         LinearDrive,
     )
-    from swashplate.simulation.batch import Batch, SquaredError
-    from swashplate.simulation.residuals import Sensitivities
     from swashplate.tables import Table
 
 Array = NDArray[np.float64]
@@ -305,7 +305,7 @@ class Drive(Result, Mapping[str, Parameter]):
         voltage, rate, start, **given :
             As in `simulate`.
         """
-        from swashplate.simulation.residuals import sensitivities
+        from swashplate.drive.derivatives import sensitivities
 
         records = drive_records("voltage", voltage, rate, **given)
         return sensitivities(self.parameters, records, start, parameters)
@@ -320,7 +320,7 @@ class Drive(Result, Mapping[str, Parameter]):
         **given: Unpack[Given],
     ) -> Sensitivities:
         """The same for pump and motor alone over a signed current. [A]"""
-        from swashplate.simulation.residuals import sensitivities
+        from swashplate.drive.derivatives import sensitivities
 
         records = drive_records("current", current, rate, **given)
         return sensitivities(self.parameters, records, start, parameters)
@@ -358,7 +358,7 @@ class Drive(Result, Mapping[str, Parameter]):
         InputError, FileError
             As in `swashplate.simulate_many`.
         """
-        from swashplate.simulation.batch import simulate_drives
+        from swashplate.drive.batch import simulate_drives
 
         commands = {"voltage": voltage, "current": current}
         chosen = [(driver, each) for driver, each in commands.items() if each is not None]

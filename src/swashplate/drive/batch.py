@@ -15,6 +15,14 @@ from typing import Any, Unpack
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from swashplate.drive.instance import (
+    card_options,
+    models_of,
+    path_of,
+    pump_options,
+    unstable_filters,
+)
+from swashplate.drive.simulation import check_output
 from swashplate.equations import Model, instance_of, parameter_paths, state_paths
 from swashplate.equations.fields import check_mapping
 from swashplate.equations.library import TAN_22_5
@@ -30,14 +38,6 @@ from swashplate.parameters.definitions import SWITCHES, columns_of, find
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import broken_rules
 from swashplate.results import Result
-from swashplate.simulation.instance import (
-    card_options,
-    models_of,
-    path_of,
-    pump_options,
-    unstable_filters,
-)
-from swashplate.simulation.result import check_output
 from swashplate.tables import write_table
 from swashplate.units import in_si
 

@@ -11,6 +11,7 @@ import tomlkit
 
 from swashplate import DomainError, Drive, InputError, ParameterError, maneuvers
 from swashplate.analysis import envelope, speed_limits
+from swashplate.drive import drive_records, simulate_drive
 from swashplate.equations import Definition, equation
 from swashplate.models.channel import steady_current
 from swashplate.models.displacement_control import (
@@ -20,7 +21,6 @@ from swashplate.models.displacement_control import (
     spool_balance,
 )
 from swashplate.models.pump import shaft_speed
-from swashplate.simulation.run import drive_records, simulate_drive
 
 RATE = 512.0
 COMMAND = maneuvers.sine(4.0, 0.8, start=0.05, length=1.5, settle=0.3).sample(RATE)

@@ -5,9 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from swashplate import ParameterSet, maneuvers
+from swashplate.drive import made_ready, wanted_columns
 from swashplate.equations.marching.derivatives import Jacobian, Triangle
 from swashplate.equations.marching.observation import ObservedRecord, Own
-from swashplate.simulation.residuals import made_ready, wanted_columns
 
 NOTHING = Own()
 RATE = 512.0

@@ -8,13 +8,12 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
-from tests.simulation.experiments import HARD, RATE, SWING, jacobian, residuals, triangle
+from tests.drive.experiments import HARD, RATE, SWING, jacobian, residuals, triangle
 
 from swashplate import DomainError, Drive, InputError, ParameterError, maneuvers
+from swashplate.drive import ALL_COLUMNS, PUMP_COLUMNS, simulate_drive
 from swashplate.equations.marching.observation import Observation, ObservedRecord, Own
 from swashplate.equations.marching.record import record_of
-from swashplate.simulation.residuals import ALL_COLUMNS, PUMP_COLUMNS
-from swashplate.simulation.run import simulate_drive
 
 CARD = ("current", "current_sum", "current_positive", "current_negative")
 PUMP = ("shaft_speed", "shaft_position", "stroker_pressure", "swash_angle", "spool_position")

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.simulation.experiments import ALL, LOAD, RIPPLE, jacobian, residuals
+from tests.drive.experiments import ALL, LOAD, RIPPLE, jacobian, residuals
 
 from swashplate import Drive, Simulation, maneuvers
 from swashplate.equations.marching.observation import Observation, ObservedRecord

@@ -5,10 +5,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
-from tests.simulation.experiments import ALL, HARD, RATE, SWING
+from tests.drive.experiments import ALL, HARD, RATE, SWING
 
 from swashplate import Drive, InputError, Limit, Simulation, maneuvers
-from swashplate.simulation.residuals import ALL_COLUMNS, Sensitivities
+from swashplate.drive import ALL_COLUMNS, Sensitivities
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from swashplate.drive.instance import (
+    check_filter_stability,
+    instance_of,
+    models_of,
+    without_ripple,
+)
+from swashplate.drive.simulation import MEASURED, UNITS, Simulation
 from swashplate.equations.declaration import interpreted
 from swashplate.equations.fields import Definition, is_real
 from swashplate.equations.marching.part import Stored
@@ -27,13 +34,6 @@ from swashplate.models.displacement_control import pressure_limits
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.plausible import check_plausible
 from swashplate.parameters.rules import FULL_VOLTAGE
-from swashplate.simulation.instance import (
-    check_filter_stability,
-    instance_of,
-    models_of,
-    without_ripple,
-)
-from swashplate.simulation.result import MEASURED, UNITS, Simulation
 from swashplate.units import in_si
 
 Array = NDArray[np.float64]

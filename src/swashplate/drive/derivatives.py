@@ -10,6 +10,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from swashplate.drive.instance import (
+    PATHS,
+    PRESSURE,
+    START,
+    check_filter_stability,
+    instance_of,
+    path_of,
+)
+from swashplate.drive.march import simulate_drive, start_states
+from swashplate.drive.simulation import Named, Simulation, check_output
 from swashplate.equations.marching import derivatives as engine
 from swashplate.equations.marching.observation import ObservedRecord, Own, every_sample
 from swashplate.equations.marching.record import Record
@@ -18,16 +28,6 @@ from swashplate.errors import InputError
 from swashplate.parameters.definitions import SWITCHES, columns_of
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.results import Result
-from swashplate.simulation.instance import (
-    PATHS,
-    PRESSURE,
-    START,
-    check_filter_stability,
-    instance_of,
-    path_of,
-)
-from swashplate.simulation.result import Named, Simulation, check_output
-from swashplate.simulation.run import simulate_drive, start_states
 from swashplate.tables import count
 
 Array = NDArray[np.float64]
