@@ -11,7 +11,7 @@ from table import Row, duration, times
 from timing import Timing, in_turns, one_core
 
 from swashplate import Drive
-from swashplate.drive import ALL_COLUMNS, PUMP_COLUMNS, made_ready
+from swashplate.drive import ALL_COLUMNS, PUMP_COLUMNS, bound_drive
 from swashplate.equations.marching.observation import Observation, ObservedRecord
 from swashplate.equations.marching.record import record_of
 from swashplate.maneuvers import source_tests
@@ -60,17 +60,17 @@ class HoistTests:
     def residuals(self, tests: list[ObservedRecord]) -> None:
         """Residuals of all tests."""
         for each in tests:
-            made_ready(self.drive.parameters, each).residuals(each)
+            bound_drive(self.drive.parameters, each).residuals(each)
 
     def jacobian(self) -> None:
         """Residuals and derivatives of all tests, into memory from before."""
         for each, kept in zip(self.pump, self.kept, strict=True):
-            made_ready(self.drive.parameters, each, PUMP).jacobian(each, kept)
+            bound_drive(self.drive.parameters, each, PUMP).jacobian(each, kept)
 
     def triangle(self, tests: list[ObservedRecord], columns: tuple[str, ...]) -> None:
         """Triangular factors of all tests."""
         for each in tests:
-            made_ready(self.drive.parameters, each, columns).triangle(each)
+            bound_drive(self.drive.parameters, each, columns).triangle(each)
 
 
 def fit_rows() -> Iterator[Row]:

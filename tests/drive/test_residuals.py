@@ -68,7 +68,7 @@ def test_a_current_drives_the_pump_alone(hoist: Drive) -> None:
         assert np.array_equal(found.residuals[observed.rows_of(number)], simulated(alone, signal))
     by = hoist.sensitivities_current(current)
     speed = found.columns[observed.rows_of(OBSERVABLE.index("shaft_speed"))]
-    close(speed[:, : len(PUMP_COLUMNS)], by.shaft_speed)
+    close(speed[:, : len(PUMP_COLUMNS)], by["shaft_speed"])
     assert (speed[:, len(PUMP_COLUMNS) :] == 0.0).all()
     for signal in CARD:
         assert (found.columns[observed.rows_of(OBSERVABLE.index(signal))] == 0.0).all()

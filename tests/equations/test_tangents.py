@@ -6,8 +6,8 @@ from tests.drive.experiments import ALL
 from tests.equations.tangents import marched
 
 from swashplate import Drive
+from swashplate.drive import drive_instance, path_of
 from swashplate.equations.fields import floats_of
-from swashplate.drive import instance_of, path_of
 from swashplate.parameters import SWITCHES
 
 RATE, SIZE = 512.0, 300
@@ -29,12 +29,12 @@ def test_columns_are_those_of_tangents(name: str) -> None:
         drive = drive.at_every_rate()
     time = np.arange(SIZE) / RATE
     voltage = 5.3 * np.sin(9.0 * time + 0.7)
-    instance = instance_of(drive.parameters, True)
+    instance = drive_instance(drive.parameters, True)
     run = instance, {"voltage": voltage}, 1.0 / RATE, "shaft_speed"
     values, slopes = marched(*run)
     _, alone = marched(*run, begins=False)
     found = drive.sensitivities(voltage, RATE)
-    assert np.array_equal(found.simulation.shaft_speed, values)
+    assert np.array_equal(found.run.shaft_speed, values)
     paths = [
         f"{instance.model.prefix(i)}{path}"
         for i, part in enumerate(instance.model.parts)

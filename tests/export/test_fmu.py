@@ -154,7 +154,7 @@ def command(samples: int = 1500) -> np.ndarray:
 
 def stepped(drive: Drive, voltage: Any, h: float = H, **options: Any) -> np.ndarray:
     """What the drive's stepper says."""
-    stepper = drive.stepper(h, **options)
+    stepper = drive.stepper(1.0 / h, **options)
     samples = [stepper.step(float(each)) for each in voltage]
     return np.array([[getattr(each, name) for name in OUTPUTS] for each in samples])
 

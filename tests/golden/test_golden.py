@@ -45,7 +45,7 @@ CASES: dict[str, Callable[[Array], Array]] = {
     "physical root": lambda voltage: columns(form(pressure_root="symmetric").simulate(voltage)),
     "all refinements": lambda v: columns(Drive.preset("hoist").replace(**LOADED).simulate(v)),
     "pump alone": lambda v: columns(Drive.preset("hoist").simulate_current(0.08 * v)),
-    "derivatives": lambda v: np.array(Drive.preset("hoist").sensitivities(v).shaft_speed),
+    "derivatives": lambda v: np.array(Drive.preset("hoist").sensitivities(v)["shaft_speed"]),
 }
 
 

@@ -4,7 +4,7 @@ import pytest
 
 from swashplate import Drive
 from swashplate.drive import card_of, pump_of
-from swashplate.models.channel import Channel
+from swashplate.models.amplifier import Channel
 from swashplate.models.displacement_control import Pump
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal, cast, get_args, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.drive import Drive, instance_of
+from swashplate.drive import Drive, drive_instance
 from swashplate.equations.declaration import interpreted
 from swashplate.equations.marching.record import SOURCE_RATE
 from swashplate.equations.marching.run import Instance, Part, called
@@ -132,7 +132,7 @@ def acceleration_curve(drive: Drive, voltage: float, points: int = 201) -> Accel
     AccelerationCurve
         The ends lie a hair's breadth inside, where the plate still moves.
     """
-    instance, ends = instance_of(drive.parameters, False), (-FULL_VOLTAGE, FULL_VOLTAGE)
+    instance, ends = drive_instance(drive.parameters, False), (-FULL_VOLTAGE, FULL_VOLTAGE)
     at = ({"current": drive.steady_current(each)} for each in ends)
     low, high = (instance.start(each, 1.0, "steady").states[1].pressure for each in at)
     inside = INSIDE * (high - low)
@@ -141,7 +141,7 @@ def acceleration_curve(drive: Drive, voltage: float, points: int = 201) -> Accel
 
 def speed_limits(drive: Drive) -> tuple[float, float]:
     """Lowest and highest speed that the swash plate's stops, or Z15, allow at all. [rad/s]"""
-    instance = instance_of(drive.parameters, False)
+    instance = drive_instance(drive.parameters, False)
     limits_of = interpreted(pressure_limits, instance.model.parts[1].replacements)
     limits = limits_of(instance.parts[1].p)
     low, high = _curve(drive, 0.0, np.array([limits.lower, limits.upper])).speed
@@ -165,7 +165,7 @@ def _curve(drive: Drive, voltage: float, pressure: Array) -> AccelerationCurve:
     The speed is that of the plate's angle less what leaks under a load that stands still; what
     leaks while it accelerates is left out.
     """
-    instance = instance_of(drive.parameters, False)
+    instance = drive_instance(drive.parameters, False)
     front, (p, options, _) = instance.parts
     # a line at rest leaks as a stiff one does
     leaks = options.leakage if options.line is None else options.line

@@ -18,9 +18,9 @@ from swashplate.crane.rope import GRAVITY, in_ship_axes, rope_leads, swing_of
 from swashplate.crane.signals import ROWS, Signals
 from swashplate.crane.stepper import ACTUATIONS
 from swashplate.crane.transfer_functions import MOTIONS
-from swashplate.drive import Limit, Named, Simulation
+from swashplate.drive import Limit, Simulation
 from swashplate.errors import InputError
-from swashplate.results import Tabular, figures
+from swashplate.results import Named, Tabular, figures
 from swashplate.tables import Column, Table
 
 if TYPE_CHECKING:

@@ -5,24 +5,20 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple, TypedDict, Unpack, overload
+from typing import TYPE_CHECKING, NamedTuple, Unpack, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from swashplate.drive.equilibrium import steady_states
 from swashplate.drive.instance import (
     at_every_rate,
     check_filter_stability,
-    instance_of,
+    drive_instance,
     with_equation,
 )
-from swashplate.drive.march import (
-    Sample,
-    drive_records,
-    drive_stepper,
-    simulate_drive,
-    steady_states,
-)
+from swashplate.drive.march import Sample, drive_stepper, simulate_drive
+from swashplate.drive.records import Given, drive_records
 from swashplate.drive.simulation import Simulation
 from swashplate.equations.marching.record import SOURCE_RATE, Interpolation, check_rate
 from swashplate.equations.marching.run import Start
@@ -39,30 +35,15 @@ from swashplate.results import Result
 from swashplate.units import in_si
 
 if TYPE_CHECKING:
-    from swashplate.drive.batch import Batch, SquaredError
-    from swashplate.drive.derivatives import Sensitivities
+    from swashplate.batch import Batch, SquaredError
+    from swashplate.drive.linear_drive import LinearDrive
+    from swashplate.drive.small_motion import Coulomb, Input
+    from swashplate.equations.marching.sensitivity import Sensitivities
     from swashplate.executors import Executor
-    from swashplate.linear import (
-        Coulomb,
-        FrequencyResponse,
-        Input,
-        LinearDrive,
-    )
+    from swashplate.linear import FrequencyResponse
     from swashplate.tables import Table
 
 Array = NDArray[np.float64]
-
-
-class Given(TypedDict, total=False):
-    """How inputs are given, and what was measured beside the command; see `Drive.simulate`."""
-
-    clip: bool
-    time: ArrayLike | None
-    interpolation: Interpolation | None
-    substeps: int | None
-    load_torque: ArrayLike | None
-    pump_speed: ArrayLike | None
-    supply_pressure: ArrayLike | None
 
 
 @dataclass(frozen=True)
@@ -186,7 +167,7 @@ class Drive(Result, Mapping[str, Parameter]):
         Parameters
         ----------
         old : equation
-            Of `swashplate.models.channel`, `swashplate.models.card`, `swashplate.models.pump`,
+            Of `swashplate.models.amplifier`, `swashplate.models.pump`,
             `swashplate.models.displacement_control` or `swashplate.models.refinements`.
         new : equation
             The same arguments, and behind them, by name, any of `parameters`.
@@ -294,21 +275,34 @@ class Drive(Result, Mapping[str, Parameter]):
         parameters: Sequence[str] | None = None,
         start: Start = "rest",
         **given: Unpack[Given],
-    ) -> Sensitivities:
+    ) -> Sensitivities[Simulation]:
         """Simulate with exact derivatives of any signal.
 
         Parameters
         ----------
-        parameters : sequence of str, optional
-            Symbols (``"Z16"`` stands for both directions) or columns (``"Z16_plus"``) to
-            differentiate by; by default all of card, pump and motor.
         voltage, rate, start, **given :
             As in `simulate`.
+        parameters : sequence of str, optional
+            Symbols (``"Z16"`` stands for both directions) or columns (``"Z16_plus"``) to
+            differentiate by; by default all of card, pump and motor, refinements apart.
+
+        Returns
+        -------
+        Sensitivities
+            Derivatives by signal, ``by["shaft_speed"]``, (n, k), with the columns' names and the
+            run.
+
+        Raises
+        ------
+        UnknownParameterError
+            If no parameter has a name.
+        InputError
+            As in `simulate`.
         """
-        from swashplate.drive.derivatives import sensitivities
+        from swashplate.drive.derivatives import drive_sensitivities
 
         records = drive_records("voltage", voltage, rate, **given)
-        return sensitivities(self.parameters, records, start, parameters)
+        return drive_sensitivities(self.parameters, records, start, parameters)
 
     def sensitivities_current(
         self,
@@ -318,12 +312,30 @@ class Drive(Result, Mapping[str, Parameter]):
         parameters: Sequence[str] | None = None,
         start: Start = "rest",
         **given: Unpack[Given],
-    ) -> Sensitivities:
-        """The same for pump and motor alone over a signed current. [A]"""
-        from swashplate.drive.derivatives import sensitivities
+    ) -> Sensitivities[Simulation]:
+        """The same for pump and motor alone over a signed current.
+
+        Parameters
+        ----------
+        current : (n,) array_like
+            Signed current. [A]
+        rate, parameters, start, **given :
+            As in `sensitivities`; by default all parameters of pump and motor.
+
+        Returns
+        -------
+        Sensitivities
+            As of `sensitivities`.
+
+        Raises
+        ------
+        InputError
+            As in `sensitivities`, and for a parameter of the card.
+        """
+        from swashplate.drive.derivatives import drive_sensitivities
 
         records = drive_records("current", current, rate, **given)
-        return sensitivities(self.parameters, records, start, parameters)
+        return drive_sensitivities(self.parameters, records, start, parameters)
 
     def simulate_many(
         self,
@@ -369,7 +381,7 @@ class Drive(Result, Mapping[str, Parameter]):
 
     def stepper(
         self,
-        h: float = 1.0 / SOURCE_RATE,
+        rate: float = SOURCE_RATE,
         *,
         interpolation: Interpolation = "linear",
         start: Start = "rest",
@@ -377,11 +389,29 @@ class Drive(Result, Mapping[str, Parameter]):
     ) -> Stepper[Sample]:
         """The drive one sample at a time: command in, sample out, numbers as in `simulate`.
 
-        `h` is the interval between samples [s]; other arguments as in `simulate`. Of `measured`,
-        such as ``("load_torque", "pump_speed")``, each step takes a number behind the voltage.
+        Parameters
+        ----------
+        rate : float
+            Samples a second, 10 Hz to 100 kHz. [Hz]
+        interpolation, start :
+            As in `simulate`.
+        measured : sequence of str
+            Of ``"load_torque"``, ``"pump_speed"`` and ``"supply_pressure"`` what each step takes a
+            number of, after the voltage.
+
+        Returns
+        -------
+        Stepper
+            Its ``step(voltage, *measured)`` returns a `Sample`.
+
+        Raises
+        ------
+        InputError
+            For a rate or option that there is not, and a rate at which the card's filter is
+            unstable.
         """
-        h = in_si(h, "s", "The interval")
-        return drive_stepper(self.parameters, h, interpolation, start, measured)
+        rate = in_si(rate, "Hz", "The rate")
+        return drive_stepper(self.parameters, rate, interpolation, start, measured)
 
     def compiled_step(
         self,
@@ -411,7 +441,7 @@ class Drive(Result, Mapping[str, Parameter]):
         rate = in_si(rate, "Hz", "The rate")
         check_rate(rate)
         check_filter_stability(self.parameters, 1.0 / rate)
-        instance = instance_of(self.parameters, by_voltage=True)
+        instance = drive_instance(self.parameters, by_voltage=True)
         return CompiledStep(instance, inputs, stored_of(instance.model, outputs), 1.0 / rate)
 
     def linearize(
@@ -461,7 +491,7 @@ class Drive(Result, Mapping[str, Parameter]):
             Where the gain is 0: in a dead zone, within the hysteresis, at a stop, or with a
             friction that has no presliding.
         """
-        from swashplate.linear import linearize_drive
+        from swashplate.drive.linearisation import linearize_drive
 
         at, current = in_si(at, "V", "The voltage"), in_si(current, "A", "The current")
         return linearize_drive(self.parameters, at, current, input, outputs, coulomb)
@@ -508,9 +538,18 @@ class Drive(Result, Mapping[str, Parameter]):
         DomainError
             If nothing moves at all, or the answer does not come to repeat itself.
         """
-        from swashplate.linear import sweep
+        from swashplate.drive.frequency_response import sweep_drive
 
-        return sweep(self.parameters, frequencies, amplitudes, bias, input, output, rate, tolerance)
+        return sweep_drive(
+            self.parameters,
+            frequencies,
+            amplitudes,
+            bias=bias,
+            input=input,
+            output=output,
+            rate=rate,
+            tolerance=tolerance,
+        )
 
     @overload
     def steady_speed(self, voltage: float) -> float: ...

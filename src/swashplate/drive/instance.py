@@ -18,9 +18,8 @@ from swashplate.equations.marching.run import Instance, Part
 from swashplate.equations.model import Model
 from swashplate.equations.replacement import Replacement, again, check_members, uses
 from swashplate.errors import InputError
-from swashplate.models.card import Card
-from swashplate.models.channel import CardOptions, Channel
-from swashplate.models.channel import step_limit as filter_limit
+from swashplate.models.amplifier import Card, CardOptions, Channel
+from swashplate.models.amplifier import step_limit as filter_limit
 from swashplate.models.displacement_control import Pump, PumpOptions, steep_stops
 from swashplate.models.drive import Source as CurrentSource
 from swashplate.models.drive import (
@@ -90,9 +89,9 @@ def with_equation(parameters: ParameterSet, made: Replacement) -> ParameterSet:
     own, models = (*parameters.equations, made), models_of(parameters.equations)
     if not uses(models.drive, made.old):
         raise InputError(
-            f"{plain(made.old).__name__} is no equation of the drive: swashplate.models.card, "
-            "swashplate.models.channel, swashplate.models.displacement_control, "
-            "swashplate.models.pump and swashplate.models.refinements have those."
+            f"{plain(made.old).__name__} is not an equation of the drive: those are in "
+            "swashplate.models.amplifier, swashplate.models.displacement_control, "
+            "swashplate.models.pump and swashplate.models.refinements."
         )
     if made.parameters is not None and not uses(models.pump_drive, made.old):
         raise InputError(
@@ -144,7 +143,7 @@ def pump_options(parameters: ParameterSet) -> PumpOptions:
 
 
 @lru_cache(maxsize=256)
-def instance_of(parameters: ParameterSet, by_voltage: bool) -> Instance:
+def drive_instance(parameters: ParameterSet, by_voltage: bool) -> Instance:
     """The drive behind a voltage, or the pump alone behind a signed current."""
     pump = Part(pump_of(parameters), pump_options(parameters))
     if by_voltage:

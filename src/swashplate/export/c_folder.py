@@ -14,7 +14,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.drive import RANGES, Drive, Sample, check_filter_stability, instance_of, models_of
+from swashplate.drive import (
+    RANGES,
+    Drive,
+    Sample,
+    check_filter_stability,
+    drive_instance,
+    models_of,
+)
 from swashplate.equations.fields import declared_by
 from swashplate.equations.marching.record import SOURCE_RATE, check_rate
 from swashplate.equations.marching.run import Instance
@@ -24,7 +31,7 @@ from swashplate.equations.printing_c import c_name, comment_line, filled, litera
 from swashplate.errors import FileError, InputError, InputTypeError
 from swashplate.export.c_source import Exported, interface, numbers
 from swashplate.export.variable_list import DRIVE, DRIVE_WORDS, OWN, References, Words, words_of
-from swashplate.models.card import stable_step
+from swashplate.models.amplifier import stable_step
 from swashplate.models.displacement_control import steep_stops
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
@@ -165,7 +172,7 @@ def content_of(
                 stacklevel=3,
             )
         check_filter_stability(what.parameters, step)
-        exported, instance = exported_drive(what), instance_of(what.parameters, True)
+        exported, instance = exported_drive(what), drive_instance(what.parameters, True)
         name, title, references, words = what.name, what.parameters.title, DRIVE, DRIVE_WORDS
     else:
         if not isinstance(what, Model):

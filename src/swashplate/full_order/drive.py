@@ -19,32 +19,30 @@ from swashplate.drive import (
     PATHS,
     UNITS,
     Drive,
-    Named,
     card_of,
     card_options,
     check_filter_stability,
+    drive_records,
 )
+from swashplate.equations import BoundModel, Sensitivities
 from swashplate.equations.declaration import interpreted
-from swashplate.equations.derivatives import derive
-from swashplate.equations.marching.derivatives import jacobian
-from swashplate.equations.marching.observation import every_sample
 from swashplate.equations.marching.record import (
     SOURCE_RATE,
     Interpolation,
     least_substeps,
-    record_of,
 )
 from swashplate.equations.marching.run import Instance, Part, Start
 from swashplate.equations.marching.use import Run, read_only
 from swashplate.errors import DomainError, InputError
 from swashplate.full_order.physical_set import PhysicalSet, from_lumped
+from swashplate.linear import linearize
 from swashplate.models import full_order as model
-from swashplate.models.displacement_control import Solenoids, solenoid_force
+from swashplate.models.displacement_control import Solenoids
 from swashplate.models.drive import Source
 from swashplate.models.full_order import PlantOptions, PlantSignals
 from swashplate.models.machine import Machine, fastest_rate, relief_pressures
 from swashplate.parameters.parameter_set import Change
-from swashplate.results import Result, Tabular, figures
+from swashplate.results import Named, Result, Tabular, figures
 from swashplate.tables import UNIT, Cell, Column, Table
 from swashplate.units import PLATE_RATE, SHAFT_ANGLE
 
@@ -353,15 +351,12 @@ class FullOrderDrive:
             raise InputError(f"The current is {current}, but must be a finite number of amperes.")
         step = 1.0 / SOURCE_RATE
         instance = self.instance(step, card=False)
-        motion = instance.start({"current": float(current)}, step, "steady").states[1].motion
-        force = interpreted(solenoid_force)(float(current), self.plant.solenoids)
-        options = instance.options[1]
-        derived = derive(model.free_rates, by="state", options={"options": options})
-        found = derived.python(motion, force, self.plant.machine, options)
-        matrix = np.zeros((5, 5))
-        matrix[0, 1] = matrix[3, 4] = 1.0
-        for (row, column), slope in zip(derived.entries, found[3:], strict=True):
-            matrix[(1, 2, 4)[row], column] = slope
+        at = {"current": float(current)}
+        motion = instance.start(at, step, "steady").states[1].motion
+        flowing = Instance(
+            model.flowing_plant, (Part(self.plant, instance.options[1]),), self.physical.name
+        )
+        matrix = linearize(flowing, at, None, states=(motion,), outputs=("swash_angle",)).A
         values, right = np.linalg.eig(matrix)
         parts = np.abs(np.linalg.inv(right).T * right)  # (state, mode), free of the states' units
         slow = int(np.argmin(np.abs(values)))
@@ -381,21 +376,37 @@ class FullOrderDrive:
         rate: float = SOURCE_RATE,
         *,
         parameters: Sequence[str],
-        signal: str = "shaft_speed",
         start: Start = "rest",
         substeps: int | None = None,
-    ) -> Array:
-        """(n, k) exact derivatives of a signal by parameters, those of the march's own steps.
+    ) -> Sensitivities[FullOrderSimulation]:
+        """Simulate with exact derivatives of any signal, those of the march's own steps.
 
-        Parameters are columns of physical quantities (``"swash_inertia"``, ``"swash_stop_plus"``),
-        of the solenoids (``"Z19_plus"``) and of the card (``"omega_plus"``, ``"tau"``); the signal
-        is of `swashplate.models.full_order.PlantSignals`, ``"shaft_position"`` or a current. Other
-        arguments as in `simulate`.
+        Parameters
+        ----------
+        voltage, rate, start, substeps :
+            As in `simulate`.
+        parameters : sequence of str
+            Physical quantities (``"swash_inertia"``, ``"swash_stop_plus"``), and columns of the
+            solenoids (``"Z19_plus"``) and of the card (``"omega_plus"``, ``"tau"``).
+
+        Returns
+        -------
+        Sensitivities
+            Derivatives by signal, ``by["shaft_speed"]``, (n, k), with the columns' names and the
+            run.
+
+        Raises
+        ------
+        UnknownParameterError
+            If there is no quantity or parameter of a name.
+        InputError
+            As in `simulate`.
         """
-        record = record_of(voltage, rate, what="voltage")
-        columns = [path_of(name) for name in parameters]
-        observed = every_sample(record, signal, "voltage", start)
-        return jacobian(self.instance(record.step, substeps=substeps), observed, columns).columns
+        records = drive_records("voltage", voltage, rate)
+        instance = self.instance(records["voltage"].step, substeps=substeps)
+        names = tuple(parameters)
+        bound = BoundModel(instance, paths=[path_of(name) for name in names])
+        return Sensitivities(FullOrderSimulation(instance, records, start), names, bound)
 
 
 # --- natural modes --------------------------------------------------------------------------------

@@ -21,13 +21,13 @@ from swashplate.drive import (
     PRESSURE,
     START,
     Limit,
-    Ready,
     Simulation,
     at_every_rate,
+    bound_drive,
     check_voltage,
-    made_ready,
     simulate_drive,
 )
+from swashplate.equations import BoundModel
 from swashplate.equations.marching.observation import Observation, ObservedRecord, Own
 from swashplate.equations.marching.record import (
     SLOWEST,
@@ -328,7 +328,9 @@ class DriveModel(Result, EquationModel):
             given = simulated_current(moved, self.parameters, self.starts.get(moved.name, {}))
         return "current", measured_current(experiment) if given is None else given, {}
 
-    def ready(self, values: Mapping[str, float], experiment: Experiment, asked: Asked) -> Ready:
+    def ready(
+        self, values: Mapping[str, float], experiment: Experiment, asked: Asked
+    ) -> BoundModel:
         """The drive with numbers; see `EquationModel.ready`."""
         states = {
             state: values[name]
@@ -338,7 +340,7 @@ class DriveModel(Result, EquationModel):
         }
         parameters, own = self.parameters_at(values), Own(states, asked.offsets)
         try:
-            return made_ready(parameters, asked.observed, asked.columns, own)
+            return bound_drive(parameters, asked.observed, asked.columns, own)
         except InputError as error:  # a filter that is unstable at this step
             raise DomainError(str(error)) from None
 

@@ -3,7 +3,7 @@
 The symbols are those of Kruse (2001). A directional parameter has a plus and a minus value, chosen
 by the sign of the signal it acts on; both are stored as magnitudes.
 
-A definition stands once, on the field of `swashplate.models.card.Card` or
+A definition stands once, on the field of `swashplate.models.amplifier.Card` or
 `swashplate.models.displacement_control.Pump` that holds the value.
 """
 
@@ -15,7 +15,7 @@ from typing import Literal
 from swashplate.equations.fields import Definition as Definition
 from swashplate.equations.fields import declared_by
 from swashplate.errors import ParameterError, UnknownParameterError
-from swashplate.models.card import Card
+from swashplate.models.amplifier import Card
 from swashplate.models.displacement_control import Pump
 
 Block = Literal["control_card", "pump_motor", "refinements"]

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from swashplate.equations.cache import kernel
 from swashplate.equations.declaration import JIT_OFF, inlined, interpreted
 from swashplate.errors import ParameterError
-from swashplate.models.channel import Channel, channel_level
+from swashplate.models.amplifier import Channel, channel_level
 from swashplate.models.displacement_control import (
     Pump,
     moment_sine,

@@ -1,0 +1,393 @@
+"""Many sets of numbers of one model over one input.
+
+Of each set its output, in memory or streamed to files, or only its cost.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, NamedTuple, Unpack
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from swashplate.equations import Model, instance_of, parameter_paths, state_paths
+from swashplate.equations.fields import Definition, check_mapping
+from swashplate.equations.marching.lanes import LANES, lanes_of
+from swashplate.equations.marching.march import output_of
+from swashplate.equations.marching.observation import Observation
+from swashplate.equations.marching.record import Record, Sampling
+from swashplate.equations.marching.run import Instance, outside
+from swashplate.equations.marching.use import Command, inputs_of
+from swashplate.errors import FileError, InputError
+from swashplate.executors import Executor, Threads
+from swashplate.results import Result
+from swashplate.tables import write_table
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.intp]
+Mask = NDArray[np.bool_]
+Broken = tuple[Mask, Callable[[int], str]]
+"""(m,) sets that break a rule, and the sentence for one of them."""
+
+SAMPLES_A_FILE = 2**23
+"""Samples of all sets of a file, 64 MB, unless a single block of sets has more."""
+
+
+@dataclass(frozen=True)
+class SquaredError(Result):
+    """Cost of a set: Σ weight · (output - measured)² over the record's samples."""
+
+    measured: ArrayLike
+    """(n,) what was measured, in the output's SI unit."""
+    weight: ArrayLike = 1.0
+    """(n,) or one number; samples of weight 0 do not count, whatever they are."""
+    output: str = "shaft_speed"
+    """Signal that is compared; of a drive one of `Simulation`, or ``"current_sum"``."""
+
+
+@dataclass(frozen=True, eq=False)
+class Batch(Result):
+    """Results of many sets, in the order of the sets.
+
+    A set that breaks a rule or leaves the model's domain does not stop the others: its cost is
+    infinite, its outputs are NaN, and `failures` says why.
+    """
+
+    cost: Array | None
+    """(m,) costs, None where outputs were asked for."""
+    output: Array | None
+    """(m, n) outputs, None where costs were asked for or files written."""
+    failures: dict[int, str]
+    """Why a set has no result, by its number."""
+    files: tuple[Path, ...] = ()
+    """Parquet tables of the outputs: the column ``time`` [s], and one for each set that could be
+    marched, called by its number."""
+
+
+def simulate_many(
+    model: Model,
+    p: Any,
+    changes: Mapping[str, ArrayLike],
+    inputs: Mapping[str, ArrayLike | Command],
+    rate: float,
+    *,
+    output: str = "",
+    cost: SquaredError | None = None,
+    to: str | Path | None = None,
+    options: Any = None,
+    given: Any = None,
+    executor: Executor | None = None,
+    **sampling: Unpack[Sampling],
+) -> Batch:
+    """Simulate many parameter sets of a model over one record, from rest or from given states.
+
+    Parameters
+    ----------
+    model, p, inputs, rate, options, given, **sampling :
+        As in `swashplate.equations.simulate`; `time`, `interpolation`, `substeps`.
+    changes : mapping of str to (m,) array_like
+        Values of parameters by path, one for each set; the others are those of `p`. With
+        ``start.`` before its path, a number of the state at the first sample, as `begin` of
+        `swashplate.equations.simulate`.
+    output : str
+        The signal to return; with `cost` it is not needed.
+    cost : SquaredError, optional
+        Reduce each set to one number on the fly, so that memory does not grow with the record.
+    to : path, optional
+        Empty folder that outputs are written to instead, file by file as they are ready, so that
+        memory does not grow with the number of sets: see `Batch.files`.
+    executor : Executor, optional
+        Where: by default `swashplate.executors.Threads`, one a core; or ``Processes``, ``Dask`` or
+        ``Serial``. The numbers do not depend on it. For other processes the model must stand in a
+        module, and on other machines the folder must be a common one.
+
+    Returns
+    -------
+    Batch
+        Outputs or costs in the order of the sets, and why a set has none.
+
+    Raises
+    ------
+    InputError
+        For what does not fit the model, or outputs that need more memory than there is.
+    FileError
+        If files cannot be written.
+    """
+    instance = instance_of(model, p, options=options, given=given)
+    records = inputs_of(instance, inputs, rate, **sampling)
+    values, count = set_columns(changes)
+    known = (*parameter_paths(model), *(f"start.{path}" for path in state_paths(model)))
+    for path in values:
+        if path not in known:
+            raise InputError(f"{model.name} has no parameter '{path}'; it has {', '.join(known)}.")
+    if cost is None and not output:
+        raise InputError(f"{model.name}: say which output of the sets is wanted, or give a cost.")
+    numbers = {path: np.full(count, number) for path, number in _numbers_of(instance).items()}
+    return march_sets(
+        model,
+        numbers | values,
+        records,
+        name=model.name,
+        rules=_rules(model, values),
+        groups=[OptionGroup(np.ones(count, dtype=np.bool_), instance.options)],
+        output=output,
+        cost=cost,
+        to=to,
+        executor=executor,
+    )
+
+
+def _numbers_of(instance: Instance) -> dict[str, float]:
+    """Parameters by path, and givens by ``"given "`` and their path, as `Lanes` takes them."""
+    model = instance.model
+    givens = [f"given {model.prefix(i)}{path}" for i, path in model.places("given")]
+    paths = (*parameter_paths(model), *givens)
+    return dict(zip(paths, (*instance.params, *instance.given), strict=True))
+
+
+def _rules(model: Model, values: Mapping[str, Array]) -> Iterator[Broken]:
+    """What values of a model's parameters must satisfy: their ranges, and that they are finite."""
+    taps = [(i, tap) for i, part in enumerate(model.parts) for tap in part.taps.values()]
+    delays = {f"{model.prefix(i)}{tap.delay}" for i, tap in taps if tap.delay}
+    for path, column in values.items():
+        if path in model.ranges:
+            yield _range_rule(path, model.ranges[path], column)
+        yield _size_rule(path, column, is_delay=path in delays)
+
+
+def _range_rule(path: str, definition: Definition, column: Array) -> Broken:
+    """The range of a parameter's `Definition`."""
+    return ~definition.holds(column), lambda i: f"{definition.broken(path, column[i])}."
+
+
+def _size_rule(path: str, column: Array, *, is_delay: bool) -> Broken:
+    """Numbers are finite, and delays not negative."""
+    rule = "a finite number, at least 0" if is_delay else "a finite number"
+    breaks = ~np.isfinite(column) | (is_delay & (column < 0.0))
+    return breaks, lambda i: f"{path} is {column[i]:g}, but must be {rule}."
+
+
+def set_columns(changes: Mapping[str, ArrayLike]) -> tuple[dict[str, Array], int]:
+    """Values as columns, one number a set, and how many sets there are."""
+    check_mapping("changes", changes)
+    values: dict[str, Array] = {}
+    for name, given in changes.items():
+        column = np.asarray(given)
+        if column.ndim != 1 or column.size == 0 or column.dtype.kind not in "fiub":
+            raise InputError(f"The values of {name} must be one number a set, in one row.")
+        values[name] = column.astype(np.float64)
+    sizes = {column.size for column in values.values()}
+    if len(sizes) != 1:
+        listed = ", ".join(f"{name} {column.size}" for name, column in values.items())
+        raise InputError(f"All parameters need the same number of sets, at least one: {listed}.")
+    return values, sizes.pop()
+
+
+class OptionGroup(NamedTuple):
+    """Sets with the same options, which kernels are compiled for."""
+
+    sets: Mask
+    """(m,) which sets have them."""
+    options: tuple[Any, ...]
+    """Options of each part of the model."""
+
+
+def march_sets(
+    model: Model,
+    numbers: Mapping[str, Array],
+    records: Mapping[str, Record],
+    *,
+    name: str,
+    rules: Iterable[Broken],
+    groups: Sequence[OptionGroup],
+    output: str = "",
+    cost: SquaredError | None = None,
+    to: str | Path | None = None,
+    executor: Executor | None = None,
+) -> Batch:
+    """March sets of a model's numbers over one record, wherever the executor runs them.
+
+    Parameters
+    ----------
+    model : Model
+        The model that all sets have in common.
+    numbers : mapping of str to (m,) array
+        Every parameter by path, every given by ``"given "`` and its path, and states at the first
+        sample by ``"start."`` and theirs, one number a set.
+    records : mapping of str to Record
+        External signals on the march's grid; what drives the model comes first.
+    name : str
+        Of the machine, for sentences.
+    rules : iterable of Broken
+        What the numbers must satisfy: a set that breaks one is not marched, and its failure is the
+        sentence of the first.
+    groups : sequence of OptionGroup
+        Every set with its options.
+    output, cost, to, executor :
+        As in `simulate_many`.
+
+    Raises
+    ------
+    InputError, FileError
+        As in `simulate_many`.
+    """
+    failures: dict[int, str] = {}
+    for mask, sentence in rules:
+        for i in np.flatnonzero(mask):
+            failures.setdefault(int(i), f"{name}: {sentence(int(i))}")
+    blocks: list[Block] = []
+    for group in groups:
+        members = np.setdiff1d(np.flatnonzero(group.sets), list(failures))
+        blocks += [(members[k : k + LANES], group.options) for k in range(0, members.size, LANES)]
+    sets = _Sets(
+        model=model,
+        numbers=numbers,
+        records=records,
+        output=cost.output if cost else output,
+        cost=cost,
+        to=to,
+    )
+    count = groups[0].sets.size
+    return _run(sets, blocks, count, failures, name, executor)
+
+
+# --- blocks of sets -------------------------------------------------------------------------------
+
+Block = tuple[Indices, tuple[Any, ...]]
+"""Up to LANES sets, and the options that they share: kernels are compiled for those."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Sets:
+    """Sets over one record, and what of them is wanted."""
+
+    model: Model
+    numbers: Mapping[str, Array]  # (m,) each, by path; see `Lanes`
+    records: Mapping[str, Record]  # external signals on the grid
+    output: str
+    cost: SquaredError | None
+    to: str | Path | None
+
+    @property
+    def record(self) -> Record:
+        """The first input."""
+        return next(iter(self.records.values()))
+
+    def file(self, blocks: Sequence[Block]) -> Path:
+        """Where outputs of some blocks go."""
+        return Path(self.to or "") / f"{blocks[0][0][0]:08d}.parquet"
+
+    @cached_property
+    def compared(self) -> tuple[Array, Array]:
+        """Measured values and weights on the march's grid, zero weight between the samples."""
+        # zeros that nobody writes to take no memory
+        measured, weight = np.zeros(self.record.values.size), np.zeros(self.record.values.size)
+        if self.cost is not None:
+            time, every = self.record.time, slice(None, None, self.record.substeps)
+            seen = Observation(self.cost.output, time, self.cost.measured, self.cost.weight)
+            weight[every] = seen.weight
+            measured[every] = np.where(weight[every] > 0.0, seen.values, 0.0)
+        return measured, weight
+
+
+def _march(shared: _Sets, blocks: Sequence[Block]) -> list[tuple[dict[int, float], Indices, Array]]:
+    """March blocks of sets; their outputs go into one file if into any.
+
+    Of each block the worst margins of the sets that failed, and of those that have them, costs or
+    outputs: none where these are in a file.
+    """
+    made, record, keep = [], shared.record, shared.cost is None
+    measured, weight = shared.compared
+    inputs = {name: each.values for name, each in shared.records.items()}
+    table = {"time": record.time} if shared.to is not None else {}
+    for sets, options in blocks:
+        padded, size = np.resize(sets, LANES), sets.size
+        lanes = lanes_of(shared.model, tuple(inputs), options, shared.output)
+        own = {path: values[padded] for path, values in shared.numbers.items()}
+        found = lanes(own, inputs, record.step, measured=measured, weight=weight, keep=keep)
+        worst, values = found.worst[:size], found.cost[:size]
+        good = np.isfinite(found.end[:size]) & (worst > 0.0)
+        if keep:
+            values = found.outputs[:size, :: record.substeps]
+        values[~good] = np.nan if keep else np.inf
+        if keep and shared.to is not None:
+            table |= {str(number): row for number, row in zip(sets, values, strict=True)}
+            values = values[:0]
+        failed = dict(zip(sets[~good].tolist(), worst[~good].tolist(), strict=True))
+        made.append((failed, sets[: len(values)], values))
+    if shared.to is not None:
+        import polars as pl
+
+        write_table(pl.DataFrame(table), shared.file(blocks))
+    return made
+
+
+def _run(
+    shared: _Sets,
+    blocks: Sequence[Block],
+    count: int,
+    failures: dict[int, str],
+    name: str,
+    executor: Executor | None,
+) -> Batch:
+    """March all blocks wherever the executor runs them; `name` is for messages."""
+    output_of(shared.model, shared.output)
+    driver = next(iter(shared.records))
+    samples, several, keep = shared.record.time.size, 1, shared.cost is None
+    values = None if keep else np.full(count, np.inf)
+    if shared.to is not None:
+        if not keep:
+            raise InputError(
+                "Outputs are written to files, costs are not: leave out one of to and cost."
+            )
+        _make_folder(Path(shared.to))
+        several = max(SAMPLES_A_FILE // (samples * LANES), 1)
+    elif keep:
+        values = _outputs(count, samples)
+    items = [blocks[k : k + several] for k in range(0, len(blocks), several)]
+    for _, made in (executor or Threads()).run(_march, shared, items):
+        for failed, sets, found in made:
+            for number, worst in failed.items():
+                why = f"the numbers grow beyond all bounds under this {driver}."
+                if not worst > 0.0:
+                    why = outside(shared.model, worst, driver)
+                failures[number] = f"{name}: {why}"
+            if values is not None:
+                values[sets] = found
+    files = tuple(map(shared.file, items)) if shared.to else ()
+    kept, costs = (values, None) if keep else (None, values)
+    return Batch(costs, kept, dict(sorted(failures.items())), files)
+
+
+def _outputs(count: int, samples: int) -> Array:
+    """Room for outputs in memory, refused if the machine has less."""
+    size = 8.0 * count * samples
+    try:
+        if size < float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")):
+            return np.full((count, samples), np.nan)
+    except (AttributeError, ValueError, OSError):  # not on Windows, which says so by a MemoryError
+        return np.full((count, samples), np.nan)
+    except MemoryError:
+        pass
+    raise InputError(
+        f"The outputs of {count} sets, {samples} samples each, take {size / 2**30:.3g} GiB, more "
+        "than this machine's memory: ask for a cost, or have them written to files with to=FOLDER."
+    )
+
+
+def _make_folder(folder: Path) -> None:
+    """A folder without outputs of an earlier batch."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        there = next(folder.glob("*.parquet"), None)
+    except OSError as error:
+        raise FileError(f"{folder} cannot be made: {error.strerror or error}.") from None
+    if there is not None:
+        raise FileError(
+            f"{folder} holds {there.name} already; name an empty folder for the outputs."
+        )
