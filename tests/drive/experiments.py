@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from swashplate import ParameterSet, maneuvers
-from swashplate.drive import bound_drive, wanted_columns
+from swashplate.drive import bound_drive, requested_columns
 from swashplate.equations.marching.derivatives import Jacobian, Triangle
 from swashplate.equations.marching.observation import ObservedRecord, Own
 
@@ -46,11 +46,15 @@ def jacobian(
     out: np.ndarray | None = None,
 ) -> Jacobian:
     found = bound_drive(parameters, observed, columns, own).jacobian(observed, out)
-    return found._replace(names=(*wanted_columns(tuple(columns)), *observed.own_columns))
+    return found._replace(
+        names=(*requested_columns(parameters.definitions, tuple(columns)), *observed.own_columns)
+    )
 
 
 def triangle(
     parameters: ParameterSet, observed: ObservedRecord, columns: Sequence[str], own: Own = NOTHING
 ) -> Triangle:
     found = bound_drive(parameters, observed, columns, own).triangle(observed)
-    return found._replace(names=(*wanted_columns(tuple(columns)), *observed.own_columns))
+    return found._replace(
+        names=(*requested_columns(parameters.definitions, tuple(columns)), *observed.own_columns)
+    )

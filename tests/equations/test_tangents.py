@@ -6,9 +6,9 @@ from tests.drive.experiments import ALL
 from tests.equations.tangents import marched
 
 from swashplate import Drive
-from swashplate.drive import drive_instance, path_of
+from swashplate.drive import drive_instance
 from swashplate.equations.fields import floats_of
-from swashplate.parameters import SWITCHES
+from swashplate.parameters import DEFINITIONS, SWITCHES
 
 RATE, SIZE = 512.0, 300
 COULOMB = ("C_plus", "C_minus")
@@ -45,7 +45,7 @@ def test_columns_are_those_of_tangents(name: str) -> None:
     for k, column in enumerate(found.names):
         if drive.parameters.numbers[column] == 0.0 and column in (*SWITCHES, *COULOMB):
             continue  # off, with a derivative to one side that is declared
-        index = paths.index(path_of(column))
+        index = paths.index(DEFINITIONS.path_of(column))
         # the gauge Z2 moves the state at rest and all that follows, which cancel but for 0.4 %
         size = max(np.abs(slopes[:, index]).max(), np.abs(alone[:, index]).max())
         assert np.abs(columns[:, k] - slopes[:, index]).max() <= 1e-12 * size, column

@@ -15,7 +15,6 @@ from swashplate.drive import Drive, Given, Limit, Simulation, simulate_drive
 from swashplate.equations.marching.record import SOURCE_RATE
 from swashplate.equations.marching.run import Start
 from swashplate.errors import DomainError, ParameterError, SwashplateError
-from swashplate.parameters.definitions import columns_of
 from swashplate.parameters.parameter_set import Change
 from swashplate.results import Result, Tabular, figures
 from swashplate.tables import Column, Table, listed, quantity, share_cell
@@ -55,7 +54,7 @@ def removals(drive: Drive) -> list[Removal]:
 
     The plussing, which no force limits, because the creep that it makes is an error, too.
     """
-    numbers = drive.parameters.numbers
+    numbers, definitions = drive.parameters.numbers, drive.parameters.definitions
     # with the card's jump left as it is, a solenoid's dead zone beyond it would stay
     jump = min(numbers["Z17"], numbers["J_plus"], numbers["J_minus"])
     plate = farthest_stop(drive)
@@ -80,7 +79,7 @@ def removals(drive: Drive) -> list[Removal]:
 
     def altered(changes: dict[str, Change]) -> dict[str, Change]:
         pairs = changes.items()
-        return {k: v for k, v in pairs if any(numbers[c] != v for c in columns_of([k]))}
+        return {k: v for k, v in pairs if any(numbers[c] != v for c in definitions.columns_of([k]))}
 
     made = [replace(each, changes=altered(each.changes)) for each in known]
     return [each for each in made if each.changes]

@@ -22,7 +22,7 @@ from swashplate.analysis.outcomes import trial as trial_of
 from swashplate.drive import Drive, Simulation
 from swashplate.errors import DomainError, InputError, ParameterError
 from swashplate.maneuvers import Maneuver
-from swashplate.parameters.definitions import CATALOGUE, COLUMNS, REFINEMENTS, columns_of
+from swashplate.parameters.definitions import CATALOGUE, COLUMNS, REFINEMENTS
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.results import GivenAxes, Result, figures
 from swashplate.tables import UNIT, Column, Table, listed, quantity
@@ -148,7 +148,7 @@ def pulled(drive: Drive, factors: Mapping[str, float]) -> Drive:
         if not factor >= 0.0:
             raise InputError(f"The factor on {name} is {factor:g}, but must be 0 or more.")
         for symbol, power in powers.items():
-            for column in columns_of([symbol]):
+            for column in drive.parameters.definitions.columns_of([symbol]):
                 if column not in numbers:
                     raise InputError(f"{column} has no value here that a factor could change.")
                 moved[column] = moved.get(column, numbers[column]) * factor**power

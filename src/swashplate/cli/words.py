@@ -188,13 +188,15 @@ def assigned(
 def drive_of(word: str, values: Sequence[str] = (), factors: Sequence[str] = ()) -> Drive:
     """The drive of a name or file, with values set and then scaled, by parameter or by lever."""
     from swashplate.drive import Drive
-    from swashplate.parameters.definitions import find
+
+    drive = Drive(parameters_of(word))
+    definitions = drive.parameters.definitions
 
     def valued(name: str) -> Any:
         if _is_lever(name):
             words = f"{name} is a lever, which has no value of its own: --scale {name}=1.5."
             raise InputError(words)
-        return find(name)
+        return definitions.find(name)
 
     set_as = "Z16=1.2e-4, Z16=1.2e-4/1.5e-4 (plus/minus) or Z16_plus=0.12mm"
     scaled_as = "Z16=1.5, Z16=1.5/1.2 (plus/minus) or orifice=1.5"
@@ -203,7 +205,7 @@ def drive_of(word: str, values: Sequence[str] = (), factors: Sequence[str] = ())
 
     def scalable(name: str) -> Any:
         try:
-            return find(name)
+            return definitions.find(name)
         except UnknownParameterError:
             from swashplate.analysis.whatif import find_lever
 
@@ -211,7 +213,7 @@ def drive_of(word: str, values: Sequence[str] = (), factors: Sequence[str] = ())
 
     chosen = assigned("--set", values, set_as, valued, units=True)
     levers = assigned("--scale", pulling, scaled_as, str, (1,))
-    drive = Drive(parameters_of(word)).replace(**chosen)
+    drive = drive.replace(**chosen)
     drive = drive.scale(**assigned("--scale", scaling, scaled_as, scalable))
     if levers:
         from swashplate.analysis.whatif import pulled

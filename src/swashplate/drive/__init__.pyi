@@ -1,11 +1,10 @@
 from .derivatives import ALL_COLUMNS as ALL_COLUMNS
 from .derivatives import PUMP_COLUMNS as PUMP_COLUMNS
 from .derivatives import bound_drive as bound_drive
-from .derivatives import wanted_columns as wanted_columns
+from .derivatives import requested_columns as requested_columns
 from .drive import Drive as Drive
 from .equilibrium import OperatingPoint as OperatingPoint
 from .frequency_response import response_table as response_table
-from .instance import PATHS as PATHS
 from .instance import PRESSURE as PRESSURE
 from .instance import START as START
 from .instance import at_every_rate as at_every_rate
@@ -14,7 +13,6 @@ from .instance import card_options as card_options
 from .instance import check_filter_stability as check_filter_stability
 from .instance import drive_instance as drive_instance
 from .instance import models_of as models_of
-from .instance import path_of as path_of
 from .instance import pump_of as pump_of
 from .instance import step_limit as step_limit
 from .linear_drive import LinearDrive as LinearDrive

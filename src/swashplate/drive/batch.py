@@ -12,7 +12,6 @@ from swashplate.batch import Batch, OptionGroup, SquaredError, march_sets, set_c
 from swashplate.drive.instance import (
     card_options,
     models_of,
-    path_of,
     pump_options,
     unstable_filters,
 )
@@ -22,7 +21,7 @@ from swashplate.equations.library import TAN_22_5
 from swashplate.equations.marching.record import Record
 from swashplate.errors import InputError
 from swashplate.executors import Executor
-from swashplate.parameters.definitions import SWITCHES, columns_of, find
+from swashplate.parameters.definitions import SWITCHES
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import broken_rules
 from swashplate.units import in_si
@@ -41,13 +40,14 @@ def simulate_drives(
 ) -> Batch:
     """March many sets over one record; see `Drive.simulate_many`."""
     check_mapping("changes", changes)
+    definitions = parameters.definitions
     given, count = set_columns(
-        {name: in_si(values, find(name).unit, name) for name, values in changes.items()}
+        {name: in_si(values, definitions.find(name).unit, name) for name, values in changes.items()}
     )
     numbers = {name: np.full(count, value) for name, value in parameters.numbers.items()}
     changed: set[str] = set()
     for name, values in given.items():
-        for column in columns_of([name]):
+        for column in definitions.columns_of([name]):
             if column in changed:
                 raise InputError(f"{column} is given twice.")
             changed.add(column)
@@ -55,12 +55,12 @@ def simulate_drives(
     check_output(cost.output if cost else output)
     driver, record = next(iter(records.items()))
     by_voltage, models = driver == "voltage", models_of(parameters.equations)
-    rules = [*broken_rules(numbers)]
+    rules = [*broken_rules(numbers, definitions)]
     if by_voltage:
         rules += unstable_filters(numbers, record.step, parameters.rate is None)
     return march_sets(
         models.drive if by_voltage else models.pump_drive,
-        {path_of(column): values for column, values in numbers.items()},
+        {definitions.path_of(column): values for column, values in numbers.items()},
         records,
         name=parameters.name,
         rules=rules,

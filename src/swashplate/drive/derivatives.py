@@ -7,12 +7,10 @@ from dataclasses import replace
 from functools import lru_cache
 
 from swashplate.drive.instance import (
-    PATHS,
     PRESSURE,
     START,
     check_filter_stability,
     drive_instance,
-    path_of,
 )
 from swashplate.drive.march import start_states
 from swashplate.drive.signals import check_output
@@ -23,28 +21,28 @@ from swashplate.equations.marching.record import Record
 from swashplate.equations.marching.run import Start
 from swashplate.equations.marching.sensitivity import Sensitivities
 from swashplate.errors import InputError
-from swashplate.parameters.definitions import SWITCHES, columns_of
+from swashplate.parameters.definitions import DEFINITIONS, SWITCHES, Definitions
 from swashplate.parameters.parameter_set import ParameterSet
 
 CURRENTS = ("current", "current_sum", "current_positive", "current_negative")
 
 
 @lru_cache(maxsize=256)
-def wanted_columns(columns: tuple[str, ...]) -> tuple[str, ...]:
-    """Columns that are asked for, symbols taken apart; refused where one is asked for twice."""
-    names: list[str] = []
-    for name in columns:
-        for each in [name] if name.startswith(START) else columns_of([name]):
-            if each in names:
-                raise InputError(f"{each} is asked for twice.")
-            names.append(each)
-    return tuple(names)
+def requested_columns(definitions: Definitions, names: tuple[str, ...]) -> tuple[str, ...]:
+    """Columns that names stand for, symbols taken apart; refused if one is asked for twice."""
+    columns: list[str] = []
+    for name in names:
+        for column in [name] if name.startswith(START) else definitions.columns_of([name]):
+            if column in columns:
+                raise InputError(f"{column} is asked for twice.")
+            columns.append(column)
+    return tuple(columns)
 
 
 @lru_cache(maxsize=256)
-def _paths(names: tuple[str, ...]) -> list[str]:
-    """Path in the model of each column."""
-    return [path_of(name) for name in names]
+def _paths(definitions: Definitions, columns: tuple[str, ...]) -> list[str]:
+    """Path in the model of each column; a state at the start is its own."""
+    return [name if name.startswith(START) else definitions.path_of(name) for name in columns]
 
 
 def bound_drive(
@@ -58,7 +56,8 @@ def bound_drive(
     These are symbols (``"Z16"`` stands for both directions), columns (``"Z16_plus"``) and states
     at the first sample whose values are among the starts of `own`, ``"start.pump.pressure"``. [Pa]
     """
-    names = wanted_columns(tuple(columns))
+    definitions = parameters.definitions
+    names = requested_columns(definitions, tuple(columns))
     by_voltage = observed.driven_by == "voltage"
     for each in observed.observations:
         check_output(each.signal)
@@ -80,7 +79,7 @@ def bound_drive(
         "start.card.minus": True,
     }
     moved |= {"card": moved["card.plus"] or moved["card.minus"], "start.pump": moved["pump"]}
-    paths = _paths(names)
+    paths = _paths(definitions, names)
     return BoundModel(
         instance,
         own._replace(start=start),
@@ -99,12 +98,12 @@ def _switched_on(parameters: ParameterSet, asked: frozenset[str]) -> ParameterSe
 
 # --- over a whole run -----------------------------------------------------------------------------
 
-PUMP_COLUMNS = tuple(name for name, path in PATHS.items() if path.startswith("pump.Z"))
+PUMP_COLUMNS = tuple(name for name, path in DEFINITIONS.paths.items() if path.startswith("pump.Z"))
 """Columns of the pump and motor of Kruse (2001)."""
 ALL_COLUMNS = (
     *PUMP_COLUMNS,
-    *(name for name in PATHS if name.endswith("_plus") and name not in PUMP_COLUMNS),
-    *(name for name in PATHS if name.endswith("_minus") and name not in PUMP_COLUMNS),
+    *(name for name in DEFINITIONS.paths if name.endswith("_plus") and name not in PUMP_COLUMNS),
+    *(name for name in DEFINITIONS.paths if name.endswith("_minus") and name not in PUMP_COLUMNS),
     "tau",
 )
 """Columns of card, pump and motor, refinements apart, in their order."""
@@ -117,17 +116,17 @@ def drive_sensitivities(
     names: Sequence[str] | None,
 ) -> Sensitivities[Simulation]:
     """Derivatives by some columns; see `Drive.sensitivities` and `Drive.sensitivities_current`."""
-    by_voltage = "voltage" in records
+    by_voltage, definitions = "voltage" in records, parameters.definitions
     columns = ALL_COLUMNS if by_voltage else PUMP_COLUMNS
     if names is not None:
         if isinstance(names, str) or not names:
             raise InputError("Name at least one parameter to differentiate by, in a list.")
-        columns = tuple(columns_of(list(names)))
-    foreign = [] if by_voltage else [n for n in columns if path_of(n).startswith("card.")]
-    if foreign:
-        raise InputError(
-            f"{foreign[0]} belongs to the card, which a given current does not go through."
-        )
+        columns = tuple(definitions.columns_of(names))
+    for column in columns:
+        if not by_voltage and definitions.path_of(column).startswith("card."):
+            raise InputError(
+                f"{column} belongs to the card, which a given current does not go through."
+            )
     (driver, record), *others = records.items()
     beside = {name: each.values for name, each in others}
     observed = every_sample(record, "shaft_speed", driver, start, beside)

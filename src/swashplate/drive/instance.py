@@ -1,4 +1,4 @@
-"""From a parameter set to a model with numbers: options, columns and paths, the filter's limit."""
+"""From a parameter set to a model with numbers: its options, and the limit of its filter."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.equations.declaration import interpreted
-from swashplate.equations.fields import declared_by
 from swashplate.equations.language import plain
 from swashplate.equations.marching.run import Instance, Part
 from swashplate.equations.model import Model
@@ -30,7 +29,6 @@ from swashplate.models.drive import (
     settled_drive,
 )
 from swashplate.models.pump import searched_pressure, settled_pressure
-from swashplate.parameters.definitions import OWN
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import SIDES, Broken, Rule, applied
 
@@ -40,24 +38,10 @@ MOST_SUBSTEPS = 1000
 """Steps a sample that anyone would wait for."""
 
 
-PATHS = {
-    column: f"{part}.{path}"
-    for part, kind in (("pump", Pump), ("card", Card))
-    for each in declared_by(kind)
-    for column, path in zip(each.columns, each.fields, strict=True)
-}
-"""Path in the model of every column such as ``Z16_plus``."""
 START = "start."
 """What the column of a number of the state at the first sample begins with, before its path."""
 PRESSURE = "pump.pressure"
 """Path of δP; at the first sample the column ``start.pump.pressure``."""
-
-
-def path_of(column: str) -> str:
-    """Path in the model of a column; a state at the start is its own."""
-    if column in OWN:  # of an equation of one's own
-        return f"pump.{column}"
-    return column if column.startswith(START) else PATHS[column]
 
 
 class Models(NamedTuple):

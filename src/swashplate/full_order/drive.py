@@ -16,7 +16,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from swashplate import maneuvers
 from swashplate.drive import (
-    PATHS,
     UNITS,
     Drive,
     card_of,
@@ -34,13 +33,14 @@ from swashplate.equations.marching.record import (
 from swashplate.equations.marching.run import Instance, Part, Start
 from swashplate.equations.marching.use import Run, read_only
 from swashplate.errors import DomainError, InputError
-from swashplate.full_order.physical_set import PhysicalSet, from_lumped
+from swashplate.full_order.physical_set import QUANTITIES, PhysicalSet, from_lumped
 from swashplate.linear import linearize
 from swashplate.models import full_order as model
 from swashplate.models.displacement_control import Solenoids
 from swashplate.models.drive import Source
 from swashplate.models.full_order import PlantOptions, PlantSignals
-from swashplate.models.machine import Machine, fastest_rate, relief_pressures
+from swashplate.models.machine import fastest_rate, relief_pressures
+from swashplate.parameters.definitions import CATALOGUE, DEFINITIONS, Definition, Definitions
 from swashplate.parameters.parameter_set import Change
 from swashplate.results import Named, Result, Tabular, figures
 from swashplate.tables import UNIT, Cell, Column, Table
@@ -62,18 +62,25 @@ LEAST_SUBSTEPS = 8  # Sub-steps a sample that kinks of the flow, at the orifices
 MOST_SUBSTEPS = 20_000  # Sub-steps a sample, beyond which the machine is too stiff for the march.
 
 
-def path_of(name: str) -> str:
-    """Path in the model of a quantity, or of a parameter of card or solenoids, by its column."""
-    if name in Machine._fields:
-        return f"plant.machine.{name}"
-    if name in Solenoids._fields:
-        return f"plant.solenoids.{name}"
-    if PATHS.get(name, "").startswith("card."):
-        return PATHS[name]
-    raise InputError(
-        f"A drive with five states has no parameter '{name}'; it has those of the card, "
-        f"{', '.join((*Solenoids._fields, *Machine._fields))}."
-    )
+def _definitions() -> Definitions:
+    """Parameters of the drive with five states: the card's, the solenoids', the machine's."""
+    by_symbol, paths = dict[str, Definition](), dict[str, str]()
+    for symbol, definition in CATALOGUE.items():
+        if definition.block == "control_card":
+            by_symbol[symbol] = definition
+            paths |= {column: DEFINITIONS.paths[column] for column in definition.columns}
+        elif set(definition.columns) <= set(Solenoids._fields):
+            by_symbol[symbol] = definition
+            paths |= {column: f"plant.solenoids.{column}" for column in definition.columns}
+    for symbol, definition in QUANTITIES.items():
+        by_symbol[symbol] = definition
+        columns = zip(definition.columns, definition.fields, strict=True)
+        paths |= {column: f"plant.machine.{path}" for column, path in columns}
+    return Definitions(by_symbol, paths)
+
+
+FULL_ORDER_DEFINITIONS = _definitions()
+"""What a drive with five states can be differentiated by."""
 
 
 class FullOrderSimulation(Run, Tabular):
@@ -386,8 +393,9 @@ class FullOrderDrive:
         voltage, rate, start, substeps :
             As in `simulate`.
         parameters : sequence of str
-            Physical quantities (``"swash_inertia"``, ``"swash_stop_plus"``), and columns of the
-            solenoids (``"Z19_plus"``) and of the card (``"omega_plus"``, ``"tau"``).
+            Symbols (``"Z19"`` stands for both directions) or columns (``"Z19_plus"``): of physical
+            quantities (``"swash_inertia"``), of the solenoids, and of the card (``"omega"``,
+            ``"tau"``).
 
         Returns
         -------
@@ -404,8 +412,9 @@ class FullOrderDrive:
         """
         records = drive_records("voltage", voltage, rate)
         instance = self.instance(records["voltage"].step, substeps=substeps)
-        names = tuple(parameters)
-        bound = BoundModel(instance, paths=[path_of(name) for name in names])
+        names = tuple(FULL_ORDER_DEFINITIONS.columns_of(parameters))
+        paths = [FULL_ORDER_DEFINITIONS.path_of(name) for name in names]
+        bound = BoundModel(instance, paths=paths)
         return Sensitivities(FullOrderSimulation(instance, records, start), names, bound)
 
 

@@ -42,7 +42,6 @@ from swashplate.identification.model import Asked, EquationModel
 from swashplate.identification.problem import Problem
 from swashplate.identification.setup import Forces
 from swashplate.identification.unknowns import Prior, Unknown, Unknowns, zero_name
-from swashplate.parameters.definitions import is_column
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.results import Result
 
@@ -350,7 +349,7 @@ class DriveModel(Result, EquationModel):
             return self.forces.slopes(name)
         if states := self._states_started_by(name):
             return {f"{START}{state}": 1.0 for state in states}
-        return {name: 1.0} if is_column(name) else {}
+        return {name: 1.0} if name in self.parameters.definitions.columns else {}
 
     def _states_started_by(self, name: str) -> list[str]:
         """Paths of the states that a pressure or a current at the first sample sets.
@@ -372,13 +371,15 @@ class DriveModel(Result, EquationModel):
     def parameters_at(self, values: Mapping[str, float]) -> ParameterSet:
         """The set for some values of the unknowns; a `DomainError` if one breaks a rule."""
         forces = () if self.forces is None else self.forces.names
-        return _at(self, tuple((n, v) for n, v in values.items() if is_column(n) or n in forces))
+        known = {*self.parameters.definitions.columns, *forces}
+        return _at(self, tuple((name, value) for name, value in values.items() if name in known))
 
 
 @lru_cache(maxsize=8)
 def _at(model: DriveModel, values: tuple[tuple[str, float], ...]) -> ParameterSet:
     """The set with values; runs of one evaluation share it, as checking its rules takes a while."""
-    changes = {name: value for name, value in values if is_column(name)}
+    columns = model.parameters.definitions.columns
+    changes = {name: value for name, value in values if name in columns}
     if model.forces is not None:
         changes |= model.forces.coefficients(dict(values), model.parameters)
     try:
