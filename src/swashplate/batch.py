@@ -59,9 +59,9 @@ class Batch(Result):
     """
 
     cost: Array | None
-    """(m,) costs, None where outputs were asked for."""
+    """(m,) costs, None if outputs were asked for."""
     output: Array | None
-    """(m, n) outputs, None where costs were asked for or files written."""
+    """(m, n) outputs, None if costs were asked for or files written."""
     failures: dict[int, str]
     """Why a set has no result, by its number."""
     files: tuple[Path, ...] = ()

@@ -9,7 +9,7 @@ import pytest
 
 from swashplate import DomainError, Drive, InputError
 from swashplate.drive import drive_instance
-from swashplate.equations import instance_of as instance_of_model
+from swashplate.equations import instance_of
 from swashplate.equations.declaration import equation
 from swashplate.equations.marching.part import Stored
 from swashplate.equations.marching.run import Instance, Part, marched
@@ -167,7 +167,7 @@ def table(rates: Callable[..., Table], lag: float, outputs: tuple[str, ...]) -> 
     model = Model("table", parameters=Lag, state=Table, step=discretised(rates, "euler"))
     states = (Table(0.0, 0.0),)
     return linearize(
-        instance_of_model(model, Lag(lag)), {"command": 0.0}, RATE, states=states, outputs=outputs
+        instance_of(model, Lag(lag)), {"command": 0.0}, RATE, states=states, outputs=outputs
     )
 
 

@@ -93,7 +93,7 @@ class Drive(Result, Mapping[str, Parameter]):
         Raises
         ------
         FileError
-            If there is no such file, or the folder holds no drive.
+            If there is no such file, or the folder does not hold a drive.
         ParameterError
             If an entry is wrong; the sentence names file, parameter and rule.
         """
@@ -162,7 +162,7 @@ class Drive(Result, Mapping[str, Parameter]):
     def with_equation(
         self, old: Equation, new: Equation, parameters: type[NamedTuple] | None = None
     ) -> Drive:
-        """A drive with an equation of one's own in the place of one of the card's or the pump's.
+        """A drive with a user-defined equation in the place of one of the card's or the pump's.
 
         Parameters
         ----------
@@ -170,7 +170,7 @@ class Drive(Result, Mapping[str, Parameter]):
             Of `swashplate.models.amplifier`, `swashplate.models.pump`,
             `swashplate.models.displacement_control` or `swashplate.models.refinements`.
         new : equation
-            The same arguments, and behind them, by name, any of `parameters`.
+            The same arguments, and after them, by name, any of `parameters`.
         parameters : class of named tuples, optional
             What the equation brings along, each a float with its `Definition` and a default. They
             are parameters of the drive from then on: ``drive.replace(seal_drag=1e-5)``, a fit's
@@ -202,9 +202,12 @@ class Drive(Result, Mapping[str, Parameter]):
         """The drive with a card's filter that means the same at every rate.
 
         Kruse's filter is a recursion at 512 Hz (`ParameterSet.rate`): marched at another rate
-        it is another filter. In its place comes the differential equation with the same poles;
-        where there is none, since the recursion changes its sign from sample to sample, an
-        `InputError`.
+        it is another filter. In its place comes the differential equation with the same poles.
+
+        Raises
+        ------
+        InputError
+            If there is none, because the recursion changes its sign from sample to sample.
         """
         return Drive(at_every_rate(self.parameters))
 
@@ -263,7 +266,25 @@ class Drive(Result, Mapping[str, Parameter]):
         start: Start = "rest",
         **given: Unpack[Given],
     ) -> Simulation:
-        """Simulate pump and motor alone over a signed current [A]; arguments as `simulate`."""
+        """Simulate pump and motor alone over a signed current.
+
+        Parameters
+        ----------
+        current : (n,) array_like
+            Signed current. [A]
+        rate, start, **given :
+            As in `simulate`.
+
+        Returns
+        -------
+        Simulation
+            Of which `Simulation.voltage` is None.
+
+        Raises
+        ------
+        InputError, DomainError
+            As in `simulate`.
+        """
         records = drive_records("current", current, rate, **given)
         return simulate_drive(self.parameters, records, start)
 
@@ -365,8 +386,15 @@ class Drive(Result, Mapping[str, Parameter]):
         cost, to, executor :
             As in `swashplate.simulate_many`.
 
+        Returns
+        -------
+        Batch
+            (m,) costs or (m, n) outputs in the order of the sets, and why a set has none.
+
         Raises
         ------
+        UnknownParameterError
+            If no parameter has a name.
         InputError, FileError
             As in `swashplate.simulate_many`.
         """
@@ -433,6 +461,11 @@ class Drive(Result, Mapping[str, Parameter]):
         rate : float
             Steps a second, without steps between; 512 or more are the march's own. [Hz]
 
+        Returns
+        -------
+        CompiledStep
+            Its ``step(machine)`` advances one sample inside a compiled kernel.
+
         Raises
         ------
         InputError
@@ -466,7 +499,7 @@ class Drive(Result, Mapping[str, Parameter]):
             Where, one of the two: a constant voltage [V], or a constant signed current [A].
         input : str or sequence of str, optional
             What moves the model: ``"voltage"``, ``"current"``, ``"solenoid_force"``; by default the
-            voltage, or the current where one is given. With another than the voltage it is the pump
+            voltage, or the current if one is given. With another than the voltage it is the pump
             and motor alone. Behind a command, or by themselves, ``"load_torque"``,
             ``"pump_speed"`` and ``"supply_pressure"``, which move about the drive's parameters.
         outputs : sequence of str
@@ -556,10 +589,25 @@ class Drive(Result, Mapping[str, Parameter]):
     @overload
     def steady_speed(self, voltage: Sequence[float] | Array) -> Array: ...
     def steady_speed(self, voltage: float | Sequence[float] | Array) -> float | Array:
-        """Speed that the drive settles at under constant commands [V → rad/s].
+        """Speed that the drive settles at under constant commands.
 
         With refinements it is the mean of a turn, in the middle of what friction and hysteresis
         leave open, under the load.
+
+        Parameters
+        ----------
+        voltage : float or array_like of any shape
+            Constant commands within ±10 V. [V]
+
+        Returns
+        -------
+        float or array of the same shape
+            Shaft speeds. [rad/s]
+
+        Raises
+        ------
+        InputError
+            For a command that is not finite or beyond ±10 V.
         """
         return self._steady(voltage)[1]
 
@@ -568,7 +616,23 @@ class Drive(Result, Mapping[str, Parameter]):
     @overload
     def steady_current(self, voltage: Sequence[float] | Array) -> Array: ...
     def steady_current(self, voltage: float | Sequence[float] | Array) -> float | Array:
-        """Signed current that the card settles at under constant commands [V → A]."""
+        """Signed current that the card settles at under constant commands.
+
+        Parameters
+        ----------
+        voltage : float or array_like of any shape
+            Constant commands within ±10 V. [V]
+
+        Returns
+        -------
+        float or array of the same shape
+            Signed currents. [A]
+
+        Raises
+        ------
+        InputError
+            For a command that is not finite or beyond ±10 V.
+        """
         return self._steady(voltage)[0]
 
     def _steady(self, voltage: float | Sequence[float] | Array) -> tuple[float | Array, ...]:

@@ -49,7 +49,7 @@ class OperatingPoint:
     """A steady state; signs as everywhere: positive goes with more speed."""
 
     voltage: float | None
-    """None where a current was given. [V]"""
+    """None if a current was given. [V]"""
     current: float
     """Signed. [A]"""
     solenoid_force: float
@@ -74,10 +74,23 @@ def operating_point(
 ) -> OperatingPoint:
     """Steady state at which small motions of an input, one of `INPUTS`, have an answer.
 
-    Given by either of voltage [V] and current [A]. Refused is where nothing moves: in a dead zone,
-    within the solenoids' hysteresis, at a stop of the swash plate, at the relief pressure, behind a
-    saturated orifice, in the grip of a friction without presliding; or where the solenoid
-    overpowers the feedback spring.
+    Parameters
+    ----------
+    parameters : ParameterSet
+        The drive.
+    input : str
+        What is to move.
+    voltage, current : float, optional
+        One of the two: a constant voltage [V], or a constant signed current [A].
+
+    Raises
+    ------
+    InputError
+        If not exactly one of voltage and current is given, or it is out of range.
+    DomainError
+        If nothing moves: in a dead zone, within the solenoids' hysteresis, at a stop of the swash
+        plate, at the relief pressure, after a saturated orifice, in the grip of a friction without
+        presliding; or if the solenoid overpowers the feedback spring.
     """
     name, given = parameters.name, current if voltage is None else voltage
     if given is None or (voltage is not None and current is not None):

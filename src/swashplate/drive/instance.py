@@ -45,7 +45,7 @@ PRESSURE = "pump.pressure"
 
 
 class Models(NamedTuple):
-    """The drive's models: behind a voltage and a current, in samples and in time, and settled."""
+    """The drive's models: driven by a voltage or a current, in samples or in time, and settled."""
 
     drive: Model
     pump_drive: Model
@@ -67,7 +67,7 @@ def models_of(equations: tuple[Replacement, ...]) -> Models:
 
 
 def with_equation(parameters: ParameterSet, made: Replacement) -> ParameterSet:
-    """The set with an equation of one's own; see `Drive.with_equation`."""
+    """The set with a user-defined equation; see `Drive.with_equation`."""
     members = made._asdict()
     check_members(members, {what: repr(member) for what, member in members.items()})
     own, models = (*parameters.equations, made), models_of(parameters.equations)
@@ -128,7 +128,15 @@ def pump_options(parameters: ParameterSet) -> PumpOptions:
 
 @lru_cache(maxsize=256)
 def drive_instance(parameters: ParameterSet, by_voltage: bool) -> Instance:
-    """The drive behind a voltage, or the pump alone behind a signed current."""
+    """A parameter set as a model with numbers.
+
+    Parameters
+    ----------
+    parameters : ParameterSet
+        The drive.
+    by_voltage : bool
+        Whether a voltage drives the card, or a signed current the pump alone.
+    """
     pump = Part(pump_of(parameters), pump_options(parameters))
     if by_voltage:
         card = Part(card_of(parameters), card_options(parameters))

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from enum import IntFlag
 from functools import cached_property
 from math import inf
-from typing import TYPE_CHECKING, Literal, cast, overload
+from typing import TYPE_CHECKING, Literal, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,13 +14,12 @@ from swashplate.drive.signals import KEPT, MOTOR, SIGNALS, UNITS
 from swashplate.equations.marching.use import Run, read_only
 from swashplate.errors import InputError
 from swashplate.models.displacement_control import Pump
-from swashplate.results import GivenAxes, Named, figures
+from swashplate.results import Named, figures
 from swashplate.tables import UNIT, Column, Table, share_cell
 from swashplate.units import SHAFT_ANGLE, display_unit
 
 if TYPE_CHECKING:
     import polars
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
@@ -71,12 +69,13 @@ class Simulation(Run):
     """
 
     kept = KEPT
+    shown = ("shaft_speed",)
 
     limit_names = tuple(str(each.name).lower() for each in Limit)
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """The signals that it has: `SIGNALS`, with refinements the motor's, behind ``"time"``."""
+        """The signals that it has: `SIGNALS`, with refinements the motor's, after ``"time"``."""
         there = SIGNALS if self.driven_by == "voltage" else SIGNALS[1:]
         known = 2 if self.pump.motor_constant > 0.0 else 1 if self.refined else 0
         return ("time", *there, *tuple(MOTOR)[:known])
@@ -97,7 +96,7 @@ class Simulation(Run):
 
     @property
     def voltage(self) -> Array | None:
-        """Command, None where a current was given instead. [V]"""
+        """Command, None if a current was given instead. [V]"""
         return self["voltage"] if self.driven_by == "voltage" else None
 
     current_positive = Named()
@@ -123,12 +122,12 @@ class Simulation(Run):
 
     @property
     def motor_torque(self) -> Array:
-        """Torque that the motor bears, positive where it drives towards positive speed. [N m]"""
+        """Torque that the motor bears, positive if it drives towards positive speed. [N m]"""
         return self.sampled(self.fine("motor_torque"))
 
     @property
     def motor_pressure_drop(self) -> Array | None:
-        """P_hi - P_lo over the motor, None where no motor_constant is given. [Pa]"""
+        """P_hi - P_lo over the motor, None if no motor_constant is given. [Pa]"""
         return self["motor_pressure_drop"] if self.pump.motor_constant > 0.0 else None
 
     @cached_property
@@ -210,66 +209,8 @@ class Simulation(Run):
             raise InputError(f"units is {units!r}; it is 'SI' or 'display'.")
         return frame.select(map(_displayed, frame.iter_columns()))
 
-    @overload
-    def plot(
-        self,
-        signals: str | Sequence[str] = (),
-        *,
-        ax: None = None,
-        label: str = "",
-        window: tuple[float, float] | None = None,
-        title: str | None = None,
-    ) -> Figure: ...
-
-    @overload
-    def plot(
-        self,
-        signals: str | Sequence[str] = (),
-        *,
-        ax: GivenAxes,
-        label: str = "",
-        window: tuple[float, float] | None = None,
-        title: str | None = None,
-    ) -> GivenAxes: ...
-
-    def plot(
-        self,
-        signals: str | Sequence[str] = (),
-        *,
-        ax: Axes | Sequence[Axes] | None = None,
-        label: str = "",
-        window: tuple[float, float] | None = None,
-        title: str | None = None,
-    ) -> Figure | Axes | Sequence[Axes]:
-        """Figure of the chain with its active limits shaded, or of some signals alone.
-
-        Parameters
-        ----------
-        signals : str or sequence of str
-            Names as of `names`, a panel each; by default the chain.
-        ax : matplotlib axes or sequence of them, optional
-            Where to draw the signals, one for each; the shaft's speed if none is named.
-        label : str
-            Of the curves: each panel gets a legend of all labelled curves in it.
-        window : (float, float), optional
-            First and last instant to show. [s]
-        title : str, optional
-            In the place of the drive's name; axes that are given have none by default.
-
-        Returns
-        -------
-        Figure, or `ax` as it was given
-
-        Raises
-        ------
-        InputError
-            For a signal that there is not, another number of axes, or a window with fewer than two
-            samples.
-        """
-        if not signals and ax is None:
-            draw = figures().plot_simulation
-            return cast("Figure", draw(self, window=window, title=title))
-        draw = figures().plot_signals
-        chosen = (signals,) if isinstance(signals, str) else tuple(signals)
-        chosen = chosen or ("shaft_speed",)
-        return cast("Figure", draw(self, chosen, ax=ax, label=label, window=window, title=title))
+    def _overview(
+        self, *, label: str, window: tuple[float, float] | None, title: str | None
+    ) -> Figure:
+        """Figure of the chain with its active limits shaded."""
+        return cast("Figure", figures().plot_simulation(self, window=window, title=title))

@@ -22,10 +22,10 @@ from swashplate.drive import (
     drive_instance,
     models_of,
 )
+from swashplate.equations import instance_of
 from swashplate.equations.fields import declared_by
 from swashplate.equations.marching.record import SOURCE_RATE, check_rate
 from swashplate.equations.marching.run import Instance
-from swashplate.equations.marching.run import instance_of as instance_of_model
 from swashplate.equations.model import Model
 from swashplate.equations.printing_c import c_name, comment_line, filled, literal
 from swashplate.errors import FileError, InputError, InputTypeError
@@ -180,7 +180,7 @@ def content_of(
                 f"{what!r} cannot be exported: give a Drive or a Model of equations"
                 f"{_nearest(what)}."
             )
-        instance = instance_of_model(what, parameters, options=options, given=given)
+        instance = instance_of(what, parameters, options=options, given=given)
         exported, name, title = Exported(what, prefix), what.name, f"Model {what.name}"
         references, words = OWN, words_of(exported)
     values = numbers(exported, instance, step)

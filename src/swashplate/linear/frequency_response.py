@@ -59,10 +59,10 @@ class FrequencyResponse(Tabular):
     amplitudes: Array
     """Of the input, as given, (a,), in its SI unit."""
     ratio: ComplexArray
-    """First harmonic of the output by that of the input, (a, f); 0 where nothing moves."""
+    """First harmonic of the output by that of the input, (a, f); 0 if nothing moves."""
     distortion: Array
     """Root mean square of all but mean and first harmonic, by that of the first harmonic, (a, f);
-    0 where nothing moves. [1]"""
+    0 if nothing moves. [1]"""
     mean: Array
     """Mean of the output, (a, f)."""
     units: Mapping[str, str] = field(default_factory=dict)
@@ -173,7 +173,7 @@ class FrequencyResponse(Tabular):
         return sentences
 
     def to_polars(self) -> polars.DataFrame:
-        """Table in SI, a row for each amplitude and frequency; no phase where nothing moves."""
+        """Table in SI, a row for each amplitude and frequency; no phase if nothing moves."""
         import polars as pl
 
         shape = self.ratio.shape

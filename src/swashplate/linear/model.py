@@ -207,8 +207,12 @@ class LinearModel:
     def bandwidth(self) -> float:
         """Frequency at which the first output falls 3 dB (to 1/√2) below its steady gain. [Hz]
 
-        Infinite where it never does, below half the rate of a sampled model; a `DomainError` where
-        the output integrates.
+        Infinite if it never does below half the rate of a sampled model.
+
+        Raises
+        ------
+        DomainError
+            If the output integrates or does not follow a steady input, or the model is unstable.
         """
         grid = _grid(self._fastest())
         self._largest(grid)
@@ -225,7 +229,7 @@ class LinearModel:
     def largest_gain(self) -> float:
         """Proportional gain at which the loop u = K (r - y) of the first output begins to swing.
 
-        In the input's unit by the output's, positive; infinite where none does.
+        In the input's unit by the output's, positive; infinite if none does.
         """
         small = 0.5 / self._largest(_grid(self._fastest()))
         return small * self.margins(copysign(small, self.gain)).gain_margin
@@ -335,8 +339,8 @@ class LoopMargins(NamedTuple):
     """Margins of a stable loop."""
 
     crossover: float
-    """Frequency at which |L| = 1 that leaves the smallest delay margin, 0 where none. [Hz]"""
-    phase_margin: float  # Phase of L above -180° there, infinite where there is no crossover. [rad]
+    """Frequency at which |L| = 1 that leaves the smallest delay margin, 0 if there is none. [Hz]"""
+    phase_margin: float  # Phase of L above -180° there, infinite without a crossover. [rad]
     delay_margin: float  # Further delay that makes the loop swing. [s]
     gain_margin: float  # Factor on L that makes the loop swing. [1]
 

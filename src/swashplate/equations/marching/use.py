@@ -224,10 +224,11 @@ class Run(Tabular):
         Parameters
         ----------
         signals : str or sequence of str
-            Names as of `names`; by default the inputs and the model's `outputs`, or all signals if
-            it names no outputs.
+            Names as of `names`, a panel each; by default the inputs and the model's `outputs`, or
+            all signals if it names no outputs. A drive shows its whole chain by default.
         ax : matplotlib axes or sequence of them, optional
-            Where to draw the signals, one for each; by default in a new figure.
+            Where to draw the signals, one for each, of a drive the shaft's speed if none is named;
+            by default in a new figure.
         label : str
             Of the curves: each panel gets a legend of all labelled curves in it.
         window : (float, float), optional
@@ -246,9 +247,18 @@ class Run(Tabular):
             samples.
         """
         chosen = (signals,) if isinstance(signals, str) else tuple(signals)
+        if not chosen and ax is None:
+            return self._overview(label=label, window=window, title=title)
         chosen = chosen or self.shown or self._usual
         draw = figures().plot_signals
         return cast("Figure", draw(self, chosen, ax=ax, label=label, window=window, title=title))
+
+    def _overview(
+        self, *, label: str, window: tuple[float, float] | None, title: str | None
+    ) -> Figure:
+        """Figure of what is shown if no signals are named."""
+        chosen, draw = self.shown or self._usual, figures().plot_signals
+        return cast("Figure", draw(self, chosen, label=label, window=window, title=title))
 
     @property
     def _usual(self) -> tuple[str, ...]:
