@@ -16,7 +16,7 @@ from swashplate.drive.march import start_states
 from swashplate.drive.signals import check_output
 from swashplate.drive.simulation import Simulation
 from swashplate.equations.marching.derivatives import NOTHING_OWN, BoundModel
-from swashplate.equations.marching.observation import ObservedRecord, Own, every_sample
+from swashplate.equations.marching.observation import ObservedRecord, Own
 from swashplate.equations.marching.record import Record
 from swashplate.equations.marching.run import Start
 from swashplate.equations.marching.sensitivity import Sensitivities
@@ -56,30 +56,51 @@ def bound_drive(
     These are symbols (``"Z16"`` stands for both directions), columns (``"Z16_plus"``) and states
     at the first sample whose values are among the starts of `own`, ``"start.pump.pressure"``. [Pa]
     """
-    definitions = parameters.definitions
-    names = requested_columns(definitions, tuple(columns))
-    by_voltage = observed.driven_by == "voltage"
     for each in observed.observations:
         check_output(each.signal)
+    by_voltage = observed.driven_by == "voltage"
+    return _bound(
+        parameters,
+        requested_columns(parameters.definitions, tuple(columns)),
+        by_voltage=by_voltage,
+        step=observed.record.step,
+        extremes=observed.extremes if by_voltage else (0.0, 0.0),
+        pump_is_seen=any(each.signal not in CURRENTS for each in observed.observations),
+        own=own,
+    )
+
+
+def _bound(
+    parameters: ParameterSet,
+    names: tuple[str, ...],
+    *,
+    by_voltage: bool,
+    step: float,
+    extremes: tuple[float, float],
+    pump_is_seen: bool = True,
+    own: Own = NOTHING_OWN,
+) -> BoundModel:
+    """The model with numbers for some columns, under a command between two extremes."""
     if by_voltage:
-        check_filter_stability(parameters, observed.record.step)
+        check_filter_stability(parameters, step)
     # what is differentiated by counts, at 0 as well, unless equations have derivatives for that
-    asked = frozenset(SWITCHES[name] for name in names if name in SWITCHES) - {"leaky", "loaded"}
-    instance = drive_instance(_switched_on(parameters, asked), by_voltage)
+    switches = frozenset(SWITCHES[name] for name in names if name in SWITCHES)
+    instance = drive_instance(_switched_on(parameters, switches - {"leaky", "loaded"}), by_voltage)
     start = dict(own.start)
     if PRESSURE in start:
         start |= start_states(instance, start[PRESSURE])
     # whether anything observed can depend on a column: on a driven channel, on the pump
-    low, high = observed.extremes if by_voltage else (0.0, 0.0)
+    low, high = extremes
     moved = {
         "card.plus": high > parameters.numbers["V_dz_plus"],
         "card.minus": -low > parameters.numbers["V_dz_minus"],
-        "pump": any(each.signal not in CURRENTS for each in observed.observations),
+        "pump": pump_is_seen,
         "start.card.plus": True,
         "start.card.minus": True,
+        "start.pump": pump_is_seen,
     }
-    moved |= {"card": moved["card.plus"] or moved["card.minus"], "start.pump": moved["pump"]}
-    paths = _paths(definitions, names)
+    moved["card"] = moved["card.plus"] or moved["card.minus"]
+    paths = _paths(parameters.definitions, names)
     return BoundModel(
         instance,
         own._replace(start=start),
@@ -127,9 +148,13 @@ def drive_sensitivities(
             raise InputError(
                 f"{column} belongs to the card, which a given current does not go through."
             )
-    (driver, record), *others = records.items()
-    beside = {name: each.values for name, each in others}
-    observed = every_sample(record, "shaft_speed", driver, start, beside)
-    bound = bound_drive(parameters, observed, columns)
+    record = next(iter(records.values()))
+    bound = _bound(
+        parameters,
+        columns,
+        by_voltage=by_voltage,
+        step=record.step,
+        extremes=(float(record.values.min()), float(record.values.max())),
+    )
     run = Simulation(drive_instance(parameters, by_voltage), records, start)
     return Sensitivities(run, columns, bound)
