@@ -11,11 +11,11 @@ from table import Row, duration, times
 from timing import Timing, in_turns, one_core
 
 from swashplate import Drive
+from swashplate.drive import ALL_COLUMNS, PUMP_COLUMNS, bound_drive
 from swashplate.equations.marching.observation import Observation, ObservedRecord
 from swashplate.equations.marching.record import record_of
 from swashplate.maneuvers import source_tests
-from swashplate.parameters.definitions import columns_of
-from swashplate.simulation.residuals import ALL_COLUMNS, PUMP_COLUMNS, made_ready
+from swashplate.parameters import DEFINITIONS
 
 Array = NDArray[np.float64]
 
@@ -23,7 +23,11 @@ ROUNDS = 40
 PUMP = tuple(name for name in PUMP_COLUMNS if name != "Z12")
 """Kruse's 27 parameters of pump and motor."""
 CARD = tuple(name for name in ALL_COLUMNS if name not in PUMP_COLUMNS and name != "tau")
-FREE = tuple(columns_of(["Z1", "Z3", "Z8", "Z10", "Z13", "Z16", "Z17", "Z19", "Z20", "Z21", "Z22"]))
+FREE = tuple(
+    DEFINITIONS.columns_of(
+        ["Z1", "Z3", "Z8", "Z10", "Z13", "Z16", "Z17", "Z19", "Z20", "Z21", "Z22"]
+    )
+)
 """What is left of them without gauges and without what no test reaches."""
 
 
@@ -60,17 +64,17 @@ class HoistTests:
     def residuals(self, tests: list[ObservedRecord]) -> None:
         """Residuals of all tests."""
         for each in tests:
-            made_ready(self.drive.parameters, each).residuals(each)
+            bound_drive(self.drive.parameters, each).residuals(each)
 
     def jacobian(self) -> None:
         """Residuals and derivatives of all tests, into memory from before."""
         for each, kept in zip(self.pump, self.kept, strict=True):
-            made_ready(self.drive.parameters, each, PUMP).jacobian(each, kept)
+            bound_drive(self.drive.parameters, each, PUMP).jacobian(each, kept)
 
     def triangle(self, tests: list[ObservedRecord], columns: tuple[str, ...]) -> None:
         """Triangular factors of all tests."""
         for each in tests:
-            made_ready(self.drive.parameters, each, columns).triangle(each)
+            bound_drive(self.drive.parameters, each, columns).triangle(each)
 
 
 def fit_rows() -> Iterator[Row]:

@@ -12,12 +12,11 @@ from table import Row, duration, times
 from timing import Timing, cores_used, in_turns, one_core
 
 from swashplate import Drive, Serial, SquaredError, maneuvers
+from swashplate.drive import PUMP_COLUMNS, bound_drive, drive_instance
 from swashplate.equations.marching.observation import Observation, ObservedRecord
 from swashplate.equations.marching.part import Stored
 from swashplate.equations.marching.record import record_of
 from swashplate.equations.marching.run import arrays_of, march_of
-from swashplate.simulation.instance import instance_of
-from swashplate.simulation.residuals import PUMP_COLUMNS, made_ready
 
 Array = NDArray[np.float64]
 
@@ -28,7 +27,7 @@ class Kernel:
     """The compiled march of a record, with everything that it reads and writes made beforehand."""
 
     def __init__(self, drive: Drive, signal: str, values: Array) -> None:
-        self.instance = instance_of(drive.parameters, signal == "voltage")
+        self.instance = drive_instance(drive.parameters, signal == "voltage")
         started = self.instance.start({signal: float(values[0])}, STEP)
         self.at_rest, self.states = started.flat, started.flat.copy()
         kept = (Stored(1, "signals", "shaft_speed"),)
@@ -82,7 +81,7 @@ class Marches:
 
     def jacobian_call(self) -> None:
         """Speed and all its derivatives, into memory from before."""
-        ready = made_ready(self.drive.parameters, self.observed, PUMP_COLUMNS)
+        ready = bound_drive(self.drive.parameters, self.observed, PUMP_COLUMNS)
         ready.jacobian(self.observed, self.rows)
 
     def pump_call(self) -> Array:
@@ -95,7 +94,7 @@ class Marches:
 
     def sensitivities_call(self) -> Array:
         """All derivatives as a user calls them."""
-        return self.drive.sensitivities_current(self.current).shaft_speed
+        return self.drive.sensitivities_current(self.current)["shaft_speed"]
 
 
 def _against_c(what: str, timing: Timing, target: float | None = None) -> Row:

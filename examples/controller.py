@@ -123,7 +123,7 @@ controllers = {
 # %%
 def tried(controller):
     """Position of the load [m] and speed of the turret [rad/s] over `TIME`."""
-    drive = slew.stepper(H, interpolation="previous")
+    drive = slew.stepper(1.0 / H, interpolation="previous")
     reach = inverse.acceleration[0] * model.time_constant
     position = speed = turret = integral = 0.0
     seen = deque([(0.0, 0.0)] * (1 + round(LATE / H)))

@@ -96,7 +96,7 @@ for factor, speed in zip(factors[::500], soon[::500], strict=True):
 # stick is let go once the drum has done a turn. That it goes on is the delay, the orifice, the lag.
 
 # %%
-stepper = hoist.stepper(1.0 / 512.0)
+stepper = hoist.stepper(512.0)
 sample, stick = stepper.step(0.0), 6.5
 while stick or sample.shaft_speed > 0.1:
     sample = stepper.step(stick)

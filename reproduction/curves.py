@@ -12,9 +12,8 @@ from reproduction.catalogue import Shown
 from reproduction.content import Curve, Figure, Level, Panel
 from reproduction.speed_path import simulated_speed
 from swashplate.analysis import with_factors
-from swashplate.drive import Drive
+from swashplate.drive import Drive, Simulation
 from swashplate.maneuvers import source_tests
-from swashplate.simulation.result import Simulation
 
 Array = NDArray[np.float64]
 

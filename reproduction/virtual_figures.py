@@ -11,9 +11,8 @@ from reproduction.catalogue import Shown
 from reproduction.content import Curve, Figure, Panel
 from reproduction.curves import MULTIPLIED, filtered_speed_deg_s
 from swashplate.campaign import interpolate_counts
-from swashplate.drive import Drive
+from swashplate.drive import Drive, simulate_drive
 from swashplate.identification.estimation.drive_model import measured_current
-from swashplate.simulation.run import simulate_drive
 
 WINDOW = (1.55, 1.75)
 """Part of the ramp that figure 7.2 looks at: the winch is slow, a count lasts some samples. [s]"""

@@ -17,6 +17,7 @@ PACKAGES = [
     "swashplate.crane.closed_loop",
     "swashplate.crane.sea",
     "swashplate.crane.studies",
+    "swashplate.drive",
     "swashplate.equations",
     "swashplate.equations.marching",
     "swashplate.identification",

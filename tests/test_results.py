@@ -192,8 +192,8 @@ def test_a_maneuver_stands_where_a_voltage_does() -> None:
     samples = command.sample(256.0)
     same = np.array_equal
     assert same(hoist.simulate(command, 256.0)["current"], hoist.simulate(samples, 256.0).current)
-    found = hoist.sensitivities(command, parameters=["Z8"]).shaft_speed
-    assert same(found, hoist.sensitivities(command.sample(), parameters=["Z8"]).shaft_speed)
+    found = hoist.sensitivities(command, parameters=["Z8"])["shaft_speed"]
+    assert same(found, hoist.sensitivities(command.sample(), parameters=["Z8"])["shaft_speed"])
     many = hoist.simulate_many({"Z8": [1.6e6]}, voltage=command).output
     given = hoist.simulate_many({"Z8": [1.6e6]}, voltage=command.sample()).output
     assert many is not None

@@ -71,8 +71,8 @@ def simulated(p: Any = NUMBERS, inputs: Any = RECORD, **given: Any) -> Any:
     return simulate(LAG, p, inputs, 10.0, **given)
 
 
-def linear(at: Any = STILL, h: Any = 0.1, states: Any = BEGUN, **given: Any) -> Any:
-    return linearize(instance_of(LAG, NUMBERS), at, h, states=states, **given)
+def linear(at: Any = STILL, rate: Any = 10.0, states: Any = BEGUN, **given: Any) -> Any:
+    return linearize(instance_of(LAG, NUMBERS), at, rate, states=states, **given)
 
 
 def exported(step: Any) -> Any:
@@ -90,7 +90,11 @@ WRONG: list[tuple[Callable[..., Any], tuple[Any, ...], str]] = [
     (lambda p: content_of(LAG, 0.1, parameters=p), (None, 3), "parameters must be a Lag"),
     (lambda at: linear(at), (3, None, [0.2]), "at is .* but must be a mapping"),
     (lambda x: linear({"command": x}), ("a", nan, [1]), "command is .* but must be a finite"),
-    (lambda h: linear(h=h), (inf, nan, -1.0, "a"), "The step is .* must be a number above 0"),
+    (
+        lambda rate: linear(rate=rate),
+        (inf, nan, -1.0, "a"),
+        "The rate is .* be a number above 0",
+    ),
     (
         lambda states: linear(states=states),
         ((), (1,), State(0.1), 3, (State("a"),), (State(nan),), (State(0.1), State(0.1))),
@@ -98,7 +102,7 @@ WRONG: list[tuple[Callable[..., Any], tuple[Any, ...], str]] = [
     ),
     (lambda inputs: linear(inputs=inputs), ((),), "needs an input"),
     (lambda outputs: linear(outputs=outputs), ((),), "needs an output"),
-    (lambda model: linearize(model, STILL, 0.1), (LAG, None), "is no model with numbers"),
+    (lambda model: linearize(model, STILL, 10.0), (LAG, None), "is not a model with numbers"),
     (lambda k: linear().margins(k), ("a", None, lambda f: f[:3]), "the controller must be a gain"),
     (lambda f: linear().response(f), ("a", None), "Frequencies must be one row of finite num"),
     (
@@ -107,7 +111,7 @@ WRONG: list[tuple[Callable[..., Any], tuple[Any, ...], str]] = [
         "begin is .* but must be a mapping",
     ),
     (
-        lambda begin: sensitivities(LAG, NUMBERS, RECORD, 10.0, output="place", begin=begin),
+        lambda begin: sensitivities(LAG, NUMBERS, RECORD, 10.0, begin=begin),
         ((1, 2), "place"),
         "begin is .* but must be a mapping",
     ),
@@ -142,7 +146,7 @@ WRONG: list[tuple[Callable[..., Any], tuple[Any, ...], str]] = [
         (3, dict),
         "no class of named tuples",
     ),
-    (lambda h: HOIST.stepper(h), ("a", None, inf), "The sample interval is .* above 0"),
+    (lambda rate: HOIST.stepper(rate), ("a", None, inf), "The rate is .* between"),
     (lambda rate: HOIST.compiled_step(rate=rate), ("a", inf, -1.0), "The rate is .* above 0"),
     (lambda rate: HOIST.simulate([1.0, 2.0], rate), ("a", None, nan), "The rate is .* between"),
     (lambda at: HOIST.linearize(at), ("a", nan, inf), "Linearise at a finite number"),

@@ -129,7 +129,7 @@ def wasm_verdict(content: bytes) -> str:
 
 def stepped(drive: Drive) -> np.ndarray:
     """Samples of the stepper under the command."""
-    stepper = drive.stepper(STEP)
+    stepper = drive.stepper(1.0 / STEP)
     samples = [stepper.step(each) for each in command()]
     return np.array([[getattr(each, name) for name in WATCHED] for each in samples])
 

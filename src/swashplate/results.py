@@ -21,9 +21,11 @@ from swashplate.errors import InputError
 from swashplate.tables import Table, write_table
 
 if TYPE_CHECKING:
+    import numpy as np
     import polars
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from numpy.typing import NDArray
 
 GivenAxes = TypeVar("GivenAxes", bound="Axes | Sequence[Axes]")
 """Matplotlib axes that a caller gives to draw in, and gets back."""
@@ -71,6 +73,18 @@ def _brief(value: Any) -> str:
         return f"<{len(items)} {type(items[0]).__name__}>"
     text = object.__repr__(value) if callable(value) else repr(value)
     return text if len(text) <= 60 and not callable(value) else f"<{type(value).__name__}>"
+
+
+class Named:
+    """An attribute that is what ``result[name]`` gives."""
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self._name = name
+
+    def __get__(self, result: Any, owner: type | None = None) -> NDArray[np.float64]:
+        if result is None:
+            return self  # type: ignore[return-value]  # the class's own attribute
+        return cast("NDArray[np.float64]", result[self._name])
 
 
 class Result:

@@ -220,7 +220,7 @@ def test_numbers_are_those_of_the_functions(done, tmp_path):
     np.testing.assert_allclose(steady, plus["speed"], rtol=1e-9)
     done("linearize", "slew", "--at", "2", "--sample-time", "0.01", "--out", "slew.toml")
     written = tomllib.loads((tmp_path / "slew.toml").read_text("utf-8"))
-    np.testing.assert_array_equal(written["A"], slew.linearize(2.0).discrete(0.01).A)
+    np.testing.assert_array_equal(written["A"], slew.linearize(2.0).discrete(100.0).A)
 
 
 @pytest.mark.parametrize(

@@ -29,13 +29,13 @@ from swashplate.crane.rope import GRAVITY
 from swashplate.crane.sea.confidence import fewest_seaways, mean_of, more_seaways, share_of
 from swashplate.crane.studies.judging import seaways_needed
 from swashplate.crane.studies.outcome import STOPPED
+from swashplate.drive import Limit
 from swashplate.errors import InputError, ParameterError
 from swashplate.executors import Processes, Serial, Threads
 from swashplate.identification.assessment import Identification
 from swashplate.identification.estimation.setup import Free, Setup, load_setup
 from swashplate.identification.fitting import fit
 from swashplate.maneuvers import source_tests
-from swashplate.simulation.result import Limit
 
 MEANT = control.DelayedFeedback(0.2, 0.2) | control.ShipCompensation() | control.PositionLoop(1.5)
 CLIPPED = control.DelayedFeedback(0.2, 0.2) | control.ShipCompensation() | control.Clip()

@@ -20,9 +20,9 @@ from swashplate import Limit
 from swashplate.analysis import DESIGN_VARIABLES, OUTCOMES
 from swashplate.campaign import CHANNEL_KINDS
 from swashplate.cli import app
+from swashplate.drive import SIGNALS
 from swashplate.logs import SUFFIXES
 from swashplate.parameters.definitions import CATALOGUE, REFINEMENTS
-from swashplate.simulation.result import SIGNALS
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"

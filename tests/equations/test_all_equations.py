@@ -22,8 +22,7 @@ from swashplate.equations import derive
 from swashplate.equations.declaration import interpreted, is_function
 from swashplate.equations.language import plain
 from swashplate.equations.model import Window
-from swashplate.models import card, full_order, machine, pump
-from swashplate.models import channel as single
+from swashplate.models import amplifier, full_order, machine, pump
 from swashplate.models import displacement_control as control
 
 POINTS, FEWER = 100, 30
@@ -149,7 +148,7 @@ class Draw:
             return H
         if name in ("direction", "sign"):
             return self.random.choice([1.0, -1.0])
-        if name in control.Pump._fields or name in single.Channel._fields:
+        if name in control.Pump._fields or name in amplifier.Channel._fields:
             return self.parameter(name)
         raise AssertionError(f"{self.name}: say in RANGES what '{name}' can be")
 
@@ -176,9 +175,9 @@ class Draw:
             return self.random.choice([None, True])
         if kind == control.Pump | control.Solenoids:
             kind = control.Pump
-        if kind in (control.Pump, control.Solenoids, single.Channel):
+        if kind in (control.Pump, control.Solenoids, amplifier.Channel):
             return kind(*map(self.parameter, kind._fields))
-        if kind in (card.CardSignals, single.ChannelSignals):
+        if kind in (amplifier.CardSignals, amplifier.ChannelSignals):
             return kind(*(self.uniform(*AMPERES) for _ in kind._fields))
         if not hasattr(kind, "_fields"):
             raise AssertionError(f"{self.name}: say how a {kind} is drawn")
@@ -189,10 +188,10 @@ class Draw:
         return known.get("options") or kind(**more)
 
 
-def filter_state(draw: Draw, _: dict[str, Any]) -> single.Filter:
+def filter_state(draw: Draw, _: dict[str, Any]) -> amplifier.Filter:
     now = draw.uniform(0.0, 0.7)
     before = now + draw.uniform(-0.01, 0.01)
-    return single.Filter(now, before, max(now + draw.uniform(-0.02, 0.02), 1e-3))
+    return amplifier.Filter(now, before, max(now + draw.uniform(-0.02, 0.02), 1e-3))
 
 
 def window(draw: Draw, _: dict[str, Any]) -> Window:
@@ -229,7 +228,7 @@ def plant_signals(draw: Draw, known: dict[str, Any]) -> full_order.PlantSignals:
 
 
 MADE: dict[Any, Callable[[Draw, dict[str, Any]], Any]] = {
-    single.Filter: filter_state,
+    amplifier.Filter: filter_state,
     Window: window,
     machine.Machine: hoist_machine,
     pump.PumpInputs: lambda draw, known: pump.PumpInputs(
@@ -309,7 +308,7 @@ def test_partials_are_those_of_differences(name: str) -> None:
 def test_no_equation_is_missed() -> None:
     """Those that the models name, and the library's, are among what was found."""
     assert EQUATIONS.keys() >= OWN_RANGES.keys()
-    modules = "channel card pump refinements machine full_order library model"
+    modules = "amplifier pump refinements machine full_order library model"
     for package in modules.split():
         assert any(name.startswith(f"{package}.") for name in EQUATIONS), package
     assert len(EQUATIONS) > 100

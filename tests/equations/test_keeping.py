@@ -83,7 +83,7 @@ from swashplate.equations import sensitivities, simulate, stepper
 
 p, command = machine.Lag(0.5), np.ones(4)
 end = simulate(machine.rod, p, {"command": command}, 100.0)["position"][-1]
-slope = sensitivities(machine.rod, p, {"command": command}, 100.0, output="position")[-1, 0]
+slope = sensitivities(machine.rod, p, {"command": command}, 100.0)["position"][-1, 0]
 stepper(machine.rod, p, ["command"], rate=100.0)
 print(end, slope, count[0])
 """

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from swashplate import DomainError, InputError
+from swashplate.batch import simulate_many
 from swashplate.equations import (
     Model,
     Tap,
@@ -22,7 +23,6 @@ from swashplate.equations import (
 )
 from swashplate.errors import EquationError
 from swashplate.models.drive import pump_drive
-from swashplate.simulation.batch import simulate_many
 
 
 class Valve(NamedTuple):
@@ -153,8 +153,8 @@ def test_stamps_and_sub_steps_are_a_finer_grid(way) -> None:
         stopped, P, {"gain": [0.3, 0.4]}, inputs, output="travel", given=SHORT, **way
     )
     assert (many.output[1] == run["travel"]).all()
-    by = sensitivities(stopped, P, inputs, output="position", given=SHORT, **way)
-    finely = sensitivities(stopped, P, fine, rate, output="position", given=SHORT)
+    by = sensitivities(stopped, P, inputs, given=SHORT, **way)["position"]
+    finely = sensitivities(stopped, P, fine, rate, given=SHORT)["position"]
     assert by == pytest.approx(finely[::substeps], abs=1e-9)
 
 
@@ -191,9 +191,8 @@ def pushed(state: Rod, command: float, push: float, p: Valve, h: float) -> Rod:
 
 @pytest.mark.parametrize("name", Valve._fields)
 def test_derivatives_are_those_of_differences(name: str) -> None:
-    found = sensitivities(
-        valve, P, {"command": COMMAND}, RATE, output="position", parameters=[name], given=STROKE
-    )[:, 0]
+    by = sensitivities(valve, P, {"command": COMMAND}, RATE, parameters=[name], given=STROKE)
+    found = by["position"][:, 0]
     value = getattr(P, name)
     ends = []
     for factor in (1.0 + 1e-5, 1.0 - 1e-5):
@@ -235,7 +234,7 @@ def test_bad_inputs_are_named() -> None:
     with pytest.raises(InputError, match="command has .* the first nan at sample 3"):
         simulate(valve, P, {"command": np.array([0.0, 0.0, 0.0, np.nan])}, RATE, **given)
     with pytest.raises(InputError, match="no parameter 'lead'"):
-        sensitivities(valve, P, good, RATE, output="position", parameters=["lead"], **given)
+        sensitivities(valve, P, good, RATE, parameters=["lead"], **given)
 
 
 def test_names_and_numbers_that_mean_nothing_are_refused() -> None:
@@ -486,7 +485,7 @@ def test_a_derivative_that_overflows_is_named() -> None:
     tank = Model("tank", Outlet, Fill, growing)
     columns = {"parameters": ["width", "start.level"], "begin": {"level": 0.0}}
     with pytest.raises(DomainError, match=r"of level by start\.level is inf at sample 2"):
-        sensitivities(tank, WIDE, {"flow": np.zeros(5)}, 1.0, output="level", **columns)
+        print(sensitivities(tank, WIDE, {"flow": np.zeros(5)}, 1.0, **columns)["level"])
     with pytest.raises(InputError, match="no limit 'full'; there are none"):
         simulate(tank, WIDE, {"flow": np.zeros(5)}, 1.0).active("full")
 

@@ -21,7 +21,7 @@ from swashplate.equations import (
     simulate,
     stepper,
 )
-from swashplate.linear.discrete import linearize
+from swashplate.linear import linearize
 
 pytestmark = pytest.mark.interpreted
 
@@ -199,7 +199,7 @@ def test_equations_of_roots_and_loops_are_replaced() -> None:
     ):
         changed = replaced(model, old, new)
         np.testing.assert_allclose(level_of(changed), expected, rtol=1e-12)
-        by = sensitivities(changed, Gain(1.0), {"command": COMMAND}, 1.0, output="level")
+        by = sensitivities(changed, Gain(1.0), {"command": COMMAND}, 1.0)["level"]
         difference = (level_of(changed, 1.001) - level_of(changed, 0.999)) / 0.002
         np.testing.assert_allclose(by[:, 0], difference, rtol=1e-8, atol=1e-8)
 
@@ -221,7 +221,7 @@ def squared_level(state: Level, command: float, p: Gain) -> Level:
 
 def test_derivatives_that_are_declared_of_the_original_do_not_count() -> None:
     model = replaced(Model("tank", Gain, Level, squared_level), twice, ten_times)
-    by = sensitivities(model, Gain(0.5), {"command": COMMAND}, 1.0, output="level")
+    by = sensitivities(model, Gain(0.5), {"command": COMMAND}, 1.0)["level"]
     np.testing.assert_allclose(by[1:, 0], 2.0 * 400.0 * 0.5 * COMMAND[:3] ** 2, rtol=1e-12)
 
 

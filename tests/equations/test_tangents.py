@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
+from tests.drive.experiments import ALL
 from tests.equations.tangents import marched
-from tests.simulation.experiments import ALL
 
 from swashplate import Drive
+from swashplate.drive import drive_instance
 from swashplate.equations.fields import floats_of
-from swashplate.simulation.instance import instance_of, path_of
-from swashplate.simulation.residuals import SWITCHES
+from swashplate.parameters import DEFINITIONS, SWITCHES
 
 RATE, SIZE = 512.0, 300
 COULOMB = ("C_plus", "C_minus")
@@ -29,12 +29,12 @@ def test_columns_are_those_of_tangents(name: str) -> None:
         drive = drive.at_every_rate()
     time = np.arange(SIZE) / RATE
     voltage = 5.3 * np.sin(9.0 * time + 0.7)
-    instance = instance_of(drive.parameters, True)
+    instance = drive_instance(drive.parameters, True)
     run = instance, {"voltage": voltage}, 1.0 / RATE, "shaft_speed"
     values, slopes = marched(*run)
     _, alone = marched(*run, begins=False)
     found = drive.sensitivities(voltage, RATE)
-    assert np.array_equal(found.simulation.shaft_speed, values)
+    assert np.array_equal(found.run.shaft_speed, values)
     paths = [
         f"{instance.model.prefix(i)}{path}"
         for i, part in enumerate(instance.model.parts)
@@ -45,7 +45,7 @@ def test_columns_are_those_of_tangents(name: str) -> None:
     for k, column in enumerate(found.names):
         if drive.parameters.numbers[column] == 0.0 and column in (*SWITCHES, *COULOMB):
             continue  # off, with a derivative to one side that is declared
-        index = paths.index(path_of(column))
+        index = paths.index(DEFINITIONS.path_of(column))
         # the gauge Z2 moves the state at rest and all that follows, which cancel but for 0.4 %
         size = max(np.abs(slopes[:, index]).max(), np.abs(alone[:, index]).max())
         assert np.abs(columns[:, k] - slopes[:, index]).max() <= 1e-12 * size, column

@@ -11,9 +11,9 @@ import pytest
 from swashplate.equations import closure, closure_hash, derive, equation
 from swashplate.equations.declaration import is_function
 from swashplate.equations.language import plain
-from swashplate.models import card, pump
+from swashplate.models import amplifier, pump
 from swashplate.models import displacement_control as control
-from swashplate.models.channel import CardOptions
+from swashplate.models.amplifier import CardOptions
 from swashplate.models.displacement_control import PumpOptions
 
 OPTIONS: dict[str, Any] = dict.fromkeys(("literal", "split", "steep", "symmetric"))
@@ -21,7 +21,7 @@ CASES = [
     (pump.pump_sample, ("state.pressure", "inputs.current", "p"), PumpOptions()),
     (control.spool_balance, ("force", "arm_sine", "p.Z4", "p.Z5", "p.Z18"), None),
     (control.leaky_step, ("pressure", "opening", "p"), None),
-    (card.card_sample, ("state", "p"), CardOptions()),
+    (amplifier.card_sample, ("state", "p"), CardOptions()),
 ]
 
 

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from swashplate import Drive, export
+from swashplate.drive import Sample
 from swashplate.models.drive import pump_drive
-from swashplate.simulation.run import Sample
 
 fmpy = pytest.importorskip("fmpy")
 from fmpy.fmi1 import FMICallException  # noqa: E402
@@ -154,7 +154,7 @@ def command(samples: int = 1500) -> np.ndarray:
 
 def stepped(drive: Drive, voltage: Any, h: float = H, **options: Any) -> np.ndarray:
     """What the drive's stepper says."""
-    stepper = drive.stepper(h, **options)
+    stepper = drive.stepper(1.0 / h, **options)
     samples = [stepper.step(float(each)) for each in voltage]
     return np.array([[getattr(each, name) for name in OUTPUTS] for each in samples])
 

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from swashplate import Drive, InputError
+from swashplate.drive import Sample
 from swashplate.export import content_of, drive_sources, libraries, values_of
 from swashplate.export.c_source import feedthrough
-from swashplate.simulation.run import Sample
 
 OK, BAD_VALUE, UNSTABLE, BAD_DELAY, DOMAIN = range(5)
 H = 1.0 / 512.0

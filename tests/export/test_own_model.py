@@ -8,10 +8,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
+from tests.drive.test_own_equation import DRAGGED
 from tests.equations.test_own_model import COMMAND, STROKE, P, valve
 from tests.export.conftest import InC
 from tests.export.webassembly import Page
-from tests.simulation.test_own_equation import DRAGGED
 
 from swashplate import Drive
 from swashplate.equations import (

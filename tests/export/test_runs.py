@@ -15,9 +15,9 @@ import pytest
 from tests.export.webassembly import Page
 
 from swashplate import Drive
+from swashplate.drive import Sample
 from swashplate.export import content_of, drive_sources, values_of, wasm
 from swashplate.models.displacement_control import PumpOptions
-from swashplate.simulation.run import Sample
 
 H = 1.0 / 512.0
 NAMES = (*Sample._fields[1:], "motor_torque", "motor_pressure_drop")

@@ -3,12 +3,12 @@
 import numpy as np
 from scipy.integrate import solve_ivp
 
+from swashplate.drive import Simulation
 from swashplate.equations.declaration import interpreted
 from swashplate.full_order import FullOrderDrive
 from swashplate.models.displacement_control import solenoid_force
 from swashplate.models.full_order import Motion, free_rates
 from swashplate.models.machine import relief_pressures
-from swashplate.simulation.result import Simulation
 
 SLACK = 1e-9
 """Part of its range by which a state passes a limit before it counts: more than rounding."""

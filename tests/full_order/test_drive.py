@@ -7,7 +7,7 @@ import polars as pl
 import pytest
 from tests.full_order.referee import solved
 
-from swashplate import DomainError, Drive, InputError, maneuvers
+from swashplate import DomainError, Drive, InputError, UnknownParameterError, maneuvers
 from swashplate.equations.declaration import interpreted
 from swashplate.full_order import (
     TABLE_MANEUVERS,
@@ -188,7 +188,9 @@ def test_wrong_options_are_sentences(hoist: FullOrderDrive, step: np.ndarray) ->
         hoist.replace(spool_mass=1e-20, feedback_arm_inertia=0.0).simulate(step)
     with pytest.raises(InputError, match="substeps is 5, but .* needs at least 6 to be stable"):
         hoist.simulate(step, substeps=5)
-    with pytest.raises(InputError, match="no parameter 'spool_weight'; it has those of the card, "):
+    with pytest.raises(
+        UnknownParameterError, match="no parameter 'spool_weight'.*; the parameters are "
+    ):
         hoist.sensitivities(step, parameters=["spool_weight"])
 
 

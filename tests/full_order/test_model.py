@@ -79,8 +79,8 @@ def richardson(full: FullOrderDrive, name: str, command: Array, start: Any, step
 
 @pytest.fixture(scope="module")
 def calm(hoist: FullOrderDrive) -> Mapping[str, Array]:
-    found = hoist.sensitivities(CALM, parameters=QUANTITIES, start="steady", substeps=STEPS)
-    return dict(zip(QUANTITIES, found.T, strict=True))
+    by = hoist.sensitivities(CALM, parameters=QUANTITIES, start="steady", substeps=STEPS)
+    return dict(zip(by.names, by["shaft_speed"].T, strict=True))
 
 
 IDLE = (
@@ -112,7 +112,7 @@ def test_derivatives_are_exact_where_nothing_switches(
 
 @pytest.fixture(scope="module")
 def stops(limited: FullOrderDrive) -> Mapping[str, Array]:
-    found = limited.sensitivities(STOPS, parameters=QUANTITIES, substeps=STEPS)
+    found = limited.sensitivities(STOPS, parameters=QUANTITIES, substeps=STEPS)["shaft_speed"]
     return dict(zip(QUANTITIES, found.T, strict=True))
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from tests.simulation.experiments import ALL
+from tests.drive.experiments import ALL
 
 from swashplate import Drive, Simulation
 
@@ -45,7 +45,7 @@ CASES: dict[str, Callable[[Array], Array]] = {
     "physical root": lambda voltage: columns(form(pressure_root="symmetric").simulate(voltage)),
     "all refinements": lambda v: columns(Drive.preset("hoist").replace(**LOADED).simulate(v)),
     "pump alone": lambda v: columns(Drive.preset("hoist").simulate_current(0.08 * v)),
-    "derivatives": lambda v: np.array(Drive.preset("hoist").sensitivities(v).shaft_speed),
+    "derivatives": lambda v: np.array(Drive.preset("hoist").sensitivities(v)["shaft_speed"]),
 }
 
 

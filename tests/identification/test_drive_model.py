@@ -21,6 +21,7 @@ from swashplate.identification.fitting import fit
 from swashplate.identification.statistics.determination import bounds_reached
 from swashplate.identification.validation import at_instants, predict
 from swashplate.maneuvers import source_tests, step
+from swashplate.parameters import DEFINITIONS
 
 
 @pytest.fixture(scope="module")
@@ -188,8 +189,8 @@ def test_a_bound_that_was_reached_is_said_with_the_entry_that_states_it(campaign
     assert said[2.6] == []
     unknown = Unknown("V_dz_plus", 0.5, 0.0, 5.0, "V")
     stated = Stage(name="card", part="card", free={"V_dz": Free(bounds=(0.0, 5.0))})
-    assert stated.beyond(unknown, -1) == "the least value that it may have"
-    assert "widen V_dz under" in stated.beyond(unknown, 1)
+    assert stated.beyond(unknown, -1, DEFINITIONS) == "the least value that it may have"
+    assert "widen V_dz under" in stated.beyond(unknown, 1, DEFINITIONS)
 
 
 # --- the measured current as what drives the pump -------------------------------------------------

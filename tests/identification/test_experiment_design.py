@@ -259,7 +259,7 @@ def pump_columns(axis: str) -> tuple[list[str], np.ndarray, np.ndarray]:
     found = [drive.sensitivities(each.sample(128.0), 128.0, parameters=PUMP) for each in voltages]
     names = list(found[0].names)
     values = np.array([drive.parameters.numbers[name] for name in names])
-    return names, values, np.vstack([each.shaft_speed for each in found])
+    return names, values, np.vstack([each["shaft_speed"] for each in found])
 
 
 def pump(axis: str, leave: set[str] = frozenset()) -> Identifiability:

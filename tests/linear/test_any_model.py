@@ -8,15 +8,16 @@ import numpy as np
 import pytest
 
 from swashplate import DomainError, Drive, InputError
-from swashplate.equations import instance_of as instance_of_model
+from swashplate.drive import drive_instance
+from swashplate.equations import instance_of
 from swashplate.equations.declaration import equation
 from swashplate.equations.marching.part import Stored
 from swashplate.equations.marching.run import Instance, Part, marched
 from swashplate.equations.model import Model, Tap, discretised, join
 from swashplate.linear import LinearModel, linearize
-from swashplate.simulation.instance import instance_of
 
-H = 0.01
+RATE = 100.0
+H = 1.0 / RATE
 
 
 class Valve(NamedTuple):
@@ -102,7 +103,7 @@ def test_a_machine_of_one_s_own(hold: str) -> None:
     at = {"command": 0.2, "leak": 1.5}
     flow = 2.0 * 0.2 + 3.0 * 0.2**2 + 0.02
     states = (Opening(0.2), Place(2.0 * flow / 0.5 / 1.5))
-    model = linearize(instance, at, H, states=states, outputs=("position", "flow", "doubled"))
+    model = linearize(instance, at, RATE, states=states, outputs=("position", "flow", "doubled"))
     assert model.inputs == ("command", "leak")
     assert model.states[:2] == ("valve.opening", "rod.position")
     assert set(model.states[2:]) == set(model.memory)
@@ -135,7 +136,7 @@ def test_a_machine_of_one_s_own(hold: str) -> None:
 
 def test_feedthrough_and_the_settled_state() -> None:
     instance = Instance(valve("linear"), (Part(VALVE._replace(delay=0.0)),), "mine")
-    model = linearize(instance, {"command": 0.2}, H)
+    model = linearize(instance, {"command": 0.2}, RATE)
     assert model.outputs == ("flow", "opening")
     np.testing.assert_allclose(model.D[:, 0], [0.1, 0.0])
     np.testing.assert_allclose(model.gains, [2.0 + 6.0 * 0.2 + 0.1, 1.0])
@@ -166,7 +167,7 @@ def table(rates: Callable[..., Table], lag: float, outputs: tuple[str, ...]) -> 
     model = Model("table", parameters=Lag, state=Table, step=discretised(rates, "euler"))
     states = (Table(0.0, 0.0),)
     return linearize(
-        instance_of_model(model, Lag(lag)), {"command": 0.0}, H, states=states, outputs=outputs
+        instance_of(model, Lag(lag)), {"command": 0.0}, RATE, states=states, outputs=outputs
     )
 
 
@@ -217,21 +218,20 @@ def test_two_integrators_need_a_lead() -> None:
 
 def test_refusals() -> None:
     alone = Instance(valve("linear"), (Part(VALVE),), "mine")
-    with pytest.raises(InputError, match="'wind' is no input"):
-        linearize(alone, {"command": 0.2}, H, inputs=("wind",))
+    with pytest.raises(InputError, match="'wind' is not an input"):
+        linearize(alone, {"command": 0.2}, RATE, inputs=("wind",))
     with pytest.raises(DomainError, match="the valve is wide open under this operating point"):
-        linearize(alone, {"command": 1.5}, H)
+        linearize(alone, {"command": 1.5}, RATE)
     with pytest.raises(
         InputError, match=r"rod has no equation for its steady.*=\[Opening\(\.{3}\), Place"
     ):
-        linearize(machine(), {"command": 0.2, "leak": 1.0}, H)
+        linearize(machine(), {"command": 0.2, "leak": 1.0}, RATE)
 
 
 @pytest.mark.parametrize("at", [-3.0, 4.0])
 def test_a_drive_as_any_model(hoist: Drive, at: float) -> None:
-    h = 1.0 / 512.0
-    own = hoist.linearize(at, outputs=("shaft_speed", "current"), coulomb="tangent").discrete(h)
-    instance = instance_of(hoist.parameters, True)
-    model = linearize(instance, {"voltage": at}, h, outputs=("shaft_speed", "current"))
+    own = hoist.linearize(at, outputs=("shaft_speed", "current"), coulomb="tangent").discrete(512.0)
+    instance = drive_instance(hoist.parameters, True)
+    model = linearize(instance, {"voltage": at}, 512.0, outputs=("shaft_speed", "current"))
     f = np.array([0.1, 1.0, 20.0])
     np.testing.assert_allclose(model.response(f), own.response(f), rtol=1e-10)

@@ -98,7 +98,7 @@ def test_where_nothing_moves(hoist: Drive, where: dict, said: str) -> None:
         ({}, "exactly one"),
         ({"at": 11.0}, "the card takes ±10 V"),
         ({"at": 4.0, "input": "pressure"}, "must be one of voltage, current"),
-        ({"at": 4.0, "outputs": ["torque"]}, "'torque' is no output"),
+        ({"at": 4.0, "outputs": ["torque"]}, "'torque' is not an output"),
         ({"at": 4.0, "coulomb": "half"}, "coulomb is 'half'"),
     ],
 )
@@ -160,7 +160,7 @@ def test_without_delay(hoist: Drive) -> None:
 
 @pytest.mark.parametrize("rate", [100.0, 512.0])
 def test_a_sampled_model_is_exact(axis: Drive, rate: float) -> None:
-    model = axis.linearize(2.0, outputs=OUTPUTS).discrete(1.0 / rate)
+    model = axis.linearize(2.0, outputs=OUTPUTS).discrete(rate)
     expected, system = model.response(F), model.to_scipy()
     assert system.dt == 1.0 / rate
     for row in range(3):
@@ -169,7 +169,7 @@ def test_a_sampled_model_is_exact(axis: Drive, rate: float) -> None:
 
 @pytest.mark.parametrize("ending", ["toml", "json"])
 def test_files_hold_everything(hoist: Drive, tmp_path: Path, ending: str) -> None:
-    model = hoist.linearize(4.0, outputs=OUTPUTS).discrete(1.0 / 512.0)
+    model = hoist.linearize(4.0, outputs=OUTPUTS).discrete(512.0)
     path = tmp_path / f"model.{ending}"
     model.write(path)
     text = path.read_text("utf-8")
@@ -178,7 +178,7 @@ def test_files_hold_everything(hoist: Drive, tmp_path: Path, ending: str) -> Non
         np.testing.assert_array_equal(read[name], getattr(model, name))
     assert read["drive"] == "hoist"
     assert read["kind"] == "sampled"
-    assert read["sample_time"] == 1.0 / 512.0
+    assert read["rate"] == 512.0
     assert read["delay"] == 7.0 / 512.0
     assert read["input_unit"] == "V"
     assert read["output_units"] == ["rad/s", "Pa", "A"]

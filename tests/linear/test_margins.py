@@ -8,14 +8,15 @@ import polars as pl
 import pytest
 
 from swashplate import DomainError, Drive, InputError
-from swashplate.linear import LinearDrive, loop_margins, response_table
+from swashplate.drive import LinearDrive, response_table
+from swashplate.linear import loop_margins
 
 
 def radius(model: LinearDrive, gain: float, late: int = 0) -> float:
     """Largest |eigenvalue| of a sampled loop u = -K y, which the controller closes `late` samples
     after the drive's own delay."""
-    assert model.sample_time is not None
-    whole = round(model.delay / model.sample_time) + late
+    assert model.rate is not None
+    whole = round(model.delay * model.rate) + late
     n = model.A.shape[0]
     loop = np.zeros((n + whole, n + whole))
     loop[:n, :n] = model.A
@@ -27,7 +28,7 @@ def radius(model: LinearDrive, gain: float, late: int = 0) -> float:
 
 @pytest.mark.parametrize("rate", [512.0, 2000.0])
 def test_the_largest_gain_brings_the_loop_to_its_edge(axis: Drive, rate: float) -> None:
-    model = axis.linearize(2.0).discrete(1.0 / rate)
+    model = axis.linearize(2.0).discrete(rate)
     largest = model.largest_gain
     assert radius(model, largest) == pytest.approx(1.0, abs=1e-9)
     assert radius(model, 0.99 * largest) < 1.0 < radius(model, 1.01 * largest)
@@ -35,10 +36,10 @@ def test_the_largest_gain_brings_the_loop_to_its_edge(axis: Drive, rate: float) 
 
 
 def test_the_delay_margin_brings_the_loop_to_its_edge(hoist: Drive) -> None:
-    h = 1.0 / 2048.0
-    model = hoist.linearize(4.0).discrete(h)
+    rate = 2048.0
+    model = hoist.linearize(4.0).discrete(rate)
     gain = 0.5 * model.largest_gain
-    whole = int(model.margins(gain).delay_margin / h)
+    whole = int(model.margins(gain).delay_margin * rate)
     assert whole > 50
     assert radius(model, gain, whole) < 1.0 < radius(model, gain, whole + 1)
 
@@ -89,7 +90,7 @@ def test_unstable_loops_have_no_margins(hoist: Drive) -> None:
     with pytest.raises(DomainError, match="closed loop is unstable"):
         model.margins(lambda f: -0.1 / (2j * pi * f))
     with pytest.raises(DomainError, match="closed loop is unstable"):
-        model.discrete(1.0 / 512.0).margins(1.01 * model.discrete(1.0 / 512.0).largest_gain)
+        model.discrete(512.0).margins(1.01 * model.discrete(512.0).largest_gain)
 
 
 def test_loops_without_sense(hoist: Drive) -> None:
@@ -117,12 +118,12 @@ def test_small_sines_agree_with_the_linear_model(name: str, at: float) -> None:
     swept = drive.frequency_response(F, [amplitude], bias=at, tolerance=1e-6)
     for frequency, ratio in zip(F, swept.ratio[0], strict=True):
         # the sweep's own step, with a whole number of them a cycle
-        h = 1.0 / (frequency * ceil(512.0 / frequency))
-        exact = model.discrete(h).response(frequency)[0]
+        rate = frequency * ceil(512.0 / frequency)
+        exact = model.discrete(rate).response(frequency)[0]
         assert abs(ratio / exact - 1.0) < 1e-6
         # promised is 0.1 %; the continuous model is apart by the time of about one step
         continuous = model.response(frequency)[0]
-        assert abs(ratio / continuous - 1.0) < 1.1 * 2.0 * np.pi * frequency * h
+        assert abs(ratio / continuous - 1.0) < 1.1 * 2.0 * np.pi * frequency / rate
     assert (swept.distortion < 1e-3).all()
     np.testing.assert_allclose(swept.mean, drive.steady_speed(at), rtol=1e-5)
 
@@ -148,7 +149,7 @@ def test_the_coulomb_term_left_out_suits_larger_motions() -> None:
 )
 def test_every_output(hoist: Drive, output: str) -> None:
     swept = hoist.frequency_response([1.0], [1e-4], bias=4.0, output=output)
-    model = hoist.linearize(4.0, outputs=[output]).discrete(1.0 / 512.0)
+    model = hoist.linearize(4.0, outputs=[output]).discrete(512.0)
     assert swept.ratio[0, 0] == pytest.approx(model.response(1.0)[0], rel=1e-4)
 
 
@@ -228,7 +229,11 @@ def test_phases_are_followed(axis: Drive) -> None:
         (([0.3, 100.0], [1.0]), {}, "to at most 64 Hz"),
         (([0.3], [11.0]), {}, "reach 11 V, but the card takes ±10 V"),
         (([0.3], [1.0]), {"bias": 9.5}, "reach 10.5 V"),
-        (([0.3], [1.0]), {"output": "torque"}, "'torque' is no output of a sweep of the voltage"),
+        (
+            ([0.3], [1.0]),
+            {"output": "torque"},
+            "'torque' is not an output of a sweep",
+        ),
         (([0.3], [1.0]), {"rate": 100.0}, "between 512 and 100000 Hz"),
         (([0.3, 1.0], [0.05, 0.08]), {}, "nothing moves about 0 V with amplitudes up to 0.08"),
     ],

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from swashplate import DomainError, Drive, InputError
-from swashplate.linear import LinearDrive
+from swashplate.drive import LinearDrive
 
 FRICTION = {"spool_friction": 0.115, "spool_presliding": 5e-5}
 LINE = {"line_stiffness": 1e6, "load_inertia": 5e3, "motor_leakage": 1e-6, "load_torque": 3e4}
@@ -38,9 +38,9 @@ MEASURED = {"load_torque": 3.0, "pump_speed": 1e-5, "supply_pressure": 10.0}
 
 def marched(model: LinearDrive, *inputs: np.ndarray) -> np.ndarray:
     """Answer of a sampled model at rest, the first input late by whole samples."""
-    assert model.sample_time is not None
+    assert model.rate is not None
     u = np.column_stack(inputs)
-    whole = round(model.delay / model.sample_time)
+    whole = round(model.delay * model.rate)
     u[:, 0] = np.concatenate((np.zeros(whole), u[:, 0]))[: len(u)]
     x, y = np.zeros(model.A.shape[0]), np.empty((len(u), len(model.outputs)))
     for n, values in enumerate(u):
@@ -64,7 +64,7 @@ def test_small_motions_of_the_simulation(
 ) -> None:
     drive = hoist.replace(**changes)
     drive = Drive(replace(drive.parameters, **forms))
-    model = drive.linearize(at, outputs=OUTPUTS, coulomb="tangent").discrete(1.0 / rate)
+    model = drive.linearize(at, outputs=OUTPUTS, coulomb="tangent").discrete(rate)
     u = 1e-5 * motion(300)
     run = drive.simulate(at + u, rate, start="steady")
     expected = marched(model, u)
@@ -79,7 +79,7 @@ def test_small_motions_of_the_simulation(
 def test_a_held_input(hoist: Drive, rate: float) -> None:
     u = 1e-5 * motion(300)
     run = hoist.simulate(4.0 + u, rate, interpolation="previous", start="steady")
-    model = hoist.linearize(4.0).discrete(1.0 / rate, "previous")
+    model = hoist.linearize(4.0).discrete(rate, "previous")
     moved = run.shaft_speed - run.shaft_speed[0]
     assert np.abs(moved - marched(model, u)[:, 0]).max() < 3e-5 * np.abs(moved).max()
 
@@ -92,17 +92,17 @@ def test_the_stepper_and_the_side_of_the_root(hoist: Drive, form: str) -> None:
     stepper = drive.stepper(start="steady")
     speed = np.array([stepper.step(-3.0 + v).shaft_speed for v in u])
     moved = speed - speed[0]
-    model = drive.linearize(-3.0).discrete(1.0 / 512.0)
+    model = drive.linearize(-3.0).discrete(512.0)
     assert np.abs(moved - marched(model, u)[:, 0]).max() < 3e-5 * np.abs(moved).max()
 
 
-def test_steady_gain_and_lag_do_not_depend_on_the_sample_time(axis: Drive) -> None:
+def test_steady_gain_and_lag_do_not_depend_on_the_rate(axis: Drive) -> None:
     model = axis.linearize(2.0)
-    for h in (0.05, 1.0 / 512.0, 1e-4):
-        sampled = model.discrete(h)
+    for rate in (20.0, 512.0, 1e4):
+        sampled = model.discrete(rate)
         assert sampled.gain == pytest.approx(model.gain, rel=1e-9)
         # the march is an explicit step: its lag is shorter by half a step of it, h²/τ² apart
-        step = min(h, 1.0 / 512.0)
+        step = min(1.0 / rate, 1.0 / 512.0)
         late = sampled.time_constant + 0.5 * step
         assert late == pytest.approx(model.time_constant, rel=2e-4)
 
@@ -113,8 +113,8 @@ def test_small_steps_lead_to_the_continuous_model(hoist: Drive, changes: dict) -
     f = np.array([0.1, 0.5, 2.0, 8.0])
     exact = model.response(f)
     errors = []
-    for h in (4e-5, 2e-5, 1e-5):
-        apart = np.abs(model.discrete(h).response(f) - exact).max(axis=1)
+    for rate in (2.5e4, 5e4, 1e5):
+        apart = np.abs(model.discrete(rate).response(f) - exact).max(axis=1)
         errors.append((apart / np.maximum(np.abs(exact).max(axis=1), 1e-9)).max())
     assert errors[0] < 0.01
     np.testing.assert_allclose(np.divide(errors[:-1], errors[1:]), 2.0, rtol=0.05)
@@ -122,27 +122,27 @@ def test_small_steps_lead_to_the_continuous_model(hoist: Drive, changes: dict) -
 
 def test_refusals(hoist: Drive) -> None:
     model = hoist.linearize(4.0)
-    with pytest.raises(InputError, match="must be a number above 0"):
+    with pytest.raises(InputError, match="The rate is nan Hz, but must be between 10 and"):
         model.discrete(float("nan"))
     with pytest.raises(InputError, match="between 10 and 100000 Hz"):
         model.discrete(1.0)
     with pytest.raises(InputError, match="interpolation is 'cubic'"):
-        model.discrete(0.01, "cubic")
+        model.discrete(100.0, "cubic")
     with pytest.raises(InputError, match="is unstable at a step"):
-        Drive.preset("slew").scale(zeta=2.0, omega=2.0).linearize(2.0).discrete(STEP)
+        Drive.preset("slew").scale(zeta=2.0, omega=2.0).linearize(2.0).discrete(512.0)
     with pytest.raises(InputError, match="from 0 on"):
         model.response([[1.0]])
-    with pytest.raises(InputError, match="to 1/\\(2 h\\) = 256 Hz"):
-        model.discrete(STEP).response(257.0)
+    with pytest.raises(InputError, match="to half the rate, 256 Hz"):
+        model.discrete(512.0).response(257.0)
 
 
 @pytest.mark.parametrize(("part", "grows"), [(0.985, False), (1.015, True)])
 def test_largest_gain_of_a_loop_that_acts_a_sample_late(
     hoist: Drive, part: float, grows: bool
 ) -> None:
-    model = hoist.linearize(4.0).discrete(STEP, "previous")
+    model = hoist.linearize(4.0).discrete(512.0, "previous")
     late = model.margins(lambda f: np.exp(-2j * np.pi * f * STEP)).gain_margin
-    stepper = hoist.stepper(STEP, interpolation="previous", start="steady")
+    stepper = hoist.stepper(512.0, interpolation="previous", start="steady")
     sample, change = stepper.step(4.0), np.radians(0.02)
     begun, errors = sample.shaft_speed, []
     for _ in range(12 * 512):
@@ -199,7 +199,7 @@ def test_where_friction_or_hysteresis_holds(hoist: Drive) -> None:
 def test_small_sines_of_a_refined_drive_agree_with_the_linear_model(hoist: Drive) -> None:
     drive = hoist.replace(**REFINED["all"])
     swept = drive.frequency_response([1.0], [1e-3], bias=4.0, tolerance=1e-6)
-    exact = drive.linearize(4.0).discrete(1.0 / 512.0).response(1.0)[0]
+    exact = drive.linearize(4.0).discrete(512.0).response(1.0)[0]
     assert abs(swept.ratio[0, 0] / exact - 1.0) < 2e-5
 
 
@@ -219,7 +219,7 @@ def test_inputs_beside_the_voltage(hoist: Drive, name: str, rate: float) -> None
     u = 1e-5 * motion(300)
     given = {each: middle[each] + values for each, values in moved.items()}
     run = drive.simulate(4.0 + u, rate, start="steady", **given)
-    expected = marched(model.discrete(1.0 / rate), u, *moved.values())
+    expected = marched(model.discrete(rate), u, *moved.values())
     for k, output in enumerate(OUTPUTS):
         found = getattr(run, output) - getattr(run, output)[0]
         assert np.abs(found - expected[:, k]).max() <= 1e-4 * np.abs(found).max(), output

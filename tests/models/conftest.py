@@ -3,9 +3,9 @@
 import pytest
 
 from swashplate import Drive
-from swashplate.models.channel import Channel
+from swashplate.drive import card_of, pump_of
+from swashplate.models.amplifier import Channel
 from swashplate.models.displacement_control import Pump
-from swashplate.simulation.instance import card_of, pump_of
 
 
 @pytest.fixture(scope="session")

@@ -7,9 +7,9 @@ import pytest
 
 from swashplate.equations import derive
 from swashplate.equations.library import faded, small_arctangent, soft_threshold
-from swashplate.models import channel as single
+from swashplate.models import amplifier
 from swashplate.models import displacement_control as control
-from swashplate.models.channel import Channel
+from swashplate.models.amplifier import Channel
 from swashplate.models.displacement_control import Pump, Stroking
 
 pytestmark = pytest.mark.interpreted
@@ -44,12 +44,12 @@ ANGLE = (control.swash_angle, ("tangent", "p.Z13_plus", "p.Z13_minus"))
 STOPS = pump_with(Z13_plus=0.3, Z13_minus=0.2)
 FORCE = (control.solenoid_force, ("current", "p.Z17", "p.Z19_plus", "p.Z19_minus"))
 SOLENOIDS = pump_with(Z17=0.25, Z19_plus=2.0, Z19_minus=3.0)
-SHARE = (single.share_above, ("first", "last", "threshold"))
+SHARE = (amplifier.share_above, ("first", "last", "threshold"))
 ZONES = (
     (control.effective_current, ("current", "Z17")),
     (soft_threshold, ("value", "width")),
 )
-LIMITED = (single.limited_current, ("target", "previous"))
+LIMITED = (amplifier.limited_current, ("target", "previous"))
 LIMITS = channel(lim1=2.0, lim2=2.0, I_t1=0.25, I_t2=0.125, a=log(2.0) / H)
 CARD = channel(V_dz=0.5, J=0.3, G1=0.1)
 NO_HEAD = (1e6, 1e-4, Stroking(0.1, 0.0, 1e6, 1e6))
@@ -65,14 +65,14 @@ TIES: list[tuple[tuple[Any, tuple[str, ...]], tuple, dict, tuple[float, ...]]] =
     (FORCE, (0.0, SOLENOIDS._replace(Z17=0.0)), {}, (2.0, -2.0, 0.0, 0.0)),
     # the card's belongs to the dead side
     (
-        (single.steady_current, ("command", "share", "p.V_dz", "p.J", "p.G1")),
+        (amplifier.steady_current, ("command", "share", "p.V_dz", "p.J", "p.G1")),
         (0.5, 0.25, CARD),
         {},
         (0.0, 0.3, 0.0, 0.25, 0.0),
     ),
     # a command that rests at the threshold gives no derivative, one that begins there has a slope
     (
-        (single.jump_share, ("newest", "middle", "oldest", "fraction", "threshold")),
+        (amplifier.jump_share, ("newest", "middle", "oldest", "fraction", "threshold")),
         (0.5, 0.5, 0.5, 0.3, 0.5),
         {},
         (0.0,) * 5,
@@ -141,16 +141,16 @@ def test_where_stop_and_relief_coincide_the_stop_counts() -> None:
 
 
 def test_ends_of_the_smooth_sign_are_saturated_and_at_rest_the_input_is_followed() -> None:
-    width, by = single.COULOMB_WIDTH * H, ("now", "before", "steady", "p.C")
+    width, by = amplifier.COULOMB_WIDTH * H, ("now", "before", "steady", "p.C")
     p, off = channel(zeta=0.5, omega=1.0, C=2.0), {"literal": None}
     within, at_end = (
-        partials(single.filtered_current, by, share * width, 0.0, 0.0, p, H, None, **off)
+        partials(amplifier.filtered_current, by, share * width, 0.0, 0.0, p, H, None, **off)
         for share in (0.5, 1.0)
     )
-    assert within[0] - at_end[0] == pytest.approx(-2.0 * H / single.COULOMB_WIDTH)
+    assert within[0] - at_end[0] == pytest.approx(-2.0 * H / amplifier.COULOMB_WIDTH)
     assert at_end[3] == pytest.approx(-H * H)
     p, w = channel(zeta=0.5, omega=0.2 / H), 0.2
-    found = partials(single.filtered_current, by, 0.0, 0.0, 0.0, p, H, None, **off)
+    found = partials(amplifier.filtered_current, by, 0.0, 0.0, 0.0, p, H, None, **off)
     assert found[:3] == pytest.approx((2.0 * (1.0 - 0.5 * w), w - w * w - 1.0, w * w))
 
 

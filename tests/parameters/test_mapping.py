@@ -3,7 +3,7 @@
 import pytest
 
 from swashplate import Drive, InputError, Pair, ParameterError
-from swashplate.parameters import COLUMNS, find
+from swashplate.parameters import COLUMNS, DEFINITIONS
 
 HOIST = Drive.preset("hoist")
 
@@ -27,7 +27,7 @@ def test_the_contract_of_a_mapping(mapping) -> None:
 def test_what_replace_takes_can_be_asked_for(column: str) -> None:
     (before,) = HOIST[column].values
     assert HOIST[column].numbers == {column: before}
-    assert HOIST[column].unit == find(column).unit
+    assert HOIST[column].unit == DEFINITIONS.find(column).unit
     changed = HOIST.replace(**{column: 0.99 * before})
     assert changed[column].value == 0.99 * before
     assert changed[column].status == "user"

@@ -128,11 +128,8 @@ class FiveStates:
     ) -> dict[str, Linearised]:
         full, command = self.at(values), experiment.input.values
         found = full.simulate(command, substeps=self.substeps)
-        how = {"parameters": names, "substeps": self.substeps}
-        return {
-            name: Linearised(getattr(found, name), full.sensitivities(command, signal=name, **how))
-            for name in experiment.channels
-        }
+        by = full.sensitivities(command, parameters=names, substeps=self.substeps)
+        return {name: Linearised(getattr(found, name), by[name]) for name in experiment.channels}
 
 
 @pytest.mark.slow

@@ -88,7 +88,7 @@ def test_erratum_27_what_a_speed_below_its_limit_does_not_show() -> None:
     luff = Drive.preset("luff")
     voltage = maneuvers.source_tests("luff")["sine 4 V 0.1 Hz"].sample(512.0)
     found = luff.sensitivities(voltage, parameters=["Z10", "Z13"])
-    by = dict(zip(found.names, np.abs(found.shaft_speed).max(axis=0), strict=True))
+    by = dict(zip(found.names, np.abs(found["shaft_speed"]).max(axis=0), strict=True))
     assert by["Z13_plus"] == by["Z13_minus"] == 0.0
     assert by["Z10"] > 0.01
     hard = luff.simulate_current(np.repeat([1.0, -1.0], [5000, 9000])).shaft_speed

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from swashplate import Drive, maneuvers
+from swashplate.batch import SquaredError
 from swashplate.equations.model import place
-from swashplate.models.card import card
-from swashplate.simulation.batch import SquaredError
+from swashplate.models.amplifier import card
 
 H = 1.0 / 512.0
 

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from swashplate.simulation.result import Simulation
+    from swashplate.drive import Simulation
 
 Array = NDArray[np.float64]
 

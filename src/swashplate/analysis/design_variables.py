@@ -9,7 +9,7 @@ from typing import NamedTuple
 from swashplate.analysis.outcomes import meant
 from swashplate.drive import Drive
 from swashplate.errors import InputError
-from swashplate.parameters.definitions import CATALOGUE, COLUMNS, REFINEMENTS, columns_of
+from swashplate.parameters.definitions import CATALOGUE, COLUMNS, REFINEMENTS
 from swashplate.tables import Column, Table
 
 FactorRange = tuple[float, float]
@@ -170,7 +170,7 @@ def with_factors(drive: Drive, factors: Mapping[str, float]) -> Drive:
         if not factor >= 0.0:
             raise InputError(f"The factor on {name} is {factor:g}, but must be 0 or more.")
         for symbol, power in powers.items():
-            for column in columns_of([symbol]):
+            for column in drive.parameters.definitions.columns_of([symbol]):
                 if column not in numbers:
                     raise InputError(f"{column} has no value here that a factor could change.")
                 scaled[column] = scaled.get(column, numbers[column]) * factor**power

@@ -12,15 +12,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from swashplate.analysis.capability import farthest_stop
 from swashplate.analysis.outcomes import checked_speed, rms_difference
-from swashplate.drive import Drive, Given
+from swashplate.drive import Drive, Given, Limit, Simulation, simulate_drive
 from swashplate.equations.marching.record import SOURCE_RATE
 from swashplate.equations.marching.run import Start
 from swashplate.errors import DomainError, ParameterError, SwashplateError
-from swashplate.parameters.definitions import columns_of
 from swashplate.parameters.parameter_set import Change
 from swashplate.results import Result, Tabular, figures
-from swashplate.simulation.result import Limit, Simulation
-from swashplate.simulation.run import simulate_drive
 from swashplate.tables import Column, Table, listed, quantity, share_cell
 
 if TYPE_CHECKING:
@@ -63,7 +60,7 @@ def removals(drive: Drive) -> list[Removal]:
     Only those whose removal changes a parameter. The spool offset is among them, although it limits
     nothing: the creep that it causes is an error, too.
     """
-    numbers = drive.parameters.numbers
+    numbers, definitions = drive.parameters.numbers, drive.parameters.definitions
     # with the card's jump left as it is, a solenoid's dead zone beyond it would stay
     jump = min(numbers["Z17"], numbers["J_plus"], numbers["J_minus"])
     plate = farthest_stop(drive)
@@ -91,7 +88,7 @@ def removals(drive: Drive) -> list[Removal]:
         changes = {
             name: value
             for name, value in removal.changes.items()
-            if any(numbers[column] != value for column in columns_of([name]))
+            if any(numbers[column] != value for column in definitions.columns_of([name]))
         }
         if changes:
             present.append(replace(removal, changes=changes))

@@ -21,7 +21,7 @@ from swashplate.tables import UNIT, Column, Table
 from swashplate.units import DisplayUnit, display_unit, of_shaft
 
 if TYPE_CHECKING:
-    from swashplate.simulation.result import Simulation
+    from swashplate.drive import Simulation
 
 Array = NDArray[np.float64]
 

@@ -18,12 +18,11 @@ from swashplate.analysis.outcomes import (
     outcome_matrix,
     trial_of,
 )
-from swashplate.drive import Drive
+from swashplate.drive import Drive, Simulation
 from swashplate.errors import DomainError, InputError, ParameterError
 from swashplate.maneuvers import Maneuver
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.results import Drawn, Result, figures
-from swashplate.simulation.result import Simulation
 from swashplate.tables import UNIT, Column, Table, listed, quantity
 from swashplate.units import of_shaft
 

@@ -30,11 +30,10 @@ from numpy.typing import NDArray
 
 from swashplate.__about__ import __version__
 from swashplate.campaign.schema import CHANNEL_KINDS, KINDS, SIGNALS, ChannelKind
-from swashplate.drive import Drive
+from swashplate.drive import Drive, Simulation
 from swashplate.equations.marching.record import SOURCE_RATE
 from swashplate.errors import FileError, InputError, ParameterError
 from swashplate.maneuvers import Maneuver, positive, source_tests, whole
-from swashplate.simulation.result import Simulation
 from swashplate.tables import write_text, write_whole
 
 if TYPE_CHECKING:

@@ -464,7 +464,8 @@ def linearize(
     bandwidth and the largest gain of a speed loop closed over the drive. The
     model is exact for small motions; 'swashplate bode' shows large ones.
     """
-    from swashplate.linear import LINEAR_MODEL, model_tables
+    from swashplate.drive import model_tables
+    from swashplate.linear import LINEAR_MODEL
 
     check_output(out, LINEAR_MODEL, force=force)
     if (at is None) == (current is None):
@@ -476,10 +477,12 @@ def linearize(
     with working("Linearising"):
         model = drive.chosen.linearize(at, current=current, input=input)
         if sample_time is not None:
-            model = model.discrete(sample_time, interpolation)
+            if not sample_time > 0.0:
+                raise InputError(f"--sample-time is {sample_time:g} s, but must be above 0.")
+            model = model.discrete(1.0 / sample_time, interpolation)
         tables = model_tables(model, frequency, None if loop_gain is None else degrees(loop_gain))
     save(out, "Model, in SI", model.write)
-    kind = "" if model.sample_time is None else f", sampled at {model.sample_time:g} s"
+    kind = "" if sample_time is None else f", sampled at {sample_time:g} s"
     drive.note(f"{drive.title}, small motions of the {model.input.replace('_', ' ')}{kind}")
     for switch in model.operating_point.one_sided:
         note(f"One-sided at the {switch}.")
@@ -538,7 +541,7 @@ def bode(
     """
     import numpy as np
 
-    from swashplate.linear import response_table
+    from swashplate.drive import response_table
 
     if not 2 <= points <= MOST_POINTS:
         raise InputError(f"--points is {points}, but must be 2 to {MOST_POINTS}.")

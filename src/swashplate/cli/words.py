@@ -19,12 +19,12 @@ if TYPE_CHECKING:
     from swashplate.analysis.outcomes import Trial
     from swashplate.campaign import Campaign, Experiment
     from swashplate.cli.options import Sampling, Simulating, Start
-    from swashplate.drive import Drive
+    from swashplate.drive import Drive, Simulation
+    from swashplate.drive.simulation import Array
     from swashplate.identification.estimation.model_setup import ModelSetup
     from swashplate.identification.estimation.setup import Setup
     from swashplate.maneuvers import Maneuver
     from swashplate.parameters.parameter_set import Change, ParameterSet
-    from swashplate.simulation.result import Array, Simulation
 
 _NUMBER = r"[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|inf\b|nan\b)"
 _VALUE = re.compile(rf"\s*({_NUMBER})(?:/({_NUMBER}))?\s*((?:1/)?[^\W\d_].*|°.*)?")
@@ -197,13 +197,15 @@ def assigned(
 def drive_of(word: str, values: Sequence[str] = (), factors: Sequence[str] = ()) -> Drive:
     """The drive of a name or file, with values set and then scaled."""
     from swashplate.drive import Drive
-    from swashplate.parameters.definitions import find
+
+    drive = Drive(parameters_of(word))
+    definitions = drive.parameters.definitions
 
     def valued(name: str) -> Any:
         if _is_design_variable(name):
             words = f"{name} is a design variable, which has no value: write --scale {name}=1.5."
             raise InputError(words)
-        return find(name)
+        return definitions.find(name)
 
     set_as = "Z16=1.2e-4, Z16=1.2e-4/1.5e-4 (plus/minus) or Z16_plus=0.12mm"
     scaled_as = "Z16=1.5, Z16=1.5/1.2 (plus/minus) or orifice=1.5"
@@ -214,7 +216,7 @@ def drive_of(word: str, values: Sequence[str] = (), factors: Sequence[str] = ())
 
     def scalable(name: str) -> Any:
         try:
-            return find(name)
+            return definitions.find(name)
         except UnknownParameterError:
             from swashplate.analysis.design_variables import powers_of
 
@@ -222,7 +224,7 @@ def drive_of(word: str, values: Sequence[str] = (), factors: Sequence[str] = ())
 
     chosen = assigned("--set", values, set_as, valued, units=True)
     changes = assigned("--scale", scaled_variables, scaled_as, str, (1,))
-    drive = Drive(parameters_of(word)).replace(**chosen)
+    drive = drive.replace(**chosen)
     drive = drive.scale(**assigned("--scale", scaling, scaled_as, scalable))
     if changes:
         from swashplate.analysis.design_variables import with_factors
@@ -411,8 +413,8 @@ def simulated(
 
 def _measured(measured: Sequence[str], log: str, time_column: str) -> dict[str, Any]:
     """Inputs other than the voltage by name: a column of a log, or a number."""
+    from swashplate.drive import MEASURED
     from swashplate.logs import read_series
-    from swashplate.simulation.result import MEASURED
 
     found = dict[str, Any]()
     for word in measured:

@@ -39,4 +39,13 @@ def linearize(crane: Crane, boom_deg: float = 45.0, rope_m: float = 20.0) -> Lin
     B[4], B[5, 1], B[6, 2] = (-g.hoist, 0.0, g.coupling * g.luff), 1.0, boom_rate(boom, g)
     C[2:, 4:] = np.eye(3)
     name = f"{crane.name}_{boom_deg:g}_{rope_m:g}"
-    return LinearModel(A, B, C, np.zeros((5, 3)), STATES, AXES, OUTPUTS, 0.0, None, name, ())
+    return LinearModel(
+        name=name,
+        A=A,
+        B=B,
+        C=C,
+        D=np.zeros((5, 3)),
+        states=STATES,
+        inputs=AXES,
+        outputs=OUTPUTS,
+    )

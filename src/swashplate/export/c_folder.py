@@ -14,22 +14,27 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.drive import Drive
+from swashplate.drive import (
+    RANGES,
+    Drive,
+    Sample,
+    check_filter_stability,
+    drive_instance,
+    models_of,
+)
+from swashplate.equations import instance_of
 from swashplate.equations.code_generation.printing_c import c_name, comment_line, filled, literal
 from swashplate.equations.fields import declared_by
 from swashplate.equations.marching.record import SOURCE_RATE, check_rate
 from swashplate.equations.marching.run import Instance
-from swashplate.equations.marching.run import instance_of as instance_of_model
 from swashplate.equations.model import Model
 from swashplate.errors import FileError, InputError, InputTypeError
 from swashplate.export.c_source import Exported, interface, numbers
 from swashplate.export.variable_list import DRIVE, DRIVE_WORDS, OWN, References, Words, words_of
-from swashplate.models.card import stable_step
+from swashplate.models.amplifier import stable_step
 from swashplate.models.displacement_control import steep_stops
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
-from swashplate.simulation.instance import check_filter_stability, instance_of, models_of
-from swashplate.simulation.run import RANGES, Sample
 from swashplate.tables import write_text
 
 Array = NDArray[np.float64]
@@ -167,7 +172,7 @@ def content_of(
                 stacklevel=3,
             )
         check_filter_stability(what.parameters, step)
-        exported, instance = exported_drive(what), instance_of(what.parameters, True)
+        exported, instance = exported_drive(what), drive_instance(what.parameters, True)
         name, title, references, words = what.name, what.parameters.title, DRIVE, DRIVE_WORDS
     else:
         if not isinstance(what, Model):
@@ -175,7 +180,7 @@ def content_of(
                 f"{what!r} cannot be exported: give a Drive or a Model of equations"
                 f"{_nearest(what)}."
             )
-        instance = instance_of_model(what, parameters, options=options, given=given)
+        instance = instance_of(what, parameters, options=options, given=given)
         exported, name, title = Exported(what, prefix), what.name, f"Model {what.name}"
         references, words = OWN, words_of(exported)
     values = numbers(exported, instance, step)

@@ -12,10 +12,10 @@ from dataclasses import dataclass, replace
 from math import inf, isfinite
 from typing import Any, Literal, NamedTuple
 
+from swashplate.drive import CHAIN, MEASURED, MOTOR
 from swashplate.equations.code_generation.printing_c import c_name, literal
 from swashplate.equations.fields import Definition, declared_by
 from swashplate.export.c_source import Exported
-from swashplate.simulation.result import CHAIN, MEASURED, MOTOR
 
 Causality = Literal["input", "output", "parameter", "independent"]
 Variability = Literal["continuous", "tunable", "fixed"]

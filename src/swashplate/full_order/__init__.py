@@ -8,7 +8,6 @@ from swashplate.full_order.drive import FullOrderDrive as FullOrderDrive
 from swashplate.full_order.drive import FullOrderSimulation as FullOrderSimulation
 from swashplate.full_order.drive import Modes as Modes
 from swashplate.full_order.drive import compare as compare
-from swashplate.full_order.drive import path_of as path_of
 from swashplate.full_order.drive import validity as validity
 from swashplate.full_order.drive import validity_table as validity_table
 from swashplate.full_order.drive import validity_verdict as validity_verdict

@@ -15,30 +15,34 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate import maneuvers
-from swashplate.drive import Drive
-from swashplate.equations.code_generation.derivatives import derive
+from swashplate.drive import (
+    UNITS,
+    Drive,
+    card_of,
+    card_options,
+    check_filter_stability,
+    drive_records,
+)
+from swashplate.equations import BoundModel, Sensitivities
 from swashplate.equations.declaration import interpreted
-from swashplate.equations.marching.derivatives import jacobian
-from swashplate.equations.marching.observation import every_sample
 from swashplate.equations.marching.record import (
     SOURCE_RATE,
     Interpolation,
     least_substeps,
-    record_of,
 )
 from swashplate.equations.marching.run import Instance, Part, Start
 from swashplate.equations.marching.use import Run, read_only
 from swashplate.errors import DomainError, InputError
-from swashplate.full_order.physical_set import PhysicalSet, from_lumped
+from swashplate.full_order.physical_set import QUANTITIES, PhysicalSet, from_lumped
+from swashplate.linear import linearize
 from swashplate.models import full_order as model
-from swashplate.models.displacement_control import Solenoids, solenoid_force
+from swashplate.models.displacement_control import Solenoids
 from swashplate.models.drive import Source
 from swashplate.models.full_order import PlantOptions, PlantSignals
-from swashplate.models.machine import Machine, fastest_rate, relief_pressures
+from swashplate.models.machine import fastest_rate, relief_pressures
+from swashplate.parameters.definitions import CATALOGUE, DEFINITIONS, Definition, Definitions
 from swashplate.parameters.parameter_set import Change
-from swashplate.results import Result, Tabular, figures
-from swashplate.simulation.instance import PATHS, card_of, card_options, check_filter_stability
-from swashplate.simulation.result import UNITS, Named
+from swashplate.results import Named, Result, Tabular, figures
 from swashplate.tables import UNIT, Cell, Column, Table
 from swashplate.units import PLATE_RATE, SHAFT_ANGLE
 
@@ -46,8 +50,8 @@ if TYPE_CHECKING:
     import polars
     from matplotlib.figure import Figure
 
+    from swashplate.drive import Simulation
     from swashplate.maneuvers import Maneuver
-    from swashplate.simulation.result import Simulation
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.int8]
@@ -58,18 +62,25 @@ LEAST_SUBSTEPS = 8  # Sub-steps a sample that kinks of the flow, at the orifices
 MOST_SUBSTEPS = 20_000  # Sub-steps a sample, beyond which the machine is too stiff for the march.
 
 
-def path_of(name: str) -> str:
-    """Path in the model of a quantity, or of a parameter of card or solenoids, by its column."""
-    if name in Machine._fields:
-        return f"plant.machine.{name}"
-    if name in Solenoids._fields:
-        return f"plant.solenoids.{name}"
-    if PATHS.get(name, "").startswith("card."):
-        return PATHS[name]
-    raise InputError(
-        f"A drive with five states has no parameter '{name}'; it has those of the card, "
-        f"{', '.join((*Solenoids._fields, *Machine._fields))}."
-    )
+def _definitions() -> Definitions:
+    """Parameters of the drive with five states: the card's, the solenoids', the machine's."""
+    by_symbol, paths = dict[str, Definition](), dict[str, str]()
+    for symbol, definition in CATALOGUE.items():
+        if definition.block == "control_card":
+            by_symbol[symbol] = definition
+            paths |= {column: DEFINITIONS.paths[column] for column in definition.columns}
+        elif set(definition.columns) <= set(Solenoids._fields):
+            by_symbol[symbol] = definition
+            paths |= {column: f"plant.solenoids.{column}" for column in definition.columns}
+    for symbol, definition in QUANTITIES.items():
+        by_symbol[symbol] = definition
+        columns = zip(definition.columns, definition.fields, strict=True)
+        paths |= {column: f"plant.machine.{path}" for column, path in columns}
+    return Definitions(by_symbol, paths)
+
+
+FULL_ORDER_DEFINITIONS = _definitions()
+"""What a drive with five states can be differentiated by."""
 
 
 class FullOrderSimulation(Run, Tabular):
@@ -347,15 +358,12 @@ class FullOrderDrive:
             raise InputError(f"The current is {current}, but must be a finite number of amperes.")
         step = 1.0 / SOURCE_RATE
         instance = self.instance(step, card=False)
-        motion = instance.start({"current": float(current)}, step, "steady").states[1].motion
-        force = interpreted(solenoid_force)(float(current), self.plant.solenoids)
-        options = instance.options[1]
-        derived = derive(model.free_rates, by="state", options={"options": options})
-        found = derived.python(motion, force, self.plant.machine, options)
-        matrix = np.zeros((5, 5))
-        matrix[0, 1] = matrix[3, 4] = 1.0
-        for (row, column), slope in zip(derived.entries, found[3:], strict=True):
-            matrix[(1, 2, 4)[row], column] = slope
+        at = {"current": float(current)}
+        motion = instance.start(at, step, "steady").states[1].motion
+        flowing = Instance(
+            model.flowing_plant, (Part(self.plant, instance.options[1]),), self.physical.name
+        )
+        matrix = linearize(flowing, at, None, states=(motion,), outputs=("swash_angle",)).A
         values, right = np.linalg.eig(matrix)
         parts = np.abs(np.linalg.inv(right).T * right)  # (state, mode), free of the states' units
         slow = int(np.argmin(np.abs(values)))
@@ -375,21 +383,39 @@ class FullOrderDrive:
         rate: float = SOURCE_RATE,
         *,
         parameters: Sequence[str],
-        signal: str = "shaft_speed",
         start: Start = "rest",
         substeps: int | None = None,
-    ) -> Array:
-        """(n, k) exact derivatives of a signal by parameters, those of the march's own steps.
+    ) -> Sensitivities[FullOrderSimulation]:
+        """Simulate with exact derivatives of any signal, those of the march's own steps.
 
-        Parameters are columns of physical quantities (``"swash_inertia"``, ``"swash_stop_plus"``),
-        of the solenoids (``"Z19_plus"``) and of the card (``"omega_plus"``, ``"tau"``); the signal
-        is of `swashplate.models.full_order.PlantSignals`, ``"shaft_position"`` or a current. Other
-        arguments as in `simulate`.
+        Parameters
+        ----------
+        voltage, rate, start, substeps :
+            As in `simulate`.
+        parameters : sequence of str
+            Symbols (``"Z19"`` stands for both directions) or columns (``"Z19_plus"``): of physical
+            quantities (``"swash_inertia"``), of the solenoids, and of the card (``"omega"``,
+            ``"tau"``).
+
+        Returns
+        -------
+        Sensitivities
+            Derivatives by signal, ``by["shaft_speed"]``, (n, k), with the columns' names and the
+            run.
+
+        Raises
+        ------
+        UnknownParameterError
+            If there is no quantity or parameter of a name.
+        InputError
+            As in `simulate`.
         """
-        record = record_of(voltage, rate, what="voltage")
-        columns = [path_of(name) for name in parameters]
-        observed = every_sample(record, signal, "voltage", start)
-        return jacobian(self.instance(record.step, substeps=substeps), observed, columns).columns
+        records = drive_records("voltage", voltage, rate)
+        instance = self.instance(records["voltage"].step, substeps=substeps)
+        names = tuple(FULL_ORDER_DEFINITIONS.columns_of(parameters))
+        paths = [FULL_ORDER_DEFINITIONS.path_of(name) for name in names]
+        bound = BoundModel(instance, paths=paths)
+        return Sensitivities(FullOrderSimulation(instance, records, start), names, bound)
 
 
 # --- natural modes --------------------------------------------------------------------------------

@@ -49,7 +49,6 @@ from swashplate.identification.statistics.intervals import (
 from swashplate.identification.statistics.profiles import Profile
 from swashplate.identification.validation import RunQuality, predict
 from swashplate.locks import locked
-from swashplate.parameters.definitions import find
 from swashplate.parameters.files import (
     FITTED_DRIVE,
     FITTED_NUMBERS,
@@ -406,7 +405,9 @@ def _interval_words(stages: Sequence[StageFit], found: ParameterSet) -> dict[str
                 for target in (each for each in unknown.targets if each in found.numbers):
                     side = target.rpartition("_")[2]
                     side = f"{side} " if side in ("plus", "minus") else ""
-                    words.setdefault(find(target).symbol, []).append(f"{side}{ends}")
+                    words.setdefault(found.definitions.find(target).symbol, []).append(
+                        f"{side}{ends}"
+                    )
     return words
 
 

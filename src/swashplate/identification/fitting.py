@@ -56,7 +56,6 @@ from swashplate.identification.estimation.stages import (
 from swashplate.identification.estimation.unknowns import Prior
 from swashplate.identification.stage_fit import Interval, StageFit
 from swashplate.identification.statistics.intervals import Estimate, uncertainty_of, weighed
-from swashplate.parameters.definitions import columns_of
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import SIDES
 from swashplate.progress import LOGGER, working
@@ -357,7 +356,7 @@ def _of_drive(
             "A fit of a drive needs to know what is free, such as 'hoist' or {'Z8': (0.5, 2)}; "
             "swashplate.identify takes drive and fit configuration from the campaign."
         )
-    setup = configuration(free, runs)
+    setup = configuration(free, runs, parameters.definitions)
     nominal, changed = with_card_filter(setup.card_filter, runs, parameters)
     doubts = refuse_unsound(check_runs(runs, smooth(nominal)))
     doubts += refuse_unsound(unfitted_currents(runs, setup))
@@ -627,9 +626,10 @@ def drawn(nominal: Drive, setup: Setup, seed: int, *, spread: float = SPREAD) ->
     that what was drawn breaks a rule: draw with another seed.
     """
     random = np.random.default_rng(seed)
-    names = [name for stage in setup.stages for name in columns_of(list(stage.free))]
+    definitions = nominal.parameters.definitions
+    names = [name for stage in setup.stages for name in definitions.columns_of(stage.free)]
     if any(stage.forces is not None for stage in setup.stages):
-        names += columns_of(list(OF_FORCES))
+        names += definitions.columns_of(OF_FORCES)
     numbers = nominal.parameters.numbers
     factors = {name: float(np.exp(random.normal(0.0, spread))) for name in names}
     return nominal.replace(**{name: numbers[name] * factor for name, factor in factors.items()})

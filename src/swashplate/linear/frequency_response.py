@@ -1,13 +1,13 @@
 """Frequency responses to sines of a size: describing functions, by simulation.
 
-The drive is marched over whole cycles of each frequency until it repeats itself.
+A model is marched over whole cycles of each frequency until its output repeats itself.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from math import ceil, sqrt
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from math import ceil
 from typing import TYPE_CHECKING, cast, overload
 
 import numpy as np
@@ -15,16 +15,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from swashplate.equations.fields import is_real
 from swashplate.equations.marching.march import output_of
-from swashplate.equations.marching.record import FASTEST, SOURCE_RATE, check_rate
+from swashplate.equations.marching.record import check_rate
 from swashplate.equations.marching.run import Instance, marched
 from swashplate.errors import DomainError, InputError
-from swashplate.linear.drive import OUTPUTS
-from swashplate.models.displacement_control import Pump
-from swashplate.parameters.parameter_set import ParameterSet
-from swashplate.parameters.rules import FULL_VOLTAGE
+from swashplate.linear.model import LinearModel
 from swashplate.results import GivenAxes, Tabular, figures
-from swashplate.simulation.instance import check_filter_stability, instance_of, without_ripple
-from swashplate.simulation.result import UNITS
 from swashplate.tables import Column, Table
 
 if TYPE_CHECKING:
@@ -32,11 +27,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from swashplate.linear.drive import LinearDrive
-
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
-SWEPT_OUTPUTS = OUTPUTS[:7]  # Without the motor's.
 SLOWEST_CYCLE = 1e-3  # Lowest frequency. [Hz]
 FEWEST_STEPS, MOST_STEPS = 8, 1_000_000
 """Steps of a cycle, which bound the frequencies from both sides."""
@@ -55,23 +47,26 @@ class FrequencyResponse(Tabular):
     """
 
     name: str
-    """Name of the drive."""
+    """Name of the machine."""
     input: str
-    """``"voltage"`` or ``"current"``."""
+    """What moves it."""
     output: str
+    """The signal that answers."""
     bias: float
-    """Mean of the input. [V or A]"""
+    """Mean of the input, in its SI unit."""
     frequencies: Array
     """Rising, (f,). [Hz]"""
     amplitudes: Array
-    """Of the input, as given, (a,). [V or A]"""
+    """Of the input, as given, (a,), in its SI unit."""
     ratio: ComplexArray
-    """First harmonic of the output by that of the input, (a, f); 0 where nothing moves."""
+    """First harmonic of the output by that of the input, (a, f); 0 if nothing moves."""
     distortion: Array
     """Root mean square of all but mean and first harmonic, by that of the first harmonic, (a, f);
-    0 where nothing moves. [1]"""
+    0 if nothing moves. [1]"""
     mean: Array
     """Mean of the output, (a, f)."""
+    units: Mapping[str, str] = field(default_factory=dict)
+    """SI units of input and output by name, as far as they are known."""
 
     def __repr__(self) -> str:
         return (
@@ -83,7 +78,7 @@ class FrequencyResponse(Tabular):
     def plot(
         self,
         *,
-        linear: LinearDrive | None = None,
+        linear: LinearModel | None = None,
         mark: float | None = 0.3,
         ax: None = None,
         title: str | None = None,
@@ -93,7 +88,7 @@ class FrequencyResponse(Tabular):
     def plot(
         self,
         *,
-        linear: LinearDrive | None = None,
+        linear: LinearModel | None = None,
         mark: float | None = 0.3,
         ax: GivenAxes,
         title: str | None = None,
@@ -102,7 +97,7 @@ class FrequencyResponse(Tabular):
     def plot(
         self,
         *,
-        linear: LinearDrive | None = None,
+        linear: LinearModel | None = None,
         mark: float | None = 0.3,
         ax: Axes | Sequence[Axes] | None = None,
         title: str | None = None,
@@ -139,10 +134,12 @@ class FrequencyResponse(Tabular):
 
     def table(self) -> Table:
         """Gain, phase and distortion by amplitude, at up to `SHOWN` of the frequencies."""
+        unit, answer_unit = self.units.get(self.input, ""), self.units.get(self.output, "")
+        gain_unit = f"{answer_unit or '1'}/{unit}" if unit else answer_unit
         columns = (
-            Column("amplitude", "g", UNITS[self.input]),
+            Column("amplitude", "g", unit),
             Column("frequency", ".4g", "Hz"),
-            Column("gain", ".4g", f"{UNITS[self.output]}/{UNITS[self.input]}", none="no motion"),
+            Column("gain", ".4g", gain_unit, none="no motion"),
             Column("phase", "z.1f", "rad"),
             Column("distortion", ".1%"),
         )
@@ -162,7 +159,7 @@ class FrequencyResponse(Tabular):
 
     def still(self) -> list[str]:
         """Where `moves` denies an answer, in words, for each amplitude that has such a place."""
-        unit, said = UNITS[self.input], list[str]()
+        unit, sentences = self.units.get(self.input, ""), list[str]()
         for amplitude, moves in zip(self.amplitudes, self.moves, strict=True):
             places = np.flatnonzero(~moves)
             if places.size == 0:
@@ -171,11 +168,12 @@ class FrequencyResponse(Tabular):
             where = f"at {low:.3g} Hz" if low == high else f"from {low:.3g} to {high:.3g} Hz"
             if high > low and places[-1] - places[0] >= places.size:
                 where = f"at {places.size} frequencies {where}"
-            said.append(f"No motion under {amplitude:g} {unit} {where}")
-        return said
+            size = f"{amplitude:g} {unit}".rstrip()
+            sentences.append(f"No motion under {size} {where}")
+        return sentences
 
     def to_polars(self) -> polars.DataFrame:
-        """Table in SI, a row for each amplitude and frequency; no phase where nothing moves."""
+        """Table in SI, a row for each amplitude and frequency; no phase if nothing moves."""
         import polars as pl
 
         shape = self.ratio.shape
@@ -191,52 +189,96 @@ class FrequencyResponse(Tabular):
 # --- sweep ----------------------------------------------------------------------------------------
 
 
-def sweep(
-    parameters: ParameterSet,
-    frequencies: ArrayLike,
-    amplitudes: ArrayLike,
-    bias: float = 0.0,
-    input: str = "voltage",
-    output: str = "shaft_speed",
-    rate: float = SOURCE_RATE,
-    tolerance: float = 1e-4,
-) -> FrequencyResponse:
-    """Describing function by sine sweep; see `Drive.frequency_response`."""
-    f, a = _checked(frequencies, "frequencies"), _checked(amplitudes, "amplitudes")
+def steps_of(frequency: float, rate: float) -> int:
+    """Steps of a cycle: whole ones, none of them longer than at the rate."""
+    return ceil(rate / frequency * (1.0 - 1e-12))
+
+
+def checked_frequencies(frequencies: ArrayLike, rate: float) -> Array:
+    """Frequencies as an array, refused unless they rise and suit the rate of the steps. [Hz]"""
     check_rate(rate)
-    if not SOURCE_RATE <= rate <= FASTEST:
-        raise InputError(
-            f"The rate is {rate:g} Hz, but must be between {SOURCE_RATE:g} and {FASTEST:g} Hz."
-        )
+    f = _checked(frequencies, "frequencies")
     lowest, highest = max(SLOWEST_CYCLE, rate / MOST_STEPS), rate / FEWEST_STEPS
     if (np.diff(f) <= 0.0).any() or f[0] < lowest or f[-1] > highest:
         raise InputError(
             f"The frequencies must rise from {lowest:g} Hz or above to at most {highest:g} Hz, an "
             "eighth of the rate."
         )
+    return f
+
+
+def checked_amplitudes(amplitudes: ArrayLike) -> Array:
+    """Amplitudes as an array, refused unless they are above 0."""
+    return _checked(amplitudes, "amplitudes")
+
+
+def sweep(
+    instance: Instance,
+    frequencies: ArrayLike,
+    amplitudes: ArrayLike,
+    rate: float,
+    *,
+    input: str,
+    output: str,
+    bias: float = 0.0,
+    tolerance: float = 1e-4,
+    size: float = 0.0,
+    units: Mapping[str, str] | None = None,
+) -> FrequencyResponse:
+    """Describing function of a model with numbers, by sine sweep.
+
+    Parameters
+    ----------
+    instance : Instance
+        The model with its numbers, see `swashplate.equations.instance_of`. It must be able to start
+        settled.
+    frequencies : (f,) array_like
+        Rising, from 1 mHz to an eighth of the rate. [Hz]
+    amplitudes : (a,) array_like
+        Of the sine about the bias, in the input's SI unit.
+    rate : float
+        Steps a second. At each frequency the step is shortened a little, so that a cycle has a
+        whole number of them and its harmonics are exact. [Hz]
+    input, output : str
+        External signal that moves the model, and the signal that answers.
+    bias : float
+        Mean of the input.
+    tolerance : float
+        Relative change of the first harmonic, from the middle of a march to its end, below which
+        the answer repeats itself.
+    size : float
+        Natural size of the output: an answer below 1e-12 of it is rounding, and counts as none.
+    units : mapping of str to str, optional
+        SI units of input and output by name; by default those that the model declares.
+
+    Returns
+    -------
+    FrequencyResponse
+        A row for each amplitude, a column for each frequency.
+
+    Raises
+    ------
+    InputError
+        For frequencies, amplitudes or options out of range, or signals that the model does not
+        have.
+    DomainError
+        If nothing moves at all, the answer does not come to repeat itself, or the model leaves its
+        domain.
+    """
+    f, a = checked_frequencies(frequencies, rate), checked_amplitudes(amplitudes)
     if not is_real(tolerance) or not 0.0 < tolerance < 1.0:
         raise InputError(f"The tolerance is {tolerance!r}, but must be between 0 and 1.")
-    if input not in ("voltage", "current"):
-        raise InputError(f"The input is '{input}'; it is 'voltage' or 'current'.")
-    if output not in SWEPT_OUTPUTS or output == input:
-        raise InputError(
-            f"'{output}' is no output of a sweep of the {input}; there are "
-            f"{', '.join(name for name in SWEPT_OUTPUTS if name != input)}."
-        )
     if not is_real(bias) or not np.isfinite(bias):
         raise InputError(f"The bias is {bias}, but must be a finite number.")
-    if input == "voltage" and (largest := abs(bias) + float(a.max())) > FULL_VOLTAGE:
-        raise InputError(f"Bias and amplitude reach {largest:g} V, but the card takes ±10 V.")
+    if units is None:
+        known = instance.model.definitions
+        units = {name: known[name].unit for name in (input, output) if name in known}
 
     ratio = np.zeros((a.size, f.size), dtype=np.complex128)
     distortion, mean = np.zeros((2, a.size, f.size))
-    instance = without_ripple(instance_of(parameters, input == "voltage"))
-    size = _size(instance.parts[1].p, output)
     for j, frequency in enumerate(f.tolist()):
-        steps = ceil(rate / frequency * (1.0 - 1e-12))
+        steps = steps_of(frequency, rate)
         step = 1.0 / (frequency * steps)
-        if input == "voltage":
-            check_filter_stability(parameters, step)
         wave = np.sin(2.0 * np.pi * np.arange(steps) / steps)
         for i, amplitude in enumerate(a.tolist()):
             cycle = bias + amplitude * wave
@@ -250,7 +292,7 @@ def sweep(
                     break
                 if count >= LONGEST * least:
                     raise DomainError(
-                        f"{parameters.name}: at {frequency:g} Hz and an amplitude of "
+                        f"{instance.name}: at {frequency:g} Hz and an amplitude of "
                         f"{amplitude:g} the answer has not settled to {tolerance:g} within "
                         f"{count} cycles; allow a larger tolerance, or look at it with a "
                         "simulation."
@@ -258,13 +300,23 @@ def sweep(
                 count *= 2
             ratio[i, j] = last / amplitude
     if not ratio.any():
+        middle_of = f"{bias:g} {units.get(input, '')}".rstrip()
         raise DomainError(
-            f"{parameters.name}: nothing moves about {bias:g} {'V' if input == 'voltage' else 'A'} "
-            f"with amplitudes up to {a.max():g}: all stay in a dead zone or at a stop; take larger "
-            "ones or another bias."
+            f"{instance.name}: nothing moves about {middle_of} with amplitudes up to {a.max():g}: "
+            "all stay in a dead zone or at a stop; take larger ones or another bias."
         )
-    name = parameters.name
-    return FrequencyResponse(name, input, output, float(bias), f, a, ratio, distortion, mean)
+    return FrequencyResponse(
+        name=instance.name,
+        input=input,
+        output=output,
+        bias=float(bias),
+        frequencies=f,
+        amplitudes=a,
+        ratio=ratio,
+        distortion=distortion,
+        mean=mean,
+        units=units,
+    )
 
 
 def _cycles(
@@ -275,18 +327,6 @@ def _cycles(
     seen, _ = output_of(instance.model, output)
     (signal,) = marched(instance, {input: record}, step, started, (seen,), input)
     return np.asarray(signal.reshape(-1, steps))
-
-
-def _size(pump: Pump, output: str) -> float:
-    """Natural size of a signal, beside which rounding is told from motion."""
-    sizes = {
-        "shaft_speed": pump.Z10,
-        "stroker_pressure": 1.0 / pump.Z1,
-        "spool_position": pump.Z5,
-        "orifice_opening": pump.Z5,
-        "solenoid_force": sqrt(pump.Z4) / pump.Z5,
-    }
-    return sizes.get(output, 1.0)
 
 
 def _harmonic(signal: Array, size: float) -> tuple[complex, float, float]:
@@ -310,38 +350,3 @@ def _checked(values: ArrayLike, what: str) -> Array:
     if data.ndim != 1 or data.size == 0 or not (np.isfinite(data) & (data > 0.0)).all():
         raise InputError(f"The {what} must be one or more finite numbers above 0, in one row.")
     return data
-
-
-def response_table(response: FrequencyResponse, frequency: float) -> Table:
-    """Gain, phase, lag and distortion of a drive by the amplitude of the sine.
-
-    `response` is from voltage to the shaft's speed; at one of its frequencies [Hz]: another is
-    refused in an `InputError`, nothing is interpolated.
-    """
-    at = int(np.argmin(np.abs(response.frequencies - frequency)))
-    nearest = float(response.frequencies[at])
-    if not abs(nearest - frequency) <= 1e-9 * nearest:
-        raise InputError(
-            f"The response was not taken at {frequency:g} Hz; the nearest frequency is "
-            f"{nearest:.6g} Hz."
-        )
-    heads = (
-        ("amplitude", "g", "V"),
-        ("gain", ".3f", "rad/s/V", "none"),
-        ("phase", "z.1f", "deg"),
-        ("lag", "z.1f", "ms"),
-        ("distortion %", ".1f"),
-        ("mean speed", "z.2f", "rad/s"),
-    )
-    made = Table("", tuple(Column(*each) for each in heads))
-    # the phase within a turn of itself, as of this frequency alone
-    phases = np.angle(response.ratio[:, at])
-    for k, amplitude in enumerate(map(float, response.amplitudes)):
-        answer: tuple[float | None, ...] = (None,) * 4
-        if response.moves[k, at]:
-            phase = float(phases[k])
-            lag = -1e3 * phase / (2.0 * np.pi * frequency)
-            distortion = 100.0 * float(response.distortion[k, at])
-            answer = (float(response.gain[k, at]), np.degrees(phase), lag, distortion)
-        made.add(amplitude, *answer, float(response.mean[k, at]))
-    return made

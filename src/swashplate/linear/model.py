@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 from math import copysign, inf, pi
 from pathlib import Path
@@ -13,7 +13,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.errors import DomainError, InputError
-from swashplate.simulation.result import UNITS
 from swashplate.tables import Form, ending, write_text
 
 if TYPE_CHECKING:
@@ -32,31 +31,40 @@ Two that integrate one after the other are found some 1e-8 apart."""
 LINEAR_MODEL = Form("a linear model", (".toml", ".json"))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class LinearModel:
     """Small motions about an operating point.
 
-    Continuous (`sample_time` None): x' = A x + B u, y = C x + D u. Sampled: x[n+1] = A x[n] +
-    B u[n], y[n] = C x[n] + D u[n]. All are deviations from the operating point, in SI. The first of
-    the inputs u comes late by `delay`.
+    Continuous (`rate` None): x' = A x + B u, y = C x + D u. Sampled: x[n+1] = A x[n] + B u[n],
+    y[n] = C x[n] + D u[n]. All are deviations from the operating point, in SI. The first of the
+    inputs u comes late by `delay`.
     """
 
-    A: Array  # (n, n)
-    B: Array  # (n, k)
-    C: Array  # (m, n)
-    D: Array  # (m, k)
+    name: str
+    """Name of the machine."""
+    A: Array
+    """(n, n)"""
+    B: Array
+    """(n, k)"""
+    C: Array
+    """(m, n)"""
+    D: Array
+    """(m, k)"""
     states: tuple[str, ...]
     inputs: tuple[str, ...]
     """The first is the one that loops, gains and responses are about unless stated otherwise."""
     outputs: tuple[str, ...]
-    delay: float
+    delay: float = 0.0
     """What stands exactly before the first input; of a sampled model whole samples. [s]"""
-    sample_time: float | None  # Interval of a sampled model, None of a continuous one. [s]
-    name: str  # Name of the machine.
-    memory: tuple[str, ...]  # States that are inputs of earlier samples.
+    rate: float | None = None
+    """Samples a second of a sampled model, None of a continuous one. [Hz]"""
+    memory: tuple[str, ...] = ()
+    """States that are inputs of earlier samples."""
+    units: Mapping[str, str] = field(default_factory=dict)
+    """SI units of inputs and outputs by name, as far as they are known."""
 
     def __repr__(self) -> str:
-        time = "continuous" if self.sample_time is None else f"sampled at {self.sample_time:g} s"
+        time = "continuous" if self.rate is None else f"sampled at {self.rate:g} Hz"
         kind, inputs = type(self).__name__, ", ".join(self.inputs)
         return f"{kind}({self.name!r}, {inputs} to {', '.join(self.outputs)}, {time})"
 
@@ -69,7 +77,7 @@ class LinearModel:
         """Poles of some of the states by themselves, the slowest first."""
         kept = [k for k, name in enumerate(self.states) if name in states]
         poles = np.linalg.eigvals(self.A[np.ix_(kept, kept)])
-        slowness = poles.real if self.sample_time is None else np.abs(poles)
+        slowness = poles.real if self.rate is None else np.abs(poles)
         return np.asarray(poles[np.lexsort((poles.imag, -slowness))], dtype=np.complex128)
 
     @cached_property
@@ -83,23 +91,23 @@ class LinearModel:
     @property
     def is_stable(self) -> bool:
         """Whether every motion dies out."""
-        if self.sample_time is None:
+        if self.rate is None:
             return bool((self.poles.real < 0.0).all())
         return bool((np.abs(self.poles) < 1.0).all())
 
     @cached_property
     def _slowest(self) -> float:
         """Frequency far below every motion that dies out if some state integrates, else 0. [Hz]"""
-        rates = np.abs(self.poles - (self.sample_time is not None))
+        rates = np.abs(self.poles - (self.rate is not None))
         dying = rates[rates > INTEGRATES * self._scale]
         if dying.size == rates.size:
             return 0.0
-        return float(1e-6 * dying.min(initial=self._scale) / (2.0 * pi * (self.sample_time or 1.0)))
+        return float(1e-6 * dying.min(initial=self._scale) * (self.rate or 1.0) / (2.0 * pi))
 
     @property
     def _scale(self) -> float:
         """Size of the poles: 1 in the z-plane, in the s-plane the fastest."""
-        if self.sample_time is not None:
+        if self.rate is not None:
             return 1.0
         return float(np.abs(self.poles).max(initial=0.0)) or 1.0
 
@@ -120,19 +128,33 @@ class LinearModel:
     def response(self, frequency: ArrayLike, input: str | None = None) -> ComplexArray:
         """Frequency response of the outputs to an input, the first by default, with its delay.
 
-        At frequencies from 0 on, of a sampled model up to 1/(2 h) [Hz]: (m,) or (m, f) complex G
-        e^(-jω delay) with G = C (p - A)⁻¹ B + D, p being jω or, sampled, e^(jωh). At 0 Hz it is
-        infinite of an output that integrates, with the sign of its growth.
+        Parameters
+        ----------
+        frequency : float or (f,) array_like
+            From 0 on, of a sampled model up to half its rate. [Hz]
+        input : str, optional
+            Of `inputs`.
+
+        Returns
+        -------
+        (m,) or (m, f) complex array
+            G e^(-jω delay) with G = C (p - A)⁻¹ B + D, p being jω or, sampled, e^(jωh). At 0 Hz it
+            is infinite of an output that integrates, with the sign of its growth.
+
+        Raises
+        ------
+        InputError
+            For other frequencies, and an input that the model does not have.
         """
         f = np.atleast_1d(np.asarray(frequency))
-        h = self.sample_time
-        highest = inf if h is None else 0.5 / h
+        h = None if self.rate is None else 1.0 / self.rate
+        highest = inf if self.rate is None else 0.5 * self.rate
         # half the rate may have been computed in another way
         numbers = f.dtype.kind in "fiub" and f.ndim == 1
         if not numbers or not (np.isfinite(f) & (f >= 0.0) & (f <= highest * (1.0 + 1e-12))).all():
             raise InputError(
                 "Frequencies must be one row of finite numbers from 0 on"
-                + ("." if h is None else f" to 1/(2 h) = {highest:g} Hz.")
+                + ("." if h is None else f" to half the rate, {highest:g} Hz.")
             )
         if input is not None and input not in self.inputs:
             raise InputError(
@@ -161,7 +183,7 @@ class LinearModel:
 
     def _fastest(self) -> float:
         """Frequency far beyond all poles, or half the rate of a sampled model. [Hz]"""
-        sampled = self.sample_time is not None
+        sampled = self.rate is not None
         growth = np.abs(self.poles) - 1.0 if sampled else self.poles.real
         integrates = np.abs(self.poles - sampled) <= INTEGRATES * self._scale
         if (growth[~integrates] >= 0.0).any():
@@ -169,7 +191,7 @@ class LinearModel:
                 f"{self.name}: the linear model is unstable (poles {self.poles}), so that a "
                 "bandwidth or margin means nothing."
             )
-        return 0.5 / self.sample_time if self.sample_time is not None else 1e3 * self._scale
+        return 1e3 * self._scale if self.rate is None else 0.5 * self.rate
 
     def _largest(self, grid: Array) -> float:
         """Largest magnitude of the response of an output that follows a steady input."""
@@ -185,8 +207,12 @@ class LinearModel:
     def bandwidth(self) -> float:
         """Frequency at which the first output falls 3 dB (to 1/√2) below its steady gain. [Hz]
 
-        Infinite where it never does, below half the rate of a sampled model; a `DomainError` where
-        the output integrates.
+        Infinite if it never does below half the rate of a sampled model.
+
+        Raises
+        ------
+        DomainError
+            If the output integrates or does not follow a steady input, or the model is unstable.
         """
         grid = _grid(self._fastest())
         self._largest(grid)
@@ -203,7 +229,7 @@ class LinearModel:
     def largest_gain(self) -> float:
         """Proportional gain at which the loop u = K (r - y) of the first output begins to swing.
 
-        In the input's unit by the output's, positive; infinite where none does.
+        In the input's unit by the output's, positive; infinite if none does.
         """
         small = 0.5 / self._largest(_grid(self._fastest()))
         return small * self.margins(copysign(small, self.gain)).gain_margin
@@ -244,9 +270,9 @@ class LinearModel:
         from scipy.signal import StateSpace
 
         matrices = self.A, self.B, self.C, self.D
-        if self.sample_time is not None:
-            late = round(self.delay / self.sample_time)
-            return StateSpace(*with_line(matrices, late), dt=self.sample_time)
+        if self.rate is not None:
+            late = round(self.delay * self.rate)
+            return StateSpace(*with_line(matrices, late), dt=1.0 / self.rate)
         if self.delay != 0.0 and not without_delay:
             raise InputError(
                 f"The model has a delay of {self.delay:g} s, which no state space holds exactly; "
@@ -257,20 +283,20 @@ class LinearModel:
 
     def content(self) -> dict[str, Any]:
         """What is written of a model, as plain numbers, strings and lists; SI."""
-        time = {} if self.sample_time is None else {"sample_time": self.sample_time}
+        time = {} if self.rate is None else {"rate": self.rate}
         return {
             "format": 1,
             "drive": self.name,
-            "kind": "continuous" if self.sample_time is None else "sampled",
+            "kind": "continuous" if self.rate is None else "sampled",
             "delay": self.delay,
             **time,
             "input": self.input,
             "inputs": list(self.inputs),
             "outputs": list(self.outputs),
             "states": list(self.states),
-            "input_unit": UNITS.get(self.input, ""),
-            "input_units": [UNITS.get(name, "") for name in self.inputs],
-            "output_units": [UNITS.get(name, "") for name in self.outputs],
+            "input_unit": self.units.get(self.input, ""),
+            "input_units": [self.units.get(name, "") for name in self.inputs],
+            "output_units": [self.units.get(name, "") for name in self.outputs],
             **{name: getattr(self, name).tolist() for name in ("A", "B", "C", "D")},
         }
 
@@ -313,8 +339,8 @@ class LoopMargins(NamedTuple):
     """Margins of a stable loop."""
 
     crossover: float
-    """Frequency at which |L| = 1 that leaves the smallest delay margin, 0 where none. [Hz]"""
-    phase_margin: float  # Phase of L above -180° there, infinite where there is no crossover. [rad]
+    """Frequency at which |L| = 1 that leaves the smallest delay margin, 0 if there is none. [Hz]"""
+    phase_margin: float  # Phase of L above -180° there, infinite without a crossover. [rad]
     delay_margin: float  # Further delay that makes the loop swing. [s]
     gain_margin: float  # Factor on L that makes the loop swing. [1]
 

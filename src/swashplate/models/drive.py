@@ -5,8 +5,14 @@ from typing import NamedTuple
 
 from swashplate.equations.declaration import equation
 from swashplate.equations.model import Model, join
-from swashplate.models.card import Card, Currents, card, flowing_card
-from swashplate.models.channel import CardOptions, channel_level
+from swashplate.models.amplifier import (
+    Card,
+    CardOptions,
+    Currents,
+    card,
+    channel_level,
+    flowing_card,
+)
 from swashplate.models.displacement_control import Pump, PumpOptions
 from swashplate.models.pump import (
     PumpInputs,

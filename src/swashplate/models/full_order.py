@@ -19,7 +19,7 @@ from swashplate.equations.declaration import equation
 from swashplate.equations.fields import OFF, Flag
 from swashplate.equations.library import clipped
 from swashplate.equations.model import Model, join
-from swashplate.models.card import card
+from swashplate.models.amplifier import card
 from swashplate.models.displacement_control import Solenoids, solenoid_force
 from swashplate.models.drive import AMMETER, POSITION, source
 from swashplate.models.machine import (
@@ -196,6 +196,20 @@ def substep(
     )
 
 
+@equation
+def plant_rates(state: Motion, current: float, p: Plant, options: PlantOptions) -> Motion:
+    """Rates of the five states under a signed current [A], where no limit holds. [1/s]"""
+    force = solenoid_force(current, p.solenoids)
+    rates = free_rates(state, force, p.machine, options)
+    return Motion(
+        spool_position=state.spool_velocity,
+        spool_velocity=rates.velocity,
+        piston_pressure=rates.pressure,
+        swash_angle=state.swash_rate,
+        swash_rate=rates.swash_rate,
+    )
+
+
 # --- the model -----------------------------------------------------------------------------------
 
 
@@ -314,3 +328,8 @@ full_drive = join("full_drive", card, plant, links=AMMETER, integrals=POSITION)
 
 full_machine = join("full_machine", source, plant, links=AMMETER, integrals=POSITION)
 """The same without a card, behind a signed current."""
+
+flowing_plant = Model(
+    "flowing_plant", parameters=Plant, state=Motion, step=plant_rates, options=PlantOptions
+)
+"""The machine in continuous time, behind a signed current: rates in place of the step."""

@@ -364,7 +364,7 @@ def searched_pressure(inputs: PumpInputs, p: Pump, options: PumpOptions) -> floa
     """δP at which the flow through the spool is what leaks, whatever the equations are. [Pa]
 
     With leakage there is no closed form, and of equations that stand for the package's none is
-    known: see `swashplate.simulation.instance.models_of`.
+    known: see `swashplate.drive.instance.models_of`.
     """
     force = solenoid_force(inputs.current, p)
     limits = pressure_limits(p)

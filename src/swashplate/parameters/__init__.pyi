@@ -1,14 +1,12 @@
 from .definitions import CATALOGUE as CATALOGUE
 from .definitions import COLUMNS as COLUMNS
+from .definitions import DEFINITIONS as DEFINITIONS
 from .definitions import OPTIONS as OPTIONS
-from .definitions import OWN as OWN
 from .definitions import REFINEMENTS as REFINEMENTS
 from .definitions import SWITCHES as SWITCHES
 from .definitions import Block as Block
 from .definitions import Definition as Definition
-from .definitions import columns_of as columns_of
-from .definitions import find as find
-from .definitions import is_column as is_column
+from .definitions import Definitions as Definitions
 from .definitions import options_of as options_of
 from .files import AXES as AXES
 from .files import Entry as Entry

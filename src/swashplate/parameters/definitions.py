@@ -3,19 +3,21 @@
 The symbols are those of Kruse (2001). A directional parameter has a plus and a minus value, chosen
 by the sign of the signal it acts on; both are stored as magnitudes.
 
-A definition stands once, on the field of `swashplate.models.card.Card` or
-`swashplate.models.displacement_control.Pump` that holds the value.
+A definition stands once, on the field of `swashplate.models.amplifier.Card` or
+`swashplate.models.displacement_control.Pump` that holds the value; those of a user-defined equation
+belong to the set that has it.
 """
 
-from collections.abc import Iterator, Mapping
-from dataclasses import replace
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
+from functools import cached_property, lru_cache
 from typing import Literal
 
 from swashplate.equations.fields import Definition as Definition
 from swashplate.equations.fields import declared_by
 from swashplate.errors import ParameterError, UnknownParameterError
-from swashplate.models.card import Card
+from swashplate.models.amplifier import Card
 from swashplate.models.displacement_control import Pump
 
 Block = Literal["control_card", "pump_motor", "refinements"]
@@ -24,17 +26,21 @@ INPUTS = ("pump_speed",)
 """Fields of the models that no set has: what drives the machine, not what it is."""
 
 
-def _collected() -> Iterator[Definition]:
-    """All parameters in the order of Kruse's tables, the refinements last."""
-    for each in declared_by(Card):
-        yield replace(each, block="control_card")
-    for each in declared_by(Pump):
-        if each.symbol not in INPUTS:
-            optional = each.default is not None
-            yield replace(each, block="refinements" if optional else "pump_motor")
+def _collected() -> Iterator[tuple[Definition, dict[str, str]]]:
+    """All parameters in the order of Kruse's tables, the refinements last, with their paths."""
+    for part, kind in (("card", Card), ("pump", Pump)):
+        for each in declared_by(kind):
+            if each.symbol in INPUTS:
+                continue
+            paths = {c: f"{part}.{path}" for c, path in zip(each.columns, each.fields, strict=True)}
+            block: Block = "control_card"
+            if part == "pump":
+                block = "pump_motor" if each.default is None else "refinements"
+            yield replace(each, block=block), paths
 
 
-_ALL = tuple(_collected())
+_COLLECTED = tuple(_collected())
+_ALL = tuple(definition for definition, _ in _COLLECTED)
 
 CATALOGUE: dict[str, Definition] = {d.symbol: d for d in _ALL if d.block != "refinements"}
 """Definitions of what every set has, by symbol, the card's first."""
@@ -55,26 +61,93 @@ OPTIONS: tuple[str, ...] = tuple(dict.fromkeys(SWITCHES.values()))
 """Those options, along the chain."""
 
 
-def is_column(name: str) -> bool:
-    """Whether a set can have a value of this name, e.g. ``Z16_plus``."""
-    return name in COLUMNS or name in REFINEMENTS or name in OWN
-
-
 def options_of(numbers: Mapping[str, float]) -> frozenset[str]:
     """Options whose parameters are not all zero; what is not among the numbers is off."""
     return frozenset(each for name, each in SWITCHES.items() if numbers.get(name, 0.0) != 0.0)
 
 
-OWN: dict[str, Definition] = {}
-"""Definitions of what users' own equations brought along, by symbol."""
+# --- names and what they stand for ----------------------------------------------------------------
 
 
-def declare(kind: type) -> None:
-    """Make the parameters of one's own equation known by name.
+@dataclass(frozen=True, eq=False)
+class Definitions:
+    """Parameters that a model has, by symbol, and what their public names stand for.
+
+    A symbol such as ``Z16`` stands for all its columns, a column such as ``Z16_plus`` for one
+    number of the model. Here alone a name becomes a path in the model.
+    """
+
+    by_symbol: Mapping[str, Definition]
+    paths: Mapping[str, str]
+    """Path in the model of every column: ``pump.Z16_plus``."""
+
+    @cached_property
+    def columns(self) -> dict[str, str]:
+        """Symbol of every column."""
+        return {
+            column: symbol for symbol, each in self.by_symbol.items() for column in each.columns
+        }
+
+    def find(self, name: str) -> Definition:
+        """Definition of a symbol (``Z16``, ``spool_friction``) or column (``Z16_plus``).
+
+        Raises
+        ------
+        UnknownParameterError
+            If there is none of that name; the sentence lists the right ones.
+        """
+        symbol = self.columns.get(name, name)
+        if symbol not in self.by_symbol:
+            raise self._unknown(name)
+        return self.by_symbol[symbol]
+
+    def columns_of(self, names: Iterable[str]) -> list[str]:
+        """Columns that symbols and columns stand for, each once, in their order; as `find`."""
+        columns: list[str] = []
+        for name in names:
+            definition = self.find(name)
+            meant = definition.columns if name == definition.symbol else (name,)
+            columns.extend(column for column in meant if column not in columns)
+        return columns
+
+    def path_of(self, column: str) -> str:
+        """Path in the model of a column; refuses as `find`."""
+        if column not in self.paths:
+            raise self._unknown(column)
+        return self.paths[column]
+
+    def _unknown(self, name: str) -> UnknownParameterError:
+        """Error for a name that no parameter has."""
+        close = get_close_matches(str(name), [*self.by_symbol, *self.columns], n=1)
+        hint = f" (did you mean {close[0]}?)" if close else ""
+        refinements = [
+            symbol for symbol, each in self.by_symbol.items() if each.block == "refinements"
+        ]
+        others = [symbol for symbol in self.by_symbol if symbol not in refinements]
+        sentence = f"There is no parameter '{name}'{hint}; the parameters are {', '.join(others)}"
+        directional = [each for each in self.by_symbol.values() if each.directional]
+        if directional:
+            plus, minus = directional[0].columns
+            sentence += f", those with two directions also as e.g. {plus} and {minus}"
+        if refinements:
+            sentence += f", and the refinements {', '.join(refinements)}"
+        return UnknownParameterError(f"{sentence}.")
+
+
+DEFINITIONS = Definitions(
+    CATALOGUE | REFINEMENTS,
+    {column: path for _, paths in _COLLECTED for column, path in paths.items()},
+)
+"""What a drive of the package's equations has."""
+
+
+@lru_cache(maxsize=64)
+def definitions_of(kinds: tuple[type, ...]) -> Definitions:
+    """What a drive has whose user-defined equations have parameters of their own.
 
     Parameters
     ----------
-    kind : class of named tuples
+    kinds : tuple of classes of named tuples
         Each field a float with its `Definition`, of one value, and a default.
 
     Raises
@@ -82,54 +155,23 @@ def declare(kind: type) -> None:
     ParameterError
         If one has no definition or is called like another one.
     """
-    for each in declared_by(kind):
-        default = kind._field_defaults.get(each.symbol)  # type: ignore[attr-defined]
-        if each.directional or default is None or not each.unit:
-            raise ParameterError(
-                f"{kind.__name__}.{each.symbol} needs a Definition with a unit, one value and a "
-                "default."
-            )
-        made = replace(each, block="refinements", default=default)
-        known = (CATALOGUE | REFINEMENTS | OWN).get(each.symbol, made)
-        if known != made:
-            raise ParameterError(
-                f"{kind.__name__}.{each.symbol}: there is another parameter {each.symbol}, "
-                f"{known.name}; give yours a name of its own."
-            )
-        OWN[each.symbol] = made
-
-
-def find(name: str) -> Definition:
-    """Definition of a symbol (``Z16``, ``spool_friction``) or column (``Z16_plus``).
-
-    Raises
-    ------
-    ParameterError
-        If there is none of that name; the sentence lists the right ones.
-    """
-    symbol = COLUMNS.get(name, name)
-    for known in (CATALOGUE, REFINEMENTS, OWN):
-        if symbol in known:
-            return known[symbol]
-    raise unknown_parameter(name)
-
-
-def unknown_parameter(name: str) -> UnknownParameterError:
-    """Error for a name that no parameter has."""
-    close = get_close_matches(str(name), [*CATALOGUE, *COLUMNS, *REFINEMENTS], n=1)
-    hint = f" (did you mean {close[0]}?)" if close else ""
-    return UnknownParameterError(
-        f"There is no parameter '{name}'{hint}; the parameters are {', '.join(CATALOGUE)}, "
-        "those with two directions also as e.g. Z16_plus and Z16_minus, and the refinements "
-        f"{', '.join(REFINEMENTS)}."
-    )
-
-
-def columns_of(names: Mapping[str, object] | tuple[str, ...] | list[str]) -> list[str]:
-    """Columns that a list of symbols and columns stands for, in its order; refuses as `find`."""
-    columns: list[str] = []
-    for name in names:
-        definition = find(name)
-        wanted = definition.columns if name == definition.symbol else (name,)
-        columns.extend(column for column in wanted if column not in columns)
-    return columns
+    if not kinds:
+        return DEFINITIONS
+    known = dict(DEFINITIONS.by_symbol)
+    for kind in kinds:
+        for each in declared_by(kind):
+            default = kind._field_defaults.get(each.symbol)  # type: ignore[attr-defined]
+            if each.directional or default is None or not each.unit:
+                raise ParameterError(
+                    f"{kind.__name__}.{each.symbol} needs a Definition with a unit, one value and "
+                    "a default."
+                )
+            definition = replace(each, block="refinements", default=default)
+            other = known.setdefault(each.symbol, definition)
+            if other != definition:
+                raise ParameterError(
+                    f"{kind.__name__}.{each.symbol}: there is another parameter {each.symbol}, "
+                    f"{other.name}; give yours a name of its own."
+                )
+    own = known.keys() - DEFINITIONS.by_symbol.keys()
+    return Definitions(known, {**DEFINITIONS.paths, **{name: f"pump.{name}" for name in own}})

@@ -12,7 +12,7 @@ from swashplate.documents import parse_toml, read_text, validated
 from swashplate.entries import Name, NotNegative, Number, Positive, Version
 from swashplate.equations.replacement import Replacement, again, found_at, uses
 from swashplate.errors import InputError, MissingFileError, ParameterError, meant
-from swashplate.parameters.definitions import Block, Definition, declare, find, options_of
+from swashplate.parameters.definitions import Block, Definition, definitions_of, options_of
 from swashplate.parameters.parameter_set import (
     CardSwitch,
     CoulombSign,
@@ -210,12 +210,14 @@ def read_set(text: str, origin: str) -> ParameterSet:
         "refinements": contents.refinements,
     }
     parameters: dict[str, Parameter] = {}
+    kinds = (each.parameters for each in equations)
     try:
+        definitions = definitions_of(tuple(kind for kind in kinds if kind is not None))
         for column in model.unreached:
-            find(column)
+            definitions.find(column)
         for block, table in blocks.items():
             for symbol, entry in table.items():
-                definition = find(symbol)
+                definition = definitions.find(symbol)
                 if symbol != definition.symbol or definition.block != block:
                     raise ParameterError(f"[{block}] has no parameter '{symbol}'.")
                 parameters[symbol] = parameter_of(definition, entry)
@@ -256,8 +258,6 @@ def _replacements(entries: Sequence[EquationPlaces], origin: str) -> tuple[Repla
                 raise InputError(f"{entry.old} is an equation of the card and takes no parameters.")
         except (ImportError, InputError) as error:
             raise ParameterError(f"{origin}: [model] equations: {error}") from None
-        if replacement.parameters is not None:
-            declare(replacement.parameters)
         replacements.append(replacement)
     return tuple(replacements)
 

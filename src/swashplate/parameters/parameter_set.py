@@ -16,15 +16,12 @@ from swashplate.errors import InputError, ParameterError
 from swashplate.parameters.definitions import (
     CATALOGUE,
     COLUMNS,
-    OWN,
     REFINEMENTS,
     SWITCHES,
     Definition,
-    columns_of,
-    declare,
-    find,
+    Definitions,
+    definitions_of,
     options_of,
-    unknown_parameter,
 )
 from swashplate.parameters.plausible import check_plausible
 from swashplate.parameters.rules import broken_rules, check_options, refuse
@@ -188,21 +185,16 @@ class ParameterSet(Entries):
     """Every single value by column, e.g. ``Z16_plus``."""
 
     def __post_init__(self) -> None:
-        own: set[str] = set()
-        for kind in (each.parameters for each in self.equations):
-            if kind is not None:
-                declare(kind)
-                own.update(kind._fields)
-        strange = [name for name in self.parameters if name in OWN and name not in own]
-        if strange:
+        definitions = self.definitions
+        known = definitions.by_symbol
+        for name in self.parameters.keys() - known.keys():
             raise ParameterError(
-                f"{self.name}: {strange[0]} belongs to an equation of your own, which this drive "
-                "does not have; see Drive.with_equation."
+                f"{self.name}: there is no parameter '{name}'; those of a user-defined equation "
+                "belong to a drive that has it, see Drive.with_equation."
             )
         missing = [symbol for symbol in CATALOGUE if symbol not in self.parameters]
         if missing:
             raise ParameterError(f"{self.name}: no value for {', '.join(missing)}.")
-        known = (*CATALOGUE, *REFINEMENTS, *OWN)
         self._keep({name: self.parameters[name] for name in known if name in self.parameters})
         for each in self.values():
             if each.own_bounds is None:
@@ -214,8 +206,15 @@ class ParameterSet(Entries):
                         f"{self.name}: {column} ({each.name}) is {value:g} {each.unit}, outside "
                         f"its bounds {low:g} to {high:g}."
                     )
-        refuse(self.name, broken_rules({name: np.array([v]) for name, v in self.numbers.items()}))
+        numbers = {name: np.array([number]) for name, number in self.numbers.items()}
+        refuse(self.name, broken_rules(numbers, definitions))
         check_options(self.name, self.options, self.numbers)
+
+    @property
+    def definitions(self) -> Definitions:
+        """What the set can have a value of, by symbol: the package's, then its own equations'."""
+        kinds = (each.parameters for each in self.equations)
+        return definitions_of(tuple(kind for kind in kinds if kind is not None))
 
     def __repr__(self) -> str:
         return f"ParameterSet({self.name!r}, {len(self)} parameters)"
@@ -232,9 +231,8 @@ class ParameterSet(Entries):
             return self.parameters[name]
         if name in COLUMNS:
             return self.parameters[COLUMNS[name]].in_direction(name)
-        definition = REFINEMENTS.get(name, OWN.get(name))
-        if definition is None or definition.default is None:
-            raise unknown_parameter(name)
+        definition = self.definitions.find(name)
+        assert definition.default is not None
         return Parameter(definition, definition.default, status="inactive")
 
     def __contains__(self, name: object) -> bool:
@@ -313,7 +311,7 @@ class ParameterSet(Entries):
             plausible range, or a broken rule.
         """
         for name, change in changes.items():
-            definition = find(name)
+            definition = self.definitions.find(name)
             meant_value(name, definition, change, self[definition.symbol])
         return self.with_numbers(changes)
 
@@ -337,7 +335,7 @@ class ParameterSet(Entries):
         """
         parameters = dict(self.parameters)
         for name, change in changes.items():
-            definition = find(name)
+            definition = self.definitions.find(name)
             old = parameters.get(definition.symbol, self[definition.symbol])
             value = value_of(name, definition, change, old)
             parameters[definition.symbol] = replace(old, value=value, source="", status="user")
@@ -346,7 +344,7 @@ class ParameterSet(Entries):
             touched = {SWITCHES[name] for name in changes if name in SWITCHES}
             options = (self.options - touched) | (options_of(numbers) & touched)
         # a number that someone gives is no longer one that tests left open
-        given = columns_of(changes)
+        given = self.definitions.columns_of(changes)
         unreached = {k: v for k, v in self.unreached.items() if k not in given}
         return replace(self, parameters=parameters, options=options, unreached=unreached)
 
@@ -354,7 +352,8 @@ class ParameterSet(Entries):
         """Copy with values multiplied by factors; names and errors as of `replace`."""
         changes: dict[str, Change] = {}
         for name, factor in factors.items():
-            numbers, columns = self[find(name).symbol].numbers, columns_of([name])
+            numbers = self[self.definitions.find(name).symbol].numbers
+            columns = self.definitions.columns_of([name])
             each = factor if isinstance(factor, tuple) else (factor,) * len(columns)
             if len(each) != len(columns):
                 takes = "one value, so it takes one factor" if len(columns) == 1 else "two values"

@@ -16,13 +16,19 @@ from numpy.typing import NDArray
 from swashplate.equations.cache import kernel
 from swashplate.equations.declaration import JIT_OFF, inlined, interpreted
 from swashplate.errors import ParameterError
-from swashplate.models.channel import Channel, channel_level
+from swashplate.models.amplifier import Channel, channel_level
 from swashplate.models.displacement_control import (
     Pump,
     moment_sine,
     solenoid_force,
 )
-from swashplate.parameters.definitions import OPTIONS, SWITCHES, Definition, find
+from swashplate.parameters.definitions import (
+    DEFINITIONS,
+    OPTIONS,
+    SWITCHES,
+    Definition,
+    Definitions,
+)
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -113,7 +119,7 @@ def check_options(owner: str, options: frozenset[str], numbers: Mapping[str, flo
             raise ParameterError(
                 f"{owner}: there is no option '{option}'; there are {', '.join(OPTIONS)}."
             )
-        own = [find(name) for name, each in SWITCHES.items() if each == option]
+        own = [DEFINITIONS.find(name) for name, each in SWITCHES.items() if each == option]
         sized = [each for each in own if each.least is not None]
         if sized and all(numbers.get(each.symbol, 0.0) == 0.0 for each in sized):
             raise ParameterError(
@@ -123,16 +129,20 @@ def check_options(owner: str, options: frozenset[str], numbers: Mapping[str, flo
             )
 
 
-def broken_rules(numbers: Mapping[str, Array]) -> Iterator[Broken]:
+def broken_rules(
+    numbers: Mapping[str, Array], definitions: Definitions = DEFINITIONS
+) -> Iterator[Broken]:
     """Every rule with the sets that break it, those about single values first.
 
     Parameters
     ----------
     numbers : mapping of (m,) arrays
         Every value by column, one element a set.
+    definitions : Definitions
+        Of the sets' parameters.
     """
     for column, values in numbers.items():
-        yield range_rule(find(column), column, values)
+        yield range_rule(definitions.find(column), column, values)
     n: Values = dict(numbers)
     n["rest"], n["ceiling"] = n["Z2"] / n["Z1"], np.minimum(n["Z9"], n["Z15"])
     size = n["rest"].size

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from swashplate.drive import Limit
 from swashplate.errors import InputError
 from swashplate.report.style import LINE, VERMILION, Dashes
-from swashplate.simulation.result import Limit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -18,9 +18,9 @@ from swashplate.crane.closed_loop.stepper import ACTUATIONS
 from swashplate.crane.crane import Crane
 from swashplate.crane.rope import GRAVITY, in_ship_axes, rope_leads, swing_of
 from swashplate.crane.sea.transfer_functions import MOTIONS
+from swashplate.drive import Limit, Simulation
 from swashplate.errors import InputError
-from swashplate.results import Tabular, figures
-from swashplate.simulation.result import Limit, Named, Simulation
+from swashplate.results import Named, Tabular, figures
 from swashplate.tables import Column, Table
 
 if TYPE_CHECKING:

@@ -27,13 +27,12 @@ from swashplate.crane.rope import (
     swing_of,
     too_fast,
 )
-from swashplate.drive import Drive
+from swashplate.drive import Drive, drive_instance
 from swashplate.equations import CompiledStep, Machine, compiled_step
 from swashplate.equations.marching.run import marched
 from swashplate.equations.marching.stepping import stored_of
 from swashplate.errors import DomainError, InputError
 from swashplate.parameters.rules import FULL_VOLTAGE
-from swashplate.simulation.instance import instance_of
 
 Array = NDArray[np.float64]
 Actuation = Literal["ideal", "volts", "inverse", "direct"]
@@ -233,7 +232,7 @@ class CraneStepper:
             for i, axis in enumerate(AXES):
                 stick = np.ascontiguousarray(commands[:, i])
                 volts = loop.open_voltages(stick, fixed.inverses[i], fixed.actuation)
-                instance = instance_of(getattr(self._crane, axis).parameters, by_voltage=True)
+                instance = drive_instance(getattr(self._crane, axis).parameters, by_voltage=True)
                 begun = instance.start({"voltage": 0.0}, h, "rest")
                 wanted = stored_of(instance.model, OUTPUTS)
                 made = marched(instance, {"voltage": volts}, h, begun, wanted, "command")

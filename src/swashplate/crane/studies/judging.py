@@ -30,8 +30,8 @@ from swashplate.crane.studies.judgment import (
 from swashplate.crane.studies.outcome import Outcome
 from swashplate.crane.studies.spectral import linear_response
 from swashplate.crane.studies.study import NONE, Case, Controllers, Study
+from swashplate.drive import Limit
 from swashplate.errors import InputError
-from swashplate.simulation.result import Limit
 from swashplate.tables import count
 
 SEAWAYS = 120

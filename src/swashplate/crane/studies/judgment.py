@@ -32,8 +32,8 @@ from swashplate.crane.studies.assumptions import Turn
 from swashplate.crane.studies.outcome import Outcome
 from swashplate.crane.studies.spectral import LinearResponse
 from swashplate.crane.studies.study import NONE, Study, assumed_words
+from swashplate.drive import Limit
 from swashplate.results import Drawn, Tabular
-from swashplate.simulation.result import Limit
 from swashplate.tables import Column, Table, count, listed
 
 if TYPE_CHECKING:

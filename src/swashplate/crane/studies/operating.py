@@ -27,11 +27,11 @@ from swashplate.crane.sea.seaway import Seaway, Spectrum
 from swashplate.crane.studies.outcome import Outcome
 from swashplate.crane.studies.spectral import DEMANDS, linear_response
 from swashplate.crane.studies.study import BUILT, IDEAL, NONE, Case, Drives, Study, assumed_words
+from swashplate.drive import Limit
 from swashplate.errors import InputError
 from swashplate.executors import Executor, Serial, Threads
 from swashplate.progress import counted
 from swashplate.results import Tabular, figures
-from swashplate.simulation.result import Limit
 from swashplate.tables import Column, Table, count, listed
 
 if TYPE_CHECKING:

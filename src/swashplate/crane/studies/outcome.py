@@ -12,7 +12,7 @@ from swashplate.crane.axes import AXES, RATE
 from swashplate.crane.closed_loop.result import PUMPS, CraneRun
 from swashplate.crane.rope import GRAVITY, rope_leads, swing_of
 from swashplate.crane.sea.extremes import peaks_of
-from swashplate.simulation.result import Limit
+from swashplate.drive import Limit
 
 Array = NDArray[np.float64]
 

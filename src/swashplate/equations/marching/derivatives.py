@@ -250,3 +250,30 @@ def _march(
     march(pieces, pointers(arrays), values[0].size, h, structs.address)
     layout.give_back(room)
     check_domain(instance, states, float(met[0]), observed.driven_by)
+
+
+# --- a model with numbers, differentiated ---------------------------------------------------------
+
+
+class BoundModel(NamedTuple):
+    """A model with numbers, and what it is differentiated by."""
+
+    instance: Instance
+    own: Own = NOTHING_OWN
+    """Values of the experiment's own unknowns."""
+    paths: Sequence[str] = ()
+    """Columns of derivatives."""
+    moved: Sequence[bool] | None = None
+    """Whether the record may depend on each column at all; by default it may."""
+
+    def residuals(self, observed: ObservedRecord) -> Array:
+        """(m,) weighted residuals of all observations; see `residuals`."""
+        return residuals(self.instance, observed, self.own)
+
+    def jacobian(self, observed: ObservedRecord, out: Array | None = None) -> Jacobian:
+        """The same residuals with their exact derivatives; see `jacobian`."""
+        return jacobian(self.instance, observed, self.paths, self.own, moved=self.moved, out=out)
+
+    def triangle(self, observed: ObservedRecord) -> Triangle:
+        """Triangular factor of [J r]; see `triangle`."""
+        return triangle(self.instance, observed, self.paths, self.own, moved=self.moved)

@@ -30,9 +30,7 @@ from numpy.typing import ArrayLike, NDArray
 from swashplate.equations.cache import kernel
 from swashplate.equations.code_generation.functions import generating
 from swashplate.equations.fields import check_mapping
-from swashplate.equations.marching.derivatives import jacobian
 from swashplate.equations.marching.march import output_of
-from swashplate.equations.marching.observation import Own, every_sample
 from swashplate.equations.marching.part import Stored
 from swashplate.equations.marching.record import (
     Between,
@@ -50,7 +48,7 @@ from swashplate.equations.marching.run import (
     marched,
 )
 from swashplate.equations.marching.stepping import CompiledStep, Machine
-from swashplate.equations.model import Model, parameter_paths
+from swashplate.equations.model import Model
 from swashplate.errors import DomainError, InputError, UnknownNameError
 from swashplate.results import GivenAxes, Tabular, figures, pandas_frame
 
@@ -226,10 +224,11 @@ class Run(Tabular):
         Parameters
         ----------
         signals : str or sequence of str
-            Names as of `names`; by default the inputs and the model's `outputs`, or all signals if
-            it names no outputs.
+            Names as of `names`, a panel each; by default the inputs and the model's `outputs`, or
+            all signals if it names no outputs. A drive shows its whole chain by default.
         ax : matplotlib axes or sequence of them, optional
-            Where to draw the signals, one for each; by default in a new figure.
+            Where to draw the signals, one for each, of a drive the shaft's speed if none is named;
+            by default in a new figure.
         label : str
             Of the curves: each panel gets a legend of all labelled curves in it.
         window : (float, float), optional
@@ -248,9 +247,18 @@ class Run(Tabular):
             samples.
         """
         chosen = (signals,) if isinstance(signals, str) else tuple(signals)
+        if not chosen and ax is None:
+            return self._overview(label=label, window=window, title=title)
         chosen = chosen or self.shown or self._usual
         draw = figures().plot_signals
         return cast("Figure", draw(self, chosen, ax=ax, label=label, window=window, title=title))
+
+    def _overview(
+        self, *, label: str, window: tuple[float, float] | None, title: str | None
+    ) -> Figure:
+        """Figure of what is shown if no signals are named."""
+        chosen, draw = self.shown or self._usual, figures().plot_signals
+        return cast("Figure", draw(self, chosen, label=label, window=window, title=title))
 
     @property
     def _usual(self) -> tuple[str, ...]:
@@ -458,64 +466,6 @@ def simulate(
     )
     maneuver = ", ".join(each.name for each in inputs.values() if isinstance(each, Command))
     return Run(instance, records, start, begin or {}, maneuver=maneuver).marched()
-
-
-def sensitivities(
-    model: Model,
-    p: Any,
-    inputs: Mapping[str, ArrayLike | Command],
-    rate: float,
-    *,
-    output: str,
-    parameters: Sequence[str] | None = None,
-    options: Any = None,
-    given: Any = None,
-    start: Start = "rest",
-    begin: Mapping[str, float] | None = None,
-    **sampling: Unpack[Sampling],
-) -> Array:
-    """(n, k) exact derivatives of a signal by parameters, and by where the state begins.
-
-    Parameters
-    ----------
-    model, p, inputs, rate, options, given, start, begin, **sampling :
-        As in `simulate`; `time`, `interpolation`, `substeps`.
-    output : str
-        The signal.
-    parameters : sequence of str, optional
-        Paths of parameters, or ``start.`` with the path of a state that `begin` names; by default
-        all parameters.
-
-    Raises
-    ------
-    InputError
-        For inputs, numbers or names that do not fit the model.
-    DomainError
-        If the model leaves its domain, or a number or a derivative overflows.
-    """
-    instance = instance_of(model, p, options=options, given=given)
-    records = inputs_of(instance, inputs, rate, **sampling)
-    output_of(model, output)
-    columns = tuple(parameters) if parameters is not None else parameter_paths(model)
-    unknown = [c for c in columns if c not in parameter_paths(model) and c[:6] != "start."]
-    if unknown:
-        raise InputError(
-            f"{model.name} has no parameter '{unknown[0]}'; it has "
-            f"{', '.join(parameter_paths(model)) or 'none'}."
-        )
-    (first, record), *others = records.items()
-    rest = {name: each.values for name, each in others}
-    observed = every_sample(record, output, first, start, rest)
-    found = jacobian(instance, observed, columns, Own(begin or {})).columns
-    bad = ~np.isfinite(found)
-    if bad.any():
-        sample = int(np.argmax(bad.any(axis=1)))
-        column = int(np.argmax(bad[sample]))
-        raise DomainError(
-            f"{instance.name}: the derivative of {output} by {columns[column]} is "
-            f"{found[sample, column]} at sample {sample}: check the size of the parameters."
-        )
-    return found
 
 
 # --- one sample at a time -------------------------------------------------------------------------

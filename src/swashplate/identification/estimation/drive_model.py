@@ -17,6 +17,17 @@ from swashplate.campaign.amplifier import CURRENTS as CURRENTS
 from swashplate.campaign.experiment import APART, RISE, Channel, Edge, Experiment, InputSignal
 from swashplate.campaign.samples import signed_by_command
 from swashplate.campaign.schema import SIGNALS as SIGNALS
+from swashplate.drive import (
+    PRESSURE,
+    START,
+    Limit,
+    Simulation,
+    at_every_rate,
+    bound_drive,
+    check_voltage,
+    simulate_drive,
+)
+from swashplate.equations import BoundModel
 from swashplate.equations.marching.observation import Observation, ObservedRecord, Own
 from swashplate.equations.marching.record import (
     SLOWEST,
@@ -31,13 +42,8 @@ from swashplate.identification.estimation.model import Asked, EquationModel
 from swashplate.identification.estimation.problem import Problem
 from swashplate.identification.estimation.setup import Forces
 from swashplate.identification.estimation.unknowns import Prior, Unknown, Unknowns, zero_name
-from swashplate.parameters.definitions import is_column
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.results import Result
-from swashplate.simulation.instance import PRESSURE, START, at_every_rate
-from swashplate.simulation.residuals import Ready, made_ready
-from swashplate.simulation.result import Limit, Simulation
-from swashplate.simulation.run import check_voltage, simulate_drive
 
 Array = NDArray[np.float64]
 Part = Literal["card", "pump", "chain"]
@@ -321,7 +327,9 @@ class DriveModel(Result, EquationModel):
             given = simulated_current(moved, self.parameters, self.starts.get(moved.name, {}))
         return "current", measured_current(experiment) if given is None else given, {}
 
-    def ready(self, values: Mapping[str, float], experiment: Experiment, asked: Asked) -> Ready:
+    def ready(
+        self, values: Mapping[str, float], experiment: Experiment, asked: Asked
+    ) -> BoundModel:
         """The drive with numbers; see `EquationModel.ready`."""
         states = {
             state: values[name]
@@ -331,7 +339,7 @@ class DriveModel(Result, EquationModel):
         }
         parameters, own = self.parameters_at(values), Own(states, asked.offsets)
         try:
-            return made_ready(parameters, asked.observed, asked.columns, own)
+            return bound_drive(parameters, asked.observed, asked.columns, own)
         except InputError as error:  # a filter that is unstable at this step
             raise DomainError(str(error)) from None
 
@@ -341,7 +349,7 @@ class DriveModel(Result, EquationModel):
             return self.forces.slopes(name)
         if states := self._states_started_by(name):
             return {f"{START}{state}": 1.0 for state in states}
-        return {name: 1.0} if is_column(name) else {}
+        return {name: 1.0} if name in self.parameters.definitions.columns else {}
 
     def _states_started_by(self, name: str) -> list[str]:
         """Paths of the states that a pressure or a current at the first sample sets.
@@ -363,13 +371,15 @@ class DriveModel(Result, EquationModel):
     def parameters_at(self, values: Mapping[str, float]) -> ParameterSet:
         """The set for some values of the unknowns; a `DomainError` if one breaks a rule."""
         forces = () if self.forces is None else self.forces.names
-        return _at(self, tuple((n, v) for n, v in values.items() if is_column(n) or n in forces))
+        known = {*self.parameters.definitions.columns, *forces}
+        return _at(self, tuple((name, value) for name, value in values.items() if name in known))
 
 
 @lru_cache(maxsize=8)
 def _at(model: DriveModel, values: tuple[tuple[str, float], ...]) -> ParameterSet:
     """The set with values; runs of one evaluation share it, as checking its rules takes a while."""
-    changes = {name: value for name, value in values if is_column(name)}
+    columns = model.parameters.definitions.columns
+    changes = {name: value for name, value in values if name in columns}
     if model.forces is not None:
         changes |= model.forces.coefficients(dict(values), model.parameters)
     try:

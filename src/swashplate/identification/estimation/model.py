@@ -12,15 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.campaign.experiment import Edge, Experiment
+from swashplate.equations import BoundModel, instance_of, parameter_paths, state_paths
 from swashplate.equations import Model as Equations
-from swashplate.equations import instance_of, parameter_paths, state_paths
 from swashplate.equations.fields import made
 from swashplate.equations.marching.layout import started_by
 from swashplate.equations.marching.observation import Observation, ObservedRecord, Own
 from swashplate.equations.marching.record import Record, even_rate, on_grid
 from swashplate.errors import DomainError, InputError
 from swashplate.results import Result, short
-from swashplate.simulation.residuals import Ready
 
 Array = NDArray[np.float64]
 INSTANT_STEP = 1e-5
@@ -185,7 +184,9 @@ class EquationModel(ABC):
         """Signal that drives the model, its record, and other external signals on its grid."""
 
     @abstractmethod
-    def ready(self, values: Mapping[str, float], experiment: Experiment, asked: Asked) -> Ready:
+    def ready(
+        self, values: Mapping[str, float], experiment: Experiment, asked: Asked
+    ) -> BoundModel:
         """The model with numbers; columns as the engine names them."""
 
     def instants_of(self, experiment: Experiment) -> Mapping[str, Edge]:
@@ -346,7 +347,9 @@ class OwnModel(Result, EquationModel):
         record = replace(record, start=float(command.time[0]))
         return left[0], record, {each.name: each.at(record.points) for each in others}
 
-    def ready(self, values: Mapping[str, float], experiment: Experiment, asked: Asked) -> Ready:
+    def ready(
+        self, values: Mapping[str, float], experiment: Experiment, asked: Asked
+    ) -> BoundModel:
         """The model with numbers; a name that is not known, or no value of one, is refused."""
         model, given = self.model, self.given
         paths, states, begin = parameter_paths(model), state_paths(model), dict[str, float]()
@@ -374,4 +377,4 @@ class OwnModel(Result, EquationModel):
                 raise InputError(f"{model.name} has no given numbers for {experiment.name}.")
             given = given[experiment.name]
         instance = instance_of(model, p, options=self.options, given=given)
-        return Ready(instance, Own(begin, asked.offsets), asked.columns)
+        return BoundModel(instance, Own(begin, asked.offsets), asked.columns)

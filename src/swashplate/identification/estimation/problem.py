@@ -40,7 +40,7 @@ from swashplate.tables import count
 if TYPE_CHECKING:
     from concurrent.futures import ThreadPoolExecutor
 
-    from swashplate.simulation.residuals import Ready
+    from swashplate.equations import BoundModel
 
 Array = NDArray[np.float64]
 Part = TypeVar("Part")
@@ -263,7 +263,7 @@ class Problem(Result):
         moved = {unknown.run for unknown in self.unknowns if unknown.kind == "instant"}
         return tuple(whole and each.name not in moved for each in self.experiments)
 
-    def _ready(self, vector: Array, number: int) -> tuple[Ready, ObservedRecord]:
+    def _ready(self, vector: Array, number: int) -> tuple[BoundModel, ObservedRecord]:
         """The model with the numbers of one experiment, and this as the march sees it."""
         experiment, (observed, _, _, asked, _) = self.experiments[number], self._own[number]
         model, zeros = cast("EquationModel", self.model), self._zeros(vector, number)

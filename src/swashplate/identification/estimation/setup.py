@@ -27,7 +27,7 @@ from swashplate.errors import (
     meant,
 )
 from swashplate.identification.estimation.unknowns import Prior, Unknown
-from swashplate.parameters.definitions import find
+from swashplate.parameters.definitions import Definitions
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import SIDES
 from swashplate.results import short
@@ -202,15 +202,18 @@ class Stage(Entry):
             raise ValueError("a card alone has no start_pressure")
         return self
 
-    def beyond(self, unknown: Unknown, side: int) -> str:
-        """What to do about an unknown of the machine at its lower (-1) or upper (1) bound."""
+    def beyond(self, unknown: Unknown, side: int, definitions: Definitions) -> str:
+        """What to do about an unknown of the machine at its lower (-1) or upper (1) bound.
+
+        `definitions` are those of the drive's parameters.
+        """
         name = unknown.name
         if self.part == "model":
             return f"to let it go on, widen '{name}' in free of the model and fit again"
         if self.forces is not None and name in self.forces.names:
             where = "relative under [stages.forces]"
         else:
-            limits = find(name)
+            limits = definitions.find(name)
             least = limits.lower if limits.least is None else limits.least
             if unknown.high >= limits.upper if side > 0 else unknown.low <= least:
                 return f"the {'greatest' if side > 0 else 'least'} value that it may have"
@@ -316,7 +319,7 @@ FreeParameters = Setup | str | Path | Mapping[str, Any]
 """What a fit is to estimate: a fit configuration, its packaged name or file, or a mapping."""
 
 
-def free_entries(free: Mapping[str, Any]) -> dict[str, Free]:
+def free_entries(free: Mapping[str, Any], definitions: Definitions) -> dict[str, Free]:
     """What a mapping frees of a drive, by symbol or column.
 
     Each value is a pair of factors on the nominal value, ``{"Z8": (0.5, 2)}``, a `Free`, or a
@@ -325,7 +328,7 @@ def free_entries(free: Mapping[str, Any]) -> dict[str, Free]:
     """
     entries: dict[str, Free] = {}
     for name, entry in free.items():
-        find(name)
+        definitions.find(name)
         if isinstance(entry, Free):
             entries[name] = entry
         elif isinstance(entry, Mapping):

@@ -48,7 +48,7 @@ from swashplate.identification.estimation.setup import (
     setup_names,
 )
 from swashplate.identification.estimation.unknowns import Unknown, Unknowns, bounded
-from swashplate.parameters.definitions import SWITCHES, Definition, columns_of, find
+from swashplate.parameters.definitions import DEFINITIONS, SWITCHES, Definition, Definitions
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.plausible import check_plausible
 from swashplate.parameters.rules import FULL_VOLTAGE
@@ -74,7 +74,11 @@ def smooth(parameters: Fitted) -> Fitted:
     return parameters
 
 
-def configuration(free: FreeParameters, experiments: Sequence[Experiment]) -> Setup:
+def configuration(
+    free: FreeParameters,
+    experiments: Sequence[Experiment],
+    definitions: Definitions = DEFINITIONS,
+) -> Setup:
     """A drive's fit configuration from any form that a caller may give it in.
 
     Parameters
@@ -86,6 +90,8 @@ def configuration(free: FreeParameters, experiments: Sequence[Experiment]) -> Se
         whole chain if both are free or no current was measured.
     experiments : sequence of Experiment
         The runs to fit.
+    definitions : Definitions
+        What the drive has, `ParameterSet.definitions`; by default without user-defined equations.
 
     Raises
     ------
@@ -93,9 +99,9 @@ def configuration(free: FreeParameters, experiments: Sequence[Experiment]) -> Se
         If the configuration cannot be read, or an entry is wrong.
     """
     if isinstance(free, Setup):
-        return _with_known_names(free, "the fit configuration")
+        return _with_known_names(free, "the fit configuration", definitions)
     if isinstance(free, str | Path):
-        return _with_known_names(load_setup(free), str(free))
+        return _with_known_names(load_setup(free), str(free), definitions)
     given: object = free
     if not isinstance(given, Mapping) or not given:
         raise InputError(
@@ -104,9 +110,10 @@ def configuration(free: FreeParameters, experiments: Sequence[Experiment]) -> Se
         )
     if "stages" in free:
         setup = validated(dict(free), Setup, "the fit configuration")
-        return _with_known_names(setup, "the fit configuration")
-    entries = free_entries(free)
-    blocks = {"card" if find(name).block == "control_card" else "pump" for name in entries}
+        return _with_known_names(setup, "the fit configuration", definitions)
+    entries = free_entries(free, definitions)
+    in_card = {definitions.find(name).block == "control_card" for name in entries}
+    blocks = {"card" if inside else "pump" for inside in in_card}
     kinds = {channel.kind for run in experiments for channel in run.channels.values()}
     part: Literal["card", "pump", "chain"] = "chain"
     if blocks == {"pump"}:
@@ -116,7 +123,7 @@ def configuration(free: FreeParameters, experiments: Sequence[Experiment]) -> Se
     return Setup(stages=(Stage(name=part, part=part, free=entries),))
 
 
-def _with_known_names(setup: Setup, origin: str) -> Setup:
+def _with_known_names(setup: Setup, origin: str, definitions: Definitions) -> Setup:
     """The fit configuration of a drive; a name in it that no parameter has is refused."""
     names = [
         (f"stage '{stage.name}', free", name)
@@ -127,7 +134,7 @@ def _with_known_names(setup: Setup, origin: str) -> Setup:
     names += [("standard_uncertainty", name) for name in setup.standard_uncertainty]
     for table, name in names:
         try:
-            find(name)
+            definitions.find(name)
         except UnknownParameterError as error:
             raise UnknownParameterError(f"{origin}, {table}: {error}") from None
     return setup
@@ -142,7 +149,8 @@ def setup_of(
     `InputError` if there is none. `free` as of `configuration`.
     """
     if free is not None:
-        return configuration(free, campaign.select(axis=axis, role="fit"))
+        runs = campaign.select(axis=axis, role="fit")
+        return configuration(free, runs, drive.definitions)
     name = drive.name if campaign.axes[axis].drive is None else campaign.drive(axis).name
     if name not in setup_names():
         raise InputError(
@@ -198,7 +206,10 @@ def stage_problem(
         channels,
         noise_scales(runs, channels),
         uncertain=tuple(
-            {c: deviation(each, _nominal(parameters, c)) for c in columns_of([name])}
+            {
+                column: deviation(each, _nominal(parameters, column))
+                for column in parameters.definitions.columns_of([name])
+            }
             for name, each in uncertain.items()
         ),
         threads=threads,
@@ -268,7 +279,8 @@ def _of_the_machine(stage: Stage, parameters: ParameterSet) -> list[Unknown]:
     """Unknowns of the drive: free parameters, both directions apart unless tied, then forces."""
     unknowns: list[Unknown] = []
     for name, entry in stage.free.items():
-        definition, columns = find(name), tuple(columns_of([name]))
+        definition = parameters.definitions.find(name)
+        columns = tuple(parameters.definitions.columns_of([name]))
         least = -np.inf if definition.least is None else definition.least
         how: Any = {"unit": definition.unit, "log": entry.log, "prior": entry.prior}
         for group in [columns] if entry.tied else [(each,) for each in columns]:

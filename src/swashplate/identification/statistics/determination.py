@@ -19,7 +19,8 @@ from swashplate.identification.estimation.unknowns import Unknown, Unknowns
 from swashplate.identification.stage_fit import StageFit, once_per_stage
 from swashplate.identification.statistics.intervals import estimates_of, uncertainty_of
 from swashplate.models.displacement_control import FORCE, MOTION, PRESSURE, TRAVEL, ZERO
-from swashplate.parameters.definitions import CATALOGUE
+from swashplate.parameters.definitions import CATALOGUE, DEFINITIONS
+from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.results import Result
 from swashplate.tables import listed
 
@@ -381,8 +382,12 @@ def bounds_reached(stage: StageFit) -> tuple[str, ...]:
     """Sentences on unknowns of the machine that ended at a bound, and what to do about it."""
     point = stage.problem.unknowns.at(stage.solution.vector)
     ends = {-1: "lower", 1: "upper"}
+    definitions = DEFINITIONS
+    if isinstance(stage.parameters, ParameterSet):
+        definitions = stage.parameters.definitions
     return tuple(
-        f"{unknown.name} ended at its {ends[side]} bound: {stage.stage.beyond(unknown, side)}."
+        f"{unknown.name} ended at its {ends[side]} bound: "
+        f"{stage.stage.beyond(unknown, side, definitions)}."
         for unknown, side in zip(point, point.at_bound.tolist(), strict=True)
         if unknown.run is None and side
     )

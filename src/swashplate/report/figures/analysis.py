@@ -26,6 +26,7 @@ from swashplate.analysis import (
     WhatIf,
     proportional_command,
 )
+from swashplate.drive import Limit, Simulation
 from swashplate.errors import InputError
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.report.lines import (
@@ -70,7 +71,6 @@ from swashplate.report.style import (
     zero_line,
 )
 from swashplate.results import GivenAxes
-from swashplate.simulation.result import Limit, Simulation
 from swashplate.tables import share_cell
 from swashplate.units import display_unit
 

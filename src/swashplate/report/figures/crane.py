@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from swashplate.crane import Crane, CraneRun, Followable, Hull, Seaway, Sweep
 from swashplate.crane.closed_loop.result import named_runs
 from swashplate.crane.sea.confidence import rms_of
+from swashplate.drive import Limit
 from swashplate.report import style
 from swashplate.report.lines import SHADES, draw, fit_time, shade_handle, stretches
 from swashplate.results import GivenAxes
-from swashplate.simulation.result import Limit
 from swashplate.tables import count
 
 Array = NDArray[np.float64]

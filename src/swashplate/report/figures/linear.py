@@ -11,9 +11,10 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, MultipleLocator, NullFormatter, NullLocator
 from numpy.typing import NDArray
 
+from swashplate.drive import LinearDrive
 from swashplate.errors import InputError
 from swashplate.full_order import SIGNAL_UNITS
-from swashplate.linear import FrequencyResponse, LinearDrive
+from swashplate.linear import FrequencyResponse, LinearModel
 from swashplate.report.style import (
     FAINT,
     GREY,
@@ -25,7 +26,6 @@ from swashplate.report.style import (
     write,
 )
 from swashplate.results import GivenAxes
-from swashplate.simulation.result import UNITS
 from swashplate.units import display_unit
 
 Array = NDArray[np.float64]
@@ -43,7 +43,7 @@ WORDS = {"shaft_speed": "speed"}
 def plot_bode(
     response: FrequencyResponse,
     *,
-    linear: LinearDrive | None = None,
+    linear: LinearModel | None = None,
     mark: float | None = 0.3,
     ax: None = None,
     title: str | None = None,
@@ -54,7 +54,7 @@ def plot_bode(
 def plot_bode(
     response: FrequencyResponse,
     *,
-    linear: LinearDrive | None = None,
+    linear: LinearModel | None = None,
     mark: float | None = 0.3,
     ax: GivenAxes,
     title: str | None = None,
@@ -64,7 +64,7 @@ def plot_bode(
 def plot_bode(
     response: FrequencyResponse,
     *,
-    linear: LinearDrive | None = None,
+    linear: LinearModel | None = None,
     mark: float | None = 0.3,
     ax: Axes | Sequence[Axes] | None = None,
     title: str | None = None,
@@ -77,7 +77,7 @@ def plot_bode(
     ----------
     response : FrequencyResponse
         What was swept.
-    linear : LinearDrive, optional
+    linear : LinearModel, optional
         Its first output is drawn dashed, for comparison.
     mark : float, optional
         A frequency to mark. [Hz]
@@ -102,18 +102,23 @@ def plot_bode(
             f"The sweep leads from {response.input} to {response.output}, but the linear model "
             f"from {linear.input} to {linear.outputs[0]}."
         )
-    unit = UNITS[response.input]
+    unit = response.units.get(response.input, "")
     looks = strokes(f"{amplitude:g} {unit}" for amplitude in response.amplitudes)
     legend = [handle(name, *look) for name, look in looks.items()]
     if linear is not None:
-        point = linear.operating_point
-        where = f"{point.current:.4g} A" if point.voltage is None else f"{point.voltage:.4g} V"
-        legend.append(handle(f"small motions about {where}", GREY, "dashed"))
+        about = ""
+        if isinstance(linear, LinearDrive):
+            point = linear.operating_point
+            where = f"{point.current:.4g} A" if point.voltage is None else f"{point.voltage:.4g} V"
+            about = f" about {where}"
+        legend.append(handle(f"small motions{about}", GREY, "dashed"))
     output = WORDS.get(response.output, response.output.replace("_", " "))
     words = f"{response.name}: {response.input} to {output}, sines about {response.bias:g} {unit}"
-    shown = display_unit(SIGNAL_UNITS[response.output], float(response.gain.max()))
+    si = SIGNAL_UNITS.get(response.output, response.units.get(response.output, ""))
+    shown = display_unit(si, float(response.gain.max()))
     by = f"({shown.name})" if "/" in shown.name else shown.name or "1"
-    labels = [f"gain ({by}/{unit})", "phase (deg)", "distortion (%)"]
+    gain_label = f"gain ({by}/{unit})" if unit else f"gain ({by})"
+    labels = [gain_label, "phase (deg)", "distortion (%)"]
     if ax is None:
         words = words if title is None else title
         figure, axes = sheet([2.3, 2.3, 1.3], words, labels, "frequency (Hz)", legend=legend)
@@ -128,7 +133,7 @@ def plot_bode(
             shown_row = np.where(moves, row, np.nan)
             panel.plot(response.frequencies, shown_row, marker=marker, ms=4.0, **how)
     if linear is not None:
-        highest = np.inf if linear.sample_time is None else 0.5 / linear.sample_time
+        highest = np.inf if linear.rate is None else 0.5 * linear.rate
         low, high = response.frequencies[0], response.frequencies[-1]
         fine = np.geomspace(low, min(high, highest), 400)
         ratio = linear.response(fine)[0]

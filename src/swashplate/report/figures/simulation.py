@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
+from swashplate.drive import Limit, Simulation
 from swashplate.equations import Definition, Run
 from swashplate.errors import InputError
 from swashplate.full_order import SIGNAL_UNITS, Comparison, FullOrderSimulation
@@ -54,7 +55,6 @@ from swashplate.report.style import (
     zero_line,
 )
 from swashplate.results import GivenAxes
-from swashplate.simulation.result import Limit, Simulation
 from swashplate.units import display_unit
 
 Flags = NDArray[np.int8]

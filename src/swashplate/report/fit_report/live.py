@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from swashplate.analysis.design_variables import DESIGN_VARIABLES
 from swashplate.campaign import Campaign, Channel, Experiment
 from swashplate.campaign.speed import DIFFERENTIATOR, LOW_PASS, speed_of
-from swashplate.drive import Drive
+from swashplate.drive import Drive, Limit
 from swashplate.equations.marching.record import Record, record_of
 from swashplate.errors import InputError
 from swashplate.export import exported_drive, values_of
@@ -28,7 +28,6 @@ from swashplate.report.fit_report.html_page import LIVE_SCRIPTS, rendered, scrip
 from swashplate.report.fit_report.runs import packed
 from swashplate.report.lines import SHADES, gap_rows
 from swashplate.report.style import in_lines
-from swashplate.simulation.result import Limit
 from swashplate.tables import listed, write_text
 from swashplate.units import DisplayUnit, display_unit, unit_text
 

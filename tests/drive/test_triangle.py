@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from tests.simulation.experiments import triangle
+from tests.drive.experiments import triangle
 
 from swashplate import DomainError, Drive
 from swashplate.equations import Model, equation, instance_of

@@ -1,4 +1,4 @@
-"""Many parameter sets over one input, of a drive or a model of one's own.
+"""Many sets of numbers of one model over one input.
 
 Of each set its output, in memory or streamed to files, or only its cost.
 """
@@ -6,43 +6,33 @@ Of each set its output, in memory or streamed to files, or only its cost.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Unpack
+from typing import Any, NamedTuple, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.equations import Model, instance_of, parameter_paths, state_paths
-from swashplate.equations.fields import check_mapping
-from swashplate.equations.library import TAN_22_5
+from swashplate.equations.fields import Definition, check_mapping
 from swashplate.equations.marching.lanes import LANES, lanes_of
 from swashplate.equations.marching.march import output_of
 from swashplate.equations.marching.observation import Observation
 from swashplate.equations.marching.record import Record, Sampling
-from swashplate.equations.marching.run import outside
-from swashplate.equations.marching.use import inputs_of
+from swashplate.equations.marching.run import Instance, outside
+from swashplate.equations.marching.use import Command, inputs_of
 from swashplate.errors import FileError, InputError
 from swashplate.executors import Executor, Threads
-from swashplate.parameters.definitions import SWITCHES, columns_of, find
-from swashplate.parameters.parameter_set import ParameterSet
-from swashplate.parameters.rules import broken_rules
 from swashplate.results import Result
-from swashplate.simulation.instance import (
-    card_options,
-    models_of,
-    path_of,
-    pump_options,
-    unstable_filters,
-)
-from swashplate.simulation.result import check_output
 from swashplate.tables import write_table
-from swashplate.units import in_si
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
+Mask = NDArray[np.bool_]
+Broken = tuple[Mask, Callable[[int], str]]
+"""(m,) sets that break a rule, and the sentence for one of them."""
 
 SAMPLES_A_FILE = 2**23
 """Samples of all sets of a file, 64 MB, unless a single block of sets has more."""
@@ -69,9 +59,9 @@ class Batch(Result):
     """
 
     cost: Array | None
-    """(m,) costs, None where outputs were asked for."""
+    """(m,) costs, None if outputs were asked for."""
     output: Array | None
-    """(m, n) outputs, None where costs were asked for or files written."""
+    """(m, n) outputs, None if costs were asked for or files written."""
     failures: dict[int, str]
     """Why a set has no result, by its number."""
     files: tuple[Path, ...] = ()
@@ -83,7 +73,7 @@ def simulate_many(
     model: Model,
     p: Any,
     changes: Mapping[str, ArrayLike],
-    inputs: Mapping[str, ArrayLike],
+    inputs: Mapping[str, ArrayLike | Command],
     rate: float,
     *,
     output: str = "",
@@ -94,7 +84,7 @@ def simulate_many(
     executor: Executor | None = None,
     **sampling: Unpack[Sampling],
 ) -> Batch:
-    """Simulate many parameter sets of a model over one record, from rest or states of one's own.
+    """Simulate many parameter sets of a model over one record, from rest or from given states.
 
     Parameters
     ----------
@@ -116,6 +106,11 @@ def simulate_many(
         ``Serial``. The numbers do not depend on it. For other processes the model must stand in a
         module, and on other machines the folder must be a common one.
 
+    Returns
+    -------
+    Batch
+        Outputs or costs in the order of the sets, and why a set has none.
+
     Raises
     ------
     InputError
@@ -125,74 +120,139 @@ def simulate_many(
     """
     instance = instance_of(model, p, options=options, given=given)
     records = inputs_of(instance, inputs, rate, **sampling)
-    paths = parameter_paths(model)
-    values, count = _given_sets(changes)
-    known = (*paths, *(f"start.{path}" for path in state_paths(model)))
+    values, count = set_columns(changes)
+    known = (*parameter_paths(model), *(f"start.{path}" for path in state_paths(model)))
     for path in values:
         if path not in known:
             raise InputError(f"{model.name} has no parameter '{path}'; it has {', '.join(known)}.")
     if cost is None and not output:
         raise InputError(f"{model.name}: say which output of the sets is wanted, or give a cost.")
+    numbers = {path: np.full(count, number) for path, number in _numbers_of(instance).items()}
+    return march_sets(
+        model,
+        numbers | values,
+        records,
+        name=model.name,
+        rules=_rules(model, values),
+        groups=[OptionGroup(np.ones(count, dtype=np.bool_), instance.options)],
+        output=output,
+        cost=cost,
+        to=to,
+        executor=executor,
+    )
+
+
+def _numbers_of(instance: Instance) -> dict[str, float]:
+    """Parameters by path, and givens by ``"given "`` and their path, as `Lanes` takes them."""
+    model = instance.model
+    givens = [f"given {model.prefix(i)}{path}" for i, path in model.places("given")]
+    paths = (*parameter_paths(model), *givens)
+    return dict(zip(paths, (*instance.params, *instance.given), strict=True))
+
+
+def _rules(model: Model, values: Mapping[str, Array]) -> Iterator[Broken]:
+    """What values of a model's parameters must satisfy: their ranges, and that they are finite."""
     taps = [(i, tap) for i, part in enumerate(model.parts) for tap in part.taps.values()]
     delays = {f"{model.prefix(i)}{tap.delay}" for i, tap in taps if tap.delay}
-    givens = [f"given {model.prefix(i)}{path}" for i, path in model.places("given")]
-    numbers = dict(zip((*paths, *givens), (*instance.params, *instance.given), strict=True))
-    failures: dict[int, str] = {}
     for path, column in values.items():
-        late = path in delays
-        rule = "a finite number, at least 0" if late else "a finite number"
-        for i in np.flatnonzero(~np.isfinite(column) | (late & (column < 0.0))):
-            failures[int(i)] = f"{model.name}: {path} is {column[i]:g}, but must be {rule}."
         if path in model.ranges:
-            for i in np.flatnonzero(~model.ranges[path].holds(column)):
-                failures[int(i)] = f"{model.name}: {model.ranges[path].broken(path, column[i])}."
-    columns = {path: np.full(count, number) for path, number in numbers.items()} | values
-    good = np.setdiff1d(np.arange(count), list(failures))
-    blocks = [(good[k : k + LANES], instance.options) for k in range(0, good.size, LANES)]
-    sets = _Sets(
-        model, columns, records, cost.output if cost else output, cost, Path(to) if to else None
-    )
-    return _run(sets, blocks, count, failures, model.name, executor)
+            yield _range_rule(path, model.ranges[path], column)
+        yield _size_rule(path, column, is_delay=path in delays)
 
 
-def simulate_drives(
-    parameters: ParameterSet,
-    changes: Mapping[str, ArrayLike],
-    records: Mapping[str, Record],
-    output: str,
-    cost: SquaredError | None,
-    to: str | Path | None,
-    executor: Executor | None,
-) -> Batch:
-    """March many sets over one record; see `Drive.simulate_many`."""
+def _range_rule(path: str, definition: Definition, column: Array) -> Broken:
+    """The range of a parameter's `Definition`."""
+    return ~definition.holds(column), lambda i: f"{definition.broken(path, column[i])}."
+
+
+def _size_rule(path: str, column: Array, *, is_delay: bool) -> Broken:
+    """Numbers are finite, and delays not negative."""
+    rule = "a finite number, at least 0" if is_delay else "a finite number"
+    breaks = ~np.isfinite(column) | (is_delay & (column < 0.0))
+    return breaks, lambda i: f"{path} is {column[i]:g}, but must be {rule}."
+
+
+def set_columns(changes: Mapping[str, ArrayLike]) -> tuple[dict[str, Array], int]:
+    """Values as columns, one number a set, and how many sets there are."""
     check_mapping("changes", changes)
-    given, count = _given_sets(
-        {name: in_si(values, find(name).unit, name) for name, values in changes.items()}
-    )
-    numbers = {name: np.full(count, value) for name, value in parameters.numbers.items()}
-    changed = [(column, each) for name, each in given.items() for column in columns_of([name])]
-    for k, (column, values) in enumerate(changed):
-        if column in dict(changed[:k]):
-            raise InputError(f"{column} is given twice.")
-        numbers[column] = values
-    driver, record = next(iter(records.items()))
-    by_voltage, models = driver == "voltage", models_of(parameters.equations)
-    output = cost.output if cost else output
-    check_output(output)
-    name, failures, exact = parameters.name, dict[int, str](), parameters.rate is None
-    unstable = unstable_filters(numbers, record.step, exact) if by_voltage else ()
-    for mask, sentence in (*broken_rules(numbers), *unstable):
+    values: dict[str, Array] = {}
+    for name, given in changes.items():
+        column = np.asarray(given)
+        if column.ndim != 1 or column.size == 0 or column.dtype.kind not in "fiub":
+            raise InputError(f"The values of {name} must be one number a set, in one row.")
+        values[name] = column.astype(np.float64)
+    sizes = {column.size for column in values.values()}
+    if len(sizes) != 1:
+        listed = ", ".join(f"{name} {column.size}" for name, column in values.items())
+        raise InputError(f"All parameters need the same number of sets, at least one: {listed}.")
+    return values, sizes.pop()
+
+
+class OptionGroup(NamedTuple):
+    """Sets with the same options, which kernels are compiled for."""
+
+    sets: Mask
+    """(m,) which sets have them."""
+    options: tuple[Any, ...]
+    """Options of each part of the model."""
+
+
+def march_sets(
+    model: Model,
+    numbers: Mapping[str, Array],
+    records: Mapping[str, Record],
+    *,
+    name: str,
+    rules: Iterable[Broken],
+    groups: Sequence[OptionGroup],
+    output: str = "",
+    cost: SquaredError | None = None,
+    to: str | Path | None = None,
+    executor: Executor | None = None,
+) -> Batch:
+    """March sets of a model's numbers over one record, wherever the executor runs them.
+
+    Parameters
+    ----------
+    model : Model
+        The model that all sets have in common.
+    numbers : mapping of str to (m,) array
+        Every parameter by path, every given by ``"given "`` and its path, and states at the first
+        sample by ``"start."`` and theirs, one number a set.
+    records : mapping of str to Record
+        External signals on the march's grid; what drives the model comes first.
+    name : str
+        Of the machine, for sentences.
+    rules : iterable of Broken
+        What the numbers must satisfy: a set that breaks one is not marched, and its failure is the
+        sentence of the first.
+    groups : sequence of OptionGroup
+        Every set with its options.
+    output, cost, to, executor :
+        As in `simulate_many`.
+
+    Raises
+    ------
+    InputError, FileError
+        As in `simulate_many`.
+    """
+    failures: dict[int, str] = {}
+    for mask, sentence in rules:
         for i in np.flatnonzero(mask):
             failures.setdefault(int(i), f"{name}: {sentence(int(i))}")
+    blocks: list[Block] = []
+    for group in groups:
+        members = np.setdiff1d(np.flatnonzero(group.sets), list(failures))
+        blocks += [(members[k : k + LANES], group.options) for k in range(0, members.size, LANES)]
     sets = _Sets(
-        models.drive if by_voltage else models.pump_drive,
-        {path_of(column): values for column, values in numbers.items()},
-        records,
-        output,
-        cost,
-        to,
+        model=model,
+        numbers=numbers,
+        records=records,
+        output=cost.output if cost else output,
+        cost=cost,
+        to=to,
     )
-    blocks = _blocks(parameters, numbers, failures, given, by_voltage)
+    count = groups[0].sets.size
     return _run(sets, blocks, count, failures, name, executor)
 
 
@@ -233,31 +293,6 @@ class _Sets:
             weight[every] = seen.weight
             measured[every] = np.where(weight[every] > 0.0, seen.values, 0.0)
         return measured, weight
-
-
-def _blocks(
-    parameters: ParameterSet,
-    numbers: Mapping[str, Array],
-    failures: Mapping[int, str],
-    changed: Iterable[str],
-    by_voltage: bool,
-) -> list[Block]:
-    """Blocks of a drive's sets that share the options which the kernels are compiled for."""
-    stops = np.tan(np.maximum(numbers["Z13_plus"], numbers["Z13_minus"]))
-    masks: dict[str, NDArray[np.bool_]] = {"steep": stops >= TAN_22_5}
-    for option in {SWITCHES[column] for column in changed if column in SWITCHES}:
-        own = [numbers[each] for each in SWITCHES if SWITCHES[each] == option and each in numbers]
-        masks[option] = np.any(own, axis=0)
-    kinds = np.stack(list(masks.values()), axis=1)
-    good = np.setdiff1d(np.arange(stops.size), list(failures))
-    base, card = pump_options(parameters), card_options(parameters) if by_voltage else None
-    found = []
-    for kind in np.unique(kinds[good], axis=0):
-        members = good[(kinds[good] == kind).all(axis=1)]
-        on = {name: True if each else None for name, each in zip(masks, kind, strict=True)}
-        options = card, base._replace(**on)
-        found += [(members[k : k + LANES], options) for k in range(0, members.size, LANES)]
-    return found
 
 
 def _march(shared: _Sets, blocks: Sequence[Block]) -> list[tuple[dict[int, float], Indices, Array]]:
@@ -356,19 +391,3 @@ def _make_folder(folder: Path) -> None:
         raise FileError(
             f"{folder} holds {there.name} already; name an empty folder for the outputs."
         )
-
-
-def _given_sets(changes: Mapping[str, ArrayLike]) -> tuple[dict[str, Array], int]:
-    """Values as columns, and how many sets there are."""
-    check_mapping("changes", changes)
-    values: dict[str, Array] = {}
-    for name, given in changes.items():
-        column = np.asarray(given)
-        if column.ndim != 1 or column.size == 0 or column.dtype.kind not in "fiub":
-            raise InputError(f"The values of {name} must be one number a set, in one row.")
-        values[name] = column.astype(np.float64)
-    sizes = {each.size for each in values.values()}
-    if len(sizes) != 1:
-        listed = ", ".join(f"{name} {each.size}" for name, each in values.items())
-        raise InputError(f"All parameters need the same number of sets, at least one: {listed}.")
-    return values, sizes.pop()

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.simulation.experiments import ALL, LOAD, RIPPLE, jacobian, residuals
+from tests.drive.experiments import ALL, LOAD, RIPPLE, jacobian, residuals
 
 from swashplate import Drive, Simulation, maneuvers
 from swashplate.equations.marching.observation import Observation, ObservedRecord
@@ -83,7 +83,7 @@ def variant(drive: Drive, form: str) -> Drive:
 
 
 def stepped(drive: Drive, voltage: np.ndarray, rate: float, **options: str) -> dict:
-    stepper = drive.stepper(1.0 / rate, **options)
+    stepper = drive.stepper(rate, **options)
     samples = [stepper.step(v) for v in voltage]
     return {name: np.array([getattr(s, name) for s in samples]) for name in SIGNALS}
 
@@ -174,7 +174,7 @@ voltage = np.load(sys.argv[1])
 drive = Drive.preset("slew").replace(Z7=0.3, Z12=0.1)
 run = drive.simulate(voltage)
 by = drive.sensitivities(voltage, parameters=["Z16", "Z1", "tau", "omega"])
-np.savez(sys.argv[2], **{name: getattr(run, name) for name in sys.argv[3:]}, by=by.shaft_speed)
+np.savez(sys.argv[2], **{name: getattr(run, name) for name in sys.argv[3:]}, by=by['shaft_speed'])
 """
 
 
@@ -196,7 +196,7 @@ def test_interpreted_run_agrees(tmp_path: Path) -> None:
         compiled = getattr(run, name)
         scale = np.abs(compiled).max()
         np.testing.assert_allclose(interpreted[name], compiled, rtol=1e-12, atol=1e-12 * scale)
-    by = drive.sensitivities(voltage, parameters=["Z16", "Z1", "tau", "omega"]).shaft_speed
+    by = drive.sensitivities(voltage, parameters=["Z16", "Z1", "tau", "omega"])["shaft_speed"]
     np.testing.assert_allclose(interpreted["by"], by, rtol=1e-10, atol=1e-12 * np.abs(by).max())
 
 

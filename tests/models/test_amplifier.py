@@ -12,10 +12,10 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from swashplate import Drive
+from swashplate.drive import step_limit
 from swashplate.equations.model import Window
-from swashplate.models import channel as single
-from swashplate.models.channel import Channel, Filter
-from swashplate.simulation.instance import step_limit
+from swashplate.models import amplifier
+from swashplate.models.amplifier import Channel, Filter
 
 Array = NDArray[np.float64]
 RATES = (200.0, 512.0, 600.0, 1000.0, 2000.0)
@@ -27,12 +27,12 @@ RATES = (200.0, 512.0, 600.0, 1000.0, 2000.0)
 @pytest.mark.interpreted
 def test_share_of_an_interval_above_the_dead_zone() -> None:
     # a ramp from 0 to 2 V over the two intervals; the last 0.5 V lie above 1.5 V
-    assert single.share_above(0.0, 2.0, 1.5) == 0.25
-    assert single.share_above(2.0, 0.0, 1.5) == 0.25
-    assert single.share_above(1.0, 1.0, 1.0) == 0.0
-    assert single.share_above(2.0, 3.0, 1.0) == 1.0
+    assert amplifier.share_above(0.0, 2.0, 1.5) == 0.25
+    assert amplifier.share_above(2.0, 0.0, 1.5) == 0.25
+    assert amplifier.share_above(1.0, 1.0, 1.0) == 0.0
+    assert amplifier.share_above(2.0, 3.0, 1.0) == 1.0
     # the interval ends 0.3 samples before the newest: it sees 1.3..2 of 0..1 and 1..2 of 1..2
-    assert single.jump_share(2.0, 1.0, 0.0, 0.3, 1.0) == pytest.approx(0.7)
+    assert amplifier.jump_share(2.0, 1.0, 0.0, 0.3, 1.0) == pytest.approx(0.7)
 
 
 # --- the filter's differential equation ----------------------------------------------------------
@@ -42,7 +42,7 @@ def marched(p: Channel, steady: Array, h: float) -> Array:
     """I* of the exact filter under an I_ss straight between samples, settled at the first."""
     state, found = Filter(float(steady[0]), 0.0, 0.0), []
     for begins, ends in pairwise([float(steady[0]), *map(float, steady)]):
-        filtered, rate = single.exact_filter(state, begins, ends, p, h)
+        filtered, rate = amplifier.exact_filter(state, begins, ends, p, h)
         found.append(filtered)
         state = Filter(filtered, rate, 0.0)
     return np.array(found)
@@ -54,7 +54,7 @@ def test_the_waves_are_cosh_and_sinh(zeta: float, w: float) -> None:
     q, e = (zeta * zeta - 1.0) * w * w, exp(-zeta * w)
     r = sqrt(abs(q))
     even, odd = (cosh(r), sinh(r)) if q > 0.0 else (cos(r), sin(r))
-    found = single.damped_waves(zeta, w)
+    found = amplifier.damped_waves(zeta, w)
     expected = (e * even, e * odd / r if r > 0.0 else e)
     assert found == pytest.approx(expected, rel=1e-13, abs=1e-15)
 
@@ -64,8 +64,8 @@ def test_nothing_happens_at_critical_damping() -> None:
     """Value and slope by ζ go through ζ = 1 as those of the power series, known there."""
     for w in (0.03, 0.3, 0.99, 1.0, 2.0):
         e, s = exp(-w), 1e-5
-        assert single.damped_waves(1.0, w) == pytest.approx((e, e), rel=1e-15)
-        below, above = single.damped_waves(1.0 - s, w), single.damped_waves(1.0 + s, w)
+        assert amplifier.damped_waves(1.0, w) == pytest.approx((e, e), rel=1e-15)
+        below, above = amplifier.damped_waves(1.0 - s, w), amplifier.damped_waves(1.0 + s, w)
         slopes = [(b - a) / (2.0 * s) for a, b in zip(below, above, strict=True)]
         # cosh r is 1 + r²/2 and sinh r/r is 1 + r²/6 there, with r² = (ζ² - 1) w²
         expected = (e * (w * w - w), e * (w * w / 3.0 - w))
@@ -117,7 +117,7 @@ def test_it_is_stable_and_sticks_at_any_rate(zeta: float) -> None:
 def test_friction_takes_the_rate_and_stops_at_zero(channel: Channel) -> None:
     # a filter that nothing else moves: x = x_0 + v h - C h²/2, less where it stops before h
     p, h = channel._replace(zeta=1e-6, omega=1e-3, C=2.5), 0.2
-    found = [single.exact_filter(Filter(0.2, v, 0.0), 0.0, 0.0, p, h) for v in (0.8, -0.4)]
+    found = [amplifier.exact_filter(Filter(0.2, v, 0.0), 0.0, 0.0, p, h) for v in (0.8, -0.4)]
     assert found[0] == pytest.approx((0.31, 0.3))
     assert found[1] == pytest.approx((0.16, 0.0))
 
@@ -126,7 +126,7 @@ def test_friction_takes_the_rate_and_stops_at_zero(channel: Channel) -> None:
 @given(st.lists(st.floats(-3.0, 3.0), min_size=3, max_size=3), st.floats(0.0, 1.0))
 def test_the_course_over_a_step_keeps_integral_and_moment(samples: list[float], f: float) -> None:
     p = Channel(0.5, 0.3, 0.1, 0.0, 0.0, 1.0, 1.0, 0.0, inf, inf, inf, 0.0, inf)
-    begins, ends = single.steady_course(-1.0, Window(tuple(samples), f), p)
+    begins, ends = amplifier.steady_course(-1.0, Window(tuple(samples), f), p)
     # time in samples back from the newest; the step goes from f + 1 to f
     back = f + (np.arange(100_000) + 0.5) / 100_000
     command = -np.interp(back, [0.0, 1.0, 2.0], samples)
@@ -161,9 +161,9 @@ def test_limiter_branches(
     channel: Channel, target: float, previous: float, steady: float, output: float, limited: bool
 ) -> None:
     p = channel._replace(**LIMITS)
-    found = single.limited_current(target, previous, steady, p, 0.01, None)
+    found = amplifier.limited_current(target, previous, steady, p, 0.01, None)
     assert found == pytest.approx(output)
-    assert single.rate_limit_active(output, target, previous, p.I_t2) is limited
+    assert amplifier.rate_limit_active(output, target, previous, p.I_t2) is limited
 
 
 @pytest.mark.interpreted
@@ -185,5 +185,5 @@ def test_switches_from_within_a_step(
     channel: Channel, target: float, previous: float, steady: float, output: float
 ) -> None:
     p = channel._replace(**LIMITS)
-    found = single.limited_current(target, previous, steady, p, 0.01, True)
+    found = amplifier.limited_current(target, previous, steady, p, 0.01, True)
     assert found == pytest.approx(output)

@@ -8,13 +8,12 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
-from tests.simulation.experiments import HARD, RATE, SWING, jacobian, residuals, triangle
+from tests.drive.experiments import HARD, RATE, SWING, jacobian, residuals, triangle
 
 from swashplate import DomainError, Drive, InputError, ParameterError, maneuvers
+from swashplate.drive import ALL_COLUMNS, PUMP_COLUMNS, simulate_drive
 from swashplate.equations.marching.observation import Observation, ObservedRecord, Own
 from swashplate.equations.marching.record import record_of
-from swashplate.simulation.residuals import ALL_COLUMNS, PUMP_COLUMNS
-from swashplate.simulation.run import simulate_drive
 
 CARD = ("current", "current_sum", "current_positive", "current_negative")
 PUMP = ("shaft_speed", "shaft_position", "stroker_pressure", "swash_angle", "spool_position")
@@ -69,7 +68,7 @@ def test_a_current_drives_the_pump_alone(hoist: Drive) -> None:
         assert np.array_equal(found.residuals[observed.rows_of(number)], simulated(alone, signal))
     by = hoist.sensitivities_current(current)
     speed = found.columns[observed.rows_of(OBSERVABLE.index("shaft_speed"))]
-    close(speed[:, : len(PUMP_COLUMNS)], by.shaft_speed)
+    close(speed[:, : len(PUMP_COLUMNS)], by["shaft_speed"])
     assert (speed[:, len(PUMP_COLUMNS) :] == 0.0).all()
     for signal in CARD:
         assert (found.columns[observed.rows_of(OBSERVABLE.index(signal))] == 0.0).all()

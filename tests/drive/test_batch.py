@@ -21,6 +21,8 @@ from swashplate import (
     Threads,
     simulate_many,
 )
+from swashplate import batch as batches
+from swashplate.drive import drive_instance
 from swashplate.equations import Model, Tap, equation, simulate
 from swashplate.equations.code_generation.lowering import definition_in, lowered
 from swashplate.equations.code_generation.machine_code import optimised
@@ -28,8 +30,6 @@ from swashplate.equations.marching.lanes import LANES, MARCH_KINDS, lanes_of
 from swashplate.equations.marching.run import LIBRARY
 from swashplate.models.displacement_control import PumpOptions
 from swashplate.models.drive import pump_drive
-from swashplate.simulation import batch as batches
-from swashplate.simulation.instance import instance_of
 
 RATE, COUNT = 100.0, 37
 COMMAND = np.sin(np.arange(400) / 25.0) + 0.3
@@ -101,7 +101,7 @@ def test_sets_begin_where_they_are_told_to() -> None:
         run = simulate(valve, p, INPUTS, RATE, given=STROKE, begin=begin)
         assert np.array_equal(batch.output[k], run["position"])
     many = {"pump.Z10": np.full(3, 12.0), "start.pump.pressure": np.array([0.0, 2e5, 4e5])}
-    parts = instance_of(Drive.preset("hoist").parameters, by_voltage=False).parts
+    parts = drive_instance(Drive.preset("hoist").parameters, by_voltage=False).parts
     p = pump_drive.parameters(*(part.p for part in parts))
     options = pump_drive.options(parts[1].options)
     record = {"current": np.full(200, 0.45)}
@@ -162,7 +162,7 @@ def test_outputs_are_streamed_to_files(tmp_path: Path, monkeypatch, per_file: in
 def test_executors_give_the_same(tmp_path: Path) -> None:
     """Of a packaged model, which other processes can import."""
     hoist = Drive.preset("hoist")
-    instance = instance_of(hoist.parameters, False)
+    instance = drive_instance(hoist.parameters, False)
     current = 0.9 * np.sin(np.arange(300) / 40.0)
     numbers = 1.2e-4 * np.linspace(0.8, 1.2, 20)
     parts = [part.p for part in instance.parts]

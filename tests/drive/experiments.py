@@ -5,9 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from swashplate import ParameterSet, maneuvers
+from swashplate.drive import bound_drive, requested_columns
 from swashplate.equations.marching.derivatives import Jacobian, Triangle
 from swashplate.equations.marching.observation import ObservedRecord, Own
-from swashplate.simulation.residuals import made_ready, wanted_columns
 
 NOTHING = Own()
 RATE = 512.0
@@ -35,7 +35,7 @@ HARD = steps(9.0, 9.0, 0.0, -9.0, -9.0, 0.0, 3.0)
 
 
 def residuals(parameters: ParameterSet, observed: ObservedRecord, own: Own = NOTHING) -> np.ndarray:
-    return made_ready(parameters, observed, (), own).residuals(observed)
+    return bound_drive(parameters, observed, (), own).residuals(observed)
 
 
 def jacobian(
@@ -45,12 +45,16 @@ def jacobian(
     own: Own = NOTHING,
     out: np.ndarray | None = None,
 ) -> Jacobian:
-    found = made_ready(parameters, observed, columns, own).jacobian(observed, out)
-    return found._replace(names=(*wanted_columns(tuple(columns)), *observed.own_columns))
+    found = bound_drive(parameters, observed, columns, own).jacobian(observed, out)
+    return found._replace(
+        names=(*requested_columns(parameters.definitions, tuple(columns)), *observed.own_columns)
+    )
 
 
 def triangle(
     parameters: ParameterSet, observed: ObservedRecord, columns: Sequence[str], own: Own = NOTHING
 ) -> Triangle:
-    found = made_ready(parameters, observed, columns, own).triangle(observed)
-    return found._replace(names=(*wanted_columns(tuple(columns)), *observed.own_columns))
+    found = bound_drive(parameters, observed, columns, own).triangle(observed)
+    return found._replace(
+        names=(*requested_columns(parameters.definitions, tuple(columns)), *observed.own_columns)
+    )

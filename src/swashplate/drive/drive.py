@@ -5,11 +5,21 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple, TypedDict, Unpack, overload
+from typing import TYPE_CHECKING, NamedTuple, Unpack, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from swashplate.drive.equilibrium import steady_states
+from swashplate.drive.instance import (
+    at_every_rate,
+    check_filter_stability,
+    drive_instance,
+    with_equation,
+)
+from swashplate.drive.march import Sample, drive_stepper, simulate_drive
+from swashplate.drive.records import Given, drive_records
+from swashplate.drive.simulation import Simulation
 from swashplate.equations.marching.record import SOURCE_RATE, Interpolation, check_rate
 from swashplate.equations.marching.run import Start
 from swashplate.equations.marching.stepping import CompiledStep, stored_of
@@ -22,47 +32,18 @@ from swashplate.parameters.files import dump_set, load_preset, load_set, preset_
 from swashplate.parameters.parameter_set import Change, Parameter, ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.results import Result
-from swashplate.simulation.instance import (
-    at_every_rate,
-    check_filter_stability,
-    instance_of,
-    with_equation,
-)
-from swashplate.simulation.result import Simulation
-from swashplate.simulation.run import (
-    Sample,
-    drive_records,
-    drive_stepper,
-    simulate_drive,
-    steady_states,
-)
 from swashplate.units import in_si
 
 if TYPE_CHECKING:
+    from swashplate.batch import Batch, SquaredError
+    from swashplate.drive.linear_drive import LinearDrive
+    from swashplate.drive.small_motion import Coulomb, Input
+    from swashplate.equations.marching.sensitivity import Sensitivities
     from swashplate.executors import Executor
-    from swashplate.linear import (
-        Coulomb,
-        FrequencyResponse,
-        Input,
-        LinearDrive,
-    )
-    from swashplate.simulation.batch import Batch, SquaredError
-    from swashplate.simulation.residuals import Sensitivities
+    from swashplate.linear import FrequencyResponse
     from swashplate.tables import Table
 
 Array = NDArray[np.float64]
-
-
-class Given(TypedDict, total=False):
-    """How inputs are given, and what was measured beside the command; see `Drive.simulate`."""
-
-    clip: bool
-    time: ArrayLike | None
-    interpolation: Interpolation | None
-    substeps: int | None
-    load_torque: ArrayLike | None
-    pump_speed: ArrayLike | None
-    supply_pressure: ArrayLike | None
 
 
 @dataclass(frozen=True)
@@ -112,7 +93,7 @@ class Drive(Result, Mapping[str, Parameter]):
         Raises
         ------
         FileError
-            If there is no such file, or the folder holds no drive.
+            If there is no such file, or the folder does not hold a drive.
         ParameterError
             If an entry is wrong; the sentence names file, parameter and rule.
         """
@@ -181,15 +162,15 @@ class Drive(Result, Mapping[str, Parameter]):
     def with_equation(
         self, old: Equation, new: Equation, parameters: type[NamedTuple] | None = None
     ) -> Drive:
-        """A drive with an equation of one's own in the place of one of the card's or the pump's.
+        """A drive with a user-defined equation in the place of one of the card's or the pump's.
 
         Parameters
         ----------
         old : equation
-            Of `swashplate.models.channel`, `swashplate.models.card`, `swashplate.models.pump`,
+            Of `swashplate.models.amplifier`, `swashplate.models.pump`,
             `swashplate.models.displacement_control` or `swashplate.models.refinements`.
         new : equation
-            The same arguments, and behind them, by name, any of `parameters`.
+            The same arguments, and after them, by name, any of `parameters`.
         parameters : class of named tuples, optional
             What the equation brings along, each a float with its `Definition` and a default. They
             are parameters of the drive from then on: ``drive.replace(seal_drag=1e-5)``, a fit's
@@ -221,9 +202,12 @@ class Drive(Result, Mapping[str, Parameter]):
         """The drive with a card's filter that means the same at every rate.
 
         Kruse's filter is a recursion at 512 Hz (`ParameterSet.rate`): marched at another rate
-        it is another filter. In its place comes the differential equation with the same poles;
-        where there is none, since the recursion changes its sign from sample to sample, an
-        `InputError`.
+        it is another filter. In its place comes the differential equation with the same poles.
+
+        Raises
+        ------
+        InputError
+            If there is none, because the recursion changes its sign from sample to sample.
         """
         return Drive(at_every_rate(self.parameters))
 
@@ -282,7 +266,25 @@ class Drive(Result, Mapping[str, Parameter]):
         start: Start = "rest",
         **given: Unpack[Given],
     ) -> Simulation:
-        """Simulate pump and motor alone over a signed current [A]; arguments as `simulate`."""
+        """Simulate pump and motor alone over a signed current.
+
+        Parameters
+        ----------
+        current : (n,) array_like
+            Signed current. [A]
+        rate, start, **given :
+            As in `simulate`.
+
+        Returns
+        -------
+        Simulation
+            Of which `Simulation.voltage` is None.
+
+        Raises
+        ------
+        InputError, DomainError
+            As in `simulate`.
+        """
         records = drive_records("current", current, rate, **given)
         return simulate_drive(self.parameters, records, start)
 
@@ -294,21 +296,34 @@ class Drive(Result, Mapping[str, Parameter]):
         parameters: Sequence[str] | None = None,
         start: Start = "rest",
         **given: Unpack[Given],
-    ) -> Sensitivities:
+    ) -> Sensitivities[Simulation]:
         """Simulate with exact derivatives of any signal.
 
         Parameters
         ----------
-        parameters : sequence of str, optional
-            Symbols (``"Z16"`` stands for both directions) or columns (``"Z16_plus"``) to
-            differentiate by; by default all of card, pump and motor.
         voltage, rate, start, **given :
             As in `simulate`.
+        parameters : sequence of str, optional
+            Symbols (``"Z16"`` stands for both directions) or columns (``"Z16_plus"``) to
+            differentiate by; by default all of card, pump and motor, refinements apart.
+
+        Returns
+        -------
+        Sensitivities
+            Derivatives by signal, ``by["shaft_speed"]``, (n, k), with the columns' names and the
+            run.
+
+        Raises
+        ------
+        UnknownParameterError
+            If no parameter has a name.
+        InputError
+            As in `simulate`.
         """
-        from swashplate.simulation.residuals import sensitivities
+        from swashplate.drive.derivatives import drive_sensitivities
 
         records = drive_records("voltage", voltage, rate, **given)
-        return sensitivities(self.parameters, records, start, parameters)
+        return drive_sensitivities(self.parameters, records, start, parameters)
 
     def sensitivities_current(
         self,
@@ -318,12 +333,30 @@ class Drive(Result, Mapping[str, Parameter]):
         parameters: Sequence[str] | None = None,
         start: Start = "rest",
         **given: Unpack[Given],
-    ) -> Sensitivities:
-        """The same for pump and motor alone over a signed current. [A]"""
-        from swashplate.simulation.residuals import sensitivities
+    ) -> Sensitivities[Simulation]:
+        """The same for pump and motor alone over a signed current.
+
+        Parameters
+        ----------
+        current : (n,) array_like
+            Signed current. [A]
+        rate, parameters, start, **given :
+            As in `sensitivities`; by default all parameters of pump and motor.
+
+        Returns
+        -------
+        Sensitivities
+            As of `sensitivities`.
+
+        Raises
+        ------
+        InputError
+            As in `sensitivities`, and for a parameter of the card.
+        """
+        from swashplate.drive.derivatives import drive_sensitivities
 
         records = drive_records("current", current, rate, **given)
-        return sensitivities(self.parameters, records, start, parameters)
+        return drive_sensitivities(self.parameters, records, start, parameters)
 
     def simulate_many(
         self,
@@ -353,12 +386,19 @@ class Drive(Result, Mapping[str, Parameter]):
         cost, to, executor :
             As in `swashplate.simulate_many`.
 
+        Returns
+        -------
+        Batch
+            (m,) costs or (m, n) outputs in the order of the sets, and why a set has none.
+
         Raises
         ------
+        UnknownParameterError
+            If no parameter has a name.
         InputError, FileError
             As in `swashplate.simulate_many`.
         """
-        from swashplate.simulation.batch import simulate_drives
+        from swashplate.drive.batch import simulate_drives
 
         commands = {"voltage": voltage, "current": current}
         chosen = [(driver, each) for driver, each in commands.items() if each is not None]
@@ -369,7 +409,7 @@ class Drive(Result, Mapping[str, Parameter]):
 
     def stepper(
         self,
-        h: float = 1.0 / SOURCE_RATE,
+        rate: float = SOURCE_RATE,
         *,
         interpolation: Interpolation = "linear",
         start: Start = "rest",
@@ -377,11 +417,29 @@ class Drive(Result, Mapping[str, Parameter]):
     ) -> Stepper[Sample]:
         """The drive one sample at a time: command in, sample out, numbers as in `simulate`.
 
-        `h` is the interval between samples [s]; other arguments as in `simulate`. Of `measured`,
-        such as ``("load_torque", "pump_speed")``, each step takes a number behind the voltage.
+        Parameters
+        ----------
+        rate : float
+            Samples a second, 10 Hz to 100 kHz. [Hz]
+        interpolation, start :
+            As in `simulate`.
+        measured : sequence of str
+            Of ``"load_torque"``, ``"pump_speed"`` and ``"supply_pressure"`` what each step takes a
+            number of, after the voltage.
+
+        Returns
+        -------
+        Stepper
+            Its ``step(voltage, *measured)`` returns a `Sample`.
+
+        Raises
+        ------
+        InputError
+            For a rate or option that there is not, and a rate at which the card's filter is
+            unstable.
         """
-        h = in_si(h, "s", "The interval")
-        return drive_stepper(self.parameters, h, interpolation, start, measured)
+        rate = in_si(rate, "Hz", "The rate")
+        return drive_stepper(self.parameters, rate, interpolation, start, measured)
 
     def compiled_step(
         self,
@@ -403,6 +461,11 @@ class Drive(Result, Mapping[str, Parameter]):
         rate : float
             Steps a second, without steps between; 512 or more are the march's own. [Hz]
 
+        Returns
+        -------
+        CompiledStep
+            Its ``step(machine)`` advances one sample inside a compiled kernel.
+
         Raises
         ------
         InputError
@@ -411,7 +474,7 @@ class Drive(Result, Mapping[str, Parameter]):
         rate = in_si(rate, "Hz", "The rate")
         check_rate(rate)
         check_filter_stability(self.parameters, 1.0 / rate)
-        instance = instance_of(self.parameters, by_voltage=True)
+        instance = drive_instance(self.parameters, by_voltage=True)
         return CompiledStep(instance, inputs, stored_of(instance.model, outputs), 1.0 / rate)
 
     def linearize(
@@ -436,7 +499,7 @@ class Drive(Result, Mapping[str, Parameter]):
             Where, one of the two: a constant voltage [V], or a constant signed current [A].
         input : str or sequence of str, optional
             What moves the model: ``"voltage"``, ``"current"``, ``"solenoid_force"``; by default the
-            voltage, or the current where one is given. With another than the voltage it is the pump
+            voltage, or the current if one is given. With another than the voltage it is the pump
             and motor alone. Behind a command, or by themselves, ``"load_torque"``,
             ``"pump_speed"`` and ``"supply_pressure"``, which move about the drive's parameters.
         outputs : sequence of str
@@ -461,7 +524,7 @@ class Drive(Result, Mapping[str, Parameter]):
             Where the gain is 0: in a dead zone, within the hysteresis, at a stop, or with a
             friction that has no presliding.
         """
-        from swashplate.linear import linearize_drive
+        from swashplate.drive.linearisation import linearize_drive
 
         at, current = in_si(at, "V", "The voltage"), in_si(current, "A", "The current")
         return linearize_drive(self.parameters, at, current, input, outputs, coulomb)
@@ -508,19 +571,43 @@ class Drive(Result, Mapping[str, Parameter]):
         DomainError
             If nothing moves at all, or the answer does not come to repeat itself.
         """
-        from swashplate.linear import sweep
+        from swashplate.drive.frequency_response import sweep_drive
 
-        return sweep(self.parameters, frequencies, amplitudes, bias, input, output, rate, tolerance)
+        return sweep_drive(
+            self.parameters,
+            frequencies,
+            amplitudes,
+            bias=bias,
+            input=input,
+            output=output,
+            rate=rate,
+            tolerance=tolerance,
+        )
 
     @overload
     def steady_speed(self, voltage: float) -> float: ...
     @overload
     def steady_speed(self, voltage: Sequence[float] | Array) -> Array: ...
     def steady_speed(self, voltage: float | Sequence[float] | Array) -> float | Array:
-        """Speed that the drive settles at under constant commands [V → rad/s].
+        """Speed that the drive settles at under constant commands.
 
         With refinements it is the mean of a turn, in the middle of what friction and hysteresis
         leave open, under the load.
+
+        Parameters
+        ----------
+        voltage : float or array_like of any shape
+            Constant commands within ±10 V. [V]
+
+        Returns
+        -------
+        float or array of the same shape
+            Shaft speeds. [rad/s]
+
+        Raises
+        ------
+        InputError
+            For a command that is not finite or beyond ±10 V.
         """
         return self._steady(voltage)[1]
 
@@ -529,7 +616,23 @@ class Drive(Result, Mapping[str, Parameter]):
     @overload
     def steady_current(self, voltage: Sequence[float] | Array) -> Array: ...
     def steady_current(self, voltage: float | Sequence[float] | Array) -> float | Array:
-        """Signed current that the card settles at under constant commands [V → A]."""
+        """Signed current that the card settles at under constant commands.
+
+        Parameters
+        ----------
+        voltage : float or array_like of any shape
+            Constant commands within ±10 V. [V]
+
+        Returns
+        -------
+        float or array of the same shape
+            Signed currents. [A]
+
+        Raises
+        ------
+        InputError
+            For a command that is not finite or beyond ±10 V.
+        """
         return self._steady(voltage)[0]
 
     def _steady(self, voltage: float | Sequence[float] | Array) -> tuple[float | Array, ...]:

@@ -1,4 +1,4 @@
-"""From a parameter set to a model with numbers: options, columns and paths, the filter's limit."""
+"""From a parameter set to a model with numbers: its options, and the limit of its filter."""
 
 from __future__ import annotations
 
@@ -12,15 +12,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.equations.declaration import interpreted
-from swashplate.equations.fields import declared_by
 from swashplate.equations.language import plain
 from swashplate.equations.marching.run import Instance, Part
 from swashplate.equations.model import Model
 from swashplate.equations.replacement import Replacement, again, check_members, uses
 from swashplate.errors import InputError
-from swashplate.models.card import Card
-from swashplate.models.channel import CardOptions, Channel
-from swashplate.models.channel import step_limit as filter_limit
+from swashplate.models.amplifier import Card, CardOptions, Channel
+from swashplate.models.amplifier import step_limit as filter_limit
 from swashplate.models.displacement_control import Pump, PumpOptions, steep_stops
 from swashplate.models.drive import Source as CurrentSource
 from swashplate.models.drive import (
@@ -31,7 +29,6 @@ from swashplate.models.drive import (
     settled_drive,
 )
 from swashplate.models.pump import searched_pressure, settled_pressure
-from swashplate.parameters.definitions import OWN
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import SIDES, Broken, Rule, applied
 
@@ -41,28 +38,14 @@ MOST_SUBSTEPS = 1000
 """Steps a sample that anyone would wait for."""
 
 
-PATHS = {
-    column: f"{part}.{path}"
-    for part, kind in (("pump", Pump), ("card", Card))
-    for each in declared_by(kind)
-    for column, path in zip(each.columns, each.fields, strict=True)
-}
-"""Path in the model of every column such as ``Z16_plus``."""
 START = "start."
 """What the column of a number of the state at the first sample begins with, before its path."""
 PRESSURE = "pump.pressure"
 """Path of δP; at the first sample the column ``start.pump.pressure``."""
 
 
-def path_of(column: str) -> str:
-    """Path in the model of a column; a state at the start is its own."""
-    if column in OWN:  # of an equation of one's own
-        return f"pump.{column}"
-    return column if column.startswith(START) else PATHS[column]
-
-
 class Models(NamedTuple):
-    """The drive's models: behind a voltage and a current, in samples and in time, and settled."""
+    """The drive's models: driven by a voltage or a current, in samples or in time, and settled."""
 
     drive: Model
     pump_drive: Model
@@ -84,15 +67,15 @@ def models_of(equations: tuple[Replacement, ...]) -> Models:
 
 
 def with_equation(parameters: ParameterSet, made: Replacement) -> ParameterSet:
-    """The set with an equation of one's own; see `Drive.with_equation`."""
+    """The set with a user-defined equation; see `Drive.with_equation`."""
     members = made._asdict()
     check_members(members, {what: repr(member) for what, member in members.items()})
     own, models = (*parameters.equations, made), models_of(parameters.equations)
     if not uses(models.drive, made.old):
         raise InputError(
-            f"{plain(made.old).__name__} is no equation of the drive: swashplate.models.card, "
-            "swashplate.models.channel, swashplate.models.displacement_control, "
-            "swashplate.models.pump and swashplate.models.refinements have those."
+            f"{plain(made.old).__name__} is not an equation of the drive: those are in "
+            "swashplate.models.amplifier, swashplate.models.displacement_control, "
+            "swashplate.models.pump and swashplate.models.refinements."
         )
     if made.parameters is not None and not uses(models.pump_drive, made.old):
         raise InputError(
@@ -144,8 +127,16 @@ def pump_options(parameters: ParameterSet) -> PumpOptions:
 
 
 @lru_cache(maxsize=256)
-def instance_of(parameters: ParameterSet, by_voltage: bool) -> Instance:
-    """The drive behind a voltage, or the pump alone behind a signed current."""
+def drive_instance(parameters: ParameterSet, by_voltage: bool) -> Instance:
+    """A parameter set as a model with numbers.
+
+    Parameters
+    ----------
+    parameters : ParameterSet
+        The drive.
+    by_voltage : bool
+        Whether a voltage drives the card, or a signed current the pump alone.
+    """
     pump = Part(pump_of(parameters), pump_options(parameters))
     if by_voltage:
         card = Part(card_of(parameters), card_options(parameters))

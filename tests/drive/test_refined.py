@@ -5,7 +5,7 @@ from math import inf
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from tests.simulation.experiments import ALL, LOAD, RATE, STICTION
+from tests.drive.experiments import ALL, LOAD, RATE, STICTION
 
 from swashplate import Drive, Simulation, maneuvers
 

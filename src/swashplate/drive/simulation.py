@@ -2,60 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from enum import IntFlag
 from functools import cached_property
 from math import inf
-from typing import TYPE_CHECKING, Any, Literal, cast, overload
+from typing import TYPE_CHECKING, Literal, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from swashplate.drive.signals import KEPT, MOTOR, SIGNALS, UNITS
 from swashplate.equations.marching.use import Run, read_only
 from swashplate.errors import InputError
 from swashplate.models.displacement_control import Pump
-from swashplate.results import GivenAxes, figures
+from swashplate.results import Named, figures
 from swashplate.tables import UNIT, Column, Table, share_cell
 from swashplate.units import SHAFT_ANGLE, display_unit
 
 if TYPE_CHECKING:
     import polars
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.uint8]
-
-CHAIN = {
-    "voltage": ("V", "command of the card within ±10 V, positive towards positive speed"),
-    "current": ("A", "signed current, positive solenoid's less the negative one's"),
-    "current_positive": ("A", "current of the solenoid towards positive speed, never negative"),
-    "current_negative": ("A", "current of the other solenoid, never negative"),
-    "solenoid_force": ("N", "net force of both solenoids on the spool"),
-    "spool_position": ("m", "displacement of the spool, within its stroke"),
-    "orifice_opening": ("m", "effective opening, what the orifices leave of the displacement"),
-    "stroker_pressure": ("Pa", "stroking pressure about its equilibrium"),
-    "swash_angle": ("rad", "angle of the swash plate"),
-    "shaft_speed": ("rad/s", "speed of the shaft, of the turret for slew"),
-    "shaft_position": ("rad", "integral of the speed, zero at the start"),
-}
-"""SI unit and meaning of each signal of a simulation, in the order of the chain."""
-MOTOR = {
-    "motor_torque": ("N m", "torque of the motor, positive where it drives to positive speed"),
-    "motor_pressure_drop": ("Pa", "drop over the motor, 0 where motor_constant is not known"),
-}
-MEASURED = {
-    "load_torque": ("N m", "static torque of the load, positive against positive speed"),
-    "pump_speed": ("1", "speed of the prime mover, relative to that of Z10"),
-    "supply_pressure": ("Pa", "supply pressure less static pressure; until it is set, Z9 counts"),
-}
-"""The same of what may be measured beside the command."""
-UNITS = {name: unit for name, (unit, _) in {**CHAIN, **MOTOR, **MEASURED}.items()}
-SIGNALS = tuple(CHAIN)
-OUTPUTS = ("current_sum", *SIGNALS[1:], *MOTOR)
-"""Signals that can be observed, or returned and compared by a batch."""
-KEPT = ("current", "current_positive", "current_negative", "stroker_pressure", "shaft_speed")
-"""What a march leaves; for all else it is marched again when it is first asked for."""
 
 
 class Limit(IntFlag):
@@ -80,24 +48,6 @@ SPOOL_STROKE = 0.01
 """What lengths of a run are at most, by which their unit is chosen. [m]"""
 
 
-def check_output(signal: str) -> None:
-    """Refuse a signal that is none of `OUTPUTS`; states of the equations may stay at zero."""
-    if signal not in OUTPUTS:
-        raise InputError(f"A drive has no signal '{signal}'; it has {', '.join(OUTPUTS)}.")
-
-
-class Named:
-    """An attribute that is what ``result[name]`` gives."""
-
-    def __set_name__(self, owner: type, name: str) -> None:
-        self._name = name
-
-    def __get__(self, result: Any, owner: type | None = None) -> Array:
-        if result is None:
-            return self  # type: ignore[return-value]  # the class's own attribute
-        return cast("Array", result[self._name])
-
-
 def _displayed(column: polars.Series) -> polars.Series:
     """A column of a run's table in the unit that people read, which its name then has."""
     name = column.name
@@ -119,12 +69,13 @@ class Simulation(Run):
     """
 
     kept = KEPT
+    shown = ("shaft_speed",)
 
     limit_names = tuple(str(each.name).lower() for each in Limit)
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """The signals that it has: `SIGNALS`, with refinements the motor's, behind ``"time"``."""
+        """The signals that it has: `SIGNALS`, with refinements the motor's, after ``"time"``."""
         there = SIGNALS if self.driven_by == "voltage" else SIGNALS[1:]
         known = 2 if self.pump.motor_constant > 0.0 else 1 if self.refined else 0
         return ("time", *there, *tuple(MOTOR)[:known])
@@ -145,7 +96,7 @@ class Simulation(Run):
 
     @property
     def voltage(self) -> Array | None:
-        """Command, None where a current was given instead. [V]"""
+        """Command, None if a current was given instead. [V]"""
         return self["voltage"] if self.driven_by == "voltage" else None
 
     current_positive = Named()
@@ -171,12 +122,12 @@ class Simulation(Run):
 
     @property
     def motor_torque(self) -> Array:
-        """Torque that the motor bears, positive where it drives towards positive speed. [N m]"""
+        """Torque that the motor bears, positive if it drives towards positive speed. [N m]"""
         return self.sampled(self.fine("motor_torque"))
 
     @property
     def motor_pressure_drop(self) -> Array | None:
-        """P_hi - P_lo over the motor, None where no motor_constant is given. [Pa]"""
+        """P_hi - P_lo over the motor, None if no motor_constant is given. [Pa]"""
         return self["motor_pressure_drop"] if self.pump.motor_constant > 0.0 else None
 
     @cached_property
@@ -258,66 +209,8 @@ class Simulation(Run):
             raise InputError(f"units is {units!r}; it is 'SI' or 'display'.")
         return frame.select(map(_displayed, frame.iter_columns()))
 
-    @overload
-    def plot(
-        self,
-        signals: str | Sequence[str] = (),
-        *,
-        ax: None = None,
-        label: str = "",
-        window: tuple[float, float] | None = None,
-        title: str | None = None,
-    ) -> Figure: ...
-
-    @overload
-    def plot(
-        self,
-        signals: str | Sequence[str] = (),
-        *,
-        ax: GivenAxes,
-        label: str = "",
-        window: tuple[float, float] | None = None,
-        title: str | None = None,
-    ) -> GivenAxes: ...
-
-    def plot(
-        self,
-        signals: str | Sequence[str] = (),
-        *,
-        ax: Axes | Sequence[Axes] | None = None,
-        label: str = "",
-        window: tuple[float, float] | None = None,
-        title: str | None = None,
-    ) -> Figure | Axes | Sequence[Axes]:
-        """Figure of the chain with its active limits shaded, or of some signals alone.
-
-        Parameters
-        ----------
-        signals : str or sequence of str
-            Names as of `names`, a panel each; by default the chain.
-        ax : matplotlib axes or sequence of them, optional
-            Where to draw the signals, one for each; the shaft's speed if none is named.
-        label : str
-            Of the curves: each panel gets a legend of all labelled curves in it.
-        window : (float, float), optional
-            First and last instant to show. [s]
-        title : str, optional
-            In the place of the drive's name; axes that are given have none by default.
-
-        Returns
-        -------
-        Figure, or `ax` as it was given
-
-        Raises
-        ------
-        InputError
-            For a signal that there is not, another number of axes, or a window with fewer than two
-            samples.
-        """
-        if not signals and ax is None:
-            draw = figures().plot_simulation
-            return cast("Figure", draw(self, window=window, title=title))
-        draw = figures().plot_signals
-        chosen = (signals,) if isinstance(signals, str) else tuple(signals)
-        chosen = chosen or ("shaft_speed",)
-        return cast("Figure", draw(self, chosen, ax=ax, label=label, window=window, title=title))
+    def _overview(
+        self, *, label: str, window: tuple[float, float] | None, title: str | None
+    ) -> Figure:
+        """Figure of the chain with its active limits shaded."""
+        return cast("Figure", figures().plot_simulation(self, window=window, title=title))

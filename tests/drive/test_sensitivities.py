@@ -5,10 +5,11 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
-from tests.simulation.experiments import ALL, HARD, RATE, SWING
+from tests.drive.experiments import ALL, HARD, RATE, SWING
 
 from swashplate import Drive, InputError, Limit, Simulation, maneuvers
-from swashplate.simulation.residuals import ALL_COLUMNS, Sensitivities
+from swashplate.drive import ALL_COLUMNS
+from swashplate.equations import Sensitivities
 
 
 @dataclass(frozen=True)
@@ -63,9 +64,8 @@ ONE_SIDED = {"C_plus", "C_minus", "Z7", "I_t2_plus", "I_t2_minus", "Z6"}
 
 
 def outputs(run: Simulation | Sensitivities) -> np.ndarray:
-    return np.stack(
-        [run.current_positive, run.current_negative, run.shaft_speed, run.shaft_position]
-    )
+    names = ("current_positive", "current_negative", "shaft_speed", "shaft_position")
+    return np.stack([run[name] for name in names])
 
 
 def differences(scene: Scene, drive: Drive, name: str) -> list[np.ndarray]:
@@ -115,8 +115,8 @@ def test_every_parameter(scene: Scene) -> None:
     drive = scene.drive()
     by = drive.sensitivities(scene.voltage, start=scene.start, parameters=scene.columns)
     if scene.limit is not None:
-        assert by.simulation.active(scene.limit).sum() > 20
-    base = outputs(by.simulation)
+        assert by.run.active(scene.limit).sum() > 20
+    base = outputs(by.run)
     moved = set()
     whole = outputs(by)
     for j, name in enumerate(by.names):
@@ -139,7 +139,7 @@ def test_every_parameter(scene: Scene) -> None:
         assert len(moved) > 25
     if scene.decay == "split":
         for name in ("I_t2_plus", "I_t2_minus"):
-            assert np.abs(by.current[:, by.names.index(name)]).max() > 0.05
+            assert np.abs(by["current"][:, by.names.index(name)]).max() > 0.05
 
 
 @pytest.mark.traced
@@ -150,7 +150,7 @@ def test_coulomb_term_has_a_one_sided_derivative_at_zero(hoist: Drive) -> None:
     run, one = hoist.simulate(voltage), hoist.replace(C=(e, 0.0)).simulate(voltage)
     difference = (one.current_positive - run.current_positive) / e
     np.testing.assert_allclose(
-        by.current_positive[:, 0], difference, atol=2e-3 * np.abs(difference).max()
+        by["current_positive"][:, 0], difference, atol=2e-3 * np.abs(difference).max()
     )
 
 
@@ -169,9 +169,9 @@ def test_columns_are_those_asked_for(hoist: Drive) -> None:
     assert some.names == ("tau", "Z16_plus", "Z16_minus", "G1_minus")
     for j, name in enumerate(some.names):
         k = everything.names.index(name)
-        assert np.array_equal(some.shaft_speed[:, j], everything.shaft_speed[:, k])
-        assert np.array_equal(some.shaft_position[:, j], everything.shaft_position[:, k])
-        assert np.array_equal(some.current[:, j], everything.current[:, k])
+        assert np.array_equal(some["shaft_speed"][:, j], everything["shaft_speed"][:, k])
+        assert np.array_equal(some["shaft_position"][:, j], everything["shaft_position"][:, k])
+        assert np.array_equal(some["current"][:, j], everything["current"][:, k])
 
 
 @pytest.mark.traced
@@ -180,12 +180,14 @@ def test_other_rates_have_sensitivities_at_their_own_samples(
 ) -> None:
     voltage = maneuvers.sine(3.0, 0.8, start=0.1, length=3.0, settle=0.4).sample(100.0)
     by = hoist.sensitivities(voltage, 100.0, parameters=["Z10", "omega_plus"])
-    assert by.shaft_position.shape == (voltage.size, 2)
+    assert by["shaft_position"].shape == (voltage.size, 2)
 
     def last(omega: float) -> float:
         return float(hoist.replace(omega_plus=omega).simulate(voltage, 100.0).shaft_position[-1])
 
     omega = hoist["omega"].value.plus
-    assert by.shaft_position[-1, 1] == pytest.approx(derivative(last, [omega], 0, 1e-3), rel=1e-5)
+    assert by["shaft_position"][-1, 1] == pytest.approx(
+        derivative(last, [omega], 0, 1e-3), rel=1e-5
+    )
     run = hoist.simulate(voltage, 100.0)
-    assert by.shaft_speed[:, 0] == pytest.approx(run.swash_angle, rel=1e-12, abs=1e-15)
+    assert by["shaft_speed"][:, 0] == pytest.approx(run.swash_angle, rel=1e-12, abs=1e-15)

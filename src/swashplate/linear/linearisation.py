@@ -1,4 +1,4 @@
-"""The discrete step of any model, linearised: matrices from the derivatives of its equations."""
+"""The step of any model, linearised: matrices from the derivatives of its equations."""
 
 from __future__ import annotations
 
@@ -15,29 +15,32 @@ from swashplate.equations.marching.record import check_rate
 from swashplate.equations.marching.run import Instance, Started, called, outside
 from swashplate.equations.model import state_paths
 from swashplate.errors import DomainError, InputError
-from swashplate.linear.model import LinearModel, Matrices
+from swashplate.linear.model import LinearModel
 
 
 def linearize(
     instance: Instance,
     at: Mapping[str, float],
-    h: float,
+    rate: float | None,
     *,
     states: Sequence[Any] | None = None,
     inputs: Sequence[str] | None = None,
     outputs: Sequence[str] | None = None,
 ) -> LinearModel:
-    """Linear model of the discrete step of any model with numbers.
+    """Linear model of the step of any model with numbers.
 
     Parameters
     ----------
-    instance, h : Instance, float
-        The model with its numbers, and its step. [s]
+    instance : Instance
+        The model with its numbers, see `swashplate.equations.instance_of`.
     at : mapping of str to float
         Constant external signals of the operating point.
+    rate : float or None
+        Steps a second of a sampled model. None if the model is in continuous time: its step then
+        returns the rates of its states, and its taps have no delay. [Hz]
     states : sequence, optional
         State of each part; by default the one that the model settles at, one sample after the
-        start.
+        start. In continuous time they must be given.
     inputs : sequence of str, optional
         External signals that move, of `at`; by default all of them.
     outputs : sequence of str, optional
@@ -46,8 +49,8 @@ def linearize(
     Returns
     -------
     LinearModel
-        Sampled. Whole samples by which all that is read of the first input is late are its `delay`;
-        other past samples that the model's taps read are states, `memory`.
+        Whole samples by which all that is read of the first input is late are its `delay`; other
+        past samples that the model's taps read are states, `memory`.
 
     Raises
     ------
@@ -58,10 +61,11 @@ def linearize(
     """
     if not isinstance(instance, Instance):
         raise InputError(
-            f"{instance!r} is no model with numbers: give swashplate.equations.instance_of(model, "
-            "p)."
+            f"{instance!r} is not a model with numbers: give "
+            "swashplate.equations.instance_of(model, p)."
         )
-    check_rate(h, "step", "s")
+    if rate is not None:
+        check_rate(rate)
     check_mapping("at", at)
     for name, value in at.items():
         if not is_real(value) or not np.isfinite(value):
@@ -72,15 +76,25 @@ def linearize(
     for name in moving:
         if name not in at or name not in instance.model.external:
             raise InputError(
-                f"{instance.name}: '{name}' is no input at the operating point; there are "
+                f"{instance.name}: '{name}' is not an input at the operating point; there are "
                 f"{', '.join(each for each in instance.model.external if each in at)}."
             )
-    model = instance.model
+    model, h = instance.model, 0.0 if rate is None else 1.0 / rate
+    if rate is None and any(part.taps for part in model.parts):
+        raise InputError(
+            f"{instance.name}: {model.name} reads past samples of its inputs, so it is not a model "
+            "in continuous time; give the rate of its steps."
+        )
     kinds = [part.state for part in model.parts]
     if states is not None and not _are(states, kinds):
         raise InputError(
             f"{instance.name}: states are {states!r}, but must be a tuple of one "
             f"{' and one '.join(kind.__name__ for kind in kinds)} of finite numbers."
+        )
+    if states is None and rate is None:
+        raise InputError(
+            f"{instance.name}: a model in continuous time is linearised at given states; give "
+            "states=[...], one of each part."
         )
     if states is None:
         for part in model.parts:
@@ -102,8 +116,7 @@ def linearize(
     wanted = (named or model.parts[-1].signal_names) if outputs is None else tuple(outputs)
     if not wanted:
         raise InputError(f"{instance.name}: a linear model needs an output.")
-    matrices, names, memory, whole = recurrence(instance, started, h, moving, wanted)
-    return LinearModel(*matrices, names, moving, wanted, whole * h, h, instance.name, memory)
+    return _linear_model(instance, started, rate, moving, wanted)
 
 
 def _are(states: Any, kinds: Sequence[Any]) -> bool:
@@ -116,21 +129,21 @@ def _are(states: Any, kinds: Sequence[Any]) -> bool:
     return all(is_real(value) and np.isfinite(value) for value in values)
 
 
-def recurrence(
+def _linear_model(
     instance: Instance,
     started: Started,
-    h: float,
+    rate: float | None,
     inputs: tuple[str, ...],
-    outputs: Sequence[str],
-) -> tuple[Matrices, tuple[str, ...], tuple[str, ...], int]:
-    """Matrices of a model's step at a point, its states, its memory, and the first input's delay.
+    outputs: tuple[str, ...],
+) -> LinearModel:
+    """A model's step, linearised at the states and constant inputs that a march would start with.
 
-    The point is given by the states and constant inputs that a march would start with. Behind the
-    paths of the model's own states stand the past samples of the inputs that its taps read, the
-    memory. The delay is in whole samples: those by which all that is read of the first input is
-    late.
+    States are the paths of the model's own ones, then the past samples of the inputs that its taps
+    read, the memory. The delay is in whole samples: those by which all that is read of the first
+    input is late.
     """
     model, signals = instance.model, tuple(started.before)
+    h = 0.0 if rate is None else 1.0 / rate
     for part, known in zip(model.parts, started.arguments, strict=True):
         if part.domain is None:
             continue
@@ -183,6 +196,19 @@ def recurrence(
         A[:n, at[name, lag]], C[:, at[name, lag]] = into[:, k], out[:, k]
     for name, lag in past:
         A[at[name, lag], at[name, lag - 1]] = 1.0
-    matrices = A[:, :size], A[:, size:], C[:, :size], C[:, size:]
     memory = tuple(f"{name}_{lag}" for name, lag in past)
-    return matrices, (*states, *memory), memory, first[inputs[0]]
+    known = model.definitions
+    return LinearModel(
+        name=instance.name,
+        A=A[:, :size],
+        B=A[:, size:],
+        C=C[:, :size],
+        D=C[:, size:],
+        states=(*states, *memory),
+        inputs=inputs,
+        outputs=outputs,
+        delay=first[inputs[0]] * h,
+        rate=rate,
+        memory=memory,
+        units={name: known[name].unit for name in (*inputs, *outputs) if name in known},
+    )

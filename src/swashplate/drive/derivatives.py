@@ -1,0 +1,160 @@
+"""Derivatives of a drive: what it is differentiated by, and sensitivities of a run."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import lru_cache
+
+from swashplate.drive.instance import (
+    PRESSURE,
+    START,
+    check_filter_stability,
+    drive_instance,
+)
+from swashplate.drive.march import start_states
+from swashplate.drive.signals import check_output
+from swashplate.drive.simulation import Simulation
+from swashplate.equations.marching.derivatives import NOTHING_OWN, BoundModel
+from swashplate.equations.marching.observation import ObservedRecord, Own
+from swashplate.equations.marching.record import Record
+from swashplate.equations.marching.run import Start
+from swashplate.equations.marching.sensitivity import Sensitivities
+from swashplate.errors import InputError
+from swashplate.parameters.definitions import DEFINITIONS, SWITCHES, Definitions
+from swashplate.parameters.parameter_set import ParameterSet
+
+CURRENTS = ("current", "current_sum", "current_positive", "current_negative")
+
+
+@lru_cache(maxsize=256)
+def requested_columns(definitions: Definitions, names: tuple[str, ...]) -> tuple[str, ...]:
+    """Columns that names stand for, symbols taken apart; refused if one is asked for twice."""
+    columns: list[str] = []
+    for name in names:
+        for column in [name] if name.startswith(START) else definitions.columns_of([name]):
+            if column in columns:
+                raise InputError(f"{column} is asked for twice.")
+            columns.append(column)
+    return tuple(columns)
+
+
+@lru_cache(maxsize=256)
+def _paths(definitions: Definitions, columns: tuple[str, ...]) -> list[str]:
+    """Path in the model of each column; a state at the start is its own."""
+    return [name if name.startswith(START) else definitions.path_of(name) for name in columns]
+
+
+def bound_drive(
+    parameters: ParameterSet,
+    observed: ObservedRecord,
+    columns: Sequence[str] = (),
+    own: Own = NOTHING_OWN,
+) -> BoundModel:
+    """The drive's model with its numbers, for some columns.
+
+    These are symbols (``"Z16"`` stands for both directions), columns (``"Z16_plus"``) and states
+    at the first sample whose values are among the starts of `own`, ``"start.pump.pressure"``. [Pa]
+    """
+    for each in observed.observations:
+        check_output(each.signal)
+    by_voltage = observed.driven_by == "voltage"
+    return _bound(
+        parameters,
+        requested_columns(parameters.definitions, tuple(columns)),
+        by_voltage=by_voltage,
+        step=observed.record.step,
+        extremes=observed.extremes if by_voltage else (0.0, 0.0),
+        pump_is_seen=any(each.signal not in CURRENTS for each in observed.observations),
+        own=own,
+    )
+
+
+def _bound(
+    parameters: ParameterSet,
+    names: tuple[str, ...],
+    *,
+    by_voltage: bool,
+    step: float,
+    extremes: tuple[float, float],
+    pump_is_seen: bool = True,
+    own: Own = NOTHING_OWN,
+) -> BoundModel:
+    """The model with numbers for some columns, under a command between two extremes."""
+    if by_voltage:
+        check_filter_stability(parameters, step)
+    # what is differentiated by counts, at 0 as well, unless equations have derivatives for that
+    switches = frozenset(SWITCHES[name] for name in names if name in SWITCHES)
+    instance = drive_instance(_switched_on(parameters, switches - {"leaky", "loaded"}), by_voltage)
+    start = dict(own.start)
+    if PRESSURE in start:
+        start |= start_states(instance, start[PRESSURE])
+    # whether anything observed can depend on a column: on a driven channel, on the pump
+    low, high = extremes
+    moved = {
+        "card.plus": high > parameters.numbers["V_dz_plus"],
+        "card.minus": -low > parameters.numbers["V_dz_minus"],
+        "pump": pump_is_seen,
+        "start.card.plus": True,
+        "start.card.minus": True,
+        "start.pump": pump_is_seen,
+    }
+    moved["card"] = moved["card.plus"] or moved["card.minus"]
+    paths = _paths(parameters.definitions, names)
+    return BoundModel(
+        instance,
+        own._replace(start=start),
+        paths,
+        [moved[path.rpartition(".")[0]] for path in paths],
+    )
+
+
+@lru_cache(maxsize=64)
+def _switched_on(parameters: ParameterSet, asked: frozenset[str]) -> ParameterSet:
+    """The set with some options on, itself where they are."""
+    if asked <= parameters.options:
+        return parameters
+    return replace(parameters, options=parameters.options | asked)
+
+
+# --- over a whole run -----------------------------------------------------------------------------
+
+PUMP_COLUMNS = tuple(name for name, path in DEFINITIONS.paths.items() if path.startswith("pump.Z"))
+"""Columns of the pump and motor of Kruse (2001)."""
+ALL_COLUMNS = (
+    *PUMP_COLUMNS,
+    *(name for name in DEFINITIONS.paths if name.endswith("_plus") and name not in PUMP_COLUMNS),
+    *(name for name in DEFINITIONS.paths if name.endswith("_minus") and name not in PUMP_COLUMNS),
+    "tau",
+)
+"""Columns of card, pump and motor, refinements apart, in their order."""
+
+
+def drive_sensitivities(
+    parameters: ParameterSet,
+    records: Mapping[str, Record],
+    start: Start,
+    names: Sequence[str] | None,
+) -> Sensitivities[Simulation]:
+    """Derivatives by some columns; see `Drive.sensitivities` and `Drive.sensitivities_current`."""
+    by_voltage, definitions = "voltage" in records, parameters.definitions
+    columns = ALL_COLUMNS if by_voltage else PUMP_COLUMNS
+    if names is not None:
+        if isinstance(names, str) or not names:
+            raise InputError("Name at least one parameter to differentiate by, in a list.")
+        columns = tuple(definitions.columns_of(names))
+    for column in columns:
+        if not by_voltage and definitions.path_of(column).startswith("card."):
+            raise InputError(
+                f"{column} belongs to the card, which a given current does not go through."
+            )
+    record = next(iter(records.values()))
+    bound = _bound(
+        parameters,
+        columns,
+        by_voltage=by_voltage,
+        step=record.step,
+        extremes=(float(record.values.min()), float(record.values.max())),
+    )
+    run = Simulation(drive_instance(parameters, by_voltage), records, start)
+    return Sensitivities(run, columns, bound)

@@ -1,0 +1,124 @@
+"""Frequency responses of a drive to sines of a size, and their table at one frequency."""
+
+from __future__ import annotations
+
+from math import sqrt
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from swashplate.drive.instance import check_filter_stability, drive_instance, without_ripple
+from swashplate.drive.signals import UNITS
+from swashplate.drive.small_motion import OUTPUTS
+from swashplate.equations.fields import is_real
+from swashplate.equations.marching.record import FASTEST, SOURCE_RATE, check_rate
+from swashplate.errors import InputError
+from swashplate.linear import (
+    FrequencyResponse,
+    checked_amplitudes,
+    checked_frequencies,
+    steps_of,
+    sweep,
+)
+from swashplate.models.displacement_control import Pump
+from swashplate.parameters.parameter_set import ParameterSet
+from swashplate.parameters.rules import FULL_VOLTAGE
+from swashplate.tables import Column, Table
+
+SWEPT_OUTPUTS = OUTPUTS[:7]  # Without the motor's.
+
+
+def sweep_drive(
+    parameters: ParameterSet,
+    frequencies: ArrayLike,
+    amplitudes: ArrayLike,
+    bias: float,
+    input: str,
+    output: str,
+    rate: float,
+    tolerance: float,
+) -> FrequencyResponse:
+    """Describing function of a drive; see `Drive.frequency_response`."""
+    check_rate(rate)
+    if not SOURCE_RATE <= rate <= FASTEST:
+        raise InputError(
+            f"The rate is {rate:g} Hz, but must be between {SOURCE_RATE:g} and {FASTEST:g} Hz."
+        )
+    f, a = checked_frequencies(frequencies, rate), checked_amplitudes(amplitudes)
+    if input not in ("voltage", "current"):
+        raise InputError(f"The input is '{input}'; it is 'voltage' or 'current'.")
+    if output not in SWEPT_OUTPUTS or output == input:
+        raise InputError(
+            f"'{output}' is not an output of a sweep of the {input}; there are "
+            f"{', '.join(name for name in SWEPT_OUTPUTS if name != input)}."
+        )
+    by_voltage = input == "voltage"
+    if by_voltage:
+        largest = float(a.max())
+        if is_real(bias) and abs(bias) + largest > FULL_VOLTAGE:
+            raise InputError(
+                f"Bias and amplitude reach {abs(bias) + largest:g} V, but the card takes ±10 V."
+            )
+        for frequency in f.tolist():
+            step = 1.0 / (frequency * steps_of(frequency, rate))
+            check_filter_stability(parameters, step)
+    instance = without_ripple(drive_instance(parameters, by_voltage))
+    return sweep(
+        instance,
+        f,
+        a,
+        rate,
+        input=input,
+        output=output,
+        bias=bias,
+        tolerance=tolerance,
+        size=_size(instance.parts[1].p, output),
+        units={name: UNITS[name] for name in (input, output)},
+    )
+
+
+def _size(pump: Pump, output: str) -> float:
+    """Natural size of a signal, beside which rounding is told from motion, in its SI unit."""
+    sizes = {
+        "shaft_speed": pump.Z10,
+        "stroker_pressure": 1.0 / pump.Z1,
+        "spool_position": pump.Z5,
+        "orifice_opening": pump.Z5,
+        "solenoid_force": sqrt(pump.Z4) / pump.Z5,
+    }
+    return sizes.get(output, 1.0)
+
+
+def response_table(response: FrequencyResponse, frequency: float) -> Table:
+    """Gain, phase, lag and distortion of a drive by the amplitude of the sine.
+
+    `response` is from voltage to the shaft's speed; at one of its frequencies [Hz]: another is
+    refused in an `InputError`, nothing is interpolated.
+    """
+    at = int(np.argmin(np.abs(response.frequencies - frequency)))
+    nearest = float(response.frequencies[at])
+    if not abs(nearest - frequency) <= 1e-9 * nearest:
+        raise InputError(
+            f"The response was not taken at {frequency:g} Hz; the nearest frequency is "
+            f"{nearest:.6g} Hz."
+        )
+    heads = (
+        ("amplitude", "g", "V"),
+        ("gain", ".3f", "rad/s/V", "none"),
+        ("phase", "z.1f", "deg"),
+        ("lag", "z.1f", "ms"),
+        ("distortion %", ".1f"),
+        ("mean speed", "z.2f", "rad/s"),
+    )
+    made = Table("", tuple(Column(*each) for each in heads))
+    # the phase within a turn of itself, as of this frequency alone
+    phases = np.angle(response.ratio[:, at])
+    for k, amplitude in enumerate(map(float, response.amplitudes)):
+        answer: tuple[float | None, ...] = (None,) * 4
+        if response.moves[k, at]:
+            phase = float(phases[k])
+            lag = -1e3 * phase / (2.0 * np.pi * frequency)
+            distortion = 100.0 * float(response.distortion[k, at])
+            answer = (float(response.gain[k, at]), np.degrees(phase), lag, distortion)
+        made.add(amplitude, *answer, float(response.mean[k, at]))
+    return made

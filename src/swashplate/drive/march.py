@@ -1,0 +1,94 @@
+"""A drive marched: over records, and one sample at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from swashplate.drive.instance import check_filter_stability, drive_instance
+from swashplate.drive.records import RANGES
+from swashplate.drive.simulation import Simulation
+from swashplate.equations.declaration import interpreted
+from swashplate.equations.marching.record import Interpolation, Record, least_substeps
+from swashplate.equations.marching.run import Instance, Start
+from swashplate.equations.marching.use import Stepper
+from swashplate.errors import DomainError, InputError
+from swashplate.models.displacement_control import pressure_limits
+from swashplate.parameters.parameter_set import ParameterSet
+from swashplate.parameters.rules import FULL_VOLTAGE
+
+
+def simulate_drive(
+    parameters: ParameterSet,
+    records: Mapping[str, Record],
+    start: Start,
+    start_pressure: float | None = None,
+) -> Simulation:
+    """March card and pump over a voltage, or the pump alone over a current; see `Drive.simulate`.
+
+    With `start_pressure` the pump begins there [Pa] and only the card's state is that of `start`.
+    """
+    driver, record = next(iter(records.items()))
+    if driver == "voltage":
+        check_filter_stability(parameters, record.step)
+    run = Simulation(drive_instance(parameters, driver == "voltage"), records, start)
+    if start_pressure is not None:
+        run = replace(run, begin=start_states(run.instance, start_pressure))
+    return run.marched()
+
+
+def start_states(instance: Instance, pressure: float) -> dict[str, float]:
+    """Numbers of the pump's state that a pressure at the start sets, by path. [Pa]"""
+    if not np.isfinite(pressure):
+        raise InputError(f"The pressure at the start must be a finite number, not {pressure}.")
+    limits_of = interpreted(pressure_limits, instance.model.parts[1].replacements)
+    limits = limits_of(instance.parts[1].p)
+    if not limits.lower <= pressure <= limits.upper:
+        raise DomainError(
+            f"{instance.name}: the pressure at the start is {pressure:.6g} Pa, but the stops of "
+            f"the swash plate and Z15 keep it between {limits.lower:.6g} and {limits.upper:.6g} Pa."
+        )
+    paths = instance.model.parts[1].free_start["pressure"]
+    return {f"pump.{path}": float(pressure) for path in paths}
+
+
+class Sample(NamedTuple):
+    """Signals at one sample, named and signed as in `Simulation`, SI."""
+
+    voltage: float
+    current_positive: float
+    current_negative: float
+    current: float
+    solenoid_force: float
+    spool_position: float
+    orifice_opening: float
+    stroker_pressure: float
+    swash_angle: float
+    shaft_speed: float
+    shaft_position: float
+
+
+def drive_stepper(
+    parameters: ParameterSet,
+    rate: float,
+    interpolation: Interpolation,
+    start: Start,
+    measured: Sequence[str],
+) -> Stepper[Sample]:
+    """The drive one sample at a time; see `Drive.stepper`."""
+    substeps = least_substeps(rate)
+    check_filter_stability(parameters, 1.0 / (rate * substeps))
+    return Stepper(
+        drive_instance(parameters, by_voltage=True),
+        ("voltage", *measured),
+        Sample._fields[1:],
+        rate,
+        lambda values: Sample(values[0], *values[1 + len(measured) :]),
+        start,
+        interpolation={"voltage": interpolation, **dict.fromkeys(measured, "linear")},
+        substeps=substeps,
+        ranges={"voltage": (-FULL_VOLTAGE, FULL_VOLTAGE), **RANGES},
+    )

@@ -1,0 +1,125 @@
+"""Derivatives of a whole run: of any signal, by parameters and by where the state begins."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from math import isfinite
+from typing import Any, Generic, TypeVar, Unpack
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from swashplate.equations.marching.derivatives import BoundModel
+from swashplate.equations.marching.observation import Own, every_sample
+from swashplate.equations.marching.record import Sampling
+from swashplate.equations.marching.run import Start, begun, instance_of
+from swashplate.equations.marching.use import Command, Run, inputs_of
+from swashplate.equations.model import Model, parameter_paths
+from swashplate.errors import DomainError, InputError
+
+Array = NDArray[np.float64]
+R = TypeVar("R", bound=Run, covariant=True)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Sensitivities(Generic[R]):
+    """Exact derivatives of a run's signals by parameters, a column for each of `names`.
+
+    Read by the signal's name: ``by["shaft_speed"]`` has (n, k) derivatives, in the output's unit
+    over the parameter's, both SI. At a switch (the edge of a dead zone, a limit just reached) they
+    are the one-sided derivatives that the equations declare.
+
+    Raises
+    ------
+    InputError
+        On reading, if the model has no such signal.
+    DomainError
+        On reading, if the model leaves its domain, or a number or a derivative overflows.
+    """
+
+    run: R
+    """The run, with the same numbers as without derivatives; marched when it is first read."""
+    names: tuple[str, ...]
+    """Columns, in the order asked for."""
+    bound: BoundModel
+    """The model with its numbers, and the columns as its paths."""
+    found: dict[str, Array] = field(default_factory=dict)
+    """Derivatives that were asked for."""
+
+    def __repr__(self) -> str:
+        count = f"{len(self.names)} parameter{'' if len(self.names) == 1 else 's'}"
+        return f"{type(self).__name__}({self.run!r}, by {count})"
+
+    def __getitem__(self, signal: str) -> Array:
+        """(n, k) derivatives of a signal behind the input, by its name."""
+        if signal not in self.found:
+            (driver, record), *others = self.run.records.items()
+            beside = {name: each.values for name, each in others}
+            observed = every_sample(record, signal, driver, self.run.start, beside)
+            columns = self.bound.jacobian(observed).columns
+            self._check(signal, columns)
+            self.found[signal] = columns
+        return self.found[signal]
+
+    def _check(self, signal: str, columns: Array) -> None:
+        """Refuse derivatives that are not finite; the first is named."""
+        with np.errstate(all="ignore"):
+            if isfinite(columns.sum()):  # of finite numbers it may overflow, of others it does not
+                return
+        bad = ~np.isfinite(columns)
+        if not bad.any():
+            return
+        sample = int(np.argmax(bad.any(axis=1)))
+        column = int(np.argmax(bad[sample]))
+        raise DomainError(
+            f"{self.run.name}: the derivative of {signal} by {self.names[column]} is "
+            f"{columns[sample, column]} at sample {sample}: check the size of the parameters."
+        )
+
+
+def sensitivities(
+    model: Model,
+    p: Any,
+    inputs: Mapping[str, ArrayLike | Command],
+    rate: float,
+    *,
+    parameters: Sequence[str] | None = None,
+    options: Any = None,
+    given: Any = None,
+    start: Start = "rest",
+    begin: Mapping[str, float] | None = None,
+    **sampling: Unpack[Sampling],
+) -> Sensitivities[Run]:
+    """Exact derivatives of a model's signals by parameters, and by where the state begins.
+
+    Parameters
+    ----------
+    model, p, inputs, rate, options, given, start, begin, **sampling :
+        As in `simulate`; `time`, `interpolation`, `substeps`.
+    parameters : sequence of str, optional
+        Paths of parameters, or ``start.`` with the path of a state that `begin` names; by default
+        all parameters.
+
+    Returns
+    -------
+    Sensitivities
+        Derivatives by signal, ``by["position"]``, (n, k), and the run.
+
+    Raises
+    ------
+    InputError
+        For inputs, numbers or names that do not fit the model.
+    """
+    instance = instance_of(model, p, options=options, given=given)
+    records = inputs_of(instance, inputs, rate, **sampling)
+    run = Run(instance, records, start, begin or {})
+    begun(instance, run.started, run.begin)  # refuses what does not fit
+    known = (*parameter_paths(model), *(f"start.{path}" for path in run.begin))
+    columns = tuple(parameters) if parameters is not None else parameter_paths(model)
+    for path in columns:
+        if path not in known:
+            raise InputError(
+                f"{model.name} has no parameter '{path}'; it has {', '.join(known) or 'none'}."
+            )
+    return Sensitivities(run, columns, BoundModel(instance, Own(run.begin), columns))

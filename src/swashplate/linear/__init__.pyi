@@ -1,0 +1,12 @@
+from .frequency_response import FrequencyResponse as FrequencyResponse
+from .frequency_response import checked_amplitudes as checked_amplitudes
+from .frequency_response import checked_frequencies as checked_frequencies
+from .frequency_response import steps_of as steps_of
+from .frequency_response import sweep as sweep
+from .linearisation import linearize as linearize
+from .model import LINEAR_MODEL as LINEAR_MODEL
+from .model import LinearModel as LinearModel
+from .model import LoopMargins as LoopMargins
+from .model import Matrices as Matrices
+from .model import loop_margins as loop_margins
+from .model import with_line as with_line

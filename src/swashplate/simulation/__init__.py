@@ -1,1 +1,0 @@
-"""The drive's simulation: from a parameter set and a record to signals, derivatives and batches."""
