@@ -21,8 +21,7 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 
-from swashplate import Drive
-from swashplate.campaign import rig
+from swashplate import Drive, rig
 from swashplate.identification.fitting import drawn
 from swashplate.identification.setup import load_setup
 from swashplate.maneuvers import source_tests

@@ -13,6 +13,7 @@ SUBMODULES = (
     "analysis",
     "campaign",
     "crane",
+    "drafting",
     "equations",
     "export",
     "full_order",
@@ -23,6 +24,7 @@ SUBMODULES = (
     "models",
     "parameters",
     "report",
+    "rig",
 )
 
 

@@ -92,7 +92,7 @@ def init(
       swashplate campaign init trial1.mat trial2.mat --out trials.toml
       swashplate campaign init log.csv --column voltage=u --column shaft_speed=n --unit n=1/min
     """
-    from swashplate.campaign.draft import FIXME, NO_ENCODER, UNUSED, draft_campaign
+    from swashplate.drafting.draft import FIXME, NO_ENCODER, UNUSED, draft_campaign
 
     target = out or logs[0].parent / "campaign.toml"
     check_output(target)
@@ -289,7 +289,7 @@ def rig(
       swashplate rig hoist --out short --maneuver step:4 --maneuver sine:6,0.2 --perturb 0.1
       swashplate campaign check virtual-hoist/campaign.toml
     """
-    from swashplate.campaign import rig as bench
+    from swashplate import rig as bench
 
     check_free(out)
     with working("Simulating"):
@@ -334,7 +334,8 @@ def guess(path: Path = CAMPAIGN, *, axis: AxisName = None, out: Path | None = No
       swashplate guess logs/campaign.toml
       swashplate fit logs/campaign.toml --from logs/start.toml --setup logs/setup.toml
     """
-    from swashplate import campaign as tests
+    from swashplate import drafting
+    from swashplate.campaign import spiked
     from swashplate.drive import Drive
     from swashplate.identification.identifying import runs_to_fit
 
@@ -345,21 +346,21 @@ def guess(path: Path = CAMPAIGN, *, axis: AxisName = None, out: Path | None = No
         campaign, chosen = words.campaign_of(path, axis)
         check_folder(folder)
         runs = runs_to_fit(campaign, chosen)
-        found = tests.guess_drive(runs)
-        parameters = tests.guessed_set(found, path.name)
+        found = drafting.guess_drive(runs)
+        parameters = drafting.guessed_set(found, path.name)
         made_folder(folder)
         Drive(parameters).to_toml(start)
-        write_text(tests.fit_configuration(found, parameters), setup)
-    show(tests.guess_table(found))
+        write_text(drafting.fit_configuration(found, parameters), setup)
+    show(drafting.guess_table(found))
     if found.amplifier is not None:
-        show(tests.amplifier_table(found.amplifier))
+        show(drafting.amplifier_table(found.amplifier))
         card = found.amplifier.card
         like = f"like that of the packaged card {card}" if card else "a plain one"
         say(
             f"Its filter is {like}; fit {found.amplifier.fit_percent:.1f} % of the currents. The "
             "first stage fits the amplifier to the current, the second one the machine."
         )
-    for sentence, _ in tests.spiked(runs).values():
+    for sentence, _ in spiked(runs).values():
         note(f"! {sentence}.")
     note(f"These numbers alone: fit {found.fit_percent:.1f} % of the mean speeds (100 % is best).")
     note(f"Start:             {start}")

@@ -387,7 +387,8 @@ def demo(*, out: Path = Path("demo"), seed: int = 1) -> None:
       swashplate demo
       swashplate demo --out results --seed 3
     """
-    from swashplate.campaign import Campaign, rig
+    from swashplate import rig
+    from swashplate.campaign import Campaign
     from swashplate.drive import Drive
     from swashplate.identification import tables
     from swashplate.identification.fitting import drawn

@@ -18,11 +18,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.campaign.amplifier import CURRENTS, AmplifierGuess, guess_amplifier
 from swashplate.campaign.campaign import Campaign
 from swashplate.campaign.experiment import Channel, Experiment
 from swashplate.campaign.quality import spiked
 from swashplate.campaign.schema import ChannelKind
+from swashplate.drafting.amplifier import CURRENTS, AmplifierGuess, guess_amplifier
 from swashplate.drive import Drive
 from swashplate.equations.cache import kernel
 from swashplate.equations.declaration import inlined
