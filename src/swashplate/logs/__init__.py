@@ -4,7 +4,6 @@
 SI. A file that is damaged or hostile ends in one sentence, and nothing half-read is returned.
 """
 
-from swashplate.logs.apart import in_parts as in_parts
 from swashplate.logs.dialect import TextOptions as TextOptions
 from swashplate.logs.log import SUFFIXES as SUFFIXES
 from swashplate.logs.log import Column as Column
@@ -16,3 +15,4 @@ from swashplate.logs.log import open_as as open_as
 from swashplate.logs.log import open_log as open_log
 from swashplate.logs.log import read_series as read_series
 from swashplate.logs.log import unit_of as unit_of
+from swashplate.logs.subprocess_reader import in_parts as in_parts

@@ -256,9 +256,9 @@ def open_as(format: str, path: str | Path) -> Log:
     """
     source = Path(path)
     _check_readable(source)
-    from swashplate.logs.apart import open_apart
+    from swashplate.logs.subprocess_reader import open_in_subprocess
 
-    return open_apart(format, source)
+    return open_in_subprocess(format, source)
 
 
 def _check_readable(source: Path, why: str = "") -> None:

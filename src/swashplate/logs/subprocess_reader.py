@@ -39,14 +39,19 @@ _PATIENCE_AT_START = 60.0
 _PATIENCE_PER_MEGABYTE = 1.0
 _LEAVE = 1.0
 """How long the other process has to end by itself, once it is asked no more [s]."""
-_START = "import sys; sys.path[:] = {path!r}; from swashplate.logs.apart import serve; serve()"
+_START = """\
+import sys
+sys.path[:] = {path!r}
+from swashplate.logs.subprocess_reader import serve
+serve()
+"""
 
 
-def open_apart(reader: str, path: Path) -> Log:
+def open_in_subprocess(reader: str, path: Path) -> Log:
     """Look into a file by `swashplate.logs.binary.look`, in the other process."""
 
     def ask(*what: Any) -> tuple[dict[str, Any], list[Array]]:
-        return _Other.ask(path, [reader, str(path.absolute()), str(path), *what])
+        return _ReaderProcess.ask(path, [reader, str(path.absolute()), str(path), *what])
 
     def load(positions: Sequence[int], first: int = 0, last: int | None = None) -> list[Array]:
         return ask([*positions], first, last)[1]
@@ -56,11 +61,11 @@ def open_apart(reader: str, path: Path) -> Log:
     return Log(path, found["format"], columns, load, found["left_out"], tuple(found["lengths"]))
 
 
-class _Other:
+class _ReaderProcess:
     """The other process. It is asked in a line of JSON and answers in one, arrays behind it."""
 
     lock = threading.Lock()
-    running: _Other | None = None
+    running: _ReaderProcess | None = None
 
     def __init__(self) -> None:
         # what it says of an error, and what libraries leave behind of a damaged file
@@ -193,7 +198,7 @@ def in_parts(log: Log, names: Sequence[str]) -> Log:
         stored = sorted(columns.union(stored))
         _convert(log, stored, table, json.dumps([*stamp, stored]))
     kept = tuple(log.columns[position] for position in stored)
-    return replace(open_apart("Parquet", table), path=log.path, columns=kept, table=table)
+    return replace(open_in_subprocess("Parquet", table), path=log.path, columns=kept, table=table)
 
 
 def _held(log: Log, names: Sequence[str]) -> Log:
