@@ -31,9 +31,7 @@ from swashplate.errors import InputError
 from swashplate.results import GivenAxes, Result, figures
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
+    from swashplate.results import Axes, Figure
 __all__ = ["Maneuver", "chirp", "multisine", "parse", "ramp", "rest", "sine", "source_tests"]
 __all__ += ["stairs", "step"]
 

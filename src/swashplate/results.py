@@ -22,7 +22,8 @@ from swashplate.tables import Table, write_table
 
 if TYPE_CHECKING:
     import polars
-    from matplotlib.axes import Axes
+    from matplotlib.axes import Axes as Axes
+    from matplotlib.figure import Figure as Figure
 
 GivenAxes = TypeVar("GivenAxes", bound="Axes | Sequence[Axes]")
 """Matplotlib axes that a caller gives to draw in, and gets back."""

@@ -24,8 +24,8 @@ from swashplate.units import display_unit
 
 if TYPE_CHECKING:
     import polars
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+
+    from swashplate.results import Axes, Figure
 
 Array = NDArray[np.float64]
 

@@ -30,9 +30,8 @@ from swashplate.tables import (
 
 if TYPE_CHECKING:
     import polars
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
+    from swashplate.results import Axes, Figure
     from swashplate.simulation.result import Simulation
 
 Array = NDArray[np.float64]

@@ -30,10 +30,8 @@ from swashplate.tables import UNIT, Column, Table, listed, quantity
 from swashplate.units import of_shaft
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
     from swashplate.analysis.monte_carlo import Bands
+    from swashplate.results import Axes, Figure
 
 Array = NDArray[np.float64]
 Range = tuple[float, float]  # Lowest and highest factor on a lever. [1]

@@ -21,9 +21,7 @@ from swashplate.results import GivenAxes, Result, figures
 from swashplate.tables import Column, Table
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
+    from swashplate.results import Axes, Figure
 Array = NDArray[np.float64]
 
 SLOWEST = 3600.0

@@ -38,8 +38,8 @@ from swashplate.tables import Column, Table, count, listed
 
 if TYPE_CHECKING:
     import polars
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+
+    from swashplate.results import Axes, Figure
 
 Array = NDArray[np.float64]
 Question = Literal["harm", "sufficiency"]

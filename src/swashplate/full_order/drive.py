@@ -44,9 +44,9 @@ from swashplate.units import PLATE_RATE, SHAFT_ANGLE
 
 if TYPE_CHECKING:
     import polars
-    from matplotlib.figure import Figure
 
     from swashplate.maneuvers import Maneuver
+    from swashplate.results import Figure
     from swashplate.simulation.result import Simulation
 
 Array = NDArray[np.float64]

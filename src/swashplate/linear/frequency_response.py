@@ -29,10 +29,9 @@ from swashplate.tables import Column, Table
 
 if TYPE_CHECKING:
     import polars
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
     from swashplate.linear.drive import LinearDrive
+    from swashplate.results import Axes, Figure
 
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
