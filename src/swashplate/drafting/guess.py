@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 from swashplate.campaign.campaign import Campaign
 from swashplate.campaign.experiment import Channel, Experiment
 from swashplate.campaign.quality import spiked
-from swashplate.campaign.schema import ChannelKind
-from swashplate.drafting.amplifier import CURRENTS, AmplifierGuess, guess_amplifier
+from swashplate.campaign.schema import CURRENTS, ChannelKind
+from swashplate.drafting.amplifier import AmplifierGuess, guess_amplifier
 from swashplate.drive import Drive
 from swashplate.equations.cache import kernel
 from swashplate.equations.declaration import inlined

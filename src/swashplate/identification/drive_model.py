@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from swashplate.campaign import ChannelKind
 from swashplate.campaign.experiment import APART, RISE, Channel, Edge, Experiment, InputSignal
 from swashplate.campaign.samples import signed_by_command
+from swashplate.campaign.schema import CURRENTS as CURRENTS
 from swashplate.campaign.schema import SIGNALS as SIGNALS
-from swashplate.drafting.amplifier import CURRENTS as CURRENTS
 from swashplate.equations.marching.observation import Observation, ObservedRecord, Own
 from swashplate.equations.marching.record import (
     SLOWEST,
