@@ -1,6 +1,9 @@
 // Curves over time as SVG: samples unpacked, panels drawn, a figure that zooms and reads values.
 
-const LEFT = 78, RIGHT = 8, GAP = 12, BELOW = 34;
+const LEFT = 78;
+const RIGHT = 8;
+const GAP = 12;
+const BELOW = 34;
 const HEIGHTS = { input: 84, overlay: 150, residual: 92 };
 const PRINTED = 450;
 const SVG = "http://www.w3.org/2000/svg";
@@ -52,7 +55,13 @@ function ticks(low, high, most) {
   const decimals = Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
   const made = [];
   for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k++) {
-    made.push([k * step, (k * step).toFixed(Math.min(decimals, 12)).replace(/^-(?=0\.?0*$)/, "").replace("-", "−")]);
+    made.push([
+      k * step,
+      (k * step)
+        .toFixed(Math.min(decimals, 12))
+        .replace(/^-(?=0\.?0*$)/, "")
+        .replace("-", "−"),
+    ]);
   }
   return made.length < 3 && most < 10 ? ticks(low, high, 2 * most) : made;
 }
@@ -115,24 +124,48 @@ function drawPanel(svg, panel, kind, label, top, height, width, [start, end]) {
   const axis = put(svg, "g", { transform: `translate(${LEFT} ${top})` });
   const box = put(axis, "svg", { width: inner, height });
   for (const [from, to, name = "ignored"] of [...(panel.ignored ?? []), ...(panel.shades ?? [])]) {
-    if (to > start && from < end) put(box, "rect", { class: name, x: x(from), y: 0, width: Math.max(x(to) - x(from), 1), height });
+    if (to > start && from < end)
+      put(box, "rect", {
+        class: name,
+        x: x(from),
+        y: 0,
+        width: Math.max(x(to) - x(from), 1),
+        height,
+      });
   }
   for (const [value, words] of ticks(low, high, height < 100 ? 4 : 5)) {
-    put(box, "line", { class: value === 0 ? "zero" : "grid", x1: 0, x2: inner, y1: y(value), y2: y(value) });
+    put(box, "line", {
+      class: value === 0 ? "zero" : "grid",
+      x1: 0,
+      x2: inner,
+      y1: y(value),
+      y2: y(value),
+    });
     put(axis, "text", { x: -7, y: y(value) + 4, "text-anchor": "end" }, words);
   }
-  for (const [value] of ticks(start, end, inner / 75)) put(box, "line", { class: "grid", x1: x(value), x2: x(value), y1: 0, y2: height });
+  for (const [value] of ticks(start, end, inner / 75))
+    put(box, "line", { class: "grid", x1: x(value), x2: x(value), y1: 0, y2: height });
   const place = [width, height, start, end, low, high].join();
   for (const [name, values] of panel.lines) {
     const known = drawn.get(values);
-    const d = known?.place === place ? known.d : path(panel, values, first, after, [start, scale], y);
+    const d =
+      known?.place === place ? known.d : path(panel, values, first, after, [start, scale], y);
     drawn.set(values, { place, d });
     put(box, "path", { class: name, d });
   }
   const lines = label.split("\n");
   lines.forEach((words, k) => {
     const across = -LEFT + 11 + 13 * k;
-    put(axis, "text", { class: "label", transform: `translate(${across} ${height / 2}) rotate(-90)`, "text-anchor": "middle" }, words);
+    put(
+      axis,
+      "text",
+      {
+        class: "label",
+        transform: `translate(${across} ${height / 2}) rotate(-90)`,
+        "text-anchor": "middle",
+      },
+      words,
+    );
   });
 }
 
@@ -161,8 +194,15 @@ class Figure {
     const panels = this.panels();
     const height = panels.reduce((sum, [, kind]) => sum + HEIGHTS[kind] + GAP, BELOW);
     const svg = document.createElementNS(SVG, "svg");
-    for (const [key, value] of [["viewBox", `0 0 ${width} ${height}`], ["role", "img"]]) svg.setAttribute(key, value);
-    svg.setAttribute("aria-label", `${this.element.dataset.name}: measured and simulated over time`);
+    for (const [key, value] of [
+      ["viewBox", `0 0 ${width} ${height}`],
+      ["role", "img"],
+    ])
+      svg.setAttribute(key, value);
+    svg.setAttribute(
+      "aria-label",
+      `${this.element.dataset.name}: measured and simulated over time`,
+    );
     let top = 6;
     for (const [panel, kind, label] of panels) {
       drawPanel(svg, panel, kind, label, top, HEIGHTS[kind], width, this.view);
@@ -171,11 +211,31 @@ class Figure {
     const inner = width - LEFT - RIGHT;
     const [start, end] = this.view;
     for (const [value, words] of ticks(start, end, inner / 75)) {
-      put(svg, "text", { x: LEFT + ((value - start) / (end - start)) * inner, y: top + 4, "text-anchor": "middle" }, words);
+      put(
+        svg,
+        "text",
+        {
+          x: LEFT + ((value - start) / (end - start)) * inner,
+          y: top + 4,
+          "text-anchor": "middle",
+        },
+        words,
+      );
     }
-    put(svg, "text", { class: "label", x: LEFT + inner / 2, y: top + 22, "text-anchor": "middle" }, "time (s)");
+    put(
+      svg,
+      "text",
+      { class: "label", x: LEFT + inner / 2, y: top + 22, "text-anchor": "middle" },
+      "time (s)",
+    );
     this.width = width;
-    this.mark = put(svg, "rect", { class: "selected", x: 0, y: 6, width: 0, height: top - 6 - GAP });
+    this.mark = put(svg, "rect", {
+      class: "selected",
+      x: 0,
+      y: 6,
+      width: 0,
+      height: top - 6 - GAP,
+    });
     this.element.replaceChildren(svg, this.readout);
     this.element.dataset.drawn = "yes";
   }
@@ -191,7 +251,10 @@ class Figure {
   /** Instant at a place of the pointer, and the place within the figure. */
   at(event) {
     const { left, width } = this.element.firstChild.getBoundingClientRect();
-    const place = Math.min(Math.max(((event.clientX - left) * this.width) / width, LEFT), this.width - RIGHT);
+    const place = Math.min(
+      Math.max(((event.clientX - left) * this.width) / width, LEFT),
+      this.width - RIGHT,
+    );
     const [start, end] = this.view;
     return [start + ((place - LEFT) / (this.width - LEFT - RIGHT)) * (end - start), place];
   }
@@ -217,16 +280,21 @@ class Figure {
       const [instant, place] = this.at(event);
       const [first, from] = held;
       held = null;
-      if (Math.abs(place - from) > 5) this.look([Math.min(first, instant), Math.max(first, instant)]);
+      if (Math.abs(place - from) > 5)
+        this.look([Math.min(first, instant), Math.max(first, instant)]);
     });
     element.addEventListener("dblclick", () => this.look(this.all));
-    element.addEventListener("wheel", (event) => {
-      if (!event.ctrlKey) return;
-      event.preventDefault();
-      const [instant] = this.at(event);
-      const factor = 1.002 ** event.deltaY;
-      this.look(this.view.map((each) => instant + factor * (each - instant)));
-    }, { passive: false });
+    element.addEventListener(
+      "wheel",
+      (event) => {
+        if (!event.ctrlKey) return;
+        event.preventDefault();
+        const [instant] = this.at(event);
+        const factor = 1.002 ** event.deltaY;
+        this.look(this.view.map((each) => instant + factor * (each - instant)));
+      },
+      { passive: false },
+    );
   }
 
   /** Write the values at an instant below the figure. */
@@ -235,7 +303,10 @@ class Figure {
     for (const [panel, , label] of this.panels()) {
       const row = Math.min(rowAt(panel.time, instant), panel.time.length - 1);
       for (const [name, values] of panel.lines) {
-        const what = name === "input" || name === "residual" ? name : `${name} ${label.replaceAll("\n", " ").replace(/ \([^()]*\)$/, "")}`;
+        const what =
+          name === "input" || name === "residual"
+            ? name
+            : `${name} ${label.replaceAll("\n", " ").replace(/ \([^()]*\)$/, "")}`;
         const unit = /\(([^()]*)\)$/.exec(label)?.[1] ?? "";
         words.push(`${what} ${values[row].toPrecision(4).replace("-", "−")} ${unit}`);
       }

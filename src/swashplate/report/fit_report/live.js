@@ -15,7 +15,11 @@ class Machine {
   constructor(exports) {
     this.c = exports;
     const values = new Float64Array(bytes(data.values).buffer);
-    new Float64Array(this.c.memory.buffer, this.c.swp_page_values(values.length), values.length).set(values);
+    new Float64Array(
+      this.c.memory.buffer,
+      this.c.swp_page_values(values.length),
+      values.length,
+    ).set(values);
     const wrong = this.sentence(this.c.swp_page_init(values.length));
     if (wrong) throw new Error(wrong);
   }
@@ -43,7 +47,10 @@ class Machine {
   simulate(run) {
     const { voltage, step, steady } = run;
     // what the run's channels are compared with, and the speed
-    const names = new Set(["shaft_speed", ...run.shown.flatMap((each) => [each.signal, each.also])]);
+    const names = new Set([
+      "shaft_speed",
+      ...run.shown.flatMap((each) => [each.signal, each.also]),
+    ]);
     const wanted = data.outputs.filter(({ name }) => names.has(name));
     const wrong = this.c.swp_page_begin(voltage.length, step, wanted.length);
     if (wrong) return { wrong: this.sentence(wrong) };
@@ -51,9 +58,14 @@ class Machine {
     new Float64Array(this.c.memory.buffer, this.c.swp_page_input(0), voltage.length).set(voltage);
     const status = this.c.swp_page_run(steady ? 1 : 0);
     if (status) return { wrong: this.sentence(status) };
-    const of = (k) => new Float64Array(this.c.memory.buffer, this.c.swp_page_row(k), voltage.length);
+    const of = (k) =>
+      new Float64Array(this.c.memory.buffer, this.c.swp_page_row(k), voltage.length);
     const signals = Object.fromEntries(wanted.map(({ name }, k) => [name, of(k).slice()]));
-    const limits = new Uint8Array(this.c.memory.buffer, this.c.swp_page_limits(), voltage.length).slice();
+    const limits = new Uint8Array(
+      this.c.memory.buffer,
+      this.c.swp_page_limits(),
+      voltage.length,
+    ).slice();
     return { signals, limits };
   }
 }
@@ -95,7 +107,9 @@ class Run {
       each.stamps = unpacked(each.time);
       each.breaks = new Set(each.breaks);
       each.values = unpacked(each.measured).map((value) => value / each.factor);
-      each.counts = each.stamps.map((t) => (each.ignored.some(([from, to]) => t >= from && t <= to) ? 0 : 1));
+      each.counts = each.stamps.map((t) =>
+        each.ignored.some(([from, to]) => t >= from && t <= to) ? 0 : 1,
+      );
     }
   }
 
@@ -112,13 +126,15 @@ class Run {
   /** Root of the mean squared error of the samples that count, and fit per cent. */
   error(channel, simulated) {
     let [n, sum, mean, square] = [0, 0, 0, 0];
-    for (let row = 0; row < simulated.length; row++) if (channel.counts[row]) {
-      n++;
-      sum += (simulated[row] - channel.values[row]) ** 2;
-      mean += channel.values[row];
-    }
+    for (let row = 0; row < simulated.length; row++)
+      if (channel.counts[row]) {
+        n++;
+        sum += (simulated[row] - channel.values[row]) ** 2;
+        mean += channel.values[row];
+      }
     mean /= n;
-    for (let row = 0; row < simulated.length; row++) if (channel.counts[row]) square += (channel.values[row] - mean) ** 2;
+    for (let row = 0; row < simulated.length; row++)
+      if (channel.counts[row]) square += (channel.values[row] - mean) ** 2;
     return { rmse: Math.sqrt(sum / n), fit: 100 * (1 - Math.sqrt(sum / square)) };
   }
 }
@@ -167,17 +183,34 @@ class LiveFigure extends Figure {
   panels() {
     const { showing: run, now, before } = this;
     const none = new Set();
-    const made = [[{ time: run.grid, breaks: none, lines: [["input", run.voltage]] }, "input", "command\n(V)"]];
+    const made = [
+      [{ time: run.grid, breaks: none, lines: [["input", run.voltage]] }, "input", "command\n(V)"],
+    ];
     // in the units that are shown, once for what stays: the run before, and all where the pointer reads
-    const line = (each, found) => ((found.lines ??= [])[each] ??= found.seen[each].map((value) => value * run.shown[each].factor));
+    const line = (each, found) =>
+      ((found.lines ??= [])[each] ??= found.seen[each].map(
+        (value) => value * run.shown[each].factor,
+      ));
     run.shown.forEach((each, k) => {
-      const lines = [["before", line(k, before)], ["simulated", line(k, now)]];
-      const own = { time: each.stamps ?? run.grid, breaks: each.breaks ?? none, ignored: each.ignored, shades: this.spans(each.shaded) };
+      const lines = [
+        ["before", line(k, before)],
+        ["simulated", line(k, now)],
+      ];
+      const own = {
+        time: each.stamps ?? run.grid,
+        breaks: each.breaks ?? none,
+        ignored: each.ignored,
+        shades: this.spans(each.shaded),
+      };
       if (each.values) {
         const measured = (each.line ??= each.values.map((value) => value * each.factor));
         made.push([{ ...own, lines: [["measured", measured], ...lines] }, "overlay", each.label]);
         const residual = lines[1][1].map((value, row) => value - measured[row]);
-        made.push([{ ...own, shades: [], lines: [["residual", residual]] }, "residual", each.residual]);
+        made.push([
+          { ...own, shades: [], lines: [["residual", residual]] },
+          "residual",
+          each.residual,
+        ]);
       } else made.push([{ ...own, lines }, "overlay", each.label]);
     });
     return made;
@@ -193,14 +226,33 @@ class Page {
     this.figure.element.dataset.name = "run";
     this.sliders();
     const names = data.runs.map((each) => each.name);
-    $("run").append(...names.map((name, k) => new Option(`${name}${data.runs[k].role === "validate" ? " (held out)" : ""}`, k)));
+    $("run").append(
+      ...names.map(
+        (name, k) =>
+          new Option(`${name}${data.runs[k].role === "validate" ? " (held out)" : ""}`, k),
+      ),
+    );
     $("run").addEventListener("change", () => this.update());
-    for (const [id, turn] of [["previous", -1], ["next", 1]]) $(id).addEventListener("click", () => this.turn(turn));
+    for (const [id, turn] of [
+      ["previous", -1],
+      ["next", 1],
+    ])
+      $(id).addEventListener("click", () => this.turn(turn));
     $("reset").addEventListener("click", () => this.reset());
-    $("copy").addEventListener("click", () => navigator.clipboard?.writeText($("toml").textContent));
+    $("copy").addEventListener("click", () =>
+      navigator.clipboard?.writeText($("toml").textContent),
+    );
     addEventListener("keydown", (event) => {
-      if (event.target.matches("input[type=number], select") || event.ctrlKey || event.metaKey || event.altKey) return;
-      const acts = { n: () => this.turn(1), p: () => this.turn(-1), r: () => this.reset() }[event.key];
+      if (
+        event.target.matches("input[type=number], select") ||
+        event.ctrlKey ||
+        event.metaKey ||
+        event.altKey
+      )
+        return;
+      const acts = { n: () => this.turn(1), p: () => this.turn(-1), r: () => this.reset() }[
+        event.key
+      ];
       if (acts) acts();
     });
     addEventListener("resize", () => this.figure.draw());
@@ -227,14 +279,17 @@ class Page {
   now() {
     const made = new Map(this.values);
     for (const lever of data.levers) {
-      for (const [number, power] of lever.moves) made.set(number, made.get(number) * this.factors.get(lever.name) ** power);
+      for (const [number, power] of lever.moves)
+        made.set(number, made.get(number) * this.factors.get(lever.name) ** power);
     }
     return made;
   }
 
   changed() {
     const now = this.now();
-    return data.parameters.filter(({ number, value }) => now.get(number) !== value).map((each) => [each, now.get(each.number)]);
+    return data.parameters
+      .filter(({ number, value }) => now.get(number) !== value)
+      .map((each) => [each, now.get(each.number)]);
   }
 
   /** One slider for each lever and parameter, on a logarithmic scale where both ends are positive. */
@@ -242,16 +297,28 @@ class Page {
     this.inputs = [];
     const add = (parent, words, unit, [low, high], read, write) => {
       const log = low > 0;
-      const place = (value) => (log ? Math.log(value / low) / Math.log(high / low) : (value - low) / (high - low));
+      const place = (value) =>
+        log ? Math.log(value / low) / Math.log(high / low) : (value - low) / (high - low);
       const value = (part) => (log ? low * (high / low) ** part : low + part * (high - low));
       const row = document.createElement("label");
       row.className = "slider";
       const name = Object.assign(document.createElement("span"), { textContent: words });
-      const range = Object.assign(document.createElement("input"), { type: "range", min: 0, max: 1, step: 0.001 });
-      const number = Object.assign(document.createElement("input"), { type: "number", step: "any" });
+      const range = Object.assign(document.createElement("input"), {
+        type: "range",
+        min: 0,
+        max: 1,
+        step: 0.001,
+      });
+      const number = Object.assign(document.createElement("input"), {
+        type: "number",
+        step: "any",
+      });
       range.setAttribute("aria-label", words);
       number.setAttribute("aria-label", `${words}, value`);
-      const of = Object.assign(document.createElement("span"), { textContent: unit, className: "unit" });
+      const of = Object.assign(document.createElement("span"), {
+        textContent: unit,
+        className: "unit",
+      });
       row.append(name, number, of, range);
       range.addEventListener("input", () => {
         write(value(Number(range.value)));
@@ -272,14 +339,26 @@ class Page {
     };
     for (const lever of data.levers) {
       const { name, words, range } = lever;
-      add($("levers"), words, "×", range, () => this.factors.get(name), (value) => this.factors.set(name, value));
+      add(
+        $("levers"),
+        words,
+        "×",
+        range,
+        () => this.factors.get(name),
+        (value) => this.factors.set(name, value),
+      );
     }
     for (const each of data.parameters) {
       if (!each.range) continue;
       const scale = each.factor;
       const parent = $(each.main ? "fitted" : "others");
-      add(parent, each.words, each.unit, each.range.map((end) => end * scale), () => this.values.get(each.number) * scale, (value) =>
-        this.values.set(each.number, value / scale),
+      add(
+        parent,
+        each.words,
+        each.unit,
+        each.range.map((end) => end * scale),
+        () => this.values.get(each.number) * scale,
+        (value) => this.values.set(each.number, value / scale),
       );
     }
     this.place();
@@ -294,7 +373,9 @@ class Page {
     const run = data.runs[number];
     const made = this.machine.simulate(run);
     if (made.wrong) return made;
-    const seen = run.shown.map((each) => (each.values ? run.seen(each, made.signals) : made.signals[each.signal]));
+    const seen = run.shown.map((each) =>
+      each.values ? run.seen(each, made.signals) : made.signals[each.signal],
+    );
     const errors = run.shown.map((each, k) => (each.values ? run.error(each, seen[k]) : null));
     return { ...made, seen, errors };
   }
@@ -322,16 +403,25 @@ class Page {
     $("measures").replaceChildren(
       ...run.shown.flatMap((each, k) => {
         if (!each.values) return [];
-        const words = ({ rmse, fit }) => `RMSE ${digits(rmse * each.factor, 3)} ${each.unit}, fit ${fit.toFixed(2)} %`;
+        const words = ({ rmse, fit }) =>
+          `RMSE ${digits(rmse * each.factor, 3)} ${each.unit}, fit ${fit.toFixed(2)} %`;
         const row = document.createElement("p");
-        row.append(Object.assign(document.createElement("b"), { textContent: each.name }), ` ${words(now.errors[k])}`);
-        row.append(Object.assign(document.createElement("span"), { textContent: ` · ${data.before}: ${words(this.before[number].errors[k])}` }));
+        row.append(
+          Object.assign(document.createElement("b"), { textContent: each.name }),
+          ` ${words(now.errors[k])}`,
+        );
+        row.append(
+          Object.assign(document.createElement("span"), {
+            textContent: ` · ${data.before}: ${words(this.before[number].errors[k])}`,
+          }),
+        );
         return [row];
       }),
     );
     const changed = this.changed();
     const blocks = new Map();
-    for (const [each] of changed) blocks.set(each.block, [...(blocks.get(each.block) ?? []), each.symbol]);
+    for (const [each] of changed)
+      blocks.set(each.block, [...(blocks.get(each.block) ?? []), each.symbol]);
     const values = this.now();
     const lines = [...blocks].flatMap(([block, symbols]) => [
       `[${block}]`,
@@ -354,13 +444,22 @@ class Page {
       const now = this.found(k);
       const row = document.createElement("tr");
       const before = this.before[k].errors?.[last];
-      const cell = (words, look = "n") => Object.assign(document.createElement("td"), { textContent: words, className: look });
-      const head = Object.assign(document.createElement("th"), { textContent: run.name, scope: "row" });
+      const cell = (words, look = "n") =>
+        Object.assign(document.createElement("td"), { textContent: words, className: look });
+      const head = Object.assign(document.createElement("th"), {
+        textContent: run.name,
+        scope: "row",
+      });
       if (!before || now.wrong) row.append(head, cell(now.wrong ?? "", ""));
       else {
         const better = now.errors[last].rmse - before.rmse;
-        const look = Math.abs(better) < 1e-9 * before.rmse ? "n" : better < 0 ? "n better" : "n worse";
-        row.append(head, cell(`${before.fit.toFixed(2)} %`), cell(`${now.errors[last].fit.toFixed(2)} %`, look));
+        const look =
+          Math.abs(better) < 1e-9 * before.rmse ? "n" : better < 0 ? "n better" : "n worse";
+        row.append(
+          head,
+          cell(`${before.fit.toFixed(2)} %`),
+          cell(`${now.errors[last].fit.toFixed(2)} %`, look),
+        );
       }
       row.addEventListener("click", () => {
         $("run").value = k;
@@ -374,9 +473,13 @@ class Page {
 
 async function begin() {
   const machine = await WebAssembly.instantiate(bytes(data.wasm), {});
-  const packs = data.runs.flatMap((run) => run.channels.flatMap((each) => [each.time, each.measured]));
+  const packs = data.runs.flatMap((run) =>
+    run.channels.flatMap((each) => [each.time, each.measured]),
+  );
   await Promise.all(packs.map(async (each) => (each.bytes = await inflated(each.code))));
-  await Promise.all(data.runs.map(async (each) => (each.volts = planes(await inflated(each.voltage)))));
+  await Promise.all(
+    data.runs.map(async (each) => (each.volts = planes(await inflated(each.voltage)))),
+  );
   data.runs = data.runs.map((each) => new Run(each));
   for (const run of data.runs) run.shown = run.channels.length ? run.channels : data.unmeasured;
   globalThis.live = new Page(new Machine(machine.instance.exports));
@@ -387,7 +490,8 @@ async function begin() {
 function planes(bytes) {
   const count = bytes.length / 4;
   const made = new Uint8Array(bytes.length);
-  for (let plane = 0; plane < 4; plane++) for (let row = 0; row < count; row++) made[4 * row + plane] = bytes[plane * count + row];
+  for (let plane = 0; plane < 4; plane++)
+    for (let row = 0; row < count; row++) made[4 * row + plane] = bytes[plane * count + row];
   return made;
 }
 

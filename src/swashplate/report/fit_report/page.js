@@ -1,20 +1,34 @@
 // The page of a report: its runs drawn as the reader comes near, folded details opened, contents marked.
 
-const runs = [...document.querySelectorAll("script[id^=samples]")].map((each) => JSON.parse(each.textContent));
-const packed = runs.flatMap((run) => [run.input, ...run.channels]).flatMap((each) => [each.time, ...each.signals]);
+const runs = [...document.querySelectorAll("script[id^=samples]")].map((each) =>
+  JSON.parse(each.textContent),
+);
+const packed = runs
+  .flatMap((run) => [run.input, ...run.channels])
+  .flatMap((each) => [each.time, ...each.signals]);
 const ready = Promise.all(packed.map(async (each) => (each.bytes = await inflated(each.code))));
 
 /** Signals of a run: the input, then of each channel what was simulated and measured, and the residual. */
 function samples(number) {
   const run = runs[number];
   const clock = (each) => ({ time: unpacked(each.time), breaks: new Set(each.breaks) });
-  const input = { ...clock(run.input), held: run.held, lines: [["input", unpacked(run.input.signals[0])]] };
+  const input = {
+    ...clock(run.input),
+    held: run.held,
+    lines: [["input", unpacked(run.input.signals[0])]],
+  };
   const channels = run.channels.map((each) => {
     const own = { ...clock(each), ignored: each.ignored };
     const [simulated, residual] = each.signals.map(unpacked);
     const measured = simulated.map((value, row) => value - each.ratio * residual[row]);
     return {
-      overlay: { ...own, lines: [["measured", measured], ["simulated", simulated]] },
+      overlay: {
+        ...own,
+        lines: [
+          ["measured", measured],
+          ["simulated", simulated],
+        ],
+      },
       residual: { ...own, lines: [["residual", residual]] },
     };
   });
@@ -53,20 +67,28 @@ class RunFigure extends Figure {
 }
 
 // What the reader comes near is drawn; all of it for paper, where nobody scrolls.
-const figures = new Map([...document.querySelectorAll(".stack")].map((each) => [each, new RunFigure(each)]));
-const near = new IntersectionObserver((seen) => {
-  for (const each of seen) {
-    if (!each.isIntersecting || each.target.dataset.drawn) continue;
-    figures.get(each.target).draw();
-  }
-}, { rootMargin: "600px" });
+const figures = new Map(
+  [...document.querySelectorAll(".stack")].map((each) => [each, new RunFigure(each)]),
+);
+const near = new IntersectionObserver(
+  (seen) => {
+    for (const each of seen) {
+      if (!each.isIntersecting || each.target.dataset.drawn) continue;
+      figures.get(each.target).draw();
+    }
+  },
+  { rootMargin: "600px" },
+);
 // in a frame of its own: drawing changes the height, which is observed, too
-const sized = new ResizeObserver((seen) => requestAnimationFrame(() => {
-  for (const { target } of seen) {
-    const figure = figures.get(target);
-    if (figure.width && figure.width !== target.clientWidth && !matchMedia("print").matches) figure.draw();
-  }
-}));
+const sized = new ResizeObserver((seen) =>
+  requestAnimationFrame(() => {
+    for (const { target } of seen) {
+      const figure = figures.get(target);
+      if (figure.width && figure.width !== target.clientWidth && !matchMedia("print").matches)
+        figure.draw();
+    }
+  }),
+);
 const showAll = (width) => figures.forEach((each) => each.draw(width));
 function start() {
   for (const [each, figure] of figures) {
@@ -91,7 +113,8 @@ ready.then(start).finally(() => {
 // A link into folded details opens them, and paper shows them.
 const opened = () => {
   const target = document.getElementById(decodeURIComponent(location.hash.slice(1)));
-  for (let each = target?.closest("details"); each; each = each.parentElement.closest("details")) each.open = true;
+  for (let each = target?.closest("details"); each; each = each.parentElement.closest("details"))
+    each.open = true;
   target?.scrollIntoView();
 };
 addEventListener("hashchange", opened);
@@ -101,7 +124,11 @@ addEventListener("beforeprint", () => folded.forEach((each) => (each.open = true
 
 // The contents mark where the reader is.
 const links = new Map([...document.querySelectorAll("nav a")].map((a) => [a.hash.slice(1), a]));
-const here = new IntersectionObserver((seen) => {
-  for (const each of seen) links.get(each.target.id)?.classList.toggle("here", each.isIntersecting);
-}, { rootMargin: "-10% 0px -70%" });
+const here = new IntersectionObserver(
+  (seen) => {
+    for (const each of seen)
+      links.get(each.target.id)?.classList.toggle("here", each.isIntersecting);
+  },
+  { rootMargin: "-10% 0px -70%" },
+);
 for (const id of links.keys()) here.observe(document.getElementById(id));
