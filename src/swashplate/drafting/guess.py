@@ -9,7 +9,7 @@ with bounds about them. All of it is where a fit begins, not its result.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import product
 from math import asin, inf, isfinite, log, sqrt, tan
@@ -19,13 +19,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.campaign.campaign import Campaign
-from swashplate.campaign.experiment import Channel, Experiment
+from swashplate.campaign.experiment import Channel, Experiment, InputSignal
 from swashplate.campaign.quality import spiked
 from swashplate.campaign.schema import CURRENTS, ChannelKind
 from swashplate.drafting.amplifier import AmplifierGuess, guess_amplifier
+from swashplate.drafting.plain_drive import MODEL, Edge, PlainDrive
 from swashplate.drive import Drive
-from swashplate.equations.cache import kernel
-from swashplate.equations.declaration import inlined
+from swashplate.equations.marching.derivatives import jacobian, residuals
+from swashplate.equations.marching.observation import ObservedRecord, Own, every_sample
+from swashplate.equations.marching.record import Record
+from swashplate.equations.marching.run import Instance, instance_of
 from swashplate.errors import InputError, ParameterError
 from swashplate.parameters.parameter_set import ParameterSet, set_of
 from swashplate.parameters.rules import SIDES
@@ -85,6 +88,12 @@ JUMPS = (0.03, 0.12)
 EDGE = 0.01
 """Command over which a jump is complete, over the largest one: a sudden one would be felt by no
 small change of a dead zone, as marches go in steps. [1]"""
+FROM_START = np.append(np.zeros(12), 1.0)
+"""Of a position's derivatives by the numbers, and the position: what the first speed moves."""
+UNLIMITED = 1e30
+"""Limit that is none, in the march."""
+SEARCHED = [0, 1, 2, 3, 10, 12, 4, 5, 6, 7, 8, 9]
+"""Which of the 13 numbers each of what is searched for is of."""
 NONE = 30.0
 """Logarithm of a limit, over the greatest speed, that is none. [1]"""
 LAGS, DELAYS, DEAD_ZONES = (0.02, 0.06, 0.2, 0.6), (0.0, 0.04, 0.12, 0.3), (0.02, 0.1, 0.25)
@@ -133,43 +142,40 @@ class Guess(NamedTuple):
     """What the current of the amplifier shows, None if no run measures one."""
 
 
-@inlined
-def _speed_at(command: float, numbers: Array, edge: float) -> float:
-    """Speed that a drive without lag, delay and limits of acceleration has at a command."""
-    speed: float = numbers[11]
-    for way in range(2):
-        sign = 1.0 - 2.0 * way
-        beyond = max(sign * command - numbers[way], 0.0)
-        speed += sign * (numbers[2 + way] * beyond + numbers[8 + way] * min(beyond / edge, 1.0))
-    limited: float = min(max(speed, -numbers[5]), numbers[4])
-    return limited
+class _Course(NamedTuple):
+    """A position over time, straight between instants; or several, the last axis being time."""
 
+    time: Array
+    """Instants (n,). [s]"""
+    values: Array
+    """(..., n)"""
 
-@kernel
-def march_guess(
-    stamps: Array, command: Array, held: bool, edge: float, numbers: Array, h: float,
-    position: Array,
-) -> None:  # fmt: skip
-    """March the position of a drive without delay, in steps from the command's first stamp.
+    def _cells(self, instants: Array) -> tuple[Any, Array]:
+        """Which of the n - 1 pieces instants (m,) lie in, and the rates of change (..., m) there."""
+        cells = np.searchsorted(self.time, instants, "right") - 1
+        cells = np.clip(cells, 0, self.time.size - 2)
+        rises = self.values[..., cells + 1] - self.values[..., cells]
+        return cells, rises / (self.time[cells + 1] - self.time[cells])
 
-    `numbers` (12,) are dead zones, gains, top speeds, accelerations and jumps of plus and minus,
-    the lag [s] and the creep. A `held` command's steps may lie between its stamps (k,), a straight
-    line's are among them. `position` (n,) is the output; its first sample gives the speed at first.
-    """
-    share, speed, last = 1.0 - np.exp(-h / max(numbers[10], 1e-4)), position[0], stamps.size - 1
-    here, now, k = _speed_at(command[0], numbers, edge), stamps[0], 0
-    position[0] = 0.0
-    for n in range(1, position.size):
-        # the mean of what drives the step, exactly: dead zones are crossed between two steps
-        end, area = stamps[0] + n * h, 0.0
-        while k < last and stamps[k + 1] <= end:
-            following = _speed_at(command[k + 1], numbers, edge)
-            area += (stamps[k + 1] - now) * (here if held else 0.5 * (here + following))
-            here, now, k = following, stamps[k + 1], k + 1
-        area += (end - now) * here
-        now, before = end, speed
-        speed += min(max(share * (area / h - speed), -h * numbers[7]), h * numbers[6])
-        position[n] = position[n - 1] + 0.5 * h * (before + speed)
+    def at(self, instants: Array) -> Array:
+        """Positions (..., m) at instants (m,); before the first and after the last it stays."""
+        cells, rates = self._cells(instants)
+        since = np.clip(instants, self.time[0], self.time[-1]) - self.time[cells]
+        return np.asarray(self.values[..., cells] + since * rates)
+
+    def rate_at(self, instants: Array) -> Array:
+        """Rates of change (..., m) at instants (m,)."""
+        moving = (instants > self.time[0]) & (instants < self.time[-1])
+        return np.asarray(np.where(moving, self._cells(instants)[1], 0.0))
+
+    def integral(self) -> _Course:
+        """Its integral from the first instant on."""
+        values = self.values
+        steps = values[..., 1:] + values[..., :-1]
+        steps *= 0.5 * np.diff(self.time)
+        area = np.zeros_like(values)
+        np.cumsum(steps, axis=-1, out=area[..., 1:])
+        return _Course(self.time, area)
 
 
 class _Windows(NamedTuple):
@@ -187,18 +193,24 @@ class _Windows(NamedTuple):
         """Root of the number (m,) of shortest windows that each of them is worth. [1]"""
         return np.sqrt((self.ends - self.begins) / WINDOW)
 
-    def mean_speeds(self, time: Array, position: Array) -> Array:
-        """Mean speeds (m,) of a position (n,) at instants (n,) [s]."""
+    def mean_speeds(self, course: _Course) -> Array:
+        """Mean speeds (..., m) of a course."""
         if not self.averaged:
-            first, last = (np.interp(instants, time, position) for instants in self[:2])
+            return self._differences(course.at)
+        return self._differences(course.integral().at)
+
+    def mean_accelerations(self, course: _Course) -> Array:
+        """Rates of change (..., m) of mean speeds if a course is moved forward in time."""
+        return self._differences(course.at if self.averaged else course.rate_at)
+
+    def _differences(self, at: Callable[[Array], Array]) -> Array:
+        if not self.averaged:
+            first, last = at(self.begins), at(self.ends)
         else:
-            steps = 0.5 * (position[1:] + position[:-1]) * np.diff(time)
-            area = np.concatenate([[0.0], np.cumsum(steps)])
             first, last = (
-                np.interp(instants + self.averaged, time, area) - np.interp(instants, time, area)
-                for instants in self[:2]
+                (at(instants + self.averaged) - at(instants)) / self.averaged
+                for instants in (self.begins, self.ends)
             )
-            first, last = first / self.averaged, last / self.averaged
         return np.asarray((last - first) / (self.ends - self.begins))
 
     def of(self, chosen: Mask) -> _Windows:
@@ -209,7 +221,11 @@ class _Windows(NamedTuple):
 class _Run(NamedTuple):
     """A run: the march's grid (n,), its command (k,) and mean speeds (m,) of windows."""
 
+    observed: ObservedRecord
     time: Array
+    """Stamps of the march's grid, and one long before. [s]"""
+    edge: float
+    """Command over which a jump is complete. [V]"""
     stamps: Array
     """Those of the command, of a straight line the grid's as well. [s]"""
     command: Array
@@ -227,26 +243,58 @@ class _Run(NamedTuple):
     """Of the way, 0 if it is fine."""
 
 
-def _simulated(run: _Run, numbers: Array) -> tuple[Array, Array]:
-    """Instants [s] and positions of a run; numbers (13,) are those of `march_guess`, and the delay.
+def _model(run: _Run, numbers: Array) -> tuple[Instance, Own]:
+    """The plain drive with numbers, and the speed that it begins with."""
+    finite = PlainDrive(*np.minimum(numbers[:12], UNLIMITED).tolist())
+    instance = instance_of(MODEL, finite, given=Edge(run.edge))
+    return instance, Own({"speed": run.start})
+
+
+def _delayed(run: _Run, positions: Array, start: Array | float, delay: float) -> _Course:
+    """Positions (..., n) on the march's grid, as late as the delay [s], with what was before.
 
     What comes out is delayed, so that the march meets its steps alike whatever the delay: else
     errors had a minimum at every whole step.
     """
-    edge = EDGE * float(np.abs(run.command).max()) or 1.0
-    position = np.full(run.time.size, run.start)
-    march_guess(run.stamps, run.command, run.held, edge, numbers[:12], STEP, position)
-    time = numbers[12] + np.append(run.time[0] - BEFORE, run.time)
-    return time, np.append(-BEFORE * run.start, position)
+    values = np.empty((*positions.shape[:-1], positions.shape[-1] + 1))
+    values[..., 0] = -BEFORE * start
+    values[..., 1:] = positions
+    return _Course(run.time + delay, values)
+
+
+def _simulated(run: _Run, numbers: Array) -> _Course:
+    """Position of a run; numbers (13,) are those of `PlainDrive`, and the delay."""
+    positions = residuals(*_observing(run, numbers))
+    return _delayed(run, positions, run.start, numbers[12])
+
+
+def _observing(run: _Run, numbers: Array) -> tuple[Instance, ObservedRecord, Own]:
+    instance, own = _model(run, numbers)
+    return instance, run.observed, own
 
 
 def _errors(runs: Sequence[_Run], numbers: Array) -> Array:
     """Simulated less measured mean speeds of all runs, weighted by their windows' lengths."""
     errors = list[Array]()
     for run in runs:
-        simulated = run.windows.mean_speeds(*_simulated(run, numbers))
+        simulated = run.windows.mean_speeds(_simulated(run, numbers))
         errors.append(run.windows.weights * (simulated - run.speeds))
     return np.concatenate(errors)
+
+
+def _linearised(runs: Sequence[_Run], numbers: Array) -> tuple[Array, Array]:
+    """The errors (m,), and their derivatives (m, 13) by the numbers."""
+    errors, slopes = list[Array](), list[Array]()
+    for run in runs:
+        instance, own = _model(run, numbers)
+        found = jacobian(instance, run.observed, PlainDrive._fields, own)
+        course = _delayed(run, found.rows, run.start * FROM_START, numbers[12])
+        speeds = run.windows.mean_speeds(course)
+        speeds[-1] -= run.speeds
+        by_delay = -run.windows.mean_accelerations(course._replace(values=course.values[-1]))
+        errors.append(run.windows.weights * speeds[-1])
+        slopes.append(run.windows.weights * np.vstack([speeds[:-1], by_delay]))
+    return np.concatenate(errors), np.concatenate(slopes, axis=1).T
 
 
 def _creep(runs: Sequence[_Run], numbers: Array, scale: float) -> float | None:
@@ -266,11 +314,11 @@ def _creep(runs: Sequence[_Run], numbers: Array, scale: float) -> float | None:
     settling = delay + LAGS_TO_REST * lag + scale / accelerations.min()
     speeds, rounding = list[Array](), 0.0
     for run in runs:
-        time, position = _simulated(run, numbers)
+        simulated = _simulated(run, numbers)
         for begin, end in _rests(run, still, settling):
             ends = begin + REST * np.arange(int((end - begin) / REST) + 1)
             measured = np.interp(ends, run.sampled, run.travelled)
-            speeds.append(np.diff(measured - np.interp(ends, time, position)) / REST)
+            speeds.append(np.diff(measured - simulated.at(ends)) / REST)
             rounding += run.resolution
     observed = np.concatenate([np.zeros(0), *speeds])
     if observed.size < RESTS:
@@ -398,11 +446,11 @@ def _run(experiment: Experiment, channel: Channel) -> _Run:
     if not channel.is_position:
         steps = 0.5 * (values[1:] + values[:-1]) * np.diff(time)
         travelled = np.concatenate([[0.0], np.cumsum(steps)])
-    course = time, travelled
+    course = _Course(time, travelled)
     if count and fastest < FEW * count:
         # a slow staircase shows a count in a window or none, whatever the speed between
         course = _edges(time, values, count)
-        windows = _windows_between(course[0], width)
+        windows = _windows_between(course.time, width)
     else:
         if channel.kind == "position":
             width = max(width, _quiet_width(time, values, interval))
@@ -416,7 +464,7 @@ def _run(experiment: Experiment, channel: Channel) -> _Run:
     for gap in np.flatnonzero(np.diff(stamps) > 3.0 * interval):
         inside &= (span[0] >= stamps[gap + 1]) | (span[1] <= stamps[gap])
     windows = windows.of(inside)
-    speeds = windows.mean_speeds(*course)
+    speeds = windows.mean_speeds(course)
     grid = drive.time[0] + STEP * np.arange(np.ceil((drive.time[-1] - drive.time[0]) / STEP) + 1.0)
     held = drive.interpolation == "previous"
     # a straight line may cross a dead zone between two stamps
@@ -424,7 +472,9 @@ def _run(experiment: Experiment, channel: Channel) -> _Run:
     start = 0.0 if experiment.start == "rest" or not speeds.size else float(speeds[0])
     command = drive.at(stamps)
     return _Run(
-        time=grid,
+        observed=_observed(drive, grid, held),
+        time=np.append(grid[0] - BEFORE, grid),
+        edge=EDGE * float(np.abs(command).max()) or 1.0,
         stamps=stamps,
         command=command,
         held=held,
@@ -437,7 +487,25 @@ def _run(experiment: Experiment, channel: Channel) -> _Run:
     )
 
 
-def _edges(time: Array, angle: Array, count: float) -> tuple[Array, Array]:
+def _observed(drive: InputSignal, grid: Array, held: bool) -> ObservedRecord:
+    """The command on the march's grid, of each step its mean."""
+    stamps, values = drive.time, drive.values
+    middles = 0.5 * (values[1:] + values[:-1])
+    pieces = (values[:-1] if held else middles) * np.diff(stamps)
+    area = np.concatenate([[0.0], np.cumsum(pieces)])
+
+    def area_at(instants: Array) -> Array:
+        before = np.clip(np.searchsorted(stamps, instants, "right") - 1, 0, stamps.size - 1)
+        first = values[before]
+        last = first if held else np.interp(instants, stamps, values)
+        return np.asarray(area[before] + 0.5 * (instants - stamps[before]) * (first + last))
+
+    means = np.diff(area_at(np.append(grid, grid[-1] + STEP))) / STEP
+    record = Record(means, float(grid[0]), 1.0 / STEP, 1)
+    return every_sample(record, "position", "command", "rest")
+
+
+def _edges(time: Array, angle: Array, count: float) -> _Course:
     """Instants at which an encoder's reading changed [s], and the angles that it then had.
 
     A reading of k counts tells that the angle lies between k and k + 1, so that it is known when
@@ -445,9 +513,9 @@ def _edges(time: Array, angle: Array, count: float) -> tuple[Array, Array]:
     """
     changed = np.flatnonzero(angle[1:] != angle[:-1])
     if changed.size < 2:
-        return time[[0, -1]], np.zeros(2)
+        return _Course(time[[0, -1]], np.zeros(2))
     instants = 0.5 * (time[changed] + time[changed + 1])
-    return instants, 0.5 * (angle[changed] + angle[changed + 1] + count)
+    return _Course(instants, 0.5 * (angle[changed] + angle[changed + 1] + count))
 
 
 def _windows_between(instants: Array, width: float) -> _Windows:
@@ -502,6 +570,14 @@ def _searched(
     def errors_of(vector: Array) -> Array:
         return _errors(runs, numbers_of(vector)) / scale
 
+    def linearised(vector: Array) -> tuple[Array, Array]:
+        """The errors (m,), and their derivatives (m, 12)."""
+        numbers = numbers_of(vector)
+        errors, by_number = _linearised(runs, numbers)
+        limits = np.where(vector[6:10] < NONE, numbers[4:8], 0.0)
+        factors = [size, numbers[2:4], numbers[10:11], np.ones(1), limits, np.full(2, scale)]
+        return errors / scale, by_number[:, SEARCHED] * (np.concatenate(factors) / scale)
+
     def loss_of(vector: Array) -> float:
         """As `least_squares` has it with the loss "soft_l1"."""
         rough = errors_of(vector) / ROUGH
@@ -509,11 +585,21 @@ def _searched(
 
     def descended(start: Array, free: Mask, **how: Any) -> tuple[float, Array]:
         """Loss and numbers after a descent in those that are free (12,)."""
+        latest: dict[bytes, Array] = {}
 
         def errors_at(part: Array) -> Array:
             whole = start.copy()
             whole[free] = part
-            return errors_of(whole)
+            errors, slopes = linearised(whole)
+            # nearly every step is taken: what is asked for next are the slopes there
+            latest.clear()
+            latest[part.tobytes()] = slopes[:, free]
+            return errors
+
+        def slopes_at(part: Array) -> Array:
+            if part.tobytes() not in latest:
+                errors_at(part)
+            return latest[part.tobytes()]
 
         solution = least_squares(
             errors_at,
@@ -522,7 +608,7 @@ def _searched(
             x_scale=TYPICAL[free],
             loss="soft_l1",
             f_scale=ROUGH,
-            diff_step=1e-3,
+            jac=slopes_at,
             **how,
         )
         end = start.copy()
@@ -541,9 +627,8 @@ def _searched(
     candidates: list[tuple[float, Array, Array]] = []
     for lag, delay, share in product(LAGS, DELAYS, DEAD_ZONES):
         numbers = np.array([*(share * size), 0.0, 0.0, *[inf] * 4, 0.0, 0.0, lag, creep, delay])
-        at_rest, unit = _errors(runs, numbers), np.eye(13)
-        ways = [_errors(runs, numbers + unit[2 + way]) for way in np.flatnonzero(tried)]
-        gain, left = np.zeros(2), np.transpose([way - at_rest for way in ways])
+        at_rest, slopes = _linearised(runs, numbers)
+        gain, left = np.zeros(2), slopes[:, 2:4][:, tried]
         beyond_creep = weighted if creep == 0.0 else -at_rest
         gain[tried] = np.linalg.lstsq(left, beyond_creep, rcond=None)[0]
         cost = float(np.sum((left @ gain[tried] - beyond_creep) ** 2))
@@ -588,7 +673,7 @@ def _searched(
         nothing = NEXT_TO_NOTHING * float(np.sum((weighted / scale) ** 2))
         if loss_of(without) < SEEN * cost + nothing:
             whole, seen[index] = without, False
-    _, whole = descended(whole, seen, jac="3-point", xtol=1e-10, ftol=1e-12, gtol=1e-12)
+    _, whole = descended(whole, seen, xtol=1e-10, ftol=1e-12, gtol=1e-12)
     return numbers_of(whole)
 
 
