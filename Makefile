@@ -15,7 +15,7 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: help .venv demo test test-slow test-kernels lint docs figures reproduce bench cluster fuzz tools browser packages calibration faults owner-table \
+.PHONY: help .venv demo test test-slow test-kernels lint lint-js docs figures reproduce bench cluster fuzz tools browser packages calibration faults owner-table \
   coverage dist matrix binaries format clean
 
 help: ## list the targets
@@ -65,6 +65,19 @@ lint: $(STAMP) ## style, format, types and the direction of imports
 	@echo; echo "== Types";   $(BIN)/mypy
 	@echo; echo "== Imports"; $(BIN)/lint-imports --no-logo
 	@echo; echo "== Spelling"; $(BIN)/codespell
+	@echo; echo "== JavaScript"
+	@if command -v node >/dev/null && test -d $(JAVASCRIPT)/node_modules; \
+	then $(MAKE) --no-print-directory lint-js; \
+	else echo "Skipped: 'make lint-js' installs its tools where there is Node.js."; \
+	fi
+
+# Biome and TypeScript, in the versions of package-lock.json; tests and pages do without.
+JAVASCRIPT := tools/javascript
+
+lint-js: ## style, format and types of the pages' JavaScript (needs Node.js)
+	@command -v npm >/dev/null || { echo "lint-js needs node and npm: install Node.js 20 or newer."; exit 1; }
+	@cd $(JAVASCRIPT) && { test node_modules/.package-lock.json -nt package-lock.json || npm ci --silent; }
+	@cd $(JAVASCRIPT) && npm run --silent lint
 
 docs: $(STAMP) ## build the documentation into docs/_build/html; warnings are errors
 	@$(BIN)/sphinx-build -q -W --keep-going -b html docs docs/_build/html
@@ -145,8 +158,9 @@ browser: ## make sure that there is a Chromium, for the test of the report's pag
 format: $(STAMP) ## sort the imports, mend what can be mended, format
 	@$(BIN)/ruff check --fix-only -q .
 	@$(BIN)/ruff format .
+	@if test -d $(JAVASCRIPT)/node_modules; then cd $(JAVASCRIPT) && npm run --silent format; fi
 
 clean: ## remove the environment, caches and everything made
-	rm -rf .venv demo benchmarks/build build dist docs/_build docs/generated htmlcov .coverage .coverage.* .hypothesis \
+	rm -rf .venv demo benchmarks/build build dist $(JAVASCRIPT)/node_modules docs/_build docs/generated htmlcov .coverage .coverage.* .hypothesis \
 	  .import_linter_cache .mypy_cache .pytest_cache .ruff_cache
 	find . -name .git -prune -o -name __pycache__ -type d -prune -exec rm -rf {} +

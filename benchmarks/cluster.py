@@ -14,8 +14,7 @@ from pathlib import Path
 
 from distributed import LocalCluster
 
-from swashplate import Campaign
-from swashplate.campaign import rig
+from swashplate import Campaign, rig
 from swashplate.executors import Dask, Serial
 from swashplate.identification.estimation.setup import load_setup
 from swashplate.identification.estimation.solving import Solution, sobol_starts, solve_from

@@ -21,8 +21,7 @@ import polars as pl
 from campaign_file import campaign_text
 from command_line import Program
 
-from swashplate import Drive
-from swashplate.campaign import rig
+from swashplate import Drive, rig
 from swashplate.identification.estimation.setup import load_setup
 from swashplate.identification.fitting import drawn
 from swashplate.maneuvers import source_tests

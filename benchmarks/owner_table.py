@@ -191,7 +191,7 @@ def write_logs(seed, folder):
 def fitted(seed, folder):
     """The fit of a winch, from its folder or made now."""
     from swashplate import Campaign
-    from swashplate.campaign import fit_configuration, guess_drive, guessed_set
+    from swashplate.drafting import fit_configuration, guess_drive, guessed_set
     from swashplate.identification import Identification, identify
 
     folder.mkdir(parents=True, exist_ok=True)

@@ -17,8 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import Bounds, minimize
 
-from swashplate import Campaign, DomainError
-from swashplate.campaign import rig
+from swashplate import Campaign, DomainError, rig
 from swashplate.executors import Processes
 from swashplate.identification.estimation.problem import Problem
 from swashplate.identification.estimation.setup import load_setup

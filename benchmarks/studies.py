@@ -9,8 +9,7 @@ from statistics import median
 from processes import limited
 from table import Row, duration
 
-from swashplate import Campaign, maneuvers
-from swashplate.campaign import rig
+from swashplate import Campaign, maneuvers, rig
 from swashplate.full_order.drive import FullOrderDrive
 from swashplate.identification.assessment import Identification
 from swashplate.identification.estimation.setup import load_setup

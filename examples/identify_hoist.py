@@ -14,8 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from swashplate import Campaign, Drive, identify
-from swashplate.campaign import rig
+from swashplate import Campaign, Drive, identify, rig
 from swashplate.identification.estimation.drive_model import true_value
 from swashplate.identification.estimation.setup import load_setup
 from swashplate.identification.estimation.stages import smooth

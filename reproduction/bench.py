@@ -7,7 +7,8 @@ from tempfile import TemporaryDirectory
 
 from scipy.optimize import brentq
 
-from swashplate.campaign import Campaign, Experiment, rig
+from swashplate import rig
+from swashplate.campaign import Campaign, Experiment
 from swashplate.drive import Drive
 from swashplate.parameters.rules import FULL_VOLTAGE
 

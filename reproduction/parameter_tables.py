@@ -10,8 +10,8 @@ from fractions import Fraction
 from typing import NamedTuple
 
 from reproduction.content import Cell, Table
-from swashplate.campaign.rig import COUNTS_PER_TURN
 from swashplate.drive import Drive
+from swashplate.rig import COUNTS_PER_TURN
 
 AXES = ("hoist", "slew", "luff")
 ENCODER_COUNTS = {"hoist": 400.0, "slew": 81_000.0, "luff": 635.0 * 4.0}

@@ -13,6 +13,7 @@ SUBMODULES = (
     "analysis",
     "campaign",
     "crane",
+    "drafting",
     "equations",
     "export",
     "full_order",
@@ -23,6 +24,7 @@ SUBMODULES = (
     "models",
     "parameters",
     "report",
+    "rig",
 )
 
 
@@ -61,6 +63,19 @@ def test_the_import_loads_no_library() -> None:
     loaded = set(fresh(program).split())
     assert "swashplate" in loaded
     assert loaded <= {"swashplate", "lazy_loader", *sys.stdlib_module_names}
+
+
+def test_nobody_pays_for_plotting_who_does_not_plot() -> None:
+    """Results name matplotlib's types; only figures import it."""
+    program = """
+import importlib, pkgutil, sys
+import swashplate
+for module in pkgutil.walk_packages(swashplate.__path__, "swashplate."):
+    if not module.name.startswith(("swashplate.report", "swashplate.__main__")):
+        importlib.import_module(module.name)
+print("swashplate.crane" in sys.modules, "matplotlib" in sys.modules)
+"""
+    assert fresh(program) == "True False"
 
 
 SCRIPT = """

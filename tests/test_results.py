@@ -31,7 +31,7 @@ from swashplate.analysis import (
     trial_of,
     what_if,
 )
-from swashplate.campaign import examine, guess_drive
+from swashplate.campaign import examine
 from swashplate.cli import app
 from swashplate.crane import (
     Crane,
@@ -42,6 +42,7 @@ from swashplate.crane import (
     control,
     simulate,
 )
+from swashplate.drafting import guess_drive
 from swashplate.full_order import compare
 from swashplate.identification import Fit, Identification, fit, outlook, predict
 from swashplate.results import LONGEST

@@ -1,6 +1,7 @@
 from . import analysis as analysis
 from . import campaign as campaign
 from . import crane as crane
+from . import drafting as drafting
 from . import equations as equations
 from . import export as export
 from . import full_order as full_order
@@ -11,6 +12,7 @@ from . import maneuvers as maneuvers
 from . import models as models
 from . import parameters as parameters
 from . import report as report
+from . import rig as rig
 from .__about__ import __version__ as __version__
 from .batch import Batch as Batch
 from .batch import SquaredError as SquaredError

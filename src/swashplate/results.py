@@ -23,8 +23,8 @@ from swashplate.tables import Table, write_table
 if TYPE_CHECKING:
     import numpy as np
     import polars
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+    from matplotlib.axes import Axes as Axes
+    from matplotlib.figure import Figure as Figure
     from numpy.typing import NDArray
 
 GivenAxes = TypeVar("GivenAxes", bound="Axes | Sequence[Axes]")

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from swashplate import Drive, InputError, ParameterError, maneuvers
+from swashplate import Drive, InputError, ParameterError, maneuvers, rig
 from swashplate.analysis import (
     Draws,
     Trial,
@@ -19,7 +19,7 @@ from swashplate.analysis import (
     stored_draws,
     trial_of,
 )
-from swashplate.campaign import Campaign, rig
+from swashplate.campaign import Campaign
 from swashplate.identification.assessment import Identification
 from swashplate.identification.estimation.drive_model import DriveModel
 from swashplate.identification.estimation.setup import Free, Setup, load_setup

@@ -36,7 +36,7 @@ def long(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Campa
     """Read a campaign of one log for which a thousand rows are long, and too many to be held."""
     for name, size in (("LONG", 1000), ("GRAIN", 10), ("BLOCK", 1500)):
         monkeypatch.setattr(f"swashplate.campaign.reading.{name}", size)
-    monkeypatch.setattr("swashplate.logs.apart.MOST_HELD", 1000)
+    monkeypatch.setattr("swashplate.logs.long_logs.MOST_HELD", 1000)
     monkeypatch.setattr("swashplate.logs.text.PIECE", 1 << 14)
 
     def read(text: str | None = None, toml: str = TOML) -> Campaign:

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.campaign.conftest import Drafted
+from tests.drafting.conftest import Drafted
 
 from swashplate import Campaign, ParameterError
-from swashplate.campaign import draft_campaign
+from swashplate.drafting import draft_campaign
 
 NAMES = "ramp", "sine", "step"
 """As a folder lists them; recorded were step, ramp and sine."""

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.campaign.conftest import Drafted
+from tests.drafting.conftest import Drafted
 
 from swashplate import Campaign
 from swashplate.campaign import Quality, beyond_the_card, campaign_findings, examine

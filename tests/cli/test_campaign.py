@@ -224,9 +224,9 @@ def test_what_positive_steps_determine(done: Words, tmp_path: Path) -> None:
 
 def test_a_guess_looks_for_its_folder_first(refused, virtual, tmp_path, monkeypatch) -> None:
     """Not after the search, which takes many times as long."""
-    from swashplate import campaign
+    from swashplate import drafting
 
-    monkeypatch.setattr(campaign, "guess_drive", lambda runs: pytest.fail("it searched"))
+    monkeypatch.setattr(drafting, "guess_drive", lambda runs: pytest.fail("it searched"))
     (tmp_path / "file").write_text("")
     sentence = refused("guess", "virtual/campaign.toml", "--out", "file/guessed")
     assert "file/guessed cannot be made" in sentence

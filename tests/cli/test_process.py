@@ -16,8 +16,7 @@ import typer
 from tests.cli.conftest import stages
 from typer.testing import CliRunner
 
-from swashplate import Drive, __version__, maneuvers
-from swashplate.campaign import rig
+from swashplate import Drive, __version__, maneuvers, rig
 from swashplate.cli import EPILOG, app
 from swashplate.cli.terminal import show
 from swashplate.tables import UNIT, Column, Table

@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 from scipy.stats import binomtest
 
-from swashplate import Campaign, Drive
+from swashplate import Campaign, Drive, rig
 from swashplate.analysis.monte_carlo import Draws, stored_draws
-from swashplate.campaign import rig
 from swashplate.crane import (
     Crane,
     Seaway,

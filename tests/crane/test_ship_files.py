@@ -10,7 +10,7 @@ from tests.fuzz.seeds import MOTIONS, capytaine, ship_table_lines, wamit_lines
 
 from swashplate.crane import read_ship, ship_motion
 from swashplate.errors import FileError, InputError, SwashplateError
-from swashplate.logs import apart
+from swashplate.logs import subprocess_reader
 
 WAVES = [(heading, omega) for heading in (0.0, 90.0, 180.0) for omega in (0.1, 0.2, 0.5)]
 
@@ -63,7 +63,7 @@ FLIPS = [(2408, 0x80), (2432, 0x20), (2480, 0x20), (1160, 0x20), (1208, 0x08), (
 @pytest.mark.parametrize(("place", "bit"), FLIPS)
 def test_a_flipped_bit_ends_in_a_sentence_in_time(ship, monkeypatch, place, bit):
     read_ship(ship)  # starts the process, which takes its time on a busy machine
-    monkeypatch.setattr(apart, "_PATIENCE", 2.0)
+    monkeypatch.setattr(subprocess_reader, "_PATIENCE", 2.0)
     content = bytearray(ship.read_bytes())
     content[place] ^= bit
     ship.write_bytes(content)
@@ -74,7 +74,7 @@ def test_a_flipped_bit_ends_in_a_sentence_in_time(ship, monkeypatch, place, bit)
 
 def test_flipped_bits_end_in_a_sentence_or_in_numbers(ship, monkeypatch):
     read_ship(ship)
-    monkeypatch.setattr(apart, "_PATIENCE", 2.0)
+    monkeypatch.setattr(subprocess_reader, "_PATIENCE", 2.0)
     whole, random = ship.read_bytes(), np.random.default_rng(34)
     written = np.flatnonzero(np.frombuffer(whole, np.uint8))
     for place in random.choice(written, 100):

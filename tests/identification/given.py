@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.signal import lfilter
 
-from swashplate import Campaign, Channel, Experiment
-from swashplate.campaign import rig
+from swashplate import Campaign, Channel, Experiment, rig
 from swashplate.campaign.experiment import InputSignal, Source
 from swashplate.executors import Serial
 from swashplate.identification.estimation.arrow import Block

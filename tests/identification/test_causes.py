@@ -7,8 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from swashplate import Campaign, Drive
-from swashplate.campaign import rig
+from swashplate import Campaign, Drive, rig
 from swashplate.identification.diagnostics.causes import behind_lag
 from swashplate.identification.diagnostics.judging import Verdict, verdict
 from swashplate.identification.estimation.setup import load_setup

@@ -8,7 +8,7 @@ import pytest
 from tests.identification.given import run_of, virtual
 
 from swashplate import Campaign, Drive, Experiment, InputError, maneuvers
-from swashplate.campaign import guess_drive
+from swashplate.drafting import guess_drive
 from swashplate.identification.diagnostics.data_checks import (
     Finding,
     check_runs,

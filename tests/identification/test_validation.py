@@ -8,8 +8,7 @@ import pytest
 from scipy.signal import lfilter
 from tests.identification.given import bench_run, first_order, run_of, virtual
 
-from swashplate import Campaign, Drive, InputError, maneuvers
-from swashplate.campaign import rig
+from swashplate import Campaign, Drive, InputError, maneuvers, rig
 from swashplate.identification.diagnostics.judging import verdict
 from swashplate.identification.validation import (
     compared,

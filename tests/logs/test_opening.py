@@ -18,7 +18,7 @@ from tests.fuzz.seeds import TIME, VOLTS, hdf5, matlab5, mdf, parquet, tdms
 from tests.logs.writing import write_log
 
 from swashplate import FileError, SwashplateError
-from swashplate.logs import apart, open_log
+from swashplate.logs import open_log, subprocess_reader
 from swashplate.logs.binary import look
 
 NO_FILES = {
@@ -67,13 +67,13 @@ def table(tmp_path):
 
 def test_a_process_that_ends_or_hangs_is_replaced(table, monkeypatch):
     log = open_log(table)
-    other = apart._Other.running
+    other = subprocess_reader._ReaderProcess.running
     os.kill(other._process.pid, signal.SIGKILL)
     with pytest.raises(FileError, match="log.parquet is damaged so that reading it breaks off"):
         log.read(["time"])
     assert log.read(["time"])["time"].tolist() == [0.0, 1.0]
-    monkeypatch.setattr(apart, "_PATIENCE", 0.2)
-    other = apart._Other.running
+    monkeypatch.setattr(subprocess_reader, "_PATIENCE", 0.2)
+    other = subprocess_reader._ReaderProcess.running
     os.kill(other._process.pid, signal.SIGSTOP)
     with pytest.raises(FileError, match="log.parquet could not be read within 0 s"):
         log.read(["time"])
@@ -84,7 +84,7 @@ def test_a_process_that_ends_or_hangs_is_replaced(table, monkeypatch):
 
 def test_an_interrupt_leaves_no_clock_that_python_waits_for(table):
     log = open_log(table)
-    other = apart._Other.running
+    other = subprocess_reader._ReaderProcess.running
     os.kill(other._process.pid, signal.SIGSTOP)
     interrupt = threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT))
     interrupt.start()
@@ -113,10 +113,10 @@ ROWS = 100_000
 READ = """
 import sys
 from pathlib import Path
-from swashplate.logs import apart, open_log
+from swashplate.logs import open_log, subprocess_reader
 
 def peak():
-    other = apart._Other.running
+    other = subprocess_reader._ReaderProcess.running
     processes = ["self"] + ([str(other._process.pid)] if other else [])
     status = [Path(f"/proc/{each}/status").read_text() for each in processes]
     return sum(int(each.split("VmHWM:")[1].split()[0]) for each in status) * 1024

@@ -12,7 +12,7 @@ from tests.identification.given import run_of
 
 from swashplate import Drive, Experiment, maneuvers
 from swashplate.analysis import envelope, standard_errors, variances_from_bounds
-from swashplate.campaign import fit_configuration, guess_drive, guess_table, guessed_set
+from swashplate.drafting import fit_configuration, guess_drive, guess_table, guessed_set
 from swashplate.identification import verdict
 from swashplate.identification.estimation.setup import Free, Setup
 from swashplate.identification.fitting import Fit, fit

@@ -30,10 +30,9 @@ from swashplate.tables import (
 
 if TYPE_CHECKING:
     import polars
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
     from swashplate.drive import Simulation
+    from swashplate.results import Axes, Figure
 
 Array = NDArray[np.float64]
 

@@ -22,7 +22,8 @@ from swashplate.tables import Column, Table, listed, quantity, share_cell
 
 if TYPE_CHECKING:
     import polars
-    from matplotlib.figure import Figure
+
+    from swashplate.results import Figure
 
 Array = NDArray[np.float64]
 

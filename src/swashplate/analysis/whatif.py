@@ -27,9 +27,8 @@ from swashplate.tables import UNIT, Column, Table, listed, quantity
 from swashplate.units import of_shaft
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from swashplate.analysis.monte_carlo import Bands
+    from swashplate.results import Figure
 
 Array = NDArray[np.float64]
 # --- before and after -----------------------------------------------------------------------------

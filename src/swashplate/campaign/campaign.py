@@ -24,9 +24,8 @@ from swashplate.tables import Column as Head
 from swashplate.tables import Table
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from swashplate.drive import Drive
+    from swashplate.results import Figure
 
 _OPEN = re.compile("=.*FIXME")
 """A line of a draft that a person has to fill in."""

@@ -27,9 +27,9 @@ from swashplate.tables import UNIT, Column, Table
 
 if TYPE_CHECKING:
     import polars
-    from matplotlib.figure import Figure
 
     from swashplate.equations.marching.record import Interpolation
+    from swashplate.results import Figure
 
 Array = NDArray[np.float64]
 

@@ -16,7 +16,8 @@ from swashplate.units import display_unit
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from matplotlib.figure import Figure
+    from swashplate.results import Figure
+
 
 Array = NDArray[np.float64]
 

@@ -103,6 +103,13 @@ SIGNALS: Mapping[ChannelKind, str] = {
     kind: KINDS[kind].signal for kind in CHANNEL_KINDS if KINDS[kind].signal
 }
 """Simulated signals by the kinds of channel that measure them."""
+CURRENTS: tuple[ChannelKind, ...] = (
+    "signed_current",
+    "rectified_current",
+    "current_plus",
+    "current_minus",
+)
+"""Kinds of channel that measure the amplifier's current."""
 
 
 def shown_unit(kind: str, unit: str) -> str:

@@ -133,7 +133,7 @@ def init(
     full scale, is scaled to volts; a sensor in such words needs its range.
     Correct the entries, then run 'swashplate campaign check'.
     """
-    from swashplate.campaign.draft import FIXME, NO_ENCODER, UNUSED, draft_campaign
+    from swashplate.drafting.draft import FIXME, NO_ENCODER, UNUSED, draft_campaign
 
     target = out or logs[0].parent / "campaign.toml"
     check_output(target, CAMPAIGN_FILE, force=force)
@@ -346,7 +346,7 @@ def rig(
     drive, not the one that a fit starts from. Fit it like logs of your machine,
     then compare with the folder truth. All files are marked as virtual.
     """
-    from swashplate.campaign import rig as bench
+    from swashplate import rig as bench
 
     check_free(out, force=force)
     with working("Simulating"):
@@ -404,7 +404,8 @@ def guess(
     initial drive for a fit, start.toml, and the parameters to estimate with
     their bounds, setup.toml.
     """
-    from swashplate import campaign as tests
+    from swashplate import drafting
+    from swashplate.campaign import spiked
     from swashplate.drive import Drive
     from swashplate.identification.identifying import runs_to_fit
 
@@ -415,21 +416,21 @@ def guess(
         campaign, chosen = words.campaign_of(path, axis)
         check_folder(folder)
         runs = runs_to_fit(campaign, chosen)
-        found = tests.guess_drive(runs)
-        parameters = tests.guessed_set(found, path.name)
+        found = drafting.guess_drive(runs)
+        parameters = drafting.guessed_set(found, path.name)
         made_folder(folder)
         Drive(parameters).to_toml(start)
-        write_text(tests.fit_configuration(found, parameters), setup)
-    show(tests.guess_table(found))
+        write_text(drafting.fit_configuration(found, parameters), setup)
+    show(drafting.guess_table(found))
     if found.amplifier is not None:
-        show(tests.amplifier_table(found.amplifier))
+        show(drafting.amplifier_table(found.amplifier))
         card = found.amplifier.card
         like = f"like that of the packaged card {card}" if card else "a plain one"
         say(
             f"Its filter is {like}; fit {found.amplifier.fit_percent:.1f} % of the currents. The "
             "first stage fits the amplifier to the current, the second one the machine."
         )
-    for sentence, _ in tests.spiked(runs).values():
+    for sentence, _ in spiked(runs).values():
         note(f"! {sentence}.")
     note(f"These numbers alone: fit {found.fit_percent:.1f} % of the mean speeds (100 % is best).")
     note(f"Start:             {start}")

@@ -474,7 +474,8 @@ def demo(
     pump and motor to ten of them, predicts the other three and writes a report.
     Takes less than a minute. Replaces an earlier demo.
     """
-    from swashplate.campaign import Campaign, rig
+    from swashplate import rig
+    from swashplate.campaign import Campaign
     from swashplate.drive import Drive
     from swashplate.identification import tables
     from swashplate.identification.estimation.setup import load_setup

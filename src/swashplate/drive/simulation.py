@@ -20,7 +20,8 @@ from swashplate.units import SHAFT_ANGLE, display_unit
 
 if TYPE_CHECKING:
     import polars
-    from matplotlib.figure import Figure
+
+    from swashplate.results import Figure
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.uint8]

@@ -48,10 +48,10 @@ from swashplate.units import PLATE_RATE, SHAFT_ANGLE
 
 if TYPE_CHECKING:
     import polars
-    from matplotlib.figure import Figure
 
     from swashplate.drive import Simulation
     from swashplate.maneuvers import Maneuver
+    from swashplate.results import Figure
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.int8]

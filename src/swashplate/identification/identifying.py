@@ -143,7 +143,7 @@ def identify(
     if not isinstance(tests, str | Path | Campaign):
         raise InputTypeError(
             f"The tests are a {type(tests).__name__}: give the path of a campaign file, which "
-            "swashplate.campaign.draft_campaign makes of logs, or a Campaign."
+            "swashplate.drafting.draft_campaign makes of logs, or a Campaign."
         )
     campaign = tests if isinstance(tests, Campaign) else Campaign.from_toml(tests)
     axis = only_axis(campaign, axis)

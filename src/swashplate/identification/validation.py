@@ -28,8 +28,7 @@ from swashplate.parameters.parameter_set import HasParameters, ParameterSet, set
 from swashplate.results import Result, figures
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
+    from swashplate.results import Figure
 Array = NDArray[np.float64]
 
 

@@ -24,9 +24,8 @@ from swashplate.tables import Column, Table
 
 if TYPE_CHECKING:
     import polars
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
+    from swashplate.results import Axes, Figure
 Array = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
 SLOWEST_CYCLE = 1e-3  # Lowest frequency. [Hz]

@@ -4,15 +4,7 @@
 SI. A file that is damaged or hostile ends in one sentence, and nothing half-read is returned.
 """
 
-from swashplate.logs.apart import in_parts as in_parts
-from swashplate.logs.dialect import TextOptions as TextOptions
-from swashplate.logs.log import SUFFIXES as SUFFIXES
-from swashplate.logs.log import Column as Column
-from swashplate.logs.log import Log as Log
-from swashplate.logs.log import Series as Series
-from swashplate.logs.log import check_duration as check_duration
-from swashplate.logs.log import check_stamps as check_stamps
-from swashplate.logs.log import open_as as open_as
-from swashplate.logs.log import open_log as open_log
-from swashplate.logs.log import read_series as read_series
-from swashplate.logs.log import unit_of as unit_of
+import lazy_loader
+
+# names are imported when they are first used: a schema needs few of the modules
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -2,7 +2,7 @@
 
 A format is a row of `FORMATS`: a context in which a file is open and says what it holds. What a
 library reads from a damaged file without a word is refused here: variables, blocks and channels
-that were cut off. All of it runs in a process of its own, see `swashplate.logs.apart`.
+that were cut off. All of it runs in a process of its own, see `swashplate.logs.subprocess_reader`.
 """
 
 from __future__ import annotations

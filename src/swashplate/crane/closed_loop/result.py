@@ -25,7 +25,8 @@ from swashplate.tables import Column, Table
 
 if TYPE_CHECKING:
     import polars
-    from matplotlib.figure import Figure
+
+    from swashplate.results import Figure
 
 Array = NDArray[np.float64]
 

@@ -20,8 +20,7 @@ from swashplate.results import Result, figures
 from swashplate.tables import Column, Table
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
+    from swashplate.results import Figure
 Array = NDArray[np.float64]
 
 

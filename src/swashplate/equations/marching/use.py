@@ -54,8 +54,8 @@ from swashplate.results import GivenAxes, Tabular, figures, pandas_frame
 
 if TYPE_CHECKING:
     import polars
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+
+    from swashplate.results import Axes, Figure
 
 Array = NDArray[np.float64]
 LARGEST = sys.float_info.max

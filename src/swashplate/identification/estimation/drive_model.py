@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.campaign import ChannelKind
-from swashplate.campaign.amplifier import CURRENTS as CURRENTS
 from swashplate.campaign.experiment import APART, RISE, Channel, Edge, Experiment, InputSignal
 from swashplate.campaign.samples import signed_by_command
+from swashplate.campaign.schema import CURRENTS as CURRENTS
 from swashplate.campaign.schema import SIGNALS as SIGNALS
 from swashplate.drive import (
     PRESSURE,

@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 
 from swashplate.campaign import KINDS, ChannelKind
 from swashplate.campaign.experiment import Channel, Experiment, InputSignal, Source
-from swashplate.campaign.rig import COUNTS_PER_TURN
 from swashplate.drive import Drive
 from swashplate.errors import InputError
 from swashplate.identification.estimation.arrow import dense_factor, triangular_factor, whitening
@@ -40,6 +39,7 @@ from swashplate.parameters.definitions import CATALOGUE, COLUMNS
 from swashplate.parameters.parameter_set import HasParameters, ParameterSet, set_of
 from swashplate.parameters.rules import FULL_VOLTAGE
 from swashplate.results import Result
+from swashplate.rig import COUNTS_PER_TURN
 from swashplate.tables import Column, Table, listed
 
 Array = NDArray[np.float64]

@@ -1,30 +1,183 @@
 // The live page: the drive as WebAssembly, sliders for its parameters, measured and simulated curves over each run.
 
-const data = JSON.parse(document.getElementById("live").textContent);
-const bytes = (words) => Uint8Array.from(atob(words), (letter) => letter.charCodeAt(0));
-const $ = (name) => document.getElementById(name);
-const digits = (value, count = 4) => {
-  const [head, power] = Number(value).toPrecision(count).replace("-", "−").split("e");
+/**
+ * A parameter's value, as `live._parameters` of Python writes it.
+ * @typedef {object} ParameterData
+ * @property {number} number Its place in the drive's C.
+ * @property {string} symbol
+ * @property {string} column
+ * @property {string} block
+ * @property {string} words
+ * @property {string} si Unit of the value.
+ * @property {string} unit Unit of people.
+ * @property {number} factor From the value to that unit.
+ * @property {number} value
+ * @property {[low: number, high: number] | null} range Ends of its slider.
+ * @property {boolean} main Whether it was fitted.
+ */
+
+/**
+ * A factor on several parameters.
+ * @typedef {object} LeverData
+ * @property {string} name
+ * @property {string} words
+ * @property {[number: number, power: number][]} moves
+ * @property {[low: number, high: number]} range
+ */
+
+/**
+ * How a signal is shown, as `live._shown` of Python writes it.
+ * @typedef {object} ShownData
+ * @property {string} signal
+ * @property {string} name
+ * @property {string} unit
+ * @property {number} factor From SI to that unit.
+ * @property {string} label
+ * @property {string} residual Label of the residual.
+ * @property {string[]} shaded Limits that are shaded.
+ */
+
+/**
+ * What a channel has besides, as `live._channel` of Python writes it.
+ * @typedef {object} MeasuredData
+ * @property {string} also A signal that is added, or nothing.
+ * @property {boolean} speed Whether the signal is a position, and its speed is compared.
+ * @property {Packed} time
+ * @property {Packed} measured In the unit that is shown.
+ * @property {number[]} breaks
+ * @property {Span[]} ignored
+ */
+
+/**
+ * A run, as `live.run_of` of Python writes it.
+ * @typedef {object} RunData
+ * @property {string} name
+ * @property {string} role
+ * @property {number} start In s.
+ * @property {number} step In s.
+ * @property {string} voltage Of four bytes each, the lowest bytes first; deflated and in base64.
+ * @property {boolean} [steady] Whether it begins in the steady state.
+ * @property {(ShownData & MeasuredData)[]} channels
+ */
+
+/**
+ * All that `live.live_page` of Python hands over.
+ * @typedef {object} LiveData
+ * @property {string} wasm
+ * @property {string} values Of the drive: doubles in base64.
+ * @property {ParameterData[]} parameters
+ * @property {LeverData[]} levers
+ * @property {{ name: string, number: number }[]} outputs
+ * @property {[bit: number, name: string][]} limits
+ * @property {string} before What the values at first are called.
+ * @property {{ low: number, high: number }} filter Angular frequencies of the filters of a speed.
+ * @property {ShownData[]} unmeasured What is shown of a run without channels.
+ * @property {RunData[]} runs
+ */
+
+/**
+ * What the compiled drive exports: statuses, of which 0 is well, and addresses in its memory.
+ * @typedef {object} MachineExports
+ * @property {WebAssembly.Memory} memory
+ * @property {(count: number) => number} swp_page_values
+ * @property {(count: number) => number} swp_page_init
+ * @property {(number: number) => number} swp_page_get
+ * @property {(number: number, value: number) => number} swp_page_set
+ * @property {() => number} swp_page_update
+ * @property {(status: number) => number} swp_page_sentence
+ * @property {(count: number, step: number, outputs: number) => number} swp_page_begin
+ * @property {(row: number, output: number) => void} swp_page_select
+ * @property {(number: number) => number} swp_page_input
+ * @property {(steady: number) => number} swp_page_run
+ * @property {(row: number) => number} swp_page_row
+ * @property {() => number} swp_page_limits
+ */
+
+/** @typedef {Record<string, Float64Array>} Signals Simulated signals by name, SI. */
+/** @typedef {{ rmse: number, fit: number }} Errors Of a channel: RMSE in SI, fit in per cent. */
+/** @typedef {{ wrong: string }} Refusal The sentence that says why there is no simulation. */
+
+/**
+ * A simulated run; of each that is shown its values, and the errors of a channel.
+ * @typedef {object} Simulated
+ * @property {Signals} signals
+ * @property {Uint8Array} limits A byte a sample, in which a limit that acts has its bit.
+ * @property {Float64Array[]} seen
+ * @property {(Errors | null)[]} errors
+ * @property {Float64Array[]} lines What is drawn of `seen`, filled where it is drawn.
+ */
+
+/**
+ * The element of a name.
+ * @template {HTMLElement} E
+ * @param {string} name
+ * @param {new () => E} kind
+ * @returns {E}
+ */
+function element(name, kind) {
+  const found = document.getElementById(name);
+  if (!(found instanceof kind)) throw new Error(`The page has no ${kind.name} '${name}'.`);
+  return found;
+}
+
+/**
+ * A new element with properties, set in their order.
+ * @template {keyof HTMLElementTagNameMap} T
+ * @param {T} tag
+ * @param {Partial<HTMLElementTagNameMap[T]>} properties
+ * @returns {HTMLElementTagNameMap[T]}
+ */
+function created(tag, properties) {
+  return Object.assign(document.createElement(tag), properties);
+}
+
+/** @type {LiveData} */
+const data = JSON.parse(element("live", HTMLScriptElement).text);
+
+/**
+ * A number in a few digits.
+ * @param {number} value
+ */
+function digits(value, count = 4) {
+  const [head, power] = value.toPrecision(count).replace("-", "−").split("e");
   return power ? `${head}·10^${Number(power)}`.replace("-", "−") : head;
-};
+}
 
 // --- the drive ---
 
 /** A drive of the compiled source: parameters by number, and runs over a voltage on an even grid. */
 class Machine {
+  /** @param {MachineExports} exports */
   constructor(exports) {
     this.c = exports;
-    const values = new Float64Array(bytes(data.values).buffer);
-    new Float64Array(this.c.memory.buffer, this.c.swp_page_values(values.length), values.length).set(values);
+    const values = new Float64Array(decoded(data.values).buffer);
+    this.doubles(this.c.swp_page_values(values.length), values.length).set(values);
     const wrong = this.sentence(this.c.swp_page_init(values.length));
     if (wrong) throw new Error(wrong);
   }
 
+  /**
+   * Doubles in the drive's memory, until it grows.
+   * @param {number} address
+   * @param {number} count
+   */
+  doubles(address, count) {
+    return new Float64Array(this.c.memory.buffer, address, count);
+  }
+
+  /**
+   * A parameter's value.
+   * @param {number} number
+   */
   get(number) {
     return this.c.swp_page_get(number);
   }
 
-  /** Set values, [[number, value], ...]; empty, or the sentence that says what is wrong. */
+  /**
+   * Set values by number; empty, or the sentence that says what is wrong.
+   * @param {Map<number, number>} values
+   * @returns {string}
+   */
   set(values) {
     for (const [number, value] of values) {
       const wrong = this.c.swp_page_set(number, value);
@@ -33,34 +186,57 @@ class Machine {
     return this.sentence(this.c.swp_page_update());
   }
 
+  /**
+   * What a status says; empty if all is well.
+   * @param {number} status
+   */
   sentence(status) {
     if (!status) return "";
     const memory = new Uint8Array(this.c.memory.buffer, this.c.swp_page_sentence(status));
     return new TextDecoder().decode(memory.subarray(0, memory.indexOf(0)));
   }
 
-  /** Signals (by name) over a run, and its limits, a byte a sample; or what is wrong. */
-  simulate(run) {
-    const { voltage, step, steady } = run;
+  /**
+   * Signals over a run, and its limits.
+   * @param {Run} run
+   * @returns {{ signals: Signals, limits: Uint8Array } | Refusal}
+   */
+  simulate({ voltage, step, steady, shown }) {
     // what the run's channels are compared with, and the speed
-    const names = new Set(["shaft_speed", ...run.shown.flatMap((each) => [each.signal, each.also])]);
-    const wanted = data.outputs.filter(({ name }) => names.has(name));
-    const wrong = this.c.swp_page_begin(voltage.length, step, wanted.length);
+    const names = new Set(["shaft_speed"]);
+    for (const { signal, measured } of shown) {
+      names.add(signal);
+      if (measured) names.add(measured.also);
+    }
+    const outputs = data.outputs.filter(({ name }) => names.has(name));
+    const count = voltage.length;
+    const wrong = this.c.swp_page_begin(count, step, outputs.length);
     if (wrong) return { wrong: this.sentence(wrong) };
-    wanted.forEach(({ number }, k) => this.c.swp_page_select(k, number));
-    new Float64Array(this.c.memory.buffer, this.c.swp_page_input(0), voltage.length).set(voltage);
+    outputs.forEach(({ number }, row) => {
+      this.c.swp_page_select(row, number);
+    });
+    this.doubles(this.c.swp_page_input(0), count).set(voltage);
     const status = this.c.swp_page_run(steady ? 1 : 0);
     if (status) return { wrong: this.sentence(status) };
-    const of = (k) => new Float64Array(this.c.memory.buffer, this.c.swp_page_row(k), voltage.length);
-    const signals = Object.fromEntries(wanted.map(({ name }, k) => [name, of(k).slice()]));
-    const limits = new Uint8Array(this.c.memory.buffer, this.c.swp_page_limits(), voltage.length).slice();
+    /** @type {Signals} */
+    const signals = {};
+    outputs.forEach(({ name }, row) => {
+      signals[name] = this.doubles(this.c.swp_page_row(row), count).slice();
+    });
+    const limits = new Uint8Array(this.c.memory.buffer, this.c.swp_page_limits(), count).slice();
     return { signals, limits };
   }
 }
 
 // --- runs ---
 
-/** Values at instants of a signal on an even grid, linear in between. */
+/**
+ * Values at instants of a signal on an even grid, linear in between.
+ * @param {Float64Array} values
+ * @param {number} start
+ * @param {number} step
+ * @param {Float64Array} time
+ */
 function interpolated(values, start, step, time) {
   const last = values.length - 1;
   return time.map((instant) => {
@@ -70,329 +246,532 @@ function interpolated(values, start, step, time) {
   });
 }
 
-/** Speed of simulated positions through the filters that the measured positions went through. */
+/**
+ * Speed of simulated positions through the filters that the measured positions went through.
+ * @param {Float64Array} positions
+ * @param {Float64Array} time
+ */
 function speedOf(positions, time) {
   const { low, high } = data.filter;
-  const made = new Float64Array(positions.length);
+  const speed = new Float64Array(positions.length);
   let state = 0;
   for (let row = 1; row < positions.length; row++) {
     const interval = time[row] - time[row - 1];
-    const [first, second] = [Math.exp(-low * interval), Math.exp(-high * interval)];
+    const first = Math.exp(-low * interval);
+    const second = Math.exp(-high * interval);
     const passed = (high / (high - low)) * (first - second);
     const drive = (positions[row] - positions[row - 1]) / interval;
-    made[row] = second * made[row - 1] + passed * state + (1 - second - passed) * drive;
+    speed[row] = second * speed[row - 1] + passed * state + (1 - second - passed) * drive;
     state = first * state + (1 - first) * drive;
   }
-  return made;
+  return speed;
 }
 
-class Run {
-  constructor(given) {
-    Object.assign(this, given);
-    this.voltage = Float64Array.from(new Float32Array(given.volts.buffer));
-    this.grid = Float64Array.from(this.voltage, (_, row) => this.start + row * this.step);
-    for (const each of this.channels) {
-      each.stamps = unpacked(each.time);
-      each.breaks = new Set(each.breaks);
-      each.values = unpacked(each.measured).map((value) => value / each.factor);
-      each.counts = each.stamps.map((t) => (each.ignored.some(([from, to]) => t >= from && t <= to) ? 0 : 1));
-    }
+/** The samples of a channel, and how simulated signals are compared with them. */
+class Measured {
+  /** @param {ShownData & MeasuredData} channel */
+  constructor(channel) {
+    this.signal = channel.signal;
+    this.also = channel.also;
+    this.speed = channel.speed;
+    this.ignored = channel.ignored;
+    this.breaks = new Set(channel.breaks);
+    this.stamps = unpacked(channel.time);
+    /** As it is drawn. */
+    this.line = unpacked(channel.measured);
+    /** In SI. */
+    this.values = this.line.map((value) => value / channel.factor);
+    /** Whether a sample counts. */
+    this.counts = Array.from(
+      this.stamps,
+      (instant) => !this.ignored.some(([from, to]) => instant >= from && instant <= to),
+    );
   }
 
-  /** What a channel would have measured of simulated signals, SI. */
-  seen(channel, signals) {
-    const of = (name) => interpolated(signals[name], this.start, this.step, channel.stamps);
-    if (channel.speed) return speedOf(of(channel.signal), channel.stamps);
-    const values = of(channel.signal);
-    if (!channel.also) return values;
-    const more = of(channel.also);
+  /**
+   * What the channel would have measured of simulated signals, SI.
+   * @param {Signals} signals
+   * @param {number} start
+   * @param {number} step
+   */
+  seen(signals, start, step) {
+    const values = interpolated(signals[this.signal], start, step, this.stamps);
+    if (this.speed) return speedOf(values, this.stamps);
+    if (!this.also) return values;
+    const more = interpolated(signals[this.also], start, step, this.stamps);
     return values.map((value, row) => value + more[row]);
   }
 
-  /** Root of the mean squared error of the samples that count, and fit per cent. */
-  error(channel, simulated) {
-    let [n, sum, mean, square] = [0, 0, 0, 0];
-    for (let row = 0; row < simulated.length; row++) if (channel.counts[row]) {
-      n++;
-      sum += (simulated[row] - channel.values[row]) ** 2;
-      mean += channel.values[row];
+  /**
+   * Root of the mean squared error of the samples that count, and fit per cent.
+   * @param {Float64Array} simulated
+   * @returns {Errors}
+   */
+  error(simulated) {
+    let count = 0;
+    let squares = 0;
+    let sum = 0;
+    for (let row = 0; row < simulated.length; row++) {
+      if (!this.counts[row]) continue;
+      count++;
+      squares += (simulated[row] - this.values[row]) ** 2;
+      sum += this.values[row];
     }
-    mean /= n;
-    for (let row = 0; row < simulated.length; row++) if (channel.counts[row]) square += (channel.values[row] - mean) ** 2;
-    return { rmse: Math.sqrt(sum / n), fit: 100 * (1 - Math.sqrt(sum / square)) };
+    const mean = sum / count;
+    let spread = 0;
+    for (let row = 0; row < simulated.length; row++) {
+      if (this.counts[row]) spread += (this.values[row] - mean) ** 2;
+    }
+    return { rmse: Math.sqrt(squares / count), fit: 100 * (1 - Math.sqrt(squares / spread)) };
+  }
+}
+
+/** @typedef {ShownData & { measured: Measured | null }} Shown A signal that is shown. */
+
+/** A run with its command and what is shown of it. */
+class Run {
+  /**
+   * @param {RunData} run
+   * @param {Float64Array} voltage
+   */
+  constructor(run, voltage) {
+    this.name = run.name;
+    this.role = run.role;
+    this.start = run.start;
+    this.step = run.step;
+    this.steady = run.steady ?? false;
+    this.voltage = voltage;
+    this.grid = Float64Array.from(voltage, (_, row) => run.start + row * run.step);
+    this.isMeasured = run.channels.length > 0;
+    /** @type {Shown[]} */
+    this.shown = this.isMeasured
+      ? run.channels.map((channel) => ({ ...channel, measured: new Measured(channel) }))
+      : data.unmeasured.map((signal) => ({ ...signal, measured: null }));
   }
 }
 
 // --- the page ---
 
+/** A run as measured, as simulated at first and as simulated now. */
 class LiveFigure extends Figure {
+  /** @param {HTMLElement} stack */
+  constructor(stack) {
+    super(stack);
+    /** @type {{ run: Run, now: Simulated, before: Simulated | null } | null} */
+    this.showing = null;
+    this.listens = false;
+  }
+
+  /**
+   * Draw a run; all of it if it is another one.
+   * @param {Run} run
+   * @param {Simulated} now
+   * @param {Simulated | null} before
+   */
   show(run, now, before) {
-    if (this.showing !== run) [this.showing, this.view] = [run, null];
-    Object.assign(this, { now, before });
+    if (this.showing?.run !== run) this.view = null;
+    this.showing = { run, now, before };
     this.draw();
   }
 
   begin() {
-    if (!this.view) this.view = this.load();
     this.all = this.load();
+    this.view ??= this.all;
     if (!this.listens) this.listen();
     this.listens = true;
+    return this.view;
   }
 
+  /** @returns {Span} */
   load() {
-    const { grid } = this.showing;
-    return [grid[0], grid.at(-1)];
+    if (!this.showing) return [0, 1];
+    const { grid } = this.showing.run;
+    return [grid[0], grid[grid.length - 1]];
   }
 
-  spans(shaded) {
-    const { grid, step } = this.showing;
-    const { limits } = this.now;
-    const wanted = data.limits.filter(([, name]) => shaded.includes(name));
-    const from = new Map();
-    const made = [];
+  /**
+   * Where limits act.
+   * @param {Run} run
+   * @param {Uint8Array} limits
+   * @param {readonly string[]} shaded
+   */
+  spans({ grid, step }, limits, shaded) {
+    const drawn = data.limits.filter(([, name]) => shaded.includes(name));
+    /** @type {Map<string, number>} */
+    const began = new Map();
+    /** @type {Shade[]} */
+    const spans = [];
     for (let row = 0; row <= grid.length; row++) {
       const acting = row < grid.length ? limits[row] : 0;
       if (row < grid.length && acting === (row ? limits[row - 1] : 0)) continue;
-      for (const [bit, name] of wanted) {
-        if (acting & bit && !from.has(name)) from.set(name, grid[row] - 0.5 * step);
-        else if (!(acting & bit) && from.has(name)) {
-          made.push([from.get(name), grid[row - 1] + 0.5 * step, name]);
-          from.delete(name);
+      for (const [bit, name] of drawn) {
+        const from = began.get(name);
+        if (acting & bit && from === undefined) began.set(name, grid[row] - 0.5 * step);
+        else if (!(acting & bit) && from !== undefined) {
+          spans.push([from, grid[row - 1] + 0.5 * step, name]);
+          began.delete(name);
         }
       }
     }
-    return made;
+    return spans;
   }
 
+  /** @returns {Panel[]} */
   panels() {
-    const { showing: run, now, before } = this;
+    if (!this.showing) return [];
+    const { run, now, before } = this.showing;
+    /** @type {Set<number>} */
     const none = new Set();
-    const made = [[{ time: run.grid, breaks: none, lines: [["input", run.voltage]] }, "input", "command\n(V)"]];
-    // in the units that are shown, once for what stays: the run before, and all where the pointer reads
-    const line = (each, found) => ((found.lines ??= [])[each] ??= found.seen[each].map((value) => value * run.shown[each].factor));
-    run.shown.forEach((each, k) => {
-      const lines = [["before", line(k, before)], ["simulated", line(k, now)]];
-      const own = { time: each.stamps ?? run.grid, breaks: each.breaks ?? none, ignored: each.ignored, shades: this.spans(each.shaded) };
-      if (each.values) {
-        const measured = (each.line ??= each.values.map((value) => value * each.factor));
-        made.push([{ ...own, lines: [["measured", measured], ...lines] }, "overlay", each.label]);
-        const residual = lines[1][1].map((value, row) => value - measured[row]);
-        made.push([{ ...own, shades: [], lines: [["residual", residual]] }, "residual", each.residual]);
-      } else made.push([{ ...own, lines }, "overlay", each.label]);
+    /** @type {Panel[]} */
+    const panels = [
+      {
+        kind: "input",
+        label: "command\n(V)",
+        time: run.grid,
+        breaks: none,
+        lines: [["input", run.voltage]],
+      },
+    ];
+    run.shown.forEach(({ measured, factor, label, residual, shaded }, number) => {
+      // in the units that are shown, once for what stays: the run before, and all where the pointer reads
+      /** @param {Simulated} simulated */
+      const line = ({ lines, seen }) => {
+        lines[number] ??= seen[number].map((value) => value * factor);
+        return lines[number];
+      };
+      /** @type {Line[]} */
+      const lines = [["simulated", line(now)]];
+      if (before) lines.unshift(["before", line(before)]);
+      const own = {
+        time: measured?.stamps ?? run.grid,
+        breaks: measured?.breaks ?? none,
+        ignored: measured?.ignored,
+      };
+      const shades = this.spans(run, now.limits, shaded);
+      if (measured) lines.unshift(["measured", measured.line]);
+      panels.push({ ...own, kind: "overlay", label, shades, lines });
+      if (!measured) return;
+      const difference = line(now).map((value, row) => value - measured.line[row]);
+      panels.push({ ...own, kind: "residual", label: residual, lines: [["residual", difference]] });
     });
-    return made;
+    return panels;
   }
 }
 
+/** Sliders, the run that is chosen, and what all runs show. */
 class Page {
-  constructor(machine) {
+  /**
+   * @param {Machine} machine
+   * @param {Run[]} runs
+   */
+  constructor(machine, runs) {
     this.machine = machine;
-    this.values = new Map(data.parameters.map((each) => [each.number, each.value]));
-    this.factors = new Map(data.levers.map((each) => [each.name, 1]));
-    this.figure = new LiveFigure($("figure"));
+    this.runs = runs;
+    this.choice = element("run", HTMLSelectElement);
+    this.wrong = element("wrong", HTMLElement);
+    this.toml = element("toml", HTMLElement);
+    /** Values of the sliders by number. */
+    this.values = new Map(data.parameters.map(({ number, value }) => [number, value]));
+    /** Factors of the levers by name. */
+    this.factors = new Map(data.levers.map(({ name }) => [name, 1]));
+    this.figure = new LiveFigure(element("figure", HTMLElement));
     this.figure.element.dataset.name = "run";
+    /**
+     * What puts the sliders where the values are.
+     * @type {(() => void)[]}
+     */
+    this.placements = [];
+    /** @type {Simulated | null} */
+    this.latest = null;
+    /** @type {number | undefined} */
+    this.later = undefined;
     this.sliders();
-    const names = data.runs.map((each) => each.name);
-    $("run").append(...names.map((name, k) => new Option(`${name}${data.runs[k].role === "validate" ? " (held out)" : ""}`, k)));
-    $("run").addEventListener("change", () => this.update());
-    for (const [id, turn] of [["previous", -1], ["next", 1]]) $(id).addEventListener("click", () => this.turn(turn));
-    $("reset").addEventListener("click", () => this.reset());
-    $("copy").addEventListener("click", () => navigator.clipboard?.writeText($("toml").textContent));
-    addEventListener("keydown", (event) => {
-      if (event.target.matches("input[type=number], select") || event.ctrlKey || event.metaKey || event.altKey) return;
-      const acts = { n: () => this.turn(1), p: () => this.turn(-1), r: () => this.reset() }[event.key];
-      if (acts) acts();
+    runs.forEach(({ name, role }, number) => {
+      const words = `${name}${role === "validate" ? " (held out)" : ""}`;
+      this.choice.append(new Option(words, String(number)));
     });
-    addEventListener("resize", () => this.figure.draw());
-    this.before = data.runs.map(() => null);
-    data.runs.forEach((_, k) => (this.before[k] = this.found(k)));
+    this.listen();
+    const first = runs.map((_, number) => this.found(number));
+    /** The runs with the values at first, null for one that cannot be simulated. */
+    this.before = first.map((run) => ("wrong" in run ? null : run));
     this.errors();
     this.update();
   }
 
+  /** Follow buttons, keys and the size of the window. */
+  listen() {
+    this.choice.addEventListener("change", () => this.update());
+    element("previous", HTMLButtonElement).addEventListener("click", () => this.turn(-1));
+    element("next", HTMLButtonElement).addEventListener("click", () => this.turn(1));
+    element("reset", HTMLButtonElement).addEventListener("click", () => this.reset());
+    element("copy", HTMLButtonElement).addEventListener("click", () => {
+      navigator.clipboard?.writeText(this.toml.textContent ?? "");
+    });
+    addEventListener("keydown", (event) => {
+      const { target } = event;
+      if (event.ctrlKey || event.metaKey || event.altKey) return;
+      if (target instanceof Element && target.matches("input[type=number], select")) return;
+      if (event.key === "n") this.turn(1);
+      if (event.key === "p") this.turn(-1);
+      if (event.key === "r") this.reset();
+    });
+    addEventListener("resize", () => this.figure.draw());
+  }
+
+  /**
+   * Choose another run.
+   * @param {number} by How many runs farther.
+   */
   turn(by) {
-    const count = data.runs.length;
-    $("run").value = (Number($("run").value) + by + count) % count;
+    const count = this.runs.length;
+    this.choice.value = String((Number(this.choice.value) + by + count) % count);
     this.update();
   }
 
+  /** Set all values as they were at first. */
   reset() {
-    for (const each of data.parameters) this.values.set(each.number, each.value);
-    for (const each of data.levers) this.factors.set(each.name, 1);
+    for (const { number, value } of data.parameters) this.values.set(number, value);
+    for (const { name } of data.levers) this.factors.set(name, 1);
     this.place();
     this.update(true);
   }
 
   /** Every parameter as the sliders have it: its own value, times the levers that move it. */
   now() {
-    const made = new Map(this.values);
-    for (const lever of data.levers) {
-      for (const [number, power] of lever.moves) made.set(number, made.get(number) * this.factors.get(lever.name) ** power);
+    const values = new Map(this.values);
+    for (const { name, moves } of data.levers) {
+      const factor = this.factors.get(name) ?? 1;
+      for (const [number, power] of moves) {
+        values.set(number, (values.get(number) ?? 0) * factor ** power);
+      }
     }
-    return made;
+    return values;
   }
 
-  changed() {
-    const now = this.now();
-    return data.parameters.filter(({ number, value }) => now.get(number) !== value).map((each) => [each, now.get(each.number)]);
-  }
-
-  /** One slider for each lever and parameter, on a logarithmic scale where both ends are positive. */
+  /** One slider for each lever and parameter. */
   sliders() {
-    this.inputs = [];
-    const add = (parent, words, unit, [low, high], read, write) => {
-      const log = low > 0;
-      const place = (value) => (log ? Math.log(value / low) / Math.log(high / low) : (value - low) / (high - low));
-      const value = (part) => (log ? low * (high / low) ** part : low + part * (high - low));
-      const row = document.createElement("label");
-      row.className = "slider";
-      const name = Object.assign(document.createElement("span"), { textContent: words });
-      const range = Object.assign(document.createElement("input"), { type: "range", min: 0, max: 1, step: 0.001 });
-      const number = Object.assign(document.createElement("input"), { type: "number", step: "any" });
-      range.setAttribute("aria-label", words);
-      number.setAttribute("aria-label", `${words}, value`);
-      const of = Object.assign(document.createElement("span"), { textContent: unit, className: "unit" });
-      row.append(name, number, of, range);
-      range.addEventListener("input", () => {
-        write(value(Number(range.value)));
-        number.value = Number(read().toPrecision(4));
-        this.update(true);
+    const levers = element("levers", HTMLElement);
+    for (const { name, words, range } of data.levers) {
+      this.slider(levers, words, "×", range, {
+        read: () => this.factors.get(name) ?? 1,
+        write: (value) => this.factors.set(name, value),
       });
-      number.addEventListener("change", () => {
-        if (number.value === "" || !Number.isFinite(Number(number.value))) return this.place();
-        write(Number(number.value));
-        range.value = place(read());
-        this.update(true);
-      });
-      this.inputs.push(() => {
-        range.value = place(read());
-        number.value = Number(read().toPrecision(4));
-      });
-      parent.append(row);
-    };
-    for (const lever of data.levers) {
-      const { name, words, range } = lever;
-      add($("levers"), words, "×", range, () => this.factors.get(name), (value) => this.factors.set(name, value));
     }
-    for (const each of data.parameters) {
-      if (!each.range) continue;
-      const scale = each.factor;
-      const parent = $(each.main ? "fitted" : "others");
-      add(parent, each.words, each.unit, each.range.map((end) => end * scale), () => this.values.get(each.number) * scale, (value) =>
-        this.values.set(each.number, value / scale),
-      );
+    for (const { range, main, factor, number, words, unit } of data.parameters) {
+      if (!range) continue;
+      const parent = element(main ? "fitted" : "others", HTMLElement);
+      this.slider(parent, words, unit, [range[0] * factor, range[1] * factor], {
+        read: () => (this.values.get(number) ?? 0) * factor,
+        write: (value) => this.values.set(number, value / factor),
+      });
     }
     this.place();
   }
 
+  /**
+   * Add a slider, on a logarithmic scale if both ends are positive.
+   * @param {HTMLElement} parent
+   * @param {string} words
+   * @param {string} unit
+   * @param {[low: number, high: number]} ends
+   * @param {{ read: () => number, write: (value: number) => void }} value
+   */
+  slider(parent, words, unit, [low, high], { read, write }) {
+    const logarithmic = low > 0;
+    /** @param {number} value */
+    const place = (value) =>
+      logarithmic ? Math.log(value / low) / Math.log(high / low) : (value - low) / (high - low);
+    /** @param {number} part */
+    const valueAt = (part) =>
+      logarithmic ? low * (high / low) ** part : low + part * (high - low);
+    const rounded = () => String(Number(read().toPrecision(4)));
+    const row = created("label", { className: "slider" });
+    const name = created("span", { textContent: words });
+    const range = created("input", { type: "range", min: "0", max: "1", step: "0.001" });
+    const number = created("input", { type: "number", step: "any" });
+    range.setAttribute("aria-label", words);
+    number.setAttribute("aria-label", `${words}, value`);
+    row.append(name, number, created("span", { textContent: unit, className: "unit" }), range);
+    range.addEventListener("input", () => {
+      write(valueAt(Number(range.value)));
+      number.value = rounded();
+      this.update(true);
+    });
+    number.addEventListener("change", () => {
+      if (number.value === "" || !Number.isFinite(Number(number.value))) {
+        this.place();
+        return;
+      }
+      write(Number(number.value));
+      range.value = String(place(read()));
+      this.update(true);
+    });
+    this.placements.push(() => {
+      range.value = String(place(read()));
+      number.value = rounded();
+    });
+    parent.append(row);
+  }
+
+  /** Put all sliders where their values are. */
   place() {
-    for (const each of this.inputs) each();
+    for (const place of this.placements) place();
   }
 
-  /** A run with the present values, seen by its channels; without channels, the speed itself. */
+  /**
+   * A run with the present values, seen by its channels; without channels, the speed itself.
+   * @param {number} number
+   * @returns {Simulated | Refusal}
+   */
   found(number) {
-    const run = data.runs[number];
-    const made = this.machine.simulate(run);
-    if (made.wrong) return made;
-    const seen = run.shown.map((each) => (each.values ? run.seen(each, made.signals) : made.signals[each.signal]));
-    const errors = run.shown.map((each, k) => (each.values ? run.error(each, seen[k]) : null));
-    return { ...made, seen, errors };
+    const run = this.runs[number];
+    const simulated = this.machine.simulate(run);
+    if ("wrong" in simulated) return simulated;
+    const { signals, limits } = simulated;
+    const seen = run.shown.map(
+      ({ measured, signal }) => measured?.seen(signals, run.start, run.step) ?? signals[signal],
+    );
+    const errors = run.shown.map(({ measured }, index) => measured?.error(seen[index]) ?? null);
+    return { signals, limits, seen, errors, lines: [] };
   }
 
+  /** Simulate and show the run that is chosen, perhaps with other values. */
   update(values = false) {
     const began = performance.now();
-    const number = Number($("run").value || 0);
-    let wrong = "";
-    if (values) wrong = this.machine.set(this.now());
+    const number = Number(this.choice.value || 0);
+    const wrong = values ? this.machine.set(this.now()) : "";
     const now = wrong ? { wrong } : this.found(number);
-    $("wrong").textContent = now.wrong ?? "";
-    $("wrong").hidden = !now.wrong;
-    if (now.wrong) return;
+    const sentence = "wrong" in now ? now.wrong : "";
+    this.wrong.textContent = sentence;
+    this.wrong.hidden = !sentence;
+    if ("wrong" in now) return;
     this.latest = now;
-    this.figure.show(data.runs[number], now, this.before[number]);
-    this.words(number, now);
+    this.figure.show(this.runs[number], now, this.before[number]);
+    this.measures(number, now);
+    this.changes();
     const taken = performance.now() - began;
     document.body.dataset.milliseconds = taken.toFixed(2);
     clearTimeout(this.later);
     this.later = setTimeout(() => this.errors(), 150);
   }
 
-  words(number, now) {
-    const run = data.runs[number];
-    $("measures").replaceChildren(
-      ...run.shown.flatMap((each, k) => {
-        if (!each.values) return [];
-        const words = ({ rmse, fit }) => `RMSE ${digits(rmse * each.factor, 3)} ${each.unit}, fit ${fit.toFixed(2)} %`;
-        const row = document.createElement("p");
-        row.append(Object.assign(document.createElement("b"), { textContent: each.name }), ` ${words(now.errors[k])}`);
-        row.append(Object.assign(document.createElement("span"), { textContent: ` · ${data.before}: ${words(this.before[number].errors[k])}` }));
-        return [row];
-      }),
-    );
-    const changed = this.changed();
-    const blocks = new Map();
-    for (const [each] of changed) blocks.set(each.block, [...(blocks.get(each.block) ?? []), each.symbol]);
+  /**
+   * The errors of a run, now and before.
+   * @param {number} number
+   * @param {Simulated} now
+   */
+  measures(number, now) {
+    /** @type {HTMLElement[]} */
+    const rows = [];
+    this.runs[number].shown.forEach(({ name, unit, factor }, index) => {
+      /** @param {Errors} errors */
+      const words = ({ rmse, fit }) =>
+        `RMSE ${digits(rmse * factor, 3)} ${unit}, fit ${fit.toFixed(2)} %`;
+      const errors = now.errors[index];
+      const before = this.before[number]?.errors[index];
+      if (!errors) return;
+      const row = document.createElement("p");
+      row.append(created("b", { textContent: name }), ` ${words(errors)}`);
+      if (before) {
+        row.append(created("span", { textContent: ` · ${data.before}: ${words(before)}` }));
+      }
+      rows.push(row);
+    });
+    element("measures", HTMLElement).replaceChildren(...rows);
+  }
+
+  /** The lines of the drive's file that other values have. */
+  changes() {
     const values = this.now();
-    const lines = [...blocks].flatMap(([block, symbols]) => [
-      `[${block}]`,
-      ...[...new Set(symbols)].map((symbol) => {
-        const own = data.parameters.filter((each) => each.symbol === symbol);
-        const numbers = own.map((each) => values.get(each.number));
-        return `${symbol} = { value = ${own.length > 1 ? `[${numbers.join(", ")}]` : numbers[0]}, unit = "${own[0].si}", status = "user" }`;
-      }),
-      "",
-    ]);
-    $("toml").textContent = lines.join("\n").trim();
-    $("copied").hidden = !changed.length;
+    const changed = data.parameters.filter(({ number, value }) => values.get(number) !== value);
+    /** @type {Map<string, Set<string>>} */
+    const blocks = new Map();
+    for (const { block, symbol } of changed) {
+      blocks.set(block, (blocks.get(block) ?? new Set()).add(symbol));
+    }
+    const lines = [];
+    for (const [block, symbols] of blocks) {
+      lines.push(`[${block}]`);
+      for (const symbol of symbols) {
+        const own = data.parameters.filter((parameter) => parameter.symbol === symbol);
+        const numbers = own.map(({ number }) => values.get(number)).join(", ");
+        const value = own.length > 1 ? `[${numbers}]` : numbers;
+        lines.push(`${symbol} = { value = ${value}, unit = "${own[0].si}", status = "user" }`);
+      }
+      lines.push("");
+    }
+    this.toml.textContent = lines.join("\n").trim();
+    element("copied", HTMLElement).hidden = !changed.length;
   }
 
   /** The table of all runs, now and before. */
   errors() {
-    if (!data.runs.some((run) => run.channels.length)) return;
-    const rows = data.runs.map((run, k) => {
+    if (!this.runs.some((run) => run.isMeasured)) return;
+    const rows = this.runs.map((run, number) => {
       const last = run.shown.length - 1;
-      const now = this.found(k);
+      const now = this.found(number);
+      const before = this.before[number]?.errors[last];
       const row = document.createElement("tr");
-      const before = this.before[k].errors?.[last];
-      const cell = (words, look = "n") => Object.assign(document.createElement("td"), { textContent: words, className: look });
-      const head = Object.assign(document.createElement("th"), { textContent: run.name, scope: "row" });
-      if (!before || now.wrong) row.append(head, cell(now.wrong ?? "", ""));
-      else {
-        const better = now.errors[last].rmse - before.rmse;
-        const look = Math.abs(better) < 1e-9 * before.rmse ? "n" : better < 0 ? "n better" : "n worse";
-        row.append(head, cell(`${before.fit.toFixed(2)} %`), cell(`${now.errors[last].fit.toFixed(2)} %`, look));
+      row.append(created("th", { textContent: run.name, scope: "row" }));
+      const errors = "wrong" in now ? null : now.errors[last];
+      if (before && errors) {
+        const fits = { before: `${before.fit.toFixed(2)} %`, now: `${errors.fit.toFixed(2)} %` };
+        row.append(created("td", { textContent: fits.before, className: "n" }));
+        row.append(created("td", { textContent: fits.now, className: comparison(errors, before) }));
+      } else {
+        row.append(created("td", { textContent: "wrong" in now ? now.wrong : "", className: "" }));
       }
       row.addEventListener("click", () => {
-        $("run").value = k;
+        this.choice.value = String(number);
         this.update();
       });
       return row;
     });
-    $("runs").replaceChildren(...rows);
+    element("runs", HTMLElement).replaceChildren(...rows);
   }
 }
 
+/**
+ * The class of a cell that says whether errors have become smaller.
+ * @param {Errors} now
+ * @param {Errors} before
+ */
+function comparison(now, before) {
+  const change = now.rmse - before.rmse;
+  if (Math.abs(change) < 1e-9 * before.rmse) return "n";
+  return change < 0 ? "n better" : "n worse";
+}
+
+/** Compile the drive, unpack the runs, and make the page. */
 async function begin() {
-  const machine = await WebAssembly.instantiate(bytes(data.wasm), {});
-  const packs = data.runs.flatMap((run) => run.channels.flatMap((each) => [each.time, each.measured]));
-  await Promise.all(packs.map(async (each) => (each.bytes = await inflated(each.code))));
-  await Promise.all(data.runs.map(async (each) => (each.volts = planes(await inflated(each.voltage)))));
-  data.runs = data.runs.map((each) => new Run(each));
-  for (const run of data.runs) run.shown = run.channels.length ? run.channels : data.unmeasured;
-  globalThis.live = new Page(new Machine(machine.instance.exports));
+  const machine = await WebAssembly.instantiate(decoded(data.wasm), {});
+  const channels = data.runs.flatMap((run) => run.channels);
+  await inflate(channels.flatMap(({ time, measured }) => [time, measured]));
+  const runs = await Promise.all(
+    data.runs.map(async (run) => new Run(run, voltages(await inflated(run.voltage)))),
+  );
+  const exports = /** @type {MachineExports} */ (/** @type {unknown} */ (machine.instance.exports));
+  // for whoever looks into the page by the browser's console
+  Object.assign(globalThis, { live: new Page(new Machine(exports), runs) });
   document.body.dataset.ready = "yes";
 }
 
-/** Four-byte numbers whose lowest bytes came first. */
-function planes(bytes) {
-  const count = bytes.length / 4;
-  const made = new Uint8Array(bytes.length);
-  for (let plane = 0; plane < 4; plane++) for (let row = 0; row < count; row++) made[4 * row + plane] = bytes[plane * count + row];
-  return made;
+/**
+ * Numbers of four bytes each, of which all lowest bytes came first.
+ * @param {Uint8Array} planes
+ */
+function voltages(planes) {
+  const count = planes.length / 4;
+  const bytes = new Uint8Array(planes.length);
+  for (let plane = 0; plane < 4; plane++) {
+    for (let row = 0; row < count; row++) bytes[4 * row + plane] = planes[plane * count + row];
+  }
+  return Float64Array.from(new Float32Array(bytes.buffer));
 }
 
 begin().catch((error) => {
-  $("wrong").hidden = false;
-  $("wrong").textContent = `The drive cannot run in this browser: ${error.message}`;
+  const wrong = element("wrong", HTMLElement);
+  wrong.hidden = false;
+  wrong.textContent = `The drive cannot run in this browser: ${error.message}`;
   throw error;
 });

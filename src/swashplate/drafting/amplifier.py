@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.campaign.experiment import Channel, Experiment
-from swashplate.campaign.schema import ChannelKind
+from swashplate.campaign.schema import CURRENTS
 from swashplate.drive import Drive
 from swashplate.errors import InputError
 from swashplate.parameters.files import preset_names
@@ -27,12 +27,6 @@ from swashplate.tables import UNIT, Cell, Column, Table
 Array = NDArray[np.float64]
 Pair = tuple[float, float]
 
-CURRENTS: tuple[ChannelKind, ...] = (
-    "signed_current",
-    "rectified_current",
-    "current_plus",
-    "current_minus",
-)
 SETTLED, SLOW = 0.3, 0.15
 """Time in which a command has changed by less than this share of the largest one, so that the
 current follows it settled, but for a delay. [s], [1]"""

@@ -3,8 +3,7 @@
 At some damage Polars aborts the whole process that reads a Parquet file, the HDF5 library goes
 round in circles, asammdf prints what it meets. A second process, started at the first such file and
 kept for the next, can be ended instead, has a limit to its memory, and turns whatever a library
-raises into one sentence. A text log of more rows than are held at once is converted to a Parquet
-table once, which is then read in parts.
+raises into one sentence.
 """
 
 from __future__ import annotations
@@ -17,20 +16,17 @@ import sys
 import tempfile
 import threading
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, cast
+from typing import Any, cast
 from weakref import finalize
 
 import numpy as np
 
 from swashplate.errors import FileError, InputError, SwashplateError
+from swashplate.logs.binary import look
 from swashplate.logs.log import Array, Column, Log, printable, said
-
-if TYPE_CHECKING:
-    import polars
 
 _PATIENCE = 30.0
 """How long a small file may take [s]."""
@@ -39,14 +35,19 @@ _PATIENCE_AT_START = 60.0
 _PATIENCE_PER_MEGABYTE = 1.0
 _LEAVE = 1.0
 """How long the other process has to end by itself, once it is asked no more [s]."""
-_START = "import sys; sys.path[:] = {path!r}; from swashplate.logs.apart import serve; serve()"
+_START = """\
+import sys
+sys.path[:] = {path!r}
+from swashplate.logs.subprocess_reader import serve
+serve()
+"""
 
 
-def open_apart(reader: str, path: Path) -> Log:
+def open_in_subprocess(reader: str, path: Path) -> Log:
     """Look into a file by `swashplate.logs.binary.look`, in the other process."""
 
     def ask(*what: Any) -> tuple[dict[str, Any], list[Array]]:
-        return _Other.ask(path, [reader, str(path.absolute()), str(path), *what])
+        return _ReaderProcess.ask(path, [reader, str(path.absolute()), str(path), *what])
 
     def load(positions: Sequence[int], first: int = 0, last: int | None = None) -> list[Array]:
         return ask([*positions], first, last)[1]
@@ -56,11 +57,11 @@ def open_apart(reader: str, path: Path) -> Log:
     return Log(path, found["format"], columns, load, found["left_out"], tuple(found["lengths"]))
 
 
-class _Other:
+class _ReaderProcess:
     """The other process. It is asked in a line of JSON and answers in one, arrays behind it."""
 
     lock = threading.Lock()
-    running: _Other | None = None
+    running: _ReaderProcess | None = None
 
     def __init__(self) -> None:
         # what it says of an error, and what libraries leave behind of a damaged file
@@ -157,96 +158,6 @@ def _ended(process: subprocess.Popen[bytes], scratch: tempfile.TemporaryDirector
     scratch.cleanup()
 
 
-# --- long logs ------------------------------------------------------------------------------------
-
-MOST_HELD = 4_000_000
-"""Rows of a text log beyond which its columns are not held whole while parts of it are read: 32 MB
-for each column, two hours at 512 Hz."""
-_GROUP = 1 << 18  # rows that are stored together, and found without those before them
-_KEY = "swashplate"
-
-
-def in_parts(log: Log, names: Sequence[str]) -> Log:
-    """A log whose rows can be read in parts, each without reading the others again.
-
-    Of a text log, the columns of these names (as in `Log.find`). They are held in memory; of one
-    of more rows than `MOST_HELD` they are converted to Parquet once, piece after piece:
-    ``log.csv.parquet`` beside it serves until the log changes. Other formats are as they are.
-    """
-    import polars as pl
-
-    if log.stream is None:
-        return log
-    if max(log.lengths, default=0) <= MOST_HELD:
-        return _held(log, names)
-    table = log.path.with_name(f"{log.path.name}.parquet")
-    columns = {log.columns.index(log.find(name)) for name in names}
-    stat = log.path.stat()
-    stamp, made_of = [stat.st_size, stat.st_mtime_ns, log.format], []
-    with suppress(pl.exceptions.PolarsError, ValueError, OSError):
-        # size, time and format of the log that a table was made of, and places of its columns
-        made_of = json.loads(pl.read_parquet_metadata(table).get(_KEY, "null"))
-    if made_of is None:
-        raise FileError(f"{table} stands where the table of a long log belongs; rename it.")
-    stored: list[int] = made_of[-1] if made_of[:-1] == stamp else []
-    if not columns <= {*stored}:
-        stored = sorted(columns.union(stored))
-        _convert(log, stored, table, json.dumps([*stamp, stored]))
-    kept = tuple(log.columns[position] for position in stored)
-    return replace(open_apart("Parquet", table), path=log.path, columns=kept, table=table)
-
-
-def _held(log: Log, names: Sequence[str]) -> Log:
-    """A log of the columns of some names alone, which are in memory."""
-    columns = tuple(dict.fromkeys(log.find(name) for name in names))
-    arrays = [*log.read([column.name for column in columns]).values()]
-
-    def load(positions: Sequence[int], first: int = 0, last: int | None = None) -> list[Array]:
-        parts = [arrays[position][first:last] for position in positions]
-        # a part must not keep all the rest in memory
-        return [part if part.size == arrays[0].size else part.copy() for part in parts]
-
-    return replace(
-        log,
-        columns=columns,
-        load=load,
-        lengths=tuple(array.size for array in arrays),
-        stream=None,
-    )
-
-
-def _convert(log: Log, columns: Sequence[int], table: Path, stamp: str) -> None:
-    import polars as pl
-    from polars.io.plugins import register_io_source
-
-    stream, names = log.stream, [str(position) for position in columns]
-    failed: list[FileError] = []
-
-    def pieces(*_: object) -> Iterator[polars.DataFrame]:
-        assert stream is not None
-        try:
-            for arrays in stream(columns):
-                yield pl.DataFrame(dict(zip(names, arrays, strict=True)))
-        except FileError as error:  # Polars would report it in words of its own
-            failed.append(error)
-            raise
-
-    partial = table.with_name(f"{table.name}.part")
-    source = register_io_source(pieces, schema=dict.fromkeys(names, pl.Float64()))
-    try:
-        source.sink_parquet(partial, row_group_size=_GROUP, metadata={_KEY: stamp})
-        partial.replace(table)
-    except (pl.exceptions.PolarsError, OSError) as error:
-        if failed:
-            raise failed[0] from None
-        raise FileError(
-            f"{log.path} has about {max(log.lengths)} rows, more than are held at once, and its "
-            f"table {table.name} cannot be written beside it: {said(error)}."
-        ) from None
-    finally:
-        partial.unlink(missing_ok=True)
-
-
 # --- the other process ----------------------------------------------------------------------------
 
 _SPARE = 3 << 30
@@ -258,8 +169,6 @@ _USED = Path("/proc/self/statm")
 
 def serve() -> None:
     """Answer questions: a line of JSON each, answered by a line and the arrays asked for."""
-    from swashplate.logs.binary import look
-
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # what libraries print must not get between the answers
     warnings.simplefilter("ignore")

@@ -6,19 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.campaign.conftest import Drafted
+from tests.drafting.conftest import Drafted
 from tests.identification.given import run_of
 
-from swashplate import Campaign, Drive, Experiment, InputError, ParameterError, maneuvers
-from swashplate.campaign import (
-    Encoder,
-    fit_configuration,
-    guess_drive,
-    guess_table,
-    guessed_set,
-    rig,
-)
-from swashplate.campaign import draft_campaign as draft
+from swashplate import Campaign, Drive, Experiment, InputError, ParameterError, maneuvers, rig
+from swashplate.campaign import Encoder
+from swashplate.drafting import draft_campaign as draft
+from swashplate.drafting import fit_configuration, guess_drive, guess_table, guessed_set
 from swashplate.identification.estimation.setup import Setup
 
 HEADERS = {

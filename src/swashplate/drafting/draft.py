@@ -34,7 +34,7 @@ Array = NDArray[np.float64]
 HEADER = """\
 # A draft, made from the headers of the logs: check each line that says "guessed", and fill in each
 # that says "FIXME". What a signal is: sign * (scale * number + offset), in its unit.
-# Every entry is explained by `swashplate campaign schema`; `swashplate campaign check` reads
+# Every entry is explained in the reference, "Campaign file"; `swashplate campaign check` reads
 # all logs and says what is wrong with them.
 """
 UNUSED = "# Columns that are not used"

@@ -10,8 +10,8 @@ from scipy.signal import lfilter
 from tests.identification.given import run_of
 
 from swashplate import Drive, InputError
-from swashplate.campaign import (
-    Experiment,
+from swashplate.campaign import Experiment
+from swashplate.drafting import (
     amplifier_table,
     fit_configuration,
     guess_amplifier,

@@ -8,8 +8,8 @@ import numpy as np
 import polars as pl
 import pytest
 
-from swashplate import Drive, FileError, InputError, maneuvers
-from swashplate.campaign import Campaign, ChannelKind, rig
+from swashplate import Drive, FileError, InputError, maneuvers, rig
+from swashplate.campaign import Campaign, ChannelKind
 
 STEP = maneuvers.step(4.0)
 FAST = maneuvers.step(9.0)

@@ -5,18 +5,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.campaign.conftest import BOTH, RATE, TIME, Columns, Drafted, read_draft, write
+from tests.drafting.conftest import BOTH, RATE, TIME, Columns, Drafted, read_draft, write
 from tests.logs.writing import write_log
 
 from swashplate import Campaign, Drive, FileError, InputError, ParameterError
 from swashplate.campaign import (
     campaign_findings,
-    draft_campaign,
     examine,
-    guess_drive,
     spiked,
     unsigned_currents,
 )
+from swashplate.drafting import draft_campaign, guess_drive
 from swashplate.identification.diagnostics.data_checks import (
     check_runs,
     refuse_unsound,

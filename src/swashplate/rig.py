@@ -4,7 +4,7 @@
 leaves: logs, campaign.toml and, apart, the truth. Everything that is written says that it is
 virtual. Refinements that a fit is to find, or to miss, are parameters of the simulated drive.
 
->>> from swashplate.campaign import rig
+>>> from swashplate import rig
 >>> rig.write(rig.run("hoist", seed=1), "virtual-hoist")
 
 The instruments are those of Kruse's campaign (a 12-bit command, one true-RMS ammeter around both

@@ -1,0 +1,6 @@
+"""A test campaign and a machine that nothing is known of but logs: what to start a fit from."""
+
+import lazy_loader
+
+# names are imported when they are first used: most callers need few of the modules
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,9 @@
+from .amplifier import AmplifierGuess as AmplifierGuess
+from .amplifier import amplifier_table as amplifier_table
+from .amplifier import guess_amplifier as guess_amplifier
+from .draft import draft_campaign as draft_campaign
+from .guess import Guess as Guess
+from .guess import guess_drive as guess_drive
+from .guess import guess_table as guess_table
+from .starting_point import fit_configuration as fit_configuration
+from .starting_point import guessed_set as guessed_set

@@ -1,0 +1,294 @@
+"""Mean speeds of a run, as they were measured and as a plain drive with a delay has them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from math import sqrt
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swashplate.campaign.experiment import Channel, Experiment, InputSignal
+from swashplate.drafting.plain_drive import MODEL, Edge, PlainDrive
+from swashplate.equations.marching.derivatives import jacobian, residuals
+from swashplate.equations.marching.observation import ObservedRecord, Own, every_sample
+from swashplate.equations.marching.record import Record
+from swashplate.equations.marching.run import Instance, instance_of
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+STEP = 0.005
+"""Step of the march. [s]"""
+BEFORE = 10.0
+"""Time before a run for which its motion at first has lasted, longer than any delay. [s]"""
+WINDOW = 0.05
+"""Time over which mean speeds are compared, or two samples where these are farther apart. [s]"""
+FEW = 10.0
+"""Counts in a window at the greatest speed below which an encoder's edges are joined by lines."""
+QUIET = 0.05
+"""Noise of mean speeds over the greatest one, to which windows of a noisy position are widened."""
+EDGE = 0.01
+"""Command over which a jump is complete, over the largest one: a sudden one would be felt by no
+small change of a dead zone, as marches go in steps. [1]"""
+FROM_START = np.append(np.zeros(12), 1.0)
+"""Of a position's derivatives by the numbers, and the position: what the first speed moves."""
+UNLIMITED = 1e30
+"""Limit that is none, in the march."""
+
+
+class Course(NamedTuple):
+    """A position over time, straight between instants; or several, the last axis being time."""
+
+    time: Array
+    """Instants (n,). [s]"""
+    values: Array
+    """(..., n)"""
+
+    def _cells(self, instants: Array) -> tuple[Any, Array]:
+        """In which of the n - 1 pieces instants (m,) lie, and the rates of change there."""
+        cells = np.searchsorted(self.time, instants, "right") - 1
+        cells = np.clip(cells, 0, self.time.size - 2)
+        rises = self.values[..., cells + 1] - self.values[..., cells]
+        return cells, rises / (self.time[cells + 1] - self.time[cells])
+
+    def at(self, instants: Array) -> Array:
+        """Positions (..., m) at instants (m,); before the first and after the last it stays."""
+        cells, rates = self._cells(instants)
+        since = np.clip(instants, self.time[0], self.time[-1]) - self.time[cells]
+        return np.asarray(self.values[..., cells] + since * rates)
+
+    def rate_at(self, instants: Array) -> Array:
+        """Rates of change (..., m) at instants (m,)."""
+        moving = (instants > self.time[0]) & (instants < self.time[-1])
+        return np.asarray(np.where(moving, self._cells(instants)[1], 0.0))
+
+    def integral(self) -> Course:
+        """Its integral from the first instant on."""
+        values = self.values
+        steps = values[..., 1:] + values[..., :-1]
+        steps *= 0.5 * np.diff(self.time)
+        area = np.zeros_like(values)
+        np.cumsum(steps, axis=-1, out=area[..., 1:])
+        return Course(self.time, area)
+
+
+class Windows(NamedTuple):
+    """Windows of time (m,) over which mean speeds are compared."""
+
+    begins: Array
+    """[s]"""
+    ends: Array
+    """[s]"""
+    averaged: float = 0.0
+    """Time after each end over which a noisy position is averaged, 0 for instants. [s]"""
+
+    @property
+    def weights(self) -> Array:
+        """Root of the number (m,) of shortest windows that each of them is worth. [1]"""
+        return np.sqrt((self.ends - self.begins) / WINDOW)
+
+    def mean_speeds(self, course: Course) -> Array:
+        """Mean speeds (..., m) of a course."""
+        if not self.averaged:
+            return self._differences(course.at)
+        return self._differences(course.integral().at)
+
+    def mean_accelerations(self, course: Course) -> Array:
+        """Rates of change (..., m) of mean speeds if a course is moved forward in time."""
+        return self._differences(course.at if self.averaged else course.rate_at)
+
+    def _differences(self, at: Callable[[Array], Array]) -> Array:
+        if not self.averaged:
+            first, last = at(self.begins), at(self.ends)
+        else:
+            first, last = (
+                (at(instants + self.averaged) - at(instants)) / self.averaged
+                for instants in (self.begins, self.ends)
+            )
+        return np.asarray((last - first) / (self.ends - self.begins))
+
+    def of(self, chosen: Mask) -> Windows:
+        """Some of them."""
+        return self._replace(begins=self.begins[chosen], ends=self.ends[chosen])
+
+
+class MovingRun(NamedTuple):
+    """A run: the march's grid (n,), its command (k,) and mean speeds (m,) of windows."""
+
+    observed: ObservedRecord
+    time: Array
+    """Stamps of the march's grid, and one long before. [s]"""
+    edge: float
+    """Command over which a jump is complete. [V]"""
+    stamps: Array
+    """Those of the command, of a straight line the grid's as well. [s]"""
+    command: Array
+    """[V]"""
+    held: bool
+    """Whether the command is held between stamps, or a straight line."""
+    start: float
+    windows: Windows
+    speeds: Array
+    sampled: Array
+    """Instants (j,) of the measured samples. [s]"""
+    travelled: Array
+    """Measured way (j,) since the first of them, of a speed its integral."""
+    resolution: float
+    """Of the way, 0 if it is fine."""
+
+
+def _model(run: MovingRun, numbers: Array) -> tuple[Instance, Own]:
+    """The plain drive with numbers, and the speed that it begins with."""
+    finite = PlainDrive(*np.minimum(numbers[:12], UNLIMITED).tolist())
+    instance = instance_of(MODEL, finite, given=Edge(run.edge))
+    return instance, Own({"speed": run.start})
+
+
+def _delayed(run: MovingRun, positions: Array, start: Array | float, delay: float) -> Course:
+    """Positions (..., n) on the march's grid, as late as the delay [s], with what was before.
+
+    What comes out is delayed, so that the march meets its steps alike whatever the delay: else
+    errors had a minimum at every whole step.
+    """
+    values = np.empty((*positions.shape[:-1], positions.shape[-1] + 1))
+    values[..., 0] = -BEFORE * start
+    values[..., 1:] = positions
+    return Course(run.time + delay, values)
+
+
+def simulated_course(run: MovingRun, numbers: Array) -> Course:
+    """Position of a run; numbers (13,) are those of `PlainDrive`, and the delay."""
+    instance, own = _model(run, numbers)
+    positions = residuals(instance, run.observed, own)
+    return _delayed(run, positions, run.start, numbers[12])
+
+
+def speed_errors(runs: Sequence[MovingRun], numbers: Array) -> Array:
+    """Simulated less measured mean speeds of all runs, weighted by their windows' lengths."""
+    errors = list[Array]()
+    for run in runs:
+        simulated = run.windows.mean_speeds(simulated_course(run, numbers))
+        errors.append(run.windows.weights * (simulated - run.speeds))
+    return np.concatenate(errors)
+
+
+def linearised_errors(runs: Sequence[MovingRun], numbers: Array) -> tuple[Array, Array]:
+    """The errors (m,), and their derivatives (m, 13) by the numbers."""
+    errors, slopes = list[Array](), list[Array]()
+    for run in runs:
+        instance, own = _model(run, numbers)
+        found = jacobian(instance, run.observed, PlainDrive._fields, own)
+        course = _delayed(run, found.rows, run.start * FROM_START, numbers[12])
+        speeds = run.windows.mean_speeds(course)
+        speeds[-1] -= run.speeds
+        by_delay = -run.windows.mean_accelerations(course._replace(values=course.values[-1]))
+        errors.append(run.windows.weights * speeds[-1])
+        slopes.append(run.windows.weights * np.vstack([speeds[:-1], by_delay]))
+    return np.concatenate(errors), np.concatenate(slopes, axis=1).T
+
+
+def moving_run(experiment: Experiment, channel: Channel) -> MovingRun:
+    """What a guess needs of a run: its command, and the mean speeds that a channel measures."""
+    drive, used = experiment.input, channel.used
+    time, values = channel.time[used], channel.values[used]
+    interval = float(np.median(np.diff(time)))
+    width = max(WINDOW, 2.0 * interval)
+    count = channel.resolution or 0.0
+    rows = round(width / interval)
+    fastest = np.abs(values[rows:] - values[:-rows]).max(initial=0.0)
+    travelled = values - values[0]
+    if not channel.is_position:
+        steps = 0.5 * (values[1:] + values[:-1]) * np.diff(time)
+        travelled = np.concatenate([[0.0], np.cumsum(steps)])
+    course = Course(time, travelled)
+    if count and fastest < FEW * count:
+        # a slow staircase shows a count in a window or none, whatever the speed between
+        course = _edges(time, values, count)
+        windows = _windows_between(course.time, width)
+    else:
+        if channel.kind == "position":
+            width = max(width, _quiet_width(time, values, interval))
+        begins = np.arange(time[0], time[-1] - 2.0 * width, width)
+        # all samples of a noisy position count, which a difference of two of them would lose
+        windows = Windows(begins, begins + width, averaged=width)
+    span = windows.begins, windows.ends + windows.averaged
+    inside = (span[0] >= drive.time[0]) & (span[1] <= drive.time[-1])
+    # windows across ignored samples or a gap tell of no speed
+    stamps = channel.time[used]
+    for gap in np.flatnonzero(np.diff(stamps) > 3.0 * interval):
+        inside &= (span[0] >= stamps[gap + 1]) | (span[1] <= stamps[gap])
+    windows = windows.of(inside)
+    speeds = windows.mean_speeds(course)
+    grid = drive.time[0] + STEP * np.arange(np.ceil((drive.time[-1] - drive.time[0]) / STEP) + 1.0)
+    held = drive.interpolation == "previous"
+    # a straight line may cross a dead zone between two stamps
+    stamps = np.append(drive.time, grid[-1]) if held else np.union1d(drive.time, grid)
+    start = 0.0 if experiment.start == "rest" or not speeds.size else float(speeds[0])
+    command = drive.at(stamps)
+    return MovingRun(
+        observed=_observed(drive, grid, held),
+        time=np.append(grid[0] - BEFORE, grid),
+        edge=EDGE * float(np.abs(command).max()) or 1.0,
+        stamps=stamps,
+        command=command,
+        held=held,
+        start=start,
+        windows=windows,
+        speeds=speeds,
+        sampled=time,
+        travelled=travelled,
+        resolution=count,
+    )
+
+
+def _observed(drive: InputSignal, grid: Array, held: bool) -> ObservedRecord:
+    """The command on the march's grid, of each step its mean."""
+    stamps, values = drive.time, drive.values
+    middles = 0.5 * (values[1:] + values[:-1])
+    pieces = (values[:-1] if held else middles) * np.diff(stamps)
+    area = np.concatenate([[0.0], np.cumsum(pieces)])
+
+    def area_at(instants: Array) -> Array:
+        before = np.clip(np.searchsorted(stamps, instants, "right") - 1, 0, stamps.size - 1)
+        first = values[before]
+        last = first if held else np.interp(instants, stamps, values)
+        return np.asarray(area[before] + 0.5 * (instants - stamps[before]) * (first + last))
+
+    means = np.diff(area_at(np.append(grid, grid[-1] + STEP))) / STEP
+    record = Record(means, float(grid[0]), 1.0 / STEP, 1)
+    return every_sample(record, "position", "command", "rest")
+
+
+def _edges(time: Array, angle: Array, count: float) -> Course:
+    """Instants at which an encoder's reading changed [s], and the angles that it then had.
+
+    A reading of k counts tells that the angle lies between k and k + 1, so that it is known when
+    the reading changes, in both directions alike. A run without two changes stood still.
+    """
+    changed = np.flatnonzero(angle[1:] != angle[:-1])
+    if changed.size < 2:
+        return Course(time[[0, -1]], np.zeros(2))
+    instants = 0.5 * (time[changed] + time[changed + 1])
+    return Course(instants, 0.5 * (angle[changed] + angle[changed + 1] + count))
+
+
+def _windows_between(instants: Array, width: float) -> Windows:
+    """Windows from one of the instants to the next that is at least a width later [s]."""
+    chosen = [0]
+    for index in range(1, instants.size):
+        if instants[index] - instants[chosen[-1]] >= width:
+            chosen.append(index)
+    return Windows(instants[chosen[:-1]], instants[chosen[1:]])
+
+
+def _quiet_width(time: Array, position: Array, interval: float) -> float:
+    """Windows in which white noise of a position leaves 5 % of its greatest speed. [s]"""
+    # 20 = 1 + 9 + 9 + 1, of the squares of a third difference
+    noise = float(np.median(np.abs(np.diff(position, 3)))) / (0.6745 * sqrt(20.0))
+    rough = max(round(0.5 / interval), 1)
+    moved = np.abs(position[rough:] - position[:-rough]) / (time[rough:] - time[:-rough])
+    fastest = float(moved.max(initial=0.0))
+    # of means over w/h samples the difference over w has the deviation noise √(2 h)/w^1.5
+    return (noise * sqrt(2.0 * interval) / (QUIET * fastest)) ** (2.0 / 3.0) if fastest else 0.0

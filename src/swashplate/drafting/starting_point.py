@@ -1,0 +1,306 @@
+"""What a fit starts from: a guess as a parameter set, and a configuration that frees it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from math import asin, isfinite, sqrt, tan
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swashplate.drafting.amplifier import AmplifierGuess
+from swashplate.drafting.guess import Guess, steady_speed
+from swashplate.drive import Drive
+from swashplate.errors import ParameterError
+from swashplate.parameters.parameter_set import ParameterSet, set_of
+from swashplate.parameters.rules import SIDES
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+SHORTEST = 0.005
+"""Lag that a drive has at least. [s]"""
+TOLD = 0.01
+"""Lag that mean speeds tell from a delay: a fifth of their window, two steps of the march. [s]"""
+OFFSET = 0.1
+"""Largest neutral offset of the spool, over its travel at the greatest speed that was seen. [1]"""
+ANGLE = 0.2
+"""Angle of the swash plate at the greatest speed that was seen, at most. [rad]"""
+STOP_FIRST, ORIFICE_FIRST = 0.9, 0.8
+"""Shares of what the largest command asks for at which a stop and an orifice that were not seen are
+put first: there they act, so that a fit can tell whether they are there. A stop farther inside
+bends the gain, and a search can end with both. [1]"""
+STEEPEST = 30.0
+"""Volts that a radian takes at least, so that at 10 V and at the upper bounds of all gains the
+solenoids do not overpower the feedback spring. [V/rad]"""
+CONFIGURATION = """\
+# Read off the logs of the axis '{0}' by `swashplate guess`: what they show is
+# free, within bounds about the first guess. A limit that the guess did not see is
+# free as well, within wide ones: a fit tells it from a lag.
+title = "{0}, guessed"
+"""
+CHAIN = """
+[[stages]]
+name = "drive"
+part = "chain"
+channels = ["shaft_speed", "position", "encoder_counts"]
+
+[stages.free]
+"""
+AMPLIFIER = """
+# The amplifier, from the current.
+[[stages]]
+name = "amplifier"
+part = "card"
+
+[stages.free]
+"""
+PUMP = """
+# Pump and motor, driven by the current of the fitted amplifier.
+[[stages]]
+name = "pump"
+part = "pump"
+channels = ["shaft_speed", "position", "encoder_counts"]
+
+[stages.free]
+"""
+NO_CREEP = "# {}: Z18 is 0, fixed"
+NOT_TRIED = "# no run goes {}: its numbers are those of the other way, fixed"
+
+
+def guessed_set(guess: Guess, source: str) -> ParameterSet:
+    """The drive "neutral" with the numbers of a guess.
+
+    The source says in the parameter file where they are from.
+
+    Notes
+    -----
+    The greatest speed that was seen is given a swash angle of 0.2 rad at most, which sets Z10; no
+    measurement of a speed could tell it. With sin φ = Z5 Z19 I/√Z4 and tan α = sin φ/Z3 the gain is
+    Z10 Z5 Z19 G1/(√Z4 Z3), and the jump likewise one of J; the lag is 1/(Z1 Z3 Z5 Z8 √(Z9/2)); the
+    acceleration beyond which the orifice opens no further is Z10 Z1 Z8 √(Z9/2) Z16. The creep
+    without a force sets Z18: sin atan(Z18/Z5) = Z3 tan α.
+
+    A limit that the guess did not see may still be there: a lag that is too short can stand for it.
+    It is put a little below what the largest command asks for, where a fit can tell, and the set
+    says that no test reached it.
+    """
+    base = Drive.preset("neutral").parameters
+    n = base.numbers
+    per_angle = max(guess.speed / ANGLE, STEEPEST * max(guess.gain))
+    per_ampere = per_angle * n["Z5"] * n["Z19_plus"] / (sqrt(n["Z4"]) * n["Z3"])
+    flow = n["Z1"] * sqrt(0.5 * n["Z9"])
+    speed_of_flow = 1.0 / (max(guess.lag, SHORTEST) * flow * n["Z3"] * n["Z5"])
+    per_opening = per_angle * flow * speed_of_flow
+    stops, openings, unreached = list[float](), list[float](), dict[str, float]()
+    for way, side in enumerate(SIDES):
+        fastest = steady_speed(guess, way)
+        top, pull = guess.top_speed[way], guess.acceleration[way]
+        if not isfinite(top):
+            unreached[f"Z13_{side}"] = fastest / per_angle
+            top = STOP_FIRST * fastest
+        if not isfinite(pull):
+            # how fast it accelerated is not known: a lag that is too short may stand for the limit
+            unreached[f"Z16_{side}"] = 0.0
+            pull = ORIFICE_FIRST * fastest / max(guess.lag, SHORTEST)
+        stops.append(top / per_angle)
+        openings.append(pull / per_opening)
+    changed: dict[str, float | tuple[float, float]]
+    if guess.amplifier is None:
+        changed = {
+            "V_dz": guess.dead_zone,
+            "J": (guess.jump[0] / per_ampere, guess.jump[1] / per_ampere),
+            "G1": (guess.gain[0] / per_ampere, guess.gain[1] / per_ampere),
+            "tau": guess.delay,
+        }
+    else:
+        changed = _with_current(guess, guess.amplifier, per_ampere / n["Z19_plus"])
+    changed |= {
+        "Z8": speed_of_flow,
+        "Z10": per_angle,
+        "Z13": (stops[0], stops[1]),
+        "Z16": (openings[0], openings[1]),
+    }
+    if guess.creep:
+        changed["Z18"] = n["Z5"] * tan(asin(n["Z3"] * tan(guess.creep / per_angle)))
+    try:
+        # what is written here is read again as what somebody wrote
+        made = base.replace(changed)
+    except ParameterError as error:
+        raise ParameterError(
+            f"The guess of {guess.axis} from {source} fails; look at units and scales of its "
+            f"signals: {error}"
+        ) from None
+    said = {
+        symbol: replace(each, source=source, status="approximate")
+        if symbol in changed
+        else replace(each, source="assumed: no speed determines it")
+        for symbol, each in made.parameters.items()
+    }
+    if not guess.creep:
+        said["Z18"] = replace(said["Z18"], source=f"assumed: {_without_creep(guess)}")
+    title = f"{guess.axis}: guessed from {source}"
+    # of a current that was measured the filter has a meaning of its own, whatever the logs' rate
+    rate = made.rate if guess.amplifier is None else None
+    card = f"{guess.axis} card"
+    return replace(
+        made,
+        name=guess.axis,
+        title=title,
+        card=card,
+        parameters=said,
+        rate=rate,
+        unreached=unreached,
+    )
+
+
+def _with_current(
+    guess: Guess, amplifier: AmplifierGuess, per_newton: float
+) -> dict[str, float | tuple[float, float]]:
+    """Numbers of the amplifier and of the solenoids, by symbol; speed per N of force given.
+
+    The machine moves from the current on that the amplifier has at the edge of the dead zone. A
+    jump of the speed is then one of the current beyond the solenoids' dead zone.
+    """
+    begins, forces = list[float](), list[float]()
+    for way in range(2):
+        per_ampere = guess.gain[way] / amplifier.gain[way]
+        edge = max(guess.dead_zone[way], amplifier.dead_zone[way] + 1e-6)
+        begins.append(max(amplifier.settled(way, edge) - guess.jump[way] / per_ampere, 0.0))
+        forces.append(per_ampere / per_newton)
+    tried = [current for current, command in zip(begins, guess.command, strict=True) if command]
+    return {
+        "V_dz": amplifier.dead_zone,
+        "J": amplifier.jump,
+        "G1": amplifier.gain,
+        **amplifier.dynamics,
+        "tau": amplifier.delay,
+        "Z17": sum(tried) / len(tried),
+        "Z19": (forces[0], forces[1]),
+    }
+
+
+def fit_configuration(guess: Guess, start: ParameterSet | Drive) -> str:
+    """Text of a fit configuration that frees what was guessed, with bounds about it.
+
+    One stage from the command to the motion, or, if a current was measured, one of the amplifier
+    and one of the pump.
+    """
+    numbers, text = set_of(start).numbers, CONFIGURATION.format(guess.axis)
+    longest = max(2.0 * guess.delay, guess.delay + 0.1)
+    delay = f"tau = {{ bounds = [0.0, {longest:.4g}] }}    # delay"
+    if guess.amplifier is None:
+        lines = _command_lines(numbers, guess.command, [each > 0.0 for each in guess.jump])
+        creep = (
+            _offset_line(guess, numbers) if guess.creep else NO_CREEP.format(_without_creep(guess))
+        )
+        lines += [*_limit_lines(guess), _lag_line(guess, 5.0), delay, creep]
+        return text + CHAIN + "\n".join(lines) + "\n"
+    of_current = _command_lines(numbers, guess.amplifier.command, (True, True))
+    of_current += [*_dynamics_lines(numbers), delay]
+    # the guess's lag is that of amplifier and pump
+    of_motion = [*_solenoid_lines(guess, numbers), *_limit_lines(guess), _lag_line(guess, 20.0)]
+    text += AMPLIFIER + "\n".join(of_current) + "\n"
+    return text + PUMP + "\n".join(of_motion) + "\n"
+
+
+def _command_lines(
+    numbers: Mapping[str, float], command: Sequence[float], jumps: Sequence[bool]
+) -> list[str]:
+    """Dead zone, jump and gain of the amplifier each way."""
+    lines = list[str]()
+    for side, largest, jumped in zip(SIDES, command, jumps, strict=True):
+        if not largest:
+            lines.append(NOT_TRIED.format(side))
+            continue
+        gain, jump = numbers[f"G1_{side}"], numbers[f"J_{side}"]
+        # so that more command never means less current, whatever the gain within its bounds; a gain
+        # that grows needs no such care, and a stop must not stand for it
+        down, up = 0.2 * gain / largest, 0.6 * gain / largest
+        most = 4.0 * jump if jump else 0.5 * gain * largest
+        lines.append(f"V_dz_{side} = {{ bounds = [0.0, {0.95 * largest:.4g}] }}")
+        if jumped:
+            lines.append(f"J_{side} = {{ bounds = [0.0, {most:.4g}] }}    # jump")
+        lines += [
+            f"G1_{side} = {{ relative = [0.5, 2.0], log = true }}",
+            f"G2_{side} = {{ bounds = [{-down:.4g}, {up:.4g}] }}    # how the gain bends",
+        ]
+    return lines
+
+
+def _dynamics_lines(numbers: Mapping[str, float]) -> list[str]:
+    """Filter and limits of rate of the current; a limit that is off stays off."""
+    lines = [
+        "zeta = { relative = [0.3, 3.0], log = true }    # damping of the current",
+        "omega = { relative = [0.2, 5.0], log = true }    # its natural frequency",
+    ]
+    limits = {"lim1": "rate away from zero", "lim2": "rate towards zero", "a": "final decay"}
+    for symbol, meaning in limits.items():
+        if isfinite(numbers[f"{symbol}_plus"]):
+            lines.append(f"{symbol} = {{ relative = [0.3, 3.0], log = true }}    # {meaning}")
+    if isfinite(numbers["lim1_plus"]) and isfinite(numbers["I_t1_plus"]):
+        lines.append("I_t1 = { relative = [0.5, 2.0] }    # current above which lim1 acts")
+    return lines
+
+
+def _solenoid_lines(guess: Guess, numbers: Mapping[str, float]) -> list[str]:
+    """Dead zone and force of the solenoids."""
+    assert guess.amplifier is not None
+    currents = [guess.amplifier.settled(way, guess.command[way]) for way in range(2)]
+    begins = numbers["Z17"]
+    smallest = min(current for current, volts in zip(currents, guess.command, strict=True) if volts)
+    # below the largest current of either way, or nothing would move
+    most = min(2.0 * begins if begins else 0.5 * smallest, 0.95 * smallest)
+    lines = [f"Z17 = {{ bounds = [0.0, {max(most, 1.05 * begins):.4g}] }}    # dead zone"]
+    lines.append(_offset_line(guess, numbers))
+    for way, side in enumerate(SIDES):
+        if not guess.command[way]:
+            lines.append(NOT_TRIED.format(side))
+            continue
+        bends = 0.5 * numbers[f"Z19_{side}"] / max(currents[way] - begins, 1e-3)
+        lines += [
+            f"Z19_{side} = {{ relative = [0.5, 2.0], log = true }}    # force for a current",
+            f"Z20_{side} = {{ bounds = [{-bends:.4g}, {bends:.4g}] }}    # how it bends",
+        ]
+    return lines
+
+
+def _offset_line(guess: Guess, numbers: Mapping[str, float]) -> str:
+    """Neutral offset of the spool, either way, with room for that of the creep that was seen."""
+    offset = OFFSET * numbers["Z5"] * numbers["Z3"] * guess.speed / numbers["Z10"]
+    offset = max(offset, 2.0 * abs(numbers["Z18"]))
+    return f"Z18 = {{ bounds = [{-offset:.4g}, {offset:.4g}] }}    # neutral offset: creep at rest"
+
+
+def _without_creep(guess: Guess) -> str:
+    """Why no creep is taken in."""
+    if guess.creep is None:
+        return "the logs rest too seldom to show a creep"
+    return "the logs show no creep at rest"
+
+
+def _limit_lines(guess: Guess) -> list[str]:
+    """Top speed and acceleration of each way that was tried, within wide bounds if not seen."""
+    lines = list[str]()
+    for way, side in enumerate(SIDES):
+        if not guess.command[way]:
+            continue
+        reach = (0.7, 1.4) if isfinite(guess.top_speed[way]) else (0.7, 3.0)
+        lines.append(_limit_line(f"Z13_{side}", reach, "top speed"))
+        reach = (0.3, 3.0) if isfinite(guess.acceleration[way]) else (0.1, 10.0)
+        lines.append(_limit_line(f"Z16_{side}", reach, "acceleration"))
+    return lines
+
+
+def _lag_line(guess: Guess, widest: float) -> str:
+    """The lag, up to so many times faster."""
+    if guess.lag > TOLD:
+        return f"Z8 = {{ relative = [0.2, {widest}], log = true }}    # lag"
+    # the acceleration is that of Z8 times Z16: without a lag nothing tells them apart
+    return "# the lag is too short to be seen: Z8 stays fixed"
+
+
+def _limit_line(column: str, reach: tuple[float, float], words: str) -> str:
+    low, high = reach
+    return f"{column} = {{ relative = [{low}, {high}], log = true }}    # {words}"

@@ -1,0 +1,12 @@
+from .dialect import TextOptions as TextOptions
+from .log import Column as Column
+from .log import Log as Log
+from .log import check_duration as check_duration
+from .log import check_stamps as check_stamps
+from .log import unit_of as unit_of
+from .long_logs import in_parts as in_parts
+from .opening import SUFFIXES as SUFFIXES
+from .opening import Series as Series
+from .opening import open_as as open_as
+from .opening import open_log as open_log
+from .opening import read_series as read_series
