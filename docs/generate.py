@@ -16,7 +16,7 @@ from typing import Any
 import typer.main
 from pydantic import BaseModel
 
-from swashplate.campaign import CampaignFile
+from swashplate.campaign import CampaignFile, json_schema
 from swashplate.cli import EPILOG, HELP, app
 from swashplate.identification.setup import Setup
 from swashplate.parameters import CATALOGUE, REFINEMENTS, Block, Definition, SetFile
@@ -31,6 +31,7 @@ def pages(folder: Path) -> None:
     made["command-line.md"] = command_line()
     made["campaign-file.md"] = schema_page("Campaign file", CampaignFile, CAMPAIGN)
     made["parameter-file.md"] = schema_page("Parameter file", SetFile, PARAMETERS)
+    made["campaign.schema.json"] = json_schema()
     made["set-up-file.md"] = schema_page("Fit configuration file", Setup, SETUP)
     for path in folder.iterdir():
         if path.name not in made:
@@ -43,14 +44,15 @@ def pages(folder: Path) -> None:
 
 CAMPAIGN = """\
 A campaign says where the logs of a machine are and what their columns mean.
-`swashplate campaign init` writes a draft from your logs, `swashplate campaign schema` prints this
-page as a JSON Schema with which editors complete entries. An introduction:
-[campaigns](../campaign.md)."""
+`swashplate campaign init` writes a draft from your logs. An introduction:
+[campaigns](../campaign.md). The same as a JSON Schema, with which
+[editors complete entries](../campaign.md#completion-in-an-editor):
+{download}`campaign.schema.json`."""
 PARAMETERS = """\
 A drive in numbers. `swashplate show hoist --toml > mine.toml` writes one to start from; symbols,
 units and ranges: [nomenclature](../nomenclature.md)."""
 SETUP = """\
-The parameters that a fit estimates, stage by stage. `swashplate excitation` says which of
+The parameters that a fit estimates, stage by stage. `swashplate advise` shows which of
 them your tests determine; [identification](../identification.md) has an example."""
 
 

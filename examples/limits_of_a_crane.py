@@ -15,13 +15,13 @@ import numpy as np
 
 from swashplate import Drive, maneuvers
 from swashplate.analysis import (
-    WIDEST,
+    DEFAULT_RANGE,
     Requirements,
     envelope,
     limit_shares,
     performance,
     size,
-    trial,
+    trial_of,
     what_if,
 )
 from swashplate.report.figures import plot_limit_timeline, save_figure
@@ -65,7 +65,7 @@ for share in shares.shares[:3]:
 # The component that comes first, changed by what a workshop can do.
 
 # %%
-LEVERS = {
+REMEDIES = {
     "dead zone": {"dead_zone": 0.5},
     "current rate": {"rate_limits": 2.0},
     "final decay": {"I_t2": 0.5},
@@ -74,13 +74,14 @@ LEVERS = {
     "spool stop": {"spool_stroke": 1.5},
     "swash stop": {"pump": 1.25},
     "relief valve": {"relief": 1.25},
-    "plussing": {"plussing": 0.5},
+    "spool offset": {"spool_offset": 0.5},
 }
 first = shares.shares[0].limit
-step = trial(drive, maneuvers.step(9.0).sample())
-better = what_if(drive, LEVERS[first], step, outcomes=["peak_speed", "rise_time"])
+step = trial_of(drive, maneuvers.step(9.0).sample())
+better = what_if(drive, REMEDIES[first], step, outcomes=["peak_speed", "rise_time"])
 (speed, rise), (then, sooner) = better.before.values, better.after.values
-print(*(f"{lever} x {factor:g}," for lever, factor in LEVERS[first].items()), "a step of 9 V:")
+factors = (f"{variable} x {factor:g}," for variable, factor in REMEDIES[first].items())
+print(*factors, "a step of 9 V:")
 print(f"  {np.degrees(speed):.1f} -> {np.degrees(then):.1f} deg/s, in {rise:.2f} -> {sooner:.2f} s")
 
 # %% [markdown]
@@ -91,10 +92,10 @@ print(f"  {np.degrees(speed):.1f} -> {np.degrees(then):.1f} deg/s, in {rise:.2f}
 # %%
 now = performance(drive)
 required = Requirements(speed=1.1 * now.speed, acceleration=1.2 * now.acceleration)
-sized = size(drive, required, {"pump": WIDEST, "orifice": WIDEST})
-for lever, factor in sized.factors.items():
-    alone = sized.alone[lever]
-    print(f"{lever} x {factor:.3f}, by itself {'never' if alone is None else f'x {alone:.3f}'}")
+sized = size(drive, required, {"pump": DEFAULT_RANGE, "orifice": DEFAULT_RANGE})
+for variable, factor in sized.factors.items():
+    alone = sized.alone[variable]
+    print(f"{variable} x {factor:.3f}, by itself {'never' if alone is None else f'x {alone:.3f}'}")
 
 # %%
 if options.figure:

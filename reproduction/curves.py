@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from reproduction.catalogue import Shown
 from reproduction.content import Curve, Figure, Level, Panel
 from reproduction.speed_path import simulated_speed
-from swashplate.analysis import pulled
+from swashplate.analysis import with_factors
 from swashplate.drive import Drive
 from swashplate.maneuvers import source_tests
 from swashplate.simulation.result import Simulation
@@ -190,7 +190,7 @@ def larger_figure(shown: Shown) -> Figure:
     """Figure 9.1: the hoist with orifices and pump flow half as large again."""
     (test,) = shown.tests
     before = simulated(shown.axis, test)
-    drive = pulled(Drive.preset(shown.axis), {"orifice": LARGER, "pump": LARGER})
+    drive = with_factors(Drive.preset(shown.axis), {"orifice": LARGER, "pump": LARGER})
     after = drive.simulate(source_tests(shown.axis)[test].sample())
     speed = filtered_speed_deg_s(after)
     return Figure(

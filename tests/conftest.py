@@ -67,22 +67,8 @@ def hoist() -> Drive:
     return Drive.preset("hoist")
 
 
-SHARED = Path(__file__).parents[2] / "shared"
-
-
 @pytest.fixture(scope="session")
 def source_parameters() -> dict:
-    """Kruse's tables as facts apart from the package, where they are at hand."""
-    path = SHARED / "spec" / "parameters.toml"
-    if not path.exists():
-        pytest.skip("Kruse's tables are not beside this checkout")
+    """Kruse's tables as facts apart from the package."""
+    path = Path(__file__).parent / "thesis" / "published.toml"
     return tomllib.loads(path.read_text("utf-8"))
-
-
-@pytest.fixture(scope="session")
-def source_text() -> str:
-    """The source itself: others' work, which stays outside the project."""
-    path = SHARED / "spec" / "thesis.txt"
-    if not path.exists():
-        pytest.skip("Kruse's text is not beside this checkout, and may not be copied into it")
-    return path.read_text("utf-8")

@@ -28,7 +28,7 @@ from swashplate.analysis import (
     limit_shares,
     one_at_a_time,
     size,
-    trial,
+    trial_of,
     what_if,
 )
 from swashplate.campaign import examine, guess_drive
@@ -101,7 +101,7 @@ def reached(roots: Iterable[object]) -> dict[type, int]:
 def analyses(drive: Drive) -> list[Any]:
     """What the package of analyses finds out about a drive."""
     voltage = TESTS[0].sample()
-    once = trial(drive, voltage)
+    once = trial_of(drive, voltage)
     return [
         envelope(drive),
         limit_shares(drive, voltage),

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swashplate import DomainError, Drive, FileError, InputError, maneuvers
-from swashplate.analysis import improvement, inverse_map, proportional_command, wanted_of_stick
+from swashplate.analysis import improvement, inverse_map, proportional_command, speed_of_command
 from swashplate.units import display_unit, shown_in
 
 MAPS = {name: inverse_map(Drive.preset(name)) for name in ("hoist", "slew", "luff", "neutral")}
@@ -128,20 +128,20 @@ def test_drives_without_an_inverse(hoist: Drive) -> None:
 
 def test_what_the_map_buys(axis: Drive) -> None:
     inverse = MAPS[axis.name]
-    wanted = wanted_of_stick(inverse, maneuvers.sine(2.0, 0.1).sample())
-    found = improvement(axis, wanted)
+    reference = speed_of_command(inverse, maneuvers.sine(2.0, 0.1).sample())
+    found = improvement(axis, reference)
     assert list(found.runs) == ["straight line", "inverse map", "inverse map and lead"]
     plain, mapped, led = found.rms.values()
     assert plain > mapped > led
     if axis.name != "luff":  # whose slowest speed of 31 deg/s leaves nothing to gain there
         assert led < 0.25 * mapped
-    np.testing.assert_allclose(found.runs["inverse map"].voltage, inverse.voltage(wanted))
-    off = axis.simulate(inverse.voltage(wanted)).shaft_speed - wanted
+    np.testing.assert_allclose(found.runs["inverse map"].voltage, inverse.voltage(reference))
+    off = axis.simulate(inverse.voltage(reference)).shaft_speed - reference
     assert mapped == pytest.approx(np.sqrt(np.mean(off**2)))
     assert "100.0%" in str(found.table()).replace(" ", "")
     # full stick is full speed, which the straight line commands with the saturation voltage
-    wanted = wanted_of_stick(inverse, [-10.0, -5.0, 0.0, 5.0, 10.0])
-    (low, high), volts = inverse.limits, proportional_command(inverse, wanted)
-    assert wanted == pytest.approx([low, 0.5 * low, 0.0, 0.5 * high, high])
+    reference = speed_of_command(inverse, [-10.0, -5.0, 0.0, 5.0, 10.0])
+    (low, high), volts = inverse.limits, proportional_command(inverse, reference)
+    assert reference == pytest.approx([low, 0.5 * low, 0.0, 0.5 * high, high])
     minus, plus = inverse.minus.voltage[0], inverse.plus.voltage[-1]
     assert volts == pytest.approx([minus, 0.5 * minus, 0.0, 0.5 * plus, plus])

@@ -32,7 +32,7 @@ def shares(hoist: Drive) -> LimitShares:
         ("spool stop", {"Z14": 2e-5}),
         ("swash stop", {"Z13": 5e-4}),
         ("relief valve", {"Z15": 5.0}),
-        ("plussing", {"Z18": 1e-4}),
+        ("spool offset", {"Z18": 1e-4}),
     ],
 )
 def test_a_single_limit_has_all_of_the_error(limit: str, changes: dict[str, float]) -> None:
@@ -84,15 +84,15 @@ def test_shares_are_what_a_changed_drive_gains(hoist: Drive, shares: LimitShares
     ideal = hoist.replace(V_dz=0.0, Z17=hoist["J"].value.plus, lim1=inf, lim2=inf, I_t2=0.0)
     ideal = ideal.replace(tau=0.0, Z16=inf, Z14=inf, Z15=inf, Z18=0.0)
     ideal = ideal.replace(Z13=by["swash stop"].changes["Z13_plus"])
-    wanted = ideal.simulate(SINE).shaft_speed
-    np.testing.assert_array_equal(shares.wanted, wanted)
+    reference = ideal.simulate(SINE).shaft_speed
+    np.testing.assert_array_equal(shares.reference, reference)
     run = hoist.simulate(SINE)
-    error = rms(run.shaft_speed - wanted)
+    error = rms(run.shaft_speed - reference)
     assert shares.error == pytest.approx(error, rel=1e-12)
-    without = rms(hoist.replace(tau=0.0).simulate(SINE).shaft_speed - wanted)
+    without = rms(hoist.replace(tau=0.0).simulate(SINE).shaft_speed - reference)
     assert by["delay"].error == pytest.approx(without, rel=1e-12)
     assert by["delay"].error_share == pytest.approx(1.0 - without / error, rel=1e-9)
-    only = ideal.replace(tau=0.014).simulate(SINE).shaft_speed - wanted
+    only = ideal.replace(tau=0.014).simulate(SINE).shaft_speed - reference
     assert by["delay"].alone == pytest.approx(rms(only), rel=1e-12)
     # shares of time
     assert by["swash stop"].time_share == run.active(Limit.SWASH_STOP).mean()
@@ -105,19 +105,19 @@ def test_shares_are_what_a_changed_drive_gains(hoist: Drive, shares: LimitShares
     assert table["error"][0] == pytest.approx(shares.shares[0].error)
 
 
-def test_a_speed_that_was_wanted_and_a_load(hoist: Drive) -> None:
+def test_a_speed_that_was_reference_and_a_load(hoist: Drive) -> None:
     leaking = hoist.replace(motor_leakage=1e-6)
     run = leaking.simulate(SINE, load_torque=3e4).shaft_speed
-    assert limit_shares(leaking, SINE, load_torque=3e4, wanted=run).error == 0.0
-    found = limit_shares(leaking, SINE, load_torque=3e4, wanted=np.zeros(SINE.size))
+    assert limit_shares(leaking, SINE, load_torque=3e4, reference=run).error == 0.0
+    found = limit_shares(leaking, SINE, load_torque=3e4, reference=np.zeros(SINE.size))
     assert found.error == pytest.approx(rms(run))
-    assert "against the wanted speed" in found.sentences()[0]
+    assert "against the reference speed" in found.sentences()[0]
     assert "against a drive without limits" in limit_shares(hoist, SINE).sentences()[0]
     (delay,) = (each for each in found.shares if each.limit == "delay")
     without = leaking.replace(tau=0.0).simulate(SINE, load_torque=3e4).shaft_speed
     assert delay.error == pytest.approx(rms(without), rel=1e-12)
     with pytest.raises(InputError, match="finite numbers, one a sample"):
-        limit_shares(hoist, SINE, wanted=np.zeros(3))
+        limit_shares(hoist, SINE, reference=np.zeros(3))
 
 
 def test_a_machine_that_was_guessed_need_not_have_an_orifice() -> None:
@@ -150,7 +150,7 @@ def test_a_command_outside_the_domain_is_refused() -> None:
     nervous.simulate(step)  # its ramp keeps it from overshooting
     with pytest.raises(DomainError, match="Without its limits the drive cannot be simulated"):
         limit_shares(nervous, step)
-    found = limit_shares(nervous, step, wanted=np.zeros(step.size))
+    found = limit_shares(nervous, step, reference=np.zeros(step.size))
     (share,) = (each for each in found.shares if each.limit == "current rate")
     assert share.error is None
     assert "overpowers the feedback spring" in share.failure

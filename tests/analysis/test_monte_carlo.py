@@ -13,11 +13,11 @@ from swashplate.analysis import (
     Draws,
     Trial,
     bands,
-    drives,
+    drawn_drives,
     find_outcomes,
     standard_errors,
     stored_draws,
-    trial,
+    trial_of,
 )
 from swashplate.campaign import Campaign, rig
 from swashplate.identification.assessment import Identification
@@ -52,7 +52,7 @@ def test_draws_outside_the_bounds_are_drawn_again(hoist):
         solution, name = SimpleNamespace(vector=unknowns.start), SimpleNamespace(name="pump")
         known = SimpleNamespace(own=own, handed=(), systematic={})
         one = SimpleNamespace(stage=name, problem=problem, solution=solution, uncertainty=known)
-        return drives([one], count, seed=1)
+        return drawn_drives([one], count, seed=1)
 
     found = drawn(4e-4, 300)
     assert found.columns["Z10"].min() >= 12.396 * 0.98
@@ -63,7 +63,7 @@ def test_draws_outside_the_bounds_are_drawn_again(hoist):
     assert "Not drawn, as fitted in all drives: Z18" in kept
     share = 100.0 * found.redrawn / (300 + found.redrawn)
     assert f"too narrow: {share:.0f} %" in redrawn
-    assert "Widen the bounds in the fit configuration" in redrawn
+    assert "Widen the bounds in the fit setup" in redrawn
     # of one in a thousand nobody decides anything
     assert len(drawn(4e-5, 300).sentences()) == 1
     with pytest.raises(InputError, match="the errors are too large for a Monte Carlo"):
@@ -71,7 +71,7 @@ def test_draws_outside_the_bounds_are_drawn_again(hoist):
     with pytest.raises(InputError, match="at least one draw, not 0"):
         drawn(1e-4, 0)
     with pytest.raises(InputError, match="at least one stage"):
-        drives([])
+        drawn_drives([])
 
 
 @pytest.mark.usefixtures("given_uncertainty")
@@ -97,7 +97,7 @@ def test_standard_errors_where_no_draw_stays_within_the_bounds(hoist):
     assert speed == pytest.approx(100.0 * without_creep, rel=1e-6)
     assert delay == 0.0
     with pytest.raises(InputError, match="errors are too large for a Monte Carlo"):
-        drives([stage], 10)
+        drawn_drives([stage], 10)
 
 
 def pumps(drive: Drive, error: float, count: int) -> Draws:
@@ -109,7 +109,7 @@ def pumps(drive: Drive, error: float, count: int) -> Draws:
 def test_a_band_by_hand(hoist):
     """The speed at the stop goes with the pump: its band is that of the drawn factors."""
     drawn = pumps(hoist, 0.3, 101)
-    command = trial(hoist, VOLTAGE)
+    command = trial_of(hoist, VOLTAGE)
     band = bands(drawn, command, find_outcomes(["final_speed"]), level=0.9)
     held = int(3.9 * 512)
     angle = hoist.parameters.numbers["Z13_plus"]

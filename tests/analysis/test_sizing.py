@@ -5,7 +5,7 @@ import pytest
 
 from swashplate import Drive, InputError, maneuvers
 from swashplate.analysis import (
-    WIDEST,
+    DEFAULT_RANGE,
     Performance,
     Requirements,
     Trial,
@@ -14,7 +14,7 @@ from swashplate.analysis import (
     size,
     sizing,
     smallest_change,
-    trial,
+    trial_of,
 )
 
 BOX = np.full(2, 0.5), np.full(2, 2.0)
@@ -39,20 +39,20 @@ def test_the_least_change(slack, expected, close):
 
 def test_a_speed_is_met_by_the_pump_in_proportion(hoist):
     required = Requirements(speed=np.radians(250.0))
-    found = size(hoist, required, {"pump": WIDEST})
+    found = size(hoist, required, {"pump": DEFAULT_RANGE})
     expected = 250.0 / np.degrees(12.396 * 0.26047)  # Z10 times the minus stop
     assert found.factors["pump"] == pytest.approx(expected, rel=1e-6)
     assert found.alone["pump"] == pytest.approx(expected, rel=1e-6)
     assert found.after.speed >= required.speed
     assert found.drive["Z10"].value == pytest.approx(12.396 * expected, rel=1e-6)
-    found = size(hoist, Requirements(speed=np.radians(180.0)), {"pump": WIDEST})
+    found = size(hoist, Requirements(speed=np.radians(180.0)), {"pump": DEFAULT_RANGE})
     assert (found.factors, found.change) == ({"pump": 1.0}, 0.0)
 
 
 def test_an_acceleration_is_shared_by_orifice_and_pump(hoist):
     """It goes with their product: equal factors, the root of the ratio."""
     required = Requirements(acceleration=np.radians(200.0))
-    found = size(hoist, required, {"orifice": WIDEST, "pump": WIDEST})
+    found = size(hoist, required, {"orifice": DEFAULT_RANGE, "pump": DEFAULT_RANGE})
     ratio = np.radians(200.0) / found.before.acceleration
     assert list(found.factors.values()) == pytest.approx([np.sqrt(ratio)] * 2, rel=2e-3)
     assert found.alone["orifice"] == pytest.approx(ratio, rel=2e-3)
@@ -62,9 +62,9 @@ def test_an_acceleration_is_shared_by_orifice_and_pump(hoist):
 
 def test_a_tracking_error(hoist):
     volts = maneuvers.sine(9.0, 0.1).sample()
-    follow = trial(hoist, volts, wanted=proportional_speed(hoist, volts, limited=False))
+    follow = trial_of(hoist, volts, reference=proportional_speed(hoist, volts, limited=False))
     required = Requirements(tracking_error=np.radians(18.0))
-    found = size(hoist, required, {"pump": WIDEST}, follow=follow)
+    found = size(hoist, required, {"pump": DEFAULT_RANGE}, follow=follow)
     assert found.before.tracking_error > required.tracking_error >= found.after.tracking_error
     less = hoist.scale(Z10=1.0 + 0.99 * (found.factors["pump"] - 1.0))
     assert performance(less, follow).tracking_error > required.tracking_error
@@ -73,7 +73,7 @@ def test_a_tracking_error(hoist):
 def test_what_cannot_be_met_says_what_can(hoist, monkeypatch):
     required = Requirements(speed=np.radians(500.0))
     with pytest.raises(InputError) as error:
-        size(hoist, required, {"orifice": WIDEST, "pump": WIDEST})
+        size(hoist, required, {"orifice": DEFAULT_RANGE, "pump": DEFAULT_RANGE})
     assert str(error.value) == (
         "Within orifice x 0.5 to 2, pump x 0.5 to 2 the hoist reaches speed 370 deg/s (required "
         "500 deg/s)."
@@ -87,18 +87,22 @@ def test_what_cannot_be_met_says_what_can(hoist, monkeypatch):
     monkeypatch.setattr(sizing, "performance", made_up)
     required = Requirements(speed=np.radians(300.0), tracking_error=np.radians(12.0))
     follow = Trial(np.zeros(2), 512.0, np.array([0.0, 1.0]))
-    with pytest.raises(InputError, match="meets each requirement, but not all at once: nearest"):
-        size(hoist, required, {"pump": WIDEST}, follow=follow)
+    with pytest.raises(InputError, match="each requirement, but not all at the same time"):
+        size(hoist, required, {"pump": DEFAULT_RANGE}, follow=follow)
 
 
 @pytest.mark.parametrize(
     ("required", "ranges", "said"),
     [
-        ({}, {"pump": WIDEST}, "give a speed, an acceleration, a tracking error"),
-        ({"speed": -1.0}, {"pump": WIDEST}, "required speed is -1, but must be positive"),
-        ({"speed": 1.0}, {}, "Name at least one lever"),
+        ({}, {"pump": DEFAULT_RANGE}, "give a speed, an acceleration, a tracking error"),
+        ({"speed": -1.0}, {"pump": DEFAULT_RANGE}, "required speed is -1, but must be positive"),
+        ({"speed": 1.0}, {}, "Name at least one design variable"),
         ({"speed": 1.0}, {"pump": (1.2, 2.0)}, "rise from 0 or more and have 1 between them"),
-        ({"tracking_error": 0.1}, {"pump": WIDEST}, "only be required with a speed to follow"),
+        (
+            {"tracking_error": 0.1},
+            {"pump": DEFAULT_RANGE},
+            "with a speed to follow",
+        ),
     ],
 )
 def test_refusals(hoist, required, ranges, said):

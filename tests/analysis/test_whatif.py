@@ -7,17 +7,17 @@ from swashplate import Drive, InputError, ParameterError, maneuvers
 from swashplate.analysis import (
     AS_IS,
     CHANGED,
-    LEVERS,
+    DESIGN_VARIABLES,
     Trial,
-    find_lever,
     find_outcomes,
     one_at_a_time,
     outcome_matrix,
+    powers_of,
     proportional_speed,
-    pulled,
     speed_per_volt,
-    trial,
+    trial_of,
     what_if,
+    with_factors,
 )
 
 RATE = 10.0
@@ -30,10 +30,10 @@ RAMP = np.clip(10.0 * (TIME - 0.9), 0.0, 10.0)
 
 @pytest.fixture(scope="module")
 def task(hoist: Drive) -> Trial:
-    return trial(hoist, maneuvers.step(9.0, stop=4.0, length=5.0).sample())
+    return trial_of(hoist, maneuvers.step(9.0, stop=4.0, length=5.0).sample())
 
 
-# --- levers ---------------------------------------------------------------------------------------
+# --- design variables -----------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -50,12 +50,12 @@ def task(hoist: Drive) -> Trial:
         ({"relief": 2.0}, {"Z15": 8.2382e6}),
         ({"Z9": 1.1}, {"Z9": 1.18173e7}),
         ({"Z16_minus": 2.0}, {"Z16_minus": 3.0252e-4}),
-        (dict.fromkeys(LEVERS, 1.0), {}),
+        (dict.fromkeys(DESIGN_VARIABLES, 1.0), {}),
     ],
 )
 def test_what_a_lever_multiplies(hoist, factors, expected):
     drive = hoist.replace(Z11=0.1, Z12=0.2)
-    before, numbers = drive.parameters.numbers, pulled(drive, factors).parameters.numbers
+    before, numbers = drive.parameters.numbers, with_factors(drive, factors).parameters.numbers
     assert {name: numbers[name] for name in expected} == pytest.approx(expected, rel=1e-12)
     assert all(numbers[name] == before[name] for name in set(before) - set(expected))
 
@@ -90,9 +90,9 @@ def test_other_outcomes_by_hand():
     beyond[20] = 12.0
     assert of(beyond, "overshoot") == pytest.approx(0.2)
     assert of(-beyond, "overshoot") == pytest.approx(0.2)
-    assert of(TRIAL.wanted + 3.0, "tracking_error") == pytest.approx(3.0)
+    assert of(TRIAL.reference + 3.0, "tracking_error") == pytest.approx(3.0)
     assert of(RAMP + 0.5, "creep") == 0.5
-    at_once = Trial(np.where(TIME > 0.05, 5.0, 0.0), RATE, TRIAL.wanted)
+    at_once = Trial(np.where(TIME > 0.05, 5.0, 0.0), RATE, TRIAL.reference)
     assert np.isnan(of(RAMP + 0.5, "creep", at_once))
     still = np.zeros_like(TIME)
     assert of(still, "final_speed") == 0.0
@@ -105,8 +105,8 @@ def test_the_ratio_is_that_of_the_limit_to_the_voltage_that_reaches_it(hoist):
     volts = [-9.0, 0.0, 4.0, 9.0]
     asked = np.degrees(proportional_speed(hoist, volts, limited=False))
     np.testing.assert_allclose(asked, [-9.0 * down, 0.0, 4.0 * up, 9.0 * up], rtol=1e-3)
-    wanted = np.degrees(proportional_speed(hoist, volts))
-    np.testing.assert_allclose(wanted, [-185.0, 0.0, 4.0 * up, 196.0], rtol=1e-3)
+    reference = np.degrees(proportional_speed(hoist, volts))
+    np.testing.assert_allclose(reference, [-185.0, 0.0, 4.0 * up, 196.0], rtol=1e-3)
     wide = hoist.replace(Z13=0.5, Z15=np.inf)  # never saturates
     assert speed_per_volt(wide, 1.0) == pytest.approx(wide.steady_speed(10.0) / 10.0)
 
@@ -116,7 +116,7 @@ def test_a_rise_time_belongs_to_a_command_that_goes_one_way(hoist):
     noisy = volts + 0.05 * np.random.default_rng(2).normal(size=volts.size)
     driver = volts - 4.0 * np.exp(-((np.arange(volts.size) - 900.0) ** 2) / 2e4)
     for command, rises in ((volts, True), (noisy, True), (driver, False)):
-        given = trial(hoist, command)
+        given = trial_of(hoist, command)
         result = what_if(hoist, {"pump": 1.2}, given, outcomes=["rise_time", "response_time"])
         assert np.isfinite(result.before.values).all() == rises
     assert "the command turns back on its way there" in result.sentences()[0]
@@ -127,7 +127,7 @@ def test_a_rise_time_belongs_to_a_command_that_goes_one_way(hoist):
 
 def test_the_acceleration_limit_goes_with_both(hoist):
     """Z10 Z16 stand in the closed form of the limit: 2.25 times as much."""
-    task = trial(hoist, maneuvers.step(9.0).sample())
+    task = trial_of(hoist, maneuvers.step(9.0).sample())
     factors, names = {"orifice": 1.5, "pump": 1.5}, ["largest_acceleration", "final_speed"]
     found = what_if(hoist, factors, task, outcomes=names).variants
     ratios = {name: each.values / found[AS_IS].values for name, each in found.items()}
@@ -138,14 +138,14 @@ def test_the_acceleration_limit_goes_with_both(hoist):
 
 
 def test_what_is_wanted_and_what_there_is_not(hoist):
-    # the wanted speed stays that of the drive as it is
-    task = trial(hoist, maneuvers.step(5.0).sample())
+    # the reference speed stays that of the drive as it is
+    task = trial_of(hoist, maneuvers.step(5.0).sample())
     result = what_if(hoist, {"pump": 1.2}, task, outcomes=["tracking_error"])
     assert result.after.values[0] > result.before.values[0]
     assert list(result.variants) == [AS_IS, CHANGED]
     # a compensated dead zone answers a small command
     slew = Drive.preset("slew")
-    task = trial(slew, maneuvers.step(0.08).sample())
+    task = trial_of(slew, maneuvers.step(0.08).sample())
     result = what_if(slew, {"dead_zone": 0.0}, task, outcomes=["final_speed", "rise_time"])
     assert result.after.values[0] > result.before.values[0] == 0.0
     (sentence,) = result.sentences()
@@ -164,7 +164,7 @@ def test_the_speed_limit_goes_with_the_pump_alone(hoist, task):
     np.testing.assert_allclose(result.swings[:, 0], [0.0, 0.2 * final], rtol=1e-4, atol=1e-9)
     assert result.sentences == ()
     # a feedback spring too weak for the solenoid: Z5 F/√Z4 reaches 1
-    at_once = trial(hoist, maneuvers.step(9.0, start=0.1, stop=1.0, length=2.0).sample())
+    at_once = trial_of(hoist, maneuvers.step(9.0, start=0.1, stop=1.0, length=2.0).sample())
     result = one_at_a_time(hoist, {"Z4": (0.01, 1.1)}, at_once, outcomes=["final_speed", "creep"])
     assert np.isnan(result.low[0, 0])
     assert np.isfinite(result.high[0, 0])
@@ -174,7 +174,7 @@ def test_the_speed_limit_goes_with_the_pump_alone(hoist, task):
 
 def test_a_maneuver_is_a_command(hoist):
     step = maneuvers.step(4.0, start=0.1, stop=1.0, length=2.0)
-    sampled = what_if(hoist, {"pump": 1.5}, trial(hoist, step.sample(512.0)))
+    sampled = what_if(hoist, {"pump": 1.5}, trial_of(hoist, step.sample(512.0)))
     found = what_if(hoist, {"pump": 1.5}, step)
     assert np.array_equal(found.trial.voltage, step.sample(512.0))
     assert found.summary() == sampled.summary()
@@ -183,19 +183,28 @@ def test_a_maneuver_is_a_command(hoist):
 @pytest.mark.parametrize(
     ("call", "said"),
     [
-        (lambda d, t: find_lever("orifise"), r"no lever 'orifise' \(did you mean orifice\?\)"),
-        (lambda d, t: pulled(d, {"pump": -1.0}), "factor on pump is -1, but must be 0 or more"),
-        (lambda d, t: pulled(d, {"pump": float("nan")}), "The factor on pump is nan"),
         (
-            lambda d, t: pulled(d.replace(Z15=np.inf), {"relief": 0.0}),
+            lambda d, t: powers_of("orifise"),
+            r"'orifise' \(did you mean orifice\?\)",
+        ),
+        (
+            lambda d, t: with_factors(d, {"pump": -1.0}),
+            "pump is -1, but must be 0 or more",
+        ),
+        (lambda d, t: with_factors(d, {"pump": float("nan")}), "The factor on pump is nan"),
+        (
+            lambda d, t: with_factors(d.replace(Z15=np.inf), {"relief": 0.0}),
             "Z15 is inf, which the factor 0 cannot change",
         ),
-        (lambda d, t: what_if(d, {}, t), "at least one lever"),
+        (lambda d, t: what_if(d, {}, t), "at least one design variable"),
         (lambda d, t: what_if(d, {"pump": "1.5"}, t), "factor on pump is the text '1.5'"),
         (lambda d, t: find_outcomes(["rise_tim"]), r"'rise_tim' \(did you mean rise_time\?\)"),
-        (lambda d, t: trial(d, [3.0, 3.0]), "stays at 3 V"),
-        (lambda d, t: trial(d, [0.0, 11.0]), "within ±10 V"),
-        (lambda d, t: trial(d, [0.0, 1.0, 2.0], wanted=[0.0, 1.0]), "must be 3 finite numbers"),
+        (lambda d, t: trial_of(d, [3.0, 3.0]), "stays at 3 V"),
+        (lambda d, t: trial_of(d, [0.0, 11.0]), "within ±10 V"),
+        (
+            lambda d, t: trial_of(d, [0.0, 1.0, 2.0], reference=[0.0, 1.0]),
+            "3 finite numbers",
+        ),
         (
             lambda d, t: one_at_a_time(d, {"pump": (2.0, 1.0)}, t, outcomes=["creep"]),
             "must rise from 0 or more, not 2 to 1",

@@ -10,7 +10,7 @@ import polars as pl
 import pytest
 
 from swashplate import Drive, maneuvers
-from swashplate.analysis import monte_carlo, performance, pulled
+from swashplate.analysis import monte_carlo, performance, with_factors
 
 FULL_ORDER = Path(__file__).parents[2] / "docs" / "full-order.md"
 
@@ -54,7 +54,7 @@ def test_figure_9_1(done, number, tmp_path):
     assert "+50.0 %" in text
     assert (tmp_path / "w.png").read_bytes().startswith(b"\x89PNG")
     assert Drive.from_toml(tmp_path / "larger.toml")["Z10"].value == pytest.approx(18.594)
-    text = done("whatif", "--levers")
+    text = done("whatif", "--variables")
     for word in ("orifice _plus _minus", "drive_speed", "rate_limit_down", "Z16 by its square"):
         assert word in text
 
@@ -71,18 +71,20 @@ def test_bands(done, tmp_path, monkeypatch):
     assert float(before) == pytest.approx(3.8, abs=1.2)
     assert float(after) == pytest.approx(1.5 * float(before), abs=0.02)
     assert cells(text, "top speed, positive")[:4] == final[:4]  # 9 V reaches the stop
-    assert "half of the interval that holds 95 % of the drives" in text
+    assert "half of the interval that contains 95 % of the drives" in text
     assert "Band of 50 drives, changed: at most" in text
     assert (tmp_path / "w.svg").exists()
 
 
 @pytest.mark.parametrize("levers", [("orifice",), ("orifice", "pump")])
 def test_the_change_that_is_proposed_is_enough(done, number, tmp_path, levers):
-    words = [word for lever in levers for word in ("--lever", lever)]
+    words = [word for lever in levers for word in ("--variable", lever)]
     text = done("size", "hoist", "--acceleration-deg-s2", "220", *words, "--out", "larger.toml")
     given = dict(re.findall(r"--scale (\w+)=([\d.]+)", text))
     assert set(given) == set(levers)
-    changed = pulled(Drive.preset("hoist"), {name: float(each) for name, each in given.items()})
+    changed = with_factors(
+        Drive.preset("hoist"), {name: float(each) for name, each in given.items()}
+    )
     assert np.degrees(performance(changed).acceleration) >= 220.0
     assert [*cells(text, "acceleration")[:2]] == [">=", "220.00"]
     assert number(text, "orifice") == pytest.approx(float(given["orifice"]), rel=1e-3)
@@ -91,15 +93,22 @@ def test_the_change_that_is_proposed_is_enough(done, number, tmp_path, levers):
 
 
 def test_one_at_a_time(done, tmp_path):
-    few = ("--lever", "pump", "--lever", "orifice=0.8/1.5", "--maneuver", "step:9,stop=4,length=5")
+    few = (
+        "--variable",
+        "pump",
+        "--variable",
+        "orifice=0.8/1.5",
+        "--maneuver",
+        "step:9,stop=4,length=5",
+    )
     words = ("--outcome", "final_speed", "--plot", "t.png", "--out", "s.csv")
     text = done("sensitivity", "hoist", *few, *words)
     assert "final speed, 196.00 deg/s as it is" in text
     assert cells(text, "pump") == ["0.9", "1.1", "176.40", "215.60", "20.0", "%"]
-    assert "not moved by orifice" in text
+    assert "not changed by orifice" in text
     assert (tmp_path / "t.png").read_bytes().startswith(b"\x89PNG")
     table = pl.read_csv(tmp_path / "s.csv")
-    assert table["lever"].to_list() == ["pump", "orifice"]
+    assert table["design variable"].to_list() == ["pump", "orifice"]
     assert table["upper factor"].to_list() == [1.1, 1.5]
     assert table["at upper factor"][0] == pytest.approx(1.1 * table["as it is"][0], rel=1e-6)
 
@@ -130,7 +139,7 @@ def test_a_linear_model_and_its_notes(done, number):
     (line,) = [line for line in text.splitlines() if "±" in line]
     assert line.split() == ["rad/s", "-40.439", "±39.104", "8.953", "0.719"]
     assert number(text, "gain at 0.3 Hz") < number(text, "steady gain")
-    left_out = "Coulomb term C, which only motions below 0.01 A/s see, is left out"
+    left_out = "Coulomb term C is left out: it acts only on motions below 0.01 A/s"
     assert left_out in done("linearize", "slew", "--at", "2")
     text = done("linearize", "neutral", "--at", "0", "--set", "G1=0.03")
     assert "One-sided at the card at 0 V: the side of positive voltage." in text
@@ -153,7 +162,7 @@ def test_gain_and_phase_at_0_3_hz(done):
 
 def test_five_states_over_a_run(done, number, tmp_path):
     text = done("full-order", "hoist", "step:9", "--out", "run.parquet", "--plot", "run.png")
-    assert text.startswith("hoist, step 9 V, five states against one: 5121 samples at 512 Hz\n")
+    assert text.startswith("hoist, step 9 V, five states versus one: 5121 samples at 512 Hz\n")
     said = " ".join(text.split())
     assert "16 of 16 physical values are assumed, as of the packaged hoist" in said
     assert cells(text, "oil_volume") == ["200", "cm³", "assumed"]
@@ -189,7 +198,7 @@ def test_five_states_of_a_drive_of_one_s_own(done, tmp_path):
     lines = text.splitlines()
     assert lines[0].startswith("mine, step 4 V, five states")
     assert lines[1].startswith("Z15 (")
-    assert lines[2] == "Left out of both models, which do not know refinements: spool_friction."
+    assert lines[2] == "Neither model has refinements; these are left out: spool_friction."
     assert cells(text, "spool_mass") == ["10", "g", "assumed"]
     text = done("full-order", "hoist", "rest:2", "--set", "Z18=0")
     assert "The shaft does not move, so nothing can be said" in text

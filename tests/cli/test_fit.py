@@ -50,7 +50,7 @@ def test_a_campaign_becomes_a_drive(done, refused, campaign, tmp_path) -> None:
     said = done(*words, "--timing")
     (times,) = re.findall(r"^Time: +(.*)$", said, re.MULTILINE)
     parts = dict(each.removesuffix(" s").rsplit(" ", 1) for each in times.split(", "))
-    assert [*parts] == ["start and kernels", "reading", "search", "judging", "report"]
+    assert [*parts] == ["start and kernels", "reading", "search", "assessment", "report"]
     assert all(float(each) >= 0.0 for each in parts.values())
     assert said.index("Stage card") < said.index("Stage pump")
     fitted = Drive.from_toml(tmp_path / "fitted" / "drive.toml")
@@ -226,7 +226,7 @@ def test_one_fit_at_a_time_into_a_folder(refused: Words, virtual: Path, tmp_path
 
 def test_a_model_that_is_executed_says_so(run, virtual: Path, tmp_path: Path) -> None:
     page = re.sub(r"[\s│]+", " ", run("fit", "--help").stdout)
-    assert "The file is executed: name only one that you trust" in page
+    assert "The file is executed: use only one that you trust" in page
     (tmp_path / "ending.py").write_text("import sys\nsys.exit(7)\n")
     done = run("fit", CAMPAIGN, "--model", "ending.py")
     assert done.exit_code == 2
@@ -245,7 +245,7 @@ def test_a_drive_beside_the_runs_that_were_held_out(done, held_out, tmp_path) ->
     assert "hoist_step_4_V" not in said
     assert re.search(r"\ncurrent +\n.* mA ", said, re.DOTALL)
     assert re.search(r"\nspeed from counts +\n.* deg/s ", said, re.DOTALL)
-    assert "'of range' below means" in " ".join(said.split())
+    assert "'of range' below: over" in " ".join(said.split())
     assert "Usable: predicts speed from counts within 0." in said
     assert "Data: Not judged: a drive that was not fitted to these runs" in said
     assert "Values: " not in said
@@ -280,7 +280,7 @@ def test_validations_that_are_refused(refused: Words, held_out: Path) -> None:
     text = held_out.read_text("utf-8").replace('role = "validate"', 'role = "ignore"')
     held_out.write_text(text, "utf-8")
     said = refused("validate", "hoist", CAMPAIGN)
-    assert "no run of the axis 'hoist' has the role 'validate'; another" in said
+    assert "no run of the axis 'hoist' has the role 'validate'; select another" in said
 
 
 def test_the_command_and_python_write_the_same(done: Words, held_out: Path, tmp_path: Path) -> None:
@@ -329,7 +329,7 @@ def test_reports_that_are_refused(refused: Words, fitted: Fit, tmp_path: Path) -
     path = tmp_path / CAMPAIGN
     text = path.read_text("utf-8")
     path.write_text(text.replace("virtual = true", "virtual = false"), "utf-8")
-    assert "nobody knows its truth" in refused(*command, "--truth", "virtual/truth")
+    assert "its true parameters are unknown" in refused(*command, "--truth", "virtual/truth")
     path.write_text(text.replace('role = "fit"', 'role = "fit"\nweight = 2.0', 1), "utf-8")
     assert "is not as it was when fitted/fit.json was fitted" in refused(*command)
 

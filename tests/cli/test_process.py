@@ -76,9 +76,13 @@ def test_what_a_command_does_not_import(tmp_path, typed, without):
 @pytest.mark.parametrize(
     ("name", "value", "said"),
     [
-        ("SOURCE_DATE_EPOCH", "yesterday", "SOURCE_DATE_EPOCH is 'yesterday', no number of sec"),
-        ("NUMBA_NUM_THREADS", "abc", "Error: NUMBA_NUM_THREADS is 'abc', no number of threads"),
-        ("NUMBA_NUM_THREADS", "0", "Error: NUMBA_NUM_THREADS is '0', no number of threads"),
+        (
+            "SOURCE_DATE_EPOCH",
+            "yesterday",
+            "SOURCE_DATE_EPOCH is 'yesterday', which is not a number",
+        ),
+        ("NUMBA_NUM_THREADS", "abc", "Error: NUMBA_NUM_THREADS is 'abc', which is not a number"),
+        ("NUMBA_NUM_THREADS", "0", "Error: NUMBA_NUM_THREADS is '0', which is not a number"),
         ("MPLBACKEND", "no_such_backend", None),
     ],
 )
@@ -94,7 +98,7 @@ def test_the_surroundings(tmp_path, name, value, said):
 
 
 def test_a_folder_that_is_gone(tmp_path):
-    words = "import os, sys; os.rmdir(os.getcwd()); sys.argv = ['swashplate', 'axes']; "
+    words = "import os, sys; os.rmdir(os.getcwd()); sys.argv = ['swashplate', 'show']; "
     folder = tmp_path / "gone"
     folder.mkdir()
     done = python("-c", f"{words}from swashplate.cli import main; main()", cwd=folder)
@@ -102,12 +106,24 @@ def test_a_folder_that_is_gone(tmp_path):
     assert done.stderr == "Error: The current folder does not exist any more; go to another.\n"
 
 
-def test_a_broken_pipe_is_silent(tmp_path):
+@pytest.mark.parametrize(
+    "typed",
+    [
+        "show",
+        "show hoist --toml",
+        "simulate hoist step:9",
+        "--help",
+        "crane run --help",
+        "--version",
+    ],
+)
+def test_a_closed_pipe_is_silent(tmp_path, typed):
+    """Whoever prints: rich, typer's help, or the command itself."""
     reading, writing = os.pipe()
     os.close(reading)
     with os.fdopen(writing, "wb") as pipe:
         done = subprocess.run(
-            [sys.executable, "-m", "swashplate", "axes"],
+            [sys.executable, "-m", "swashplate", *typed.split()],
             cwd=tmp_path,
             stdout=pipe,
             stderr=subprocess.PIPE,
@@ -115,6 +131,36 @@ def test_a_broken_pipe_is_silent(tmp_path):
         )
     assert done.stderr == b""
     assert done.returncode == 141  # as a shell reports SIGPIPE; 1 is a verdict
+
+
+@pytest.mark.skipif(shutil.which("bash") is None, reason="there is no bash here")
+@pytest.mark.parametrize(
+    ("typed", "codes"),
+    [
+        ("simulate hoist step:9 | head -1", {0, 141}),  # 0 if all was written before it stopped
+        ("simulate hoist hop 2>&1 | true", {141}),
+    ],
+)
+def test_a_reader_that_stops_early(tmp_path, typed, codes):
+    """The error of a command, too, may have nobody who reads it."""
+    words = f"{shlex.quote(sys.executable)} -m swashplate {typed}; exit ${{PIPESTATUS[0]}}"
+    done = subprocess.run(["bash", "-c", words], cwd=tmp_path, capture_output=True, check=False)
+    assert done.returncode in codes
+    assert done.stderr == b""
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no full disk here")
+def test_a_full_disk_is_an_error(tmp_path):
+    with Path("/dev/full").open("wb") as full:
+        done = subprocess.run(
+            [sys.executable, "-m", "swashplate", "show"],
+            cwd=tmp_path,
+            stdout=full,
+            stderr=subprocess.PIPE,
+            check=False,
+        )
+    assert done.returncode == 2
+    assert done.stderr == b"Error: The output cannot be written: No space left on device.\n"
 
 
 def test_ctrl_c_leaves_whole_files_only(tmp_path):
@@ -215,6 +261,8 @@ def test_every_end_of_an_interval_is_whole(monkeypatch, capsys) -> None:
 GROUP = typer.main.get_group(app).commands
 COMMANDS = [*GROUP.values(), *GROUP["campaign"].commands.values()]
 COMMANDS = [each for each in COMMANDS if not hasattr(each, "commands")]
+OF_CRANES = [*GROUP["crane"].commands.values()]
+"""Their examples take minutes; tests/crane runs such commands."""
 INSTEAD = {
     "--starts 50": "--starts 1 --jobs 1",
     "--folds 5": "--folds 2 --jobs 1",
@@ -236,11 +284,11 @@ def examples() -> list[str]:
     return list(dict.fromkeys(found))
 
 
-@pytest.mark.parametrize("command", COMMANDS, ids=lambda each: str(each.name))
+@pytest.mark.parametrize("command", [*COMMANDS, *OF_CRANES], ids=lambda each: str(each.name))
 def test_each_command_has_an_example_and_short_lines(command):
     """Lines are kept as they are written, and a line has 78 characters between its margins."""
     assert max(map(len, command.help.splitlines())) <= 78
-    assert re.search(rf"swashplate (campaign )?{command.name}\b", command.epilog)
+    assert re.search(rf"swashplate (campaign |crane )?{command.name}\b", command.epilog)
 
 
 @pytest.fixture(scope="module")

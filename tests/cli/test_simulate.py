@@ -213,7 +213,7 @@ def test_two_axes(done, number):
 
 
 def test_drives_and_parameters_are_listed_in_80_columns(done):
-    text = done("axes")
+    text = done("show")
     for name in preset_names():
         assert f"\n{name} " in text
     assert "rexroth_mdsd_1k_2x_4" in text

@@ -97,7 +97,7 @@ def test_the_command_reads_a_log_with_its_units(tmp_path):
     assert float(period) == pytest.approx(8.27, abs=0.01)
     late = said(str(path), "--column", "angle", "--start", "150", "--stop", "500")
     assert late.exit_code == 2
-    assert "lasts from 0 to 169.9 s, but 150 to 500 s are asked for" in " ".join(
+    assert "lasts from 0 to 169.9 s, but 150 to 500 s are requested" in " ".join(
         late.stderr.split()
     )
     few = said(str(path), "--column", "angle", "--start", "20", "--stop", "40")

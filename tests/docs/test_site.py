@@ -17,7 +17,7 @@ import typer.main
 
 import swashplate
 from swashplate import Limit
-from swashplate.analysis import LEVERS, OUTCOMES
+from swashplate.analysis import DESIGN_VARIABLES, OUTCOMES
 from swashplate.campaign import CHANNEL_KINDS
 from swashplate.cli import app
 from swashplate.logs import SUFFIXES
@@ -127,7 +127,7 @@ def test_the_tables_of_the_nomenclature_are_those_of_the_definitions(scripts: Mo
         assert page.count(f"\n| {definition.symbol} | {definition.name} |") == 1
 
 
-BOTH_WAYS = [name for name in LEVERS if not name.endswith(("_plus", "_minus"))]
+BOTH_WAYS = [name for name in DESIGN_VARIABLES if not name.endswith(("_plus", "_minus"))]
 
 
 @pytest.mark.parametrize(

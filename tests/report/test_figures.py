@@ -26,7 +26,7 @@ from swashplate.analysis import (
     inverse_map,
     limit_shares,
     one_at_a_time,
-    trial,
+    trial_of,
     what_if,
 )
 from swashplate.equations import Definition, Model, Run, discretised, equation, simulate
@@ -126,13 +126,13 @@ def test_names_are_drawn_as_they_are(tmp_path: Path, format: str) -> None:
         ElementTree.parse(tmp_path / "a.svg")
 
 
-LEVERS = ("orifice", "pump", "relief")
+VARIABLES = ("orifice", "pump", "relief")
 DEGREE = 180.0 / np.pi
 
 
 @pytest.fixture(scope="module")
 def task(hoist: Drive) -> Trial:
-    return trial(hoist, maneuvers.step(9.0, stop=4.0, length=5.0).sample())
+    return trial_of(hoist, maneuvers.step(9.0, stop=4.0, length=5.0).sample())
 
 
 @pytest.fixture(scope="module")
@@ -144,9 +144,9 @@ def made(hoist: Drive, step: Simulation, all_limits: Simulation, task: Trial) ->
     band = bands(drawn, task)
     changed = what_if(hoist, {"orifice": 1.5, "pump": 1.5}, task)
     outcomes = ("final_speed", "rise_time", "overshoot")
-    one = one_at_a_time(hoist, dict.fromkeys(LEVERS, (0.9, 1.1)), task, outcomes=outcomes)
+    one = one_at_a_time(hoist, dict.fromkeys(VARIABLES, (0.9, 1.1)), task, outcomes=outcomes)
     inverse = inverse_map(luff)
-    wanted = 0.5 * np.sin(task.time)
+    reference = 0.5 * np.sin(task.time)
     current = hoist.simulate_current(0.5 * np.sin(np.arange(2000) / 300.0))
     loaded = FullOrderDrive.preset("hoist").replace(load_torque=2e3)
     both = compare(loaded, loaded.drive.simulate(maneuvers.step(9.0, length=8.0).sample()))
@@ -164,7 +164,7 @@ def made(hoist: Drive, step: Simulation, all_limits: Simulation, task: Trial) ->
         "whatif": figures.plot_whatif(changed, bands={"as it is": band}),
         "tornado": figures.plot_tornado(one),
         "map": figures.plot_compensation(inverse),
-        "improvement": figures.plot_compensation(inverse, improvement(luff, wanted)),
+        "improvement": figures.plot_compensation(inverse, improvement(luff, reference)),
         "bode": figures.plot_bode(response, linear=hoist.linearize(4.0)),
     }
 
@@ -283,7 +283,7 @@ def test_the_timeline_has_a_row_for_each_limit(made, all_limits) -> None:
     share = 100.0 * np.mean(all_limits.active(Limit.ORIFICE))
     assert f"{share:.1f} %" in [text.get_text() for text in rows.texts]
     with pytest.raises(InputError, match="the run has"):
-        figures.plot_limit_timeline(all_limits, wanted=[0.0])
+        figures.plot_limit_timeline(all_limits, reference=[0.0])
 
 
 def test_the_timeline_and_the_table_agree_on_the_dead_zone(hoist: Drive, step: Simulation) -> None:
@@ -300,7 +300,7 @@ def test_speeds_before_and_after(made: dict[str, Figure]) -> None:
     figure = made["whatif"]
     tops = sorted(float(each.max()) for each in lines(figure, 1))
     assert tops[-1] == pytest.approx(294.0, abs=0.05)
-    names = ["as it is", "orifice x 1.5", "pump x 1.5", "changed", "wanted"]
+    names = ["as it is", "orifice x 1.5", "pump x 1.5", "changed", "reference"]
     assert legend(figure) == names
     assert labels(figure)[3] == "about the median (deg/s)"
 
@@ -317,7 +317,7 @@ def test_the_strongest_lever_is_at_the_top(made: dict[str, Figure]) -> None:
         assert ax.get_xlabel() == f"{outcome} ({number.split()[1]})"
         base = ax.lines[-1].get_xdata()[0]
         assert float(number.split()[0]) == pytest.approx(base, abs=0.005)
-    assert "no lever moves it" in [text.get_text() for text in still.texts]
+    assert "no design variable changes it" in [text.get_text() for text in still.texts]
 
 
 def test_lines_of_a_sweep_are_the_response(made: dict[str, Figure], hoist: Drive) -> None:

@@ -1,7 +1,7 @@
 from .capability import AcceleratedBy as AcceleratedBy
 from .capability import AccelerationCurve as AccelerationCurve
+from .capability import DirectionLimits as DirectionLimits
 from .capability import Envelope as Envelope
-from .capability import Way as Way
 from .capability import acceleration_curve as acceleration_curve
 from .capability import dead_zone as dead_zone
 from .capability import envelope as envelope
@@ -12,7 +12,12 @@ from .compensation import InverseMap as InverseMap
 from .compensation import improvement as improvement
 from .compensation import inverse_map as inverse_map
 from .compensation import proportional_command as proportional_command
-from .compensation import wanted_of_stick as wanted_of_stick
+from .compensation import speed_of_command as speed_of_command
+from .design_variables import DESIGN_VARIABLES as DESIGN_VARIABLES
+from .design_variables import DesignVariable as DesignVariable
+from .design_variables import FactorRange as FactorRange
+from .design_variables import powers_of as powers_of
+from .design_variables import with_factors as with_factors
 from .limits import LimitShare as LimitShare
 from .limits import LimitShares as LimitShares
 from .limits import limit_shares as limit_shares
@@ -22,7 +27,7 @@ from .monte_carlo import Draws as Draws
 from .monte_carlo import assumed_parameters as assumed_parameters
 from .monte_carlo import bands as bands
 from .monte_carlo import changes_left_open as changes_left_open
-from .monte_carlo import drives as drives
+from .monte_carlo import drawn_drives as drawn_drives
 from .monte_carlo import standard_errors as standard_errors
 from .monte_carlo import stored_draws as stored_draws
 from .monte_carlo import variances_from_bounds as variances_from_bounds
@@ -33,8 +38,8 @@ from .outcomes import find_outcomes as find_outcomes
 from .outcomes import outcome_matrix as outcome_matrix
 from .outcomes import proportional_speed as proportional_speed
 from .outcomes import speed_per_volt as speed_per_volt
-from .outcomes import trial as trial
-from .sizing import WIDEST as WIDEST
+from .outcomes import trial_of as trial_of
+from .sizing import DEFAULT_RANGE as DEFAULT_RANGE
 from .sizing import Performance as Performance
 from .sizing import Requirements as Requirements
 from .sizing import Sizing as Sizing
@@ -43,11 +48,7 @@ from .sizing import size as size
 from .sizing import smallest_change as smallest_change
 from .whatif import AS_IS as AS_IS
 from .whatif import CHANGED as CHANGED
-from .whatif import LEVERS as LEVERS
 from .whatif import OneAtATime as OneAtATime
-from .whatif import Range as Range
 from .whatif import WhatIf as WhatIf
-from .whatif import find_lever as find_lever
 from .whatif import one_at_a_time as one_at_a_time
-from .whatif import pulled as pulled
 from .whatif import what_if as what_if

@@ -1,11 +1,11 @@
-"""Envelope of a drive: what it can do each way, and the largest acceleration at every speed."""
+"""Envelope of a drive: what it can do in each direction, and its largest accelerations."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, fields, replace
 from math import atan, inf
-from typing import TYPE_CHECKING, Any, Literal, cast, get_args, overload
+from typing import TYPE_CHECKING, Any, Literal, cast, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,18 +31,20 @@ Array = NDArray[np.float64]
 
 # --- steady edges ---------------------------------------------------------------------------------
 
-GRID = 200  # Parts into which an interval is cut at each refinement.
-CLOSE = 1e-12  # Width at which an edge counts as found. [V]
+GRID = 200
+"""Parts into which an interval is cut at each refinement."""
+CLOSE = 1e-12
+"""Width at which an edge counts as found. [V]"""
 NEARLY_FULL = (1.0 - 1e-9) * FULL_VOLTAGE
-"""An edge beyond is none: the speed grows up to full voltage. [V]"""
+"""An edge beyond is not one: the speed grows up to full voltage. [V]"""
 
 
 def edge(holds: Callable[[Array], NDArray[np.bool_]], end: float) -> tuple[float, float | None]:
     """The last command on the way from 0 V to `end` [V] before something first fails to hold. [V]
 
     `holds` says of commands [V], element by element, whether it does. Both sides of the edge, at
-    most 1e-12 V apart: the one inside, 0 V where it does not even hold there, and the one outside,
-    None where it holds up to the end.
+    most 1e-12 V apart: the one inside, 0 V if it does not even hold there, and the one outside,
+    None if it holds up to the end.
     """
     low, high = 0.0, end
     if holds(np.linspace(low, high, GRID + 1)).all():
@@ -57,19 +59,22 @@ def edge(holds: Callable[[Array], NDArray[np.bool_]], end: float) -> tuple[float
     return low, high
 
 
-def dead_zone(drive: Drive, way: float) -> tuple[float, float | None]:
-    """Commands of one way, +1 or -1, up to which the current stays within Z17 and no force acts.
+def dead_zone(drive: Drive, direction: float) -> tuple[float, float | None]:
+    """Commands of one direction, +1 or -1, up to which the current stays within Z17.
 
-    The last one [V], and the first one beyond [V], None where there is none up to ±10 V.
+    The last one [V], and the first one beyond [V] under which a force acts, None if there is none
+    up to ±10 V.
     """
     dead = drive.parameters.numbers["Z17"]
-    return edge(lambda volts: np.abs(drive.steady_current(volts)) <= dead, way * FULL_VOLTAGE)
+    return edge(lambda volts: np.abs(drive.steady_current(volts)) <= dead, direction * FULL_VOLTAGE)
 
 
-def saturation(drive: Drive, way: float) -> float | None:
-    """Command beyond which the steady speed stays as it is, None where it grows up to ±10 V. [V]"""
-    full = drive.steady_speed(way * FULL_VOLTAGE)
-    inside, outside = edge(lambda volts: drive.steady_speed(volts) != full, way * FULL_VOLTAGE)
+def saturation(drive: Drive, direction: float) -> float | None:
+    """Command beyond which the steady speed stays as it is, None if it grows up to ±10 V. [V]"""
+    full = drive.steady_speed(direction * FULL_VOLTAGE)
+    inside, outside = edge(
+        lambda volts: drive.steady_speed(volts) != full, direction * FULL_VOLTAGE
+    )
     return None if abs(inside) > NEARLY_FULL else outside
 
 
@@ -78,7 +83,8 @@ def saturation(drive: Drive, way: float) -> float | None:
 FEEDBACK_ARM = 0.98
 """Sine of the feedback arm's angle at which a plate without a stop is still held: at 1 the closed
 form of the spool ends."""
-WIDEST = 1.5  # Largest angle of a plate without a stop; the model ends at a right angle. [rad]
+WIDEST = 1.5
+"""Largest angle of a plate without a stop; the model ends at a right angle. [rad]"""
 
 
 def farthest_stop(drive: Drive) -> float:
@@ -89,8 +95,10 @@ def farthest_stop(drive: Drive) -> float:
 def without_limits(drive: Drive, columns: Iterable[str]) -> Drive:
     """A drive whose limits of these columns lie as far as its model can take."""
     numbers = drive.parameters.numbers
-    far = {column: farthest_stop(drive) if column.startswith("Z13") else inf for column in columns}
-    limits = {column: max(value, numbers[column]) for column, value in far.items()}
+    limits = {}
+    for column in columns:
+        farthest = farthest_stop(drive) if column.startswith("Z13") else inf
+        limits[column] = max(farthest, numbers[column])
     return Drive(drive.parameters.with_numbers(limits))
 
 
@@ -100,7 +108,8 @@ AcceleratedBy = Literal["valve", "spool stop", "orifice"]
 """What sets the flow to the stroking piston: the opening that the solenoids can give, the spool's
 stop Z14, or the in-line orifice Z16."""
 
-INSIDE = 1e-9  # Part of the range of pressure by which a curve ends before it.
+INSIDE = 1e-9
+"""Share of the range of pressure by which a curve ends before it. [1]"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,11 +142,16 @@ def acceleration_curve(drive: Drive, voltage: float, points: int = 201) -> Accel
     AccelerationCurve
         The ends lie a hair's breadth inside, where the plate still moves.
     """
-    instance, ends = instance_of(drive.parameters, False), (-FULL_VOLTAGE, FULL_VOLTAGE)
-    at = ({"current": drive.steady_current(each)} for each in ends)
-    low, high = (instance.start(each, 1.0, "steady").states[1].pressure for each in at)
+    low, high = (_settled_pressure(drive, end) for end in (-FULL_VOLTAGE, FULL_VOLTAGE))
     inside = INSIDE * (high - low)
     return _curve(drive, voltage, np.linspace(low + inside, high - inside, points))
+
+
+def _settled_pressure(drive: Drive, voltage: float) -> float:
+    """Stroking pressure that a command settles at. [Pa]"""
+    pump = instance_of(drive.parameters, False)
+    started = pump.start({"current": drive.steady_current(voltage)}, 1.0, "steady")
+    return float(started.states[1].pressure)
 
 
 def speed_limits(drive: Drive) -> tuple[float, float]:
@@ -149,14 +163,14 @@ def speed_limits(drive: Drive) -> tuple[float, float]:
     return float(low), float(high)
 
 
-def starting_acceleration(drive: Drive, way: float) -> tuple[float, AcceleratedBy]:
+def starting_acceleration(drive: Drive, direction: float) -> tuple[float, AcceleratedBy]:
     """Acceleration of the plate upright under the full command, and what sets it. [rad/s²]
 
-    Z10 Z1 Z8 √(Z9/2) x/(1 + Z6) without offset and leakage, x = Z16 where the orifice limits
-    (Kruse 2001, eqs. 6.67 to 6.71).
+    Z10 Z1 Z8 √(Z9/2) x/(1 + Z6) without offset and leakage, x = Z16 if the orifice limits (Kruse
+    2001, eqs. 6.67 to 6.71).
     """
     numbers = drive.parameters.numbers
-    curve = _curve(drive, way * FULL_VOLTAGE, np.array([numbers["Z2"] / numbers["Z1"]]))
+    curve = _curve(drive, direction * FULL_VOLTAGE, np.array([numbers["Z2"] / numbers["Z1"]]))
     return float(curve.acceleration[0]), curve.by[0]
 
 
@@ -173,22 +187,28 @@ def _curve(drive: Drive, voltage: float, pressure: Array) -> AccelerationCurve:
     forms = PumpOptions(symmetric=options.symmetric, steep=options.steep, leakage=leaks)
     still = Part(p._replace(Z12=0.0, load_inertia=0.0), forms)
     instance = Instance(instance.model, (front, still), instance.name)
-    known = instance.start({"current": drive.steady_current(voltage)}, 1.0).arguments[1]
+    arguments = instance.start({"current": drive.steady_current(voltage)}, 1.0).arguments[1]
     pump: Any = instance.model.parts[1]
-    found = [
-        called(pump, pump.sample, {**known, "state": PumpState(each)}) for each in pressure.tolist()
+    samples = [
+        called(pump, pump.sample, {**arguments, "state": PumpState(state)})
+        for state in pressure.tolist()
     ]
-    speed, rate, free = np.array([(s.shaft_speed, s.swash_rate, s.spool_free) for s in found]).T
-    orifice = np.where(free > 0.0, p.Z16_plus, p.Z16_minus)
-    limited = np.minimum(np.abs(free), p.Z14) > orifice
-    code, words = np.where(limited, 2, np.abs(free) > p.Z14), get_args(AcceleratedBy)
-    return AccelerationCurve(speed, p.Z10 * rate, tuple(words[each] for each in code))
+    speed = np.array([sample.shaft_speed for sample in samples])
+    swash_rate = np.array([sample.swash_rate for sample in samples])
+    spool = np.array([sample.spool_free for sample in samples])
+    orifice = np.where(spool > 0.0, p.Z16_plus, p.Z16_minus)
+    by_orifice = np.minimum(np.abs(spool), p.Z14) > orifice
+    by_stop = np.abs(spool) > p.Z14
+    causes = np.select([by_orifice, by_stop], ["orifice", "spool stop"], "valve")
+    return AccelerationCurve(speed, p.Z10 * swash_rate, tuple(causes.tolist()))
 
 
 # --- envelope -------------------------------------------------------------------------------------
 
-GAIN_POINTS = 401  # Commands between dead zone and saturation at which the gain is taken.
-LOW, HIGH = 0.1, 0.9  # Parts of the change of speed between which a rise time counts.
+GAIN_POINTS = 401
+"""Commands between dead zone and saturation at which the gain is taken."""
+LOW, HIGH = 0.1, 0.9
+"""Shares of the change of speed between which a rise time counts. [1]"""
 DECIDES = 0.01
 """Share of a number that a limit must be able to change to decide it. [1]"""
 SHORTEST, LONGEST = 8.0, 256.0
@@ -196,13 +216,13 @@ SHORTEST, LONGEST = 8.0, 256.0
 
 
 def _row(words: str, unit: str, spec: str = "") -> Any:
-    """A field that is a row of the table: in words, its unit and format; None unless known."""
+    """A field that is a row of the table: its words, unit and format. None if it is not known."""
     return field(default=None, metadata={"row": (words, unit, spec)})
 
 
 @dataclass(frozen=True)
-class Way(Result):
-    """What a drive can do one way; everything carries that way's sign, gains are positive. SI."""
+class DirectionLimits(Result):
+    """What a drive can do in one direction, SI, with its sign; gains are positive."""
 
     accelerated_by: AcceleratedBy  # What sets the acceleration at rest.
     dead_zone: float = _row("dead zone up to", "V")  # Largest command that moves nothing.
@@ -213,16 +233,22 @@ class Way(Result):
     smallest_gain: float | None = _row("gain, smallest", "rad/s/V")
     largest_gain: float | None = _row("gain, largest", "rad/s/V")
     saturation_voltage: float | None = _row("saturation voltage", "V", ".2f")
-    """Command beyond which the speed stays; None where it grows up to ±10 V."""
+    """Command beyond which the speed stays; None if it grows up to ±10 V."""
     top_speed: float = _row("speed at full voltage", "rad/s")  # Steady, at ±10 V.
     speed_limit: float = _row("speed limit", "rad/s")
     """Speed with the swash plate at its stop, or where Z15 holds the pressure."""
     acceleration: float = _row("acceleration at rest", "rad/s^2", "z.2f")  # Under ±10 V.
     starting_rise: float | None = _row("starting, 10 to 90 %", "s")
-    """Of a step to ±10 V from rest, as the reach; None where nothing moves."""
-    starting_reach: float | None = _row("starting, to 90 %", "s")  # From the command on.
-    stopping_rise: float | None = _row("stopping, 10 to 90 %", "s")  # Once the command is gone.
+    """Time from 10 % to 90 % of a step to ±10 V from rest; None if nothing moves."""
+    starting_reach: float | None = _row("starting, to 90 %", "s")
+    """Time from that command to 90 %."""
+    stopping_rise: float | None = _row("stopping, 10 to 90 %", "s")
+    """The same two when the command goes back to 0 V."""
     stopping_reach: float | None = _row("stopping, to 90 %", "s")
+
+
+PLUS, MINUS = 0, 1
+"""Index of a direction in pairs."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -233,68 +259,75 @@ class Envelope(Tabular):
     """Name of the drive."""
     creep: float
     """Steady speed at 0 V. [rad/s]"""
-    plus: Way
-    minus: Way
+    plus: DirectionLimits
+    minus: DirectionLimits
     accelerating: tuple[AccelerationCurve, AccelerationCurve]
     """Largest acceleration over the speed under +10 V and -10 V."""
     released: AccelerationCurve
     """Acceleration over the speed with the stick let go."""
-    nearest: tuple[Way, Way] | None = None
-    """Both ways if limits that no test reached lie where the tests ended; None without such."""
-    farthest: tuple[Way, Way] | None = None
-    """Both ways if there are no such limits."""
+    nearest: tuple[DirectionLimits, DirectionLimits] | None = None
+    """Both directions if limits that no test reached lie where the tests ended; None without
+    such limits."""
+    farthest: tuple[DirectionLimits, DirectionLimits] | None = None
+    """Both directions if there are no such limits."""
     orifice_unknown: tuple[bool, bool] = (False, False)
-    """Whether it is not known how far the tests opened the orifice of a way."""
+    """Whether it is not known how far the tests opened the orifice of a direction."""
 
     def table(self) -> Table:
-        """Dead zone, gains, limits and times of both ways."""
-        ways = {"plus": "positive", "minus": "negative"}
-        heads = (Column(words, "z.3f", none="none", key=key) for key, words in ways.items())
-        made = Table("", (Column("Envelope", key="quantity"), *heads, UNIT))
-        for each in fields(Way):
-            if "row" in each.metadata:
-                words, unit, spec = each.metadata["row"]
-                cells = (self._cell(each.name, way, unit) for way in (0, 1))
-                made.add(Cell(each.name, words), *cells, unit=unit, spec=spec)
-            if each.name == "acceleration":
-                by = (self._accelerated_by(way) for way in (0, 1))
-                made.add(Cell("accelerated_by", "... set by the"), *by)
-        both = self.creep, Cell(self.creep, "")
-        made.add(Cell("creep", "creep at 0 V"), *both, unit="rad/s", section=True)
-        return made
+        """Dead zone, gains, limits and times of both directions."""
+        columns = (
+            Column("Envelope", key="quantity"),
+            Column("positive", "z.3f", none="none", key="plus"),
+            Column("negative", "z.3f", none="none", key="minus"),
+            UNIT,
+        )
+        table = Table("", columns)
+        for quantity in fields(DirectionLimits):
+            name = quantity.name
+            if "row" in quantity.metadata:
+                words, unit, spec = quantity.metadata["row"]
+                cells = (self._cell(name, index, unit) for index in (PLUS, MINUS))
+                table.add(Cell(name, words), *cells, unit=unit, spec=spec)
+            if name == "acceleration":
+                causes = (self._accelerated_by(index) for index in (PLUS, MINUS))
+                table.add(Cell("accelerated_by", "... set by the"), *causes)
+        creep = Cell("creep", "creep at 0 V")
+        table.add(creep, self.creep, Cell(self.creep, ""), unit="rad/s", section=True)
+        return table
 
-    def _open(self, name: str, way: int) -> tuple[float | None, float | None] | None:
+    def _open(self, name: str, index: int) -> tuple[float | None, float | None] | None:
         """A number by its nearest and farthest limits, if those that no test reached decide it."""
         if self.nearest is None or self.farthest is None:
             return None
-        near, far = getattr(self.nearest[way], name), getattr(self.farthest[way], name)
+        near = getattr(self.nearest[index], name)
+        far = getattr(self.farthest[index], name)
         if near is None or far is None:
             return None if near is far else (near, far)
         return (near, far) if abs(far - near) > DECIDES * abs(near) else None
 
-    def _cell(self, name: str, way: int, unit: str) -> float | Cell | None:
+    def _cell(self, name: str, index: int, unit: str) -> float | Cell | None:
         """A number, or the end that is known of it."""
-        ends = self._open(name, way)
+        ends = self._open(name, index)
         if ends is None:
-            value: float | None = getattr((self.plus, self.minus)[way], name)
+            value: float | None = getattr((self.plus, self.minus)[index], name)
             return value
         near, far = ends
-        if near is None or far is None or self._reach_unknown(way, name):
+        if near is None or far is None or self._orifice_decides(index, name):
             return Cell(None, "not seen")
         words = "at least" if abs(far) > abs(near) else "at most"
         return Cell(near, f"{words} {plain(display_unit(unit).factor * near, 4)}, not seen")
 
-    def _reach_unknown(self, way: int, name: str) -> bool:
-        """Whether the tests do not tell how far an orifice, which decides a number, was opened."""
-        return self.orifice_unknown[way] and name.startswith(("acceleration", "start", "stop"))
+    def _orifice_decides(self, index: int, name: str) -> bool:
+        """Whether a number follows from an orifice whose largest opening the tests do not show."""
+        return self.orifice_unknown[index] and name.startswith(("acceleration", "start", "stop"))
 
-    def _accelerated_by(self, way: int) -> Cell:
-        if self._open("acceleration", way) is not None:
+    def _accelerated_by(self, index: int) -> Cell:
+        if self._open("acceleration", index) is not None:
             return Cell(None, "not seen")
-        return Cell(None, (self.plus, self.minus)[way].accelerated_by)
+        return Cell(None, (self.plus, self.minus)[index].accelerated_by)
 
     def to_polars(self) -> polars.DataFrame:
-        """Table in SI: ``quantity``, ``plus``, ``minus``, ``unit``; null where there is none."""
+        """Table in SI: ``quantity``, ``plus``, ``minus``, ``unit``; null if there is none."""
         import polars as pl
 
         return self.table().to_polars().filter(pl.col("unit") != "")
@@ -317,28 +350,33 @@ class Envelope(Tabular):
 
 
 def envelope(drive: Drive) -> Envelope:
-    """What a drive can do each way.
+    """What a drive can do in each direction.
 
     Dead zone, creep and gains of the steady map, limits of speed and acceleration, and the times
     of a full step, which are those of a simulation. Of a drive that was fitted or guessed, a number
     that a limit decides which no test reached has one end, or none.
     """
-    up, down, released = (
-        acceleration_curve(drive, volts) for volts in (FULL_VOLTAGE, -FULL_VOLTAGE, 0.0)
+    plus, minus = _both_directions(drive)
+    capability = Envelope(
+        name=drive.name,
+        creep=float(drive.steady_speed(0.0)),
+        plus=plus,
+        minus=minus,
+        accelerating=(
+            acceleration_curve(drive, FULL_VOLTAGE),
+            acceleration_curve(drive, -FULL_VOLTAGE),
+        ),
+        released=acceleration_curve(drive, 0.0),
     )
-    ways = _both_ways(drive)
-    creep = float(drive.steady_speed(0.0))
-    found = Envelope(drive.name, creep, *ways, (up, down), released)
     unreached = drive.parameters.unreached
     if not unreached:
-        return found
-    reached = {column: value for column, value in unreached.items() if value}
-    nearest = Drive(drive.parameters.with_numbers(reached))
-    farthest = without_limits(drive, unreached)
+        return capability
+    where_tests_ended = {column: value for column, value in unreached.items() if value}
+    nearest = Drive(drive.parameters.with_numbers(where_tests_ended))
     return replace(
-        found,
-        nearest=_both_ways(nearest),
-        farthest=_both_ways(farthest),
+        capability,
+        nearest=_both_directions(nearest),
+        farthest=_both_directions(without_limits(drive, unreached)),
         orifice_unknown=(
             unreached.get("Z16_plus") == 0.0,
             unreached.get("Z16_minus") == 0.0,
@@ -346,45 +384,53 @@ def envelope(drive: Drive) -> Envelope:
     )
 
 
-def _both_ways(drive: Drive) -> tuple[Way, Way]:
+def _both_directions(drive: Drive) -> tuple[DirectionLimits, DirectionLimits]:
     low, high = speed_limits(drive)
-    return _way(drive, 1.0, high), _way(drive, -1.0, low)
+    return _limits_of(drive, 1.0, high), _limits_of(drive, -1.0, low)
 
 
-def _way(drive: Drive, way: float, limit: float) -> Way:
-    (inside, outside), full = dead_zone(drive, way), way * FULL_VOLTAGE
-    acceleration, by = starting_acceleration(drive, way)
+def _limits_of(drive: Drive, direction: float, speed_limit: float) -> DirectionLimits:
+    inside, outside = dead_zone(drive, direction)
+    full = direction * FULL_VOLTAGE
+    acceleration, accelerated_by = starting_acceleration(drive, direction)
     top = float(drive.steady_speed(full))
-    found: dict[str, Any] = {
+    limits: dict[str, Any] = {
+        "accelerated_by": accelerated_by,
+        "acceleration": acceleration,
         "dead_zone": inside,
         "smallest_speed": top,
         "top_speed": top,
-        "speed_limit": limit,
+        "speed_limit": speed_limit,
     }
-    if outside is not None:  # else no command moves it
-        found["saturation_voltage"] = saturated = saturation(drive, way)
-        volts = np.linspace(outside, full if saturated is None else saturated, GAIN_POINTS)
-        speeds = drive.steady_speed(volts)
-        slopes = np.diff(speeds) / np.diff(volts)
-        found["smallest_speed"] = float(speeds[0])
-        found["gain"] = float((speeds[-1] - speeds[0]) / (volts[-1] - volts[0]))
-        found["smallest_gain"], found["largest_gain"] = float(slopes.min()), float(slopes.max())
-        for name, step in (("starting", (0.0, full)), ("stopping", (full, 0.0))):
-            found[f"{name}_rise"], found[f"{name}_reach"] = _times(drive, *step)
-    return Way(by, acceleration=acceleration, **found)
+    if outside is None:  # no command moves it
+        return DirectionLimits(**limits)
+    saturated = saturation(drive, direction)
+    volts = np.linspace(outside, full if saturated is None else saturated, GAIN_POINTS)
+    speeds = drive.steady_speed(volts)
+    slopes = np.diff(speeds) / np.diff(volts)
+    limits["saturation_voltage"] = saturated
+    limits["smallest_speed"] = float(speeds[0])
+    limits["gain"] = float((speeds[-1] - speeds[0]) / (volts[-1] - volts[0]))
+    limits["smallest_gain"] = float(slopes.min())
+    limits["largest_gain"] = float(slopes.max())
+    limits["starting_rise"], limits["starting_reach"] = _times(drive, 0.0, full)
+    limits["stopping_rise"], limits["stopping_reach"] = _times(drive, full, 0.0)
+    return DirectionLimits(**limits)
 
 
 def _times(drive: Drive, before: float, after: float) -> tuple[float | None, float | None]:
     """Times from 10 % to 90 % and to 90 % of a step between two settled commands. [s]"""
-    first, last = (float(drive.steady_speed(volts)) for volts in (before, after))
+    first = float(drive.steady_speed(before))
+    last = float(drive.steady_speed(after))
     length = SHORTEST
     while first != last and length <= LONGEST:
         command = np.full(int(length * SOURCE_RATE) + 1, after)
         command[0] = before
         run = drive.simulate(command, start="steady")
-        done = (run.shaft_speed - first) / (last - first)
-        if done.max() >= HIGH:
-            low, high = (float(run.time[np.argmax(done >= part)]) for part in (LOW, HIGH))
+        progress = (run.shaft_speed - first) / (last - first)
+        if progress.max() >= HIGH:
+            low = float(run.time[np.argmax(progress >= LOW)])
+            high = float(run.time[np.argmax(progress >= HIGH)])
             return high - low, high
         length *= 2.0
     return None, None

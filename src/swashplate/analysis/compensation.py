@@ -39,20 +39,22 @@ Array = NDArray[np.float64]
 
 # --- the map --------------------------------------------------------------------------------------
 
-FEWEST, MOST = 2, 10_001  # Points each way.
-MOST_SHOWN = 5  # Points each way in a table.
+FEWEST, MOST = 2, 10_001
+"""Points in each direction that a map may have."""
+MOST_SHOWN = 5
+"""Points in each direction that a table shows."""
 INVERSE_MAP = Form("an inverse map", (".toml", ".csv", ".parquet"))
 COMMENTS = """\
-# swashplate inverse steady-state map: the voltage for a wanted speed; SI units
+# swashplate inverse steady-state map: the voltage for a reference speed; SI units
 # plus and minus: straight lines between the points; beyond their ends hold the end
 # between minus and plus: the nearest of minus' last point, rest and plus' first point
 """
 ROUNDING = 1e-9
-"""Part of the range of speeds by which a wanted one may exceed it and still count as the limit."""
+"""Part of the range of speeds by which a reference may exceed it and still count as the limit."""
 
 
-class Branch(NamedTuple):
-    """One way's part of the map, both rising, straight lines between the points."""
+class MapBranch(NamedTuple):
+    """The map in one direction: both rise, with straight lines between the points."""
 
     def __repr__(self) -> str:
         return short(self)
@@ -63,27 +65,27 @@ class Branch(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class InverseMap(Result):
-    """Voltage for a wanted speed; positive voltage and positive speed go together.
+    """Voltage for a reference speed; positive voltage and positive speed go together.
 
     Between the slowest speeds that can be held each way there is nothing but the creep at 0 V. A
-    wanted speed in this gap gets whichever of the three is nearest, 0 V if two are.
+    reference speed in this gap gets whichever of the three is nearest, 0 V if two are.
     """
 
     name: str
     """Name of the drive."""
-    minus: Branch
+    minus: MapBranch
     """From the speed limit to the dead zone's edge."""
-    plus: Branch
+    plus: MapBranch
     """From the dead zone's edge to the speed limit."""
     creep: float
     """Speed at 0 V. [rad/s]"""
     acceleration: tuple[float, float]
-    """Largest acceleration from rest, plus and minus, magnitudes. A wanted speed that changes
+    """Largest acceleration from rest, plus and minus, magnitudes. A reference speed that changes
     faster is not followed, whatever the voltage. [rad/s²]"""
     lag: float
     """Time by which the speed follows a slow change of the command, see `command`. [s]"""
     error: float
-    """Largest error of the straight lines: steady speed less wanted speed half way between two
+    """Largest error of the straight lines: steady speed less reference speed half way between two
     points. [rad/s]"""
 
     @property
@@ -115,7 +117,7 @@ class InverseMap(Result):
         ax: Axes | Sequence[Axes] | None = None,
         title: str | None = None,
     ) -> Figure | Axes | Sequence[Axes]:
-        """Figure of the voltage over the wanted speed, with a close-up at standstill.
+        """Figure of the voltage over the reference speed, with a close-up at standstill.
 
         By default a new figure, with the runs of an `improvement` below; with `ax` the map is drawn
         there, in a second one its close-up, and `ax` returned. See
@@ -125,64 +127,68 @@ class InverseMap(Result):
         return cast("Figure", draw(self, improvement, ax=ax, title=title))
 
     def voltage(self, speed: ArrayLike, *, clip: bool = False) -> Array:
-        """Voltage for wanted speeds, element by element; it never falls where the speed rises.
+        """Voltage for reference speeds, element by element; it never falls where the speed rises.
 
-        Wanted speeds of any shape [rad/s]; one beyond the limits is refused in an `InputError`, as
-        is one that is no finite number, or with `clip` the limit is taken. [V]
+        Reference speeds of any shape [rad/s]. One beyond the limits is refused in an `InputError`,
+        as is one that is not finite; with `clip` the limit is taken. [V]
         """
         try:
-            wanted = np.asarray(speed, dtype=np.float64)
+            reference = np.asarray(speed, dtype=np.float64)
         except (TypeError, ValueError):
             raise InputError(
-                "The wanted speed must be a number or a sequence of numbers."
+                "The reference speed must be a number or a sequence of numbers."
             ) from None
-        if not np.isfinite(wanted).all():
-            raise InputError("The wanted speed must be finite everywhere.")
-        (low, high), (below, above) = self.limits, self.gap
-        inside, slack = np.clip(wanted, low, high), ROUNDING * (high - low)
-        beyond = wanted[np.abs(wanted - inside) > slack]
+        if not np.isfinite(reference).all():
+            raise InputError("The reference speed must be finite everywhere.")
+        low, high = self.limits
+        below, above = self.gap
+        inside = np.clip(reference, low, high)
+        beyond = reference[np.abs(reference - inside) > ROUNDING * (high - low)]
         if beyond.size and not clip:
-            worst, least, most = (
-                quantity(float(each), "rad/s", spec=".6g")
-                for each in (beyond[np.abs(beyond).argmax()], low, high)
-            )
+            worst = quantity(float(beyond[np.abs(beyond).argmax()]), "rad/s", spec=".6g")
+            least = quantity(low, "rad/s", spec=".6g")
+            most = quantity(high, "rad/s", spec=".6g")
             raise InputError(
                 f"{self.name} cannot settle at {worst}: its speeds reach from {least} to {most}."
             )
         # the creep comes first, so that it wins a tie
-        held = np.array([self.creep, below, above])
-        volts = np.array([0.0, self.minus.voltage[-1], self.plus.voltage[0]])
-        found = volts[np.argmin(np.abs(inside[..., np.newaxis] - held), axis=-1)]
-        found = np.where(inside > above, np.interp(inside, *self.plus), found)
-        return np.asarray(np.where(inside < below, np.interp(inside, *self.minus), found))
+        slowest = np.array([self.creep, below, above])
+        slowest_voltages = np.array([0.0, self.minus.voltage[-1], self.plus.voltage[0]])
+        nearest = np.argmin(np.abs(inside[..., np.newaxis] - slowest), axis=-1)
+        upwards = np.interp(inside, self.plus.speed, self.plus.voltage)
+        downwards = np.interp(inside, self.minus.speed, self.minus.voltage)
+        voltage = np.where(inside > above, upwards, slowest_voltages[nearest])
+        return np.asarray(np.where(inside < below, downwards, voltage))
 
     def command(self, speed: ArrayLike, rate: float) -> Array:
-        """Voltage over time for a wanted speed over time, with the drive's lag made up for.
+        """Voltage over time for a reference speed over time, with the drive's lag made up for.
 
         Parameters
         ----------
         speed : (n,) array_like
-            Wanted speed, n ≥ 2, without noise. [rad/s]
+            Reference speed, n ≥ 2, without noise. [rad/s]
         rate : float
             Its samples a second. [Hz]
 
         Returns
         -------
         (n,) array
-            Voltage for wanted + lag · d(wanted)/dt, that sum held within the speed limits. [V]
+            Voltage for reference + lag · d(reference)/dt, clipped to the speed limits. [V]
 
         Raises
         ------
         InputError
-            For a wanted speed beyond the limits, or a rate out of range.
+            For a reference speed beyond the limits, or a rate out of range.
         """
         self.voltage(speed)  # refuses what cannot be
-        wanted = np.asarray(speed, dtype=np.float64)
-        if wanted.ndim != 1 or wanted.size < 2:
-            raise InputError("A command needs two or more samples of the wanted speed in one row.")
+        reference = np.asarray(speed, dtype=np.float64)
+        if reference.ndim != 1 or reference.size < 2:
+            raise InputError(
+                "A command needs two or more samples of the reference speed in one row."
+            )
         if not (np.isfinite(rate) and rate > 0.0):
             raise InputError(f"A command needs a rate above 0 Hz, not {rate:g} Hz.")
-        return self.voltage(wanted + self.lag * np.gradient(wanted, 1.0 / rate), clip=True)
+        return self.voltage(reference + self.lag * np.gradient(reference, 1.0 / rate), clip=True)
 
     def to_polars(self) -> polars.DataFrame:
         """Table of the points, voltage rising: ``speed`` [rad/s] and ``voltage`` [V], SI."""
@@ -190,36 +196,38 @@ class InverseMap(Result):
 
     def _points(self, most: int) -> Table:
         """The map at some points each way, and at rest."""
-        made = Table("", (Column("speed", "z.3f", "rad/s"), Column("voltage", "z.4f", "V")))
-        rest = Branch(np.array([self.creep]), np.zeros(1))
+        table = Table("", (Column("speed", "z.3f", "rad/s"), Column("voltage", "z.4f", "V")))
+        rest = MapBranch(np.array([self.creep]), np.zeros(1))
         for branch in (self.minus, rest, self.plus):
             size = branch.speed.size
-            for n in np.unique(np.linspace(0, size - 1, min(most, size)).round().astype(int)):
-                made.add(float(branch.speed[n]), float(branch.voltage[n]))
-        return made
+            spread = np.linspace(0, size - 1, min(most, size))
+            for index in np.unique(spread.round().astype(int)):
+                table.add(float(branch.speed[index]), float(branch.voltage[index]))
+        return table
 
     def tables(self, speeds: Sequence[float] = ()) -> list[Table]:
-        """Voltages of wanted speeds [rad/s]; the map at a few points; where it holds."""
+        """Voltages of reference speeds [rad/s]; the map at a few points; where it holds."""
         columns = (
-            Column("wanted speed", "g", "rad/s"),
+            Column("reference speed", "g", "rad/s"),
             Column("voltage", "z.4f", "V"),
             Column("settles at", "z.3f", "rad/s"),
         )
-        wanted = Table("", columns)
+        voltages_table = Table("", columns)
         voltages = self.voltage(speeds)
         # the map the other way round: in the gap the drive creeps, or goes at its slowest
         map_voltages = np.concatenate([self.minus.voltage, [0.0], self.plus.voltage])
         map_speeds = np.concatenate([self.minus.speed, [self.creep], self.plus.speed])
         settled = np.interp(voltages, map_voltages, map_speeds)
         for row in zip(speeds, voltages, settled, strict=True):
-            wanted.add(*map(float, row))
+            voltages_table.add(*map(float, row))
         below, above = self.gap
         if any(below < speed < above for speed in speeds):
-            low, high = (quantity(each, "rad/s", spec="z.3f") for each in (below, above))
-            wanted.caption = f"between {low} and {high} only the creep at 0 V can be held"
-        made, total = self._points(MOST_SHOWN), self.minus.speed.size + self.plus.speed.size + 1
-        if len(made.rows) < total:
-            made.caption = f"{len(made.rows)} of {total} points shown"
+            low, high = (quantity(edge, "rad/s", spec="z.3f") for edge in (below, above))
+            voltages_table.caption = f"between {low} and {high} only the creep at 0 V can be held"
+        points = self._points(MOST_SHOWN)
+        total = self.minus.speed.size + self.plus.speed.size + 1
+        if len(points.rows) < total:
+            points.caption = f"{len(points.rows)} of {total} points shown"
         up, down = self.acceleration
         limits = Table(
             "", (Column("Limit"), Column("negative", ".3f"), Column("positive", ".3f"), UNIT)
@@ -229,7 +237,7 @@ class InverseMap(Result):
         limits.add("acceleration at rest", -down, up, unit="rad/s^2", spec=".2f")
         limits.add("lag", "", 1e3 * self.lag, unit="ms", spec=".1f")
         limits.add("error of the straight lines", "", self.error, unit="rad/s", spec=".2g")
-        return [*([wanted] if wanted.rows else []), made, limits]
+        return [voltages_table, points, limits] if speeds else [points, limits]
 
     def write(self, path: str | Path) -> None:
         """Write the map as .toml for a controller, or as a table (`to_polars`) .csv or .parquet.
@@ -293,7 +301,8 @@ def inverse_map(drive: Drive, points: int = 101) -> InverseMap:
         raise InputError(
             f"An inverse map takes {FEWEST} to {MOST} points per direction, not {points}."
         )
-    plus, minus = (_branch(drive, way, points) for way in (1.0, -1.0))
+    plus = _branch(drive, 1.0, points)
+    minus = _branch(drive, -1.0, points)
     creep = float(drive.steady_speed(0.0))
     if not minus.speed[-1] <= creep <= plus.speed[0]:
         low, at, high = np.degrees([minus.speed[-1], creep, plus.speed[0]])
@@ -302,24 +311,35 @@ def inverse_map(drive: Drive, points: int = 101) -> InverseMap:
             f"{low:.4g} and {high:.4g} deg/s, so that its steady map has no inverse; check Z17, "
             "Z18 and the card's J."
         )
-    up, down = (abs(starting_acceleration(drive, way)[0]) for way in (1.0, -1.0))
-    errors, lags = [], []
+    upwards, _ = starting_acceleration(drive, 1.0)
+    downwards, _ = starting_acceleration(drive, -1.0)
+    errors, lags = list[float](), list[float]()
     for branch in (plus, minus):
-        middle, volts = (0.5 * (each[1:] + each[:-1]) for each in branch)
-        errors.append(float(np.abs(drive.steady_speed(volts) - middle).max()))
+        speed = 0.5 * (branch.speed[1:] + branch.speed[:-1])
+        voltage = 0.5 * (branch.voltage[1:] + branch.voltage[:-1])
+        errors.append(float(np.abs(drive.steady_speed(voltage) - speed).max()))
         # of slow small motions half way up the map
         model = drive.linearize(float(0.5 * (branch.voltage[0] + branch.voltage[-1])))
         phase = float(np.angle(model.response([LAG_FREQUENCY])[0, 0]))
         lags.append(-phase / (2.0 * np.pi * LAG_FREQUENCY))
-    return InverseMap(drive.name, minus, plus, creep, (up, down), 0.5 * sum(lags), max(errors))
+    return InverseMap(
+        name=drive.name,
+        minus=minus,
+        plus=plus,
+        creep=creep,
+        acceleration=(abs(upwards), abs(downwards)),
+        lag=0.5 * sum(lags),
+        error=max(errors),
+    )
 
 
-def _branch(drive: Drive, way: float, points: int) -> Branch:
-    """Points of one way, from the lower voltage to the higher."""
-    start, end = dead_zone(drive, way)[1], saturation(drive, way)
-    end = way * FULL_VOLTAGE if end is None else end
+def _branch(drive: Drive, direction: float, points: int) -> MapBranch:
+    """Points of one direction, from the lower voltage to the higher."""
+    _, start = dead_zone(drive, direction)
+    saturated = saturation(drive, direction)
+    end = direction * FULL_VOLTAGE if saturated is None else saturated
     if start is None or start == end:
-        side = "positive" if way > 0.0 else "negative"
+        side = "positive" if direction > 0.0 else "negative"
         raise DomainError(
             f"No {side} command up to {FULL_VOLTAGE:g} V moves {drive.name}, so its steady map has "
             "no inverse; check V_dz, J, G1 to G3 and Z17."
@@ -333,7 +353,7 @@ def _branch(drive: Drive, way: float, points: int) -> Branch:
             f"The steady speed of {drive.name} does not rise from {volts[n]:.4g} to "
             f"{volts[n + 1]:.4g} V, so its steady map has no inverse there; check G1, G2 and G3."
         )
-    return Branch(speed, volts)
+    return MapBranch(speed, volts)
 
 
 # --- what the map buys ----------------------------------------------------------------------------
@@ -341,59 +361,63 @@ def _branch(drive: Drive, way: float, points: int) -> Branch:
 
 @dataclass(frozen=True, eq=False)
 class Improvement(Result):
-    """A wanted speed commanded in several ways, the plainest first."""
+    """A reference speed commanded in several ways, the plainest first."""
 
-    name: str  # Name of the drive.
-    wanted: Array  # (n,). [rad/s]
+    name: str
+    """Name of the drive."""
+    reference: Array
+    """(n,) reference speed. [rad/s]"""
     runs: Mapping[str, Simulation]
     """``"straight line"``, ``"inverse map"`` and ``"inverse map and lead"``."""
 
     @property
     def rms(self) -> dict[str, float]:
-        """Rms of speed less wanted speed of each way. [rad/s]"""
-        return {k: rms_difference(run.shaft_speed, self.wanted) for k, run in self.runs.items()}
+        """Rms of speed less reference speed, by the way of commanding it. [rad/s]"""
+        return {k: rms_difference(run.shaft_speed, self.reference) for k, run in self.runs.items()}
 
     def table(self) -> Table:
         """Errors of the speed, controller by controller."""
         columns = (Column("rms", ".3f", "rad/s"), Column("largest", ".3f", "rad/s"))
-        made = Table("Error of the speed", (Column("Controller"), *columns, Column("rms", ".1%")))
+        table = Table("Error of the speed", (Column("Controller"), *columns, Column("rms", ".1%")))
         rms = self.rms
         for name, run in self.runs.items():
-            largest = float(np.abs(run.shaft_speed - self.wanted).max())
-            made.add(name, rms[name], largest, rms[name] / rms["straight line"])
-        return made
+            largest = float(np.abs(run.shaft_speed - self.reference).max())
+            table.add(name, rms[name], largest, rms[name] / rms["straight line"])
+        return table
 
 
-def proportional_command(inverse: InverseMap, wanted: ArrayLike) -> Array:
-    """Voltage of a controller that knows nothing of the drive but its full speed each way. [V]
+def proportional_command(inverse: InverseMap, reference: ArrayLike) -> Array:
+    """Voltage of a controller that knows only the drive's full speed in each direction. [V]
 
-    A straight line each way from 0 V at standstill to the saturation voltage at the limit.
+    A straight line in each direction from 0 V at standstill to the saturation voltage at the limit.
     """
-    speed, (low, high) = np.asarray(wanted, dtype=np.float64), inverse.limits
+    speed = np.asarray(reference, dtype=np.float64)
+    low, high = inverse.limits
     up, down = inverse.plus.voltage[-1] / high, inverse.minus.voltage[0] / low
     return np.asarray(np.where(speed >= 0.0, up * speed, down * speed))
 
 
-def wanted_of_stick(inverse: InverseMap, voltage: ArrayLike) -> Array:
-    """Speed that a stick asks for: in proportion, ±10 V for the full speed of that way. [rad/s]"""
-    volts, (low, high) = np.asarray(voltage, dtype=np.float64), inverse.limits
+def speed_of_command(inverse: InverseMap, voltage: ArrayLike) -> Array:
+    """Speed that a command asks for: in proportion, ±10 V for the full speed. [rad/s]"""
+    volts = np.asarray(voltage, dtype=np.float64)
+    low, high = inverse.limits
     return np.asarray(np.where(volts >= 0.0, 0.1 * high * volts, -0.1 * low * volts))
 
 
 def improvement(
     drive: Drive,
-    wanted_speed: ArrayLike,
+    reference_speed: ArrayLike,
     rate: float = SOURCE_RATE,
     *,
     inverse: InverseMap | None = None,
 ) -> Improvement:
-    """What the inverse map buys: a wanted speed simulated with and without it.
+    """What the inverse map buys: a reference speed simulated with and without it.
 
     Parameters
     ----------
     drive : Drive
         What is driven.
-    wanted_speed : (n,) array_like
+    reference_speed : (n,) array_like
         [rad/s]
     rate : float
         Its samples a second. [Hz]
@@ -409,20 +433,20 @@ def improvement(
     Raises
     ------
     InputError
-        For a wanted speed beyond the drive's limits, one of standstill only, or a record that
+        For a reference speed beyond the drive's limits, one of standstill only, or a record that
         cannot be simulated.
     """
     chosen = inverse_map(drive) if inverse is None else inverse
-    led = chosen.command(wanted_speed, rate)
-    wanted = np.array(wanted_speed, dtype=np.float64)
-    if not wanted.any():
+    with_lead = chosen.command(reference_speed, rate)
+    reference = np.array(reference_speed, dtype=np.float64)
+    if not reference.any():
         raise InputError(
-            "The wanted speed is standstill throughout; take one that moves the drive."
+            "The reference speed is standstill throughout; take one that moves the drive."
         )
     commands = {
-        "straight line": proportional_command(chosen, wanted),
-        "inverse map": chosen.voltage(wanted),
-        "inverse map and lead": led,
+        "straight line": proportional_command(chosen, reference),
+        "inverse map": chosen.voltage(reference),
+        "inverse map and lead": with_lead,
     }
     runs = {name: drive.simulate(voltage, rate) for name, voltage in commands.items()}
-    return Improvement(drive.name, wanted, runs)
+    return Improvement(drive.name, reference, runs)

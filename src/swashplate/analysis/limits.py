@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from math import inf
 from typing import TYPE_CHECKING, Unpack, cast
@@ -35,12 +36,16 @@ Array = NDArray[np.float64]
 class Removal(Result):
     """A limit, the component behind it, and the changes that take it away."""
 
-    limit: str  # In words.
-    component: str  # What would have to change in the machine.
-    flag: Limit | None  # How a simulation marks it, None for what acts always or is not marked.
-    changes: dict[str, Change]  # What takes it away, SI.
-    # Measured input without which it is away.
+    limit: str
+    """Its name in words."""
+    component: str
+    """What would have to change in the machine."""
+    flag: Limit | None
+    """How a simulation marks it; None for what acts always or is not marked."""
+    changes: dict[str, Change]
+    """Parameters that take it away, SI."""
     signal: str = field(default="", kw_only=True)
+    """Measured input without which it is away."""
 
 
 MEASURED = (
@@ -49,13 +54,14 @@ MEASURED = (
         "supply", "charge pump: less sag (supply_pressure)", None, {}, signal="supply_pressure"
     ),
 )
-"""What measured inputs take away from a drive; a load is not the machine's."""
+"""Limits that measured inputs show; a load does not belong to the machine."""
 
 
 def removals(drive: Drive) -> list[Removal]:
-    """What can be taken away from a drive, in the order of the chain, where that alters anything.
+    """Limits of a drive that can be taken away, in the order of the chain.
 
-    The plussing, which no force limits, because the creep that it makes is an error, too.
+    Only those whose removal changes a parameter. The spool offset is among them, although it limits
+    nothing: the creep that it causes is an error, too.
     """
     numbers = drive.parameters.numbers
     # with the card's jump left as it is, a solenoid's dead zone beyond it would stay
@@ -67,25 +73,29 @@ def removals(drive: Drive) -> list[Removal]:
     if drive.parameters["Z4"].status == "assumed":  # a guessed machine may have no orifice
         orifice = "what limits the acceleration, in the model an in-line orifice (Z16)"
     compensated = "card: dead-zone compensation (V_dz, or an inverse map)"
-    ramp = {"lim1": inf, "lim2": inf}
-    known = (
+    no_ramp: dict[str, Change] = {"lim1": inf, "lim2": inf}
+    candidates = (
         Removal("dead zone", compensated, Limit.DEAD_ZONE, {"V_dz": 0.0, "Z17": jump}),
-        Removal("current rate", "card: faster ramp (lim1, lim2)", Limit.CURRENT_RATE, {**ramp}),
+        Removal("current rate", "card: faster ramp (lim1, lim2)", Limit.CURRENT_RATE, no_ramp),
         Removal("final decay", "card: no decay of the current (I_t2)", None, {"I_t2": 0.0}),
         Removal("delay", "card: shorter delay (tau)", None, {"tau": 0.0}),
         Removal("orifice", orifice, Limit.ORIFICE, {"Z16": inf}),
         Removal("spool stop", "spool: longer stroke (Z14)", Limit.SPOOL, {"Z14": inf}),
         Removal("swash stop", larger, Limit.SWASH_STOP, {**stops}),
         Removal("relief valve", "relief valve: higher setting (Z15)", Limit.RELIEF, {"Z15": inf}),
-        Removal("plussing", "spool: centred at rest (Z18)", None, {"Z18": 0.0}),
+        Removal("spool offset", "spool: centred at rest (Z18)", None, {"Z18": 0.0}),
     )
 
-    def altered(changes: dict[str, Change]) -> dict[str, Change]:
-        pairs = changes.items()
-        return {k: v for k, v in pairs if any(numbers[c] != v for c in columns_of([k]))}
-
-    made = [replace(each, changes=altered(each.changes)) for each in known]
-    return [each for each in made if each.changes]
+    present = []
+    for removal in candidates:
+        changes = {
+            name: value
+            for name, value in removal.changes.items()
+            if any(numbers[column] != value for column in columns_of([name]))
+        }
+        if changes:
+            present.append(replace(removal, changes=changes))
+    return present
 
 
 # --- what each of them costs ----------------------------------------------------------------------
@@ -99,11 +109,13 @@ class LimitShare(Removal):
     """Share of the record's samples at which it acts, of the dead zone only those with a command
     other than 0 V; None for what no flag marks."""
     error: float | None
-    """Rms tracking error without it; None where there is none to be had, see `failure`. [rad/s]"""
+    """Rms tracking error without it; None if there is none, see `failure`. [rad/s]"""
     error_share: float | None
     """By how much of itself the rms error falls without it; negative if it grows. [1]"""
-    alone: float | None  # Rms tracking error with this limit and none of the others. [rad/s]
-    failure: str = ""  # Why a drive without it cannot be simulated.
+    alone: float | None
+    """Rms tracking error with this limit and none of the others. [rad/s]"""
+    failure: str = ""
+    """Why a drive without it cannot be simulated."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,63 +130,76 @@ class LimitShares(Tabular):
     """Name of the drive."""
     run: Simulation
     """The drive as it is."""
-    wanted: Array
+    reference: Array
     """Wanted speed, (n,). [rad/s]"""
     error: float
     """Rms tracking error of the drive as it is. [rad/s]"""
     shares: tuple[LimitShare, ...]
-    reference: str = "a drive without limits"
-    """What is compared with, in words."""
+    compared_with: str = "a drive without limits"
+    """What the drive is compared with, in words."""
     unseen: tuple[str, ...] = ()
     """Columns of limits that act here and that no test of the drive reached."""
 
     @property
     def first(self) -> LimitShare | None:
         """The limit to change first; None if no single change makes the error smaller."""
-        return next((each for each in self.shares[:1] if (each.error_share or 0.0) > 0.0), None)
+        costliest = self.shares[0] if self.shares else None
+        if costliest is None or (costliest.error_share or 0.0) <= 0.0:
+            return None
+        return costliest
 
     def sentences(self) -> list[str]:
         """What to change first, and what cannot be left out."""
-        first, said = self.first, ["No single change makes the error smaller."]
+        first = self.first
+        sentences = ["No single change makes the error smaller."]
         if first is not None and first.error is not None:
-            share = 1.0 - first.error / self.error
-            said = [
+            reduction = 1.0 - first.error / self.error
+            sentences = [
                 f"Change first: {first.component}. Without this limit the rms error of the "
-                f"speed, against {self.reference}, falls by {100.0 * share:.1f} % to "
+                f"speed, against {self.compared_with}, falls by {100.0 * reduction:.1f} % to "
                 f"{quantity(first.error, 'rad/s', spec='.3f')}."
             ]
         if self.unseen:
-            said.append(
-                f"No test reached {listed(self.unseen)}: what is said of it here is no more than "
-                "where the tests ended."
+            sentences.append(
+                f"No test reached {listed(self.unseen)}: its value here is only where the tests "
+                "ended."
             )
-        failed = (each for each in self.shares if each.failure)
-        return said + [f"Not without the {each.limit}: {each.failure}" for each in failed]
+        for share in self.shares:
+            if share.failure:
+                sentences.append(f"Not without the {share.limit}: {share.failure}")
+        return sentences
 
     def table(self, *, acting: bool = False) -> Table:
         """What each limit costs, the costliest first; or only those that do something here."""
-        errors = ("rad/s", "none")
         columns = (
             Column("Limit", key="limit"),
-            *(Column(name, of="f") for name in ("component", "failure")),
+            Column("component", of="f"),
+            Column("failure", of="f"),
             Column("share of time", ".1%", key="time_share"),
-            Column("error without it\n", ".3f", *errors, key="error"),
+            Column("error without it\n", ".3f", "rad/s", "none", key="error"),
             Column("share of error", "z.1%", key="error_share"),
-            Column("error if alone\n", ".3f", *errors, key="alone"),
+            Column("error if alone\n", ".3f", "rad/s", "none", key="alone"),
         )
-        made = Table("", columns)
-        for each in self.shares:
-            if acting and not (each.time_share or each.error_share or each.failure or each.alone):
+        table = Table("", columns)
+        for share in self.shares:
+            acts = share.time_share or share.error_share or share.failure or share.alone
+            if acting and not acts:
                 continue
-            words = each.limit, each.component, each.failure
-            time = share_cell(each.time_share)
-            made.add(*words, time, each.error, each.error_share, each.alone)
-        return made
+            table.add(
+                share.limit,
+                share.component,
+                share.failure,
+                share_cell(share.time_share),
+                share.error,
+                share.error_share,
+                share.alone,
+            )
+        return table
 
     def plot(self, *, title: str | None = None) -> Figure:
-        """Figure of command and speed, beside the wanted speed, and of when each limit acts."""
+        """Figure of command and speed, beside the reference speed, and of when each limit acts."""
         draw = figures().plot_limit_timeline
-        return cast("Figure", draw(self.run, wanted=self.wanted, title=title))
+        return cast("Figure", draw(self.run, reference=self.reference, title=title))
 
     def to_polars(self) -> polars.DataFrame:
         """Table of the shares, SI, the costliest first."""
@@ -187,7 +212,7 @@ def limit_shares(
     rate: float = SOURCE_RATE,
     *,
     start: Start = "rest",
-    wanted: ArrayLike | None = None,
+    reference: ArrayLike | None = None,
     **given: Unpack[Given],
 ) -> LimitShares:
     """Share of time and of error due to each limit of a drive under a command, ranked.
@@ -198,8 +223,8 @@ def limit_shares(
         The drive.
     voltage, rate, start, **given :
         The command and what was measured beside it, as in `Drive.simulate`.
-    wanted : (n,) array_like, optional
-        Speed that was wanted at the samples; by default what the drive would do without any of its
+    reference : (n,) array_like, optional
+        Reference speed at the samples; by default what the drive would do without any of its
         limits. [rad/s]
 
     Returns
@@ -211,31 +236,31 @@ def limit_shares(
     Raises
     ------
     InputError
-        For a record that cannot be simulated, or a wanted speed that is not as long.
+        For a record that cannot be simulated, or a reference speed that is not as long.
     DomainError
         If the drive as it is leaves the model's domain, or the one without any limits does and no
-        speed is given as wanted. A limit whose removal breaks a rule of the parameters has a share
+        reference speed is given. A limit whose removal breaks a rule of the parameters has a share
         with a `failure`, and stays where all others are taken away.
 
     Notes
     -----
     A counterfactual: one limit is taken away (the dead zone's V_dz and as much of Z17 as the card's
     jump does not cover, lim1 and lim2, I_t2, tau, Z16, Z14, Z13, Z15, Z18), the command is
-    simulated again and compared with the same wanted speed. That, by default, still has the lags of
-    the card's filter and of the valve, so that only the limits make an error. A measured pump speed
-    or supply pressure is a limit, too: away, the set's own stands in its place.
+    simulated again and compared with the same reference speed. By default that speed still has the
+    lags of the card's filter and of the valve, so that only the limits make an error. A measured
+    pump speed or supply pressure is a limit, too: without it the value of the parameter set counts.
     """
-    return shares_of(drive, drive.simulate(voltage, rate, start=start, **given), wanted)
+    return shares_of(drive, drive.simulate(voltage, rate, start=start, **given), reference)
 
 
-def shares_of(drive: Drive, run: Simulation, wanted: ArrayLike | None = None) -> LimitShares:
+def shares_of(drive: Drive, run: Simulation, reference: ArrayLike | None = None) -> LimitShares:
     """Shares of each limit in a run of a drive; see `limit_shares`."""
 
-    def speed_without(*limits: Removal) -> Array | str:
+    def speed_without(removed: Sequence[Removal]) -> Array | str:
         """Speed over the same command, or why there is none."""
-        changes = {name: value for each in limits for name, value in each.changes.items()}
-        left = {each.signal for each in limits}
-        records = {name: each for name, each in run.records.items() if name not in left}
+        changes = {name: value for removal in removed for name, value in removal.changes.items()}
+        signals = {removal.signal for removal in removed}
+        records = {name: record for name, record in run.records.items() if name not in signals}
         try:
             other = drive.parameters.with_numbers(changes)
             return simulate_drive(other, records, run.start).shaft_speed
@@ -243,40 +268,61 @@ def shares_of(drive: Drive, run: Simulation, wanted: ArrayLike | None = None) ->
             return str(refusal)
 
     present = removals(drive) + [each for each in MEASURED if each.signal in run.records]
-    removed, unlimited = list[Removal](), drive
-    for each in present:  # as many at once as the model's domain allows
-        try:
-            unlimited = Drive(unlimited.parameters.with_numbers(each.changes))
-        except ParameterError:
-            continue
-        removed.append(each)
-    free = speed_without(*removed)
-    if wanted is None and isinstance(free, str):
+    removable = _removable_together(drive, present)
+    unlimited = speed_without(removable)
+    if reference is not None:
+        compared = checked_speed(reference, run.shaft_speed.size)
+    elif isinstance(unlimited, str):
         raise DomainError(
             "Without its limits the drive cannot be simulated, so that there is no speed to "
-            f"compare with; give the one that is wanted ({free.rstrip('.')})."
+            f"compare with; give a reference speed ({unlimited.rstrip('.')})."
         )
-    asked = checked_speed(free if wanted is None else wanted, run.shaft_speed.size)
+    else:
+        compared = checked_speed(unlimited, run.shaft_speed.size)
 
     def error_of(speed: Array | str) -> float | None:
-        return None if isinstance(speed, str) else rms_difference(speed, asked)
+        return None if isinstance(speed, str) else rms_difference(speed, compared)
 
-    error, shares = rms_difference(run.shaft_speed, asked), []
-    for each in present:
-        speed = speed_without(each)
-        without = error_of(speed)
+    error = rms_difference(run.shaft_speed, compared)
+    shares = []
+    for removal in present:
+        speed = speed_without([removal])
+        error_without = error_of(speed)
+        error_share = None
+        if error_without is not None:
+            error_share = 1.0 - error_without / error if error else 0.0
+        others = [other for other in removable if other is not removal]
         shares.append(
             LimitShare(
-                **vars(each),
-                time_share=None if each.flag is None else run.time_share(each.flag),
-                error=without,
-                error_share=None if without is None else 1.0 - without / error if error else 0.0,
-                alone=error_of(speed_without(*(one for one in removed if one is not each))),
+                **vars(removal),
+                time_share=None if removal.flag is None else run.time_share(removal.flag),
+                error=error_without,
+                error_share=error_share,
+                alone=error_of(speed_without(others)),
                 failure=speed if isinstance(speed, str) else "",
             )
         )
-    shares.sort(key=lambda each: inf if each.error is None else each.error)
-    acting = {column for each in shares if each.time_share for column in each.changes}
-    unseen = tuple(column for column in drive.parameters.unreached if column in acting)
-    made = LimitShares(drive.name, run, asked, error, tuple(shares), unseen=unseen)
-    return made if wanted is None else replace(made, reference="the wanted speed")
+    shares.sort(key=lambda share: inf if share.error is None else share.error)
+    acting = {column for share in shares if share.time_share for column in share.changes}
+    result = LimitShares(
+        name=drive.name,
+        run=run,
+        reference=compared,
+        error=error,
+        shares=tuple(shares),
+        unseen=tuple(column for column in drive.parameters.unreached if column in acting),
+    )
+    return result if reference is None else replace(result, compared_with="the reference speed")
+
+
+def _removable_together(drive: Drive, present: Sequence[Removal]) -> list[Removal]:
+    """As many limits as the model's domain allows to be taken away at the same time."""
+    removable = []
+    unlimited = drive.parameters
+    for removal in present:
+        try:
+            unlimited = unlimited.with_numbers(removal.changes)
+        except ParameterError:
+            continue
+        removable.append(removal)
+    return removable

@@ -11,8 +11,8 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
+from swashplate.analysis.design_variables import with_factors
 from swashplate.analysis.outcomes import Outcome, Trial, outcome_matrix
-from swashplate.analysis.whatif import pulled
 from swashplate.drive import Drive
 from swashplate.errors import DomainError, InputError, ParameterError
 from swashplate.identification.assessment import Identification
@@ -31,12 +31,16 @@ Array = NDArray[np.float64]
 ASSUMED = 0.2
 """Standard deviation of an assumed parameter over its value: a guess takes 0.2 rad for the plate's
 largest angle, machines have 0.25 to 0.35. [1]"""
-STEP, LARGEST_STEP, NEGLIGIBLE = 0.1, 0.05, 1e-12
-"""Of a derivative along an error of estimates: part of a standard error, change of the solver's
-numbers at most, and changes of them that count as none. [1]"""
-MOST_REDRAWN, NARROWED = 20, 0.1
-"""Draws outside the model's domain for each one inside from which the drawing is given up, and part
-of all draws from which those that were left out narrow the bands."""
+STEP = 0.1
+"""Step of a derivative along an error of the estimates, over the standard error. [1]"""
+LARGEST_STEP = 0.05
+"""Largest change of one of the solver's numbers in such a step. [1]"""
+NEGLIGIBLE = 1e-12
+"""Change of the solver's numbers that counts as none. [1]"""
+MOST_REDRAWN = 20
+"""Draws outside the model's domain for each one inside from which the drawing is given up."""
+NARROWED = 0.1
+"""Share of all draws from which those that were left out narrow the bands. [1]"""
 
 # --- drives that the tests allow ------------------------------------------------------------------
 
@@ -51,36 +55,36 @@ class Draws(Result):
     fixed: tuple[str, ...] = ()
     """Parameters that stay as fitted: at a bound or not determined by the tests."""
 
-    def pulled(self, factors: Mapping[str, float]) -> Draws:
-        """The same with levers moved on every drive."""
-        return replace(self, drives=tuple(pulled(each, factors) for each in self.drives))
+    def with_factors(self, factors: Mapping[str, float]) -> Draws:
+        """The same with design variables scaled on every drive."""
+        return replace(self, drives=tuple(with_factors(drive, factors) for drive in self.drives))
 
     @property
     def columns(self) -> dict[str, Array]:
         """Every value of every drive by column, as `Drive.simulate_many` takes them. [SI]"""
-        numbers = [each.parameters.numbers for each in self.drives]
-        return {name: np.array([each[name] for each in numbers]) for name in numbers[0]}
+        numbers = [drive.parameters.numbers for drive in self.drives]
+        return {name: np.array([by_name[name] for by_name in numbers]) for name in numbers[0]}
 
     def sentences(self) -> tuple[str, ...]:
         """What the draws rest on."""
-        said = []
+        sentences = []
         if self.fixed:
-            said.append(
+            sentences.append(
                 f"Not drawn, as fitted in all drives: {', '.join(self.fixed)}; the bands leave out "
                 "what their errors would add."
             )
-        drawn = self.redrawn + len(self.drives)
-        if self.redrawn > NARROWED * drawn:
-            said.append(
-                f"The bands are too narrow: {100.0 * self.redrawn / drawn:.0f} % of the drives "
+        attempts = self.redrawn + len(self.drives)
+        if self.redrawn > NARROWED * attempts:
+            sentences.append(
+                f"The bands are too narrow: {100.0 * self.redrawn / attempts:.0f} % of the drives "
                 "that the errors of the estimates allow lie beyond the parameters' bounds or the "
-                "model's domain, and were left out. Widen the bounds in the fit configuration, or "
-                "fix the parameters that are not determined."
+                "model's domain, and were left out. Widen the bounds in the fit setup, or fix the "
+                "parameters that are not determined."
             )
-        return tuple(said)
+        return tuple(sentences)
 
 
-def drives(stages: Sequence[StageFit], draws: int = 200, seed: int = 0) -> Draws:
+def drawn_drives(stages: Sequence[StageFit], draws: int = 200, seed: int = 0) -> Draws:
     """Drives that a fit's tests allow, drawn from the errors of its estimates.
 
     Parameters
@@ -108,28 +112,28 @@ def drives(stages: Sequence[StageFit], draws: int = 200, seed: int = 0) -> Draws
         raise InputError("A Monte Carlo needs at least one stage of a fit.")
     if draws < 1:
         raise InputError(f"There must be at least one draw, not {draws}.")
-    random, made, redrawn = np.random.default_rng(seed), list[Drive](), 0
-    while len(made) < draws:
+    random = np.random.default_rng(seed)
+    drives = list[Drive]()
+    redrawn = 0
+    while len(drives) < draws:
         parameters = _drawn(stages, random)
         if parameters is not None:
-            made.append(Drive(parameters))
+            drives.append(Drive(parameters))
             continue
         redrawn += 1
-        if redrawn > MOST_REDRAWN * (len(made) + 10):
+        if redrawn > MOST_REDRAWN * (len(drives) + 10):
             raise InputError(
-                f"Of {redrawn + len(made)} draws only {len(made)} lie within the bounds "
+                f"Of {redrawn + len(drives)} draws only {len(drives)} lie within the bounds "
                 "and the model's domain: the errors are too large for a Monte Carlo; test more, or "
                 "free fewer parameters."
             )
-    fixed = tuple(
-        unknown.name
-        for each in stages
-        for unknown, determined in zip(
-            each.problem.unknowns, uncertainty_of(each).own.determined, strict=True
-        )
-        if not determined and unknown.run is None
-    )
-    return Draws(tuple(made), redrawn, fixed)
+    fixed = []
+    for stage in stages:
+        determined = uncertainty_of(stage).own.determined
+        for unknown, is_determined in zip(stage.problem.unknowns, determined, strict=True):
+            if unknown.run is None and not is_determined:
+                fixed.append(unknown.name)
+    return Draws(tuple(drives), redrawn, tuple(fixed))
 
 
 def assumed_parameters(stages: Sequence[StageFit]) -> list[dict[str, float]]:
@@ -149,17 +153,18 @@ def assumed_parameters(stages: Sequence[StageFit]) -> list[dict[str, float]]:
     stated = {name for together in stages[0].problem.uncertain for name in together}
     if any(stage.stage.forces is not None for stage in stages):
         moved |= set(Forces.columns)
-    known = moved | stated | LIMIT_COLUMNS.keys()
-    found = []
+    left_out = moved | stated | LIMIT_COLUMNS.keys()
+    assumed = []
     for parameter in model.parameters.values():
         numbers = {
             column: ASSUMED * value
             for column, value in parameter.numbers.items()
             if isfinite(value) and value != 0.0
         }
-        if parameter.status in ("assumed", "approximate") and known.isdisjoint(numbers) and numbers:
-            found.append(numbers)
-    return found
+        is_assumed = parameter.status in ("assumed", "approximate")
+        if is_assumed and numbers and left_out.isdisjoint(numbers):
+            assumed.append(numbers)
+    return assumed
 
 
 def standard_errors(
@@ -176,8 +181,9 @@ def standard_errors(
     numbers : callable
         From a drive to an array of any shape.
     assumed : sequence of mappings
-        What fixed numbers may be off by besides, by column, as of `assumed_parameters`. The
-        estimates follow them, so that what the tests show counts, whatever the scales. [SI]
+        What other fixed numbers may be off by, by column, as of `assumed_parameters`. The
+        estimates are refitted to first order for each of them, so that what the tests show stays
+        as it is. [SI]
 
     Raises
     ------
@@ -196,19 +202,20 @@ def standard_errors(
     for stage in stages:
         # what belongs to a run alone is no part of the drive
         machine = stage.problem.unknowns.shared
-        sizes, axes = np.linalg.eigh(uncertainty_of(stage).own.matrix[np.ix_(machine, machine)])
-        for size, axis in zip(sizes, axes.T, strict=True):
+        covariance = uncertainty_of(stage).own.matrix[np.ix_(machine, machine)]
+        variances, axes = np.linalg.eigh(covariance)
+        for variance_along, axis in zip(variances, axes.T, strict=True):
             error = np.zeros(len(stage.problem.unknowns))
-            error[machine] = sqrt(max(size, 0.0)) * axis
+            error[machine] = sqrt(max(variance_along, 0.0)) * axis
             if np.abs(error).max(initial=0.0) > NEGLIGIBLE:
                 slope = _slope(stages, {stage.stage.name: error}, {}, numbers, base)
                 variance += slope**2
     for effect in _effects(stages):
         variance += _slope(stages, {}, {effect: 1.0}, numbers, base) ** 2
-    follow = {stage.stage.name: slopes_by(stage, assumed) for stage in stages if assumed}
-    for k, off in enumerate(assumed):
-        errors = {name: slopes[:, k] for name, slopes in follow.items()}
-        variance += _slope(stages, errors, {}, numbers, base, off) ** 2
+    following = {stage.stage.name: slopes_by(stage, assumed) for stage in stages if assumed}
+    for k, offsets in enumerate(assumed):
+        errors = {name: slopes[:, k] for name, slopes in following.items()}
+        variance += _slope(stages, errors, {}, numbers, base, offsets) ** 2
     return np.asarray(np.sqrt(variance))
 
 
@@ -230,12 +237,13 @@ def variances_from_bounds(
     base = numbers(stages[-1].drive)
     variances = {}
     for stage in stages:
-        own, names = uncertainty_of(stage).own, stage.problem.unknowns.names
+        covariance = uncertainty_of(stage).own.matrix
+        unknowns = stage.problem.unknowns
         for name in set(identifiability_of(stage).at_bounds).difference(but):
-            index = names.index(name)
-            deviation = sqrt(max(float(own.matrix[index, index]), 0.0))
-            if stage.problem.unknowns[index].run is None and deviation > NEGLIGIBLE:
-                errors = {stage.stage.name: own.matrix[index] / deviation}
+            index = unknowns.names.index(name)
+            deviation = sqrt(max(float(covariance[index, index]), 0.0))
+            if unknowns[index].run is None and deviation > NEGLIGIBLE:
+                errors = {stage.stage.name: covariance[index] / deviation}
                 variances[name] = _slope(stages, errors, {}, numbers, base) ** 2
     return variances
 
@@ -251,13 +259,14 @@ def changes_left_open(
     base = numbers(stages[-1].drive)
     largest = np.zeros_like(base)
     for stage in stages:
-        seen, names = identifiability_of(stage), stage.problem.unknowns.names
-        directions = [direction.changes for direction in seen.null]
-        directions += [{name: 1.0} for name in seen.unexcited if name not in but]
+        identifiability = identifiability_of(stage)
+        names = stage.problem.unknowns.names
+        directions = [direction.changes for direction in identifiability.null]
+        directions += [{name: 1.0} for name in identifiability.unexcited if name not in but]
         for changes in directions:
             error = np.zeros(len(names))
-            for name, by in changes.items():
-                error[names.index(name)] = by
+            for name, change in changes.items():
+                error[names.index(name)] = change
             slope = _slope(stages, {stage.stage.name: error}, {}, numbers, base)
             largest = np.maximum(largest, LARGEST_STEP * np.abs(slope))
     return largest
@@ -273,7 +282,8 @@ def _slope(
 ) -> Array:
     """Change of numbers for errors of the stages' vectors and effects, by a small step along them.
 
-    Systematic effects are by name, in standard uncertainties.
+    Systematic effects are by name, in standard uncertainties. The uncertainties that a stage needs
+    are computed when they are first asked for, and kept with it.
     """
     largest = max((float(np.abs(error).max()) for error in errors.values()), default=0.0)
     for stage in stages:
@@ -282,10 +292,12 @@ def _slope(
             largest = max(largest, float(np.abs(change).max()))
     first = min(STEP, LARGEST_STEP / largest) if largest else STEP
     for step in (first, -first, 0.1 * first, -0.1 * first):
-        moved = {name: step * error for name, error in errors.items()}
-        other = {column: step * size for column, size in assumed.items()}
-        small = {effect: step * size for effect, size in effects.items()}
-        parameters = _moved(stages, moved, small, other)
+        parameters = _moved(
+            stages,
+            {name: step * error for name, error in errors.items()},
+            {effect: step * size for effect, size in effects.items()},
+            {column: step * size for column, size in assumed.items()},
+        )
         if parameters is not None:
             return np.asarray((numbers(Drive(parameters)) - base) / step)
     raise InputError(
@@ -300,9 +312,9 @@ def _drawn(stages: Sequence[StageFit], random: np.random.Generator) -> Parameter
     effects = dict(zip(names, random.normal(size=len(names)).tolist(), strict=True))
     errors = {}
     for stage in stages:
-        own = uncertainty_of(stage).own.matrix
+        covariance = uncertainty_of(stage).own.matrix
         errors[stage.stage.name] = random.multivariate_normal(
-            np.zeros(len(own)), own, check_valid="ignore", method="eigh"
+            np.zeros(len(covariance)), covariance, check_valid="ignore", method="eigh"
         )
     return _moved(stages, errors, effects)
 
@@ -315,14 +327,15 @@ def _effects(stages: Sequence[StageFit]) -> list[str]:
         for effect, change in uncertainty_of(stage).systematic.items():
             if np.abs(change[machine]).max(initial=0.0) > NEGLIGIBLE:
                 moving[effect] = None
-    # a fixed number may move no estimate, and what is computed of the drive all the same
-    moving |= dict.fromkeys(effect_of_fixed(each) for each in stages[0].problem.uncertain)
+    # a fixed number that moves no estimate still moves what is computed of the drive
+    for together in stages[0].problem.uncertain:
+        moving[effect_of_fixed(together)] = None
     return list(moving)
 
 
 def _moved(
     stages: Sequence[StageFit],
-    own: Mapping[str, Array],
+    own_errors: Mapping[str, Array],
     effects: Mapping[str, float],
     assumed: Mapping[str, float] = MappingProxyType({}),
 ) -> ParameterSet | None:
@@ -345,20 +358,22 @@ def _moved(
         if fixed:
             parameters = parameters.with_numbers(fixed, parameters.options)
         for stage in stages:
-            problem, known = stage.problem, uncertainty_of(stage)
+            problem = stage.problem
             assert isinstance(problem.model, DriveModel)
-            error = own.get(stage.stage.name, np.zeros(len(problem.unknowns)))
-            for handed in known.handed:
-                error = error + handed.slopes @ errors[handed.stage]
+            uncertainty = uncertainty_of(stage)
+            error = own_errors.get(stage.stage.name, np.zeros(len(problem.unknowns)))
+            for earlier in uncertainty.handed:
+                error = error + earlier.slopes @ errors[earlier.stage]
             errors[stage.stage.name] = error
             vector = stage.solution.vector + error
             for effect, size in effects.items():
-                if effect in known.systematic:
-                    vector = vector + size * known.systematic[effect]
+                if effect in uncertainty.systematic:
+                    vector = vector + size * uncertainty.systematic[effect]
             low, high = problem.unknowns.bounds
-            if ((vector < low) | (vector > high))[known.own.determined].any():
+            beyond = (vector < low) | (vector > high)
+            if beyond[uncertainty.own.determined].any():
                 return None
-            # a model of its own: the fitted one keeps what it made for other parameters
+            # a new model: the fitted one keeps what it computed for other parameters
             fresh = DriveModel(parameters, problem.model.part, forces=problem.model.forces)
             parameters = fresh.parameters_at(problem.unknowns.targets(vector, ""))
     except (DomainError, ParameterError):
@@ -396,17 +411,18 @@ def stored_draws(
     FileError, InputError, ParameterError
         If the folder holds no fit, or campaign or drive are not those of the fit.
     """
-    place = Path(folder)
-    fit = Identification.load(place, campaign).fit
+    path = Path(folder)
+    fit = Identification.load(path, campaign).fit
     if drive is not None:
-        given, found = drive.parameters.numbers, fit.drive.parameters.numbers
-        other = [name for name, value in found.items() if given[name] != value]
-        if other:
+        numbers = drive.parameters.numbers
+        fitted = fit.drive.parameters.numbers
+        different = [name for name, value in fitted.items() if numbers[name] != value]
+        if different:
             raise InputError(
-                f"The fit in {place} is that of another drive ({', '.join(other[:3])} differ): "
-                f"give the drive that it found, {place}."
+                f"The fit in {path} is that of another drive ({', '.join(different[:3])} differ): "
+                f"give the drive that it found, {path}."
             )
-    return drives(fit.stages, draws, seed)
+    return drawn_drives(fit.stages, draws, seed)
 
 
 # --- bands ----------------------------------------------------------------------------------------
@@ -425,8 +441,10 @@ class Bands(Result):
     half_widths: Array
     """(2 + K,) half of the intervals of the speed limits, positive and negative [rad/s], and of
     each outcome in its unit."""
-    level: float  # Part of the drives between lower and upper, instant by instant.
-    draws: int  # Drives that it is taken from.
+    level: float
+    """Share of the drives between lower and upper, instant by instant. [1]"""
+    draws: int
+    """Drives that it is taken from."""
 
     @property
     def widest(self) -> tuple[float, float]:
@@ -444,18 +462,18 @@ def bands(
     Parameters
     ----------
     drawn : Draws
-        See `drives`.
+        See `drawn_drives`.
     trial : Trial
         The command, from rest.
     outcomes : sequence of Outcome
-        Of which intervals are wanted, such as `WhatIf.outcomes`.
+        Outcomes whose intervals are computed, such as `WhatIf.outcomes`.
     level : float
-        Part of the drives within the band, between 0 and 1.
+        Share of the drives within the band, between 0 and 1.
 
     Raises
     ------
     InputError
-        If the level is none, or the record is too long for so many drives.
+        If the level is not between 0 and 1, or the record is too long for so many drives.
     DomainError
         If a drive leaves the model's domain under the command.
     """
@@ -472,9 +490,17 @@ def bands(
         why = next(iter(run.failures.values()))
         raise DomainError(f"A drawn drive cannot be simulated: {why}")
     assert run.output is not None
-    parts = 0.5 - 0.5 * level, 0.5, 0.5 + 0.5 * level
-    limits = [each.steady_speed([FULL_VOLTAGE, -FULL_VOLTAGE]) for each in drawn.drives]
-    found = np.column_stack([limits, outcome_matrix(run.output, trial, outcomes)])
-    low, _, high = np.quantile(found, parts, axis=0)
-    lower, median, upper = np.quantile(run.output, parts, axis=0, overwrite_input=True)
-    return Bands(trial.time, lower, median, upper, 0.5 * (high - low), level, count)
+    shares = 0.5 - 0.5 * level, 0.5, 0.5 + 0.5 * level
+    limits = [drive.steady_speed([FULL_VOLTAGE, -FULL_VOLTAGE]) for drive in drawn.drives]
+    numbers = np.column_stack([limits, outcome_matrix(run.output, trial, outcomes)])
+    low, _, high = np.quantile(numbers, shares, axis=0)
+    lower, median, upper = np.quantile(run.output, shares, axis=0, overwrite_input=True)
+    return Bands(
+        time=trial.time,
+        lower=lower,
+        median=median,
+        upper=upper,
+        half_widths=0.5 * (high - low),
+        level=level,
+        draws=count,
+    )

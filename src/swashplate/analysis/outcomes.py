@@ -25,19 +25,24 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-# --- a command to judge drives by -----------------------------------------------------------------
+# --- a command to compare drives by ---------------------------------------------------------------
 
-REST = 0.5  # A command that rests at 0 V this long lets the drive settle at its creep. [s]
-TURNED = 0.05  # Part of its range by which a command may turn back and still go one way.
+REST = 0.5
+"""A command that rests at 0 V this long lets the drive settle at its creep. [s]"""
+TURNED = 0.05
+"""Share of its range by which a command may turn back and still go one way. [1]"""
 
 
 @dataclass(frozen=True, eq=False)
 class Trial(Result):
-    """A command, and the speed that a perfect drive would make of it. Make it with `trial`."""
+    """A command, and the speed that a perfect drive would make of it. Made by `trial_of`."""
 
-    voltage: Array  # (n,) [V]
-    rate: float  # Samples a second. [Hz]
-    wanted: Array  # (n,) speed of the shaft. [rad/s]
+    voltage: Array
+    """(n,) command. [V]"""
+    rate: float
+    """Samples a second. [Hz]"""
+    reference: Array
+    """(n,) speed of the shaft that is compared with. [rad/s]"""
 
     @property
     def time(self) -> Array:
@@ -61,23 +66,24 @@ class Trial(Result):
 
         Turning back by less than a twentieth of the way is noise.
         """
-        way = self.voltage[self.begin : self.last + 1] * np.sign(self.voltage[self.last])
-        return bool((np.maximum.accumulate(way) - way).max() <= TURNED * np.ptp(self.voltage))
+        approach = self.voltage[self.begin : self.last + 1] * np.sign(self.voltage[self.last])
+        turned_back = (np.maximum.accumulate(approach) - approach).max()
+        return bool(turned_back <= TURNED * np.ptp(self.voltage))
 
 
 def first_move(voltage: Array) -> int:
-    """Last sample before a command leaves its first value, 0 where it never does."""
+    """Last sample before a command leaves its first value, 0 if it never does."""
     return max(int(np.argmax(voltage != voltage[0])) - 1, 0)
 
 
-def trial(
+def trial_of(
     drive: Drive,
     voltage: ArrayLike | Maneuver,
     rate: float = 512.0,
     *,
-    wanted: ArrayLike | None = None,
+    reference: ArrayLike | None = None,
 ) -> Trial:
-    """A command to judge drives by.
+    """A command to compare drives by.
 
     Parameters
     ----------
@@ -87,31 +93,34 @@ def trial(
         Command. [V]
     rate : float
         Samples a second. [Hz]
-    wanted : (n,) array_like, optional
+    reference : (n,) array_like, optional
         Speed that a perfect drive would have; by default `proportional_speed` of this drive,
-        which stays what is wanted of its variants. [rad/s]
+        which stays the reference of its variants. [rad/s]
 
     Raises
     ------
     InputError
-        If the command is no row of at least two numbers within ±10 V that changes, or the wanted
-        speed is not as long.
+        If the command is not a row of at least two numbers within ±10 V that changes, or the
+        reference speed is not as long.
     """
     volts = np.array(sampled(voltage, rate), dtype=np.float64)
     if volts.ndim != 1 or volts.size < 2 or not (np.abs(volts) <= FULL_VOLTAGE).all():
         raise InputError("A command needs two samples or more, in one row, within ±10 V.")
     if (volts == volts[0]).all():
-        raise InputError(f"The command stays at {volts[0]:g} V; to judge a drive it has to change.")
-    speed = proportional_speed(drive, volts) if wanted is None else np.array(wanted, dtype=float)
-    return Trial(volts, float(rate), checked_speed(speed, volts.size))
+        raise InputError(
+            f"The command stays at {volts[0]:g} V; to compare drives it has to change."
+        )
+    if reference is None:
+        reference = proportional_speed(drive, volts)
+    return Trial(volts, float(rate), checked_speed(reference, volts.size))
 
 
 def checked_speed(speed: ArrayLike, size: int) -> Array:
-    """A wanted speed, an `InputError` if it is not `size` finite numbers. [rad/s]"""
-    wanted = np.array(speed, dtype=np.float64)
-    if wanted.shape != (size,) or not np.isfinite(wanted).all():
-        raise InputError(f"The wanted speed must be {size} finite numbers, one a sample.")
-    return wanted
+    """A reference speed, an `InputError` if it is not `size` finite numbers. [rad/s]"""
+    reference = np.array(speed, dtype=np.float64)
+    if reference.shape != (size,) or not np.isfinite(reference).all():
+        raise InputError(f"The reference speed must be {size} finite numbers, one a sample.")
+    return reference
 
 
 def proportional_speed(drive: Drive, voltage: ArrayLike, *, limited: bool = True) -> Array:
@@ -122,8 +131,10 @@ def proportional_speed(drive: Drive, voltage: ArrayLike, *, limited: bool = True
     volts = np.asarray(voltage, dtype=np.float64)
     plus, minus = speed_per_volt(drive, 1.0), speed_per_volt(drive, -1.0)
     speed: Array = np.where(volts >= 0.0, plus, minus) * volts
-    ends = drive.steady_speed([-FULL_VOLTAGE, FULL_VOLTAGE])
-    return np.clip(speed, ends.min(), ends.max()) if limited else speed
+    if not limited:
+        return speed
+    limits = drive.steady_speed([-FULL_VOLTAGE, FULL_VOLTAGE])
+    return np.clip(speed, limits.min(), limits.max())
 
 
 def speed_per_volt(drive: Drive, sign: float) -> float:
@@ -136,7 +147,7 @@ def speed_per_volt(drive: Drive, sign: float) -> float:
 
 
 Compute = Callable[[Array, Trial], Array]
-"""From (m, n) speeds [rad/s] and the command to (m,) numbers, NaN where there is none."""
+"""From (m, n) speeds [rad/s] and the command to (m,) numbers, NaN if there is none."""
 
 
 @dataclass(frozen=True)
@@ -147,7 +158,8 @@ class Outcome(Result):
     unit: str
     meaning: str
     compute: Compute
-    undefined: str = ""  # Why there may be none, as a half sentence.
+    undefined: str = ""
+    """Why there may be none, as a half sentence."""
 
     @property
     def words(self) -> str:
@@ -166,9 +178,8 @@ class Outcome(Result):
 
     def add_to(self, table: Table, cells: Sequence[float]) -> None:
         """Add a row of its values, SI."""
-        table.add(
-            self.words, *cells, unit="" if self.unit == "1" else of_shaft(self.unit), spec=self.spec
-        )
+        unit = "" if self.unit == "1" else of_shaft(self.unit)
+        table.add(self.words, *cells, unit=unit, spec=self.spec)
 
 
 OUTCOMES: dict[str, Outcome] = {}
@@ -228,15 +239,17 @@ def overshoot(speed: Array, trial: Trial) -> Array:
 
 @_outcome("rad/s")
 def tracking_error(speed: Array, trial: Trial) -> Array:
-    """Root of the mean squared difference from the wanted speed."""
-    return np.array([rms_difference(each, trial.wanted) for each in speed])
+    """Root of the mean squared difference from the reference speed."""
+    return np.array([rms_difference(row, trial.reference) for row in speed])
 
 
 @_outcome("rad/s", "the command does not rest at 0 V long enough at its start")
 def creep(speed: Array, trial: Trial) -> Array:
     """Speed just before the command first leaves zero."""
     rests = trial.voltage[0] == 0.0 and trial.begin >= REST * trial.rate
-    return np.array(speed[:, trial.begin]) if rests else np.full(len(speed), np.nan)
+    if not rests:
+        return np.full(len(speed), np.nan)
+    return np.array(speed[:, trial.begin])
 
 
 @_outcome("rad")
@@ -245,16 +258,17 @@ def travel(speed: Array, trial: Trial) -> Array:
     return np.asarray(np.trapezoid(speed, dx=1.0 / trial.rate, axis=1))
 
 
-def _reached(speed: Array, trial: Trial, part: float) -> Array:
-    """(m,) time from the command's first move to a part of the final speed. [s]"""
+def _reached(speed: Array, trial: Trial, share: float) -> Array:
+    """(m,) time from the command's first move to a share of the final speed. [s]"""
     if not trial.goes_straight:
         return np.full(len(speed), np.nan)
     rising = speed[:, trial.begin : trial.last + 1]
     final = rising[:, -1]
-    share = rising * np.sign(final)[:, None] - part * np.abs(final)[:, None]
-    after = np.argmax(share >= 0.0, axis=1)  # the last sample always is
-    rows, before = np.arange(len(speed)), np.maximum(after - 1, 0)
-    low, high = share[rows, before], share[rows, after]
+    excess = rising * np.sign(final)[:, None] - share * np.abs(final)[:, None]
+    after = np.argmax(excess >= 0.0, axis=1)  # the last sample always is
+    before = np.maximum(after - 1, 0)
+    rows = np.arange(len(speed))
+    low, high = excess[rows, before], excess[rows, after]
     rise = np.where(high > low, high - low, 1.0)
     samples = np.where(after > 0, before + np.clip(-low / rise, 0.0, 1.0), 0.0)
     return np.asarray(np.where(final != 0.0, samples / trial.rate, np.nan))
@@ -265,9 +279,9 @@ def rms_difference(speed: Array, other: Array) -> float:
     return float(np.sqrt(np.mean((speed - other) ** 2)))
 
 
-def meant(name: str, known: Iterable[str]) -> str:
-    """A hint at the known name that an unknown one is like, empty if it is like none."""
-    close = get_close_matches(name, known, n=1)
+def meant(name: str, names: Iterable[str]) -> str:
+    """A hint at the name that an unknown one resembles, empty if it resembles none."""
+    close = get_close_matches(name, names, n=1)
     return f" (did you mean {close[0]}?)" if close else ""
 
 
@@ -285,9 +299,9 @@ def find_outcomes(names: Sequence[str]) -> tuple[Outcome, ...]:
 
 
 def outcome_matrix(speed: Array, trial: Trial, outcomes: Sequence[Outcome]) -> Array:
-    """(m, K) outcomes, in their units, of (m, n) speeds [rad/s]; NaN where there is none."""
-    made = [each.compute(speed, trial) for each in outcomes]
-    return np.array(made).reshape(len(made), len(speed)).T
+    """(m, K) outcomes, in their units, of (m, n) speeds [rad/s]; NaN if there is none."""
+    values = [outcome.compute(speed, trial) for outcome in outcomes]
+    return np.array(values).reshape(len(outcomes), len(speed)).T
 
 
 # --- runs side by side ----------------------------------------------------------------------------
@@ -300,8 +314,8 @@ def side_by_side(runs: Mapping[str, Simulation]) -> Table:
     task = Trial(first.voltage, first.record.rate, first.shaft_speed)
     speeds = np.array([run.shaft_speed for run in runs.values()])
     columns = (Column(name, "z.2f", none="none") for name in runs)
-    made = Table("", (Column(""), *columns, UNIT))
-    for each in OUTCOMES.values():
-        if each.name != "tracking_error":  # nothing was wanted
-            each.add_to(made, each.compute(speeds, task).tolist())
-    return made
+    table = Table("", (Column(""), *columns, UNIT))
+    for outcome in OUTCOMES.values():
+        if outcome.name != "tracking_error":  # there is no reference
+            outcome.add_to(table, outcome.compute(speeds, task).tolist())
+    return table

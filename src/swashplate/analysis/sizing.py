@@ -9,8 +9,8 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from swashplate.analysis.design_variables import FactorRange, check_ranges, with_factors
 from swashplate.analysis.outcomes import Trial, rms_difference, speed_per_volt
-from swashplate.analysis.whatif import Range, check_ranges, pulled
 from swashplate.drive import Drive
 from swashplate.errors import DomainError, InputError, ParameterError
 from swashplate.parameters.rules import FULL_VOLTAGE
@@ -23,7 +23,12 @@ Array = NDArray[np.float64]
 # --- what a drive can do --------------------------------------------------------------------------
 
 Direction = Literal["both", "positive", "negative"]
-STEP_LENGTH, STEP_RATE = 2.0, 512.0  # Of the full step that shows the largest acceleration. [s, Hz]
+STEP_LENGTH = 2.0
+"""Duration of the full step that shows the largest acceleration. [s]"""
+STEP_RATE = 512.0
+"""Its samples a second. [Hz]"""
+SMALLEST = 1e-300
+"""In place of zero where a number is divided by, or its logarithm taken."""
 
 
 class Performance(NamedTuple):
@@ -32,7 +37,7 @@ class Performance(NamedTuple):
     speed: float  # That the largest command settles at. [rad/s]
     acceleration: float  # Largest one after a full step from rest. [rad/s²]
     tracking_error: float | None
-    """RMS difference from the wanted speed, None where none is wanted. [rad/s]"""
+    """RMS difference from the reference speed, None if there is none. [rad/s]"""
 
 
 def performance(
@@ -45,8 +50,8 @@ def performance(
     drive : Drive
         From rest.
     follow : Trial, optional
-        Its wanted speed is to be followed. The command is in proportion to it, by the drive's own
-        ratio (see `speed_per_volt`), and ends at ±10 V: a larger pump is given less voltage.
+        Its reference speed is to be followed. The command is in proportion to it, by the ratio of
+        the drive itself (see `speed_per_volt`), within ±10 V: a larger pump is given less voltage.
     direction : {"both", "positive", "negative"}
         Which speed and acceleration count.
 
@@ -65,10 +70,10 @@ def performance(
             accelerations.append(float(change.max() * STEP_RATE))
     error = None
     if follow is not None:
-        ratio = [max(speed_per_volt(drive, sign), 1e-300) for sign in (1.0, -1.0)]
-        volts = follow.wanted / np.where(follow.wanted >= 0.0, *ratio)
+        up, down = (max(speed_per_volt(drive, sign), SMALLEST) for sign in (1.0, -1.0))
+        volts = follow.reference / np.where(follow.reference >= 0.0, up, down)
         run = drive.simulate(np.clip(volts, -FULL_VOLTAGE, FULL_VOLTAGE), follow.rate)
-        error = rms_difference(run.shaft_speed, follow.wanted)
+        error = rms_difference(run.shaft_speed, follow.reference)
     return Performance(min(speeds), min(accelerations), error)
 
 
@@ -109,28 +114,35 @@ class Requirements(Result):
         values = {name: getattr(self, name) for name in REQUIRED}
         return {name: value for name, value in values.items() if value is not None}
 
-    def slacks(self, found: Performance) -> Array:
+    def slacks(self, reached: Performance) -> Array:
         """By how much each is met, in the order of `given`: ln of the ratio, negative if not."""
-        ratios = [max(getattr(found, name), 1e-300) / each for name, each in self.given.items()]
-        return np.log(ratios) * [REQUIRED[name][1] for name in self.given]
+        slacks = []
+        for name, required in self.given.items():
+            _, sign = REQUIRED[name]
+            slacks.append(sign * np.log(max(getattr(reached, name), SMALLEST) / required))
+        return np.array(slacks)
 
-    def reached(self, found: Sequence[Performance]) -> str:
+    def reached(self, performances: Sequence[Performance]) -> str:
         """What the best of some drives reach, as the rest of a sentence."""
-        slacks = np.array([self.slacks(each) for each in found])
-
-        def said(name: str, index: int) -> str:
-            unit, wanted = REQUIRED[name][0], self.given[name]
-            done, limit = (
-                quantity(each, unit, spec=".4g") for each in (getattr(found[index], name), wanted)
-            )
-            return f"{name.replace('_', ' ')} {done} (required {limit})"
-
-        best, nearest = slacks.argmax(axis=0), int(slacks.min(axis=1).argmax())
-        missed = [said(n, best[k]) for k, n in enumerate(self.given) if slacks[best[k], k] < 0.0]
+        slacks = np.array([self.slacks(performance) for performance in performances])
+        best = slacks.argmax(axis=0)
+        missed = [
+            self._beside(name, performances[best[k]])
+            for k, name in enumerate(self.given)
+            if slacks[best[k], k] < 0.0
+        ]
         if missed:
             return f"reaches {listed(missed)}"
-        each = listed([said(name, nearest) for name in self.given])
-        return f"meets each requirement, but not all at once: nearest is {each}"
+        nearest = performances[int(slacks.min(axis=1).argmax())]
+        numbers = listed([self._beside(name, nearest) for name in self.given])
+        return f"meets each requirement, but not all at the same time: nearest is {numbers}"
+
+    def _beside(self, name: str, performance: Performance) -> str:
+        """A number that was reached, beside the required one."""
+        unit, _ = REQUIRED[name]
+        number = quantity(getattr(performance, name), unit, spec=".4g")
+        required = quantity(self.given[name], unit, spec=".4g")
+        return f"{name.replace('_', ' ')} {number} (required {required})"
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,12 +150,14 @@ class Sizing(Result):
     """The smallest change that meets the requirements."""
 
     requirements: Requirements
-    factors: Mapping[str, float]  # By lever; 1 leaves it alone.
-    drive: Drive  # The changed drive.
+    factors: Mapping[str, float]
+    """By design variable; 1 leaves it as it is."""
+    drive: Drive
+    """The changed drive."""
     before: Performance
     after: Performance
     alone: Mapping[str, float | None]
-    """By lever the factor that is enough without the others, None where there is none."""
+    """By design variable the factor that is enough without the others, None if there is none."""
 
     @property
     def change(self) -> float:
@@ -151,34 +165,46 @@ class Sizing(Result):
         return float(np.sqrt(_change(np.array([*self.factors.values()]))))
 
     def tables(self) -> tuple[Table, Table]:
-        """How far each lever moves, and by itself; what is required, as it is and changed."""
-        heads = Column("lever"), Column("factor", ".4f"), Column("change", "+z.2%")
-        moved = Table("", (*heads, Column("enough by itself", ".4f", none="no")))
+        """Each design variable's factor, together and alone; what is required, before and after."""
+        factors = Table(
+            "",
+            (
+                Column("design variable"),
+                Column("factor", ".4f"),
+                Column("change", "+z.2%"),
+                Column("enough alone", ".4f", none="no"),
+            ),
+        )
         for name, factor in self.factors.items():
-            moved.add(name, factor, factor - 1.0, self.alone[name])
-        columns = (Column(each, ".2f") for each in ("required", "as it is", "changed"))
-        done = Table("", (Column(""), *columns, UNIT))
+            factors.add(name, factor, factor - 1.0, self.alone[name])
+        columns = (Column(head, ".2f") for head in ("required", "as it is", "changed"))
+        requirements = Table("", (Column(""), *columns, UNIT))
         for name, (unit, sign) in REQUIRED.items():
-            before, wanted = getattr(self.before, name), getattr(self.requirements, name)
-            sort, factor = "<>"[sign > 0.0], display_unit(unit).factor
-            limit = None if wanted is None else Cell(wanted, f"{sort}= {factor * wanted:.2f}")
-            if before is not None:
-                words = name.replace("_", " ")
-                done.add(words, limit, before, getattr(self.after, name), unit=unit)
-        return moved, done
+            before = getattr(self.before, name)
+            if before is None:
+                continue
+            required = getattr(self.requirements, name)
+            limit = None
+            if required is not None:
+                relation = ">=" if sign > 0.0 else "<="
+                limit = Cell(required, f"{relation} {display_unit(unit).factor * required:.2f}")
+            after = getattr(self.after, name)
+            requirements.add(name.replace("_", " "), limit, before, after, unit=unit)
+        return factors, requirements
 
 
-WIDEST: Range = (0.5, 2.0)  # Factors that a lever may take unless others are given.
+DEFAULT_RANGE: FactorRange = (0.5, 2.0)
+"""Factors that a design variable may take unless others are given. [1]"""
 
 
 def size(
     drive: Drive,
     requirements: Requirements,
-    ranges: Mapping[str, Range],
+    ranges: Mapping[str, FactorRange],
     *,
     follow: Trial | None = None,
 ) -> Sizing:
-    """Find the smallest change of the levers that meets the requirements.
+    """Find the smallest change of the design variables that meets the requirements.
 
     Parameters
     ----------
@@ -187,62 +213,77 @@ def size(
     requirements : Requirements
         What it shall do.
     ranges : mapping of str to (float, float)
-        The levers that may be moved, with the lowest and highest factor; 1 lies between. [1]
+        The design variables that may change, with the lowest and highest factor; 1 lies between.
+        [1]
     follow : Trial, optional
-        Whose wanted speed is to be followed, needed for a required tracking error.
+        Whose reference speed is to be followed, needed for a required tracking error.
 
     Raises
     ------
     InputError
-        If the levers do not reach the requirements: the sentence says what they reach. Or for an
-        unknown lever, a range without 1, or a tracking error without a speed to follow.
+        If the requirements cannot be met: the sentence says what can be reached. Or for an unknown
+        design variable, a range without 1, or a tracking error without a speed to follow.
 
     Notes
     -----
-    Smallest means the least Σ (factor - 1)²: twice as large counts as much as 100 % off.
+    Smallest means the least Σ (factor - 1)².
     """
     if requirements.tracking_error is not None and follow is None:
         raise InputError("A tracking error can only be required with a speed to follow.")
     check_ranges(ranges, around=1.0)
-    names, (low, high) = list(ranges), np.array(list(ranges.values()), dtype=np.float64).T
+    names = list(ranges)
+    low, high = np.array(list(ranges.values()), dtype=np.float64).T
     tried: dict[tuple[float, ...], Performance | None] = {}
 
-    def done(point: Array) -> Performance | None:
+    def performance_at(point: Array) -> Performance | None:
         key = tuple(point.tolist())
         if key not in tried:
             try:
-                changed = pulled(drive, dict(zip(names, key, strict=True)))
+                changed = with_factors(drive, dict(zip(names, key, strict=True)))
                 tried[key] = performance(changed, follow, direction=requirements.direction)
             except (ParameterError, DomainError):
                 tried[key] = None
         return tried[key]
 
     def slack(point: Array) -> Array:
-        found = done(point)
-        # as far from all requirements as no drive that can be simulated is
-        return (
-            np.full(len(requirements.given), -1e3) if found is None else requirements.slacks(found)
-        )
+        reached = performance_at(point)
+        if reached is None:
+            return np.full(len(requirements.given), WORSE_THAN_ANY)
+        return requirements.slacks(reached)
 
     before = performance(drive, follow, direction=requirements.direction)
     point = smallest_change(slack, low, high)
-    after = None if point is None else done(point)
+    after = None if point is None else performance_at(point)
     if point is None or after is None:
-        words = ", ".join(f"{name} x {pair[0]:g} to {pair[1]:g}" for name, pair in ranges.items())
-        reached = requirements.reached([each for each in tried.values() if each is not None])
-        raise InputError(f"Within {words} the {drive.name} {reached}.")
+        searched = ", ".join(
+            f"{name} x {low:g} to {high:g}" for name, (low, high) in ranges.items()
+        )
+        simulated = [reached for reached in tried.values() if reached is not None]
+        raise InputError(f"Within {searched} the {drive.name} {requirements.reached(simulated)}.")
     factors = dict(zip(names, point.tolist(), strict=True))
     alone = {name: smallest_alone(slack, low, high, k) for k, name in enumerate(names)}
-    return Sizing(requirements, factors, pulled(drive, factors), before, after, alone)
+    return Sizing(
+        requirements=requirements,
+        factors=factors,
+        drive=with_factors(drive, factors),
+        before=before,
+        after=after,
+        alone=alone,
+    )
 
 
 # --- search ---------------------------------------------------------------------------------------
 
 Slack = Callable[[Array], Array]
-"""From (L,) factors to (r,) slacks, all 0 or more where the factors satisfy."""
-SCANNED = 6  # log₂ of the points of a Sobol sequence that are tried.
-FINEST = 1e-9  # Part of the way to which an end is bisected.
-ALONG = 32  # Points along a single factor's range.
+"""From (L,) factors to (r,) slacks, all 0 or more if the factors satisfy."""
+WORSE_THAN_ANY = -1e3
+"""Slack of what cannot be simulated: below that of any drive that can. [1]"""
+SCANNED = 6
+"""log₂ of the points of a Sobol sequence that are tried."""
+FINEST = 1e-9
+"""Share of the way to which an end is bisected. [1]"""
+ALONG = 32
+"""Points along the range of a single factor."""
 
 
 def smallest_change(slack: Slack, low: Array, high: Array) -> Array | None:
@@ -269,7 +310,8 @@ def smallest_change(slack: Slack, low: Array, high: Array) -> Array | None:
     points = [low, high, *(low + inner * (high - low))]
     for k in range(low.size):
         factor = smallest_alone(slack, low, high, k)
-        points += [] if factor is None else [_with(unchanged, k, factor)]
+        if factor is not None:
+            points.append(_with(unchanged, k, factor))
 
     def drawn_in(point: Array) -> Array:
         drawn = _edge(slack, unchanged, point)
@@ -277,9 +319,10 @@ def smallest_change(slack: Slack, low: Array, high: Array) -> Array | None:
             drawn = _edge(slack, _with(drawn, k, 1.0), drawn)
         return drawn
 
-    good = sorted((point for point in points if _met(slack, point)), key=_change)
-    found = [drawn_in(each) for each in good[:2]]
-    for start in list(found):
+    satisfying = sorted((point for point in points if _met(slack, point)), key=_change)
+    starts = [drawn_in(point) for point in satisfying[:2]]
+    solutions = list(starts)
+    for start in starts:
         solved = minimize(
             _change,
             start,
@@ -290,13 +333,14 @@ def smallest_change(slack: Slack, low: Array, high: Array) -> Array | None:
             options={"maxiter": 60, "ftol": 1e-10, "eps": 1e-5},
         )
         # SLSQP may have stopped on the wrong side: back towards where it began
-        found.append(drawn_in(_edge(slack, np.clip(solved.x, low, high), start)))
-    return min(found, key=_change, default=None)
+        solutions.append(drawn_in(_edge(slack, np.clip(solved.x, low, high), start)))
+    return min(solutions, key=_change, default=None)
 
 
 def smallest_alone(slack: Slack, low: Array, high: Array, index: int) -> float | None:
     """The factor nearest to 1 that satisfies by itself, the others being 1; None if none does."""
-    unchanged, reached = np.ones(low.size), list[float]()
+    unchanged = np.ones(low.size)
+    reached = list[float]()
     for end in (float(low[index]), float(high[index])):
         before = unchanged
         for factor in np.linspace(1.0, end, ALONG + 1):
@@ -323,9 +367,9 @@ def _edge(slack: Slack, start: Array, goal: Array) -> Array:
 
 
 def _with(point: Array, index: int, factor: float) -> Array:
-    moved = point.copy()
-    moved[index] = factor
-    return moved
+    other = point.copy()
+    other[index] = factor
+    return other
 
 
 def _met(slack: Slack, point: Array) -> bool:

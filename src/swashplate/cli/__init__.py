@@ -1,7 +1,7 @@
 """The command line: parse, call, print.
 
-A command's module is imported when it is called, and what takes long inside the function that needs
-it, so that no command waits for the imports of another.
+A command's module is imported when the command is called, and slow libraries within the function
+that needs them, so that no command waits for the imports of another.
 """
 
 import gc
@@ -19,15 +19,14 @@ import typer
 from typer.core import TyperGroup
 
 from swashplate.__about__ import __version__
-from swashplate.cli.options import command
-from swashplate.cli.terminal import CLOSED_PIPE, close_output, say_error
+from swashplate.cli.terminal import Stream, close_output, say_error
 from swashplate.errors import FileError, InputError, SwashplateError, UnsoundDataError
 
 HELP = """\
 Hydrostatic drives: from a joystick's voltage to the speed of the shaft.
 
 A drive is a proportional amplifier (the control card), a pump and a motor.
-Packaged are three measured ones, the hoist, slew and luff axes of a crane,
+Included: three identified drives, the hoist, slew and luff axes of a crane,
 and a neutral one to start your own from. A command is a file of measured
 voltages or a maneuver: a name and its numbers in V, s and Hz.
 
@@ -43,77 +42,72 @@ Maneuvers, and some of the options that may follow their numbers:
 """
 EPILOG = """\
 Examples:
-  swashplate axes                                     the packaged drives
-  swashplate simulate hoist step:9 --plot step.png    one run, drawn
+  swashplate show                                     the packaged drives
+  swashplate simulate hoist step:9 --plot step.png    one run, with a figure
   swashplate simulate hoist step:9 --units rpm,bar    in other units
   swashplate simulate hoist log.csv --interpolation previous --out run.csv
   swashplate show hoist --toml > mine.toml            a drive of your own
-  swashplate compare hoist mine.toml                  what that changes
+  swashplate compare hoist mine.toml                  its differences
   swashplate campaign init logs/*.csv                 tests of your machine
   swashplate rig hoist --out virtual                  tests of a virtual one
-  swashplate fit virtual/campaign.toml                the drive behind them
+  swashplate fit virtual/campaign.toml                the drive from its tests
   swashplate limits fitted/drive.toml step:9          what limits it
   swashplate whatif hoist --scale orifice=1.5 --maneuver step:9
   swashplate full-order hoist step:9                  is one state enough
   swashplate crane run tg3637 --slew 1 --until slew_deg=45
   swashplate export hoist --fmu hoist.fmu             for other programs
-  swashplate demo                                     everything at once
+  swashplate demo                                     all of it, virtually
 
-Files are written in SI units, whole or not at all. Errors are one sentence on
-standard error, with exit code 2; a verdict that is not met ends with 1, as do
-data that nothing can be fitted to, an interrupted command with 130.
-'swashplate COMMAND --help' says more.
+Files are in SI units and written atomically. Errors: one sentence on standard
+error, exit code 2. Other exit codes: 0 done, 1 not usable or does not fit,
+130 interrupted. 'swashplate COMMAND --help' describes a command.
 """
 
 
 COMMANDS = {
-    "Demonstrations": {"demo": "identify.demo"},
-    "Simulate": {
-        "simulate": "simulation.simulate",
-        "compare": "simulation.compare",
-        "axes": "simulation.axes",
-        "show": "simulation.show_parameters",
-    },
-    "Test": {"rig": "campaign.rig", "campaign": "campaign.app"},
+    "Demonstration": {"demo": "identify"},
+    "Simulate": {"simulate": "simulation", "compare": "simulation", "show": "simulation"},
+    "Test": {"rig": "campaign", "campaign": "campaign"},
     "Identify": {
-        "guess": "campaign.guess",
-        "excitation": "campaign.excitation",
-        "fit": "identify.fit",
-        "validate": "identify.validate",
-        "advise": "campaign.advise",
-        "report": "identify.report",
+        "guess": "campaign",
+        "advise": "campaign",
+        "fit": "identify",
+        "validate": "identify",
+        "report": "identify",
     },
     "Analyse": {
-        "limits": "analyse.limits",
-        "whatif": "analyse.whatif",
-        "size": "analyse.size",
-        "sensitivity": "analyse.sensitivity",
-        "compensate": "analyse.compensate",
-        "linearize": "analyse.linearize",
-        "bode": "analyse.bode",
-        "full-order": "analyse.full_order",
-        "crane": "crane.app",
+        "limits": "analyse",
+        "whatif": "analyse",
+        "size": "analyse",
+        "sensitivity": "analyse",
+        "compensate": "analyse",
+        "linearize": "analyse",
+        "bode": "analyse",
+        "full-order": "analyse",
+        "crane": "crane",
     },
-    "Export": {"export": "exports.export", "live": "exports.live"},
-    "This installation": {"doctor": "installation.doctor"},
+    "Export": {"export": "exports", "live": "exports"},
+    "Installation": {"doctor": "installation"},
 }
-"""Where each command stands, by the panel of the help that lists it."""
+"""Module of each command, by the panel of the help that lists it."""
 
 
 PANELS = {name: panel for panel, names in COMMANDS.items() for name in names}
 
 
 @cache
+def _group(module: str) -> Any:
+    """The commands of a module, imported now."""
+    return typer.main.get_group(import_module(f"swashplate.cli.{module}").app)
+
+
+@cache
 def _loaded(name: str) -> Any:
-    """A command, imported now."""
-    module, _, function = COMMANDS[PANELS[name]][name].partition(".")
-    found = getattr(import_module(f"swashplate.cli.{module}"), function)
-    alone = typer.Typer(callback=lambda: None, rich_markup_mode="rich")
-    if isinstance(found, typer.Typer):
-        alone.add_typer(found, name=name, rich_help_panel=PANELS[name])
-    else:
-        command(alone, name, panel=PANELS[name])(found)
-    return typer.main.get_group(alone).commands[name]
+    """A command of the root, imported now."""
+    panel = PANELS[name]
+    found = _group(COMMANDS[panel][name]).commands[name]
+    found.rich_help_panel = panel
+    return found
 
 
 class _Commands(Mapping[str, Any]):
@@ -130,9 +124,9 @@ class _Commands(Mapping[str, Any]):
 
 
 class Commands(TyperGroup):
-    """The commands; what a user can mend ends as one sentence and exit code 2.
+    """The commands; an error that a user can correct ends as one sentence and exit code 2.
 
-    Data that no fit could mean anything of end with 1, as a verdict on a fit that finds them.
+    Data that make every fit meaningless end with 1, as the verdict on a fit that finds them.
     """
 
     def __init__(self, **given: Any) -> None:
@@ -147,9 +141,6 @@ class Commands(TyperGroup):
         """Run a command."""
         try:
             return super().invoke(ctx)
-        except BrokenPipeError:
-            close_output()
-            raise typer.Exit(CLOSED_PIPE) from None
         except UnsoundDataError as error:
             say_error(error, "Not usable, as the data are not sound")
             raise typer.Exit(1) from None
@@ -172,8 +163,8 @@ app = typer.Typer(
 )
 
 
-def _version(asked: bool) -> None:
-    if asked:
+def _version(requested: bool) -> None:
+    if requested:
         typer.echo(f"swashplate {__version__}")
         raise typer.Exit
 
@@ -191,10 +182,14 @@ def options(
 def _check_surroundings() -> None:
     epoch = os.environ.get("SOURCE_DATE_EPOCH", "0")
     if not epoch.isdecimal():
-        raise InputError(f"SOURCE_DATE_EPOCH is '{epoch}', no number of seconds since 1970")
+        raise InputError(
+            f"SOURCE_DATE_EPOCH is '{epoch}', which is not a number of seconds since 1970"
+        )
     threads = os.environ.get("NUMBA_NUM_THREADS", "1")
     if not threads.isdecimal() or int(threads) == 0:
-        raise InputError(f"NUMBA_NUM_THREADS is '{threads}', no number of threads; unset it")
+        raise InputError(
+            f"NUMBA_NUM_THREADS is '{threads}', which is not a number of threads; unset it"
+        )
     try:
         Path.cwd()
     except OSError:
@@ -207,7 +202,10 @@ def main() -> None:
     # other; runs, starts and draws are spread over the cores instead
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     if isinstance(sys.stdout, io.TextIOWrapper):
-        sys.stdout.reconfigure(errors="replace")  # a terminal without "±" or "−" shows "?"
+        # a terminal without "±" or "−" shows "?"
+        sys.stdout = Stream.around(sys.stdout, errors="replace")
+    if isinstance(sys.stderr, io.TextIOWrapper):
+        sys.stderr = Stream.around(sys.stderr, errors=sys.stderr.errors)
     # a process that lives for seconds need not look for cycles among what its libraries define:
     # that takes a fifth of a fit, and a second more at the end
     gc.set_threshold(50_000, 20, 50)

@@ -11,79 +11,89 @@ from typing import Annotated, Literal
 import typer
 
 from swashplate.cli import words
+from swashplate.cli.commands import command
 from swashplate.cli.options import (
+    NO_VALUE,
+    DriveArgument,
     DriveChoice,
     FigureFile,
+    Force,
     Interpolation,
+    ManeuverOrLog,
+    OptionalCommand,
     Sampling,
     SetFile,
     Simulating,
     TableFile,
-    option,
+    VariablesOption,
 )
 from swashplate.cli.terminal import bullets, check_output, draw, note, save, say, show, working
 from swashplate.errors import InputError
 from swashplate.tables import joined, quantity
 
 LEVEL, SPAN = 0.95, (0.9, 1.1)
-"""Of bands, and the factors of a lever that names none."""
+"""Level of the bands, and the usual factors of a design variable."""
 OUTCOMES = ("final_speed", "rise_time", "largest_acceleration", "tracking_error", "creep")
 SIZED = ("orifice", "pump")
-PULLED = (*SIZED, "supply_pressure", "rate_limits", "dead_zone", "spool_stroke", "relief")
+VARIED = (*SIZED, "supply_pressure", "rate_limits", "dead_zone", "spool_stroke", "relief")
 MOST_POINTS = 2000
 AMPLITUDES = (1.0, 4.0, 6.5, 9.0)
 
+
 Direction = Literal["both", "positive", "negative"]
 Input = Literal["voltage", "current", "solenoid_force"]
+
+app = typer.Typer(rich_markup_mode="rich")
 
 
 # --- limits and changes ---------------------------------------------------------------------------
 
 
+@command(
+    app,
+    "limits",
+    examples="""
+        swashplate limits hoist
+        swashplate limits hoist --plot envelope.png
+        swashplate limits luff sine:9,0.1 --plot timeline.png
+        swashplate limits mine.toml log.csv --interpolation previous --out shares.csv
+    """,
+)
 def limits(
     drive: DriveChoice,
-    command: str | None = None,
+    maneuver: OptionalCommand = None,
     *,
     out: TableFile = None,
     plot: FigureFile = None,
     sampling: Simulating,
+    force: Force = False,
 ) -> None:
-    """Show what a drive can do, or what limits it under a command.
+    """Show the limits of a drive, or those that act under a command.
 
     Without a command: dead zone, gain, limits of speed and acceleration, rise
-    times ('swashplate bode' says how it follows sines). With one: how often each
-    limit acts, by how much the error falls without it, and so which component to
-    change first. The error is the rms of the speed less that of a drive without
-    limits. The shares need not add up to 100 %.
-
-    Options:
-      command MANEUVER|FILE: A maneuver or a log, as in 'swashplate simulate': what limits the drive
-          under it. Without one, what the drive can do at all.
-
-    For example:
-      swashplate limits hoist
-      swashplate limits hoist --plot envelope.png
-      swashplate limits luff sine:9,0.1 --plot timeline.png
-      swashplate limits mine.toml log.csv --interpolation previous --out shares.csv
+    times ('swashplate bode' shows the frequency response). With a command: how
+    often each limit acts and by how much the error falls without it, which tells
+    which component to change first. The error is the RMS difference of the speed
+    from that of a drive without limits. The shares need not add up to 100 %.
     """
     from swashplate.analysis.capability import envelope
     from swashplate.analysis.limits import shares_of
 
-    if command is None:
+    if maneuver is None:
         with working("Measuring"):
             found = envelope(drive.chosen)
         save(out, "Envelope, in SI", found.write)
         draw(plot, "plot_envelope", found)
-        drive.note(f"{drive.title}: what it can do")
+        drive.note(f"{drive.title}: performance envelope")
         show(found.table())
         return
     with working("Simulating"):
         chosen = words.at_rate(drive.chosen, sampling.rate)
-        name, run = words.simulated(chosen, command, sampling)
+        name, run = words.simulated_as(chosen, maneuver, sampling)
         shares = shares_of(chosen, run)
     title = f"{drive.title}, {name}"
     save(out, "Shares of each limit, in SI", shares.write)
-    draw(plot, "plot_limit_timeline", run, wanted=shares.wanted, title=title)
+    draw(plot, "plot_limit_timeline", run, reference=shares.reference, title=title)
     error = quantity(shares.error, "rad/s", spec=".3f")
     # which of the limits that act here no test reached is said below, by the result itself
     drive.note(f"{title}: {error} rms from a drive without limits", unreached=False)
@@ -94,48 +104,73 @@ def limits(
         say(sentence)
 
 
-def _list_levers(asked: bool) -> None:
-    if asked:
-        from swashplate.analysis.whatif import levers_table
+def _list_variables(requested: bool) -> None:
+    if requested:
+        from swashplate.analysis.design_variables import design_variables_table
 
-        show(levers_table())
+        show(design_variables_table())
         raise typer.Exit
 
 
+@command(
+    app,
+    "whatif",
+    examples="""
+        swashplate whatif hoist --scale orifice=1.5 --scale pump=1.5
+        swashplate whatif slew --scale orifice_diameter=1.2 --maneuver step:6 --plot w.png
+        swashplate whatif fitted --scale dead_zone=0 --uncertainty fitted
+        swashplate whatif mine.toml --scale pump=1.2 --maneuver log.csv --interpolation previous
+        swashplate whatif --variables
+    """,
+)
 def whatif(
-    drive: str,
+    drive: DriveArgument,
     *,
-    factors: list[str],
-    maneuver: str = "sine:9,0.1",
-    uncertainty: Path | None = None,
-    campaign: Path | None = None,
+    factors: Annotated[
+        list[str],
+        typer.Option(
+            "--scale",
+            metavar="NAME=FACTOR",
+            help=(
+                "Factor on a design variable, such as orifice=1.5, pump=1.5 or dead_zone=0 (see "
+                "--variables), or on a parameter, such as Z16_plus=1.2; may be repeated."
+            ),
+        ),
+    ],
+    maneuver: ManeuverOrLog = "sine:9,0.1",
+    uncertainty: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DIR", help="Folder of a fit: show bands from the errors of its estimates."
+        ),
+    ] = None,
+    campaign: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="CAMPAIGN.toml", help="Campaign of that fit, if it has been moved since."
+        ),
+    ] = None,
     plot: FigureFile = None,
     out: SetFile = None,
-    levers: Annotated[
-        bool, option("List the levers and end.", "--levers", callback=_list_levers, is_eager=True)
+    list_variables: Annotated[
+        bool,
+        typer.Option(
+            "--variables",
+            metavar=NO_VALUE,
+            help="List the design variables and exit.",
+            callback=_list_variables,
+            is_eager=True,
+        ),
     ] = False,
     sampling: Sampling,
+    force: Force = False,
 ) -> None:
-    """Predict what a change of the machine does.
+    """Predict the effect of a change to the machine.
 
-    Simulates the drive as it is and with its levers moved, over one command.
-    The speed that is wanted is in proportion to the voltage, at the ratio of
-    the drive as it is. With --uncertainty outcomes get intervals and the figure
-    bands: drives are drawn from the errors of a fit's estimates.
-
-    Options:
-      factors --scale LEVER=FACTOR: A factor on a lever: orifice=1.5, pump=1.5, dead_zone=0 ... (see
-          --levers), or on a parameter: Z16_plus=1.2. May be repeated.
-      maneuver NAME|FILE: Command for both: a maneuver such as step:9 or "step +9 V", or a log.
-      uncertainty DIR: Folder that 'fit' wrote: bands from the errors of its estimates.
-      campaign CAMPAIGN.toml: The campaign of that fit, if it is not where it was.
-
-    For example:
-      swashplate whatif hoist --scale orifice=1.5 --scale pump=1.5
-      swashplate whatif slew --scale orifice_diameter=1.2 --maneuver step:6 --plot w.png
-      swashplate whatif fitted --scale dead_zone=0 --uncertainty fitted
-      swashplate whatif mine.toml --scale pump=1.2 --maneuver log.csv --interpolation previous
-      swashplate whatif --levers
+    Simulates the drive as it is and with design variables changed, over one
+    command. The reference speed is proportional to the voltage, with the gain of
+    the drive as it is. With --uncertainty, metrics get intervals and the
+    figure gets bands: drives are drawn from the errors of a fit's estimates.
     """
     from swashplate.analysis import monte_carlo
     from swashplate.analysis.whatif import AS_IS, CHANGED, what_if
@@ -149,8 +184,10 @@ def whatif(
     if uncertainty is not None:
         with working("Drawing drives"):
             draws = monte_carlo.stored_draws(uncertainty, drive=choice.chosen, campaign=campaign)
-            drawn = {AS_IS: draws, CHANGED: draws.pulled(moved)}
-            said.append(f"± is half of the interval that holds {100.0 * LEVEL:g} % of the drives.")
+            drawn = {AS_IS: draws, CHANGED: draws.with_factors(moved)}
+            said.append(
+                f"± is half of the interval that contains {100.0 * LEVEL:g} % of the drives."
+            )
             for which, each in drawn.items():
                 band = monte_carlo.bands(each, trial, result.outcomes, level=LEVEL)
                 bands[which], (width, when) = band, band.widest
@@ -171,39 +208,58 @@ def whatif(
     bullets(result.sentences(), said)
 
 
+@command(
+    app,
+    "size",
+    examples="""
+        swashplate size hoist --speed-deg-s 250 --variable pump
+        swashplate size hoist --acceleration-deg-s2 200 --variable orifice=1/2 --variable pump=1/1.5
+        swashplate size hoist --tracking-deg-s 19 --maneuver sine:9,0.1 --out larger.toml
+    """,
+)
 def size(
     drive: DriveChoice,
     *,
-    speed_deg_s: float | None = None,
-    acceleration_deg_s2: float | None = None,
-    tracking_deg_s: float | None = None,
-    maneuver: str | None = None,
-    direction: Direction = "both",
-    levers: list[str] | None = None,
+    speed_deg_s: Annotated[
+        float | None, typer.Option(metavar="DEG/S", help="Required speed.")
+    ] = None,
+    acceleration_deg_s2: Annotated[
+        float | None,
+        typer.Option(metavar="DEG/S2", help="Required acceleration after a full step from rest."),
+    ] = None,
+    tracking_deg_s: Annotated[
+        float | None,
+        typer.Option(
+            metavar="DEG/S", help="Largest acceptable RMS error while following the maneuver."
+        ),
+    ] = None,
+    maneuver: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help=(
+                "Maneuver to follow: the reference speed is proportional to its voltage, with the "
+                "gain of the drive as it is. Each candidate is commanded in proportion to that "
+                "speed, with its own gain."
+            ),
+        ),
+    ] = None,
+    direction: Annotated[
+        Direction, typer.Option(help="Direction in which speed and acceleration are required.")
+    ] = "both",
+    variables: VariablesOption = None,
     out: SetFile = None,
+    force: Force = False,
 ) -> None:
-    """Find the smallest change that meets what is required.
+    """Find the smallest change that meets requirements.
 
-    Smallest is the least sum of squares of the changes, each in per cent. What
-    cannot be met is refused, with what can be reached. Levers are orifice and
-    pump, from half to twice, unless others are named.
-
-    Options:
-      speed_deg_s DEG/S: Speed that is required.
-      acceleration_deg_s2 DEG/S2: Acceleration that is required, after a full step from rest.
-      tracking_deg_s DEG/S: Largest RMS error that is allowed while following the maneuver.
-      maneuver NAME: What is to be followed: the speed in proportion to this maneuver's voltage, at
-          the ratio of the drive as it is. Each candidate is commanded in proportion to it, at its
-          own ratio.
-      direction: Where speed and acceleration are required.
-
-    For example:
-      swashplate size hoist --speed-deg-s 250 --lever pump
-      swashplate size hoist --acceleration-deg-s2 200 --lever orifice=1/2 --lever pump=1/1.5
-      swashplate size hoist --tracking-deg-s 19 --maneuver sine:9,0.1 --out larger.toml
+    The smallest change is the one with the least sum of squares of the changes
+    in per cent. Infeasible requirements are rejected, with the values that can
+    be reached. The design variables are orifice and pump, from half to twice,
+    unless others are named.
     """
     from swashplate.analysis import sizing
-    from swashplate.analysis.outcomes import proportional_speed, trial
+    from swashplate.analysis.outcomes import proportional_speed, trial_of
 
     if (tracking_deg_s is None) != (maneuver is None):
         raise InputError("--tracking-deg-s and --maneuver belong together: give both or neither.")
@@ -211,97 +267,128 @@ def size(
     speed, acceleration, error = (None if each is None else radians(each) for each in given)
     required = sizing.Requirements(speed, acceleration, error, direction)
     with working("Sizing"):
-        follow, ranges = None, words.ranges_of(levers or SIZED, sizing.WIDEST)
+        follow, ranges = None, words.ranges_of(variables or SIZED, sizing.DEFAULT_RANGE)
         if maneuver is not None:
             voltage = words.maneuver_of(maneuver, drive.chosen).sample()
             # a larger drive may well be what it takes to reach it
-            wanted = proportional_speed(drive.chosen, voltage, limited=False)
-            follow = trial(drive.chosen, voltage, wanted=wanted)
+            reference = proportional_speed(drive.chosen, voltage, limited=False)
+            follow = trial_of(drive.chosen, voltage, reference=reference)
         found = sizing.size(drive.chosen, required, ranges, follow=follow)
     save(out, "Changed drive", found.drive.to_toml)
     drive.note(drive.title)
     show(*found.tables())
     if found.change == 0.0:
-        say("The drive meets it as it is; nothing needs to be changed.")
+        say("The drive meets the requirements as it is.")
     elif not drive.changes:  # whatif begins at a drive as its file has it
         moved = [f"{name}={factor!r}" for name, factor in found.factors.items() if factor != 1.0]
         scales = [word for each in moved for word in ("--scale", each)]
         said = shlex.join(["swashplate", "whatif", drive.drive, *scales])
-        note(f"See it over a command: {said}")
+        note(f"To simulate the change: {said}")
 
 
+@command(
+    app,
+    "sensitivity",
+    examples="""
+        swashplate sensitivity hoist
+        swashplate sensitivity hoist --variable orifice --variable pump=0.8/1.5 --plot tornado.png
+        swashplate sensitivity slew --maneuver step:4 --out all.csv
+    """,
+)
 def sensitivity(
     drive: DriveChoice,
     *,
-    levers: list[str] | None = None,
-    outcomes: list[str] | None = None,
-    maneuver: str = "step:9",
+    variables: VariablesOption = None,
+    outcomes: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--outcome",
+            metavar="NAME",
+            help=(
+                "Metric: final_speed, peak_speed, rise_time, response_time, largest_acceleration, "
+                "overshoot, tracking_error, creep or travel; may be repeated."
+            ),
+        ),
+    ] = None,
+    maneuver: ManeuverOrLog = "step:9",
     plot: FigureFile = None,
     out: TableFile = None,
     sampling: Sampling,
+    force: Force = False,
 ) -> None:
-    """Show which lever moves which outcome, each moved down and up by itself.
-
-    Options:
-      outcomes --outcome NAME: final_speed, peak_speed, rise_time, response_time,
-          largest_acceleration, overshoot, tracking_error, creep or travel; may be repeated.
-      maneuver NAME|FILE: Command: a maneuver such as step:9 or "step +9 V", or a log.
-
-    For example:
-      swashplate sensitivity hoist
-      swashplate sensitivity hoist --lever orifice --lever pump=0.8/1.5 --plot tornado.png
-      swashplate sensitivity slew --maneuver step:4 --out all.csv
-    """
+    """Show the effect of each design variable, changed down and up by itself."""
     from swashplate.analysis import one_at_a_time
 
     with working("Simulating"):
         name, trial = words.trial_of(drive.chosen, maneuver, sampling)
-        ranges = words.ranges_of(levers or (*PULLED, "plussing"), SPAN)
+        ranges = words.ranges_of(variables or (*VARIED, "spool_offset"), SPAN)
         found = one_at_a_time(drive.chosen, ranges, trial, outcomes=tuple(outcomes or OUTCOMES))
     title = f"{drive.title}, {name}"
     save(out, "All numbers, in SI", joined(found.tables(every=True)).write)
-    draw(plot, "plot_tornado", found, title=f"{title}: each lever by itself")
+    draw(plot, "plot_tornado", found, title=f"{title}: each design variable by itself")
     drive.note(title)
     show(*found.tables())
     bullets(dict.fromkeys(found.sentences))
 
 
+@command(
+    app,
+    "compensate",
+    examples="""
+        swashplate compensate hoist --out hoist-inverse.toml
+        swashplate compensate hoist --speed-deg-s 5 --speed-deg-s -120
+        swashplate compensate luff sine:4,0.1 --plot inverse.png
+    """,
+)
 def compensate(
     drive: DriveChoice,
-    stick: str | None = None,
+    stick: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="MANEUVER|FILE",
+            help=(
+                "Position of the joystick over time, as a maneuver or a log: ±10 V requests full "
+                "speed in that direction. Shows what the map gains."
+            ),
+        ),
+    ] = None,
     *,
-    speeds_deg_s: list[float] | None = None,
-    points: int = 101,
-    out: Path | None = None,
+    speeds_deg_s: Annotated[
+        list[float] | None,
+        typer.Option(
+            "--speed-deg-s",
+            metavar="DEG/S",
+            help="Required speed whose voltage is printed; may be repeated.",
+        ),
+    ] = None,
+    points: Annotated[
+        int,
+        typer.Option(metavar="N", min=0, help="Number of points per direction, 2 to 10001."),
+    ] = 101,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="Write the map in SI units: .toml for a controller, .csv or .parquet as a table.",
+        ),
+    ] = None,
     plot: FigureFile = None,
     sampling: Sampling,
+    force: Force = False,
 ) -> None:
-    """Invert a drive's steady map: the voltage for a wanted speed.
+    """Invert a drive's steady-state map: find the voltage for a required speed.
 
-    The map crosses the dead zone at once, ends where the speed saturates, and
-    is straight between its points, so that any controller can follow it. With
-    what a stick does, compares three controllers in simulation: a straight
-    line, the map, and the map with the drive's lag made up for.
-
-    Options:
-      stick MANEUVER|FILE: What the stick does: ±10 V asks for the full speed of that way, in
-          proportion. A maneuver or a log as in 'swashplate simulate'. Shows what the map gains
-          under it.
-      speeds_deg_s --speed-deg-s DEG/S: A wanted speed to print the voltage of; may be repeated.
-      points N: Points of the map per direction, 2 to 10001.
-      out FILE: Write the map, in SI: .toml for a controller, .csv or .parquet as a table.
-
-    For example:
-      swashplate compensate hoist --out hoist-inverse.toml
-      swashplate compensate hoist --speed-deg-s 5 --speed-deg-s -120
-      swashplate compensate luff sine:4,0.1 --plot inverse.png
+    The map steps across the dead zone, ends where the speed saturates, and is
+    linear between its points, so that any controller can evaluate it. With a
+    joystick command, three controllers are compared in simulation: a straight
+    line, the map, and the map with compensation of the drive's lag.
     """
     from swashplate.analysis import compensation
 
-    check_output(out, compensation.INVERSE_MAP)
+    check_output(out, compensation.INVERSE_MAP, force=force)
     if stick is not None and stick.lstrip("+-").replace(".", "", 1).isdecimal():
         raise InputError(
-            f"{stick} is a number, not what a stick does: for the voltage of a speed write "
+            f"{stick} is a number, not a maneuver or a log: for the voltage of a speed, write "
             f"--speed-deg-s {stick}."
         )
     with working("Inverting"):
@@ -310,55 +397,76 @@ def compensate(
         tables = found.tables([radians(each) for each in speeds_deg_s or ()])
         if stick is not None:
             name, run = words.simulated(chosen, stick, sampling)
-            wanted = compensation.wanted_of_stick(found, run["voltage"])
-            bought = compensation.improvement(chosen, wanted, run.record.rate, inverse=found)
+            reference = compensation.speed_of_command(found, run["voltage"])
+            bought = compensation.improvement(chosen, reference, run.record.rate, inverse=found)
             tables.append(replace(bought.table(), title=f"Error of the speed under {name}"))
     save(out, "Inverse map, in SI", found.write)
     draw(plot, "plot_compensation", found, bought)
-    drive.note(f"{drive.title}: voltage for a wanted speed")
+    drive.note(f"{drive.title}: voltage for a required speed")
     show(*tables)
 
 
 # --- other models of a drive ----------------------------------------------------------------------
 
 
+@command(
+    app,
+    "linearize",
+    examples="""
+        swashplate linearize hoist --at 4
+        swashplate linearize hoist --at -2 --loop-gain 0.1
+        swashplate linearize slew --at 2 --sample-time 0.01 --out slew.toml
+        swashplate linearize luff --current 0 --input solenoid_force
+    """,
+)
 def linearize(
     drive: DriveChoice,
     *,
-    at: float | None = None,
-    current: float | None = None,
-    input: Input | None = None,
-    sample_time: float | None = None,
-    interpolation: Interpolation = "linear",
-    loop_gain: float | None = None,
-    frequency: float = 0.3,
-    out: Path | None = None,
+    at: Annotated[
+        float | None, typer.Option(metavar="V", help="Constant voltage of the operating point.")
+    ] = None,
+    current: Annotated[
+        float | None,
+        typer.Option(metavar="A", help="Constant signed current of the operating point."),
+    ] = None,
+    input: Annotated[
+        Input | None,
+        typer.Option(help="Input of the model (default: voltage, or current with --current)."),
+    ] = None,
+    sample_time: Annotated[
+        float | None,
+        typer.Option(
+            metavar="S", help="Discretise the model, with the recurrences of the simulation."
+        ),
+    ] = None,
+    interpolation: Annotated[
+        Interpolation,
+        typer.Option(help="Input between samples: linear, or zero-order hold."),
+    ] = "linear",
+    loop_gain: Annotated[
+        float | None,
+        typer.Option(
+            metavar="V/(DEG/S)", help="Print the margins of a proportional speed loop of this gain."
+        ),
+    ] = None,
+    frequency: Annotated[
+        float, typer.Option(metavar="HZ", help="Frequency at which gain and phase are printed.")
+    ] = 0.3,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Write the model in SI units: .toml or .json."),
+    ] = None,
+    force: Force = False,
 ) -> None:
     """Linearise a drive at a voltage or a current.
 
     Prints the operating point, the gain, the lag of the pump, the poles, the
-    bandwidth and what a speed loop closed over the drive can bear. The model is
-    exact for small motions; 'swashplate bode' shows what becomes of large ones.
-
-    Options:
-      at V: Linearise at this constant voltage.
-      current A: Or at this constant signed current.
-      input: What moves the model; by default the voltage, or the current with --current.
-      sample_time S: Sample the model, with the recurrences of the simulation.
-      interpolation: The input between samples: linear, or zero-order hold.
-      loop_gain V/(DEG/S): Print the margins of a proportional speed loop of this gain.
-      frequency HZ: Frequency to print gain and phase at.
-      out FILE: Write the model, in SI, to a .toml or .json file.
-
-    For example:
-      swashplate linearize hoist --at 4
-      swashplate linearize hoist --at -2 --loop-gain 0.1
-      swashplate linearize slew --at 2 --sample-time 0.01 --out slew.toml
-      swashplate linearize luff --current 0 --input solenoid_force
+    bandwidth and the largest gain of a speed loop closed over the drive. The
+    model is exact for small motions; 'swashplate bode' shows large ones.
     """
     from swashplate.linear import LINEAR_MODEL, model_tables
 
-    check_output(out, LINEAR_MODEL)
+    check_output(out, LINEAR_MODEL, force=force)
     if (at is None) == (current is None):
         raise InputError(
             "A drive is linearised at a voltage or a current: give one of --at and --current."
@@ -377,43 +485,56 @@ def linearize(
         note(f"One-sided at the {switch}.")
     coulomb = "C_plus" if (at or 0.0) >= 0.0 else "C_minus"
     if model.input == "voltage" and model.parameters.numbers[coulomb] > 0.0:
-        note("The card's Coulomb term C, which only motions below 0.01 A/s see, is left out.")
+        note("The card's Coulomb term C is left out: it acts only on motions below 0.01 A/s.")
     show(*tables)
 
 
+@command(
+    app,
+    "bode",
+    examples="""
+        swashplate bode hoist
+        swashplate bode hoist --amplitude 1 --amplitude 9 --plot bode.png
+        swashplate bode slew --bias 3 --amplitude 0.1 --linear-at 3 --out bode.csv
+    """,
+)
 def bode(
     drive: DriveChoice,
     *,
-    amplitudes: list[float] | None = None,
-    bias: float = 0.0,
-    lowest: float = 0.02,
-    highest: float = 5.0,
-    points: int = 40,
-    frequency: float = 0.3,
-    linear_at: float | None = None,
+    amplitudes: Annotated[
+        list[float] | None,
+        typer.Option(
+            "--amplitude",
+            metavar="V",
+            help="Amplitude of the sine; may be repeated (default: 1, 4, 6.5 and 9).",
+        ),
+    ] = None,
+    bias: Annotated[float, typer.Option(metavar="V", help="Mean of the sine.")] = 0.0,
+    lowest: Annotated[float, typer.Option("--from", metavar="HZ", help="Lowest frequency.")] = 0.02,
+    highest: Annotated[float, typer.Option("--to", metavar="HZ", help="Highest frequency.")] = 5.0,
+    points: Annotated[
+        int,
+        typer.Option(
+            metavar="N", min=0, help="Number of frequencies, evenly spaced on a logarithmic axis."
+        ),
+    ] = 40,
+    frequency: Annotated[
+        float, typer.Option(metavar="HZ", help="Frequency to print, and to mark in the figure.")
+    ] = 0.3,
+    linear_at: Annotated[
+        float | None,
+        typer.Option(metavar="V", help="Also draw the linear model at this voltage."),
+    ] = None,
     plot: FigureFile = None,
     out: TableFile = None,
+    force: Force = False,
 ) -> None:
-    """Sweep sines of several amplitudes through a drive.
+    """Measure the frequency response of a drive by simulated sines.
 
-    Each sine is simulated until the answer repeats itself; gain and phase are
-    those of its first harmonic, the distortion is all the rest of it. Prints the
-    gain, the phase and the time by which the speed lags at one frequency: what a
-    controller that is to damp a swing of that frequency has to make up for.
-
-    Options:
-      amplitudes --amplitude V: Amplitude of the sine; may be repeated. By default 1, 4, 6.5 and 9.
-      bias V: Mean of the sine.
-      lowest --from HZ: Lowest frequency.
-      highest --to HZ: Highest frequency.
-      points N: Frequencies, evenly spaced on a logarithmic axis.
-      frequency HZ: Frequency to print and to mark.
-      linear_at V: Draw the linear model at this voltage beside the sines.
-
-    For example:
-      swashplate bode hoist
-      swashplate bode hoist --amplitude 1 --amplitude 9 --plot bode.png
-      swashplate bode slew --bias 3 --amplitude 0.1 --linear-at 3 --out bode.csv
+    Each sine is simulated until the response is periodic. Gain and phase are
+    those of its first harmonic, the distortion is the rest. Prints the gain, the
+    phase and the time lag of the speed at one frequency: the lag that a
+    controller for a swing of that frequency has to compensate.
     """
     import numpy as np
 
@@ -440,42 +561,57 @@ def bode(
         say(f"{each}.")
 
 
+@command(
+    app,
+    "full-order",
+    examples="""
+        swashplate full-order hoist
+        swashplate full-order hoist step:9 --plot full.png
+        swashplate full-order fitted/drive.toml sine:4,1 --like luff
+        swashplate full-order hoist step:4 --physical load_torque=2kN*m --out run.csv
+        swashplate full-order hoist log.csv --interpolation previous
+    """,
+)
 def full_order(
     drive: DriveChoice,
-    command: str | None = None,
+    maneuver: OptionalCommand = None,
     *,
-    like: str | None = None,
-    physical: list[str] | None = None,
+    like: Annotated[
+        str | None,
+        typer.Option(
+            metavar="AXIS",
+            help=(
+                "Packaged axis that supplies the assumed physical values (default: the drive's "
+                "own, otherwise hoist)."
+            ),
+        ),
+    ] = None,
+    physical: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=VALUE",
+            help=(
+                "Physical value in place of the assumed one: oil_volume=1e-4 in SI units, "
+                "oil_volume=100cm^3 with a unit; may be repeated."
+            ),
+        ),
+    ] = None,
     out: TableFile = None,
     plot: FigureFile = None,
     sampling: Simulating,
+    force: Force = False,
 ) -> None:
     """Check whether one state is enough for a drive and a command.
 
-    Gives spool and swash plate their mass back: a model with five states, whose
-    physical values are completed from the drive's parameters and from assumed
-    ones. Prints these, the modes, and by how much the speed of the one-state
-    model differs. What is assumed can be replaced by what you know.
-
-    Options:
-      command MANEUVER|FILE: A maneuver or a log, as in 'swashplate simulate'. Without one, a table
-          of maneuvers.
-      like AXIS: Packaged axis whose assumed physical values count; by default the drive's own, or
-          else hoist.
-      physical NAME=VALUE: Another physical value: oil_volume=1e-4 in SI, oil_volume=100cm^3 with a
-          unit. May be repeated.
-
-    For example:
-      swashplate full-order hoist
-      swashplate full-order hoist step:9 --plot full.png
-      swashplate full-order fitted/drive.toml sine:4,1 --like luff
-      swashplate full-order hoist step:4 --physical load_torque=2kN*m --out run.csv
-      swashplate full-order hoist log.csv --interpolation previous
+    Compares the drive with a model of five states, in which spool and swash
+    plate have mass. Its physical values follow from the drive's parameters and
+    from assumed values, which you can replace. Prints these values, the modes,
+    and the difference in speed. Without a command, a table of maneuvers.
     """
     from swashplate import full_order as full
     from swashplate.full_order import physical_set
 
-    if command is None and plot is not None:
+    if maneuver is None and plot is not None:
         raise InputError("--plot draws one run; name a maneuver or a log, such as step:9.")
     given = words.physical_values(physical or ())
     with working("Completing the physical values"):
@@ -484,23 +620,23 @@ def full_order(
         whole = full.FullOrderDrive.from_drive(chosen.plain, axis, **given)
         tables = [physical_set.choices_table(axis, given), whole.modes().table()]
     with working("Simulating"):
-        if command is None:
+        if maneuver is None:
             found = full.validity(whole, sampling.rate)
             title, said = drive.title, f"{len(found.rows)} maneuvers"
         else:
-            name, run = words.simulated(whole.drive, command, sampling)
+            name, run = words.simulated_as(whole.drive, maneuver, sampling)
             both = full.compare(whole, run, start=sampling.start)
             found = full.validity_table(whole.physical.name, [(name, both)])
             title = f"{drive.title}, {name}"
             said = f"{both.time.size} samples at {sampling.rate:g} Hz"
-    if command is None:
+    if maneuver is None:
         save(out, "Table", found.write)
     else:
         save(out, "All signals, in SI", both.write)
-        draw(plot, "plot_full_order", both, title=f"{title}, five states against one")
-    drive.note(f"{title}, five states against one: {said}")
+        draw(plot, "plot_full_order", both, title=f"{title}, five states versus one")
+    drive.note(f"{title}, five states versus one: {said}")
     if chosen.parameters.refinements:
         listed = ", ".join(chosen.parameters.refinements)
-        note(f"Left out of both models, which do not know refinements: {listed}.")
+        note(f"Neither model has refinements; these are left out: {listed}.")
     show(*tables, found)
     say(full.validity_verdict(found))

@@ -1,4 +1,4 @@
-"""``swashplate campaign``, ``rig``, ``guess``, ``excitation``, ``advise``: tests, their worth."""
+"""``swashplate campaign``, ``rig``, ``guess`` and ``advise``: tests, and what they are worth."""
 
 from __future__ import annotations
 
@@ -11,9 +11,20 @@ from typing import Annotated, Literal
 import typer
 
 from swashplate.cli import words
-from swashplate.cli.options import AxisName, DriveChoice, TableFile, command
+from swashplate.cli.commands import command
+from swashplate.cli.options import (
+    CAMPAIGN,
+    NO_VALUE,
+    AxisOption,
+    CampaignArgument,
+    DriveChoice,
+    Force,
+    InitialDrive,
+    SeedOption,
+    SetupOption,
+    new_file,
+)
 from swashplate.cli.terminal import (
-    FORCED,
     bullets,
     check_free,
     check_output,
@@ -27,7 +38,9 @@ from swashplate.cli.terminal import (
 from swashplate.errors import InputError
 from swashplate.tables import (
     FIGURE,
+    TABLE,
     Column,
+    Form,
     Table,
     check_folder,
     count,
@@ -42,60 +55,88 @@ LEGEND = (
     "lost: jumps that no motion explains"
 )
 INFORMATION = (
-    "Under 'runs', one letter a run: # gives 20 % or more of the information, + gives less, . "
-    "gives none, - is not fitted here. 'effect' is how much 1 % of the value changes all residuals "
-    "together; 1 is one standard deviation of noise."
+    "Under 'runs', one symbol per run: # gives 20 % or more of the information, + gives less, . "
+    "gives none, - is not fitted here. 'effect' is the change of all residuals together for 1 % of "
+    "the value; 1 is one standard deviation of noise."
 )
 Severity = Literal["clean", "realistic", "harsh"]
-CAMPAIGN = Path("campaign.toml")
+CAMPAIGN_FILE = Form("a campaign file")
 
-app = typer.Typer(
-    help="Measured tests: make, check and look at a campaign file.",
+app = typer.Typer(rich_markup_mode="rich")
+files = typer.Typer(
+    help="Campaigns of measured tests: create, check and plot.",
     no_args_is_help=True,
     rich_markup_mode="rich",
 )
+app.add_typer(files, name="campaign")
 
 
 # --- campaign files -------------------------------------------------------------------------------
 
 
+@command(
+    files,
+    "init",
+    examples="""
+        swashplate campaign init logs/*.csv --drive hoist --title "Winch 3, harbour, J. Weber"
+        swashplate campaign init trial1.mat trial2.mat --out trials.toml
+        swashplate campaign init log.csv --column voltage=u --column shaft_speed=n --unit n=1/min
+    """,
+    units=False,
+)
 def init(
     *,
-    logs: Annotated[
-        list[Path], typer.Argument(metavar="LOGS...", help="The logs, one run of the machine each.")
-    ],
-    out: Path | None = None,
-    drive: str | None = None,
-    counts_per_turn: float | None = None,
-    column: list[str] | None = None,
-    unit: list[str] | None = None,
-    title: str | None = None,
+    logs: Annotated[list[Path], typer.Argument(metavar="LOGS...", help="Logs, one run each.")],
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="Campaign file (default: campaign.toml next to the first log)."
+        ),
+    ] = None,
+    drive: Annotated[
+        str | None,
+        typer.Option(
+            metavar="AXIS|SET.toml", help="Packaged drive or parameter file of the tested machine."
+        ),
+    ] = None,
+    counts_per_turn: Annotated[
+        float | None,
+        typer.Option(
+            metavar="COUNTS",
+            help="Encoder counts per revolution incl. quadrature; if omitted, a FIXME is written.",
+        ),
+    ] = None,
+    column: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="KIND=COLUMN",
+            help="Kind of a column: time, voltage, shaft_speed or another; may be repeated.",
+        ),
+    ] = None,
+    unit: Annotated[
+        list[str] | None,
+        typer.Option(metavar="COLUMN=UNIT", help="Unit of a column; may be repeated."),
+    ] = None,
+    title: Annotated[
+        str | None,
+        typer.Option(
+            metavar="TEXT",
+            help="Title of the report: machine, place, author (default: name of the folder).",
+        ),
+    ] = None,
+    force: Force = False,
 ) -> None:
-    """Write the first draft of a campaign file from the headers of logs.
+    """Draft a campaign file from the headers of logs.
 
-    What each column is gets guessed from its name and unit, and marked as such;
-    what cannot be told says FIXME. A PLC's words, 27648 or 32767 at full scale,
-    are scaled to volts if they are the command; for a sensor they need its range.
-    Read the file, mend what is wrong, then run 'swashplate campaign check'.
-
-    Options:
-      out FILE: The campaign file; by default campaign.toml beside the first log.
-      drive AXIS|SET.toml: A packaged drive or a parameter file that the tests belong to.
-      counts_per_turn COUNTS: Of the encoder, quadrature included; else it is left to be filled in.
-      column KIND=COLUMN: What a column is: time, voltage, shaft_speed or another kind; may be
-          repeated.
-      unit COLUMN=UNIT: Unit of a column; may be repeated.
-      title TEXT: Heading of the report: machine, place, author; by default the folder's name.
-
-    For example:
-      swashplate campaign init logs/*.csv --drive hoist --title "Winch 3, harbour, J. Weber"
-      swashplate campaign init trial1.mat trial2.mat --out trials.toml
-      swashplate campaign init log.csv --column voltage=u --column shaft_speed=n --unit n=1/min
+    Columns are identified from name and unit and marked "guessed"; unknown
+    entries are marked FIXME. A command in the words of a PLC, 27648 or 32767 at
+    full scale, is scaled to volts; a sensor in such words needs its range.
+    Correct the entries, then run 'swashplate campaign check'.
     """
     from swashplate.campaign.draft import FIXME, NO_ENCODER, UNUSED, draft_campaign
 
     target = out or logs[0].parent / "campaign.toml"
-    check_output(target)
+    check_output(target, CAMPAIGN_FILE, force=force)
     file = None if drive is None else words.drive_file(drive)
     if file is not None:  # a drive as a campaign file names it
         place, root = file.resolve(), target.parent.resolve()
@@ -129,20 +170,28 @@ def init(
     note(f"Then run\n  swashplate campaign check {shlex.quote(str(target))}")
 
 
-def check(path: Path = CAMPAIGN, *, strict: bool = False) -> None:
+@command(
+    files,
+    "check",
+    examples="""
+        swashplate campaign check
+        swashplate campaign check harbour/campaign.toml --strict
+    """,
+)
+def check(
+    path: CampaignArgument = CAMPAIGN,
+    *,
+    strict: Annotated[
+        bool,
+        typer.Option("--strict", metavar=NO_VALUE, help="Exit with code 1 if there are findings."),
+    ] = False,
+) -> None:
     """Check a campaign and the measurements in all its logs.
 
-    Each signal's rate, jitter, longest interval, range, clipping and lost
-    counts, the maneuver recognised from the voltage, and below the table
-    whatever someone should look into: also windows that no run takes, and runs
-    that are far from what the axis's drive would do.
-
-    Options:
-      strict: End with exit code 1 if there are findings.
-
-    For example:
-      swashplate campaign check
-      swashplate campaign check harbour/campaign.toml --strict
+    Prints rate, jitter, longest interval, range, clipping and lost counts of
+    each signal and the maneuver recognised from the voltage. Findings follow
+    below each table, also windows that belong to no run and runs far from the
+    simulation of the axis's drive.
     """
     from swashplate import campaign as tests
     from swashplate.identification.data_checks import beside_the_drives
@@ -155,8 +204,7 @@ def check(path: Path = CAMPAIGN, *, strict: bool = False) -> None:
         of_file = dict.fromkeys((*tests.campaign_findings(campaign), *beside_the_drives(campaign)))
     roles = [each.role for each in campaign]
     counted = ", ".join(f"{roles.count(role)} to {role}" for role in dict.fromkeys(roles))
-    virtual = " (virtual)" * campaign.virtual
-    note(f"{campaign.title}{virtual}: {len(campaign)} experiments ({counted})")
+    note(f"{words.title_of(campaign)}: {len(campaign)} experiments ({counted})")
     for overview in campaign.overviews:
         show(overview.table())
         bullets([overview.sentence])
@@ -181,32 +229,43 @@ def check(path: Path = CAMPAIGN, *, strict: bool = False) -> None:
         raise typer.Exit(1)
 
 
+@command(
+    files,
+    "plot",
+    examples="""
+        swashplate campaign plot harbour/campaign.toml --out overview.png
+        swashplate campaign plot --run hoistr6 --channel counts --from 5.8 --to 6.6
+    """,
+)
 def plot(
-    path: Path = CAMPAIGN,
+    path: CampaignArgument = CAMPAIGN,
     *,
-    out: Annotated[Path, FIGURE] = Path("campaign.png"),
-    run: str | None = None,
-    channel: str | None = None,
-    begin: float | None = None,
-    end: float | None = None,
+    out: Annotated[Path, new_file(FIGURE, "Figure: .png, .svg or .pdf.")] = Path("campaign.png"),
+    run: Annotated[
+        str | None,
+        typer.Option(metavar="NAME", help="Run to plot in detail; requires --channel."),
+    ] = None,
+    channel: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help=(
+                "Channel to plot: a position with its speed, another channel with the simulation "
+                "of the axis's drive."
+            ),
+        ),
+    ] = None,
+    begin: Annotated[
+        float | None, typer.Option("--from", metavar="S", help="Start of the plot.")
+    ] = None,
+    end: Annotated[float | None, typer.Option("--to", metavar="S", help="End of the plot.")] = None,
+    force: Force = False,
 ) -> None:
-    """Draw all runs and channels of a campaign, or one channel closely.
+    """Plot all runs and channels of a campaign, or one channel in detail.
 
     The overview is one figure for each axis and eight runs, numbered if there
-    are several. A log of more than 250,000 rows has a figure of its own: all of
-    it, with the windows that are used.
-
-    Options:
-      out FILE: The figure: .png, .svg or .pdf.
-      run NAME: Look at one experiment closely; --channel must be given.
-      channel NAME: The channel: a position with its speed, another against what the axis's drive
-          does.
-      begin --from S: Show from here on.
-      end --to S: Show up to here.
-
-    For example:
-      swashplate campaign plot harbour/campaign.toml --out overview.png
-      swashplate campaign plot --run hoistr6 --channel counts --from 5.8 --to 6.6
+    are several. A log of more than 250,000 rows has a figure of its own that
+    marks the windows in use.
     """
     from swashplate.campaign import Campaign
     from swashplate.identification import predict
@@ -230,68 +289,66 @@ def plot(
         how = {"window": window, "title": f"{run}, {channel}"}
         draw(out, "plot_channel", shown, simulated, **how)
     else:
-        figures = campaign.plot(title=campaign.title + " (virtual)" * campaign.virtual)
+        figures = campaign.plot(title=words.title_of(campaign))
         several = [out.with_stem(f"{out.stem}-{k}") for k in range(1, len(figures) + 1)]
-        check_free(*several)
+        check_free(*several, force=force)
         for path, figure in zip([out] if len(figures) == 1 else several, figures, strict=True):
             draw(path, figure)
-
-
-def schema() -> None:
-    """Print a campaign file's JSON Schema, for editors that check while one writes.
-
-    For example:
-      swashplate campaign schema > campaign.schema.json
-    """
-    from swashplate.campaign import json_schema
-
-    typer.echo(json_schema(), nl=False)
-
-
-command(app, "init")(init)
-command(app, "check")(check)
-command(app, "plot")(plot)
-command(app, "schema")(schema)
 
 
 # --- virtual tests --------------------------------------------------------------------------------
 
 
+@command(
+    app,
+    "rig",
+    examples="""
+        swashplate rig hoist --out virtual-hoist
+        swashplate rig slew --out worn --seed 7 --severity harsh --backlash-deg 0.1
+        swashplate rig hoist --out loaded --set load_torque=30kN*m --set motor_leakage=1e-6
+        swashplate rig hoist --out short --maneuver step:4 --maneuver sine:6,0.2 --perturb 0.1
+        swashplate campaign check virtual-hoist/campaign.toml
+    """,
+)
 def rig(
     drive: DriveChoice,
     *,
-    out: Path,
-    seed: int = 1,
-    severity: Severity = "realistic",
-    backlash_deg: float = 0.0,
-    perturb: float = 0.0,
-    maneuver: list[str] | None = None,
+    out: Annotated[
+        Path, typer.Option(metavar="DIR", help="New or empty folder for logs and campaign.")
+    ],
+    seed: SeedOption = 1,
+    severity: Annotated[
+        Severity, typer.Option(help="Quality of the instruments: perfect, good, or poor.")
+    ] = "realistic",
+    backlash_deg: Annotated[
+        float, typer.Option(metavar="DEG", help="Backlash between shaft and encoder.")
+    ] = 0.0,
+    perturb: Annotated[
+        float,
+        typer.Option(
+            metavar="X",
+            help="Random change of all true parameters, also fixed ones, as a share: 0.1.",
+        ),
+    ] = 0.0,
+    maneuver: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="MANEUVER",
+            help="Test in place of those of Kruse (2001), such as step:4; may be repeated.",
+        ),
+    ] = None,
+    force: Force = False,
 ) -> None:
-    """Write a virtual test campaign: logs, campaign.toml and, apart, the truth.
+    """Create a virtual test campaign: logs, campaign file and the true parameters.
 
-    A drive with known parameters is simulated over the tests of Kruse (2001)
-    and read by instruments with chosen errors. --set and --scale change the
-    drive that is simulated, not the one that a fit starts from. Fit it as you
-    would your machine's logs, then look into truth/. Every file says that it is
-    virtual.
-
-    Options:
-      out DIR: A new or empty folder for logs and campaign.
-      severity: The instruments: perfect, as in a good campaign, or with everything wrong.
-      backlash_deg DEG: Play between shaft and encoder.
-      perturb: Draw all true parameters, fixed ones too, within this share: 0.1.
-      maneuver MANEUVER: A test instead of those of Kruse (2001), such as step:4. May be repeated.
-
-    For example:
-      swashplate rig hoist --out virtual-hoist
-      swashplate rig slew --out worn --seed 7 --severity harsh --backlash-deg 0.1
-      swashplate rig hoist --out loaded --set load_torque=30kN*m --set motor_leakage=1e-6
-      swashplate rig hoist --out short --maneuver step:4 --maneuver sine:6,0.2 --perturb 0.1
-      swashplate campaign check virtual-hoist/campaign.toml
+    Simulates a drive with known parameters over the tests of Kruse (2001), read
+    by instruments with the chosen errors. --set and --scale change the simulated
+    drive, not the one that a fit starts from. Fit it like logs of your machine,
+    then compare with the folder truth. All files are marked as virtual.
     """
     from swashplate.campaign import rig as bench
 
-    check_free(out)
+    check_free(out, force=force)
     with working("Simulating"):
         nominal = words.drive_of(drive.drive)
         tests = bench.run(
@@ -304,7 +361,7 @@ def rig(
             perturb=perturb,
         )
     with working("Writing"):
-        path = bench.write(tests, out, overwrite=FORCED.get())
+        path = bench.write(tests, out, overwrite=force)
     text = (Column("log"), Column("maneuver", wrap=True), Column("role"))
     made = Table("", (*text, Column("rows", "d"), Column("s", ".4g")))
     for run in tests.runs.values():
@@ -312,27 +369,40 @@ def rig(
         made.add(f"{run.stem}.csv", run.name, run.role, time.size, float(time[-1] - time[0]))
     show(made)
     note(f"Campaign: {path}")
-    note(f"Truth:    {path.parent / 'truth'} (open it only after the fit)")
+    note(f"Truth:    {path.parent / 'truth'} (to be opened after the fit)")
 
 
 # --- before a fit, and between fits ---------------------------------------------------------------
 
 
-def guess(path: Path = CAMPAIGN, *, axis: AxisName = None, out: Path | None = None) -> None:
-    """Read dead zones, gains, limits, delays and creep of a machine off its logs.
+@command(
+    app,
+    "guess",
+    examples="""
+        swashplate campaign init logs/*.csv --drive neutral
+        swashplate guess logs/campaign.toml
+        swashplate fit logs/campaign.toml --from logs/start.toml --setup logs/setup.toml
+    """,
+)
+def guess(
+    path: CampaignArgument = CAMPAIGN,
+    *,
+    axis: AxisOption = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DIR",
+            help="Folder for start.toml and setup.toml (default: the campaign's).",
+        ),
+    ] = None,
+    force: Force = False,
+) -> None:
+    """Estimate dead zones, gains, limits, delays and creep of an unknown machine.
 
-    For a machine of unknown numbers: needs the command and a speed or a position.
-    If a current is measured, the amplifier is read off it and fitted first.
-    Writes a drive to start a fit from, start.toml, and what the fit is to change
-    within which bounds, setup.toml.
-
-    Options:
-      out DIR: Folder for start.toml and setup.toml; by default the campaign's.
-
-    For example:
-      swashplate campaign init logs/*.csv --drive neutral
-      swashplate guess logs/campaign.toml
-      swashplate fit logs/campaign.toml --from logs/start.toml --setup logs/setup.toml
+    Needs logs of the command and of a speed or a position. If a current is
+    measured, the amplifier is estimated from it and fitted first. Writes an
+    initial drive for a fit, start.toml, and the parameters to estimate with
+    their bounds, setup.toml.
     """
     from swashplate import campaign as tests
     from swashplate.drive import Drive
@@ -341,7 +411,7 @@ def guess(path: Path = CAMPAIGN, *, axis: AxisName = None, out: Path | None = No
     folder = path.parent if out is None else out
     start, setup = folder / "start.toml", folder / "setup.toml"
     with working(f"Reading {path}"):
-        check_free(start, setup)
+        check_free(start, setup, force=force)
         campaign, chosen = words.campaign_of(path, axis)
         check_folder(folder)
         runs = runs_to_fit(campaign, chosen)
@@ -368,123 +438,137 @@ def guess(path: Path = CAMPAIGN, *, axis: AxisName = None, out: Path | None = No
     note(f"Then run\n  {shlex.join(then)}")
 
 
-def excitation(
-    path: Path = CAMPAIGN,
-    *,
-    axis: AxisName = None,
-    setup: str | None = None,
-    begin: str | None = None,
-    out: TableFile = None,
-) -> None:
-    """Show before a fit which parameters the runs determine, and what to fix.
-
-    Simulates the runs with the drive as it is: how much each parameter changes
-    what was measured, by which run, and which can change together without
-    effect: those are to be fixed, or tested further.
-
-    For example:
-      swashplate excitation virtual/campaign.toml
-      swashplate excitation harbour/campaign.toml --setup mine.toml --from worn.toml
-      swashplate excitation harbour/campaign.toml --out runs.csv
-    """
-    from swashplate.identification.data_checks import check_runs, refuse_unsound
-    from swashplate.identification.experiment_design import outlook
-    from swashplate.identification.stages import smooth
-
-    with working(f"Reading {path}"):
-        _, runs, plan, drive = words.fit_of(path, axis, setup, begin)
-    with working("Simulating"):
-        doubts = refuse_unsound(check_runs(runs, smooth(drive)))
-        looks = [outlook(stage, smooth(drive), runs) for stage in plan.stages]
-    names = [each.name for each in runs]
-    shown = [look.table(names) for look in looks]
-    save(out, "Table", joined(shown).write)
-    for sentence in doubts:
-        say(f"! {sentence}")
-    for look, table in zip(looks, shown, strict=True):
-        show(table)
-        # what no run exercises is said with its reason
-        bullets(replace(look.identifiability, unexcited=()).sentences(), look.sentences())
-    note("")
-    for number, name in enumerate(names, start=1):
-        note(f"run {number}: {name}")
-    say(INFORMATION)
-    if all(look.identifiability.complete for look in looks):
-        note("The fit configuration can stay as it is.")
-
-
+@command(
+    app,
+    "advise",
+    examples="""
+        swashplate advise harbour/campaign.toml                      before a fit
+        swashplate advise harbour/campaign.toml --setup mine.toml --from worn.toml
+        swashplate advise harbour/campaign.toml --drive fitted/drive.toml     after it
+        swashplate advise harbour/campaign.toml --maneuver step:-9 --top 1
+        swashplate advise harbour/campaign.toml --runs runs.csv --out tests.csv
+        swashplate advise hoist                                      before any test
+    """,
+)
 def advise(
-    word: str,
+    subject: Annotated[
+        str,
+        typer.Argument(
+            metavar="CAMPAIGN.toml|DRIVE",
+            help="Campaign with the tests made so far, or a drive that has not been tested.",
+        ),
+    ] = str(CAMPAIGN),
     *,
-    drive: str | None = None,
-    axis: AxisName = None,
-    setup: str | None = None,
-    maneuver: list[str] | None = None,
-    top: int = 10,
-    tests: int = 4,
-    out: TableFile = None,
+    axis: AxisOption = None,
+    setup: SetupOption = None,
+    begin: InitialDrive = None,
+    drive: Annotated[
+        str | None,
+        typer.Option(
+            metavar="SET.toml",
+            help=(
+                "Fitted drive: noise is that of its residuals, and the default of --setup is the "
+                "setup.toml next to it."
+            ),
+        ),
+    ] = None,
+    maneuver: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="MANEUVER", help="Test to rank in place of the usual ones; may be repeated."
+        ),
+    ] = None,
+    top: Annotated[int, typer.Option(metavar="N", min=0, help="Number of tests to list.")] = 10,
+    tests: Annotated[
+        int, typer.Option(metavar="N", min=0, help="Number of tests in the plan.")
+    ] = 4,
+    runs: Annotated[
+        Path | None,
+        new_file(TABLE, "Write each run's share of the information: .csv or .parquet."),
+    ] = None,
+    out: Annotated[
+        Path | None, new_file(TABLE, "Write the ranked tests: .csv or .parquet.")
+    ] = None,
+    force: Force = False,
 ) -> None:
-    """Recommend the test that determines each parameter best.
+    """Show which parameters the tests determine, and which test to make next.
 
-    Ranks tests by the information that they would add to those made so far, at
-    the drive's present values. Errors are standard errors from noise alone; a
-    drive that differs from its model is known less well.
-
-    Options:
-      word CAMPAIGN.toml|AXIS|SET.toml: Tests made so far; or only a drive, for a fresh plan.
-      drive SET.toml: The fitted drive: noise is then that of its residuals, and
-        free is what the setup.toml beside it estimates.
-      maneuver MANEUVER: A test to judge instead of the usual ones. May be repeated.
-      top: Tests to list.
-      tests: Tests in the plan.
-
-    For example:
-      swashplate advise hoist                                      a fresh plan
-      swashplate advise harbour/campaign.toml --drive fitted/drive.toml
-      swashplate advise harbour/campaign.toml --maneuver step:-9 --top 1
+    For the tests of a campaign: how much each parameter changes what was
+    measured, in which run, and which parameters can change together without
+    effect: fix these, or make further tests. Then tests are ranked by the
+    information that they would add. All of it holds at the values of one drive:
+    the initial one before a fit, the fitted one after it (--drive). Errors are
+    standard errors from noise alone, without the errors of the model.
     """
     from swashplate.campaign import KINDS
     from swashplate.drive import Drive
     from swashplate.identification import experiment_design as design
+    from swashplate.identification.data_checks import check_runs, refuse_unsound
     from swashplate.identification.setup import load_setup
     from swashplate.identification.stages import smooth
 
-    tested = words.file_kind(Path(word)) == "campaign"
-    fitted = words.drive_file(drive or word) if drive or not tested else None
-    with working("Judging tests"):
-        # what a fit estimated stands beside the drive that it found
-        if fitted is not None and (fitted.parent / words.CONFIGURATION).is_file():
-            setup = setup or str(fitted.parent / words.CONFIGURATION)
+    tested = words.file_kind(Path(subject)) == "campaign"
+    given = {"--axis": axis, "--from": begin, "--drive": drive, "--runs": runs}
+    for option, value in given.items():
+        if value is not None and not tested:
+            raise InputError(f"{option} needs a campaign: {subject} is a drive without tests.")
+    if begin is not None and drive is not None:
+        raise InputError(
+            "--from is the initial drive before a fit, --drive the fitted one: give one of them."
+        )
+    named = drive if tested else subject
+    source = None if named is None else words.drive_file(named)
+    if setup is None and source is not None:
+        # a fit writes what it estimated next to the drive that it found
+        estimated = source.parent / words.CONFIGURATION
+        setup = str(estimated) if estimated.is_file() else None
+    looks, doubts, made = list[design.Outlook](), tuple[str, ...](), list[str]()
+    with working("Evaluating the tests"):
         if tested:
-            _, runs, plan, start = words.fit_of(Path(word), axis, setup, drive)
-            bench = design.bench(smooth(start), plan, runs, fitted=drive is not None)
+            _, experiments, plan, start = words.fit_of(Path(subject), axis, setup, drive or begin)
+            doubts = refuse_unsound(check_runs(experiments, smooth(start)))
+            looks = [design.outlook(stage, smooth(start), experiments) for stage in plan.stages]
+            made = [experiment.name for experiment in experiments]
+            bench = design.bench(smooth(start), plan, experiments, fitted=drive is not None)
         else:
-            if axis is not None:
-                raise InputError("--axis belongs to a campaign; a drive is one axis.")
-            start = words.parameters_of(drive or word)
-            plan = load_setup(setup or start.name)
-            bench = design.bench(smooth(start), plan)
+            start = words.parameters_of(subject)
+            bench = design.bench(smooth(start), load_setup(setup or start.name))
         machine = Drive(bench.parameters)
-        named = [words.maneuver_of(each, machine) for each in maneuver or ()]
-        trials = {each.name: each for each in named or design.default_maneuvers()}
-        at_hand = [bench.candidate(each) for each in trials.values()]
-        ranked = design.advise(bench.present, at_hand, bench.variables)
-        in_turn = design.in_turn(bench.present, at_hand, bench.variables, tests)
-    save(out, "Table", design.advice_table("", ranked).write)
+        requested = [words.maneuver_of(word, machine) for word in maneuver or ()]
+        maneuvers = {each.name: each for each in requested or design.default_maneuvers()}
+        candidates = [bench.candidate(each) for each in maneuvers.values()]
+        ranked = design.advise(bench.present, candidates, bench.variables)
+        in_turn = design.in_turn(bench.present, candidates, bench.variables, tests)
+    determined = [look.table(made) for look in looks]
+    if determined:
+        save(runs, "Shares of the information", joined(determined).write)
+    save(out, "Tests", design.advice_table("", ranked).write)
+    for sentence in doubts:
+        say(f"! {sentence}")
+    for look, table in zip(looks, determined, strict=True):
+        show(table)
+        # what no run exercises is said with its reason
+        bullets(replace(look.identifiability, unexcited=()).sentences(), look.sentences())
+    if looks:
+        note("")
+        for number, name in enumerate(made, start=1):
+            note(f"run {number}: {name}")
+        say(INFORMATION)
+        if all(look.identifiability.complete for look in looks):
+            note("The fit configuration can stay as it is.")
     show(design.advice_table("Tests", ranked[:top]))
     if in_turn:
-        title = "A plan, each test chosen in addition to those before it"
-        show(design.advice_table(title, in_turn))
+        show(design.advice_table("Plan, each test in addition to those before it", in_turn))
         errors = zip(in_turn[-1].names, in_turn[-1].after, strict=True)
         undetermined = [name for name, error in errors if not error <= 1.0]
         if undetermined:
-            say(f"- After these, {', '.join(undetermined)} would still not be known to 100 %.")
+            say(f"- Still not determined after these: {', '.join(undetermined)}.")
     show(design.best_tests_table(ranked))
-    for each in bench.sensors:
-        noise = f"{each.noise:.3g} {KINDS[each.kind].units[0]} ({each.origin})"
-        note(f"{each.kind}: noise {noise}, one independent sample every {each.memory:.3g} s")
+    for sensor in bench.sensors:
+        noise = f"{sensor.noise:.3g} {KINDS[sensor.kind].units[0]} ({sensor.origin})"
+        note(f"{sensor.kind}: noise {noise}, one independent sample every {sensor.memory:.3g} s")
     say(
-        "Errors are standard errors in per cent of the value, from noise alone and at these values "
-        "of the drive; '-' is not determined (100 % and more). 'better' is by how much what is "
-        "known already would be known better, on the mean."
+        "Errors are standard errors in per cent of the value, from noise alone, at these values of "
+        "the drive; '-': not determined (100 % and more). 'better' is the mean factor by which the "
+        "errors of the parameters that are determined already would shrink."
     )

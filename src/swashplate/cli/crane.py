@@ -1,4 +1,4 @@
-"""``swashplate crane``: geometry, runs, judgment of control, operability over a year."""
+"""``swashplate crane``: geometry, runs, assessment of control, operability over a year."""
 
 from __future__ import annotations
 
@@ -9,9 +9,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from swashplate.cli.commands import command
 from swashplate.cli.crane_options import (
     AXES,
     AtSea,
+    CraneArgument,
     Operated,
     Studied,
     control_of,
@@ -20,7 +22,14 @@ from swashplate.cli.crane_options import (
     numbers_of,
     sea_sentences,
 )
-from swashplate.cli.options import FigureFile, TableFile, command
+from swashplate.cli.options import (
+    LOG_FORMATS,
+    NO_VALUE,
+    DaskOption,
+    FigureFile,
+    TableFile,
+    new_file,
+)
 from swashplate.cli.terminal import draw, note, save, say, say_saved, show, side, working
 from swashplate.errors import InputError
 from swashplate.tables import PAGE, Column, Form, Table
@@ -31,26 +40,36 @@ if TYPE_CHECKING:
 VERDICT = Form("a verdict", (".html", ".csv", ".parquet"))
 OPERABILITY = Form("an operability", (".html", ".csv", ".parquet"))
 LEAST_ALLOWED = 0.5
-"""Percent of seaways below which a share is probably meant."""
+"""Percentage of seaways below which --allowed was probably given as a share."""
 
-app = typer.Typer(
-    help="Whole cranes: boom, rope and load behind three drives, on a ship.",
+app = typer.Typer(rich_markup_mode="rich")
+cranes = typer.Typer(
+    help="Cranes on a ship: boom, rope and load, moved by three drives.",
     no_args_is_help=True,
     rich_markup_mode="rich",
 )
+app.add_typer(cranes, name="crane")
 
 
-def show_crane(crane: str, *, toml: bool = False) -> None:
-    """Show a crane's geometry and limits: which are assumed, and where they come from.
-
-    Options:
-      crane CRANE|FILE.toml: A packaged crane, tg3637, or your own.
-      toml: Print the file, to begin your own from.
-
-    For example:
-      swashplate crane show tg3637
-      swashplate crane show tg3637 --toml > mine.toml
-    """
+@command(
+    cranes,
+    "show",
+    examples="""
+        swashplate crane show tg3637
+        swashplate crane show tg3637 --toml > mine.toml
+    """,
+)
+def show_crane(
+    crane: CraneArgument,
+    *,
+    toml: Annotated[
+        bool,
+        typer.Option(
+            "--toml", metavar=NO_VALUE, help="Print the crane's file, to start your own from."
+        ),
+    ] = False,
+) -> None:
+    """Show a crane's geometry and limits, their sources, and what is assumed."""
     if toml:
         from swashplate.crane.crane import preset_text
         from swashplate.documents import read_text
@@ -66,51 +85,70 @@ def show_crane(crane: str, *, toml: bool = False) -> None:
         say(sentence)
 
 
+@command(
+    cranes,
+    "run",
+    examples="""
+        swashplate crane run tg3637 --slew 1 --until slew_deg=45
+        swashplate crane run tg3637 --slew 1 --until slew_deg=45 --variant volts \\
+            --variant inverse --variant inverse:zv-tip --plot slew.png
+        swashplate crane run tg3637 --sea ss3 --seed 1 --at slew_deg=90 --at rope_m=27 \\
+            --variant inverse --variant inverse:feedback=0.2+ship+clip
+    """,
+)
 def run(
     operated: Operated,
     *,
-    slew: float = 0.0,
-    luff: float = 0.0,
-    hoist: float = 0.0,
-    until: list[str] | None = None,
-    duration: float | None = None,
-    length: float = 60.0,
-    seed: int | None = None,
-    variant: list[str] | None = None,
-    brake: bool = True,
+    slew: Annotated[
+        float, typer.Option(metavar="X", help="Joystick position of the slew, -1 to 1.")
+    ] = 0.0,
+    luff: Annotated[
+        float, typer.Option(metavar="X", help="Joystick position of the luff, -1 to 1.")
+    ] = 0.0,
+    hoist: Annotated[
+        float, typer.Option(metavar="X", help="Joystick position of the hoist, -1 to 1.")
+    ] = 0.0,
+    until: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="TARGET=VALUE",
+            help="Target of an axis: slew_deg=45, boom_deg=53.5, rope_m=23; may be repeated.",
+        ),
+    ] = None,
+    duration: Annotated[
+        float | None,
+        typer.Option(metavar="S", help="Duration of the motion of an axis without a target."),
+    ] = None,
+    length: Annotated[float, typer.Option(metavar="S", help="Duration of the run.")] = 60.0,
+    seed: Annotated[
+        int | None, typer.Option(metavar="N", help="Random seed of the seaway.")
+    ] = None,
+    variant: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="DRIVES[:CONTROL]",
+            help=(
+                "Command of the drives and, after a colon, control. Drives: inverse (the default, "
+                "also called identified), volts or ideal. Control: zv-tip, zvd-tip, ei-tip, "
+                "feedback=GAIN/DELAY, ship, clip=M, loop=GAIN, sensors=NOISE_DEG/DELAY/RATE "
+                "(noise of the rope's angle, seconds, Hz), joined by +. May be repeated."
+            ),
+        ),
+    ] = None,
+    brake: Annotated[
+        bool,
+        typer.Option("--brake/--no-brake", metavar=NO_VALUE, help="Brake the hoist at rest."),
+    ] = True,
     out: TableFile = None,
     plot: FigureFile = None,
-    scene: Annotated[Path | None, PAGE] = None,
+    scene: Annotated[Path | None, new_file(PAGE, "Write an animated scene: .html.")] = None,
 ) -> None:
-    r"""Run a crane, once or with several variants of control and drives.
+    """Run a crane, once or with several variants of control and drives.
 
-    The stick's commands are parts of the full speeds. Without a controller they
-    are wanted speeds; with 'volts', as on the crane, 10 V for 1. The residual
-    swing is the largest one for 25 s, from 4 s after the stick has returned and
+    Joystick positions are fractions of full speed: speeds, or with
+    'volts', as on the crane, a voltage of 10 V at 1. The residual swing is the
+    largest one within 25 s, counted from 4 s after the joystick has returned and
     the controller has ended its command.
-
-    Options:
-      slew: Stick of the slew, -1 to 1.
-      luff: Stick of the luff, -1 to 1.
-      hoist: Stick of the hoist, -1 to 1.
-      until TARGET=VALUE: Where an axis is led to: slew_deg=45, boom_deg=53.5, rope_m=23. May be
-          repeated.
-      duration S: Time for which an axis without target moves.
-      length S: Length of the run.
-      seed N: Random seed of the seaway.
-      variant DRIVES[:CONTROL]: Drives behind the stick and, after a colon, control: inverse (the
-          default, also called identified), volts or ideal; zv-tip, zvd-tip, ei-tip,
-          feedback=GAIN/DELAY, ship, clip=M, loop=GAIN, sensors=NOISE_DEG/DELAY/RATE (noise of the
-          rope's angle, seconds, Hz), joined by +. May be repeated.
-      brake --brake/--no-brake: Whether a brake holds the hoist at rest.
-      scene FILE: Write the scene that moves: .html.
-
-    For example:
-      swashplate crane run tg3637 --slew 1 --until slew_deg=45
-      swashplate crane run tg3637 --slew 1 --until slew_deg=45 --variant volts \
-          --variant inverse --variant inverse:zv-tip --plot slew.png
-      swashplate crane run tg3637 --sea ss3 --seed 1 --at slew_deg=90 --at rope_m=27 \
-          --variant inverse --variant inverse:feedback=0.2+ship+clip
     """
     runs, first = {}, ""
     if out is not None and len(variant or ()) > 1:
@@ -144,41 +182,65 @@ def run(
     _end(crane, tables, *sea_sentences(seaway), *sentences, *crane.provenance())
 
 
+@command(
+    cranes,
+    "judge",
+    examples="""
+        swashplate crane judge tg3637 --sea ss3
+        swashplate crane judge tg3637 --control feedback=0.2/0.2+ship+clip --ask harm
+        swashplate crane judge tg3637 --scale luff.orifice=3 --out judge.html
+        swashplate crane judge tg3637 --drive luff=fitted --drives identified,drawn
+    """,
+)
 def judge(
     study: Studied,
     *,
-    allowed: float = 5.0,
-    ask: str | None = None,
-    remedies: bool = True,
-    turns: bool = True,
-    dask: str | None = None,
-    out: Annotated[Path | None, VERDICT] = None,
+    allowed: Annotated[
+        float,
+        typer.Option(
+            metavar="PERCENT",
+            help="Acceptable percentage of seaways in which control is worse than none.",
+        ),
+    ] = 5.0,
+    ask: Annotated[
+        str | None,
+        typer.Option(
+            metavar="QUESTIONS",
+            help=(
+                "Questions that the exit code answers: harm, sufficiency, or both, joined by a "
+                "comma (default: both; harm alone if the crane has no limits)."
+            ),
+        ),
+    ] = None,
+    remedies: Annotated[
+        bool,
+        typer.Option(
+            "--remedies/--no-remedies", metavar=NO_VALUE, help="Search for changes that suffice."
+        ),
+    ] = True,
+    turns: Annotated[
+        bool,
+        typer.Option(
+            "--turns/--no-turns",
+            metavar=NO_VALUE,
+            help="Search for inputs, such as the ship's roll period, that would change the answer.",
+        ),
+    ] = True,
+    dask: DaskOption = None,
+    out: Annotated[
+        Path | None,
+        new_file(VERDICT, "Write the verdict as a page, .html, or its numbers, .csv or .parquet."),
+    ] = None,
     plot: FigureFile = None,
 ) -> None:
-    """Judge control on a crane's drives over many seaways: does it harm, does it suffice?
+    """Assess control over many seaways: does it harm, and is it sufficient?
 
-    Every variant goes through the same seaways of ten minutes. Control harms if
-    the swing is larger than without it in more than 5 % of them, as far as the
-    95 % interval of that share tells. It suffices if in three hours all that the
-    crane's file limits, from swing to the place of the load, stays within its
-    limits. If it fails, a larger orifice and a clip are tried. The exit code is
-    0 only if every question asked is answered with yes.
-
-    Options:
-      allowed PERCENT: Seaways in which control may be worse than none, in percent.
-      ask QUESTIONS: What the exit code answers: harm, sufficiency, or both, joined by a comma; by
-          default both, harm alone if the crane has no limits.
-      remedies --remedies/--no-remedies: Whether to look for what would do.
-      turns --turns/--no-turns: Whether to look for numbers, as the ship's roll period, that would
-          turn the answer.
-      dask ADDRESS: Run on a Dask cluster: tcp://HOST:PORT.
-      out FILE: Write the verdict's page, .html, or its numbers, .csv or .parquet.
-
-    For example:
-      swashplate crane judge tg3637 --sea ss3
-      swashplate crane judge tg3637 --control feedback=0.2/0.2+ship+clip --ask harm
-      swashplate crane judge tg3637 --scale luff.orifice=3 --out judge.html
-      swashplate crane judge tg3637 --drive luff=fitted --drives identified,drawn
+    All variants go through the same seaways of ten minutes. Control harms if the
+    swing is larger than without it in more than 5 % of them, based on the 95 %
+    interval; "not decided" if the interval contains 5 %. Control is sufficient if
+    all quantities that the crane's file limits, from the swing to the position of
+    the load, stay within their limits in three hours. If not, a larger orifice
+    and a clip are tried. The exit code is 0 only if each answer is favourable.
     """
     if 0.0 < allowed < LEAST_ALLOWED:
         raise InputError(
@@ -213,40 +275,61 @@ def judge(
     say(found.headline)
 
 
+@command(
+    cranes,
+    "operability",
+    examples="""
+        swashplate crane operability tg3637
+        swashplate crane operability tg3637 site.csv --scale luff.orifice=3 --out year.html
+        swashplate crane operability mine.toml site.csv --drive luff=fitted --ship ship.re1
+    """,
+)
 def operability(
     study: Studied,
-    scatter: str | None = None,
+    scatter: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="FILE.csv",
+            help="Scatter diagram: columns hs, tp and share (default: a fictitious one).",
+        ),
+    ] = None,
     *,
-    headings: str | None = None,
-    out: Annotated[Path | None, OPERABILITY] = None,
+    headings: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NUMBERS",
+            help=(
+                "Wave headings in degrees, equally likely, joined by commas (default: "
+                "0,45,...,315)."
+            ),
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        new_file(
+            OPERABILITY,
+            "Write a page, .html, or the limiting quantity of each sea and heading, .csv or "
+            ".parquet.",
+        ),
+    ] = None,
     plot: FigureFile = None,
 ) -> None:
-    """Show the share of a year that a crane can work, and what limits it in each sea.
+    """Show the share of a year in which a crane can work, and its limits.
 
-    A scatter diagram says how often each sea comes. Each sea and heading is held
-    against the limits of the crane's file: in the frequency domain where that is
-    enough, by simulation near a limit. The sea's height, period and heading come
-    from the diagram; ship, peak factor and spreading from the options.
-
-    Options:
-      scatter FILE.csv: Columns hs, tp and share; without it a made-up diagram, of no place.
-      headings NUMBERS: Headings of the waves in degrees, as likely as each other, joined by
-          commas; by default 0,45,...,315.
-      out FILE: Write the page, .html, or what limits each sea and heading, .csv or .parquet.
-
-    For example:
-      swashplate crane operability tg3637
-      swashplate crane operability tg3637 site.csv --scale luff.orifice=3 --out year.html
-      swashplate crane operability mine.toml site.csv --drive luff=fitted --ship ship.re1
+    A scatter diagram states how often each sea occurs. Each sea and heading is
+    compared with the limits of the crane's file: in the frequency domain if that
+    is accurate enough, by simulation near a limit. Height, period and heading of
+    the waves come from the diagram; ship, peak factor and spreading from the
+    options.
     """
     from swashplate.crane import Scatter
     from swashplate.crane import operability as operable
 
     diagram = Scatter.packaged() if scatter is None else Scatter.from_csv(scatter)
     if study.heading is not None:
-        raise InputError("--heading is of one sea: operability goes over --headings.")
+        raise InputError("--heading belongs to one sea: for operability give --headings.")
     if study.sea:
-        note("Of --sea the peak factor and the spreading count.")
+        note("Only the peak factor and the spreading of --sea are used.")
     more: dict[str, Any] = {}
     if headings is not None:
         words = headings.split(",")
@@ -262,15 +345,20 @@ def operability(
     _end(study.chosen, found.tables(), *found.sentences(), *study.chosen.provenance())
 
 
+@command(
+    cranes,
+    "follow",
+    examples="""
+        swashplate crane follow tg3637 --plot follow.png
+        swashplate crane follow tg3637 --sea ss3 --at boom_deg=60
+        swashplate crane follow tg3637 --sea 1.5,8 --roll-period 16
+    """,
+)
 def follow(at_sea: AtSea, *, out: TableFile = None, plot: FigureFile = None) -> None:
-    """Show the largest sines of the tip that each axis can follow, and what seas ask for.
+    """Show the largest sines of the tip that each axis can follow in a sea.
 
-    By default of all packaged seas; with --sea only of that.
-
-    For example:
-      swashplate crane follow tg3637 --plot follow.png
-      swashplate crane follow tg3637 --sea ss3 --at boom_deg=60
-      swashplate crane follow tg3637 --sea 1.5,8 --roll-period 16
+    These are compared with the motion that the sea demands: all packaged seas, or
+    that of --sea.
     """
     with working("Simulating"):
         from swashplate.crane import follow as largest_sines
@@ -286,11 +374,24 @@ def follow(at_sea: AtSea, *, out: TableFile = None, plot: FigureFile = None) -> 
     _end(at_sea.chosen, found.tables(), *about_sea, *at_sea.chosen.provenance())
 
 
+@command(
+    cranes,
+    "sweep",
+    examples="""
+        swashplate crane sweep tg3637 bearing --points 0,45,90,135,180 --plot sectors.png
+        swashplate crane sweep tg3637 orifice --points 1,1.5,2,3 --plot orifice.png
+    """,
+)
 def sweep(
     study: Studied,
-    over: str,
+    over: Annotated[
+        str, typer.Argument(metavar="bearing|height|orifice", help="Quantity to sweep.")
+    ],
     *,
-    points: str | None = None,
+    points: Annotated[
+        str | None,
+        typer.Option(metavar="NUMBERS", help="Points of the sweep, joined by commas."),
+    ] = None,
     out: TableFile = None,
     plot: FigureFile = None,
 ) -> None:
@@ -300,14 +401,6 @@ def sweep(
     height: significant height of the waves in m, with the period of --sea.
     orifice: factors on the luff drive's in-line orifice.
     Each point is simulated in 6 seaways of 10 min.
-
-    Options:
-      over bearing|height|orifice: The quantity.
-      points NUMBERS: Points of the sweep, joined by commas.
-
-    For example:
-      swashplate crane sweep tg3637 bearing --points 0,45,90,135,180 --plot sectors.png
-      swashplate crane sweep tg3637 orifice --points 1,1.5,2,3 --plot orifice.png
     """
     more: dict[str, Any] = {}
     if points is not None:
@@ -320,30 +413,42 @@ def sweep(
     _end(study.chosen, found.tables(), *sea_sentences(study.waters), *study.chosen.provenance())
 
 
+@command(
+    cranes,
+    "damping",
+    examples="""
+        swashplate crane damping swing.csv --column swing --start 12 --stop 90 --rope 20
+    """,
+    units=False,
+)
 def damping(
-    log: str,
+    log: Annotated[str, typer.Argument(metavar="LOG", help=f"Log: {LOG_FORMATS}.")],
     *,
-    column: str = "swing",
-    time_column: str = "time",
-    start: float | None = None,
-    stop: float | None = None,
-    rope: float | None = None,
+    column: Annotated[
+        str,
+        typer.Option(
+            metavar="NAME",
+            help="Column of the angle, with its unit in the header: 'swing \\[deg]'.",
+        ),
+    ] = "swing",
+    time_column: Annotated[
+        str, typer.Option(metavar="NAME", help="Column of the time in LOG.")
+    ] = "time",
+    start: Annotated[
+        float | None, typer.Option(metavar="S", help="Start of the free swing in the log.")
+    ] = None,
+    stop: Annotated[
+        float | None, typer.Option(metavar="S", help="End of the free swing in the log.")
+    ] = None,
+    rope: Annotated[
+        float | None,
+        typer.Option(metavar="M", help="Length of the rope, to check the period."),
+    ] = None,
 ) -> None:
-    r"""Find the damping ratio of a load that swings freely, from a log of its angle.
+    """Estimate the damping ratio of a freely swinging load from a log of its angle.
 
     A decaying sine is fitted to the signed angle in one plane, with the crane at
     rest and at least five swings.
-
-    Options:
-      log LOG: The log: text such as .csv, .parquet, .mat, .h5, .tdms or .mf4.
-      column NAME: Column of the angle; its unit stands in the header, 'swing \[deg]'.
-      time_column NAME: Column of the time in LOG.
-      start S: Time of the log from which on it swings freely.
-      stop S: Time of the log up to which it does.
-      rope M: Length of the rope, by which the period is checked.
-
-    For example:
-      swashplate crane damping swing.csv --column swing --start 12 --stop 90 --rope 20
     """
     from swashplate.crane import swing_damping
     from swashplate.logs import read_series
@@ -354,7 +459,7 @@ def damping(
     ends = last if stop is None else stop
     if not first <= begins < ends <= last:
         raise InputError(
-            f"{log} lasts from {first:g} to {last:g} s, but {begins:g} to {ends:g} s are asked for."
+            f"{log} lasts from {first:g} to {last:g} s, but {begins:g} to {ends:g} s are requested."
         )
     within = (begins <= series.time) & (series.time <= ends)
     try:
@@ -392,12 +497,3 @@ def _stationary_words(operated: Operated, seaway: Seaway, damping: float) -> str
         f"the long run, by the sea's spectrum and a damping of {100.0 * damping:g} %; a run begins "
         "at rest."
     )
-
-
-command(app, "show")(show_crane)
-command(app, "run")(run)
-command(app, "judge")(judge)
-command(app, "operability")(operability)
-command(app, "follow")(follow)
-command(app, "sweep")(sweep)
-command(app, "damping")(damping)

@@ -1,13 +1,16 @@
-"""Options of ``swashplate crane``: the crane, its ship and sea, its load, what a study is about."""
+"""Options of ``swashplate crane``: the crane, its ship, sea and load, and studies of seaways."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-from swashplate.cli.terminal import FORCED, long_work, side
+import typer
+
+from swashplate.cli.options import force_option
+from swashplate.cli.terminal import long_work, side
 from swashplate.cli.words import pairs_of
 from swashplate.errors import InputError
 
@@ -19,67 +22,124 @@ if TYPE_CHECKING:
 START, AXES = ("slew_deg", "boom_deg", "rope_m"), ("hoist", "slew", "luff")
 
 
+CraneArgument = Annotated[
+    str,
+    typer.Argument(
+        metavar="CRANE|FILE.toml", help="Packaged crane, tg3637, or the file of your own."
+    ),
+]
+
+
 @dataclass(frozen=True)
 class Placed:
-    """A crane, its drives, and where it begins.
+    """A crane, its drives, and its initial position."""
 
-    Options:
-      crane CRANE|FILE.toml: A packaged crane, tg3637, or your own.
-      drive AXIS=SET: Another drive: luff=mine.toml, or the folder of a fit, whose verdict is shown.
-          May be repeated.
-      force: Replace older files, and take drives whose fit is not usable.
-      at NAME=VALUE: Where it begins: slew_deg, boom_deg, rope_m, as rope_m=25. May be repeated.
-    """
-
-    crane: str
-    drive: list[str] | None = None
-    at: list[str] | None = None
+    crane: CraneArgument
+    drive: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="AXIS=SET",
+            help=(
+                "Drive of an axis: luff=mine.toml, or the folder of a fit, whose verdict is shown; "
+                "may be repeated."
+            ),
+        ),
+    ] = None
+    at: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=VALUE",
+            help="Initial slew_deg, boom_deg or rope_m, such as rope_m=25; may be repeated.",
+        ),
+    ] = None
+    force: Annotated[
+        bool, force_option("Replace existing files, and accept drives whose fit is not usable.")
+    ] = False
 
     @cached_property
     def chosen(self) -> Crane:
         """The crane, with its drives; one whose fit is not usable is refused without --force."""
         drives = dict(pairs_of("--drive", self.drive, "luff=mine.toml"))
         crane = crane_of(self.crane).with_drive(known=True, **drives)
-        if not FORCED.get():
+        if not self.force:
             _refuse_unusable(crane)
         return crane
 
     @property
     def pose(self) -> dict[str, Any]:
-        """Where a run begins, as far as it is given."""
+        """The initial position, as far as it is given."""
         return numbers_of("--at", self.at, "rope_m=25", START)
 
 
 @dataclass(frozen=True)
 class AtSea(Placed):
-    """A crane on its ship in a sea.
+    """A crane on its ship in a sea."""
 
-    Options:
-      sea SEA: The sea: ss2, ss3, ss3-swell, ss4, ss5 or ss6; or significant height in m and peak
-          period in s, with the peak factor if it is not 1, and 'spread' for directions spread by
-          cos²: 1.5,8 or 1.5,8,3.3,spread.
-      heading DEG: Where the waves come from: 0 astern, 90 starboard (the default), 180 ahead, 270
-          port.
-      ship FILE[,ULEN]: The ship's transfer functions: .re1 of VERES, .nc of Capytaine, .csv, or
-          .4 of WAMIT with its ULEN, hull.4,175; by default the packaged hull's.
-      roll_period S: Natural roll period of the packaged hull, assumed to be 13 s.
-      roll_damping RATIO: Damping ratio of the packaged hull's roll, assumed to be 0.06.
-      speed M/S: Speed of the ship, forward.
-      list_deg --list DEG: Constant list, positive with starboard down.
-      trim_deg --trim DEG: Constant trim, positive with the bow down.
-      reference X,Y,Z: Point that the ship's transfer functions are given for, in the crane's axes:
-          forward, port and up in m, by default 0,0,0.
-    """
-
-    sea: list[str] | None = None
-    heading: float | None = None
-    ship: str | None = None
-    roll_period: float | None = None
-    roll_damping: float | None = None
-    speed: float | None = None
-    list_deg: float | None = None
-    trim_deg: float | None = None
-    reference: str | None = None
+    sea: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="SEA",
+            help=(
+                "Sea: ss2, ss3, ss3-swell, ss4, ss5 or ss6; or significant height in m and peak "
+                "period in s, with the peak factor if it is not 1, and 'spread' for directions "
+                "spread by cos²: 1.5,8 or 1.5,8,3.3,spread."
+            ),
+        ),
+    ] = None
+    heading: Annotated[
+        float | None,
+        typer.Option(
+            metavar="DEG",
+            help=(
+                "Direction that the waves come from: 0 astern, 90 starboard, 180 ahead, 270 port "
+                "(default: 90)."
+            ),
+        ),
+    ] = None
+    ship: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FILE[,ULEN]",
+            help=(
+                "Transfer functions of the ship: .re1 of VERES, .nc of Capytaine, .csv, or .4 of "
+                "WAMIT with its ULEN, such as hull.4,175 (default: those of the packaged hull)."
+            ),
+        ),
+    ] = None
+    roll_period: Annotated[
+        float | None,
+        typer.Option(
+            metavar="S", help="Natural roll period of the packaged hull (default: 13 s, assumed)."
+        ),
+    ] = None
+    roll_damping: Annotated[
+        float | None,
+        typer.Option(
+            metavar="RATIO",
+            help="Damping ratio of the packaged hull's roll (default: 0.06, assumed).",
+        ),
+    ] = None
+    speed: Annotated[
+        float | None, typer.Option(metavar="M/S", help="Forward speed of the ship.")
+    ] = None
+    list_deg: Annotated[
+        float | None,
+        typer.Option("--list", metavar="DEG", help="Constant list, positive with starboard down."),
+    ] = None
+    trim_deg: Annotated[
+        float | None,
+        typer.Option("--trim", metavar="DEG", help="Constant trim, positive with the bow down."),
+    ] = None
+    reference: Annotated[
+        str | None,
+        typer.Option(
+            metavar="X,Y,Z",
+            help=(
+                "Reference point of the ship's transfer functions in the crane's axes: forward, "
+                "port and up in m (default: 0,0,0)."
+            ),
+        ),
+    ] = None
 
     @property
     def _lean(self) -> dict[str, Any]:
@@ -88,7 +148,7 @@ class AtSea(Placed):
 
     @property
     def _at_sea(self) -> dict[str, Any]:
-        """What is given of waves and ship besides the sea and the lean, by the option's name."""
+        """The options of waves and ship that are given, except the sea and the lean, by name."""
         return _given(
             heading=self.heading,
             ship=self.ship,
@@ -113,10 +173,10 @@ class AtSea(Placed):
             given = [*self._at_sea, *_given(seed=seed)]
             if given:
                 option = given[0].replace("_", "-")
-                raise InputError(f"--{option} needs a sea: give --sea, as --sea ss3.")
+                raise InputError(f"--{option} needs a sea: give --sea, such as --sea ss3.")
             return None
         if len(words) > 1:
-            raise InputError(f"--sea {' --sea '.join(words)} is too much: write one sea.")
+            raise InputError(f"--sea {' --sea '.join(words)}: give one sea.")
         sea, spread = _sea_of(words[0])
         options = self._lean | _given(heading_deg=self.heading, speed=self.speed, seed=seed)
         if self.reference is not None:
@@ -145,7 +205,7 @@ class AtSea(Placed):
         if roll:
             raise InputError(
                 f"--ship {self.ship} has its own roll: leave --roll-period and --roll-damping out, "
-                "which are of the packaged hull."
+                "which belong to the packaged hull."
             )
         path, _, unit = self.ship.partition(",")
         return read_ship(path, number_of(f"--ship {self.ship}", unit) if unit else None)
@@ -153,23 +213,40 @@ class AtSea(Placed):
 
 @dataclass(frozen=True)
 class Operated(AtSea):
-    """A crane on its ship, and the load on its rope.
+    """A crane on its ship, and the load on its rope."""
 
-    Options:
-      suspension NAME=VALUE: How the load hangs: stiffness of the rope (EA) in N, as stiffness=6e7;
-          damping ratio of its bounce on an elastic rope; hook in kg and sling in m. May be
-          repeated.
-      wind FORWARD,PORT: Velocity of the air in m/s. Needs --drag-area.
-      drag_area M2: Drag area of the load, its drag coefficient times its area.
-      load KG: Mass of the load; by default the crane's safe load.
-      swing_damping RATIO: Damping ratio of the load's swing; by default the crane's, 0.005 assumed.
-    """
-
-    load: float | None = None
-    swing_damping: float | None = None
-    suspension: list[str] | None = None
-    wind: str | None = None
-    drag_area: float | None = None
+    load: Annotated[
+        float | None,
+        typer.Option(metavar="KG", help="Mass of the load (default: the crane's safe load)."),
+    ] = None
+    swing_damping: Annotated[
+        float | None,
+        typer.Option(
+            metavar="RATIO",
+            help="Damping ratio of the load's swing (default: the crane's; 0.005, assumed).",
+        ),
+    ] = None
+    suspension: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=VALUE",
+            help=(
+                "Property of the suspension: stiffness of the rope (EA) in N, such as "
+                "stiffness=6e7; bounce_damping, the damping ratio of an elastic rope; hook in kg; "
+                "sling in m; may be repeated."
+            ),
+        ),
+    ] = None
+    wind: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FORWARD,PORT", help="Velocity of the air in m/s; requires --drag-area."
+        ),
+    ] = None
+    drag_area: Annotated[
+        float | None,
+        typer.Option(metavar="M2", help="Drag area of the load: drag coefficient times area."),
+    ] = None
 
     @property
     def setup(self) -> dict[str, Any]:
@@ -186,7 +263,7 @@ class Operated(AtSea):
         if self.wind is not None:
             if self.drag_area is None:
                 raise InputError(
-                    f"--wind {self.wind} blows on nothing: give the load's --drag-area, as 12."
+                    f"--wind {self.wind} needs the load's drag area: give --drag-area, such as 12."
                 )
             setup["wind"] = _vector("--wind", self.wind, "10,-5")
         return setup
@@ -194,33 +271,64 @@ class Operated(AtSea):
 
 @dataclass(frozen=True)
 class Studied(Operated):
-    """What a study of seaways is about.
+    """A study of many seaways."""
 
-    Options:
-      control CONTROL: Control, as of 'run' after the colon; by default as it is designed for
-          ideal drives.
-      seeds N: Number of seaways; judge takes 120 by default.
-      length S: Time for which each seaway counts, by default 600.
-      run_in S: Time before it, by default 120; each run begins in a stationary swing.
-      drives NAMES: ideal: follow at once; identified: the crane's own; volts: these, 10 V for full
-          speed; drawn: from the errors of the fits that the drives come from, while control
-          knows the fits; by default ideal,identified. A verdict is on the last.
-      scale AXIS.NAME=FACTOR: Drives with a lever or parameter moved, which control knows, judged
-          last: luff.orifice=1.5. May be repeated.
-    """
-
-    control: str = "feedback=0.2/0.2+ship+loop=1.5"
-    seeds: int | None = None
-    length: float | None = None
-    run_in: float | None = None
-    drives: str | None = None
-    scale: list[str] | None = None
+    control: Annotated[
+        str,
+        typer.Option(
+            metavar="CONTROL",
+            help=(
+                "Control, written as after the colon of --variant of 'swashplate crane run'; the "
+                "default is a design for ideal drives."
+            ),
+        ),
+    ] = "feedback=0.2/0.2+ship+loop=1.5"
+    seeds: Annotated[
+        int | None,
+        typer.Option(metavar="N", help="Number of seaways (judge: 120 by default)."),
+    ] = None
+    length: Annotated[
+        float | None,
+        typer.Option(metavar="S", help="Evaluated duration of each seaway (default: 600 s)."),
+    ] = None
+    run_in: Annotated[
+        float | None,
+        typer.Option(
+            metavar="S",
+            help=(
+                "Duration before the evaluation (default: 120 s); each run starts in a stationary "
+                "swing."
+            ),
+        ),
+    ] = None
+    drives: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAMES",
+            help=(
+                "Sets of drives, joined by commas (default: ideal,identified). ideal: without "
+                "delay or limits; identified: the crane's own; volts: these, 10 V for full speed; "
+                "drawn: from the errors of the fits, unknown to the controller. The verdict is on "
+                "the last set."
+            ),
+        ),
+    ] = None
+    scale: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="AXIS.NAME=FACTOR",
+            help=(
+                "Factor on a design variable or parameter of a drive, known to the controller; "
+                "added as the last set: luff.orifice=1.5; may be repeated."
+            ),
+        ),
+    ] = None
 
     def through(self, study: Callable[..., Any], *first: Any, **more: Any) -> Any:
         """A study of the controller, whose progress is shown."""
         law = control_of(self.control)
         if law is None:
-            raise InputError("--control is empty: there is nothing to judge.")
+            raise InputError("--control is empty: there is nothing to assess.")
         how = self.setup | _given(length=self.length, run_in=self.run_in) | more
         if self.waters is not None:
             how["sea"] = self.waters
@@ -244,7 +352,7 @@ class Studied(Operated):
 
     def sets(self) -> dict[str, Any]:
         """Sets of drives by name."""
-        from swashplate.analysis.whatif import find_lever
+        from swashplate.analysis.design_variables import powers_of
         from swashplate.crane import drawn_cranes, upgraded
 
         names = filter(None, map(str.strip, (self.drives or "ideal,identified").split(",")))
@@ -256,20 +364,20 @@ class Studied(Operated):
                 raise InputError("--drives drawn needs the folder of a fit: --drive luff=FOLDER.")
             sets["drawn"] = drawn_cranes(self.chosen)
             kept = [axis for axis in AXES if axis not in drawn]
-            as_given = f"; as given, since they come from no fit: {', '.join(kept)}" if kept else ""
+            as_given = f"; not drawn, without a fit: {', '.join(kept)}" if kept else ""
             side.print(f"Drawn: {', '.join(drawn)}{as_given}")
         crane, changed = self.chosen, []
         for name, text in pairs_of("--scale", self.scale, "luff.orifice=1.5"):
-            (axis, _, lever), words = name.partition("."), f"--scale {name}={text}"
-            if not lever or axis not in AXES:
+            (axis, _, variable), words = name.partition("."), f"--scale {name}={text}"
+            if not variable or axis not in AXES:
                 raise InputError(
                     f"{words}: write the axis first, luff.orifice=1.5; the axes are "
                     f"{', '.join(AXES)}."
                 )
-            find_lever(lever)
+            powers_of(variable)
             factor = number_of(words, text)
-            crane = upgraded(crane, axis, {lever: factor})
-            changed.append(f"{axis} {lever} ×{factor:g}")
+            crane = upgraded(crane, axis, {variable: factor})
+            changed.append(f"{axis} {variable} ×{factor:g}")
         if changed:
             sets[", ".join(changed)] = crane
         return sets
@@ -315,7 +423,7 @@ def _given(**options: Any) -> dict[str, Any]:
 
 
 def sea_sentences(seaway: Seaway | None) -> tuple[str, ...]:
-    """What a seaway does not simulate as it is asked for."""
+    """Where the simulated seaway differs from the requested one."""
     return () if seaway is None else seaway.sentences()
 
 
@@ -331,8 +439,7 @@ def _sea_of(text: str) -> tuple[str | Spectrum, bool]:
             options = zip(("--heading", "--seed"), numbers, strict=False)
             instead = " ".join(f"{option} {number}" for option, number in options)
             raise InputError(
-                f"--sea {text}: after the name of a sea there are no numbers; write --sea {first} "
-                f"{instead}."
+                f"--sea {text}: the name of a sea takes no numbers; write --sea {first} {instead}."
             )
         return first, spread
     if not 1 <= len(numbers) <= 2:
@@ -385,5 +492,5 @@ def _refuse_unusable(crane: Crane) -> None:
             raise InputError(
                 f"{axis}={source.place}: the verdict on the fit of this drive is "
                 f"'{source.verdict.rstrip('.')}'; fit again until it is usable, as its report "
-                f"advises, give another drive, or take this one all the same with --force."
+                f"advises, give another drive, or accept this one with --force."
             )

@@ -1,4 +1,4 @@
-"""``swashplate export`` and ``live``: a drive where there is no Python."""
+"""``swashplate export`` and ``live``: a drive outside Python."""
 
 from __future__ import annotations
 
@@ -8,7 +8,16 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Literal
 
-from swashplate.cli.options import AxisName, DriveChoice
+import typer
+
+from swashplate.cli.commands import command
+from swashplate.cli.options import (
+    NO_VALUE,
+    AxisOption,
+    DriveChoice,
+    Force,
+    new_file,
+)
 from swashplate.cli.terminal import check_free, note, save, working
 from swashplate.cli.words import campaign_of, drive_file, maneuver_of
 from swashplate.errors import InputError
@@ -18,38 +27,63 @@ FMU = Form("an FMU", (".fmu",))
 WASM = Form("WebAssembly", (".wasm",))
 
 
+app = typer.Typer(rich_markup_mode="rich")
+
+
+@command(
+    app,
+    "export",
+    examples="""
+        swashplate export hoist --fmu hoist.fmu
+        swashplate export fitted/ --fmu winch.fmu --fmi 3.0 --platforms linux64,win64
+        swashplate export mine.toml --c folder
+        swashplate export hoist --set tau=10ms --step 0.001 --fmu hoist.fmu
+        swashplate export hoist --wasm hoist.wasm
+    """,
+)
 def export(
     drive: DriveChoice,
     *,
-    fmu: Annotated[Path | None, FMU] = None,
-    c: Path | None = None,
-    wasm: Annotated[Path | None, WASM] = None,
-    fmi: Literal["2", "2.0", "3", "3.0"] = "2.0",
-    step: float | None = None,
-    platforms: str | None = None,
-    compile: bool = False,
+    fmu: Annotated[Path | None, new_file(FMU, "FMU for co-simulation.", metavar="FILE.fmu")] = None,
+    c: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DIR", help="New or empty folder for C source with the drive's numbers."
+        ),
+    ] = None,
+    wasm: Annotated[
+        Path | None,
+        new_file(WASM, "WebAssembly with the drive's numbers.", metavar="FILE.wasm"),
+    ] = None,
+    fmi: Annotated[
+        Literal["2", "2.0", "3", "3.0"], typer.Option(help="FMI version of the FMU.")
+    ] = "2.0",
+    step: Annotated[
+        float | None,
+        typer.Option(
+            metavar="S",
+            help="Internal step, at most 1/512 s; independent of the communication step.",
+        ),
+    ] = None,
+    platforms: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME,NAME",
+            help="Platforms of the FMU (default: all): linux64, aarch64-linux, win64, darwin64.",
+        ),
+    ] = None,
+    compile: Annotated[
+        bool,
+        typer.Option(
+            "--compile", metavar=NO_VALUE, help="Also compile the C source for this machine."
+        ),
+    ] = False,
+    force: Force = False,
 ) -> None:
-    """Take a drive along: as an FMU, as C source, or as WebAssembly.
+    """Export a drive as FMU, C source or WebAssembly.
 
-    An FMU needs neither Python nor a compiler where it runs, and none is
-    needed to write it: the package brings its libraries along.
-
-    Options:
-      fmu FILE.fmu: An FMU for co-simulation.
-      c DIR: C source with the drive's numbers, in a folder of its own.
-      wasm FILE.wasm: WebAssembly with the drive's numbers.
-      fmi: Version of the standard for the FMU.
-      step S: The drive's own step, at most 1/512 s, whatever the master's is.
-      platforms NAME,NAME: Machines that the FMU is for: linux64, aarch64-linux, win64, darwin64;
-          all by default.
-      compile: Compile the C source for this machine, too.
-
-    For example:
-      swashplate export hoist --fmu hoist.fmu
-      swashplate export fitted/ --fmu winch.fmu --fmi 3.0 --platforms linux64,win64
-      swashplate export mine.toml --c folder
-      swashplate export hoist --set tau=10ms --step 0.001 --fmu hoist.fmu
-      swashplate export hoist --wasm hoist.wasm
+    An FMU needs no Python and no compiler, neither to write it nor to run it:
+    the package contains its libraries.
     """
     if fmu is None and c is None and wasm is None:
         raise InputError("Say what to export: --fmu FILE.fmu, --c DIR or --wasm FILE.wasm.")
@@ -59,7 +93,7 @@ def export(
         raise InputError("--platforms is of an FMU; name it with --fmu FILE.fmu.")
     if c is not None:
         check_folder(c)
-        check_free(c)
+        check_free(c, force=force)
     with working("Exporting"):
         from swashplate import export as exporting
 
@@ -99,32 +133,40 @@ def said() -> Iterator[None]:
         note(f"Note: {text}")
 
 
+@command(
+    app,
+    "live",
+    examples="""
+        swashplate live fitted harbour/campaign.toml
+        swashplate live hoist --maneuver step:9 --out hoist.html
+        swashplate live fitted harbour/campaign.toml --scale orifice=1.5
+    """,
+)
 def live(
     drive: DriveChoice,
-    path: Path | None = None,
+    path: Annotated[
+        Path | None,
+        typer.Argument(
+            metavar="CAMPAIGN.toml", help="Campaign of tests to show with their simulation."
+        ),
+    ] = None,
     *,
-    axis: AxisName = None,
-    maneuver: str | None = None,
-    out: Annotated[Path, PAGE] = Path("live.html"),
+    axis: AxisOption = None,
+    maneuver: Annotated[
+        str | None,
+        typer.Option(metavar="NAME", help="Maneuver to simulate in place of tests: step:9."),
+    ] = None,
+    out: Annotated[Path, new_file(PAGE, "Page: .html.")] = Path("live.html"),
+    force: Force = False,
 ) -> None:
-    """Write a page in which the drive runs, with sliders for its parameters.
+    """Write a page that simulates the drive, with sliders for its parameters.
 
-    One file that works offline: open it in a browser, move a slider, and the
-    simulated curves, their errors and the limits follow. Changed values stand
-    below as lines to put into the drive's file.
-
-    Options:
-      path CAMPAIGN.toml: Tests that are shown beside what the drive makes of them.
-      maneuver NAME: A maneuver instead of tests, such as step:9.
-      out FILE: The page, .html.
-
-    For example:
-      swashplate live fitted harbour/campaign.toml
-      swashplate live hoist --maneuver step:9 --out hoist.html
-      swashplate live fitted harbour/campaign.toml --scale orifice=1.5
+    A single file that works offline: open it in a browser, move a slider, and
+    the simulated curves, their errors and the limits follow. Changed values are
+    listed as lines for the drive's parameter file.
     """
     if (path is None) == (maneuver is None):
-        raise InputError("Name a campaign, or a maneuver with --maneuver; one of them.")
+        raise InputError("Name either a campaign, or a maneuver with --maneuver.")
     with working("Writing the page"):
         from swashplate.report.fit_report import write_live_page
 

@@ -11,7 +11,22 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from swashplate.cli import words
-from swashplate.cli.options import AxisName, Required, option
+from swashplate.cli.commands import command
+from swashplate.cli.options import (
+    CAMPAIGN,
+    NO_VALUE,
+    AxisOption,
+    CampaignArgument,
+    DaskOption,
+    DriveArgument,
+    Force,
+    InitialDrive,
+    ModelFile,
+    RequiredOption,
+    SeedOption,
+    SetupOption,
+    new_file,
+)
 from swashplate.cli.terminal import (
     bullets,
     check_free,
@@ -47,16 +62,17 @@ FILES = {
 """What `Identification.save` writes, of a drive or of a user-defined model."""
 MEASURES = (
     "NRMSE is the RMSE over the standard deviation of what was measured, fit % is 100 (1 - NRMSE); "
-    "'of range' below means over the largest less the smallest value of the signal."
+    "'of range' below: over the range of the signal, its largest less its smallest value."
 )
 
 Loss = Literal["linear", "soft_l1", "cauchy"]
 Role = Literal["validate", "fit", "all"]
-CAMPAIGN = Path("campaign.toml")
+
+app = typer.Typer(rich_markup_mode="rich")
 
 
 class Clock:
-    """Where the time goes, part after part; kernels are loaded in any of them, and count apart."""
+    """Time spent in each part; loading kernels, which happens in any of them, counts separately."""
 
     def __init__(self) -> None:
         self.parts = {"start and kernels": process_time()}
@@ -77,74 +93,113 @@ class Clock:
         return ", ".join(f"{name} {seconds:.2f} s" for name, seconds in self.parts.items())
 
 
+@command(
+    app,
+    "fit",
+    examples="""
+        swashplate rig hoist --out virtual --perturb 0.1
+        swashplate fit virtual/campaign.toml --out fitted
+        swashplate fit harbour/campaign.toml --setup mine.toml --starts 50 --seed 1
+        swashplate fit harbour/campaign.toml --folds 5 --profile Z16_plus
+        swashplate fit valve/campaign.toml --model valve.py
+        swashplate simulate fitted/drive.toml step:9
+    """,
+)
 def fit(
-    path: Path = CAMPAIGN,
+    path: CampaignArgument = CAMPAIGN,
     *,
-    out: Path = Path("fitted"),
-    axis: AxisName = None,
-    setup: str | None = None,
-    model: Path | None = None,
-    joint: bool = False,
-    begin: str | None = None,
+    out: Annotated[
+        Path, typer.Option(metavar="DIR", help="Folder for the fitted drive and its tables.")
+    ] = Path("fitted"),
+    axis: AxisOption = None,
+    setup: SetupOption = None,
+    model: ModelFile = None,
+    joint: Annotated[
+        bool,
+        typer.Option(
+            "--joint",
+            metavar=NO_VALUE,
+            help="Finally estimate all parameters at once, through the whole drive.",
+        ),
+    ] = False,
+    begin: InitialDrive = None,
     starts: Annotated[
         int | None,
-        option(
-            "More starts, spread over the bounds; 0 tries none, even if residuals ask for some.",
-            min=0,
+        typer.Option(
             metavar="N",
+            min=0,
+            help=(
+                "Number of additional starts, spread over the bounds (0: none, even if residuals "
+                "call for some)."
+            ),
         ),
     ] = None,
     evaluations: Annotated[
-        int, option("Evaluations of the model that a search may take.", min=1, metavar="N")
+        int,
+        typer.Option(metavar="N", min=1, help="Largest number of model evaluations per search."),
     ] = MOST_EVALUATIONS,
-    folds: int = 0,
-    profile: list[str] | None = None,
-    seed: int = 0,
-    jobs: int = 0,
-    dask: str | None = None,
-    resume: bool = False,
-    loss: Loss = "linear",
-    require: Required = 10.0,
-    report: Annotated[bool, option("Write report.html, one file that works offline.")] = True,
-    timing: bool = False,
+    folds: Annotated[
+        int, typer.Option(metavar="N", min=0, help="Number of cross-validation folds (0: off).")
+    ] = 0,
+    profile: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME",
+            help="Parameter whose cost profile is computed, or 'all'; may be repeated.",
+        ),
+    ] = None,
+    seed: SeedOption = 0,
+    jobs: Annotated[
+        int, typer.Option(metavar="N", min=0, help="Number of worker processes (0: all cores).")
+    ] = 0,
+    dask: DaskOption = None,
+    resume: Annotated[
+        bool,
+        typer.Option(
+            "--resume",
+            metavar=NO_VALUE,
+            help="Continue an interrupted search with the starts saved in DIR.",
+        ),
+    ] = False,
+    loss: Annotated[
+        Loss, typer.Option(help="Loss function; the robust ones reduce the weight of outliers.")
+    ] = "linear",
+    require: RequiredOption = 10.0,
+    report: Annotated[
+        bool,
+        typer.Option(
+            "--report/--no-report",
+            metavar=NO_VALUE,
+            help="Write report.html, a single file that works offline.",
+        ),
+    ] = True,
+    timing: Annotated[
+        bool,
+        typer.Option("--timing", metavar=NO_VALUE, help="Print the time spent in each part."),
+    ] = False,
+    force: Force = False,
 ) -> None:
-    """Identify a drive, or a model of your own, from its tests.
+    """Identify a drive, or a user-defined model, from its tests.
 
-    Fits the runs with the role 'fit', stage after stage, predicts those with the
-    role 'validate', and says what the data determine. Writes the drive as a
-    parameter file that 'simulate' takes, the fit configuration, the estimates
-    with their intervals, and what 'report' needs to write the report again.
-    Ctrl-C or SIGTERM keeps the best so far, of several starts those that ended,
-    and the exit code is 130. It is 1 if the result is not usable.
-
-    Options:
-      out DIR: Folder for the fitted drive and its tables.
-      joint: After the stages, estimate all parameters at once, through the whole drive.
-      folds: Cross-validate over so many parts of the runs; 0 = off.
-      profile NAME: Profile the cost along this parameter, or 'all'; may be repeated.
-      jobs: Processes for all of these; 0 = all cores.
-      dask ADDRESS: Run them on the cluster of this scheduler.
-      resume: Continue a search: keep the starts that DIR holds already.
-      loss: Robust loss functions reduce the weight of outliers.
-      timing: Print where the time went, from the start of the process.
-
-    For example:
-      swashplate rig hoist --out virtual --perturb 0.1
-      swashplate fit virtual/campaign.toml --out fitted
-      swashplate fit harbour/campaign.toml --setup mine.toml --starts 50 --seed 1
-      swashplate fit harbour/campaign.toml --folds 5 --profile Z16_plus
-      swashplate fit valve/campaign.toml --model valve.py
-      swashplate simulate fitted/drive.toml step:9
+    Fits the runs with the role 'fit', stage by stage, predicts those with the
+    role 'validate', and shows which parameters the data determine. Writes the
+    fitted drive as a parameter file, the fit configuration, the estimates with
+    their intervals, and the data that 'report' needs. Exit code 1: the result is
+    not usable. Ctrl-C or SIGTERM keeps the best result so far (of several
+    starts: those that ended) and exits with code 130.
     """
     clock = Clock()
     check_folder(out)
     lock(out)
     if not resume:
-        check_free(*(out / name for name in FILES))
+        check_free(*(out / name for name in FILES), force=force)
         if report:
-            check_free(out / "report.html")
+            check_free(out / "report.html", force=force)
     if model is not None and (setup is not None or begin is not None or joint):
-        raise InputError(f"{model} says what is free and where it begins: leave out the others.")
+        raise InputError(
+            f"{model} defines its free parameters and their initial values: leave out --setup, "
+            "--from and --joint."
+        )
     with working("Starting"), clock.part("start and kernels"):
         from swashplate.executors import Dask, Processes
         from swashplate.identification.identifying import identify
@@ -174,16 +229,16 @@ def fit(
     if result.fit.interrupted and starts:
         last = result.fit.stages[-1]
         note(
-            f"Interrupted in the stage '{last.stage.name}': {last.solution.message}. The same "
-            "command with --resume goes on; nothing is written but the starts."
+            f"Interrupted in the stage '{last.stage.name}': {last.solution.message}. Only the "
+            "starts are written; the same command with --resume continues."
         )
         raise typer.Exit(INTERRUPTED)
-    with working("Judging"), clock.part("judging"):
+    with working("Assessing"), clock.part("assessment"):
         verdict = result.verdict
     with clock.part("report"):
         lines = _written(result, out)
         lines += [_reported(result, out)] if report else []
-    note(f"{campaign.title}{' (virtual)' * campaign.virtual}")
+    note(words.title_of(campaign))
     _say_fit(result)
     for line in [*lines, f"Time:      {clock}"] if timing else lines:
         note(line)
@@ -241,29 +296,33 @@ def _say_verdict(verdict: Verdict) -> None:
         say(verdict.validity)
 
 
+@command(
+    app,
+    "validate",
+    examples="""
+        swashplate validate fitted/drive.toml virtual/campaign.toml
+        swashplate validate hoist harbour/campaign.toml --role all --out validation
+    """,
+)
 def validate(
-    drive: str,
-    path: Path = CAMPAIGN,
+    drive: DriveArgument,
+    path: CampaignArgument = CAMPAIGN,
     *,
-    axis: AxisName = None,
-    model: Path | None = None,
-    role: Role = "validate",
-    out: Path | None = None,
-    require: Required = 10.0,
+    axis: AxisOption = None,
+    model: ModelFile = None,
+    role: Annotated[
+        Role, typer.Option(help="Runs to predict: those held out, those to fit, or both.")
+    ] = "validate",
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Folder for report.html and measures.csv.")
+    ] = None,
+    require: RequiredOption = 10.0,
+    force: Force = False,
 ) -> None:
-    """Predict runs from their command alone and judge the drive by them.
+    """Predict runs from their command alone and assess the drive by them.
 
-    Prints errors run by run, what is left in the residuals, and a verdict. The
-    exit code is 1 if the drive is not usable for these runs.
-
-    Options:
-      drive SET.toml: The drive: a parameter file, the folder of a fit, or a packaged one.
-      role: Runs that were held out, those to fit, or both.
-      out DIR: Folder for report.html and measures.csv.
-
-    For example:
-      swashplate validate fitted/drive.toml virtual/campaign.toml
-      swashplate validate hoist harbour/campaign.toml --role all --out validation
+    Prints the errors of each run, the structure left in the residuals, and a
+    verdict. Exit code 1: the drive is not usable for these runs.
     """
     from swashplate.identification import tables
     from swashplate.identification.assessment import versions
@@ -273,16 +332,16 @@ def validate(
 
     if out is not None:
         check_folder(out)
-        check_free(out / "measures.csv", out / "report.html")
+        check_free(out / "measures.csv", out / "report.html", force=force)
     with working(f"Reading {path}"):
         parameters: Parameters | None = None if model else words.parameters_of(drive)
         campaign, chosen = words.campaign_of(path, axis)
-        wanted = ("fit", "validate") if role == "all" else (role,)
-        runs = [each for each in campaign.select(axis=chosen) if each.role in wanted]
+        roles = ("fit", "validate") if role == "all" else (role,)
+        runs = [each for each in campaign.select(axis=chosen) if each.role in roles]
     if not runs:
         raise InputError(
-            f"{path}: no run of the axis '{chosen}' has the role {' or '.join(map(repr, wanted))}; "
-            "another one is asked for with --role."
+            f"{path}: no run of the axis '{chosen}' has the role {' or '.join(map(repr, roles))}; "
+            "select another with --role."
         )
     with working("Predicting"):
         refuse_unsound(spike_findings(runs, "linear"))
@@ -305,8 +364,7 @@ def validate(
                 parameters, campaign, page, predicted, judged=judged, notes=notes
             )
         lines = [f"Measures:  {out / 'measures.csv'}", f"Report:    {page}"]
-    virtual = " (virtual)" * campaign.virtual
-    note(f"{campaign.title}{virtual}, {chosen}: {parameters.name} from {drive}")
+    note(f"{words.title_of(campaign)}, {chosen}: {parameters.name} from {drive}")
     show(*measures)
     say(MEASURES)
     for line in lines:
@@ -314,32 +372,52 @@ def validate(
     _say_verdict(judged)
 
 
+@command(
+    app,
+    "report",
+    examples="""
+        swashplate fit virtual/campaign.toml --out fitted
+        swashplate report fitted virtual/campaign.toml --truth virtual/truth
+        swashplate report fitted virtual/campaign.toml --pdf report.pdf
+    """,
+)
 def report(
-    fitted: Path,
-    path: Path | None = None,
+    fitted: Annotated[
+        Path,
+        typer.Argument(metavar="FITTED", help="Folder that 'fit' wrote, or its drive.toml."),
+    ],
+    path: Annotated[
+        Path | None,
+        typer.Argument(
+            metavar="CAMPAIGN.toml",
+            help="Campaign that was fitted (default: where 'fit' found it).",
+        ),
+    ] = None,
     *,
-    model: Path | None = None,
-    pdf: Annotated[Path | None, PRINTED] = None,
-    data: Annotated[Path | None, TABLE] = None,
-    truth: str | None = None,
+    model: ModelFile = None,
+    pdf: Annotated[
+        Path | None, new_file(PRINTED, "Also print the report to PDF; needs Chromium.")
+    ] = None,
+    data: Annotated[
+        Path | None,
+        new_file(TABLE, "Write all samples, measured and simulated: .csv or .parquet."),
+    ] = None,
+    truth: Annotated[
+        str | None,
+        typer.Option(
+            metavar="TRUTH",
+            help=(
+                "True parameters of virtual tests, shown next to the estimates: folder or "
+                "parameter file."
+            ),
+        ),
+    ] = None,
+    force: Force = False,
 ) -> None:
-    """Write the report of a fit again, from what the fit stored.
+    """Write the report of a fit again, from the data that the fit stored.
 
     Nothing is fitted. The campaign must be the one that was fitted: if its
     samples, weights or ignored windows have changed, the report is refused.
-
-    Options:
-      fitted FITTED: The folder that 'fit' wrote, or its drive.toml.
-      path PATH: The campaign that was fitted; where 'fit' found it, if omitted.
-      pdf FILE: Print the report to this PDF as well, by Chromium.
-      data FILE: Write all samples, measured and simulated, as one table: .csv or .parquet.
-      truth TRUTH: Of virtual tests: the folder or parameter file of what was simulated, to stand
-          beside the estimates.
-
-    For example:
-      swashplate fit virtual/campaign.toml --out fitted
-      swashplate report fitted virtual/campaign.toml --truth virtual/truth
-      swashplate report fitted virtual/campaign.toml --pdf report.pdf
     """
     from swashplate.identification.assessment import Identification
     from swashplate.report.fit_report import find_browser, print_report, shown_runs, write_samples
@@ -352,7 +430,8 @@ def report(
         found = Identification.load(fitted, path, model=model)
         if true is not None and not found.campaign.virtual:
             raise InputError(
-                f"{found.campaign.path} is not virtual: nobody knows its truth, leave out --truth."
+                f"{found.campaign.path} is not virtual, so that its true parameters are unknown: "
+                "leave out --truth."
             )
         if fitted.suffix.lower() == ".toml":
             given, numbers = words.parameters_of(str(fitted)).numbers, found.fit.parameters
@@ -360,9 +439,9 @@ def report(
             if other:
                 raise InputError(
                     f"{fitted} is not the drive that {folder / 'fit.json'} found "
-                    f"({', '.join(other[:3])} differ): judge it with 'swashplate validate'."
+                    f"({', '.join(other[:3])} differ): assess it with 'swashplate validate'."
                 )
-    with working("Judging"):
+    with working("Assessing"):
         verdict = found.verdict
     note(_reported(found, folder, true))
     save(pdf, "Printed", lambda to: print_report(folder / "report.html", to))
@@ -372,20 +451,28 @@ def report(
     say(verdict.headline)
 
 
-def demo(*, out: Path = Path("demo"), seed: int = 1) -> None:
+@command(
+    app,
+    "demo",
+    examples="""
+        swashplate demo
+        swashplate demo --out results --seed 3
+    """,
+)
+def demo(
+    *,
+    out: Annotated[
+        Path, typer.Option(metavar="DIR", help="Folder for logs, drive and report.")
+    ] = Path("demo"),
+    seed: SeedOption = 1,
+    force: Force = False,
+) -> None:
     """Identify a virtual hoist from its tests, and compare it with the truth.
 
-    Draws a hoist that differs from the published one, logs the 13 tests of
-    Kruse (2001) through a 12-bit command, an ammeter and an encoder, fits card,
+    Draws a hoist that differs from the published one, records the 13 tests of
+    Kruse (2001) with a 12-bit command, an ammeter and an encoder, fits amplifier,
     pump and motor to ten of them, predicts the other three and writes a report.
-    Takes less than a minute. An earlier demo is replaced.
-
-    Options:
-      out FOLDER: Folder for logs, drive and report.
-
-    For example:
-      swashplate demo
-      swashplate demo --out results --seed 3
+    Takes less than a minute. Replaces an earlier demo.
     """
     from swashplate.campaign import Campaign, rig
     from swashplate.drive import Drive
@@ -396,8 +483,8 @@ def demo(*, out: Path = Path("demo"), seed: int = 1) -> None:
     from swashplate.identification.validation import with_speeds
     from swashplate.report.figures import plot_channel, save_figure
 
-    if not (out / "virtual" / "truth").is_dir():  # an earlier demo is replaced, nothing else
-        check_free(out)
+    if not (out / "virtual" / "truth").is_dir():  # only an earlier demo is replaced
+        check_free(out, force=force)
     lock(out)
     setup = load_setup("hoist")
     with long_work("", 5) as begin:

@@ -1,4 +1,4 @@
-"""``swashplate doctor``: what this installation consists of, and whether it works."""
+"""``swashplate doctor``: versions of this installation, and whether it works."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from pathlib import Path
 import typer
 
 from swashplate.__about__ import __version__
+from swashplate.cli.commands import command
 from swashplate.cli.terminal import note, say, show, working
 from swashplate.executors import available_cores
 from swashplate.tables import Column, Table
@@ -20,7 +21,7 @@ from swashplate.tables import Column, Table
 LIBRARIES = ("numpy", "scipy", "numba", "polars", "pydantic", "matplotlib", "jinja2", "h5py")
 """Whose versions matter when a result or a figure differs."""
 EXTRAS = {
-    "binaries": ("ziglang", "exports of equations of one's own for every platform"),
+    "binaries": ("ziglang", "exports of user-defined equations for every platform"),
     "dask": ("distributed", "fit --dask: many starts on a cluster"),
     "fmu": ("fmpy", "an FMU compared with the drive, export.compare"),
     "mdf": ("asammdf", "logs in ASAM MDF 4 (.mf4)"),
@@ -33,29 +34,33 @@ FULL_SPEED_DEG_S = 196.0
 DIGITS = 0.05
 """Half a unit of its last digit. [deg/s]"""
 WITHOUT_BYTE_CODE = (
-    "not kept for {names}: every start compiles their source again, for seconds. Run "
+    "not stored for {names}: every start compiles their source again, which takes seconds. Run "
     "'python -m compileall -q' on the folder of the installed packages, or unset "
     "PYTHONDONTWRITEBYTECODE"
 )
 """{names} are those of the libraries, or the package itself."""
 
+app = typer.Typer(rich_markup_mode="rich")
 
+
+@command(app, "doctor", examples="swashplate doctor", units=False)
 def doctor() -> None:
-    """Show versions, cores, compiled kernels and extras, and simulate once.
+    """Show versions, cores, compiled kernels and extras, and check a simulation.
 
-    Paste what it prints into a question or a report of a problem. Exit code 1
-    if the simulation does not give the published speed.
-
-    For example:
-      swashplate doctor
+    Paste the output into a question or a problem report. Exit code 1: the
+    simulation does not give the published speed.
     """
-    made = Table("", (Column("what"), Column("found"), Column("enables", wrap=True)))
+    made = Table("", (Column("component"), Column("value"), Column("enables", wrap=True)))
     made.add("swashplate", __version__, "")
     made.add("Python", platform.python_version(), "")
     made.add("system", f"{platform.system()} {platform.machine()}", "")
     made.add("cores", str(available_cores()), "")
     if os.environ.get("NUMBA_DISABLE_JIT", "0") != "0":
-        made.add("NUMBA_DISABLE_JIT", "set", "nothing is compiled, all is a hundred times slower")
+        made.add(
+            "NUMBA_DISABLE_JIT",
+            "set",
+            "nothing is compiled; everything is about a hundred times slower",
+        )
     if sys.dont_write_bytecode and (names := _without_byte_code()):
         made.add("byte code", "-", WITHOUT_BYTE_CODE.format(names=", ".join(names)))
     extras = {f"extra {name}": entry for name, entry in EXTRAS.items()}

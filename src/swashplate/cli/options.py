@@ -1,26 +1,21 @@
-"""Arguments and options that several commands share, and groups of them that go together.
+"""Arguments and options that several commands share, and groups of them that belong together.
 
-A command whose parameter is one of the groups here gets the group's fields as options: `command`
-spreads them in its signature and gathers them again.
+Each is a type with its option: a parameter `plot: FigureFile = None` is the option --plot. A
+parameter whose type is one of the groups here stands for the group's fields; see `command`.
 """
 
 from __future__ import annotations
 
-import inspect
-import re
-from collections.abc import Callable, Mapping
-from contextlib import ExitStack
-from dataclasses import MISSING, dataclass, field, fields, is_dataclass
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
-from typer.models import ParameterInfo
 
-from swashplate.cli.terminal import FORCED, RESOURCES, SAVED, check_output, note, say_saved
+from swashplate.cli.terminal import check_output, note
 from swashplate.tables import FIGURE, TABLE, Form
-from swashplate.units import show_rod, shown_in
+from swashplate.units import show_rod
 
 if TYPE_CHECKING:
     from swashplate.drive import Drive
@@ -28,78 +23,164 @@ if TYPE_CHECKING:
 Interpolation = Literal["linear", "previous"]
 Start = Literal["rest", "steady"]
 
-
-def option(help: str, *names: str, metavar: str | None = None, **more: Any) -> Any:
-    """An option of Typer's, its help first; one without a value is a switch by its name."""
-    return typer.Option(*names, help=help, metavar=metavar, **more)
-
-
-def argument(metavar: str, help: str) -> Any:
-    """A positional argument of Typer's."""
-    return typer.Argument(metavar=metavar, help=help, show_default=False)
+NO_VALUE = " "
+"""Metavar of a switch; without one, its help shows <bool>."""
+CAMPAIGN = Path("campaign.toml")
+LOG_FORMATS = ".csv and other text, .parquet, .mat, .h5, .tdms or .mf4"
 
 
-AxisName = Annotated[
-    str | None, option("The axis, where the campaign has several.", metavar="NAME")
-]
+def new_file(form: Form, help: str, *, metavar: str = "FILE") -> Any:
+    """Option for a file that a command writes.
+
+    A file that cannot be written, or that exists and is not to be replaced, is refused before
+    anything is computed: the command needs the option `Force`.
+    """
+
+    def check(context: typer.Context, path: Path | None) -> Path | None:
+        check_output(path, form, force=context.params["force"])
+        return path
+
+    return typer.Option(metavar=metavar, help=help, callback=check)
+
+
+def force_option(help: str) -> Any:
+    """Option --force; it is read before the options for files, which depend on it."""
+    return typer.Option("--force", metavar=NO_VALUE, help=help, is_eager=True)
+
+
+Force = Annotated[bool, force_option("Replace existing files.")]
 TableFile = Annotated[
-    Path | None,
-    option("Write all numbers, in SI, to a .csv or .parquet file.", metavar="FILE"),
-    TABLE,
+    Path | None, new_file(TABLE, "Write all numbers in SI units: .csv or .parquet.")
 ]
-FigureFile = Annotated[
-    Path | None, option("Draw a figure: .png, .svg or .pdf.", metavar="FILE"), FIGURE
-]
+FigureFile = Annotated[Path | None, new_file(FIGURE, "Draw a figure: .png, .svg or .pdf.")]
 SetFile = Annotated[
     Path | None,
-    option("Write the changed drive as a parameter file.", metavar="SET.toml"),
-    Form("a parameter file", (".toml",)),
-]
-Required = Annotated[
-    float, option("Largest error of a prediction, in % of the signal's range.", min=0.0)
+    new_file(
+        Form("a parameter file", (".toml",)),
+        "Write the changed drive as a parameter file.",
+        metavar="SET.toml",
+    ),
 ]
 
-SHARED = """
-  begin --from AXIS|SET.toml: Begin at this drive instead of the campaign's.
-  clip: Clip a voltage beyond ±10 V instead of refusing it.
-  measured NAME=COLUMN: A column of FILE, or a number in SI, for pump_speed (1 at the speed of Z10),
-      load_torque or supply_pressure. May be repeated.
-  column NAME: Column of the voltage in FILE.
-  command MANEUVER|FILE: A maneuver such as step:9 or "step +9 V", or a log with columns of time and
-      voltage: text such as .csv, .parquet, .mat, .h5, .tdms or .mf4; a column may carry its unit:
-      'time \\[ms]'.
-  drive AXIS|SET.toml: A packaged drive (see 'swashplate axes'), your own TOML file, or the folder
-      of a fit.
-  factors --scale NAME=FACTOR: A factor on a parameter or a lever, after --set: Z16=1.5,
-      orifice=1.5. May be repeated.
-  force: Replace older files.
-  interpolation: The voltage between rows or samples: linear, or zero-order hold. Must be given with
-      a FILE.
-  levers --lever LEVER[=LOW/HIGH]: A lever or parameter, by itself or with its lowest and highest
-      factor; may be repeated. 'swashplate whatif --levers' lists them.
-  model FILE.py: A Python file with a model of your own and what is free of it. The file is
-      executed: name only one that you trust.
-  path CAMPAIGN.toml: The campaign file, beside its logs.
-  rate HZ: Samples a second, 10 to 100000.
-  seed: Of everything drawn at random.
-  setup NAME|FILE: What is free: a packaged fit configuration (hoist, slew, luff, neutral ...) or
-      your own TOML file; by default the one of the axis's drive.
-  start: Start from rest at 0 V, or settled at the first voltage.
-  time_column NAME: Column of the time in FILE.
-  units UNIT,UNIT: Units to show, such as rpm,bar; m/min is of rope, with --drum.
-  values --set NAME=VALUE: Another value for a parameter: Z16=1.2e-4 in SI, Z16=1.2e-4/1.5e-4 for
-      plus and minus, Z16_plus=0.12mm with a unit. May be repeated.
-"""
-"""Parameters that several commands have, described as in a command's own docstring."""
+CampaignArgument = Annotated[
+    Path, typer.Argument(metavar="CAMPAIGN.toml", help="Campaign file, in the folder of its logs.")
+]
+DriveArgument = Annotated[
+    str,
+    typer.Argument(
+        metavar="AXIS|SET.toml",
+        help="Packaged drive (listed by 'swashplate show'), parameter file, or folder of a fit.",
+    ),
+]
+SetOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="NAME=VALUE",
+        help=(
+            "Value of a parameter: Z16=1.2e-4 in SI units, Z16=1.2e-4/1.5e-4 for plus and minus, "
+            "Z16_plus=0.12mm with a unit; may be repeated."
+        ),
+    ),
+]
+ScaleOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--scale",
+        metavar="NAME=FACTOR",
+        help=(
+            "Factor on a parameter or design variable, applied after --set: Z16=1.5, orifice=1.5; "
+            "may be repeated."
+        ),
+    ),
+]
+CommandArgument = Annotated[
+    str,
+    typer.Argument(
+        metavar="MANEUVER|FILE",
+        help=(
+            'Maneuver, such as step:9 or "step +9 V", or a log with columns of time and voltage: '
+            f"{LOG_FORMATS}. A column may state its unit: 'time \\[ms]'."
+        ),
+    ),
+]
+
+OptionalCommand = Annotated[
+    str | None,
+    typer.Argument(metavar="MANEUVER|FILE", help="Maneuver or log, as in 'swashplate simulate'."),
+]
+
+AxisOption = Annotated[
+    str | None, typer.Option(metavar="NAME", help="Axis; needed if the campaign has several.")
+]
+ModelFile = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FILE.py",
+        help=(
+            "Python file that defines a model and its free parameters. The file is executed: use "
+            "only one that you trust."
+        ),
+    ),
+]
+SetupOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="NAME|FILE",
+        help=(
+            "Parameters to estimate: a packaged configuration (hoist, slew, luff, neutral ...) or "
+            "a TOML file (default: that of the axis's drive)."
+        ),
+    ),
+]
+InitialDrive = Annotated[
+    str | None,
+    typer.Option(
+        "--from", metavar="AXIS|SET.toml", help="Initial drive (default: the campaign's)."
+    ),
+]
+RequiredOption = Annotated[
+    float,
+    typer.Option(
+        "--require",
+        metavar="X",
+        min=0.0,
+        help="Largest acceptable prediction error, in % of the signal's range.",
+    ),
+]
+SeedOption = Annotated[int, typer.Option(metavar="N", min=0, help="Random seed.")]
+DaskOption = Annotated[
+    str | None,
+    typer.Option(metavar="ADDRESS", help="Address of a Dask scheduler: tcp://HOST:PORT."),
+]
+ManeuverOrLog = Annotated[
+    str,
+    typer.Option(
+        metavar="MANEUVER|FILE",
+        help='Command: a maneuver, such as step:9 or "step +9 V", or a log.',
+    ),
+]
+VariablesOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--variable",
+        metavar="NAME[=LOW/HIGH]",
+        help=(
+            "Design variable or parameter, alone or with its lowest and highest factor; may be "
+            "repeated. 'swashplate whatif --variables' lists them."
+        ),
+    ),
+]
+RateOption = Annotated[float, typer.Option(metavar="HZ", help="Sampling rate, 10 to 100000 Hz.")]
 
 
 @dataclass(frozen=True)
 class DriveChoice:
     """A drive as the command line names it, with values set and then scaled."""
 
-    drive: str
-    values: list[str] | None = None
-    factors: list[str] | None = None
+    drive: DriveArgument
+    values: SetOption = None
+    factors: ScaleOption = None
 
     @cached_property
     def chosen(self) -> Drive:
@@ -146,15 +227,21 @@ class DriveChoice:
 
 @dataclass(frozen=True)
 class Sampling:
-    """How a command is sampled, and read where it is a file; no options say how a run begins."""
+    """How a command is sampled, and read if it is a file."""
 
-    rate: float = 512.0
-    interpolation: Interpolation | None = None
-    time_column: str = "time"
-    column: str = "voltage"
-    start: Start = field(default="rest", init=False)
-    clip: bool = field(default=False, init=False)
-    measured: list[str] | None = field(default=None, init=False)
+    rate: RateOption = 512.0
+    interpolation: Annotated[
+        Interpolation | None,
+        typer.Option(
+            help="Voltage between rows: linear, or zero-order hold. Required with a FILE."
+        ),
+    ] = None
+    time_column: Annotated[
+        str, typer.Option(metavar="NAME", help="Column of the time in FILE.")
+    ] = "time"
+    column: Annotated[str, typer.Option(metavar="NAME", help="Column of the voltage in FILE.")] = (
+        "voltage"
+    )
 
     def __post_init__(self) -> None:
         """Refuse a rate out of range, before anything is sampled."""
@@ -167,118 +254,22 @@ class Sampling:
 class Simulating(Sampling):
     """How a command is sampled, and simulated."""
 
-    start: Start = "rest"
-    clip: bool = False
-    measured: list[str] | None = None
-
-
-@dataclass(frozen=True)
-class Replacing:
-    """Whether files that are there may be replaced."""
-
-    force: bool = False
-
-
-@dataclass(frozen=True)
-class ShownUnits:
-    """Units that tables and figures are shown in."""
-
-    units: str = ""
-    drum: Annotated[float | None, option("Diameter of the drum on the shaft.", metavar="M")] = None
-
-
-_ENTRY = re.compile(r"^  (\w+)((?: --[\w/-]+)*) ?([A-Z\[]\S*)?: (.*(?:\n   .*)*)", re.MULTILINE)
-"""An entry of a docstring's options."""
-FOLDERS = {"out", "c"}
-"""Parameters of commands that write folders; those of files have a form."""
-UNITLESS = {"axes", "damping", "doctor", "init", "schema"}
-"""Commands that show no quantity, or only seconds."""
-
-
-def command(
-    app: typer.Typer, name: str, panel: str | None = None
-) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Register a command: its groups spread, --force and units added.
-
-    Its docstring ends with "Options:", an entry for each parameter that no shared type here
-    describes: name, flag if it has another, metavar, colon, help; a group's docstring may end so,
-    too. Parameters before the ``*`` are arguments. Examples stand behind them, and are shown below
-    the options. A parameter whose type has a `Form` is a file, which must be free beforehand.
-    """
-
-    def register(function: Callable[..., None]) -> Callable[..., None]:
-        text = inspect.cleandoc(function.__doc__ or "")
-        text, head, shown = text.partition("\n\nFor example:")
-        text, _, entries = text.partition("\n\nOptions:\n")
-        hints = get_type_hints(function, include_extras=True)
-        given = inspect.signature(function).parameters.values()
-        groups = {each.name: hints[each.name] for each in given if is_dataclass(hints[each.name])}
-        forms = {
-            name: form
-            for name, hint in hints.items()
-            for form in getattr(hint, "__metadata__", ())
-            if isinstance(form, Form)
-        }
-        kinds = [kind for group in groups.values() for kind in group.__mro__[::-1]]
-        shared = [inspect.cleandoc(each.__doc__ or "").partition("Options:\n")[2] for each in kinds]
-        found = _ENTRY.finditer("\n".join([SHARED, *shared, entries]))
-        said = {each[1]: each for each in found}
-        flat = list[inspect.Parameter]()
-        for each in given:
-            own = [each.replace(annotation=hints[each.name])]
-            flat += _spread(groups[each.name]) if each.name in groups else own
-        flat += _spread(Replacing) if forms or FOLDERS & {each.name for each in given} else []
-        flat += _spread(ShownUnits) if name not in UNITLESS else []
-        flat = [_described(each, said) for each in flat]
-
-        def run(**words: Any) -> None:
-            units, drum = words.pop("units", ""), words.pop("drum", None)
-            FORCED.set(words.pop("force", False))
-            SAVED.set([])
-            for name, form in forms.items():
-                check_output(words[name], form)
-            for name, group in groups.items():
-                words[name] = group(**{each.name: words.pop(each.name) for each in _spread(group)})
-            shown = [unit.strip() for unit in units.split(",") if unit.strip()]
-            with shown_in(shown, drum), ExitStack() as resources:
-                RESOURCES.set(resources)
-                function(**words)
-            say_saved()
-
-        run.__doc__ = text
-        run.__wrapped__ = function  # type: ignore[attr-defined]
-        # Typer reads the options off the signature, which functions have without declaring it
-        run.__signature__ = inspect.Signature(flat)  # type: ignore[attr-defined]
-        run.__annotations__ = {each.name: each.annotation for each in flat}
-        app.command(name, epilog=f"Examples:{shown}" * bool(head), rich_help_panel=panel)(run)
-        return function
-
-    return register
-
-
-def _described(given: inspect.Parameter, entries: Mapping[str, re.Match[str]]) -> inspect.Parameter:
-    """A parameter as Typer reads it, from its entry unless its type describes it."""
-    kind, own = given.annotation, entries.get(given.name)
-    told = any(isinstance(each, ParameterInfo) for each in getattr(kind, "__metadata__", ()))
-    if own is not None and not told:
-        flags, metavar, words = own[2].split(), own[3], " ".join(own[4].split())
-        flags = flags or ([f"--{given.name}"] if kind is bool else [])
-        least = {"min": 0} if kind is int else {}
-        # a switch takes nothing, which Typer would show as <bool>
-        metavar = metavar or {bool: " ", int: "N", float: "X"}.get(kind)
-        more = option(words, *flags, metavar=metavar, **least)
-        is_option = given.kind is inspect.Parameter.KEYWORD_ONLY
-        kind = Annotated[kind, more if is_option else argument(own[3] or given.name.upper(), words)]
-    return given.replace(annotation=kind, kind=inspect.Parameter.KEYWORD_ONLY)
-
-
-def _spread(group: Any) -> list[inspect.Parameter]:
-    """A group's fields as parameters; what must be given is an argument."""
-    hints, made = get_type_hints(group, include_extras=True), []
-    for each in fields(group):
-        must, hint = each.default is MISSING, hints[each.name]
-        kind = inspect.Parameter.POSITIONAL_OR_KEYWORD if must else inspect.Parameter.KEYWORD_ONLY
-        default = inspect.Parameter.empty if must else each.default
-        if each.init:
-            made.append(inspect.Parameter(each.name, kind, default=default, annotation=hint))
-    return made
+    start: Annotated[
+        Start, typer.Option(help="Start from rest at 0 V, or settled at the first voltage.")
+    ] = "rest"
+    clip: Annotated[
+        bool,
+        typer.Option(
+            "--clip", metavar=NO_VALUE, help="Clip voltages beyond ±10 V instead of refusing them."
+        ),
+    ] = False
+    measured: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=COLUMN",
+            help=(
+                "Column of FILE, or number in SI units, for pump_speed (1 at the speed of Z10), "
+                "load_torque or supply_pressure; may be repeated."
+            ),
+        ),
+    ] = None

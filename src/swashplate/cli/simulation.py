@@ -1,49 +1,68 @@
-"""``swashplate simulate``, ``compare``, ``axes`` and ``show``: drives under commands."""
+"""``swashplate simulate``, ``compare`` and ``show``: drives under commands."""
 
 from __future__ import annotations
 
 from importlib import resources
 from pathlib import Path
+from typing import Annotated
 
 import typer
 
 from swashplate.cli import words
-from swashplate.cli.options import DriveChoice, FigureFile, Sampling, Simulating, TableFile
+from swashplate.cli.commands import command
+from swashplate.cli.options import (
+    NO_VALUE,
+    CommandArgument,
+    DriveChoice,
+    FigureFile,
+    Force,
+    RateOption,
+    ScaleOption,
+    SetOption,
+    Simulating,
+    TableFile,
+)
 from swashplate.cli.terminal import draw, note, save, say, show, working
 from swashplate.documents import parse_toml
+from swashplate.errors import InputError
 from swashplate.tables import Column, Table, quantity, write_table
 
+app = typer.Typer(rich_markup_mode="rich")
 
+
+@command(
+    app,
+    "simulate",
+    examples="""
+        swashplate simulate hoist step:9
+        swashplate simulate hoist "step +9 V" --plot step.png --units rpm
+        swashplate simulate hoist sine:6.5,0.1 --set Z16_plus=0.12mm --out sine.csv
+        swashplate simulate mine.toml log.csv --interpolation previous --out run.csv
+    """,
+)
 def simulate(
     drive: DriveChoice,
-    command: str,
+    maneuver: CommandArgument,
     *,
     sampling: Simulating,
     out: TableFile = None,
     plot: FigureFile = None,
-    begin: float | None = None,
-    end: float | None = None,
+    begin: Annotated[
+        float | None, typer.Option("--from", metavar="S", help="Start of the plot.")
+    ] = None,
+    end: Annotated[float | None, typer.Option("--to", metavar="S", help="End of the plot.")] = None,
+    force: Force = False,
 ) -> None:
     """Simulate a drive over a maneuver or a measured voltage.
 
-    Prints what the drive did: its largest speeds and currents, how far it went
-    and how long each of its limits held it back, the dead zone only while the
-    command is not 0 V. --out writes every signal, --plot draws them.
-    'swashplate --help' lists the maneuvers.
-
-    Options:
-      begin --from S: Plot from here on.
-      end --to S: Plot up to here.
-
-    For example:
-      swashplate simulate hoist step:9
-      swashplate simulate hoist "step +9 V" --plot step.png --units rpm
-      swashplate simulate hoist sine:6.5,0.1 --set Z16_plus=0.12mm --out sine.csv
-      swashplate simulate mine.toml log.csv --interpolation previous --out run.csv
+    Prints the largest speeds and currents, the distance travelled, and how long
+    each limit acted (the dead zone only while the command is not 0 V). --out
+    writes all signals, --plot draws them. 'swashplate --help' lists the
+    maneuvers.
     """
     with working("Simulating"):
         chosen = words.at_rate(drive.chosen, sampling.rate)
-        name, run = words.simulated(chosen, command, sampling)
+        name, run = words.simulated_as(chosen, maneuver, sampling)
         tables, title = run.tables(), f"{drive.title}, {name}"
     save(out, "All signals, in SI", run.write)
     window = words.window_of(run.time, begin, end)
@@ -53,28 +72,32 @@ def simulate(
     show(*tables)
 
 
+@command(
+    app,
+    "compare",
+    examples="""
+        swashplate compare hoist luff
+        swashplate compare hoist mine.toml --maneuver sine:6.5,0.1 --plot both.png
+    """,
+)
 def compare(
-    first: str,
-    second: str,
+    first: Annotated[str, typer.Argument(metavar="A", help="Packaged drive or parameter file.")],
+    second: Annotated[str, typer.Argument(metavar="B", help="Drive to compare with the first.")],
     *,
-    maneuver: str = "step:9",
-    rate: float = 512.0,
+    maneuver: Annotated[
+        str,
+        typer.Option(metavar="NAME", help='Maneuver for both, such as step:9 or "step +9 V".'),
+    ] = "step:9",
+    rate: RateOption = 512.0,
     plot: FigureFile = None,
     out: TableFile = None,
+    force: Force = False,
 ) -> None:
     """Compare two drives over the same maneuver.
 
-    Shows outcomes of both, such as the final speed, at the last moment at which
-    the voltage is at its largest. --out writes the voltage and both speeds.
-
-    Options:
-      first A: A packaged drive or a TOML file.
-      second B: Another, compared with the first.
-      maneuver NAME: Maneuver for both, such as step:9 or "step +9 V".
-
-    For example:
-      swashplate compare hoist luff
-      swashplate compare hoist mine.toml --maneuver sine:6.5,0.1 --plot both.png
+    Prints performance metrics of both, such as the final speed: the speed at the
+    last moment at which the voltage is at its largest. --out writes the voltage
+    and both speeds.
     """
     with working("Simulating"):
         from swashplate.analysis.outcomes import rms_difference, side_by_side
@@ -84,12 +107,12 @@ def compare(
         if labels[0] == labels[1]:  # then by what was typed
             labels = [first, second if second != first else f"{second} (2)"]
         drives = dict(zip(labels, pair, strict=True))
-        command = words.maneuver_of(maneuver, *pair)
-        voltage = command.sample(Sampling(rate).rate)
+        chosen = words.maneuver_of(maneuver, *pair)
+        voltage = chosen.sample(rate)
         runs = {label: drive.simulate(voltage, rate) for label, drive in drives.items()}
         made = side_by_side(runs)
         rms = rms_difference(*(run.shaft_speed for run in runs.values()))
-    title = f"{' and '.join(runs)}, {command.name}"
+    title = f"{' and '.join(runs)}, {chosen.name}"
 
     def write(path: Path) -> None:
         import polars as pl
@@ -104,44 +127,53 @@ def compare(
     note(f"rms difference of the speeds: {quantity(rms, 'rad/s', spec='.2f')}")
 
 
-def axes() -> None:
-    """List the packaged drives and their control cards.
+@command(
+    app,
+    "show",
+    examples="""
+        swashplate show
+        swashplate show hoist
+        swashplate show hoist --toml > mine.toml    (a start for a drive of your own)
+    """,
+)
+def show_parameters(
+    drive: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="AXIS|SET.toml",
+            help="Packaged drive, parameter file, or folder of a fit; without one, a list.",
+        ),
+    ] = None,
+    *,
+    values: SetOption = None,
+    factors: ScaleOption = None,
+    toml: Annotated[
+        bool,
+        typer.Option(
+            "--toml", metavar=NO_VALUE, help="Print a parameter file, complete and ready to edit."
+        ),
+    ] = False,
+) -> None:
+    """Show every parameter of a drive, or list the packaged drives.
 
-    For example:
-      swashplate axes
+    Each parameter is shown with its unit and its source. A parameter with a plus
+    and a minus value has one for each direction; both are magnitudes. Units are
+    SI.
     """
-    # their files as they stand: nothing is checked or compiled for a list of names
-    made = Table("", (Column("name"), Column("drive", wrap=True), Column("control card")))
-    sets = (resources.files("swashplate.parameters") / "sets").iterdir()
-    for path in sorted((each for each in sets if each.name.endswith(".toml")), key=str):
-        found = parse_toml(path.read_text("utf-8"), path.name)
-        card = found["control_card"]
-        made.add(found["name"], found["title"], card if isinstance(card, str) else "its own")
-    show(made)
-
-
-def show_parameters(drive: DriveChoice, *, toml: bool = False) -> None:
-    """Show every parameter of a drive, with its unit and where it comes from.
-
-    A parameter with a plus and a minus value has one for each direction; both
-    are magnitudes. Units are SI.
-
-    Options:
-      toml: Print a TOML file, complete and ready to edit.
-
-    For example:
-      swashplate show hoist
-      swashplate show hoist --toml > mine.toml    (a start for your own drive)
-    """
+    if drive is None:
+        if toml or values or factors:
+            raise InputError("Name the drive to show: 'swashplate show' lists the packaged ones.")
+        show(packaged_drives())
+        return
     # in SI: a rod's drive has angles inside, which chosen units of its motion would change
-    parameters = words.drive_of(drive.drive, drive.values or (), drive.factors or ()).parameters
+    parameters = words.drive_of(drive, values or (), factors or ()).parameters
     if toml:
         from swashplate.parameters.files import dump_set
 
         typer.echo(dump_set(parameters), nl=False)
         return
     say(f"{parameters.name}: {parameters.title}")
-    for line in words.changes_between(words.parameters_of(drive.drive), parameters):
+    for line in words.changes_between(words.parameters_of(drive), parameters):
         note(line)
     show(*parameters.tables())
     rate = "any rate" if parameters.rate is None else f"{parameters.rate:g} Hz"
@@ -150,3 +182,15 @@ def show_parameters(drive: DriveChoice, *, toml: bool = False) -> None:
         f"{parameters.coulomb_sign}, card_switch {parameters.card_switch}, card's filter for "
         f"{rate}, options {', '.join(sorted(parameters.options)) or 'none'}"
     )
+
+
+def packaged_drives() -> Table:
+    """The packaged drives and their control cards."""
+    # their files as they stand: nothing is checked or compiled for a list of names
+    made = Table("", (Column("name"), Column("drive", wrap=True), Column("control card")))
+    sets = (resources.files("swashplate.parameters") / "sets").iterdir()
+    for path in sorted((each for each in sets if each.name.endswith(".toml")), key=str):
+        found = parse_toml(path.read_text("utf-8"), path.name)
+        card = found["control_card"]
+        made.add(found["name"], found["title"], card if isinstance(card, str) else "its own")
+    return made

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -9,7 +10,7 @@ from contextlib import ExitStack, contextmanager
 from contextvars import ContextVar
 from pathlib import Path
 from textwrap import fill
-from typing import Any
+from typing import Any, NoReturn
 
 import rich.table
 from rich import box
@@ -20,13 +21,10 @@ from swashplate.errors import FileError
 from swashplate.progress import Work, shown_by
 from swashplate.tables import UNIT, Form, Table, check_place, ending
 
-FORCED: ContextVar[bool] = ContextVar("FORCED", default=False)
-"""Whether older files may be replaced: --force."""
 SAVED: ContextVar[list[str]] = ContextVar("SAVED")
 """Lines on the files that a command wrote."""
 RESOURCES: ContextVar[ExitStack] = ContextVar("RESOURCES")
 """What is released when a command ends, such as the lock of a folder."""
-ANY = Form("a file")
 BETWEEN = 2
 """Characters between two columns."""
 NARROW = "\N{NO-BREAK SPACE}%"
@@ -36,22 +34,58 @@ CLOSED_PIPE = 141
 """Exit code if whoever reads the output has closed it, as a shell reports a SIGPIPE: 128 + 13."""
 
 
-class Terminal(Console):
-    """A console that does not take a closed pipe for a verdict, whose exit code is 1."""
+class Stream(io.TextIOWrapper):
+    """Standard output or error that ends the process quietly once nobody reads it any more.
 
-    def on_broken_pipe(self) -> None:
-        """End quietly, as ``| head`` closes what it has read enough of."""
-        close_output()
-        raise SystemExit(CLOSED_PIPE)
+    Python ignores SIGPIPE, which would end another program here, so that a worker or a cluster that
+    goes away is an exception and not the end of this process: it leaves with the exit code that a
+    shell reports for the signal. What takes the exception first otherwise, Typer or Rich, leaves
+    with 1, which is a verdict here.
+    """
+
+    def write(self, text: str, /) -> int:
+        """Write text."""
+        try:
+            return super().write(text)
+        except BrokenPipeError:
+            end_quietly()
+
+    def flush(self) -> None:
+        """Write what is buffered."""
+        try:
+            super().flush()
+        except BrokenPipeError:
+            end_quietly()
+
+    @classmethod
+    def around(cls, stream: io.TextIOWrapper, errors: str | None) -> Stream:
+        """A stream that writes to where another one does."""
+        stream.flush()
+        return cls(
+            stream.buffer,
+            encoding=stream.encoding,
+            errors=errors,
+            line_buffering=stream.line_buffering,
+            write_through=stream.write_through,
+        )
+
+
+def end_quietly() -> NoReturn:
+    """End as a program that SIGPIPE ended, seen from a shell."""
+    close_output()
+    raise SystemExit(CLOSED_PIPE)
 
 
 def close_output() -> None:
-    """Let what is still in the buffer of standard output go nowhere."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    """Let what is still in the buffers of standard output and error go nowhere."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, Stream):
+            os.dup2(nowhere, stream.fileno())
 
 
 # names of files and maneuvers are printed as they are, whatever brackets and colons they hold
-output = Terminal(markup=False, highlight=False, emoji=False)
+output = Console(markup=False, highlight=False, emoji=False)
 side = Console(stderr=True, markup=False, highlight=False, emoji=False)
 """Standard error: what a pipe must not carry."""
 
@@ -212,9 +246,11 @@ def long_work(text: str, steps: int = 0) -> Iterator[Callable[..., None]]:
             yield show
 
 
-def check_free(*paths: Path) -> None:
-    """Refuse to replace a file, or to mix with what a folder holds, unless --force says so."""
-    for path in () if FORCED.get() else paths:
+def check_free(*paths: Path, force: bool = False) -> None:
+    """Refuse to replace a file, or to mix with what a folder holds, unless forced to."""
+    if force:
+        return
+    for path in paths:
         if path.is_file() or (path.is_dir() and any(path.iterdir())):
             what = "is not empty" if path.is_dir() else "exists already"
             raise FileError(f"{path} {what}; name another place, or replace it with --force.")
@@ -227,12 +263,12 @@ def lock(folder: Path) -> None:
     RESOURCES.get().enter_context(locked(folder))
 
 
-def check_output(path: Path | None, form: Form = ANY) -> None:
+def check_output(path: Path | None, form: Form, *, force: bool) -> None:
     """Refuse a file that cannot or must not be written, before anything is computed."""
     if path is not None:
         ending(path, form)
         check_place(path)
-        check_free(path)
+        check_free(path, force=force)
 
 
 def save(path: Path | None, what: str, write: Callable[[Path], object]) -> None:

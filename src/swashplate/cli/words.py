@@ -1,4 +1,4 @@
-"""From the words of a command line to drives, commands, campaigns, levers and simulations."""
+"""From the words of a command line to drives, commands, campaigns and simulations."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from swashplate.errors import FileError, InputError, MissingFileError, UnknownPa
 from swashplate.units import unit_text
 
 if TYPE_CHECKING:
+    from swashplate.analysis.design_variables import FactorRange
     from swashplate.analysis.outcomes import Trial
-    from swashplate.analysis.whatif import Range
     from swashplate.campaign import Campaign, Experiment
-    from swashplate.cli.options import Sampling
+    from swashplate.cli.options import Sampling, Simulating, Start
     from swashplate.drive import Drive
     from swashplate.identification.model_setup import ModelSetup
     from swashplate.identification.setup import Setup
@@ -48,9 +48,9 @@ _MARKS = {"runs": "campaign", "stages": "setup", "control_card": "drive", "pump_
 _INSTEAD = {
     ("log", "campaign"): "make a campaign of it with 'swashplate campaign init {}'",
     ("log", "drive"): "a drive is a packaged name, a parameter file or the folder of a fit",
-    ("drive", "campaign"): "name the campaign first; a fit begins at a drive given with --from",
+    ("drive", "campaign"): "name the campaign first, and the initial drive with --from",
     ("setup", "campaign"): "name the campaign first, and this file with --setup",
-    ("campaign", "drive"): "name a drive here, and the campaign where CAMPAIGN.toml stands",
+    ("campaign", "drive"): "name a drive here, and the campaign in place of CAMPAIGN.toml",
     ("setup", "drive"): "name a drive here, and this file with --setup",
 }
 
@@ -68,12 +68,19 @@ def file_kind(path: Path) -> str:
     return next((kind for mark, kind in _MARKS.items() if mark in found), "")
 
 
-def check_kind(path: Path, wanted: str) -> None:
-    """Refuse a file that is plainly of another kind than wanted; say where such a file goes."""
+def check_kind(path: Path, expected: str) -> None:
+    """Refuse a file that is plainly of another kind than expected; say where such a file goes."""
     kind = file_kind(path)
-    instead = _INSTEAD.get((kind, wanted))
+    instead = _INSTEAD.get((kind, expected))
     if path.is_file() and instead is not None:
-        raise InputError(f"{path} is {_NAMES[kind]}, not {_NAMES[wanted]}: {instead.format(path)}.")
+        raise InputError(
+            f"{path} is {_NAMES[kind]}, not {_NAMES[expected]}: {instead.format(path)}."
+        )
+
+
+def title_of(campaign: Campaign) -> str:
+    """Title of a campaign, marked if its tests are virtual."""
+    return f"{campaign.title} (virtual)" if campaign.virtual else campaign.title
 
 
 def campaign_of(path: Path, axis: str | None = None) -> tuple[Campaign, str]:
@@ -128,7 +135,7 @@ def parameters_of(word: str) -> ParameterSet:
 
 
 def model_parameters_of(folder: str, file: Path, runs: Sequence[Experiment]) -> ModelSetup:
-    """A model of one's own with the numbers that a fit wrote into its folder."""
+    """A user-defined model with the numbers that a fit wrote into its folder."""
     from swashplate.equations.fields import is_real
     from swashplate.identification.model_setup import ModelSetup
 
@@ -143,11 +150,13 @@ def model_parameters_of(folder: str, file: Path, runs: Sequence[Experiment]) -> 
         )
     for name, value in table.items():
         if isinstance(value, bool) or not is_real(value):
-            raise InputError(f"{place}: {name} under [{setup.name}] is {value!r:.60}, no number.")
+            raise InputError(
+                f"{place}: {name} under [{setup.name}] is {value!r:.60}, which is not a number."
+            )
     return replace(nominal, numbers={name: float(value) for name, value in table.items()})
 
 
-# --- changes and levers ---------------------------------------------------------------------------
+# --- changes and design variables -----------------------------------------------------------------
 
 
 def assigned(
@@ -186,48 +195,50 @@ def assigned(
 
 
 def drive_of(word: str, values: Sequence[str] = (), factors: Sequence[str] = ()) -> Drive:
-    """The drive of a name or file, with values set and then scaled, by parameter or by lever."""
+    """The drive of a name or file, with values set and then scaled."""
     from swashplate.drive import Drive
     from swashplate.parameters.definitions import find
 
     def valued(name: str) -> Any:
-        if _is_lever(name):
-            words = f"{name} is a lever, which has no value of its own: --scale {name}=1.5."
+        if _is_design_variable(name):
+            words = f"{name} is a design variable, which has no value: write --scale {name}=1.5."
             raise InputError(words)
         return find(name)
 
     set_as = "Z16=1.2e-4, Z16=1.2e-4/1.5e-4 (plus/minus) or Z16_plus=0.12mm"
     scaled_as = "Z16=1.5, Z16=1.5/1.2 (plus/minus) or orifice=1.5"
-    pulling = [word for word in factors if _is_lever(word.partition("=")[0].strip())]
-    scaling = [word for word in factors if word not in pulling]
+    scaled_variables = [
+        word for word in factors if _is_design_variable(word.partition("=")[0].strip())
+    ]
+    scaling = [word for word in factors if word not in scaled_variables]
 
     def scalable(name: str) -> Any:
         try:
             return find(name)
         except UnknownParameterError:
-            from swashplate.analysis.whatif import find_lever
+            from swashplate.analysis.design_variables import powers_of
 
-            return find_lever(name)  # refuses it, and lists levers as well
+            return powers_of(name)  # refuses it, and lists design variables as well
 
     chosen = assigned("--set", values, set_as, valued, units=True)
-    levers = assigned("--scale", pulling, scaled_as, str, (1,))
+    changes = assigned("--scale", scaled_variables, scaled_as, str, (1,))
     drive = Drive(parameters_of(word)).replace(**chosen)
     drive = drive.scale(**assigned("--scale", scaling, scaled_as, scalable))
-    if levers:
-        from swashplate.analysis.whatif import pulled
+    if changes:
+        from swashplate.analysis.design_variables import with_factors
 
-        drive = pulled(drive, levers)
+        drive = with_factors(drive, changes)
     return drive
 
 
-def _is_lever(name: str) -> bool:
+def _is_design_variable(name: str) -> bool:
     from swashplate.parameters.definitions import CATALOGUE, COLUMNS, REFINEMENTS
 
     if name in CATALOGUE or name in COLUMNS or name in REFINEMENTS:
         return False
-    from swashplate.analysis.whatif import LEVERS
+    from swashplate.analysis.design_variables import DESIGN_VARIABLES
 
-    return name in LEVERS
+    return name in DESIGN_VARIABLES
 
 
 def physical_values(words: Sequence[str]) -> dict[str, Change]:
@@ -239,24 +250,24 @@ def physical_values(words: Sequence[str]) -> dict[str, Change]:
 
 
 def factors_of(words: Sequence[str]) -> dict[str, float]:
-    """Factors by lever or parameter from words such as ``orifice=1.5``."""
-    from swashplate.analysis.whatif import find_lever
+    """Factors by design variable or parameter from words such as ``orifice=1.5``."""
+    from swashplate.analysis.design_variables import powers_of
 
-    return assigned("--scale", words, "orifice=1.5", find_lever, (1,))
+    return assigned("--scale", words, "orifice=1.5", powers_of, (1,))
 
 
-def ranges_of(words: Sequence[str], usual: Range) -> dict[str, Range]:
-    """Ranges of factors by lever from words such as ``pump`` or ``pump=0.8/1.5``."""
-    from swashplate.analysis.whatif import find_lever
+def ranges_of(words: Sequence[str], usual: FactorRange) -> dict[str, FactorRange]:
+    """Ranges of factors by design variable from words such as ``pump`` or ``pump=0.8/1.5``."""
+    from swashplate.analysis.design_variables import powers_of
 
     whole = [word if "=" in word else f"{word}={usual[0]}/{usual[1]}" for word in words]
-    return assigned("--lever", whole, "pump or pump=0.8/1.5", find_lever, (2,))
+    return assigned("--variable", whole, "pump or pump=0.8/1.5", powers_of, (2,))
 
 
 def pairs_of(
     option: str, given: Sequence[str] | None, example: str, *, often: bool = False
 ) -> list[tuple[str, str]]:
-    """What stands before and behind the equals sign of each; the first is given once, or often."""
+    """The text before and after each equals sign; the first is given once, or often."""
     pairs = list[tuple[str, str]]()
     for each in given or ():
         name, equals, value = each.partition("=")
@@ -289,9 +300,9 @@ def changes_between(before: ParameterSet, after: ParameterSet) -> list[str]:
         ratios = [b / a for a, b in zip(old.values, new.values, strict=False) if a and isfinite(a)]
         far = [r for r in ratios if isfinite(r) and not 1.0 / SURPRISING < abs(r) < SURPRISING]
         if any(far):
+            in_unit = f" ({unit})" if unit else ""
             lines.append(
-                f"! {old.symbol} is {max(far):.3g} times what it was: is it meant"
-                f"{f' in {unit}' * bool(unit)}?"
+                f"! {old.symbol} changes by a factor of {max(far):.3g}: check its unit{in_unit}."
             )
     return lines
 
@@ -331,16 +342,36 @@ def at_rate(drive: Drive, rate: float) -> Drive:
     steps = "" if marched == rate else f", computed in steps of 1/{marched:g} s,"
     note(
         f"{drive.name}: the card's filter is a recursion for {own:g} Hz; at {rate:g} Hz{steps} the "
-        "differential equation with the same poles takes its place."
+        "differential equation with the same poles replaces it."
     )
     return drive.at_every_rate()
 
 
-def simulated(drive: Drive, command: str, options: Sampling) -> tuple[str, Simulation]:
+def simulated_as(drive: Drive, command: str, options: Simulating) -> tuple[str, Simulation]:
+    """As `simulated`, from the start and with the inputs that the options name."""
+    return simulated(
+        drive,
+        command,
+        options,
+        start=options.start,
+        clip=options.clip,
+        measured=options.measured or (),
+    )
+
+
+def simulated(
+    drive: Drive,
+    command: str,
+    options: Sampling,
+    *,
+    start: Start = "rest",
+    clip: bool = False,
+    measured: Sequence[str] = (),
+) -> tuple[str, Simulation]:
     """Name of a command, a maneuver or a file, and the drive's simulation over it."""
     from swashplate.logs import open_log, read_series
 
-    head = command.partition(":")[0]  # stairs:2/4/0 is no path
+    head = command.partition(":")[0]  # stairs:2/4/0 is not a path
     if not ("/" in head or _ENDING.search(head) or Path(command).is_file()):
         maneuver = maneuver_of(command, drive)
         name, where, values, time = maneuver.name, "", maneuver.sample(options.rate), None
@@ -363,23 +394,28 @@ def simulated(drive: Drive, command: str, options: Sampling) -> tuple[str, Simul
                 "--interpolation previous (each row held until the next)."
             )
         name, where, values, time = Path(command).name, f"{command}: ", series.values, series.time
-    between, start, clip = options.interpolation, options.start, options.clip
-    given = _measured(command if where else "", options)
+    inputs = _measured(measured, command if where else "", options.time_column)
     try:
         return name, drive.simulate(
-            values, options.rate, time=time, interpolation=between, start=start, clip=clip, **given
+            values,
+            options.rate,
+            time=time,
+            interpolation=options.interpolation,
+            start=start,
+            clip=clip,
+            **inputs,
         )
     except InputError as error:
         raise InputError(f"{where}{error}") from None
 
 
-def _measured(log: str, options: Sampling) -> dict[str, Any]:
-    """Inputs beside the voltage by name: a column of a log, or a number."""
+def _measured(measured: Sequence[str], log: str, time_column: str) -> dict[str, Any]:
+    """Inputs other than the voltage by name: a column of a log, or a number."""
     from swashplate.logs import read_series
     from swashplate.simulation.result import MEASURED
 
     found = dict[str, Any]()
-    for word in options.measured or ():
+    for word in measured:
         name, _, said = (part.strip() for part in word.partition("="))
         if name not in MEASURED or not said or name in found:
             known = ", ".join(MEASURED)
@@ -391,7 +427,7 @@ def _measured(log: str, options: Sampling) -> dict[str, Any]:
                 must = "a maneuver has no columns, so give a number in SI"
                 raise InputError(f"--measured {word}: {must}.") from None
             unit = MEASURED[name][0]
-            found[name] = read_series(log, said, unit, time_column=options.time_column).values
+            found[name] = read_series(log, said, unit, time_column=time_column).values
     return found
 
 
@@ -404,8 +440,8 @@ def window_of(time: Array, begin: float | None, end: float | None) -> tuple[floa
 
 def trial_of(drive: Drive, command: str, options: Sampling) -> tuple[str, Trial]:
     """Name of a command, a maneuver or a log, and the trial that it makes."""
-    from swashplate.analysis.outcomes import trial
+    from swashplate.analysis.outcomes import trial_of
 
     drive = at_rate(drive, options.rate)
     name, run = simulated(drive, command, options)
-    return name, trial(drive, run["voltage"], options.rate)
+    return name, trial_of(drive, run["voltage"], options.rate)

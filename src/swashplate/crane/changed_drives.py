@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from swashplate.analysis.whatif import pulled
+from swashplate.analysis.design_variables import with_factors
 from swashplate.crane.axes import AXES, check_names
 from swashplate.crane.crane import Crane
 from swashplate.crane.drives import DriveSource
@@ -32,10 +32,10 @@ def upgraded(crane: Crane, axis: str, levers: Mapping[str, float]) -> Crane:
     """
     known_to_controller = dict(crane.known_to_controller)
     if axis in known_to_controller:
-        known_to_controller[axis] = pulled(known_to_controller[axis], levers)
+        known_to_controller[axis] = with_factors(known_to_controller[axis], levers)
     # the verdict stays that of what was changed, draws do not
     sources = _without_draws(crane.sources, (axis,))
-    drive: dict[str, Any] = {axis: pulled(getattr(crane, axis), levers)}
+    drive: dict[str, Any] = {axis: with_factors(getattr(crane, axis), levers)}
     return replace(crane, known_to_controller=known_to_controller, sources=sources, **drive)
 
 

@@ -18,11 +18,11 @@ from swashplate.analysis import (
     CHANGED,
     AcceleratedBy,
     Bands,
+    DirectionLimits,
     Envelope,
     Improvement,
     InverseMap,
     OneAtATime,
-    Way,
     WhatIf,
     proportional_command,
 )
@@ -171,7 +171,7 @@ def _draw_envelope(ax: Axes, envelope: Envelope) -> None:
         _mark_way(ax, way, color, height)
 
 
-def _mark_way(ax: Axes, way: Way, color: str, height: float) -> None:
+def _mark_way(ax: Axes, way: DirectionLimits, color: str, height: float) -> None:
     """The speed that a way ends at, and the acceleration that it begins with."""
     units = display_unit("rad/s"), display_unit("rad/s^2")
     speed, acceleration = units[0].factor * way.top_speed, units[1].factor * way.acceleration
@@ -209,7 +209,7 @@ BAR = 0.72
 
 
 def plot_limit_timeline(
-    run: Simulation, *, wanted: ArrayLike | None = None, title: str | None = None
+    run: Simulation, *, reference: ArrayLike | None = None, title: str | None = None
 ) -> Figure:
     """Figure of voltage and speed over time, and below a row for each limit that acts.
 
@@ -217,19 +217,19 @@ def plot_limit_timeline(
     ----------
     run : Simulation
         What to show.
-    wanted : (n,) array_like, optional
-        The speed of a drive without limits, or another wanted one, to draw dashed. [rad/s]
+    reference : (n,) array_like, optional
+        The speed of a drive without limits, or another reference, to draw dashed. [rad/s]
 
     Raises
     ------
     InputError
-        If the wanted speed has another length than the run.
+        If the reference speed has another length than the run.
     """
     acting, unit = [each for each in Limit if run.held_back(each).any()], display_unit("rad/s")
-    asked = None if wanted is None else np.asarray(wanted, dtype=np.float64)
+    asked = None if reference is None else np.asarray(reference, dtype=np.float64)
     if asked is not None and asked.shape != run.time.shape:
         raise InputError(
-            f"The wanted speed has shape {asked.shape}, but the run has {run.time.size} samples."
+            f"The reference speed has shape {asked.shape}, but the run has {run.time.size} samples."
         )
     legend = [handle("speed", BLUE)]
     if asked is not None:
@@ -292,7 +292,7 @@ def plot_whatif(
     Parameters
     ----------
     result : WhatIf
-        What `analysis.whatif.what_if` found. The wanted speed is drawn dotted, the speed limits
+        What `analysis.whatif.what_if` found. The reference speed is drawn dotted, the speed limits
         before and after as thin lines.
     bands : mapping of str to Bands, optional
         By variant (``"as it is"``, ``"changed"``) the band that its speed lies in; a panel more
@@ -304,7 +304,7 @@ def plot_whatif(
     looks |= {name: Stroke(color, "dashed") for name, color in zip(alone, colors, strict=False)}
     looks[CHANGED] = Stroke(VERMILION, "solid")
     legend = [handle(name, *look) for name, look in looks.items()]
-    legend.append(handle("wanted", GREY, "dotted"))
+    legend.append(handle("reference", GREY, "dotted"))
     moved = ", ".join(f"{name} x {factor:g}" for name, factor in result.factors.items())
     words = f"{result.before.drive.name}: {moved}" if title is None else title
     heights = [1.2, 2.8, 1.8, 1.3] if bands else [1.2, 2.8, 1.8]
@@ -320,7 +320,7 @@ def plot_whatif(
     for name, band in bands.items():
         shade_band(axes[1], band, looks[name].color)
         shade_band(axes[3], band, looks[name].color, about=band.median)
-    draw(axes[1], time, speed.factor * result.trial.wanted, GREY, dashes="dotted", zorder=1.9)
+    draw(axes[1], time, speed.factor * result.trial.reference, GREY, dashes="dotted", zorder=1.9)
     middle = 0.5 * (time[1:] + time[:-1])
     for name, look in looks.items():
         found = result.variants[name].run.shaft_speed
@@ -354,8 +354,8 @@ def shade_band(ax: Axes, band: Bands, color: ColorType, *, about: Array | float 
 # --- sensitivities --------------------------------------------------------------------------------
 
 THICK = 0.72
-NOTHING = 1e-9
-"""Swings below this part of the largest are not drawn."""
+NO_SWING = 1e-9
+"""Swing, as a share of the base value, up to which nothing changes an outcome. [1]"""
 
 
 @overload
@@ -372,7 +372,7 @@ def plot_tornado(
     ax: Axes | Sequence[Axes] | None = None,
     title: str | None = None,
 ) -> Figure | Axes | Sequence[Axes]:
-    """Figure of what each lever does by itself, a panel an outcome, the strongest at the top.
+    """Figure of what each design variable does alone, a panel an outcome, the strongest at the top.
 
     Parameters
     ----------
@@ -408,7 +408,7 @@ def plot_tornado(
     columns = min(len(shown), 2)
     rows = -(-len(shown) // columns)
     figure = new_figure(WIDTH, HEAD + ROW + rows * (0.22 * len(result.ranges) + 0.75) + 0.5 * FOOT)
-    write_title(figure, "Each lever by itself" if title is None else title)
+    write_title(figure, "Each design variable alone" if title is None else title)
     figure.legend(handles=legend, loc="outside lower left", ncols=3, **how)
     panels = list(figure.subplots(rows, columns, squeeze=False).flat)
     for empty in panels[len(shown) :]:
@@ -418,23 +418,26 @@ def plot_tornado(
 
 
 def _draw_swings(panels: Sequence[Axes], result: OneAtATime, shown: Sequence[int]) -> None:
-    levers = list(result.ranges)
+    variables = list(result.ranges)
     for ax, k in zip(panels, shown, strict=True):
-        outcome, swings = result.outcomes[k], np.nan_to_num(result.swings[:, k])
-        order, unit = np.argsort(swings, kind="stable"), outcome.shown
+        outcome = result.outcomes[k]
+        swings = np.nan_to_num(result.swings[:, k])
+        order = np.argsort(swings, kind="stable")
+        unit = outcome.shown
         base = unit.factor * result.base[k]
         dress(ax, "", unit.label(outcome.words))
-        for place, lever in enumerate(order):
+        for position, index in enumerate(order):
             for values, color in ((result.low, BLUE), (result.high, VERMILION)):
-                change = unit.factor * values[lever, k] - base
+                change = unit.factor * values[index, k] - base
                 if np.isfinite(change):
-                    ax.barh(place, change, THICK, left=base, color=color, zorder=2.0)
-        if not (swings > NOTHING * abs(result.base[k])).any():
+                    ax.barh(position, change, THICK, left=base, color=color, zorder=2.0)
+        if not (swings > NO_SWING * abs(result.base[k])).any():
             half = max(abs(base), 1.0) * 0.1
             ax.set_xlim(base - half, base + half)
-            ax.text(0.5, 0.5, "no lever moves it", transform=ax.transAxes, fontsize=SMALL)
+            words = "no design variable changes it"
+            ax.text(0.5, 0.5, words, transform=ax.transAxes, fontsize=SMALL)
         ax.axvline(base, color=INK, linewidth=0.8, zorder=3.0)
-        names = [levers[lever].replace("_", " ") for lever in order]
+        names = [variables[index].replace("_", " ") for index in order]
         ax.set_yticks(range(len(names)), labels=names)
         ax.set_ylim(-0.6, len(names) - 0.4)
         ax.grid(False, axis="y")
@@ -477,7 +480,7 @@ def plot_compensation(
     ax: Axes | Sequence[Axes] | None = None,
     title: str | None = None,
 ) -> Figure | Axes | Sequence[Axes]:
-    """Figure of the voltage over the wanted speed, with a close-up at standstill.
+    """Figure of the voltage over the reference speed, with a close-up at standstill.
 
     Parameters
     ----------
@@ -515,13 +518,13 @@ def plot_compensation(
     _draw_map(inverse, whole, close)
     if improvement is not None:
         pairs = zip(improvement.runs, COLORS, strict=True)
-        legend = [handle("map, wanted speed", INK)]
+        legend = [handle("map, reference speed", INK)]
         legend += [handle(f"with {name}", color) for name, color in pairs]
         speed = figure.add_subplot(grid[1, :])
         error = figure.add_subplot(grid[2, :], sharex=speed)
         _draw_improvement(speed, error, improvement)
         figure.align_ylabels([whole, speed, error])
-    words = f"{inverse.name}: voltage for a wanted speed" if title is None else title
+    words = f"{inverse.name}: voltage for a reference speed" if title is None else title
     write_title(figure, words)
     put_legend(whole, legend, beyond=True)
     whole.set_title(" ", fontsize=NORMAL, pad=8.0)
@@ -539,7 +542,7 @@ def _draw_map(inverse: InverseMap, whole: Axes, close: Axes | None = None) -> No
         straight, across = proportional_command(inverse, speed), unit.factor * speed
         ax.plot(across, straight, color=GREY, linestyle="dashed", linewidth=1.0)
         ax.plot(across, inverse.voltage(speed), color=INK, linewidth=LINE)
-        dress(ax, "", unit.label("wanted speed"))
+        dress(ax, "", unit.label("reference speed"))
         zero_line(ax, upright=True)
     volts = [float(inverse.voltage(end)) for end in (low, high)]
     whole.set_ylim(1.25 * volts[0], 1.25 * volts[1])  # room for the words there
@@ -577,7 +580,7 @@ def _draw_improvement(speed: Axes, error: Axes, improvement: Improvement) -> Non
     for run, color in zip(runs, COLORS, strict=True):
         done = run.shaft_speed
         draw(speed, time, unit.factor * done, color)
-        draw(error, time, unit.factor * (done - improvement.wanted), color)
-    draw(speed, time, unit.factor * improvement.wanted, INK, width=1.0, zorder=3.0)
+        draw(error, time, unit.factor * (done - improvement.reference), color)
+    draw(speed, time, unit.factor * improvement.reference, INK, width=1.0, zorder=3.0)
     fit_time(error, time)
     speed.tick_params(labelbottom=False)

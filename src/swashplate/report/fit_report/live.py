@@ -12,7 +12,7 @@ from zlib import compress
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.analysis.whatif import LEVERS
+from swashplate.analysis.design_variables import DESIGN_VARIABLES
 from swashplate.campaign import Campaign, Channel, Experiment
 from swashplate.campaign.speed import DIFFERENTIATOR, LOW_PASS, speed_of
 from swashplate.drive import Drive
@@ -36,7 +36,7 @@ Array = NDArray[np.float64]
 
 SPAN = 4.0
 """Factor by which a slider goes below and above the present value."""
-SHOWN = ("orifice", "pump", "supply_pressure", "rate_limits", "dead_zone", "plussing")
+SHOWN = ("orifice", "pump", "supply_pressure", "rate_limits", "dead_zone", "spool_offset")
 """Levers that have a slider of their own; each parameter has one too."""
 BEFORE_CURRENT = Limit.DEAD_ZONE | Limit.CURRENT_RATE
 """Limits that are shaded behind a current; the others are behind what the pump does."""
@@ -216,7 +216,7 @@ def _levers(values: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
     """Levers with the numbers that they move and the powers with which they do."""
     made = []
     for name in SHOWN:
-        powers = LEVERS[name]
+        powers = DESIGN_VARIABLES[name]
         moves = [
             (each["number"], powers[key])
             for each in values
