@@ -26,8 +26,7 @@ TYPES = {"bool": "i1", "int": "i64", "float": "double"}
 """LLVM's types of numbers, the wider ones later. A pointer is of the kind of what it points to,
 with a star before it."""
 KINDS = [*TYPES]
-ORDERED = {"<": "olt", "<=": "ole", ">": "ogt", ">=": "oge", "==": "oeq", "!=": "une"}
-WHOLE = {"<": "slt", "<=": "sle", ">": "sgt", ">=": "sge", "==": "eq", "!=": "ne"}
+TESTS = {"<": "lt", "<=": "le", ">": "gt", ">=": "ge", "==": "eq", "!=": "ne"}
 OPERATIONS = {"+": "add", "-": "sub", "*": "mul", "/": "div"}
 OWN = {"sqrt", "exp", "log", "sin", "cos", "fabs", "floor"}
 """Functions that LLVM knows by itself; others are those of C."""
@@ -417,7 +416,10 @@ class Lowering:
     def compared(self, op: str, one: Operand, two: Operand) -> Operand:
         """A comparison."""
         one, two = self.alike(one, two)
-        how = f"fcmp {ORDERED[op]}" if one.kind == "float" else f"icmp {WHOLE[op]}"
+        if one.kind == "float":  # true of what is no number only if it is `!=`
+            how = f"fcmp {'u' if op == '!=' else 'o'}{TESTS[op]}"
+        else:
+            how = f"icmp {'' if op in ('==', '!=') else 's'}{TESTS[op]}"
         return self.operand("bool", f"{how} {TYPES[one.kind]} {one.text}, {two.text}")
 
     def _negative(self, value: Operand) -> Operand:
