@@ -13,7 +13,7 @@ from swashplate.equations.functions import FUNCTIONS
 from swashplate.equations.language import plain
 from swashplate.equations.loops import blank, root
 from swashplate.equations.lowering import definition_in, lowered
-from swashplate.equations.machine_code import machine_code
+from swashplate.equations.machine_code import code_of
 
 LIBRARY = {**vars(math), **FUNCTIONS}
 UNCOMPILED = {
@@ -30,7 +30,7 @@ pytestmark = pytest.mark.skipif(JIT_OFF, reason="nothing is compiled")
 def both(text: str, *numbers: float, count: int = 4, size: int = 4) -> list[NDArray[np.float64]]:
     """What ``function(x, count, out)`` leaves in `out`, compiled and in Python."""
     definition = lambda: definition_in(text, "function", LIBRARY)  # noqa: E731
-    code = machine_code("function", text, KINDS, definition)
+    code = code_of("function", text, KINDS, definition)
     space: dict[str, Any] = dict(UNCOMPILED)
     exec(text, space)
     left = []

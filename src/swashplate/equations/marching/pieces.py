@@ -24,7 +24,7 @@ from swashplate.equations.lowering import (
     number,
     type_of,
 )
-from swashplate.equations.machine_code import machine_code
+from swashplate.equations.machine_code import code_of
 
 PIECE = "count, first, h, records, before, whole, fraction, params, given, states, met, flat"
 """Arguments of a piece.
@@ -57,7 +57,7 @@ def routine(function: Callable[..., None]) -> Piece:
     hints = {k: v for k, v in function.__annotations__.items() if k != "return"}
     kinds = tuple(_kind_of(hint) for hint in hints.values())
     name = function.__name__
-    return machine_code(name, name, kinds, lambda: definition_of(function))
+    return code_of(name, name, kinds, lambda: definition_of(function))
 
 
 def _kind_of(hint: Any) -> str:

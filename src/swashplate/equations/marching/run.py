@@ -26,7 +26,7 @@ from swashplate.equations.functions import FUNCTIONS, generating
 from swashplate.equations.keeping import kept, key_of
 from swashplate.equations.language import plain
 from swashplate.equations.lowering import definition_in
-from swashplate.equations.machine_code import machine_code
+from swashplate.equations.machine_code import code_of
 from swashplate.equations.marching.march import march_source
 from swashplate.equations.marching.part import Stored, taps_of
 from swashplate.equations.marching.pieces import (
@@ -380,7 +380,7 @@ def compiled(
         return module(file, text, **names)[member]
     title = file if file.endswith(member) else f"{file}_{member}"
     library = LIBRARY | {**names}
-    return machine_code(title, text, kinds, lambda: definition_in(text, member, library))
+    return code_of(title, text, kinds, lambda: definition_in(text, member, library))
 
 
 @generating
