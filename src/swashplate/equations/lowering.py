@@ -155,7 +155,7 @@ class Lowering:
 
     def function(self, function: Definition, kinds: Sequence[str], symbol: str) -> str:
         """Text of the module."""
-        scope, formals = Scope(0, function.space, "return"), []
+        scope, formals = Scope(0, function.space, "return"), list[str]()
         for argument, kind in zip(function.tree.args.args, kinds, strict=True):
             value = Operand(kind, f"%argument{len(formals)}")
             formals.append(f"{type_of(kind)} {value.text}")
