@@ -27,7 +27,9 @@ from swashplate.equations import Model, Tap, equation, simulate
 from swashplate.equations.code_generation.lowering import definition_in, lowered
 from swashplate.equations.code_generation.machine_code import optimised
 from swashplate.equations.marching.lanes import LANES, MARCH_KINDS, lanes_of
+from swashplate.equations.marching.pieces import PIECE_KINDS
 from swashplate.equations.marching.run import LIBRARY
+from swashplate.equations.marching.structure import structure_of
 from swashplate.models.displacement_control import PumpOptions
 from swashplate.models.drive import pump_drive
 
@@ -309,6 +311,16 @@ def test_samples_without_weight_may_be_missing(hoist: Drive) -> None:
     batch = hoist.simulate_many({"Z10": [12.396]}, voltage=[0.0, 0.0, 0.0], cost=cost)
     speed = hoist.simulate([0.0, 0.0, 0.0]).shaft_speed
     assert batch.cost[0] == pytest.approx(speed[0] ** 2 + (speed[2] - 1.0) ** 2, rel=1e-14)
+
+
+@pytest.mark.skipif(bool(config.DISABLE_JIT), reason="nothing is compiled")
+def test_partial_derivatives_are_filled_as_vectors() -> None:
+    options = (None, PumpOptions())
+    pieces = structure_of(pump_drive, ("current",), options, ("shaft_speed",)).facts.pieces
+    (fill,) = (piece for piece in pieces if piece.member == "fill_pump")
+    function = definition_in(fill.text, fill.member, LIBRARY)
+    text = str(optimised(lowered(function, PIECE_KINDS, "fill")))
+    assert re.search(r"<\d+ x double> @llvm\.sqrt", text)
 
 
 @pytest.mark.skipif(bool(config.DISABLE_JIT), reason="nothing is compiled")

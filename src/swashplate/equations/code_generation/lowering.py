@@ -26,8 +26,7 @@ TYPES = {"bool": "i1", "int": "i64", "float": "double"}
 """LLVM's types of numbers, the wider ones later. A pointer is of the kind of what it points to,
 with a star before it."""
 KINDS = [*TYPES]
-ORDERED = {"<": "olt", "<=": "ole", ">": "ogt", ">=": "oge", "==": "oeq", "!=": "une"}
-WHOLE = {"<": "slt", "<=": "sle", ">": "sgt", ">=": "sge", "==": "eq", "!=": "ne"}
+TESTS = {"<": "lt", "<=": "le", ">": "gt", ">=": "ge", "==": "eq", "!=": "ne"}
 OPERATIONS = {"+": "add", "-": "sub", "*": "mul", "/": "div"}
 OWN = {"sqrt", "exp", "log", "sin", "cos", "fabs", "floor"}
 """Functions that LLVM knows by itself; others are those of C."""
@@ -156,10 +155,11 @@ class Lowering:
 
     def function(self, function: Definition, kinds: Sequence[str], symbol: str) -> str:
         """Text of the module."""
-        scope, formals = Scope(0, function.space, "return"), []
+        scope, formals = Scope(0, function.space, "return"), list[str]()
         for argument, kind in zip(function.tree.args.args, kinds, strict=True):
-            formals.append(f"{type_of(kind)} %{argument.arg}")
-            self._store(scope.key(argument.arg), Operand(kind, f"%{argument.arg}"))
+            value = Operand(kind, f"%argument{len(formals)}")
+            formals.append(f"{type_of(kind)} {value.text}")
+            self._store(scope.key(argument.arg), value)
         if self._body(function.tree.body, scope):
             self._jump(scope.end)
         self._begin(scope.end)
@@ -226,23 +226,25 @@ class Lowering:
             self._kinds[key] = value.kind
             raise _WidenedError
         self._allocate(key, type_of(kind))
-        self.emit(f"store {type_of(kind)} {self.cast(value, kind).text}, ptr %{key}")
+        self.emit(f'store {type_of(kind)} {self.cast(value, kind).text}, ptr %"{key}"')
 
     def _load(self, key: str) -> Operand:
         kind = self._kinds[key]
         self._allocate(key, type_of(kind))
-        return self.operand(kind, f"load {type_of(kind)}, ptr %{key}")
+        return self.operand(kind, f'load {type_of(kind)}, ptr %"{key}"')
 
     def _allocate(self, key: str, kind: str) -> None:
-        self._variables.setdefault(key, f"  %{key} = alloca {kind}")
+        # in quotes, as Python knows other letters, too
+        self._variables.setdefault(key, f'  %"{key}" = alloca {kind}')
 
     def room(self, size: int) -> Operand:
         """Memory for some floats, all zero."""
         key = self._label("room$")
         self._allocate(key, f"[{size} x double]")
         self.declare("llvm.memset.p0.i64", "void @llvm.memset.p0.i64(ptr, i8, i64, i1)")
-        self.emit(f"call void @llvm.memset.p0.i64(ptr %{key}, i8 0, i64 {8 * size}, i1 false)")
-        return Operand("*float", f"%{key}")
+        room = Operand("*float", f'%"{key}"')
+        self.emit(f"call void @llvm.memset.p0.i64(ptr {room.text}, i8 0, i64 {8 * size}, i1 false)")
+        return room
 
     # -- statements --------------------------------------------------------------------------------
 
@@ -417,7 +419,10 @@ class Lowering:
     def compared(self, op: str, one: Operand, two: Operand) -> Operand:
         """A comparison."""
         one, two = self.alike(one, two)
-        how = f"fcmp {ORDERED[op]}" if one.kind == "float" else f"icmp {WHOLE[op]}"
+        if one.kind == "float":  # true of what is no number only if it is `!=`
+            how = f"fcmp {'u' if op == '!=' else 'o'}{TESTS[op]}"
+        else:
+            how = f"icmp {'' if op in ('==', '!=') else 's'}{TESTS[op]}"
         return self.operand("bool", f"{how} {TYPES[one.kind]} {one.text}, {two.text}")
 
     def _negative(self, value: Operand) -> Operand:

@@ -23,7 +23,7 @@ from swashplate.equations.code_generation.lowering import (
     number,
     type_of,
 )
-from swashplate.equations.code_generation.machine_code import machine_code
+from swashplate.equations.code_generation.machine_code import code_of
 from swashplate.equations.declaration import JIT_OFF
 
 PIECE = "count, first, h, records, before, whole, fraction, params, given, states, met, flat"
@@ -57,7 +57,7 @@ def routine(function: Callable[..., None]) -> Piece:
     hints = {k: v for k, v in function.__annotations__.items() if k != "return"}
     kinds = tuple(_kind_of(hint) for hint in hints.values())
     name = function.__name__
-    return machine_code(name, name, kinds, lambda: definition_of(function))
+    return code_of(name, name, kinds, lambda: definition_of(function))
 
 
 def _kind_of(hint: Any) -> str:
