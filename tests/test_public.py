@@ -13,6 +13,7 @@ SUBMODULES = (
     "analysis",
     "campaign",
     "crane",
+    "drive",
     "equations",
     "export",
     "full_order",
