@@ -27,7 +27,7 @@ class Kernel:
     """The compiled march of a record, with everything that it reads and writes made beforehand."""
 
     def __init__(self, drive: Drive, signal: str, values: Array) -> None:
-        self.instance = drive_instance(drive.parameters, signal == "voltage")
+        self.instance = drive_instance(drive.parameters, by_voltage=signal == "voltage")
         started = self.instance.start({signal: float(values[0])}, STEP)
         self.at_rest, self.states = started.flat, started.flat.copy()
         kept = (Stored(1, "signals", "shaft_speed"),)

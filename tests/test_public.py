@@ -14,6 +14,7 @@ SUBMODULES = (
     "campaign",
     "crane",
     "drafting",
+    "drive",
     "equations",
     "export",
     "full_order",

@@ -2,6 +2,7 @@ from . import analysis as analysis
 from . import campaign as campaign
 from . import crane as crane
 from . import drafting as drafting
+from . import drive as drive
 from . import equations as equations
 from . import export as export
 from . import full_order as full_order

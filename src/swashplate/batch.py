@@ -295,36 +295,50 @@ class _Sets:
         return measured, weight
 
 
-def _march(shared: _Sets, blocks: Sequence[Block]) -> list[tuple[dict[int, float], Indices, Array]]:
-    """March blocks of sets; their outputs go into one file if into any.
+class _Marched(NamedTuple):
+    """What a block of sets gave."""
 
-    Of each block the worst margins of the sets that failed, and of those that have them, costs or
-    outputs: none where these are in a file.
-    """
-    made, record, keep = [], shared.record, shared.cost is None
+    failed: dict[int, float]
+    """Worst margins of the sets that failed, by their numbers."""
+    sets: Indices
+    """Numbers of the sets that have values: none if these are in a file."""
+    values: Array
+    """Their costs or outputs."""
+
+
+def _march(shared: _Sets, blocks: Sequence[Block]) -> list[_Marched]:
+    """March blocks of sets; their outputs go into one file if into any."""
+    record, keep = shared.record, shared.cost is None
     measured, weight = shared.compared
     inputs = {name: each.values for name, each in shared.records.items()}
     table = {"time": record.time} if shared.to is not None else {}
+    marched = []
     for sets, options in blocks:
         padded, size = np.resize(sets, LANES), sets.size
-        lanes = lanes_of(shared.model, tuple(inputs), options, shared.output)
-        own = {path: values[padded] for path, values in shared.numbers.items()}
-        found = lanes(own, inputs, record.step, measured=measured, weight=weight, keep=keep)
-        worst, values = found.worst[:size], found.cost[:size]
-        good = np.isfinite(found.end[:size]) & (worst > 0.0)
+        march = lanes_of(shared.model, tuple(inputs), options, shared.output)
+        lanes = march(
+            {path: values[padded] for path, values in shared.numbers.items()},
+            inputs,
+            record.step,
+            measured=measured,
+            weight=weight,
+            keep=keep,
+        )
+        worst, values = lanes.worst[:size], lanes.cost[:size]
+        good = np.isfinite(lanes.end[:size]) & (worst > 0.0)
         if keep:
-            values = found.outputs[:size, :: record.substeps]
+            values = lanes.outputs[:size, :: record.substeps]
         values[~good] = np.nan if keep else np.inf
         if keep and shared.to is not None:
             table |= {str(number): row for number, row in zip(sets, values, strict=True)}
             values = values[:0]
         failed = dict(zip(sets[~good].tolist(), worst[~good].tolist(), strict=True))
-        made.append((failed, sets[: len(values)], values))
+        marched.append(_Marched(failed, sets[: len(values)], values))
     if shared.to is not None:
         import polars as pl
 
         write_table(pl.DataFrame(table), shared.file(blocks))
-    return made
+    return marched
 
 
 def _run(
@@ -338,7 +352,8 @@ def _run(
     """March all blocks wherever the executor runs them; `name` is for messages."""
     output_of(shared.model, shared.output)
     driver = next(iter(shared.records))
-    samples, several, keep = shared.record.time.size, 1, shared.cost is None
+    samples, keep = shared.record.time.size, shared.cost is None
+    blocks_an_item = 1
     values = None if keep else np.full(count, np.inf)
     if shared.to is not None:
         if not keep:
@@ -346,22 +361,25 @@ def _run(
                 "Outputs are written to files, costs are not: leave out one of to and cost."
             )
         _make_folder(Path(shared.to))
-        several = max(SAMPLES_A_FILE // (samples * LANES), 1)
+        blocks_an_item = max(SAMPLES_A_FILE // (samples * LANES), 1)
     elif keep:
         values = _outputs(count, samples)
-    items = [blocks[k : k + several] for k in range(0, len(blocks), several)]
-    for _, made in (executor or Threads()).run(_march, shared, items):
-        for failed, sets, found in made:
-            for number, worst in failed.items():
+    items = [blocks[k : k + blocks_an_item] for k in range(0, len(blocks), blocks_an_item)]
+    for _, marched in (executor or Threads()).run(_march, shared, items):
+        for block in marched:
+            for number, worst in block.failed.items():
                 why = f"the numbers grow beyond all bounds under this {driver}."
                 if not worst > 0.0:
                     why = outside(shared.model, worst, driver)
                 failures[number] = f"{name}: {why}"
             if values is not None:
-                values[sets] = found
-    files = tuple(map(shared.file, items)) if shared.to else ()
-    kept, costs = (values, None) if keep else (None, values)
-    return Batch(costs, kept, dict(sorted(failures.items())), files)
+                values[block.sets] = block.values
+    return Batch(
+        cost=None if keep else values,
+        output=values if keep else None,
+        failures=dict(sorted(failures.items())),
+        files=tuple(map(shared.file, items)) if shared.to else (),
+    )
 
 
 def _outputs(count: int, samples: int) -> Array:

@@ -164,7 +164,7 @@ def test_outputs_are_streamed_to_files(tmp_path: Path, monkeypatch, per_file: in
 def test_executors_give_the_same(tmp_path: Path) -> None:
     """Of a packaged model, which other processes can import."""
     hoist = Drive.preset("hoist")
-    instance = drive_instance(hoist.parameters, False)
+    instance = drive_instance(hoist.parameters, by_voltage=False)
     current = 0.9 * np.sin(np.arange(300) / 40.0)
     numbers = 1.2e-4 * np.linspace(0.8, 1.2, 20)
     parts = [part.p for part in instance.parts]

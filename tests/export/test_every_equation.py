@@ -154,7 +154,7 @@ def test_four_functions_read_as_they_were_reviewed() -> None:
     texts = [
         equation_in_c(EQUATIONS[name], functions).text
         for name in (
-            "channel.limited_current",
+            "amplifier.limited_current",
             "displacement_control.pressure_limits",
             "displacement_control.solenoid_force",
             "pump.settled_pressure",

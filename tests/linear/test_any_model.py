@@ -231,7 +231,7 @@ def test_refusals() -> None:
 @pytest.mark.parametrize("at", [-3.0, 4.0])
 def test_a_drive_as_any_model(hoist: Drive, at: float) -> None:
     own = hoist.linearize(at, outputs=("shaft_speed", "current"), coulomb="tangent").discrete(512.0)
-    instance = drive_instance(hoist.parameters, True)
+    instance = drive_instance(hoist.parameters, by_voltage=True)
     model = linearize(instance, {"voltage": at}, 512.0, outputs=("shaft_speed", "current"))
     f = np.array([0.1, 1.0, 20.0])
     np.testing.assert_allclose(model.response(f), own.response(f), rtol=1e-10)

@@ -85,7 +85,8 @@ def _bound(
         check_filter_stability(parameters, step)
     # what is differentiated by counts, at 0 as well, unless equations have derivatives for that
     switches = frozenset(SWITCHES[name] for name in names if name in SWITCHES)
-    instance = drive_instance(_switched_on(parameters, switches - {"leaky", "loaded"}), by_voltage)
+    switched = _switched_on(parameters, switches - {"leaky", "loaded"})
+    instance = drive_instance(switched, by_voltage=by_voltage)
     start = dict(own.start)
     if PRESSURE in start:
         start |= start_states(instance, start[PRESSURE])
@@ -156,5 +157,5 @@ def drive_sensitivities(
         step=record.step,
         extremes=(float(record.values.min()), float(record.values.max())),
     )
-    run = Simulation(drive_instance(parameters, by_voltage), records, start)
+    run = Simulation(drive_instance(parameters, by_voltage=by_voltage), records, start)
     return Sensitivities(run, columns, bound)

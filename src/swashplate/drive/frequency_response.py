@@ -62,7 +62,7 @@ def sweep_drive(
         for frequency in f.tolist():
             step = 1.0 / (frequency * steps_of(frequency, rate))
             check_filter_stability(parameters, step)
-    instance = without_ripple(drive_instance(parameters, by_voltage))
+    instance = without_ripple(drive_instance(parameters, by_voltage=by_voltage))
     return sweep(
         instance,
         f,

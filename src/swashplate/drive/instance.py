@@ -66,28 +66,28 @@ def models_of(equations: tuple[Replacement, ...]) -> Models:
     return models
 
 
-def with_equation(parameters: ParameterSet, made: Replacement) -> ParameterSet:
+def with_equation(parameters: ParameterSet, replacement: Replacement) -> ParameterSet:
     """The set with a user-defined equation; see `Drive.with_equation`."""
-    members = made._asdict()
+    members = replacement._asdict()
     check_members(members, {what: repr(member) for what, member in members.items()})
-    own, models = (*parameters.equations, made), models_of(parameters.equations)
-    if not uses(models.drive, made.old):
+    models, name = models_of(parameters.equations), plain(replacement.old).__name__
+    if not uses(models.drive, replacement.old):
         raise InputError(
-            f"{plain(made.old).__name__} is not an equation of the drive: those are in "
+            f"{name} is not an equation of the drive: those are in "
             "swashplate.models.amplifier, swashplate.models.displacement_control, "
             "swashplate.models.pump and swashplate.models.refinements."
         )
-    if made.parameters is not None and not uses(models.pump_drive, made.old):
+    if replacement.parameters is not None and not uses(models.pump_drive, replacement.old):
         raise InputError(
-            f"{plain(made.old).__name__} is an equation of the card: one of your own in its place "
-            "has the same arguments; parameters of your own go with the pump's equations."
+            f"{name} is an equation of the card: one of your own in its place has the same "
+            "arguments; parameters of your own go with the pump's equations."
         )
-    models_of(own)  # refuses what does not fit
-    found = replace(parameters, equations=own)
-    if made.parameters is None:
-        return found
-    defaults = made.parameters._field_defaults
-    return found.with_numbers(defaults, found.options)
+    equations = (*parameters.equations, replacement)
+    models_of(equations)  # refuses what does not fit
+    changed = replace(parameters, equations=equations)
+    if replacement.parameters is None:
+        return changed
+    return changed.with_numbers(replacement.parameters._field_defaults, changed.options)
 
 
 def card_of(parameters: ParameterSet) -> Card:
@@ -103,8 +103,8 @@ def pump_of(parameters: ParameterSet) -> Pump:
     """The pump's numbers; of the refinements those that are given."""
     kind: Any = models_of(parameters.equations).pump_drive.parts[1].parameters
     numbers = parameters.numbers
-    made: Pump = kind(**{name: numbers[name] for name in kind._fields if name in numbers})
-    return made
+    pump: Pump = kind(**{name: numbers[name] for name in kind._fields if name in numbers})
+    return pump
 
 
 def card_options(parameters: ParameterSet) -> CardOptions:
@@ -127,7 +127,7 @@ def pump_options(parameters: ParameterSet) -> PumpOptions:
 
 
 @lru_cache(maxsize=256)
-def drive_instance(parameters: ParameterSet, by_voltage: bool) -> Instance:
+def drive_instance(parameters: ParameterSet, *, by_voltage: bool) -> Instance:
     """A parameter set as a model with numbers.
 
     Parameters

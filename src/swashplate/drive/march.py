@@ -34,7 +34,7 @@ def simulate_drive(
     driver, record = next(iter(records.items()))
     if driver == "voltage":
         check_filter_stability(parameters, record.step)
-    run = Simulation(drive_instance(parameters, driver == "voltage"), records, start)
+    run = Simulation(drive_instance(parameters, by_voltage=driver == "voltage"), records, start)
     if start_pressure is not None:
         run = replace(run, begin=start_states(run.instance, start_pressure))
     return run.marched()

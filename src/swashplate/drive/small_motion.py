@@ -85,7 +85,7 @@ def small_motion_model(
     """
     step = 0.0 if rate is None else 1.0 / rate
     by_voltage = inputs[0] == "voltage"
-    instance = without_ripple(drive_instance(parameters, by_voltage))
+    instance = without_ripple(drive_instance(parameters, by_voltage=by_voltage))
     front, machine = instance.parts
     command, side, sign, at = "current", "", 1.0, {"current": point.current}
     if by_voltage:

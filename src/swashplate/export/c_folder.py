@@ -172,7 +172,7 @@ def content_of(
                 stacklevel=3,
             )
         check_filter_stability(what.parameters, step)
-        exported, instance = exported_drive(what), drive_instance(what.parameters, True)
+        exported, instance = exported_drive(what), drive_instance(what.parameters, by_voltage=True)
         name, title, references, words = what.name, what.parameters.title, DRIVE, DRIVE_WORDS
     else:
         if not isinstance(what, Model):
