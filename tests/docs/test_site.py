@@ -171,7 +171,8 @@ def messages_of(package: str) -> list[str]:
 
 def test_notes_of_a_fit_are_worded_as_they_are_printed() -> None:
     """What stands between numbers, names and ``...`` in a note is within a message."""
-    messages = "\n".join([*messages_of("identification"), *messages_of("campaign")])
+    folders = ("identification", "campaign", "drafting")
+    messages = "\n".join(said for folder in folders for said in messages_of(folder))
     page = (DOCS / "how-to" / "fit-notes.md").read_text("utf-8")
     notes = re.findall(r"^\| (?!note|-)(.+?) \|", page, re.MULTILINE)
     assert len(notes) > 20
