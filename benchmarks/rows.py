@@ -14,7 +14,7 @@ from timing import Timing, cores_used, in_turns, one_core
 from swashplate import Drive, Serial, SquaredError, maneuvers
 from swashplate.drive import PUMP_COLUMNS, bound_drive, drive_instance
 from swashplate.equations.marching.observation import Observation, ObservedRecord
-from swashplate.equations.marching.part import Stored
+from swashplate.equations.marching.part import SignalId
 from swashplate.equations.marching.record import record_of
 from swashplate.equations.marching.run import arrays_of, march_of
 
@@ -30,7 +30,7 @@ class Kernel:
         self.instance = drive_instance(drive.parameters, signal == "voltage")
         started = self.instance.start({signal: float(values[0])}, STEP)
         self.at_rest, self.states = started.flat, started.flat.copy()
-        kept = (Stored(1, "signals", "shaft_speed"),)
+        kept = (SignalId(1, "signals", "shaft_speed"),)
         planned = march_of(self.instance.model, (signal,), self.instance.options, kept)
         self.march = planned()
         self.out, self.met = np.empty((1, values.size)), np.empty(1)

@@ -464,7 +464,7 @@ class Drive(Result, Mapping[str, Parameter]):
         Returns
         -------
         CompiledStep
-            Its ``step(machine)`` advances one sample inside a compiled kernel.
+            Its ``step(context)`` advances one sample inside a compiled kernel.
 
         Raises
         ------

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from swashplate.equations.declaration import interpreted
 from swashplate.equations.language import plain
-from swashplate.equations.marching.run import Instance, Part
+from swashplate.equations.marching.run import Instance, PartNumbers
 from swashplate.equations.model import Model
 from swashplate.equations.replacement import Replacement, again, check_members, uses
 from swashplate.errors import InputError
@@ -137,12 +137,12 @@ def drive_instance(parameters: ParameterSet, by_voltage: bool) -> Instance:
     by_voltage : bool
         Whether a voltage drives the card, or a signed current the pump alone.
     """
-    pump = Part(pump_of(parameters), pump_options(parameters))
+    pump = PartNumbers(pump_of(parameters), pump_options(parameters))
     if by_voltage:
-        card = Part(card_of(parameters), card_options(parameters))
+        card = PartNumbers(card_of(parameters), card_options(parameters))
         return Instance(models_of(parameters.equations).drive, (card, pump), parameters.name)
     model = models_of(parameters.equations).pump_drive
-    return Instance(model, (Part(CurrentSource()), pump), parameters.name)
+    return Instance(model, (PartNumbers(CurrentSource()), pump), parameters.name)
 
 
 def without_ripple(instance: Instance) -> Instance:

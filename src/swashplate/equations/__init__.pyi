@@ -20,7 +20,7 @@ from .marching.run import instance_of as instance_of
 from .marching.sensitivity import Sensitivities as Sensitivities
 from .marching.sensitivity import sensitivities as sensitivities
 from .marching.stepping import CompiledStep as CompiledStep
-from .marching.stepping import Machine as Machine
+from .marching.stepping import StepContext as StepContext
 from .marching.stepping import compiled_step as compiled_step
 from .marching.use import Run as Run
 from .marching.use import Stepper as Stepper

@@ -113,13 +113,13 @@ class Definition:
         return f"{low:g} to {high:g}" if low > 0.0 else f"at most {high:g}"
 
 
-class Direction(Enum):
+class OtherDirection(Enum):
     """Marks the other direction of a parameter with two values."""
 
     MINUS = "minus"
 
 
-MINUS = Direction.MINUS
+MINUS = OtherDirection.MINUS
 """On a field ``Z16_minus``: the definition stands on ``Z16_plus``."""
 
 

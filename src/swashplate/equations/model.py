@@ -117,7 +117,7 @@ class Place(NamedTuple):
     slope: float
 
 
-class Source(NamedTuple):
+class SignalSource(NamedTuple):
     """A signal of a part, or of its state."""
 
     part: int
@@ -128,7 +128,7 @@ class Link(NamedTuple):
     """A signal between parts: that of one part, or an equation over signals of several."""
 
     name: str
-    sources: tuple[Source, ...]
+    sources: tuple[SignalSource, ...]
     equation: Equation | None = None
 
     @property
@@ -502,11 +502,11 @@ def _too_late(model: Model) -> Iterator[str]:
         )
 
 
-def _source(parts: Sequence[Model], signal: str) -> Source | None:
+def _source(parts: Sequence[Model], signal: str) -> SignalSource | None:
     """Where a signal of some parts comes from: of the last that has it."""
     for j in range(len(parts) - 1, -1, -1):
         if signal in parts[j].signal_names:
-            return Source(j, signal)
+            return SignalSource(j, signal)
     return None
 
 

@@ -30,14 +30,13 @@ from swashplate.equations.marching.record import (
     Interpolation,
     least_substeps,
 )
-from swashplate.equations.marching.run import Instance, Part, Start
+from swashplate.equations.marching.run import Instance, PartNumbers, Start
 from swashplate.equations.marching.use import Run, read_only
 from swashplate.errors import DomainError, InputError
 from swashplate.full_order.physical_set import QUANTITIES, PhysicalSet, from_lumped
 from swashplate.linear import linearize
 from swashplate.models import full_order as model
 from swashplate.models.displacement_control import Solenoids
-from swashplate.models.drive import Source
 from swashplate.models.full_order import PlantOptions, PlantSignals
 from swashplate.models.machine import fastest_rate, relief_pressures
 from swashplate.parameters.definitions import CATALOGUE, DEFINITIONS, Definition, Definitions
@@ -263,11 +262,13 @@ class FullOrderDrive:
         symmetric = parameters.pressure_root == "symmetric"
         options = PlantOptions(symmetric or None, self.physical.air)
         given = model.Substeps(float(self.substeps(step, substeps)))
-        plant, front, kind = Part(self.plant, options, given), Part(Source()), model.full_machine
-        if card:
-            check_filter_stability(parameters, step)
-            front, kind = Part(card_of(parameters), card_options(parameters)), model.full_drive
-        return Instance(kind, (front, plant), self.physical.name)
+        plant = PartNumbers(self.plant, options, given)
+        if not card:
+            source = PartNumbers(CurrentSource())
+            return Instance(model.full_machine, (source, plant), self.physical.name)
+        check_filter_stability(parameters, step)
+        front = PartNumbers(card_of(parameters), card_options(parameters))
+        return Instance(model.full_drive, (front, plant), self.physical.name)
 
     def substeps(self, step: float, wanted: int | None = None) -> int:
         """Sub-steps that a step [s] of the record takes.
@@ -361,7 +362,7 @@ class FullOrderDrive:
         at = {"current": float(current)}
         motion = instance.start(at, step, "steady").states[1].motion
         flowing = Instance(
-            model.flowing_plant, (Part(self.plant, instance.options[1]),), self.physical.name
+            model.flowing_plant, (PartNumbers(self.plant, instance.options[1]),), self.physical.name
         )
         matrix = linearize(flowing, at, None, states=(motion,), outputs=("swash_angle",)).A
         values, right = np.linalg.eig(matrix)
@@ -490,7 +491,7 @@ TABLE_MANEUVERS: tuple[tuple[str, Maneuver], ...] = (
 
 
 @dataclass(frozen=True, eq=False)
-class Comparison(Tabular):
+class OrderComparison(Tabular):
     """Both models over one command, driven by the same current.
 
     The reduced one is marched in fine steps, so that what is compared are the equations.
@@ -555,7 +556,7 @@ class Comparison(Tabular):
         return made
 
 
-def compare(full: FullOrderDrive, run: Simulation, *, start: Start = "rest") -> Comparison:
+def compare(full: FullOrderDrive, run: Simulation, *, start: Start = "rest") -> OrderComparison:
     """Simulate both models over the current of a run of ``full.drive``.
 
     The reduced model has the lumps of the full-order one; `start` as in `FullOrderDrive.follow`.
@@ -571,7 +572,7 @@ def compare(full: FullOrderDrive, run: Simulation, *, start: Start = "rest") -> 
         substeps=max(steps, LEAST_FINE_STEPS, least_substeps(rate)),
     )
     speed = np.ascontiguousarray(fine.shaft_speed[:: record.substeps])
-    return Comparison(followed, read_only(speed), run.voltage)
+    return OrderComparison(followed, read_only(speed), run.voltage)
 
 
 def validity(full: FullOrderDrive, rate: float = SOURCE_RATE) -> Table:
@@ -580,7 +581,7 @@ def validity(full: FullOrderDrive, rate: float = SOURCE_RATE) -> Table:
     return validity_table(full.physical.name, ((name, compare(full, run)) for name, run in runs))
 
 
-def validity_table(axis: str, compared: Iterable[tuple[str, Comparison]]) -> Table:
+def validity_table(axis: str, compared: Iterable[tuple[str, OrderComparison]]) -> Table:
     """Differences in shaft speed under some commands, and whether one state is enough for them.
 
     A row for each command: top speed, largest and rms difference in per cent of it, and whether the

@@ -41,7 +41,7 @@ class Operand:
     text: str
 
 
-class Definition(NamedTuple):
+class FunctionDefinition(NamedTuple):
     """A function that can be called: its tree, and what the names in it stand for."""
 
     tree: ast.FunctionDef
@@ -66,28 +66,28 @@ def lowers(function: Any) -> Callable[[F], F]:
     return declared
 
 
-def definition_of(function: Any) -> Definition:
+def definition_of(function: Any) -> FunctionDefinition:
     """A Python function, by its source."""
     function = plain(function)
-    return Definition(unchecked(function).node, function.__globals__)
+    return FunctionDefinition(unchecked(function).node, function.__globals__)
 
 
-def definition_in(text: str, name: str, library: Mapping[str, Any]) -> Definition:
+def definition_in(text: str, name: str, library: Mapping[str, Any]) -> FunctionDefinition:
     """A function of a module's text, in which other names stand for what is in a library."""
     space = dict(library)
     for node in ast.parse(text).body:
         if isinstance(node, ast.FunctionDef):
-            space[node.name] = Definition(node, space)
-    found: Definition = space[name]
+            space[node.name] = FunctionDefinition(node, space)
+    found: FunctionDefinition = space[name]
     return found
 
 
-def lowered(function: Definition, kinds: Sequence[str], symbol: str) -> str:
+def lowered(function: FunctionDefinition, kinds: Sequence[str], symbol: str) -> str:
     """Text of a module in LLVM's language with a function that returns nothing.
 
     Parameters
     ----------
-    function : Definition
+    function : FunctionDefinition
         The function.
     kinds : sequence of str
         Of its arguments: "float", "int", or "*float" for a pointer to floats.
@@ -154,7 +154,7 @@ class Lowering:
         self._loops: list[tuple[str, str]] = []
         """Of each loop around, where it goes on and where it ends."""
 
-    def function(self, function: Definition, kinds: Sequence[str], symbol: str) -> str:
+    def function(self, function: FunctionDefinition, kinds: Sequence[str], symbol: str) -> str:
         """Text of the module."""
         scope, formals = Scope(0, function.space, "return"), []
         for argument, kind in zip(function.tree.args.args, kinds, strict=True):
@@ -499,13 +499,13 @@ class Lowering:
     # -- calls -------------------------------------------------------------------------------------
 
     def _call(self, function: Any, given: list[Any]) -> Any:
-        if isinstance(function, Definition):
+        if isinstance(function, FunctionDefinition):
             return self._written_out(function, given)
         if function in LOWERED:
             return LOWERED[function](self, *given)
         return self._written_out(definition_of(function), given)
 
-    def _written_out(self, function: Definition, given: list[Any]) -> Any:
+    def _written_out(self, function: FunctionDefinition, given: list[Any]) -> Any:
         """A function in the place of its call."""
         self._scopes += 1
         scope, formals = Scope(self._scopes, function.space, self._label("end")), function.tree.args

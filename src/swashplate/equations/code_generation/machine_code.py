@@ -19,7 +19,7 @@ from numba.core.registry import cpu_target
 
 from swashplate import progress
 from swashplate.equations.cache import COMPILING
-from swashplate.equations.code_generation.lowering import Definition, lowered
+from swashplate.equations.code_generation.lowering import FunctionDefinition, lowered
 from swashplate.equations.keeping import kept
 
 SYMBOL = "code"
@@ -55,7 +55,7 @@ _loaded: dict[tuple[str, str, tuple[str, ...]], Code] = {}
 
 
 def machine_code(
-    name: str, text: str, kinds: tuple[str, ...], definition: Callable[[], Definition]
+    name: str, text: str, kinds: tuple[str, ...], definition: Callable[[], FunctionDefinition]
 ) -> Code:
     """Machine code of a function that returns nothing.
 

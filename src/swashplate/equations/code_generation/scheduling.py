@@ -20,14 +20,14 @@ Flat = Callable[[Sequence[Node]], bool]
 class Region:
     """What is computed together: the whole, or one side of a branch."""
 
-    def __init__(self, branch: Branch | None = None, side: int = 0) -> None:
+    def __init__(self, branch: Conditional | None = None, side: int = 0) -> None:
         self.branch, self.side = branch, side
         self.enclosing: tuple[Region, ...] = (self,)
         """The region and those that it lies in, the innermost first."""
         if branch is not None:
             self.enclosing = (self, *branch.region.enclosing)
         self.nodes: list[Node] = []
-        self.branches: list[Branch] = []
+        self.branches: list[Conditional] = []
 
     @property
     def earlier(self) -> Iterator[Region]:
@@ -38,7 +38,7 @@ class Region:
                     yield branch.sides[self.side]
 
 
-class Branch:
+class Conditional:
     """An `if` with its `else`, and the choices that get their values in it."""
 
     def __init__(self, test: Node, level: int, region: Region) -> None:
@@ -97,10 +97,10 @@ class Schedule:
     def _place(self) -> None:
         """Give every node its regions: the outermost of those that need it."""
         self.whole = Region()
-        self._all: list[Branch] = []
+        self._all: list[Conditional] = []
         self._of: dict[Node, list[Region]] = {}
-        self._branch_of: dict[tuple[Node, Region], Branch] = {}
-        branches: dict[tuple[int, Node, Region], Branch] = {}
+        self._branch_of: dict[tuple[Node, Region], Conditional] = {}
+        branches: dict[tuple[int, Node, Region], Conditional] = {}
         level = self._levels()
         needed: dict[Node, dict[Region, None]] = {}
         for node in self._results:
@@ -126,7 +126,7 @@ class Schedule:
                 key = level[node], test, region
                 branch = branches.get(key)
                 if branch is None:
-                    branch = branches[key] = Branch(test, level[node], region)
+                    branch = branches[key] = Conditional(test, level[node], region)
                     region.branches.append(branch)
                     self._all.append(branch)
                     needed.setdefault(test, {})[region] = None
@@ -157,26 +157,26 @@ class Schedule:
                     return each
         raise AssertionError(node)
 
-    def branch_of(self, node: Node, region: Region) -> Branch | None:
+    def branch_of(self, node: Node, region: Region) -> Conditional | None:
         """The branch that gives a choice its value in a region; None of anything else."""
         return self._branch_of.get((node, region))
 
     # -- order -------------------------------------------------------------------------------------
 
-    def steps(self, region: Region) -> Iterator[Node | Branch]:
+    def steps(self, region: Region) -> Iterator[Node | Conditional]:
         """Nodes and branches of a region, each after those that it needs."""
-        items: list[Node | Branch] = [*region.nodes, *region.branches]
-        at: dict[Node | Branch, int] = {}
-        waits: dict[Node | Branch, set[Node | Branch]] = {}
+        items: list[Node | Conditional] = [*region.nodes, *region.branches]
+        at: dict[Node | Conditional, int] = {}
+        waits: dict[Node | Conditional, set[Node | Conditional]] = {}
         for item in items:
             waits[item] = {*self._needs(item, region)} - {item}
             nodes = [item] if isinstance(item, Node) else item.members
             at[item] = min(self._index[node] for node in nodes)
-        behind: dict[Node | Branch, list[Node | Branch]] = {}
+        behind: dict[Node | Conditional, list[Node | Conditional]] = {}
         for item, others in waits.items():
             for other in others:
                 behind.setdefault(other, []).append(item)
-        ready: list[tuple[int, int, Node | Branch]] = []
+        ready: list[tuple[int, int, Node | Conditional]] = []
         for k, item in enumerate(items):
             if not waits[item]:
                 heappush(ready, (at[item], k, item))
@@ -189,7 +189,7 @@ class Schedule:
                 if not waits[later]:
                     heappush(ready, (at[later], number[later], later))
 
-    def _needs(self, item: Node | Branch, region: Region) -> Iterator[Node | Branch]:
+    def _needs(self, item: Node | Conditional, region: Region) -> Iterator[Node | Conditional]:
         """Items of a region that one of its items needs."""
         for node, where in self.uses(item, region):
             found = self.region_of(node, where)
@@ -204,7 +204,7 @@ class Schedule:
             else:
                 yield node
 
-    def uses(self, item: Node | Branch, region: Region) -> Iterator[tuple[Node, Region]]:
+    def uses(self, item: Node | Conditional, region: Region) -> Iterator[tuple[Node, Region]]:
         """What an item of a region reads, all that lies within it included, and from where."""
         if isinstance(item, Node):
             yield from ((operand, region) for operand in item.args)

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.equations.code_generation.functions import generating
-from swashplate.equations.marching.layout import Layout, layout_of, started_by
-from swashplate.equations.marching.observation import ObservedRecord, Own
+from swashplate.equations.marching.layout import JacobianLayout, layout_of, started_by
+from swashplate.equations.marching.observation import ObservedRecord, RunValues
 from swashplate.equations.marching.pieces import Struct, addresses, pointers
 from swashplate.equations.marching.rows import (
     ROWS,
@@ -54,7 +54,7 @@ def _slopes(
 
 
 def _begun(
-    layout: Layout,
+    layout: JacobianLayout,
     instance: Instance,
     first: Mapping[str, float],
     h: float,
@@ -83,7 +83,7 @@ def _begun(
 
 @generating
 def _at_rest(
-    layout: Layout, instance: Instance, h: float, own: tuple[str, ...]
+    layout: JacobianLayout, instance: Instance, h: float, own: tuple[str, ...]
 ) -> tuple[Struct[Program], Array]:
     """Those of a start at rest, which depends on no record."""
     return _begun(layout, instance, {}, h, "rest", own)
@@ -121,10 +121,10 @@ class Triangle(NamedTuple):
     negative."""
 
 
-NOTHING_OWN = Own()
+NOTHING_OWN = RunValues()
 
 
-def residuals(instance: Instance, observed: ObservedRecord, own: Own = NOTHING_OWN) -> Array:
+def residuals(instance: Instance, observed: ObservedRecord, own: RunValues = NOTHING_OWN) -> Array:
     """(m,) weighted residuals of all observations, one after the other, 0 where the weight is.
 
     Of each weight · (simulated + offset - measured) in its signal's SI unit; `own` are values of
@@ -139,7 +139,7 @@ def jacobian(
     instance: Instance,
     observed: ObservedRecord,
     columns: Sequence[str],
-    own: Own = NOTHING_OWN,
+    own: RunValues = NOTHING_OWN,
     *,
     moved: Sequence[bool] | None = None,
     out: Array | None = None,
@@ -167,7 +167,7 @@ def triangle(
     instance: Instance,
     observed: ObservedRecord,
     columns: Sequence[str],
-    own: Own = NOTHING_OWN,
+    own: RunValues = NOTHING_OWN,
     *,
     moved: Sequence[bool] | None = None,
 ) -> Triangle:
@@ -199,7 +199,7 @@ NO_FACTOR = np.zeros((0, 0))
 def _march(
     instance: Instance,
     observed: ObservedRecord,
-    own: Own,
+    own: RunValues,
     columns: Sequence[str],
     to: ArrayLike,
     rows: Array,
@@ -214,7 +214,7 @@ def _march(
     signals, seen = tuple(records), tuple(dict.fromkeys(o.signal for o in observed.observations))
     missing = [c for c in columns if c.startswith("start.") and c[6:] not in own.start]
     if missing:
-        raise InputError(f"{missing[0]} is a column, so Own needs a value of it.")
+        raise InputError(f"{missing[0]} is a column, so RunValues needs a value of it.")
     structure = structure_of(instance.model, signals, instance.options, seen)
     plan, offsets = observed.plan, observed.offsets(own.offsets)
     numbers = tuple(seen.index(each.signal) for each in observed.observations)
@@ -259,7 +259,7 @@ class BoundModel(NamedTuple):
     """A model with numbers, and what it is differentiated by."""
 
     instance: Instance
-    own: Own = NOTHING_OWN
+    own: RunValues = NOTHING_OWN
     """Values of the experiment's own unknowns."""
     paths: Sequence[str] = ()
     """Columns of derivatives."""

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from swashplate.equations import graph
 from swashplate.equations.code_generation.functions import generating
 from swashplate.equations.code_generation.printing import (
-    Block,
+    CodeBlock,
     Statement,
     function_source,
     indented,
@@ -35,7 +35,7 @@ from swashplate.equations.declaration import JIT_OFF
 from swashplate.equations.graph import Node
 from swashplate.equations.keeping import kept, key_of
 from swashplate.equations.marching.march import Sampler, lower, output_of
-from swashplate.equations.marching.part import PartCode, Stored, taps_of
+from swashplate.equations.marching.part import PartCode, SignalId, taps_of
 from swashplate.equations.marching.pieces import FLOATS, INTS, pointers
 from swashplate.equations.marching.rows import aligned
 from swashplate.equations.marching.run import compiled
@@ -228,7 +228,7 @@ class _Writer:
         place, is_rate = output_of(model, output)
         self._sampler = Sampler(model, signals, options, [place])
         self._straight = Straight()
-        self._ahead: list[tuple[PartCode, Block]] = []
+        self._ahead: list[tuple[PartCode, CodeBlock]] = []
         text = self._sampler.module(*self._texts(place, is_rate))
         parts = [self._part_of(part) for part in self._sampler.used]
         self.facts = LaneFacts(text, self._straight.number, parts)
@@ -243,7 +243,7 @@ class _Writer:
             {path: states[path].value for path in self._sampler.carried[part.part]},
         )
 
-    def _texts(self, place: Stored, is_rate: bool) -> list[str]:
+    def _texts(self, place: SignalId, is_rate: bool) -> list[str]:
         """Texts of both functions."""
         sampler, straight, model = self._sampler, self._straight, self._sampler.model
         following: list[tuple[str, str, frozenset[str]]] = []
@@ -307,7 +307,7 @@ class _Writer:
     def _part(
         self,
         part: PartCode,
-        place: Stored,
+        place: SignalId,
         following: list[tuple[str, str, frozenset[str]]],
         worst: str,
     ) -> str:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from swashplate.equations.code_generation.functions import generating
 from swashplate.equations.fields import floats_of
-from swashplate.equations.marching.part import Stored, taps_of
+from swashplate.equations.marching.part import SignalId, taps_of
 from swashplate.equations.marching.pieces import Struct
 from swashplate.equations.marching.rows import (
     CALL,
@@ -39,7 +39,7 @@ Todo = tuple[int, int, int, int]
 """A row of `Program.todo`."""
 
 
-class Layout:
+class JacobianLayout:
     """A program without the numbers that depend on parameters, and the memory it needs.
 
     `pieces` are the numbers of those that are called, `slots` the numbers of terms with a factor of
@@ -56,7 +56,7 @@ class Layout:
         self._observations = len(observed)
         self._spare: deque[Struct[Room]] = deque(maxlen=8)
         self.places: dict[Moved, int] = {}
-        self._by: dict[Stored, dict[int, Term]] = {}
+        self._by: dict[SignalId, dict[int, Term]] = {}
         """Derivatives of what is known, by the number of each column that moves it."""
         self._begun: set[Moved] = set()  # States that a column moves at the first sample.
         self._sums: list[tuple[int, list[Term]]] = []  # Rows that are made, and of what.
@@ -139,16 +139,16 @@ class Layout:
             i, prefix = part.part, model.prefix(part.part)
             for path in floats_of(model.parts[i].parameters):
                 if f"{prefix}{path}" in number:
-                    self._by[Stored(i, "p", path)] = {number[f"{prefix}{path}"]: Term()}
+                    self._by[SignalId(i, "p", path)] = {number[f"{prefix}{path}"]: Term()}
             for tap in (each for each in taps if each.part == i):
-                column, known = f"{prefix}{tap.tap.delay}", Stored(i, "fraction", str(tap.number))
+                column, known = f"{prefix}{tap.tap.delay}", SignalId(i, "fraction", str(tap.number))
                 if tap.tap.delay and column in number:
                     self._by[known] = {number[column]: Term(slot=(known, column))}
             for column in self.columns:
                 for path in started_by(model, i, column):
-                    self._begun.add((Stored(i, "state", path), column))
+                    self._begun.add((SignalId(i, "state", path), column))
 
-    def _terms(self, result: Stored, c: int) -> list[Term]:
+    def _terms(self, result: SignalId, c: int) -> list[Term]:
         """What a derivative by a column is the sum of."""
         if result in self._by:
             return [self._by[result][c]] if c in self._by[result] else []
@@ -199,7 +199,7 @@ class Layout:
         """Columns of a recurrence, and rows that they need, if there are any."""
         since, begin = len(self._sums), len(self._lanes)
         found: list[list[tuple[int, int, int]]] = []
-        made: dict[Stored, dict[int, Term]] = {state: {} for state in group.states}
+        made: dict[SignalId, dict[int, Term]] = {state: {} for state in group.states}
         for c, column in enumerate(self.columns):
             terms = [self._terms(state, c) for state in group.states]
             if any(terms) or any((state, column) in self._begun for state in group.states):
@@ -237,13 +237,13 @@ class Layout:
 @generating
 def layout_of(
     structure: Structure, columns: tuple[str, ...], observed: tuple[int, ...], start: str
-) -> Layout:
+) -> JacobianLayout:
     """What to do in every block for some columns: paths of parameters, and ``start.`` of a state.
 
     `observed` says for each observation which of the structure's observed signals it is, and
     `start` where the record begins.
     """
-    return Layout(structure, columns, observed, start)
+    return JacobianLayout(structure, columns, observed, start)
 
 
 def started_by(model: Model, part: int, column: str) -> tuple[str, ...]:

@@ -25,7 +25,7 @@ from swashplate.equations.code_generation.functions import Function
 from swashplate.equations.code_generation.printing import (
     BRANCHING,
     PYTHON,
-    Block,
+    CodeBlock,
     assigned,
     function_source,
     indented,
@@ -34,20 +34,20 @@ from swashplate.equations.code_generation.scheduling import Flat
 from swashplate.equations.code_generation.values import Value, leaves
 from swashplate.equations.fields import floats_of
 from swashplate.equations.graph import Node, names_in
-from swashplate.equations.marching.part import PartCode, Stored
+from swashplate.equations.marching.part import PartCode, SignalId
 from swashplate.equations.marching.pieces import PIECE
-from swashplate.equations.model import Model, Source
+from swashplate.equations.model import Model, SignalSource
 from swashplate.errors import InputError
 
 _OWN = """
 n m j c lane first last worst h half value error total count size used progress values lines
 whole fraction params given constants states out flags records before measured weight outputs flat
-inputs table kept tangent lanes columns program plan sink room block met machine volts current speed
+inputs table kept tangent lanes columns program plan sink room block met context volts current speed
 at everything voltage target counts coming cost rate integral shown choose width
 """
 RESERVED = {*_OWN.split(), *(name for name in vars(math) if not name.startswith("_"))}
 """Names that the kernels use themselves."""
-MACHINE = [
+CONTEXT_FIELDS = [
     "inputs",
     "lines",
     "whole",
@@ -59,7 +59,7 @@ MACHINE = [
     "states",
     "outputs",
 ]
-"""What a step takes from a `Machine`."""
+"""What a step takes from a `StepContext`."""
 
 
 class Sampler:
@@ -73,7 +73,7 @@ class Sampler:
         All parts, and those that are needed.
     ends, carried : list
         Of each part the results that are needed, and the paths of the states.
-    sources : dict of Source to Node
+    sources : dict of SignalSource to Node
         Signals that other parts or links need.
     functions : dict of str to Function
         Generated functions that what was printed calls.
@@ -84,14 +84,14 @@ class Sampler:
         model: Model,
         signals: Sequence[str],
         options: Sequence[Any],
-        wanted: Sequence[Stored],
+        wanted: Sequence[SignalId],
     ) -> None:
         self.model, self.signals = model, tuple(signals)
         taken = {*RESERVED, *self.signals, *(f"{each}_before" for each in self.signals)}
         self.parts = [PartCode(model, i, signals, each, taken) for i, each in enumerate(options)]
         self.ends: list[list[Node]] = [[] for _ in self.parts]
         self.carried: list[list[str]] = [[] for _ in self.parts]
-        self.sources: dict[Source, Node] = {}
+        self.sources: dict[SignalSource, Node] = {}
         self.functions: dict[str, Function] = {}
         for each in wanted:
             if each.kind == "link":
@@ -122,21 +122,21 @@ class Sampler:
             if link is not None and any(part.source(each) in read for each in link.sources):
                 self._need(link.sources)
 
-    def _need(self, sources: Sequence[Source]) -> None:
+    def _need(self, sources: Sequence[SignalSource]) -> None:
         for source in (each for each in sources if each not in self.sources):
             node = self.sources[source] = self.parts[source.part].signal(source.signal)
             self.ends[source.part].append(node)
 
-    def outside(self) -> dict[str, Stored]:
+    def outside(self) -> dict[str, SignalId]:
         """What is known ahead of a sample, by name: numbers, the state, places and records."""
-        known = {"h": Stored(0, "h")}
+        known = {"h": SignalId(0, "h")}
         for part in self.used:
             i = part.part
             for kind, value in (("p", part.p), ("given", part.given), ("state", part.state)):
-                known |= {node.value: Stored(i, kind, path) for path, node in leaves(value)}
+                known |= {node.value: SignalId(i, kind, path) for path, node in leaves(value)}
             known |= part.outside
             for tap in part.taps:
-                known[part.fraction(tap)] = Stored(i, "fraction", str(tap.number))
+                known[part.fraction(tap)] = SignalId(i, "fraction", str(tap.number))
         return known
 
     def module(self, *texts: str) -> str:
@@ -162,15 +162,15 @@ class Sampler:
         named: bool = False,
         flat: Flat | None = None,
         branches: bool = True,
-    ) -> Block:
-        """Lines that compute some nodes of a part; `hints` are names for some, see `Block`.
+    ) -> CodeBlock:
+        """Lines that compute some nodes of a part; `hints` are names for some, see `CodeBlock`.
 
         Choices are not branches with `flat`, for loops of vector instructions, or if there are to
         be none but those that save work.
         """
         labels = {**part.trace.labels, **(hints or {})}
         language = BRANCHING if branches and flat is None else PYTHON
-        block = Block(
+        block = CodeBlock(
             results, labels, part.taken, known=known, named=named, flat=flat, language=language
         )
         self.functions |= block.functions
@@ -225,9 +225,9 @@ class Sampler:
     def body(
         self,
         part: PartCode,
-        places: Mapping[Stored, str],
+        places: Mapping[SignalId, str],
         known: Mapping[Node, str],
-        more: Mapping[Stored, str] = MappingProxyType({}),
+        more: Mapping[SignalId, str] = MappingProxyType({}),
     ) -> Sampled:
         """A part's sample, with signals that other parts need and what is kept.
 
@@ -262,8 +262,8 @@ class Sampler:
     def kept_lines(
         self,
         part: PartCode,
-        kept: Sequence[Stored],
-        places: Mapping[Stored, str],
+        kept: Sequence[SignalId],
+        places: Mapping[SignalId, str],
         known: Mapping[Node, str],
     ) -> list[str]:
         """Lines that keep some numbers of a part, behind its sample."""
@@ -275,18 +275,20 @@ class Sampler:
             lines += self.stored(part, each, places[each], texts)
         return lines
 
-    def kept_nodes(self, part: PartCode, stored: Stored) -> list[Node]:
+    def kept_nodes(self, part: PartCode, stored: SignalId) -> list[Node]:
         """What a number that is kept is made of: limits of a bit each."""
         return part.limits if stored.kind == "limits" else [self.observed(part, stored)]
 
-    def stored(self, part: PartCode, stored: Stored, place: str, texts: Iterator[str]) -> list[str]:
+    def stored(
+        self, part: PartCode, stored: SignalId, place: str, texts: Iterator[str]
+    ) -> list[str]:
         """Lines that keep a number, from the texts of what it is made of."""
         if stored.kind != "limits":
             return assigned(place, next(texts))
         bits = [f"choose({next(texts)}, {1 << k}, 0)" for k in range(len(part.limits))]
         return assigned(place, " | ".join(bits))
 
-    def observed(self, part: PartCode, stored: Stored) -> Node:
+    def observed(self, part: PartCode, stored: SignalId) -> Node:
         """A number that is kept, of what is known at its part's end."""
         if stored.kind != "link":
             return part.node(stored)
@@ -336,8 +338,8 @@ def march_source(
     model: Model,
     signals: Sequence[str],
     options: Sequence[Any],
-    places: Mapping[Stored, str],
-    more: Mapping[Stored, str] = MappingProxyType({}),
+    places: Mapping[SignalId, str],
+    more: Mapping[SignalId, str] = MappingProxyType({}),
 ) -> str:
     """Text of a module with the march over samples as a `piece`.
 
@@ -391,11 +393,11 @@ def march_source(
 
 
 def step_source(
-    model: Model, signals: Sequence[str], options: Sequence[Any], stored: Sequence[Stored]
+    model: Model, signals: Sequence[str], options: Sequence[Any], stored: Sequence[SignalId]
 ) -> tuple[str, int]:
     """Text of a module of one sample, for steppers and loops, and how many constants it has.
 
-    ``prepare(params, given, h, constants)`` computes constants once. ``step(machine)`` shifts the
+    ``prepare(params, given, h, constants)`` computes constants once. ``step(context)`` shifts the
     newest inputs into the delay lines (a row for each signal, newest first), fills the outputs with
     the numbers of this sample in the order of `stored`, takes the states to the next one, and
     returns the margin of the domain.
@@ -403,7 +405,7 @@ def step_source(
     sampler = Sampler(model, signals, options, stored)
     row = sampler.signals.index
     tapped = sorted({row(tap.tap.signal) for part in sampler.used for tap in part.taps})
-    lines = [f"{each} = machine.{each}" for each in MACHINE]
+    lines = [f"{each} = context.{each}" for each in CONTEXT_FIELDS]
     prepare, ends, count = list[str](), ["worst = inf"], 0
     if tapped:
         lines += ["for j in range(lines.shape[1] - 1, 0, -1):"]
@@ -435,22 +437,22 @@ def step_source(
     head, says = "prepare(params, given, h, constants)", f"Constants of {model.name}."
     prepared = function_source(head, says, [*prepare, "return"])
     says, lines = f"One sample of {model.name}.", [*lines, *ends, "return worst"]
-    stepped = function_source("step(machine)", says, lines, "@inlined")
+    stepped = function_source("step(context)", says, lines, "@inlined")
     return sampler.module(prepared, stepped), count
 
 
-def output_of(model: Model, output: str) -> tuple[Stored, bool]:
+def output_of(model: Model, output: str) -> tuple[SignalId, bool]:
     """Where a signal comes from, and whether it is that signal's integral."""
     integral = output in model.integrals
     name = model.integrals[output] if integral else output
     if name in model.links:
-        return Stored(model.links[name].after, "link", name), integral
+        return SignalId(model.links[name].after, "link", name), integral
     for i in range(len(model.parts) - 1, -1, -1):
         own = model.parts[i]
         if own.signals is not None and name in floats_of(own.signals):
-            return Stored(i, "signals", name), integral
+            return SignalId(i, "signals", name), integral
         if name in floats_of(own.state):
-            return Stored(i, "state", name), integral
+            return SignalId(i, "state", name), integral
     known = [name for part in model.parts for name in part.signal_names]
     raise InputError(
         f"{model.name} has no signal '{output}'; it has "

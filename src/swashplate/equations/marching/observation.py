@@ -78,7 +78,7 @@ class Observation:
         return f"Observation({self.signal!r}, {np.size(self.time)} samples)"
 
 
-class Own(NamedTuple):
+class RunValues(NamedTuple):
     """Values of what belongs to one experiment alone, not to the machine."""
 
     start: Mapping[str, float] = MappingProxyType({})

@@ -11,14 +11,14 @@ from swashplate.equations.code_generation.values import leaves
 from swashplate.equations.graph import Node, names_in, rewritten
 from swashplate.equations.keeping import kept, key_of
 from swashplate.equations.marching.march import Sampler
-from swashplate.equations.marching.part import Stored
+from swashplate.equations.marching.part import SignalId
 from swashplate.equations.model import Model
 
 
 class StepDerivatives(NamedTuple):
     """Next states of a model, then what is seen of it, with their derivatives."""
 
-    arguments: dict[str, Stored]
+    arguments: dict[str, SignalId]
     """What the function takes, by name."""
     derived: Derived
     """By all states and samples of inputs among them."""
@@ -26,7 +26,7 @@ class StepDerivatives(NamedTuple):
 
 @generating
 def step_derivatives(
-    model: Model, signals: tuple[str, ...], options: tuple[Any, ...], seen: tuple[Stored, ...]
+    model: Model, signals: tuple[str, ...], options: tuple[Any, ...], seen: tuple[SignalId, ...]
 ) -> StepDerivatives:
     """A model's next states, then what is `seen`, with their derivatives."""
     return kept(
@@ -37,10 +37,10 @@ def step_derivatives(
 
 
 def _derived(
-    model: Model, signals: tuple[str, ...], options: tuple[Any, ...], seen: tuple[Stored, ...]
+    model: Model, signals: tuple[str, ...], options: tuple[Any, ...], seen: tuple[SignalId, ...]
 ) -> StepDerivatives:
     """The same, made of the equations."""
-    states = [Stored(i, "state", path) for i, path in model.places("state")]
+    states = [SignalId(i, "state", path) for i, path in model.places("state")]
     sampler = Sampler(model, signals, options, [*states, *seen])
     results, labels = list[Node](), dict[Node, str]()
     passed: dict[Node, Node] = {}

@@ -17,7 +17,7 @@ from swashplate.equations.model import (
     Equation,
     Link,
     Model,
-    Source,
+    SignalSource,
     Tap,
     Window,
     arguments_of,
@@ -34,7 +34,7 @@ HOLDS: dict[str, Equation] = {
 }
 
 
-class Stored(NamedTuple):
+class SignalId(NamedTuple):
     """A number of a part: what a march can keep, and what that is derived by."""
 
     part: int
@@ -167,7 +167,7 @@ class PartCode:
         self.trace.label(made, name)
         return made
 
-    def source(self, source: Source) -> str:
+    def source(self, source: SignalSource) -> str:
         """Name of a signal that another part needs."""
         return f"x_{self.model.parts[source.part].name}_{source.signal.replace('.', '_')}"
 
@@ -224,15 +224,15 @@ class PartCode:
         return [node for node in found if node.op not in LEAVES]
 
     @cached_property
-    def outside(self) -> dict[str, Stored]:
+    def outside(self) -> dict[str, SignalId]:
         """Names of what is read of records: samples of taps, and inputs as they come."""
         found = {}
         for tap in self.taps:
             for j, name in enumerate(self.tap_samples(tap)):
-                found[name] = Stored(self.part, "tap", f"{tap.input}.{j}")
+                found[name] = SignalId(self.part, "tap", f"{tap.input}.{j}")
         for name, node in self.inputs.items():
             if node == graph.name(f"x_{self.own.tap(name).signal}"):
-                found[node.value] = Stored(self.part, "input", name)
+                found[node.value] = SignalId(self.part, "input", name)
         return found
 
     def signal(self, path: str) -> Node:
@@ -240,7 +240,7 @@ class PartCode:
         signals = self.known.get("signals", Tuple(None, ()))
         return {**dict(leaves(self.state)), **dict(leaves(signals))}[path]
 
-    def node(self, stored: Stored) -> Node:
+    def node(self, stored: SignalId) -> Node:
         """A number that is kept."""
         if stored.kind in ("tap", "input"):
             return next(graph.name(n) for n, each in self.outside.items() if each == stored)

@@ -28,7 +28,7 @@ from swashplate.equations.fields import (
 from swashplate.equations.keeping import kept, key_of
 from swashplate.equations.language import plain
 from swashplate.equations.marching.march import march_source
-from swashplate.equations.marching.part import Stored, taps_of
+from swashplate.equations.marching.part import SignalId, taps_of
 from swashplate.equations.marching.pieces import (
     PIECE_KINDS,
     Piece,
@@ -60,7 +60,7 @@ def check_start(start: str) -> None:
         raise InputError(f"start is '{start}'; it is 'rest' or 'steady'.")
 
 
-class Part(NamedTuple):
+class PartNumbers(NamedTuple):
     """Numbers of a part of a model."""
 
     p: Any
@@ -95,7 +95,7 @@ class Instance:
     """A model with its numbers."""
 
     model: Model
-    parts: tuple[Part, ...]
+    parts: tuple[PartNumbers, ...]
     name: str
 
     @cached_property
@@ -143,7 +143,7 @@ class Instance:
         rest = [[each.fraction, each.slope] for each in found]
         return Places(whole, *np.array(rest).reshape(-1, 2).T.copy())
 
-    def number_at(self, stored: Stored, before: Mapping[str, float], h: float) -> float:
+    def number_at(self, stored: SignalId, before: Mapping[str, float], h: float) -> float:
         """Number that is known ahead of a sample, of constant records; 0 for the place of a tap."""
         own, kind, path = self.parts[stored.part], stored.kind, stored.path
         if kind in ("p", "given"):
@@ -290,9 +290,9 @@ def instance_of(model: Model, p: Any, *, options: Any = None, given: Any = None)
     """
     parts = []
     for part in model.parts:
-        own = Part(p, options, given)
+        own = PartNumbers(p, options, given)
         if len(model.parts) > 1:
-            own = Part(*(getattr(each, part.name, None) for each in own))
+            own = PartNumbers(*(getattr(each, part.name, None) for each in own))
         if own.options is None and part.options is not None:
             own = own._replace(options=part.options())
         kinds = {"parameters": part.parameters, "options": part.options, "given": part.given}
@@ -388,8 +388,8 @@ def march_of(
     model: Model,
     signals: tuple[str, ...],
     options: tuple[Any, ...],
-    stored: tuple[Stored, ...],
-    more: tuple[Stored, ...] = (),
+    stored: tuple[SignalId, ...],
+    more: tuple[SignalId, ...] = (),
 ) -> Planned:
     """The march over whole records, a row for each number that is kept, then for each of `more`."""
     rows = {each: f"flat[{row} * count + n]" for row, each in enumerate((*stored, *more))}
@@ -408,11 +408,11 @@ def marched(
     records: Mapping[str, Array],
     h: float,
     started: Started,
-    stored: tuple[Stored, ...],
+    stored: tuple[SignalId, ...],
     cause: str = "input",
     begin: Mapping[str, float] = MappingProxyType({}),
     *,
-    more: tuple[Stored, ...] = (),
+    more: tuple[SignalId, ...] = (),
     everything: bool = False,
 ) -> Array:
     """(r, n) numbers in the order of `stored`, marched over whole records; limits as sums of bits.
@@ -436,7 +436,7 @@ def marched(
 
 
 def check_outputs(
-    instance: Instance, stored: Sequence[Stored], table: Array, h: float, cause: str
+    instance: Instance, stored: Sequence[SignalId], table: Array, h: float, cause: str
 ) -> None:
     """Refuse samples that are not finite; of (r, n) or (r,) numbers the first one is named."""
     with np.errstate(all="ignore"):

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.equations.marching.derivatives import BoundModel
-from swashplate.equations.marching.observation import Own, every_sample
+from swashplate.equations.marching.observation import RunValues, every_sample
 from swashplate.equations.marching.record import Sampling
 from swashplate.equations.marching.run import Start, begun, instance_of
 from swashplate.equations.marching.use import Command, Run, inputs_of
@@ -122,4 +122,4 @@ def sensitivities(
             raise InputError(
                 f"{model.name} has no parameter '{path}'; it has {', '.join(known) or 'none'}."
             )
-    return Sensitivities(run, columns, BoundModel(instance, Own(run.begin), columns))
+    return Sensitivities(run, columns, BoundModel(instance, RunValues(run.begin), columns))

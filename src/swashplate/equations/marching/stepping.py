@@ -5,15 +5,15 @@ Examples
 >>> valve = compiled_step(model, Valve(0.05, 0.1), ("command",), ("position",), rate=512.0)
 >>> step = valve.step
 >>> @kernel
-... def positioned(machine, target, path):
+... def positioned(context, target, path):
 ...     worst = inf
 ...     for n in range(path.size):
-...         machine.inputs[0] = 5.0 * (target - machine.outputs[0])
-...         worst = min(worst, step(machine))
-...         path[n] = machine.outputs[0]
+...         context.inputs[0] = 5.0 * (target - context.outputs[0])
+...         worst = min(worst, step(context))
+...         path[n] = context.outputs[0]
 ...     return worst
->>> machine = valve.machine()
->>> valve.check(machine, positioned(machine, 0.2, path))
+>>> context = valve.context()
+>>> valve.check(context, positioned(context, 0.2, path))
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from swashplate.equations.code_generation.functions import generating
 from swashplate.equations.keeping import kept, key_of
 from swashplate.equations.marching.march import output_of, step_source
-from swashplate.equations.marching.part import Stored
+from swashplate.equations.marching.part import SignalId
 from swashplate.equations.marching.record import check_rate
 from swashplate.equations.marching.run import (
     Instance,
@@ -43,7 +43,7 @@ from swashplate.errors import InputError
 Array = NDArray[np.float64]
 
 
-class Machine(NamedTuple):
+class StepContext(NamedTuple):
     """A model's numbers in a loop: what a compiled step takes, and all that it remembers."""
 
     inputs: Array
@@ -61,8 +61,8 @@ class Machine(NamedTuple):
     h: float
     """[s]"""
 
-    def copied(self) -> Machine:
-        """The machine with a memory of its own: both go on from here apart."""
+    def copied(self) -> StepContext:
+        """A copy that remembers for itself: both go on from here independently."""
         own = {
             name: getattr(self, name).copy() for name in ("inputs", "outputs", "states", "lines")
         }
@@ -71,8 +71,8 @@ class Machine(NamedTuple):
 
 @generating
 def _kernels(
-    model: Model, inputs: tuple[str, ...], options: tuple[Any, ...], stored: tuple[Stored, ...]
-) -> tuple[Callable[..., None], Callable[[Machine], float], int]:
+    model: Model, inputs: tuple[str, ...], options: tuple[Any, ...], stored: tuple[SignalId, ...]
+) -> tuple[Callable[..., None], Callable[[StepContext], float], int]:
     """Compiled constants of a model, its step, and how many constants there are."""
     text, count = kept(
         f"{model.name}_step",
@@ -91,7 +91,7 @@ class CompiledStep:
     Attributes
     ----------
     step : callable
-        ``step(machine) -> margin``: reads ``machine.inputs``, fills ``machine.outputs`` with the
+        ``step(context) -> margin``: reads ``context.inputs``, fills ``context.outputs`` with the
         same sample, takes the state to the next one, and returns the margin of the model's domain.
         A `kernel` that calls it inlines it; numbers are those of `simulate` to the last bit.
     inputs, outputs : tuple of str
@@ -99,7 +99,7 @@ class CompiledStep:
     """
 
     def __init__(
-        self, instance: Instance, inputs: Sequence[str], stored: Sequence[Stored], h: float
+        self, instance: Instance, inputs: Sequence[str], stored: Sequence[SignalId], h: float
     ) -> None:
         self._instance, self._h, self._stored = instance, h, tuple(stored)
         self.inputs = tuple(inputs)
@@ -115,8 +115,10 @@ class CompiledStep:
             f"{', '.join(self.outputs)}, {1.0 / self._h:g} Hz)"
         )
 
-    def machine(self, first: Mapping[str, float] | None = None, start: Start = "rest") -> Machine:
-        """A machine at its start, at rest or settled under the `first` inputs, by default zero."""
+    def context(
+        self, first: Mapping[str, float] | None = None, start: Start = "rest"
+    ) -> StepContext:
+        """A context at its start: at rest, or settled under the `first` inputs (default: 0)."""
         found, first = self._instance, first or {}
         values = {name: float(first.get(name, 0.0)) for name in self.inputs}
         newest = np.array([*values.values()])
@@ -129,12 +131,12 @@ class CompiledStep:
             lines[:] = newest[:, None]
         outputs, states = np.zeros(len(self.outputs)), found.start(values, self._h, start).flat
         own = places.whole, places.fraction, found.params, found.given, constants, self._h
-        return Machine(newest, outputs, states, lines, *own)
+        return StepContext(newest, outputs, states, lines, *own)
 
-    def check(self, machine: Machine, margin: float, cause: str = "input") -> None:
+    def check(self, context: StepContext, margin: float, cause: str = "input") -> None:
         """Refuse what a loop has computed outside the model's equations.
 
-        `machine` is as the loop has left it, `margin` the least that the steps have returned, and
+        `context` is as the loop has left it, `margin` the least that the steps have returned, and
         `cause` what has driven the model, for the sentence.
 
         Raises
@@ -143,8 +145,8 @@ class CompiledStep:
             If the margin is not above 0, or a number of the state or of the newest outputs is not
             finite.
         """
-        check_domain(self._instance, machine.states, margin, cause)
-        check_outputs(self._instance, self._stored, machine.outputs, self._h, cause)
+        check_domain(self._instance, context.states, margin, cause)
+        check_outputs(self._instance, self._stored, context.outputs, self._h, cause)
 
 
 def compiled_step(
@@ -179,13 +181,13 @@ def compiled_step(
     return CompiledStep(instance, inputs, stored_of(model, outputs), 1.0 / rate)
 
 
-def stored_of(model: Model, outputs: Sequence[str]) -> tuple[Stored, ...]:
+def stored_of(model: Model, outputs: Sequence[str]) -> tuple[SignalId, ...]:
     """Where the outputs of a step come from; ``"limits"`` of the last part that has any."""
     found = []
     limited = [i for i, part in enumerate(model.parts) if part.limits is not None]
     for output in outputs:
         if output == "limits" and limited:
-            found.append(Stored(limited[-1], "limits"))
+            found.append(SignalId(limited[-1], "limits"))
             continue
         stored, integral = output_of(model, output)
         if integral:

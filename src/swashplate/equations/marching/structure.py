@@ -26,14 +26,14 @@ from swashplate.equations.declaration import JIT_OFF
 from swashplate.equations.graph import Node, names_in, rewritten
 from swashplate.equations.keeping import kept, key_of
 from swashplate.equations.marching.march import Sampler, march_source, output_of
-from swashplate.equations.marching.part import PartCode, Stored
+from swashplate.equations.marching.part import PartCode, SignalId
 from swashplate.equations.marching.pieces import PIECE
 from swashplate.equations.marching.rows import STRIDE
 from swashplate.equations.marching.run import PlannedPiece
-from swashplate.equations.model import Model, Source
+from swashplate.equations.model import Model, SignalSource
 from swashplate.errors import InputError
 
-Moved = tuple[Stored, str]
+Moved = tuple[SignalId, str]
 """A number, and the column that it is derived by."""
 
 
@@ -54,7 +54,7 @@ class Term(NamedTuple):
 class Group(NamedTuple):
     """States of a part that wait for each other, in one recurrence."""
 
-    states: tuple[Stored, ...]
+    states: tuple[SignalId, ...]
     factors: list[int]  # Places of their partial derivatives by each other.
     piece: int  # See `recurrence`.
 
@@ -66,14 +66,14 @@ class PartStructure(NamedTuple):
     fill: int | None  # Piece that fills in its partial derivatives.
     rows: range  # Places of these.
     groups: list[Group]
-    needed: list[Stored]  # Signals that other parts or links need.
-    behind: dict[Stored, Stored]  # Signals that equal a state at the next sample.
+    needed: list[SignalId]  # Signals that other parts or links need.
+    behind: dict[SignalId, SignalId]  # Signals that equal a state at the next sample.
 
 
 class Starting(NamedTuple):
     """Constants and states at the start with their derivatives, as a function of scalars."""
 
-    arguments: tuple[Stored, ...]
+    arguments: tuple[SignalId, ...]
     moves: tuple[Moved, ...]
     """What is derived, by which column: the last numbers that `derived` gives."""
     derived: Derived
@@ -84,9 +84,9 @@ class Facts(NamedTuple):
 
     size: int
     """Of the block; its first row is for what nobody reads."""
-    row_of: dict[Stored, int]
+    row_of: dict[SignalId, int]
     """First place of each number that the march leaves in the block."""
-    partials: dict[Stored, dict[Stored, Term]]
+    partials: dict[SignalId, dict[SignalId, Term]]
     """Of each result (signal, or state at the next sample) its partial derivatives by parameters
     (``p``), constants (``k``), places of taps (``fraction``), states and signals."""
     pieces: list[PlannedPiece]
@@ -108,7 +108,7 @@ class Structure:
     facts: Facts
 
     @cached_property
-    def observed(self) -> list[tuple[Stored, bool]]:
+    def observed(self) -> list[tuple[SignalId, bool]]:
         """What is observed, and whether as an integral."""
         return [output_of(self.model, each) for each in self.outputs]
 
@@ -163,9 +163,9 @@ class _Structuring:
         self.observed = [output_of(model, each)[0] for each in observed]
         self.sampler = Sampler(model, signals, options, self.observed)
         self.size = STRIDE
-        self.row_of: dict[Stored, int] = {}
+        self.row_of: dict[SignalId, int] = {}
         self._named: dict[str, int] = {}  # Place of each number's row by its name in the code.
-        self.partials: dict[Stored, dict[Stored, Term]] = {}
+        self.partials: dict[SignalId, dict[SignalId, Term]] = {}
         self.pieces: list[PlannedPiece] = []
         self._constants: dict[int, dict[Node, str]] = {}
         """By part, what follows from parameters alone, with its names."""
@@ -184,16 +184,16 @@ class _Structuring:
         """What was found out."""
         return Facts(self.size, self.row_of, self.partials, self.pieces, self.parts)
 
-    def as_stored(self, source: Source) -> Stored:
+    def signal_id_of(self, source: SignalSource) -> SignalId:
         """A signal of a part, or of its state."""
         state = source.signal in dict(leaves(self.sampler.parts[source.part].state))
-        return Stored(source.part, "state" if state else "signals", source.signal)
+        return SignalId(source.part, "state" if state else "signals", source.signal)
 
     def _row(self) -> int:
         self.size += STRIDE
         return self.size - STRIDE
 
-    def _keep(self, stored: Stored, name: str = "") -> None:
+    def _keep(self, stored: SignalId, name: str = "") -> None:
         """Have the march leave a number, which has a name in the code."""
         if stored not in self.row_of:
             self.row_of[stored] = self._row()
@@ -206,11 +206,11 @@ class _Structuring:
         """Differentiate what is needed of a part, and plan its pieces."""
         i, sampler = part.part, self.sampler
         observed = [place for place in self.observed if place.part == i]
-        needed = [self.as_stored(source) for source in sampler.sources if source.part == i]
-        states = {path: Stored(i, "state", path) for path in sampler.carried[i]}
+        needed = [self.signal_id_of(source) for source in sampler.sources if source.part == i]
+        states = {path: SignalId(i, "state", path) for path in sampler.carried[i]}
         following, here = dict(leaves(part.following)), dict(leaves(part.state))
         results = {state: following[path] for path, state in states.items()}
-        behind: dict[Stored, Stored] = {}
+        behind: dict[SignalId, SignalId] = {}
         for each in dict.fromkeys([*needed, *observed]):
             if each.kind == "signals":
                 node = part.signal(each.path)
@@ -243,21 +243,21 @@ class _Structuring:
             groups.append(Group(group, factors, len(self.pieces)))
         return PartStructure(i, filled, rows, groups, needed, behind)
 
-    def _fill(self, part: PartCode, results: Mapping[Stored, Node]) -> tuple[int | None, range]:
+    def _fill(self, part: PartCode, results: Mapping[SignalId, Node]) -> tuple[int | None, range]:
         """Piece that writes partial derivatives at known states into rows; places of these."""
         i, ends = part.part, [*results.values()]
-        by: dict[Node, Stored] = {
-            graph.name(name): Stored(i, "p", path) for name, path in part.parameters.items()
+        by: dict[Node, SignalId] = {
+            graph.name(name): SignalId(i, "p", path) for name, path in part.parameters.items()
         }
         _, known = self.sampler.ahead(part, ends)
         self._constants[i] = {node: known[node] for node in part.ahead(ends)}
-        by |= {node: Stored(i, "k", name) for node, name in self._constants[i].items()}
-        by |= {node: Stored(i, "state", path) for path, node in leaves(part.state)}
+        by |= {node: SignalId(i, "k", name) for node, name in self._constants[i].items()}
+        by |= {node: SignalId(i, "state", path) for path, node in leaves(part.state)}
         for tap in part.taps:
             if tap.tap.delay:
-                by[graph.name(part.fraction(tap))] = Stored(i, "fraction", str(tap.number))
+                by[graph.name(part.fraction(tap))] = SignalId(i, "fraction", str(tap.number))
         for source in self.sampler.sources:
-            by[graph.name(part.source(source))] = self.as_stored(source)
+            by[graph.name(part.source(source))] = self.signal_id_of(source)
         found, order, moving = Gradients(ends, [*by]), [*results], [*by.values()]
         self.partials |= {each: {} for each in order}
         first, wanted = self.size, dict[int, Node]()
@@ -292,11 +292,11 @@ class _Structuring:
         self.pieces.append(PlannedPiece(file, name, self.sampler.module(text)))
         return len(self.pieces), range(first, self.size)
 
-    def _link(self, place: Stored) -> dict[Stored, Term]:
+    def _link(self, place: SignalId) -> dict[SignalId, Term]:
         """Partial derivatives of a link: numbers, or refused."""
         part, link = self.sampler.parts[place.part], self.model.links[place.path]
         made = self.sampler.observed(part, place)
-        by = {graph.name(part.source(each)): self.as_stored(each) for each in link.sources}
+        by = {graph.name(part.source(each)): self.signal_id_of(each) for each in link.sources}
         partials = Gradients([made], [*by]).partials
         if any(node.op != "number" for node in partials.values()):
             raise InputError(
@@ -312,7 +312,7 @@ class _Structuring:
         """Constants and states where a record begins, with their derivatives."""
         sampler = self.sampler
         outside = {n: each for n, each in sampler.outside().items() if each.kind != "state"}
-        results: dict[Stored, Node] = {}
+        results: dict[SignalId, Node] = {}
         by: dict[str, str] = {}
         begins: dict[Node, Node] = {}
         """What names stand for where the record begins."""
@@ -329,7 +329,7 @@ class _Structuring:
                 graph.name(part.source(source)): node
                 for (source, _), node in zip(own, signals, strict=True)
             }
-            results |= {Stored(i, "k", name): node for node, name in self._constants[i].items()}
+            results |= {SignalId(i, "k", name): node for node, name in self._constants[i].items()}
             carried = [each for each in self.partials if each[:2] == (i, "state")]
             results |= {state: starts[state.path] for state in carried}
             by |= {name: f"{prefix}{path}" for name, path in part.parameters.items()}
@@ -397,7 +397,7 @@ def _sum(terms: Sequence[str]) -> str:
     return terms[0] if not half else f"({_sum(terms[:half])} + {_sum(terms[half:])})"
 
 
-def _strongly_connected(flows: Mapping[Stored, list[Stored]]) -> Iterable[tuple[Stored, ...]]:
+def _strongly_connected(flows: Mapping[SignalId, list[SignalId]]) -> Iterable[tuple[SignalId, ...]]:
     """States in groups that wait for each other, each group behind those that it needs."""
     reach = {each: {each} for each in flows}
     for _ in flows:  # no way is longer
@@ -407,7 +407,7 @@ def _strongly_connected(flows: Mapping[Stored, list[Stored]]) -> Iterable[tuple[
         each: tuple(other for other in flows if other in reach[each] and each in reach[other])
         for each in flows
     }
-    order: TopologicalSorter[tuple[Stored, ...]] = TopologicalSorter()
+    order: TopologicalSorter[tuple[SignalId, ...]] = TopologicalSorter()
     for each in flows:
         others = dict.fromkeys(group[i] for i in flows[each])
         order.add(group[each], *(other for other in others if other != group[each]))

@@ -31,7 +31,7 @@ from swashplate.equations.cache import kernel
 from swashplate.equations.code_generation.functions import generating
 from swashplate.equations.fields import check_mapping
 from swashplate.equations.marching.march import output_of
-from swashplate.equations.marching.part import Stored
+from swashplate.equations.marching.part import SignalId
 from swashplate.equations.marching.record import (
     Between,
     Record,
@@ -47,7 +47,7 @@ from swashplate.equations.marching.run import (
     instance_of,
     marched,
 )
-from swashplate.equations.marching.stepping import CompiledStep, Machine
+from swashplate.equations.marching.stepping import CompiledStep, StepContext
 from swashplate.equations.model import Model
 from swashplate.errors import DomainError, InputError, UnknownNameError
 from swashplate.results import GivenAxes, Tabular, figures, pandas_frame
@@ -63,21 +63,21 @@ S = TypeVar("S")
 T = TypeVar("T", bound=np.generic)
 
 
-class Left(NamedTuple):
+class MarchOutputs(NamedTuple):
     """What a march leaves, by name: at first, and besides if it is to leave everything."""
 
-    first: dict[str, Stored]
-    more: dict[str, Stored]
+    first: dict[str, SignalId]
+    more: dict[str, SignalId]
 
 
 @lru_cache(maxsize=256)
-def left_by(model: Model, kept: tuple[str, ...]) -> Left:
+def left_by(model: Model, kept: tuple[str, ...]) -> MarchOutputs:
     """What a march leaves of a model of which some signals are kept from the first march."""
     first = {name: output_of(model, name)[0] for name in kept or model.every_signal}
     more = {name: output_of(model, name)[0] for name in model.every_signal if name not in first}
     limited = dict.fromkeys(part for part, _ in model.limit_bits.values())
-    more |= {f"limits {part}": Stored(part, "limits") for part in limited}
-    return Left(first, more)
+    more |= {f"limits {part}": SignalId(part, "limits") for part in limited}
+    return MarchOutputs(first, more)
 
 
 def read_only(array: NDArray[T]) -> NDArray[T]:
@@ -472,12 +472,12 @@ def simulate(
 
 
 @generating
-def _steps(step: Callable[[Machine], float]) -> Callable[..., tuple[float, bool]]:
+def _steps(step: Callable[[StepContext], float]) -> Callable[..., tuple[float, bool]]:
     """The compiled march over the steps of one sample."""
 
     @kernel
     def steps(
-        inputs: Array, held: NDArray[np.bool_], substeps: int, machine: Machine,
+        inputs: Array, held: NDArray[np.bool_], substeps: int, context: StepContext,
         rates: NDArray[np.int64], totals: Array,
     ) -> tuple[float, bool]:  # fmt: skip
         """Advance by one sample, from the inputs before to these; `totals` as in `StepperState`.
@@ -487,20 +487,20 @@ def _steps(step: Callable[[Machine], float]) -> Callable[..., tuple[float, bool]
         worst = np.inf
         for j in range(substeps):
             for i in range(held.size):
-                machine.inputs[i] = inputs[1, i]
+                context.inputs[i] = inputs[1, i]
                 if j < substeps - 1:
                     rise = 0.0 if held[i] else (j + 1) / substeps
-                    machine.inputs[i] = inputs[0, i] + rise * (inputs[1, i] - inputs[0, i])
-            worst = min(worst, step(machine))
+                    context.inputs[i] = inputs[0, i] + rise * (inputs[1, i] - inputs[0, i])
+            worst = min(worst, step(context))
             for r in range(rates.size):
-                rate = machine.outputs[rates[r]]
-                totals[0, r] = totals[0, r] + 0.5 * machine.h * (totals[1, r] + rate)
+                rate = context.outputs[rates[r]]
+                totals[0, r] = totals[0, r] + 0.5 * context.h * (totals[1, r] + rate)
                 totals[1, r] = rate
         inputs[0] = inputs[1]
         finite = True
-        for state in machine.states:
+        for state in context.states:
             finite = finite and np.isfinite(state)
-        for output in machine.outputs:
+        for output in context.outputs:
             finite = finite and np.isfinite(output)
         for total in totals[0]:
             finite = finite and np.isfinite(total)
@@ -512,7 +512,7 @@ def _steps(step: Callable[[Machine], float]) -> Callable[..., tuple[float, bool]
 class StepperState(NamedTuple):
     """All that a stepper remembers, good to keep and to return to."""
 
-    machine: Machine
+    context: StepContext
     totals: Array
     """Integrals so far, and their rates at the sample."""
     inputs: Array
@@ -522,8 +522,8 @@ class StepperState(NamedTuple):
 
     def copied(self) -> StepperState:
         """The state with a memory of its own."""
-        machine, totals, inputs, begun = self
-        return StepperState(machine.copied(), totals.copy(), inputs.copy(), begun)
+        context, totals, inputs, begun = self
+        return StepperState(context.copied(), totals.copy(), inputs.copy(), begun)
 
 
 class Stepper(Generic[S]):
@@ -554,7 +554,7 @@ class Stepper(Generic[S]):
         self._ranges = [ranges.get(name, (-LARGEST, LARGEST)) for name in inputs]
         self.inputs, limits = tuple(inputs), instance.model.limit_bits
         found = [
-            (Stored(limits[name][0], "limits"), False)
+            (SignalId(limits[name][0], "limits"), False)
             if name in limits
             else output_of(instance.model, name)
             for name in outputs
@@ -572,7 +572,7 @@ class Stepper(Generic[S]):
         self._compiled = CompiledStep(instance, inputs, stored, 1.0 / (rate * self._substeps))
         self._steps = _steps(self._compiled.step)
         totals, values = np.zeros((2, len(rates))), np.zeros((2, len(inputs)))
-        self._state = StepperState(self._compiled.machine(), totals, values, False)
+        self._state = StepperState(self._compiled.context(), totals, values, False)
 
     def __repr__(self) -> str:
         return f"Stepper({self._compiled!r})"
@@ -584,11 +584,11 @@ class Stepper(Generic[S]):
 
     @state.setter
     def state(self, state: StepperState) -> None:
-        own, given = self._state.machine, state.machine
+        own, given = self._state.context, state.context
         if given.lines.shape != own.lines.shape or given.states.size != own.states.size:
             raise InputError("This state belongs to a stepper of another model, delay or rate.")
         memory = {name: getattr(given, name) for name in ("states", "outputs", "lines", "inputs")}
-        self._state = state._replace(machine=own._replace(**memory)).copied()
+        self._state = state._replace(context=own._replace(**memory)).copied()
 
     def step(self, *inputs: float) -> S:
         """Advance by one sample interval.
@@ -625,21 +625,21 @@ class Stepper(Generic[S]):
                 room = f" within ±{high:g}" if low == -high else f" from {low:g} to {high:g}"
                 room = "" if low == -LARGEST else room
                 raise InputError(f"The {name} is {value!r}, but must be a finite number{room}.")
-        machine, totals, values, begun = self._state
+        context, totals, values, begun = self._state
         values[1] = inputs
         if not begun:
             if self._start == "steady":
                 first = dict(zip(self.inputs, inputs, strict=True))
-                machine = self._compiled.machine(first, "steady")
-            self._state = StepperState(machine, totals, values, True)
+                context = self._compiled.context(first, "steady")
+            self._state = StepperState(context, totals, values, True)
         substeps = self._substeps if begun else 1
-        worst, finite = self._steps(values, self._held, substeps, machine, self._rates, totals)
+        worst, finite = self._steps(values, self._held, substeps, context, self._rates, totals)
         if not begun:
             totals[0] = 0.0
         if not (worst > 0.0 and finite):
-            self._compiled.check(machine, worst, self.inputs[0])
+            self._compiled.check(context, worst, self.inputs[0])
             raise DomainError(f"{self._name}: an integral overflows under this {self.inputs[0]}.")
-        row = [*inputs, *machine.outputs.tolist(), *totals[0].tolist()]
+        row = [*inputs, *context.outputs.tolist(), *totals[0].tolist()]
         return self._sample([row[at] for at in self._order])
 
 

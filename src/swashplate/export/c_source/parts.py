@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, get_type_hints
 
 from swashplate.equations import graph
 from swashplate.equations.code_generation.functions import FUNCTIONS, RESERVED, Function, fresh_name
-from swashplate.equations.code_generation.printing import STEMS, Block, assigned
+from swashplate.equations.code_generation.printing import STEMS, CodeBlock, assigned
 from swashplate.equations.code_generation.printing_c import (
     C,
     as_double,
@@ -28,7 +28,7 @@ from swashplate.equations.code_generation.values import Tuple, Value, fixed, lea
 from swashplate.equations.graph import LEAVES, MATH_FUNCTIONS, Node, names_in, ordered
 from swashplate.equations.language import Parsed
 from swashplate.equations.marching.part import PartCode
-from swashplate.equations.model import Equation, Source, arguments_of
+from swashplate.equations.model import Equation, SignalSource, arguments_of
 
 if TYPE_CHECKING:
     from swashplate.export.c_source.model import Writer
@@ -171,7 +171,7 @@ class PartInC:
         known |= {node: f"k->{name}" for node, name in self.constants.items()}
         for i, part in enumerate(self.w.e.model.parts[: self.number]):
             for path in part.signal_names:
-                source = Source(i, path)
+                source = SignalSource(i, path)
                 known[graph.name(self.part.source(source))] = self.w.place(source, "before")
         return known
 
@@ -209,7 +209,7 @@ class PartInC:
         nodes += [last] if last is not None else []
         language = C(self.w.loops, trace.origins, taken)
         labels = self.labels(trace, nodes)
-        block = Block(nodes, labels, taken, known={**known, **names}, language=language)
+        block = CodeBlock(nodes, labels, taken, known={**known, **names}, language=language)
         lines, texts = language.headed(block.lines), iter(block.texts)
         for word, each in results.items():
             lines += [""] if each and lines else []
@@ -262,7 +262,7 @@ class PartInC:
 
     def _looked(self, value: Node, places: Mapping[Node, str]) -> str:
         """What a tap makes of its window, as one expression."""
-        block = Block([value], {}, set(), known=places, language=C(self.w.loops, {}, set()))
+        block = CodeBlock([value], {}, set(), known=places, language=C(self.w.loops, {}, set()))
         assert not block.lines
         return block.texts[0]
 
@@ -351,7 +351,7 @@ class PartInC:
                 known[node] = f"{array}[{places.index((self.number, path))}]"
         for name, node in self.options.items():
             known[node] = f"options[{self.w.e.options.index((self.number, name))}]"
-        block = Block([*self.constants], self._labels, taken, known=known)
+        block = CodeBlock([*self.constants], self._labels, taken, known=known)
         first = self.w.first_constant(self.number)
         lines = [*block.lines]
         for k, text in enumerate(block.texts):

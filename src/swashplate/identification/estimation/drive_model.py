@@ -28,7 +28,7 @@ from swashplate.drive import (
     simulate_drive,
 )
 from swashplate.equations import BoundModel
-from swashplate.equations.marching.observation import Observation, ObservedRecord, Own
+from swashplate.equations.marching.observation import Observation, ObservedRecord, RunValues
 from swashplate.equations.marching.record import (
     SLOWEST,
     SOURCE_RATE,
@@ -337,7 +337,7 @@ class DriveModel(Result, EquationModel):
             if name in values
             for state in self._states_started_by(name)
         }
-        parameters, own = self.parameters_at(values), Own(states, asked.offsets)
+        parameters, own = self.parameters_at(values), RunValues(states, asked.offsets)
         try:
             return bound_drive(parameters, asked.observed, asked.columns, own)
         except InputError as error:  # a filter that is unstable at this step
