@@ -11,7 +11,7 @@ from swashplate import DomainError, Drive, InputError
 from swashplate.drive import drive_instance
 from swashplate.equations import instance_of
 from swashplate.equations.declaration import equation
-from swashplate.equations.marching.part import SignalId
+from swashplate.equations.marching.part_code import SignalId
 from swashplate.equations.marching.run import Instance, PartNumbers, marched
 from swashplate.equations.model import Model, Tap, discretised, join
 from swashplate.linear import LinearModel, linearize

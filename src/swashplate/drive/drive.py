@@ -22,8 +22,8 @@ from swashplate.drive.records import Given, drive_records
 from swashplate.drive.simulation import Simulation
 from swashplate.equations.marching.record import SOURCE_RATE, Interpolation, check_rate
 from swashplate.equations.marching.run import Start
+from swashplate.equations.marching.simulation import Stepper
 from swashplate.equations.marching.stepping import CompiledStep, stored_of
-from swashplate.equations.marching.use import Stepper
 from swashplate.equations.model import Equation
 from swashplate.equations.replacement import Replacement
 from swashplate.errors import InputError

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from swashplate.drive.instance import card_of, drive_instance, models_of, without_ripple
 from swashplate.equations.declaration import interpreted
 from swashplate.equations.fields import is_real
-from swashplate.equations.marching.part import SignalId
+from swashplate.equations.marching.part_code import SignalId
 from swashplate.equations.marching.record import SOURCE_RATE
 from swashplate.equations.marching.run import Started, called, marched
 from swashplate.errors import DomainError, InputError

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.drive.signals import KEPT, MOTOR, SIGNALS, UNITS
-from swashplate.equations.marching.use import Run, read_only
+from swashplate.equations.marching.simulation import Run, read_only
 from swashplate.errors import InputError
 from swashplate.models.displacement_control import Pump
 from swashplate.results import Named, figures

@@ -19,13 +19,13 @@ from .marching.run import Instance as Instance
 from .marching.run import instance_of as instance_of
 from .marching.sensitivity import Sensitivities as Sensitivities
 from .marching.sensitivity import sensitivities as sensitivities
+from .marching.simulation import Run as Run
+from .marching.simulation import Stepper as Stepper
+from .marching.simulation import simulate as simulate
+from .marching.simulation import stepper as stepper
 from .marching.stepping import CompiledStep as CompiledStep
 from .marching.stepping import StepContext as StepContext
 from .marching.stepping import compiled_step as compiled_step
-from .marching.use import Run as Run
-from .marching.use import Stepper as Stepper
-from .marching.use import simulate as simulate
-from .marching.use import stepper as stepper
 from .model import Model as Model
 from .model import Tap as Tap
 from .model import Window as Window

@@ -31,7 +31,7 @@ from swashplate.equations.marching.record import (
     least_substeps,
 )
 from swashplate.equations.marching.run import Instance, PartNumbers, Start
-from swashplate.equations.marching.use import Run, read_only
+from swashplate.equations.marching.simulation import Run, read_only
 from swashplate.errors import DomainError, InputError
 from swashplate.full_order.physical_set import QUANTITIES, PhysicalSet, from_lumped
 from swashplate.linear import linearize

@@ -10,7 +10,7 @@ import numpy as np
 from swashplate.equations.fields import check_mapping, floats_of, is_real, value_at
 from swashplate.equations.marching.march import output_of
 from swashplate.equations.marching.one_step import step_derivatives
-from swashplate.equations.marching.part import taps_of
+from swashplate.equations.marching.part_code import taps_of
 from swashplate.equations.marching.record import check_rate
 from swashplate.equations.marching.run import Instance, Started, called, outside
 from swashplate.equations.model import state_paths

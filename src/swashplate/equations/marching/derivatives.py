@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.equations.code_generation.functions import generating
+from swashplate.equations.marching.kernels import Struct, addresses, pointers
 from swashplate.equations.marching.layout import JacobianLayout, layout_of, started_by
 from swashplate.equations.marching.observation import ObservedRecord, RunValues
-from swashplate.equations.marching.pieces import Struct, addresses, pointers
 from swashplate.equations.marching.rows import (
     ROWS,
     Program,

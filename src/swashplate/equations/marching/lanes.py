@@ -34,9 +34,9 @@ from swashplate.equations.code_generation.values import leaves
 from swashplate.equations.declaration import JIT_OFF
 from swashplate.equations.graph import Node
 from swashplate.equations.keeping import kept, key_of
+from swashplate.equations.marching.kernels import FLOATS, INTS, pointers
 from swashplate.equations.marching.march import Sampler, lower, output_of
-from swashplate.equations.marching.part import PartCode, SignalId, taps_of
-from swashplate.equations.marching.pieces import FLOATS, INTS, pointers
+from swashplate.equations.marching.part_code import PartCode, SignalId, taps_of
 from swashplate.equations.marching.rows import aligned
 from swashplate.equations.marching.run import compiled
 from swashplate.equations.model import Model

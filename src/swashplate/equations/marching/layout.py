@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from swashplate.equations.code_generation.functions import generating
 from swashplate.equations.fields import floats_of
-from swashplate.equations.marching.part import SignalId, taps_of
-from swashplate.equations.marching.pieces import Struct
+from swashplate.equations.marching.kernels import Struct
+from swashplate.equations.marching.part_code import SignalId, taps_of
 from swashplate.equations.marching.rows import (
     CALL,
     COMBINE,

@@ -34,8 +34,8 @@ from swashplate.equations.code_generation.scheduling import Flat
 from swashplate.equations.code_generation.values import Value, leaves
 from swashplate.equations.fields import floats_of
 from swashplate.equations.graph import Node, names_in
-from swashplate.equations.marching.part import PartCode, SignalId
-from swashplate.equations.marching.pieces import PIECE
+from swashplate.equations.marching.kernels import PIECE
+from swashplate.equations.marching.part_code import PartCode, SignalId
 from swashplate.equations.model import Model, SignalSource
 from swashplate.errors import InputError
 

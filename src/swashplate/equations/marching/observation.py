@@ -9,7 +9,7 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swashplate.equations.marching.pieces import Struct
+from swashplate.equations.marching.kernels import Struct
 from swashplate.equations.marching.record import Record, column
 from swashplate.equations.marching.rows import Plan
 from swashplate.equations.marching.run import Start, check_start

@@ -11,7 +11,7 @@ from swashplate.equations.code_generation.values import leaves
 from swashplate.equations.graph import Node, names_in, rewritten
 from swashplate.equations.keeping import kept, key_of
 from swashplate.equations.marching.march import Sampler
-from swashplate.equations.marching.part import SignalId
+from swashplate.equations.marching.part_code import SignalId
 from swashplate.equations.model import Model
 
 

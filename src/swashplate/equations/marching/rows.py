@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.equations.code_generation.functions import generating
-from swashplate.equations.marching.pieces import (
+from swashplate.equations.marching.kernels import (
     Struct,
     behind,
     call,
@@ -310,7 +310,7 @@ def march_observed(pieces: Indices, arrays: Indices, size: int, h: float, struct
     """March block by block, and compare what comes with what was observed.
 
     `pieces` are addresses, of the march first, and `arrays` what they take from ``records`` on (see
-    `pieces.PIECE`), of a record of `size` samples with step `h`; `structs` is the address of a
+    `kernels.PIECE`), of a record of `size` samples with step `h`; `structs` is the address of a
     `March`.
     """
     march = fields_of(structs, March)

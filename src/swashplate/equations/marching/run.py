@@ -27,14 +27,14 @@ from swashplate.equations.fields import (
 )
 from swashplate.equations.keeping import kept, key_of
 from swashplate.equations.language import plain
-from swashplate.equations.marching.march import march_source
-from swashplate.equations.marching.part import SignalId, taps_of
-from swashplate.equations.marching.pieces import (
+from swashplate.equations.marching.kernels import (
     PIECE_KINDS,
     Piece,
     Planned,
     pointers,
 )
+from swashplate.equations.marching.march import march_source
+from swashplate.equations.marching.part_code import SignalId, taps_of
 from swashplate.equations.model import (
     Link,
     Model,
@@ -479,7 +479,7 @@ def arrays_of(
     met: Array,
     flat: Array,
 ) -> tuple[Any, ...]:
-    """What pieces take from ``records`` on (see `pieces.PIECE`); `values` must be kept as well."""
+    """What pieces take from ``records`` on (see `kernels.PIECE`); `values` must be kept as well."""
     before = np.array([*started.before.values()])
     numbers = instance.params, instance.given
     return (pointers(values), before, places.whole, places.fraction, *numbers, states, met, flat)

@@ -14,7 +14,7 @@ from swashplate.equations.marching.derivatives import BoundModel
 from swashplate.equations.marching.observation import RunValues, every_sample
 from swashplate.equations.marching.record import Sampling
 from swashplate.equations.marching.run import Start, begun, instance_of
-from swashplate.equations.marching.use import Command, Run, inputs_of
+from swashplate.equations.marching.simulation import Command, Run, inputs_of
 from swashplate.equations.model import Model, parameter_paths
 from swashplate.errors import DomainError, InputError
 

@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from swashplate.equations.code_generation.functions import generating
 from swashplate.equations.keeping import kept, key_of
 from swashplate.equations.marching.march import output_of, step_source
-from swashplate.equations.marching.part import SignalId
+from swashplate.equations.marching.part_code import SignalId
 from swashplate.equations.marching.record import check_rate
 from swashplate.equations.marching.run import (
     Instance,

@@ -25,9 +25,9 @@ from swashplate.equations.code_generation.values import leaves
 from swashplate.equations.declaration import JIT_OFF
 from swashplate.equations.graph import Node, names_in, rewritten
 from swashplate.equations.keeping import kept, key_of
+from swashplate.equations.marching.kernels import PIECE
 from swashplate.equations.marching.march import Sampler, march_source, output_of
-from swashplate.equations.marching.part import PartCode, SignalId
-from swashplate.equations.marching.pieces import PIECE
+from swashplate.equations.marching.part_code import PartCode, SignalId
 from swashplate.equations.marching.rows import STRIDE
 from swashplate.equations.marching.run import PlannedPiece
 from swashplate.equations.model import Model, SignalSource

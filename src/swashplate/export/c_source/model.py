@@ -31,7 +31,7 @@ from swashplate.equations.fields import Definition, declared_by, floats_of, valu
 from swashplate.equations.graph import Node, names_in
 from swashplate.equations.language import plain
 from swashplate.equations.marching.march import Sampler, output_of
-from swashplate.equations.marching.part import TapOf, taps_of
+from swashplate.equations.marching.part_code import TapOf, taps_of
 from swashplate.equations.marching.run import Instance, module
 from swashplate.equations.model import Equation, Link, Model, SignalSource
 from swashplate.export.c_source.parts import PartInC, path_of

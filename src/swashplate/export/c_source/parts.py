@@ -27,7 +27,7 @@ from swashplate.equations.code_generation.tracing import Trace
 from swashplate.equations.code_generation.values import Tuple, Value, fixed, leaves, undecided
 from swashplate.equations.graph import LEAVES, MATH_FUNCTIONS, Node, names_in, ordered
 from swashplate.equations.language import Parsed
-from swashplate.equations.marching.part import PartCode
+from swashplate.equations.marching.part_code import PartCode
 from swashplate.equations.model import Equation, SignalSource, arguments_of
 
 if TYPE_CHECKING:

@@ -31,7 +31,7 @@ from swashplate.equations.cache import kernel
 from swashplate.equations.code_generation.functions import generating
 from swashplate.equations.fields import check_mapping
 from swashplate.equations.marching.march import output_of
-from swashplate.equations.marching.part import SignalId
+from swashplate.equations.marching.part_code import SignalId
 from swashplate.equations.marching.record import (
     Between,
     Record,
