@@ -28,27 +28,27 @@ class Kernel:
 
     def __init__(self, drive: Drive, signal: str, values: Array) -> None:
         self.instance = drive_instance(drive.parameters, signal == "voltage")
-        started = self.instance.start({signal: float(values[0])}, STEP)
-        self.at_rest, self.states = started.flat, started.flat.copy()
+        initial = self.instance.start({signal: float(values[0])}, STEP)
+        self.at_rest, self.states = initial.flat, initial.flat.copy()
         kept = (SignalId(1, "signals", "shaft_speed"),)
         planned = march_of(self.instance.model, (signal,), self.instance.options, kept)
         self.march = planned()
-        self.out, self.met = np.empty((1, values.size)), np.empty(1)
+        self.out, self.worst_margin = np.empty((1, values.size)), np.empty(1)
         self.values = (values,)
-        places = self.instance.places((signal,), STEP)
+        delays = self.instance.tap_delays((signal,), STEP)
         self.arrays = arrays_of(
             self.instance,
             self.values,
-            started,
-            places,
+            initial,
+            delays,
             self.states,
-            self.met,
+            self.worst_margin,
             self.out.reshape(-1),
         )
 
     def __call__(self) -> Array:
         """The shaft speed from rest."""
-        self.states[:], self.met[:] = self.at_rest, np.inf
+        self.states[:], self.worst_margin[:] = self.at_rest, np.inf
         self.march(self.out.size, 0, STEP, *self.arrays)
         return self.out[0]
 

@@ -15,7 +15,7 @@ from swashplate.drive.instance import (
 from swashplate.drive.march import start_states
 from swashplate.drive.signals import check_output
 from swashplate.drive.simulation import Simulation
-from swashplate.equations.marching.derivatives import NOTHING_OWN, BoundModel
+from swashplate.equations.marching.derivatives import NO_RUN_VALUES, BoundModel
 from swashplate.equations.marching.observation import ObservedRecord, RunValues
 from swashplate.equations.marching.record import Record
 from swashplate.equations.marching.run import Start
@@ -49,7 +49,7 @@ def bound_drive(
     parameters: ParameterSet,
     observed: ObservedRecord,
     columns: Sequence[str] = (),
-    own: RunValues = NOTHING_OWN,
+    own: RunValues = NO_RUN_VALUES,
 ) -> BoundModel:
     """The drive's model with its numbers, for some columns.
 
@@ -78,7 +78,7 @@ def _bound(
     step: float,
     extremes: tuple[float, float],
     pump_is_seen: bool = True,
-    own: RunValues = NOTHING_OWN,
+    own: RunValues = NO_RUN_VALUES,
 ) -> BoundModel:
     """The model with numbers for some columns, under a command between two extremes."""
     if by_voltage:

@@ -109,12 +109,15 @@ class Tap(NamedTuple):
         return self.width or (3 if self.hold == "mean" else 2)
 
 
-class Place(NamedTuple):
-    """Where a tap reads at one step: whole samples back, the rest, and d(rest)/d(delay)."""
+class TapDelay(NamedTuple):
+    """Where a tap reads at one step."""
 
-    whole: int
+    samples: int
+    """Whole samples back."""
     fraction: float
+    """Further back by this fraction of a sample."""
     slope: float
+    """d(fraction)/d(delay). [1/s]"""
 
 
 class SignalSource(NamedTuple):
@@ -520,12 +523,13 @@ def state_paths(model: Model) -> tuple[str, ...]:
     return tuple(f"{model.prefix(i)}{path}" for i, path in model.places("state"))
 
 
-def place(tap: Tap, delay: float, h: float) -> Place:
+def tap_delay(tap: Tap, delay: float, h: float) -> TapDelay:
     """Where a tap reads at a step of `h` for a delay [s]."""
-    samples = delay / h
-    end = max(samples, tap.ahead) - tap.ahead
-    whole = int(end // 1.0)
-    return Place(whole, end - whole, 1.0 / h if samples >= tap.ahead else 0.0)
+    steps = delay / h
+    back = max(steps, tap.ahead) - tap.ahead
+    samples = int(back // 1.0)
+    slope = 1.0 / h if steps >= tap.ahead else 0.0
+    return TapDelay(samples, back - samples, slope)
 
 
 def arguments_of(equation: Equation) -> tuple[str, ...]:

@@ -37,6 +37,7 @@ from swashplate.full_order.physical_set import QUANTITIES, PhysicalSet, from_lum
 from swashplate.linear import linearize
 from swashplate.models import full_order as model
 from swashplate.models.displacement_control import Solenoids
+from swashplate.models.drive import Source as CurrentSource
 from swashplate.models.full_order import PlantOptions, PlantSignals
 from swashplate.models.machine import fastest_rate, relief_pressures
 from swashplate.parameters.definitions import CATALOGUE, DEFINITIONS, Definition, Definitions

@@ -322,9 +322,9 @@ def _cycles(
     instance: Instance, input: str, output: str, record: Array, step: float, steps: int
 ) -> Array:
     """Answer from the steady state under the first sample, a row for each cycle."""
-    started = instance.start({input: float(record[0])}, step, "steady")
+    initial = instance.start({input: float(record[0])}, step, "steady")
     seen, _ = output_of(instance.model, output)
-    (signal,) = marched(instance, {input: record}, step, started, (seen,), input)
+    (signal,) = marched(instance, {input: record}, step, initial, (seen,), input)
     return np.asarray(signal.reshape(-1, steps))
 
 

@@ -340,9 +340,12 @@ class LoopMargins(NamedTuple):
 
     crossover: float
     """Frequency at which |L| = 1 that leaves the smallest delay margin, 0 if there is none. [Hz]"""
-    phase_margin: float  # Phase of L above -180° there, infinite without a crossover. [rad]
-    delay_margin: float  # Further delay that makes the loop swing. [s]
-    gain_margin: float  # Factor on L that makes the loop swing. [1]
+    phase_margin: float
+    """Phase of L above -180° there, infinite without a crossover. [rad]"""
+    delay_margin: float
+    """Further delay that makes the loop swing. [s]"""
+    gain_margin: float
+    """Factor on L that makes the loop swing. [1]"""
 
 
 def loop_margins(loop: Response, delay: float, fastest: float, name: str) -> LoopMargins:

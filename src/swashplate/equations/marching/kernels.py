@@ -1,10 +1,10 @@
-"""Pieces of a march, compiled one by one and called by address.
+"""Kernels of a march, compiled one by one and called by address.
 
 A Jacobian runs some generated functions over every block of samples. What called them by name would
-be compiled together with them, for every model and every choice of its options. So all pieces have
-one signature, ``piece(count, first, h, records, before, whole, fraction, params, given, states,
-met, flat) -> None``, and the routine that calls them, by address, is the same for all: compiled
-once, kept on disk, as is each piece for all models that share it.
+be compiled together with them, for every model and every choice of its options. So all kernels have
+one signature, ``kernel(count, first, h, records, before, delay_samples, delay_fraction, params,
+given, states, worst_margin, flat) -> None``, and the routine that calls them, by address, is the
+same for all: compiled once, kept on disk, as is each kernel for all models that share it.
 """
 
 from collections.abc import Callable, Container, Sequence
@@ -26,28 +26,32 @@ from swashplate.equations.code_generation.lowering import (
 from swashplate.equations.code_generation.machine_code import machine_code
 from swashplate.equations.declaration import JIT_OFF
 
-PIECE = "count, first, h, records, before, whole, fraction, params, given, states, met, flat"
-"""Arguments of a piece.
+KERNEL_ARGUMENTS = (
+    "count, first, h, records, before, delay_samples, delay_fraction, params, given, states, "
+    "worst_margin, flat"
+)
+"""Arguments of a kernel.
 
 ``count, first`` samples of the block, and the first of them; ``h`` step; ``records`` a record for
-each signal, ``before`` what it was before; ``whole, fraction`` delays of the taps; ``params,
-given`` numbers; ``states`` at the first sample, replaced by those behind the last; ``met`` the
-worst margin, in one place; ``flat`` the block, a row for each number.
+each signal, ``before`` what it was before; ``delay_samples, delay_fraction`` delays of the taps;
+``params, given`` numbers; ``states`` at the first sample, replaced by those after the last;
+``worst_margin`` the worst margin of the domain so far, an array of one number; ``flat`` the block,
+a row for each number.
 """
 
 FLOATS, INTS = "*float", "*int"
-PIECE_KINDS = ("int", "int", "float", f"*{FLOATS}", FLOATS, INTS, *(FLOATS,) * 6)
+KERNEL_KINDS = ("int", "int", "float", f"*{FLOATS}", FLOATS, INTS, *(FLOATS,) * 6)
 """Kinds of these arguments, see `lowering`."""
 
 Fields = TypeVar("Fields", bound=tuple[Any, ...])
 
-Piece = Any
+Kernel = Any
 """What is called: machine code (`Code`), or a plain function if nothing is compiled."""
-Planned = Callable[[], Piece]
-"""Compiles a piece when it is first needed (`generating`): residuals alone need no derivatives."""
+PlannedCode = Callable[[], Kernel]
+"""Compiles a kernel when it is first needed (`generating`): residuals alone need no derivatives."""
 
 
-def routine(function: Callable[..., None]) -> Piece:
+def routine(function: Callable[..., None]) -> Kernel:
     """Compile a function of numbers and arrays that is part of the engine, by its annotations.
 
     Arrays become pointers, which do not know their shapes. Other routines `run` it by its address.
@@ -69,9 +73,9 @@ def _kind_of(hint: Any) -> str:
     return INTS if np.issubdtype(element, np.integer) else FLOATS
 
 
-def addresses(pieces: Sequence[Planned], needed: Container[int]) -> Any:
-    """What `call` is given of each piece; the pieces themselves must be kept as well."""
-    made = [each() if k in needed else None for k, each in enumerate(pieces)]
+def addresses(kernels: Sequence[PlannedCode], needed: Container[int]) -> Any:
+    """What `call` is given of each kernel; the kernels themselves must be kept as well."""
+    made = [each() if k in needed else None for k, each in enumerate(kernels)]
     if JIT_OFF:
         return made
     return np.array([0 if each is None else each.address for each in made], dtype=np.int64)
@@ -165,7 +169,7 @@ def _pointer(code: Lowering, kind: str, address: Operand) -> Operand:
     return code.operand(kind, f"inttoptr i64 {address.text} to ptr")
 
 
-def run(routine: Piece, arguments: tuple[Any, ...]) -> None:
+def run(routine: Kernel, arguments: tuple[Any, ...]) -> None:
     """Run a routine."""
     routine(*arguments)
 
@@ -176,9 +180,9 @@ def _run(code: Lowering, address: Operand, arguments: tuple[Operand, ...]) -> No
     code.emit(f"call void {_pointer(code, INTS, address).text}({texts})")
 
 
-def call(piece: Piece, count: int, first: int, h: float, arrays: Any) -> None:
-    """Call a piece with arrays, see `pointers`."""
-    piece(count, first, h, *arrays)
+def call(kernel: Kernel, count: int, first: int, h: float, arrays: Any) -> None:
+    """Call a kernel with arrays, see `pointers`."""
+    kernel(count, first, h, *arrays)
 
 
 @lowers(call)
@@ -188,16 +192,16 @@ def _call(code: Lowering, address: Operand, *arguments: Operand) -> None:
 
 
 def _each(code: Lowering, arrays: Operand) -> list[Operand]:
-    """Pointers to the arrays that a piece takes."""
-    words = [code.load(arrays, number(k)) for k in range(len(PIECE_KINDS) - 3)]
+    """Pointers to the arrays that a kernel takes."""
+    words = [code.load(arrays, number(k)) for k in range(len(KERNEL_KINDS) - 3)]
     return [_pointer(code, INTS, word) for word in words]
 
 
 def call_recurrence(
-    piece: Piece, count: int, lanes: Any, size: int, tangent: Any, arrays: Any
+    kernel: Kernel, count: int, lanes: Any, size: int, tangent: Any, arrays: Any
 ) -> None:
     """Call a recurrence, which takes lanes, how many they are, and tangents."""
-    piece(count, size, 0.0, *arrays[:2], lanes, arrays[3], tangent, *arrays[5:])
+    kernel(count, size, 0.0, *arrays[:2], lanes, arrays[3], tangent, *arrays[5:])
 
 
 @lowers(call_recurrence)

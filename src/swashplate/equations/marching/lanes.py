@@ -35,7 +35,7 @@ from swashplate.equations.declaration import JIT_OFF
 from swashplate.equations.graph import Node
 from swashplate.equations.keeping import kept, key_of
 from swashplate.equations.marching.kernels import FLOATS, INTS, pointers
-from swashplate.equations.marching.march import Sampler, lower, output_of
+from swashplate.equations.marching.march import SampleCode, lower, output_of
 from swashplate.equations.marching.part_code import PartCode, SignalId, taps_of
 from swashplate.equations.marching.rows import aligned
 from swashplate.equations.marching.run import compiled
@@ -52,7 +52,7 @@ CALLED: dict[str, Any] = {"sqrt": np.sqrt} if JIT_OFF else {}
 """What the text calls in place of the library's."""
 
 PREPARE_KINDS = ("float", FLOATS)
-MARCH = "count, h, length, records, whole, flat, measured, weight, outputs"
+MARCH = "count, h, length, records, delay_samples, flat, measured, weight, outputs"
 """Arguments of a march: samples, step, length of a row of the outputs, 0 without any, and arrays
 without shapes."""
 MARCH_KINDS = ("int", "float", "int", f"*{FLOATS}", INTS, *(FLOATS,) * 4)
@@ -159,11 +159,11 @@ def report(model: Model, output: str | None = None, *, options: Any = None) -> s
         own = options if len(model.parts) == 1 else getattr(options, part.name, None)
         chosen.append(part.options() if own is None and part.options is not None else own)
     names = (*model.outputs, *model.parts[-1].outputs) or model.parts[-1].signal_names
-    sampler = Sampler(model, signals, chosen, [output_of(model, output or names[-1])[0]])
-    for used in sampler.used:
-        ends = sampler.ends[used.part]
-        _, known = sampler.ahead(used, ends, still=fractions_of(used))
-        block = sampler.printed(used, ends, known=known, flat=all_vector)
+    sample_code = SampleCode(model, signals, chosen, [output_of(model, output or names[-1])[0]])
+    for used in sample_code.used:
+        ends = sample_code.ends[used.part]
+        _, known = sample_code.ahead(used, ends, still=fractions_of(used))
+        block = sample_code.printed(used, ends, known=known, flat=all_vector)
         for statement in [each for each in block.statements if not is_vector(each)]:
             for node in statement.nodes:
                 if node.op not in VECTOR:
@@ -185,16 +185,20 @@ def _called(node: Node) -> str:
 
 def fractions_of(part: PartCode) -> list[str]:
     """Names of the places of a part's taps, which do not change during a march."""
-    return [part.fraction(tap) for tap in part.taps]
+    return [part.delay_fraction(tap) for tap in part.taps]
 
 
 class Marched(NamedTuple):
     """What LANES sets leave."""
 
-    cost: Array  # (LANES,) sum of weighted squared errors.
-    worst: Array  # (LANES,) worst margin of the domain, infinite without one.
-    end: Array  # (LANES,) a sum that is finite where all numbers are.
-    outputs: Array  # (LANES, n) the output, or (LANES, 0).
+    cost: Array
+    """(LANES,) sum of weighted squared errors."""
+    worst: Array
+    """(LANES,) worst margin of the domain, infinite without one."""
+    end: Array
+    """(LANES,) a sum that is finite where all numbers are."""
+    outputs: Array
+    """(LANES, n) the output, or (LANES, 0)."""
 
 
 class LanePart(NamedTuple):
@@ -226,11 +230,11 @@ class _Writer:
         self, model: Model, signals: Sequence[str], options: Sequence[Any], output: str
     ) -> None:
         place, is_rate = output_of(model, output)
-        self._sampler = Sampler(model, signals, options, [place])
+        self._sample_code = SampleCode(model, signals, options, [place])
         self._straight = Straight()
         self._ahead: list[tuple[PartCode, CodeBlock]] = []
-        text = self._sampler.module(*self._texts(place, is_rate))
-        parts = [self._part_of(part) for part in self._sampler.used]
+        text = self._sample_code.module(*self._texts(place, is_rate))
+        parts = [self._part_of(part) for part in self._sample_code.used]
         self.facts = LaneFacts(text, self._straight.number, parts)
 
     def _part_of(self, part: PartCode) -> LanePart:
@@ -239,17 +243,17 @@ class _Writer:
             part.part,
             part.parameters,
             {node.value: path for path, node in leaves(part.given)},
-            {tap.number: part.fraction(tap) for tap in part.taps},
-            {path: states[path].value for path in self._sampler.carried[part.part]},
+            {tap.number: part.delay_fraction(tap) for tap in part.taps},
+            {path: states[path].value for path in self._sample_code.carried[part.part]},
         )
 
     def _texts(self, place: SignalId, is_rate: bool) -> list[str]:
         """Texts of both functions."""
-        sampler, straight, model = self._sampler, self._straight, self._sampler.model
+        sample_code, straight, model = self._sample_code, self._straight, self._sample_code.model
         following: list[tuple[str, str, frozenset[str]]] = []
         """What rows become at the end of a sample."""
         worst = ""
-        for part in sampler.used:
+        for part in sample_code.used:
             straight.cut()
             worst = self._part(part, place, following, worst)
         if worst:
@@ -269,12 +273,12 @@ class _Writer:
         # row that was just written number by number cannot be read as a whole at once
         first: list[str] = []
         fetched: list[str] = []
-        for part in sampler.used:
+        for part in sample_code.used:
             for tap in part.taps:
-                record = f"records[{sampler.signals.index(tap.tap.signal)}]"
-                queue = [f"{part.fraction(tap)}_coming", *part.tap_samples(tap)]
+                record = f"records[{sample_code.signals.index(tap.tap.signal)}]"
+                queue = [f"{part.delay_fraction(tap)}_coming", *part.tap_samples(tap)]
                 for lines, name, n in ((first, queue[1], "0"), (fetched, queue[0], "coming")):
-                    index = f"{n} - whole[{tap.number} * LANES + lane]"
+                    index = f"{n} - delay_samples[{tap.number} * LANES + lane]"
                     lines.append(f"at = {index}")
                     lines.append(f"{straight.row(name)} = {record}[at] if at >= 0 else 0.0")
                 following += [(old, new, frozenset((new,))) for new, old in pairwise(queue)]
@@ -283,7 +287,7 @@ class _Writer:
         read = {name for loop in straight.loops for each in loop for name in each.reads}
         shared = {"target": "measured[n]", "counts": "weight[n]"}
         shared["half"] = "0.5 * h if n > 0 else 0.0"
-        shared |= {f"x_{name}": f"records[{k}][n]" for k, name in enumerate(sampler.signals)}
+        shared |= {f"x_{name}": f"records[{k}][n]" for k, name in enumerate(sample_code.signals)}
         inner = [f"{name} = {value}" for name, value in shared.items() if name in read]
         if fetched:
             inner += ["coming = min(n + 1, last)", *over_lanes(fetched)]
@@ -312,12 +316,12 @@ class _Writer:
         worst: str,
     ) -> str:
         """Append a part's sample; the name of the worst margin so far."""
-        sampler, straight = self._sampler, self._straight
-        head = sampler.printed(
-            part, part.ahead(sampler.ends[part.part], fractions_of(part)), named=True
+        sample_code, straight = self._sample_code, self._straight
+        head = sample_code.printed(
+            part, part.ahead(sample_code.ends[part.part], fractions_of(part)), named=True
         )
         self._ahead.append((part, head))
-        own = [(source, n) for source, n in sampler.sources.items() if source.part == part.part]
+        own = [(source, n) for source, n in sample_code.sources.items() if source.part == part.part]
         steps = dict(leaves(part.following))
         results = {part.source(source): node for source, node in own}
         if part.margin is not None:
@@ -327,8 +331,8 @@ class _Writer:
         if place.part == part.part and place.kind != "link":
             results["value"] = part.node(place)
         states = dict(leaves(part.state))
-        carried = {states[path].value: steps[path] for path in sampler.carried[part.part]}
-        block = sampler.printed(
+        carried = {states[path].value: steps[path] for path in sample_code.carried[part.part]}
+        block = sample_code.printed(
             part, [*results.values(), *carried.values()], known=head.names, flat=all_vector
         )
         for statement in block.statements:
@@ -337,7 +341,9 @@ class _Writer:
         for name in results:
             straight.let(name, *next(texts))
         if place.part == part.part and place.kind == "link":
-            observed = sampler.printed(part, [sampler.observed(part, place)], known=block.names)
+            observed = sample_code.printed(
+                part, [sample_code.observed(part, place)], known=block.names
+            )
             for statement in observed.statements:
                 straight.add(statement)
             straight.let("value", *observed.results[0])
@@ -346,7 +352,7 @@ class _Writer:
 
     def _prepared(self, read: set[str]) -> list[str]:
         """Lines of a lane ahead of the march, from what is known to what is read in it."""
-        sampler, straight = self._sampler, self._straight
+        sample_code, straight = self._sample_code, self._straight
         lines: list[str] = []
         used = set[str]()
         for part, head in self._ahead:
@@ -354,9 +360,12 @@ class _Writer:
             made = {name for each in head.statements for name in each.names}
             lines += straight.saves(read & made)
             used |= {name for each in head.statements for name in each.reads} - made
-            states, begun = dict(leaves(part.state)), dict(leaves(part.begun()))
-            carried = sampler.carried[part.part]
-            at_rest = sampler.printed(part, [begun[path] for path in carried], known=head.names)
+            states = dict(leaves(part.state))
+            initial = dict(leaves(part.initial_state()))
+            carried = sample_code.carried[part.part]
+            at_rest = sample_code.printed(
+                part, [initial[path] for path in carried], known=head.names
+            )
             lines += at_rest.lines
             for path, (text, reads) in zip(carried, at_rest.results, strict=True):
                 lines.append(f"{straight.row(states[path].value)} = {text}")
@@ -402,7 +411,7 @@ class Lanes:
         """
         rows, model = self._facts.rows, self._model
         block = aligned(len(rows), LANES)
-        whole = np.zeros((max(len(self._taps), 1), LANES), dtype=np.int64)
+        delay_samples = np.zeros((max(len(self._taps), 1), LANES), dtype=np.int64)
         starts: dict[str, int] = {}
         for part in self._facts.parts:
             prefix, own = model.prefix(part.part), model.parts[part.part]
@@ -416,10 +425,10 @@ class Lanes:
             for tap in (each for each in self._taps if each.part == part.part):
                 late = numbers[f"{prefix}{tap.tap.delay}"] / h if tap.tap.delay else np.zeros(LANES)
                 end = np.maximum(late, tap.tap.ahead) - tap.tap.ahead
-                whole[tap.number] = np.floor(end)
+                delay_samples[tap.number] = np.floor(end)
                 fraction = part.fractions[tap.number]
                 if fraction in rows:
-                    block[rows[fraction]] = end - whole[tap.number]
+                    block[rows[fraction]] = end - delay_samples[tap.number]
             for path, name in part.states.items():
                 starts[f"start.{prefix}{path}"] = rows[name]
         worst = block[rows["worst"]] if "worst" in rows else np.empty(LANES)
@@ -433,9 +442,17 @@ class Lanes:
             self.prepare(h, block.reshape(-1))
             for path in starts.keys() & numbers.keys():
                 block[starts[path]] = numbers[path]
-            flat, left = block.reshape(-1), outputs.reshape(-1)
-            length, own = outputs.shape[1], pointers(values)
-            self.march(size, h, length, own, whole.reshape(-1), flat, measured, weight, left)
+            self.march(
+                size,
+                h,
+                outputs.shape[1],
+                pointers(values),
+                delay_samples.reshape(-1),
+                block.reshape(-1),
+                measured,
+                weight,
+                outputs.reshape(-1),
+            )
         end = block[[rows["cost"], *starts.values()]].sum(axis=0)
         return Marched(block[rows["cost"]], worst, end, outputs[:, :size])
 

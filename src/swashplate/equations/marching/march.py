@@ -34,24 +34,25 @@ from swashplate.equations.code_generation.scheduling import Flat
 from swashplate.equations.code_generation.values import Value, leaves
 from swashplate.equations.fields import floats_of
 from swashplate.equations.graph import Node, names_in
-from swashplate.equations.marching.kernels import PIECE
+from swashplate.equations.marching.kernels import KERNEL_ARGUMENTS
 from swashplate.equations.marching.part_code import PartCode, SignalId
 from swashplate.equations.model import Model, SignalSource
 from swashplate.errors import InputError
 
 _OWN = """
 n m j c lane first last worst h half value error total count size used progress values lines
-whole fraction params given constants states out flags records before measured weight outputs flat
-inputs table kept tangent lanes columns program plan sink room block met context volts current speed
-at everything voltage target counts coming cost rate integral shown choose width
+delay_samples delay_fraction params given constants states out flags records before measured weight
+outputs flat inputs table kept tangent lanes columns program plan sink room block
+worst_margin lower context volts current speed at everything voltage target counts coming cost rate
+integral shown choose width
 """
 RESERVED = {*_OWN.split(), *(name for name in vars(math) if not name.startswith("_"))}
 """Names that the kernels use themselves."""
 CONTEXT_FIELDS = [
     "inputs",
     "lines",
-    "whole",
-    "fraction",
+    "delay_samples",
+    "delay_fraction",
     "params",
     "given",
     "h",
@@ -62,7 +63,7 @@ CONTEXT_FIELDS = [
 """What a step takes from a `StepContext`."""
 
 
-class Sampler:
+class SampleCode:
     """One sample of a whole model: the code of its parts, and what of it is needed.
 
     `wanted` are numbers that are kept at every sample; parts that none of them needs are left out.
@@ -136,7 +137,7 @@ class Sampler:
                 known |= {node.value: SignalId(i, kind, path) for path, node in leaves(value)}
             known |= part.outside
             for tap in part.taps:
-                known[part.fraction(tap)] = SignalId(i, "fraction", str(tap.number))
+                known[part.delay_fraction(tap)] = SignalId(i, "fraction", str(tap.number))
         return known
 
     def module(self, *texts: str) -> str:
@@ -200,12 +201,15 @@ class Sampler:
             if node.value in read
         ]
 
-    def places(self, part: PartCode) -> list[str]:
-        """Lines that take the places of a part's taps from arrays."""
+    def delays(self, part: PartCode) -> list[str]:
+        """Lines that take the delays of a part's taps from arrays."""
         return [
             f"{name} = {array}[{tap.number}]"
             for tap in part.taps
-            for name, array in ((part.whole(tap), "whole"), (part.fraction(tap), "fraction"))
+            for name, array in (
+                (part.delay_samples(tap), "delay_samples"),
+                (part.delay_fraction(tap), "delay_fraction"),
+            )
         ]
 
     def fetched(
@@ -216,7 +220,7 @@ class Sampler:
         for tap in part.taps:
             for j, name in enumerate(part.tap_samples(tap)):
                 if name in read:
-                    back = f"{part.whole(tap)} + {j}" if j else part.whole(tap)
+                    back = f"{part.delay_samples(tap)} + {j}" if j else part.delay_samples(tap)
                     lines.append(f"{name} = {past(tap.tap.signal, back)}")
         inputs = [part.own.tap(name).signal for name in part.own.input_types]
         known = [each for each in dict.fromkeys(inputs) if each in self.signals]
@@ -341,24 +345,24 @@ def march_source(
     places: Mapping[SignalId, str],
     more: Mapping[SignalId, str] = MappingProxyType({}),
 ) -> str:
-    """Text of a module with the march over samples as a `piece`.
+    """Text of a module with the march over samples as a `kernel`.
 
     `places` says what is kept, and where it goes at sample ``n``; `more` what is kept, too, if the
-    second number of ``met`` is not zero.
+    second number of ``worst_margin`` is not zero.
     """
-    sampler = Sampler(model, signals, options, [*places, *more])
-    parts = sampler.used
+    sample_code = SampleCode(model, signals, options, [*places, *more])
+    parts = sample_code.used
     lines, saved, samples = ["last = first + count"], list[str](), list[list[str]]()
-    for k, signal in enumerate(sampler.signals):
+    for k, signal in enumerate(sample_code.signals):
         lines += [f"{signal} = records[{k}]", f"{signal}_before = before[{k}]"]
-    lines += ["everything = met[1] != 0.0"] if more else []
+    lines += ["everything = worst_margin[1] != 0.0"] if more else []
     for part in parts:
-        ahead, known = sampler.ahead(part, sampler.ends[part.part])
-        sample = sampler.body(part, places, known, more)
-        states = sampler.states(part, sample.following)
-        lines += [*sampler.places(part), *ahead, *states.load]
+        ahead, known = sample_code.ahead(part, sample_code.ends[part.part])
+        sample = sample_code.body(part, places, known, more)
+        states = sample_code.states(part, sample.following)
+        lines += [*sample_code.delays(part), *ahead, *states.load]
         saved += states.save
-        fetched = sampler.fetched(
+        fetched = sample_code.fetched(
             part,
             lambda signal, back: f"{signal}[n - ({back})] if n >= {back} else {signal}_before",
             lambda signal: f"{signal}[n]",
@@ -370,8 +374,8 @@ def march_source(
         samples.append([*inner, *states.step])
     margins = any(part.margin is not None for part in parts)
     lines += ["worst, total = inf, 0.0"] if margins else []
-    passed = [parts[-1].source(each) for each in sampler.sources if each.part != parts[-1].part]
-    if passed and any(sampler.carried[part.part] for part in parts[:-1]):
+    passed = [parts[-1].source(each) for each in sample_code.sources if each.part != parts[-1].part]
+    if passed and any(sample_code.carried[part.part] for part in parts[:-1]):
         # the last part is a sample behind the others, so that neither waits for the other
         late = re.compile(rf"\b({'|'.join(passed)})\b")
         lines += [*(f"{name} = 0.0" for name in passed), "for m in range(first, last + 1):"]
@@ -386,10 +390,11 @@ def march_source(
         # a sum is no number once a margin was none
         lines += [
             "worst = worst if total == total or worst <= 0.0 else total",
-            "met[0] = worst if worst < met[0] or worst != worst else met[0]",
+            "lower = worst < worst_margin[0] or worst != worst",
+            "worst_margin[0] = worst if lower else worst_margin[0]",
         ]
     says = f"March {model.name} over its inputs."
-    return sampler.module(function_source(f"march({PIECE})", says, lines, ""))
+    return sample_code.module(function_source(f"march({KERNEL_ARGUMENTS})", says, lines, ""))
 
 
 def step_source(
@@ -402,9 +407,9 @@ def step_source(
     the numbers of this sample in the order of `stored`, takes the states to the next one, and
     returns the margin of the domain.
     """
-    sampler = Sampler(model, signals, options, stored)
-    row = sampler.signals.index
-    tapped = sorted({row(tap.tap.signal) for part in sampler.used for tap in part.taps})
+    sample_code = SampleCode(model, signals, options, stored)
+    row = sample_code.signals.index
+    tapped = sorted({row(tap.tap.signal) for part in sample_code.used for tap in part.taps})
     lines = [f"{each} = context.{each}" for each in CONTEXT_FIELDS]
     prepare, ends, count = list[str](), ["worst = inf"], 0
     if tapped:
@@ -412,18 +417,22 @@ def step_source(
         lines += [f"    lines[{k}, j] = lines[{k}, j - 1]" for k in tapped]
         lines += [f"lines[{k}, 0] = inputs[{k}]" for k in tapped]
     places = {each: f"outputs[{k}]" for k, each in enumerate(stored)}
-    for part in sampler.used:
-        ends_of_part = sampler.ends[part.part]
-        ahead, known = sampler.ahead(part, ends_of_part)
+    for part in sample_code.used:
+        ends_of_part = sample_code.ends[part.part]
+        ahead, known = sample_code.ahead(part, ends_of_part)
         prepare += ahead
         for node in part.ahead(ends_of_part):
             prepare.append(f"constants[{count}] = {known[node]}")
             lines.append(f"{known[node]} = constants[{count}]")
             count += 1
-        sample = sampler.body(part, places, known)
-        states = sampler.states(part, sample.following)
-        lines += [*sampler.places(part), *sampler.given(part, sampler.read(part)), *states.load]
-        lines += sampler.fetched(
+        sample = sample_code.body(part, places, known)
+        states = sample_code.states(part, sample.following)
+        lines += [
+            *sample_code.delays(part),
+            *sample_code.given(part, sample_code.read(part)),
+            *states.load,
+        ]
+        lines += sample_code.fetched(
             part,
             lambda signal, back: f"lines[{row(signal)}, {back}]",
             lambda signal: f"inputs[{row(signal)}]",
@@ -431,14 +440,14 @@ def step_source(
         lines += sample.lines
         if sample.margin:
             lowest = lower(graph.name("worst"), graph.name(sample.margin))
-            compared = sampler.printed(part, [lowest])
+            compared = sample_code.printed(part, [lowest])
             ends += [*compared.lines, f"worst = {compared.texts[0]}"]
         ends += [*states.step, *states.save]
     head, says = "prepare(params, given, h, constants)", f"Constants of {model.name}."
     prepared = function_source(head, says, [*prepare, "return"])
     says, lines = f"One sample of {model.name}.", [*lines, *ends, "return worst"]
     stepped = function_source("step(context)", says, lines, "@inlined")
-    return sampler.module(prepared, stepped), count
+    return sample_code.module(prepared, stepped), count
 
 
 def output_of(model: Model, output: str) -> tuple[SignalId, bool]:

@@ -10,7 +10,7 @@ from swashplate.equations.code_generation.gradients import Derived, derived_func
 from swashplate.equations.code_generation.values import leaves
 from swashplate.equations.graph import Node, names_in, rewritten
 from swashplate.equations.keeping import kept, key_of
-from swashplate.equations.marching.march import Sampler
+from swashplate.equations.marching.march import SampleCode
 from swashplate.equations.marching.part_code import SignalId
 from swashplate.equations.model import Model
 
@@ -41,19 +41,19 @@ def _derived(
 ) -> StepDerivatives:
     """The same, made of the equations."""
     states = [SignalId(i, "state", path) for i, path in model.places("state")]
-    sampler = Sampler(model, signals, options, [*states, *seen])
+    sample_code = SampleCode(model, signals, options, [*states, *seen])
     results, labels = list[Node](), dict[Node, str]()
     passed: dict[Node, Node] = {}
     """What the names of signals between parts stand for."""
-    for part in sampler.used:
+    for part in sample_code.used:
         results += rewritten([node for _, node in leaves(part.following)], passed)
-        for source, node in sampler.sources.items():
+        for source, node in sample_code.sources.items():
             if source.part == part.part:
                 passed[graph.name(part.source(source))] = rewritten([node], passed)[0]
         labels |= part.trace.labels
     for place in seen:
-        results += rewritten([sampler.observed(sampler.parts[place.part], place)], passed)
-    outside = sampler.outside()
+        results += rewritten([sample_code.observed(sample_code.parts[place.part], place)], passed)
+    outside = sample_code.outside()
     known = {name: outside[name] for name in sorted(names_in(results) & outside.keys())}
     by = [name for name, each in known.items() if each.kind in ("state", "tap", "input")]
     name, says = f"{model.name}_linear", f"Next states and outputs of {model.name}."

@@ -93,7 +93,11 @@ class PartCode:
         self.taken.add("h")
         self.taps = [each for each in taps_of(model, self.records) if each.part == part]
         for tap in self.taps:
-            self.taken |= {*self.tap_samples(tap), self.fraction(tap), self.whole(tap)}
+            self.taken |= {
+                *self.tap_samples(tap),
+                self.delay_fraction(tap),
+                self.delay_samples(tap),
+            }
         own = self.own
         self.p = _named(own.parameters, self._fresh("p"))
         self.given = _named(own.given, self._fresh("given")) if own.given else Tuple(None, ())
@@ -150,7 +154,7 @@ class PartCode:
                 return graph.ZERO
             return dict(leaves(self.p))[self.own.defaults[name]]
         samples = tuple(map(graph.name, self.tap_samples(found)))
-        window = Tuple(Window, (Tuple(None, samples), graph.name(self.fraction(found))))
+        window = Tuple(Window, (Tuple(None, samples), graph.name(self.delay_fraction(found))))
         return window if tap.width else self._call(HOLDS[tap.hold], window=window)
 
     def _linked(self, link: Link) -> Node:
@@ -175,12 +179,12 @@ class PartCode:
         """Names of a tap's samples, newest first."""
         return [f"{self.prefix}{tap.input}_{j}" for j in range(tap.tap.samples)]
 
-    def fraction(self, tap: TapOf) -> str:
-        """Name of the rest of a tap's place."""
+    def delay_fraction(self, tap: TapOf) -> str:
+        """Name of the fraction of a sample in a tap's delay."""
         return f"{self.prefix}{tap.input}_f"
 
-    def whole(self, tap: TapOf) -> str:
-        """Name of the whole samples of a tap's place."""
+    def delay_samples(self, tap: TapOf) -> str:
+        """Name of the whole samples in a tap's delay."""
         return f"{self.prefix}{tap.input}_whole"
 
     @cached_property
@@ -248,7 +252,7 @@ class PartCode:
             return dict(leaves(self.state))[stored.path]
         return self.signal(stored.path)
 
-    def begun(self, start: str = "rest") -> Value:
+    def initial_state(self, start: str = "rest") -> Value:
         """State at the start.
 
         At rest every signal is zero, or what its default parameter is; ``steady`` is the steady

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from swashplate.equations.marching.derivatives import BoundModel
 from swashplate.equations.marching.observation import RunValues, every_sample
 from swashplate.equations.marching.record import Sampling
-from swashplate.equations.marching.run import Start, begun, instance_of
+from swashplate.equations.marching.run import Start, initial_states, instance_of
 from swashplate.equations.marching.simulation import Command, Run, inputs_of
 from swashplate.equations.model import Model, parameter_paths
 from swashplate.errors import DomainError, InputError
@@ -114,7 +114,7 @@ def sensitivities(
     instance = instance_of(model, p, options=options, given=given)
     records = inputs_of(instance, inputs, rate, **sampling)
     run = Run(instance, records, start, begin or {})
-    begun(instance, run.started, run.begin)  # refuses what does not fit
+    initial_states(instance, run.initial, run.begin)  # refuses what does not fit
     known = (*parameter_paths(model), *(f"start.{path}" for path in run.begin))
     columns = tuple(parameters) if parameters is not None else parameter_paths(model)
     for path in columns:

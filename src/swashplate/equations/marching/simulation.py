@@ -40,9 +40,9 @@ from swashplate.equations.marching.record import (
     on_grid,
 )
 from swashplate.equations.marching.run import (
+    InitialStates,
     Instance,
     Start,
-    Started,
     check_start,
     instance_of,
     marched,
@@ -129,7 +129,7 @@ class Run(Tabular):
             self.instance,
             records,
             self.record.step,
-            self.started,
+            self.initial,
             tuple(first.values()),
             self.driven_by,
             self.begin,
@@ -140,7 +140,7 @@ class Run(Tabular):
         self.found.update(zip(names, table, strict=True))
 
     @property
-    def started(self) -> Started:
+    def initial(self) -> InitialStates:
         """States at the first sample, `begin` apart, and what they follow from."""
         first = {name: float(each.values[0]) for name, each in self.records.items()}
         return self.instance.start(first, self.record.step, self.start)

@@ -44,17 +44,19 @@ Array = NDArray[np.float64]
 
 
 class StepContext(NamedTuple):
-    """A model's numbers in a loop: what a compiled step takes, and all that it remembers."""
+    """What a compiled step takes in a loop: a model's numbers, and all that it remembers."""
 
     inputs: Array
     """Newest sample of each input; the loop sets them before each step."""
     outputs: Array
-    """Outputs at that sample, behind the step."""
+    """Outputs at that sample, filled by the step."""
     states: Array
     lines: Array
-    """Inputs of late, newest first: what delays look at."""
-    whole: NDArray[np.int64]
-    fraction: Array
+    """Past samples of the inputs, newest first, for the delays."""
+    delay_samples: NDArray[np.int64]
+    """Whole samples of each tap's delay."""
+    delay_fraction: Array
+    """What its delay has besides, as a fraction of a sample."""
     params: Array
     given: Array
     constants: Array
@@ -63,10 +65,12 @@ class StepContext(NamedTuple):
 
     def copied(self) -> StepContext:
         """A copy that remembers for itself: both go on from here independently."""
-        own = {
-            name: getattr(self, name).copy() for name in ("inputs", "outputs", "states", "lines")
-        }
-        return self._replace(**own)
+        return self._replace(
+            inputs=self.inputs.copy(),
+            outputs=self.outputs.copy(),
+            states=self.states.copy(),
+            lines=self.lines.copy(),
+        )
 
 
 @generating
@@ -79,8 +83,8 @@ def _kernels(
         (key_of(model), inputs, options, stored),
         lambda: step_source(model, inputs, options, stored),
     )
-    made = module(f"{model.name}_step", text)
-    return made["prepare"], made["step"], count
+    functions = module(f"{model.name}_step", text)
+    return functions["prepare"], functions["step"], count
 
 
 class CompiledStep:
@@ -101,9 +105,11 @@ class CompiledStep:
     def __init__(
         self, instance: Instance, inputs: Sequence[str], stored: Sequence[SignalId], h: float
     ) -> None:
-        self._instance, self._h, self._stored = instance, h, tuple(stored)
+        self._instance = instance
+        self._h = h
+        self._stored = tuple(stored)
         self.inputs = tuple(inputs)
-        self.outputs = tuple(each.path or each.kind for each in stored)
+        self.outputs = tuple(signal.path or signal.kind for signal in stored)
         instance.check_inputs(self.inputs)
         self._prepare, self.step, self._count = _kernels(
             instance.model, self.inputs, instance.options, tuple(stored)
@@ -119,19 +125,29 @@ class CompiledStep:
         self, first: Mapping[str, float] | None = None, start: Start = "rest"
     ) -> StepContext:
         """A context at its start: at rest, or settled under the `first` inputs (default: 0)."""
-        found, first = self._instance, first or {}
+        instance = self._instance
+        first = first or {}
         values = {name: float(first.get(name, 0.0)) for name in self.inputs}
         newest = np.array([*values.values()])
-        places = found.places(self.inputs, self._h)
+        delays = instance.tap_delays(self.inputs, self._h)
         constants = np.zeros(self._count)
-        self._prepare(found.params, found.given, self._h, constants)
-        longest = int(places.whole.max()) if places.whole.size else 0
+        self._prepare(instance.params, instance.given, self._h, constants)
+        longest = int(delays.samples.max(initial=0))
         lines = np.zeros((len(self.inputs), longest + 3))
         if start == "steady":
             lines[:] = newest[:, None]
-        outputs, states = np.zeros(len(self.outputs)), found.start(values, self._h, start).flat
-        own = places.whole, places.fraction, found.params, found.given, constants, self._h
-        return StepContext(newest, outputs, states, lines, *own)
+        return StepContext(
+            inputs=newest,
+            outputs=np.zeros(len(self.outputs)),
+            states=instance.start(values, self._h, start).flat,
+            lines=lines,
+            delay_samples=delays.samples,
+            delay_fraction=delays.fraction,
+            params=instance.params,
+            given=instance.given,
+            constants=constants,
+            h=self._h,
+        )
 
     def check(self, context: StepContext, margin: float, cause: str = "input") -> None:
         """Refuse what a loop has computed outside the model's equations.
@@ -159,7 +175,7 @@ def compiled_step(
     options: Any = None,
     given: Any = None,
 ) -> CompiledStep:
-    """Compiled step of a model of one's own, for kernels that close loops around it.
+    """Compiled step of a user-defined model, for kernels that close loops around it.
 
     Parameters
     ----------
@@ -183,11 +199,11 @@ def compiled_step(
 
 def stored_of(model: Model, outputs: Sequence[str]) -> tuple[SignalId, ...]:
     """Where the outputs of a step come from; ``"limits"`` of the last part that has any."""
-    found = []
+    ids = []
     limited = [i for i, part in enumerate(model.parts) if part.limits is not None]
     for output in outputs:
         if output == "limits" and limited:
-            found.append(SignalId(limited[-1], "limits"))
+            ids.append(SignalId(limited[-1], "limits"))
             continue
         stored, integral = output_of(model, output)
         if integral:
@@ -195,5 +211,5 @@ def stored_of(model: Model, outputs: Sequence[str]) -> tuple[SignalId, ...]:
                 f"{output} is the integral of {stored.path}, and not known within a step: take "
                 f"{stored.path} and add it up in the loop."
             )
-        found.append(stored)
-    return tuple(found)
+        ids.append(stored)
+    return tuple(ids)

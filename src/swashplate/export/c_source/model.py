@@ -30,7 +30,7 @@ from swashplate.equations.code_generation.tracing import Trace
 from swashplate.equations.fields import Definition, declared_by, floats_of, value_at
 from swashplate.equations.graph import Node, names_in
 from swashplate.equations.language import plain
-from swashplate.equations.marching.march import Sampler, output_of
+from swashplate.equations.marching.march import SampleCode, output_of
 from swashplate.equations.marching.part_code import TapOf, taps_of
 from swashplate.equations.marching.run import Instance, module
 from swashplate.equations.model import Equation, Link, Model, SignalSource
@@ -484,18 +484,20 @@ def feedthrough(exported: Exported, instance: Instance, step: float) -> dict[str
     """
     model, at_once = exported.model, newest(exported, instance, step)
     places = [output_of(model, name)[0] for name in exported.names]
-    sampler = Sampler(model, model.external, instance.options, places)
+    sample_code = SampleCode(model, model.external, instance.options, places)
     signals = {f"x_{name}": name for name in model.external}
-    for part in sampler.used:
+    for part in sample_code.used:
         signals |= {
             part.tap_samples(each)[0]: each.tap.signal
             for each in part.taps
             if each.tap.signal in at_once
         }
-    sources = {sampler.parts[each.part].source(each): n for each, n in sampler.sources.items()}
+    sources = {
+        sample_code.parts[each.part].source(each): n for each, n in sample_code.sources.items()
+    }
     found = {}
     for name, place in zip(exported.names, places, strict=True):
-        read, pending = set[str](), [sampler.observed(sampler.parts[place.part], place)]
+        read, pending = set[str](), [sample_code.observed(sample_code.parts[place.part], place)]
         while pending:
             names = names_in([pending.pop()])
             pending += [sources[each] for each in (names & sources.keys()) - read]

@@ -241,7 +241,7 @@ class PartInC:
             for j, name in enumerate(self.part.tap_samples(tap)):
                 signal = tap.tap.signal
                 places[graph.name(name)] = before[signal] if start else f"{window}->s[{j}]"
-            places[graph.name(self.part.fraction(tap))] = "0.0" if start else f"{window}->f"
+            places[graph.name(self.part.delay_fraction(tap))] = "0.0" if start else f"{window}->f"
         for name in self.own.input_types:
             node, signal = self.part.inputs[name], self.own.tap(name).signal
             link, default = model.link_of(self.number, name), self.own.defaults.get(name)
