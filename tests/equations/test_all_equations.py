@@ -116,7 +116,7 @@ RANGES = {
 OWN_RANGES: dict[str, dict[str, tuple[float, float]]] = {
     "refinements.held_back": {"before": (-3e-5, 3e-5), "width": (1e-6, 1e-5)},
     "refinements.magnetising_current": {"current": (0.0, 0.02), "previous": (0.0, 0.02)},
-    "channel.current_acceleration": {"rate": (-0.05, 0.05)},
+    "amplifier.current_acceleration": {"rate": (-0.05, 0.05)},
     "library.arctangent": {"tangent": (-4.0, 4.0)},
     "machine.mixture_modulus": {"pressure": (2e5, 1e7)},
     "full_order.stopped": {"position": (-1.0, 1.0), "lower": (-0.5, -0.2), "upper": (0.2, 0.5)},

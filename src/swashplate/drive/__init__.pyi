@@ -5,7 +5,7 @@ from .derivatives import requested_columns as requested_columns
 from .drive import Drive as Drive
 from .equilibrium import OperatingPoint as OperatingPoint
 from .frequency_response import response_table as response_table
-from .instance import PRESSURE as PRESSURE
+from .instance import PRESSURE_PATH as PRESSURE_PATH
 from .instance import START as START
 from .instance import at_every_rate as at_every_rate
 from .instance import card_of as card_of

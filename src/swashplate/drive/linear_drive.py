@@ -14,7 +14,7 @@ from swashplate.drive.signals import UNITS
 from swashplate.drive.small_motion import Coulomb, lifted, small_motion_model
 from swashplate.equations.marching.record import Interpolation, least_substeps
 from swashplate.errors import DomainError, InputError
-from swashplate.linear import LinearModel, with_line
+from swashplate.linear import LinearModel, with_delay_line
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.results import Result
 from swashplate.tables import UNIT, Cell, Column, Table
@@ -124,7 +124,7 @@ class LinearDrive(LinearModel, Result):
         last = tuple(f"{name}_last" for name in self.inputs)
         # what is measured beside the command goes straight from sample to sample
         held = [interpolation == "previous", *(False for _ in self.inputs[1:])]
-        delayed = with_line((fine.A, fine.B, fine.C, fine.D), whole)
+        delayed = with_delay_line((fine.A, fine.B, fine.C, fine.D), whole)
         A, B, C, D = lifted(*delayed, substeps, held)
         return replace(
             sampled,

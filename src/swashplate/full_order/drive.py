@@ -547,7 +547,10 @@ class OrderComparison(Tabular):
         return cast("Figure", figures().plot_full_order(self, title=title))
 
     def to_polars(self) -> polars.DataFrame:
-        """Table of the full-order model's signals, with command and reduced model's speed."""
+        """Table of the full-order model's signals, with command and reduced model's speed.
+
+        The full-order model is marched again for signals that were not computed so far.
+        """
         import polars as pl
 
         speed = pl.Series("reduced_shaft_speed", self.reduced_speed)

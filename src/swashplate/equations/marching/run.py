@@ -364,9 +364,9 @@ LIBRARY: dict[str, Any] = {
 """What generated modules call besides their own functions."""
 
 
-def module(name: str, text: str, **more: Any) -> dict[str, Any]:
+def module(name: str, text: str, **further: Any) -> dict[str, Any]:
     """A generated module, compiled."""
-    return generated(name, text, LIBRARY | more)
+    return generated(name, text, LIBRARY | further)
 
 
 @dataclass(frozen=True)
@@ -409,15 +409,15 @@ def march_of(
     signals: tuple[str, ...],
     options: tuple[Any, ...],
     stored: tuple[SignalId, ...],
-    more: tuple[SignalId, ...] = (),
+    further: tuple[SignalId, ...] = (),
 ) -> PlannedCode:
-    """The march over whole records, a row for each number that is kept, then for each of `more`."""
-    rows = {each: f"flat[{row} * count + n]" for row, each in enumerate((*stored, *more))}
+    """The march over whole records: rows for the numbers that are kept, then for `further` ones."""
+    rows = {each: f"flat[{row} * count + n]" for row, each in enumerate((*stored, *further))}
     always = {each: rows[each] for each in stored}
-    later = {each: rows[each] for each in more}
+    later = {each: rows[each] for each in further}
     text = kept(
         f"{model.name}_march",
-        (key_of(model), signals, options, stored, more),
+        (key_of(model), signals, options, stored, further),
         lambda: march_source(model, signals, options, always, later),
     )
     return PlannedKernel(f"{model.name}_march", "march", text)
@@ -432,18 +432,18 @@ def marched(
     cause: str = "input",
     begin: Mapping[str, float] = MappingProxyType({}),
     *,
-    more: tuple[SignalId, ...] = (),
+    further: tuple[SignalId, ...] = (),
     everything: bool = False,
 ) -> Array:
     """(r, n) numbers in the order of `stored`, marched over whole records; limits as sums of bits.
 
     From where `initial` begins, or from states by path; `cause` is what drives the model, for the
     sentence if it leaves its domain or a number overflows. The same march can leave
-    `more` numbers, which follow in the table if it is to leave `everything`.
+    `further` numbers, which follow in the table if it is to leave `everything`.
     """
     signals, size = tuple(records), next(iter(records.values())).size
-    planned = march_of(instance.model, signals, instance.options, stored, more)
-    stored = (*stored, *more) if everything else stored
+    planned = march_of(instance.model, signals, instance.options, stored, further)
+    stored = (*stored, *further) if everything else stored
     table = np.empty((len(stored), size))
     worst_margin = np.array([np.inf, float(everything)])
     states = initial_states(instance, initial, begin)

@@ -44,8 +44,8 @@ class Sensitivities(Generic[R]):
     """Columns, in the order asked for."""
     bound: BoundModel
     """The model with its numbers, and the columns as its paths."""
-    found: dict[str, Array] = field(default_factory=dict)
-    """Derivatives that were asked for."""
+    computed: dict[str, Array] = field(default_factory=dict)
+    """Derivatives of the signals that were read so far."""
 
     def __repr__(self) -> str:
         count = f"{len(self.names)} parameter{'' if len(self.names) == 1 else 's'}"
@@ -53,14 +53,14 @@ class Sensitivities(Generic[R]):
 
     def __getitem__(self, signal: str) -> Array:
         """(n, k) derivatives of a signal behind the input, by its name."""
-        if signal not in self.found:
+        if signal not in self.computed:
             (driver, record), *others = self.run.records.items()
             beside = {name: each.values for name, each in others}
             observed = every_sample(record, signal, driver, self.run.start, beside)
             columns = self.bound.jacobian(observed).columns
             self._check(signal, columns)
-            self.found[signal] = columns
-        return self.found[signal]
+            self.computed[signal] = columns
+        return self.computed[signal]
 
     def _check(self, signal: str, columns: Array) -> None:
         """Refuse derivatives that are not finite; the first is named."""

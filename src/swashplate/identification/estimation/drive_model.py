@@ -18,7 +18,7 @@ from swashplate.campaign.samples import signed_by_command
 from swashplate.campaign.schema import CURRENTS as CURRENTS
 from swashplate.campaign.schema import SIGNALS as SIGNALS
 from swashplate.drive import (
-    PRESSURE,
+    PRESSURE_PATH,
     START,
     Limit,
     Simulation,
@@ -357,7 +357,7 @@ class DriveModel(Result, EquationModel):
         A pump alone has no card that could begin with a current.
         """
         if name == START_PRESSURE:
-            return [PRESSURE]
+            return [PRESSURE_PATH]
         if name not in START_CURRENTS or self.part == "pump":
             return []
         # I*, that of a sample before, and I; with the differential equation no sample before
