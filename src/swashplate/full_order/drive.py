@@ -222,19 +222,21 @@ class FullOrderDrive:
         return cls(Drive.preset(name), physical)
 
     @classmethod
-    def from_drive(cls, drive: Drive, like: str | None = None, **chosen: Change) -> FullOrderDrive:
+    def from_drive(
+        cls, drive: Drive, like: str | None = None, **quantities: Change
+    ) -> FullOrderDrive:
         """A full-order drive for any parameters, a fitted set's for example.
 
         The drive gives card, solenoids and the lumps that the machine shall have, Z6 apart; the
-        physical set is completed from them and what is chosen in SI, e.g. ``oil_volume=1e-4``, as
-        `swashplate.full_order.from_lumped` says.
+        physical set is completed from them and from `quantities` in SI, e.g. ``oil_volume=1e-4``;
+        see `swashplate.full_order.from_lumped`.
 
         Raises
         ------
         ParameterError
             For an unknown name, or if lumps contradict each other or a choice.
         """
-        return cls(drive, from_lumped(drive.parameters, like, **chosen))
+        return cls(drive, from_lumped(drive.parameters, like, **quantities))
 
     def replace(self, **changes: Change) -> FullOrderDrive:
         """With other physical values in SI, e.g. ``replace(load_torque=2e3)``."""
@@ -255,9 +257,9 @@ class FullOrderDrive:
         )
 
     def instance(self, step: float, *, substeps: int | None = None, card: bool = True) -> Instance:
-        """The model with numbers, for the engine: behind a voltage, or without a card a current.
+        """The model with numbers, for the engine; a voltage drives it, or a current without `card`.
 
-        At a distance of the samples [s]; `substeps` as in `follow`.
+        `step` is the distance of the samples [s]; `substeps` as in `follow`.
         """
         parameters = self.drive.parameters
         symmetric = parameters.pressure_root == "symmetric"
@@ -271,7 +273,7 @@ class FullOrderDrive:
         front = PartNumbers(card_of(parameters), card_options(parameters))
         return Instance(model.full_drive, (front, plant), self.physical.name)
 
-    def substeps(self, step: float, wanted: int | None = None) -> int:
+    def substeps(self, step: float, requested: int | None = None) -> int:
         """Sub-steps that a step [s] of the record takes.
 
         By default 8, or so many that the fastest mode takes six a turn.
@@ -281,18 +283,18 @@ class FullOrderDrive:
         DomainError
             If the machine is too stiff for the march.
         InputError
-            If so few are wanted that the march would be unstable.
+            If so few are requested that the march would be unstable.
         """
         fastest = float(interpreted(fastest_rate)(self.physical.machine))
         needed = max(ceil(fastest * step / RESOLUTION), LEAST_SUBSTEPS)
-        if wanted is not None:
+        if requested is not None:
             least = floor(fastest * step / STABLE) + 1
-            if wanted < least:
+            if requested < least:
                 raise InputError(
-                    f"substeps is {wanted}, but the fastest mode, at {fastest:.3g} rad/s, needs "
+                    f"substeps is {requested}, but the fastest mode, at {fastest:.3g} rad/s, needs "
                     f"at least {least} to be stable and {needed} to be followed."
                 )
-            return wanted
+            return requested
         if needed > MOST_SUBSTEPS:
             raise DomainError(
                 f"{self.physical.name}: the fastest mode, at {fastest:.3g} rad/s, would take "
@@ -325,7 +327,7 @@ class FullOrderDrive:
     def follow(
         self, run: Simulation, *, start: Start = "rest", substeps: int | None = None
     ) -> FullOrderSimulation:
-        """Simulate the machine over the current of a run that there is.
+        """Simulate the machine over the current of an earlier run.
 
         Parameters
         ----------
@@ -372,11 +374,11 @@ class FullOrderDrive:
         others = [k for k in range(5) if k != slow]
         by_spool = sorted(others, key=lambda k: -float(parts[:2, k].sum() / parts[:, k].sum()))
         return Modes(
-            values.astype(np.complex128),
-            complex(values[slow]),
-            _upper(values[by_spool[:2]]),
-            _upper(values[by_spool[2:]]),
-            _upper(np.linalg.eigvals(matrix[3:, 3:])),
+            eigenvalues=values.astype(np.complex128),
+            slow=complex(values[slow]),
+            spool=_upper(values[by_spool[:2]]),
+            swash=_upper(values[by_spool[2:]]),
+            swash_at_held_pressure=_upper(np.linalg.eigvals(matrix[3:, 3:])),
         )
 
     def sensitivities(
@@ -502,7 +504,7 @@ class OrderComparison(Tabular):
     reduced_speed: Array
     """Shaft speed of the reduced model. [rad/s]"""
     voltage: Array | None
-    """Command, None where a current was given instead. [V]"""
+    """Command; None if a current was given instead. [V]"""
 
     @property
     def time(self) -> Array:
@@ -533,14 +535,14 @@ class OrderComparison(Tabular):
     def table(self) -> Table:
         """Top speed, and the largest and the rms difference of the reduced model."""
         columns = (Column("Shaft speed"), Column("", ".4g"), UNIT, Column("share", ".2%"))
-        made = Table("", columns)
+        table = Table("", columns)
         largest = float(np.abs(self.error).max())
         rms = float(np.sqrt(np.mean(self.error**2)))
         relative = self.relative  # NaN, shown as nothing, if it does not move
-        made.add("top speed, five states", self.top_speed, None, unit="rad/s")
-        made.add("largest difference", largest, relative[0], unit="rad/s")
-        made.add("rms difference", rms, relative[1], unit="rad/s")
-        return made
+        table.add("top speed, five states", self.top_speed, None, unit="rad/s")
+        table.add("largest difference", largest, relative[0], unit="rad/s")
+        table.add("rms difference", rms, relative[1], unit="rad/s")
+        return table
 
     def plot(self, *, title: str | None = None) -> Figure:
         """Figure of both speeds, their difference, and what lies between command and speed."""
@@ -554,10 +556,10 @@ class OrderComparison(Tabular):
         import polars as pl
 
         speed = pl.Series("reduced_shaft_speed", self.reduced_speed)
-        made = self.full.to_polars().with_columns(speed)
+        frame = self.full.to_polars().with_columns(speed)
         if self.voltage is not None:
-            made.insert_column(1, pl.Series("voltage", self.voltage))
-        return made
+            frame.insert_column(1, pl.Series("voltage", self.voltage))
+        return frame
 
 
 def compare(full: FullOrderDrive, run: Simulation, *, start: Start = "rest") -> OrderComparison:
@@ -591,7 +593,7 @@ def validity_table(axis: str, compared: Iterable[tuple[str, OrderComparison]]) -
     A row for each command: top speed, largest and rms difference in per cent of it, and whether the
     largest difference is within 1 %; none without motion.
     """
-    made = Table(
+    table = Table(
         "Reduced model less full-order one, in % of the top speed",
         (
             Column("axis", of="f"),
@@ -602,14 +604,15 @@ def validity_table(axis: str, compared: Iterable[tuple[str, OrderComparison]]) -
             Column("within 1 %", key="within_1_percent"),
         ),
     )
-    for name, each in compared:
-        if each.moves:
-            enough = each.relative[0] <= ENOUGH
+    for name, comparison in compared:
+        if comparison.moves:
+            largest, rms = comparison.relative
+            enough = largest <= ENOUGH
             cell = Cell(enough, "yes" if enough else "no")
-            made.add(axis, name, each.top_speed, *(100.0 * x for x in each.relative), cell)
+            table.add(axis, name, comparison.top_speed, 100.0 * largest, 100.0 * rms, cell)
         else:
-            made.add(axis, name, each.top_speed, None, None, Cell(None, "does not move"))
-    return made
+            table.add(axis, name, comparison.top_speed, None, None, Cell(None, "does not move"))
+    return table
 
 
 def validity_verdict(table: Table) -> str:

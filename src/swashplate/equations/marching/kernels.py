@@ -75,17 +75,18 @@ def _kind_of(hint: Any) -> str:
 
 def addresses(kernels: Sequence[PlannedCode], needed: Container[int]) -> Any:
     """What `call` is given of each kernel; the kernels themselves must be kept as well."""
-    made = [each() if k in needed else None for k, each in enumerate(kernels)]
+    compiled = [kernel() if k in needed else None for k, kernel in enumerate(kernels)]
     if JIT_OFF:
-        return made
-    return np.array([0 if each is None else each.address for each in made], dtype=np.int64)
+        return compiled
+    words = [0 if kernel is None else kernel.address for kernel in compiled]
+    return np.array(words, dtype=np.int64)
 
 
 def pointers(arrays: tuple[NDArray[Any], ...]) -> Any:
     """What compiled code is given of several arrays, which must be kept as well."""
     if JIT_OFF:
         return arrays
-    return np.array([each.ctypes.data for each in arrays], dtype=np.int64)
+    return np.array([array.ctypes.data for array in arrays], dtype=np.int64)
 
 
 class Struct(Generic[Fields]):
@@ -122,17 +123,18 @@ def _word(field: Any, kind: str) -> int:
     if not isinstance(field, np.ndarray):
         return int(field.address)
     # compiled code cannot tell what it finds at an address
-    found = field.__array_interface__
-    if found["typestr"] != kind or found["strides"] is not None:
+    interface = field.__array_interface__
+    if interface["typestr"] != kind or interface["strides"] is not None:
         raise ValueError(f"An array of a struct must be C-contiguous and of type {kind}.")
-    return int(found["data"][0])
+    address, _ = interface["data"]
+    return int(address)
 
 
 # --- what routines call ---------------------------------------------------------------------------
 
 
 def behind(array: Any, start: int) -> Any:
-    """Numbers of an array from a place on, as one row."""
+    """Numbers of an array from an index on, as one row."""
     return array.reshape(-1)[start:]
 
 
@@ -176,7 +178,7 @@ def run(routine: Kernel, arguments: tuple[Any, ...]) -> None:
 
 @lowers(run)
 def _run(code: Lowering, address: Operand, arguments: tuple[Operand, ...]) -> None:
-    texts = ", ".join(f"{type_of(each.kind)} {each.text}" for each in arguments)
+    texts = ", ".join(f"{type_of(operand.kind)} {operand.text}" for operand in arguments)
     code.emit(f"call void {_pointer(code, INTS, address).text}({texts})")
 
 
@@ -188,10 +190,10 @@ def call(kernel: Kernel, count: int, first: int, h: float, arrays: Any) -> None:
 @lowers(call)
 def _call(code: Lowering, address: Operand, *arguments: Operand) -> None:
     count, first, h, arrays = arguments
-    _run(code, address, (count, first, h, *_each(code, arrays)))
+    _run(code, address, (count, first, h, *_array_pointers(code, arrays)))
 
 
-def _each(code: Lowering, arrays: Operand) -> list[Operand]:
+def _array_pointers(code: Lowering, arrays: Operand) -> list[Operand]:
     """Pointers to the arrays that a kernel takes."""
     words = [code.load(arrays, number(k)) for k in range(len(KERNEL_KINDS) - 3)]
     return [_pointer(code, INTS, word) for word in words]
@@ -207,6 +209,6 @@ def call_recurrence(
 @lowers(call_recurrence)
 def _call_recurrence(code: Lowering, address: Operand, *arguments: Operand) -> None:
     count, lanes, size, tangent, arrays = arguments
-    taken = _each(code, arrays)
+    taken = _array_pointers(code, arrays)
     taken[2], taken[4] = lanes, tangent
     _run(code, address, (count, size, number(0.0), *taken))

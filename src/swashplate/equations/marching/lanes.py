@@ -120,12 +120,19 @@ class Straight:
         """Text of the loops over lanes; the names in `shared` are the same for all lanes."""
         lines: list[str] = []
         for k, loop in enumerate(self.loops):
-            made = {name for each in loop for name in each.names}
-            read = {name for each in loop for name in each.reads}
-            later = {name for after in self.loops[k + 1 :] for each in after for name in each.reads}
-            body = [line for each in loop for line in each.lines]
-            loads, saves = self.loads(read - made - shared), self.saves(made & later)
-            lines += over_lanes([*loads, *body, *saves])
+            computed = {name for statement in loop for name in statement.names}
+            read = {name for statement in loop for name in statement.reads}
+            read_later = {
+                name
+                for later_loop in self.loops[k + 1 :]
+                for statement in later_loop
+                for name in statement.reads
+            }
+            body = self.loads(read - computed - shared)
+            for statement in loop:
+                body += statement.lines
+            body += self.saves(computed & read_later)
+            lines += over_lanes(body)
         return lines
 
 
@@ -142,37 +149,44 @@ def report(model: Model, output: str | None = None, *, options: Any = None) -> s
     model : Model
         A single model, or a joined one.
     output : str, optional
-        Signal that is wanted; by default the last that the model names.
+        Signal to return; by default the last that the model names.
     options : named tuple, optional
         Its options; all off if omitted.
 
     Returns
     -------
     str
-        A line for each operation that is done set by set, with the equation that it stands in; or
-        that there is none. `simulate_many` works either way, and slower in the first.
+        A line for each operation that is done set by set, with the equation that it stands in, or a
+        sentence if there is none. `simulate_many` works in both cases, but slower in the first.
     """
-    signals, chosen, found = list[str](), list[Any](), dict[str, None]()
+    signals = list[str]()
+    options_of_parts = list[Any]()
+    calls = dict[str, None]()
     for i, part in enumerate(model.parts):
         outside = [name for name in part.input_types if model.link_of(i, name) is None]
         signals += [part.tap(name).signal for name in outside if name not in part.defaults]
-        own = options if len(model.parts) == 1 else getattr(options, part.name, None)
-        chosen.append(part.options() if own is None and part.options is not None else own)
+        own_options = options if len(model.parts) == 1 else getattr(options, part.name, None)
+        if own_options is None and part.options is not None:
+            own_options = part.options()
+        options_of_parts.append(own_options)
     names = (*model.outputs, *model.parts[-1].outputs) or model.parts[-1].signal_names
-    sample_code = SampleCode(model, signals, chosen, [output_of(model, output or names[-1])[0]])
+    signal, _ = output_of(model, output or names[-1])
+    sample_code = SampleCode(model, signals, options_of_parts, [signal])
     for used in sample_code.used:
         ends = sample_code.ends[used.part]
         _, known = sample_code.ahead(used, ends, still=fractions_of(used))
         block = sample_code.printed(used, ends, known=known, flat=all_vector)
-        for statement in [each for each in block.statements if not is_vector(each)]:
+        for statement in block.statements:
+            if is_vector(statement):
+                continue
             for node in statement.nodes:
                 if node.op not in VECTOR:
                     source = used.trace.origins.get(node)
                     where = used.own.name if source is None else source.name
-                    found[f"{where} calls {_called(node)}"] = None
-    if not found:
+                    calls[f"{where} calls {_called(node)}"] = None
+    if not calls:
         return f"Nothing keeps {model.name} from vector instructions."
-    return "\n".join([f"{model.name} is not all vector instructions:", *found])
+    return "\n".join([f"{model.name} is not all vector instructions:", *calls])
 
 
 def _called(node: Node) -> str:
@@ -184,19 +198,19 @@ def _called(node: Node) -> str:
 
 
 def fractions_of(part: PartCode) -> list[str]:
-    """Names of the places of a part's taps, which do not change during a march."""
+    """Names of the fractions in the delays of a part's taps, which do not change during a march."""
     return [part.delay_fraction(tap) for tap in part.taps]
 
 
 class Marched(NamedTuple):
-    """What LANES sets leave."""
+    """Results of LANES sets."""
 
     cost: Array
     """(LANES,) sum of weighted squared errors."""
     worst: Array
     """(LANES,) worst margin of the domain, infinite without one."""
     end: Array
-    """(LANES,) a sum that is finite where all numbers are."""
+    """(LANES,) a sum that is finite if all numbers are."""
     outputs: Array
     """(LANES, n) the output, or (LANES, 0)."""
 
@@ -209,7 +223,7 @@ class LanePart(NamedTuple):
     """Path of each parameter by the name of its row; `given` likewise."""
     given: dict[str, str]
     fractions: dict[int, str]
-    """By the number of a tap, the row of the rest of its place."""
+    """By the number of a tap, the row of the fraction in its delay."""
     states: dict[str, str]
     """By path, the row of each number of the state that is carried."""
 
@@ -229,11 +243,11 @@ class _Writer:
     def __init__(
         self, model: Model, signals: Sequence[str], options: Sequence[Any], output: str
     ) -> None:
-        place, is_rate = output_of(model, output)
-        self._sample_code = SampleCode(model, signals, options, [place])
+        signal, is_rate = output_of(model, output)
+        self._sample_code = SampleCode(model, signals, options, [signal])
         self._straight = Straight()
         self._ahead: list[tuple[PartCode, CodeBlock]] = []
-        text = self._sample_code.module(*self._texts(place, is_rate))
+        text = self._sample_code.module(*self._texts(signal, is_rate))
         parts = [self._part_of(part) for part in self._sample_code.used]
         self.facts = LaneFacts(text, self._straight.number, parts)
 
@@ -247,7 +261,7 @@ class _Writer:
             {path: states[path].value for path in self._sample_code.carried[part.part]},
         )
 
-    def _texts(self, place: SignalId, is_rate: bool) -> list[str]:
+    def _texts(self, signal: SignalId, is_rate: bool) -> list[str]:
         """Texts of both functions."""
         sample_code, straight, model = self._sample_code, self._straight, self._sample_code.model
         following: list[tuple[str, str, frozenset[str]]] = []
@@ -255,7 +269,7 @@ class _Writer:
         worst = ""
         for part in sample_code.used:
             straight.cut()
-            worst = self._part(part, place, following, worst)
+            worst = self._part(part, signal, following, worst)
         if worst:
             following.append(("worst", worst, frozenset((worst,))))
         shown = "value"
@@ -311,7 +325,7 @@ class _Writer:
     def _part(
         self,
         part: PartCode,
-        place: SignalId,
+        signal: SignalId,
         following: list[tuple[str, str, frozenset[str]]],
         worst: str,
     ) -> str:
@@ -328,8 +342,8 @@ class _Writer:
             before = graph.name(worst or "worst")
             worst = part.fresh("lowest")
             results[worst] = lower(before, part.margin)
-        if place.part == part.part and place.kind != "link":
-            results["value"] = part.node(place)
+        if signal.part == part.part and signal.kind != "link":
+            results["value"] = part.node(signal)
         states = dict(leaves(part.state))
         carried = {states[path].value: steps[path] for path in sample_code.carried[part.part]}
         block = sample_code.printed(
@@ -340,9 +354,9 @@ class _Writer:
         texts = iter(block.results)
         for name in results:
             straight.let(name, *next(texts))
-        if place.part == part.part and place.kind == "link":
+        if signal.part == part.part and signal.kind == "link":
             observed = sample_code.printed(
-                part, [sample_code.observed(part, place)], known=block.names
+                part, [sample_code.observed(part, signal)], known=block.names
             )
             for statement in observed.statements:
                 straight.add(statement)
@@ -357,9 +371,9 @@ class _Writer:
         used = set[str]()
         for part, head in self._ahead:
             lines += head.lines
-            made = {name for each in head.statements for name in each.names}
-            lines += straight.saves(read & made)
-            used |= {name for each in head.statements for name in each.reads} - made
+            computed = {name for statement in head.statements for name in statement.names}
+            lines += straight.saves(read & computed)
+            used |= {name for statement in head.statements for name in statement.reads} - computed
             states = dict(leaves(part.state))
             initial = dict(leaves(part.initial_state()))
             carried = sample_code.carried[part.part]
@@ -370,9 +384,9 @@ class _Writer:
             for path, (text, reads) in zip(carried, at_rest.results, strict=True):
                 lines.append(f"{straight.row(states[path].value)} = {text}")
                 used |= reads
-            made |= {name for each in at_rest.statements for name in each.names}
-            used |= {name for each in at_rest.statements for name in each.reads}
-            used -= made
+            computed |= {name for statement in at_rest.statements for name in statement.names}
+            used |= {name for statement in at_rest.statements for name in statement.reads}
+            used -= computed
         return [*straight.loads(used - {"h"}), *lines]
 
 

@@ -66,7 +66,7 @@ CONTEXT_FIELDS = [
 class SampleCode:
     """One sample of a whole model: the code of its parts, and what of it is needed.
 
-    `wanted` are numbers that are kept at every sample; parts that none of them needs are left out.
+    `outputs` are numbers that are kept at every sample; parts that none of them needs are left out.
 
     Attributes
     ----------
@@ -85,21 +85,27 @@ class SampleCode:
         model: Model,
         signals: Sequence[str],
         options: Sequence[Any],
-        wanted: Sequence[SignalId],
+        outputs: Sequence[SignalId],
     ) -> None:
-        self.model, self.signals = model, tuple(signals)
-        taken = {*RESERVED, *self.signals, *(f"{each}_before" for each in self.signals)}
-        self.parts = [PartCode(model, i, signals, each, taken) for i, each in enumerate(options)]
+        self.model = model
+        self.signals = tuple(signals)
+        taken = {*RESERVED, *self.signals, *(f"{signal}_before" for signal in self.signals)}
+        self.parts = [
+            PartCode(model, i, signals, options_of_part, taken)
+            for i, options_of_part in enumerate(options)
+        ]
         self.ends: list[list[Node]] = [[] for _ in self.parts]
         self.carried: list[list[str]] = [[] for _ in self.parts]
         self.sources: dict[SignalSource, Node] = {}
         self.functions: dict[str, Function] = {}
-        for each in wanted:
-            if each.kind == "link":
-                self._need(model.links[each.path].sources)
+        for output in outputs:
+            part = self.parts[output.part]
+            if output.kind == "link":
+                self._need(model.links[output.path].sources)
+            elif output.kind == "limits":
+                self.ends[output.part] += part.limits
             else:
-                part = self.parts[each.part]
-                self.ends[each.part] += part.limits if each.kind == "limits" else [part.node(each)]
+                self.ends[output.part].append(part.node(output))
         for part in reversed(self.parts):
             if self.ends[part.part]:
                 self._settle(part)
@@ -120,25 +126,27 @@ class SampleCode:
         self.carried[part.part] = [path for path in state if path in carried]
         for name in part.own.input_types:
             link = self.model.link_of(part.part, name)
-            if link is not None and any(part.source(each) in read for each in link.sources):
+            if link is not None and any(part.source(source) in read for source in link.sources):
                 self._need(link.sources)
 
     def _need(self, sources: Sequence[SignalSource]) -> None:
-        for source in (each for each in sources if each not in self.sources):
-            node = self.sources[source] = self.parts[source.part].signal(source.signal)
-            self.ends[source.part].append(node)
+        for source in sources:
+            if source not in self.sources:
+                node = self.parts[source.part].signal(source.signal)
+                self.sources[source] = node
+                self.ends[source.part].append(node)
 
     def outside(self) -> dict[str, SignalId]:
-        """What is known ahead of a sample, by name: numbers, the state, places and records."""
-        known = {"h": SignalId(0, "h")}
+        """What is known ahead of a sample, by name: numbers, the state, delays and records."""
+        ids = {"h": SignalId(0, "h")}
         for part in self.used:
             i = part.part
             for kind, value in (("p", part.p), ("given", part.given), ("state", part.state)):
-                known |= {node.value: SignalId(i, kind, path) for path, node in leaves(value)}
-            known |= part.outside
+                ids |= {node.value: SignalId(i, kind, path) for path, node in leaves(value)}
+            ids |= part.outside
             for tap in part.taps:
-                known[part.delay_fraction(tap)] = SignalId(i, "fraction", str(tap.number))
-        return known
+                ids[part.delay_fraction(tap)] = SignalId(i, "fraction", str(tap.number))
+        return ids
 
     def module(self, *texts: str) -> str:
         """Text of a module of some functions, with the generated ones that they call."""
@@ -216,67 +224,77 @@ class SampleCode:
         self, part: PartCode, past: Callable[[str, str], str], now: Callable[[str], str]
     ) -> list[str]:
         """Lines that read a part's inputs: what a signal was some samples ago, and what it is."""
-        lines, read = [], self.read(part)
+        lines = []
+        read = self.read(part)
         for tap in part.taps:
             for j, name in enumerate(part.tap_samples(tap)):
                 if name in read:
                     back = f"{part.delay_samples(tap)} + {j}" if j else part.delay_samples(tap)
                     lines.append(f"{name} = {past(tap.tap.signal, back)}")
         inputs = [part.own.tap(name).signal for name in part.own.input_types]
-        known = [each for each in dict.fromkeys(inputs) if each in self.signals]
-        return lines + [f"x_{each} = {now(each)}" for each in known if f"x_{each}" in read]
+        lines += [
+            f"x_{signal} = {now(signal)}"
+            for signal in dict.fromkeys(inputs)
+            if signal in self.signals and f"x_{signal}" in read
+        ]
+        return lines
 
     def body(
         self,
         part: PartCode,
-        places: Mapping[SignalId, str],
+        targets: Mapping[SignalId, str],
         known: Mapping[Node, str],
-        more: Mapping[SignalId, str] = MappingProxyType({}),
+        further: Mapping[SignalId, str] = MappingProxyType({}),
     ) -> Sampled:
         """A part's sample, with signals that other parts need and what is kept.
 
-        `places` are the texts of where numbers are kept, and `more` of those that are kept if
-        ``everything`` is; limits are one, a bit for each. `known` nodes have names already.
+        `targets` are the texts of where numbers are kept, and `further` of those that are kept if
+        ``everything`` is; limits are one number, a bit for each. `known` nodes have names already.
         """
-        own = [(source, n) for source, n in self.sources.items() if source.part == part.part]
+        sources = {
+            source: node for source, node in self.sources.items() if source.part == part.part
+        }
         steps = dict(leaves(part.following))
         margin = [] if part.margin is None else [part.margin]
-        kept = [each for each in places if each.part == part.part and each.kind != "link"]
-        results = [node for _, node in own] + margin
-        results += [node for each in kept for node in self.kept_nodes(part, each)]
+        outputs = [
+            output for output in targets if output.part == part.part and output.kind != "link"
+        ]
+        results = [*sources.values(), *margin]
+        results += [node for output in outputs for node in self.kept_nodes(part, output)]
         results += [steps[path] for path in self.carried[part.part]]
         block = self.printed(part, results, known=known)
         texts = iter(block.texts)
         lines = block.lines
-        lines += [f"{part.source(source)} = {next(texts)}" for source, _ in own]
+        lines += [f"{part.source(source)} = {next(texts)}" for source in sources]
         margin_name = part.fresh("margin") if margin else ""
         if margin:
             lines += assigned(margin_name, next(texts))
-        for each in kept:
-            lines += self.stored(part, each, places[each], texts)
+        for output in outputs:
+            lines += self.stored(part, output, targets[output], texts)
         following = [*texts]
         known = {**known, **block.names}
-        links = [each for each in places if each.part == part.part and each.kind == "link"]
-        lines += self.kept_lines(part, links, places, known)
-        later = [each for each in more if each.part == part.part]
+        links = [output for output in targets if output.part == part.part and output.kind == "link"]
+        lines += self.kept_lines(part, links, targets, known)
+        later = [output for output in further if output.part == part.part]
         if later:
-            lines += ["if everything:", *indented(self.kept_lines(part, later, more, known))]
+            lines += ["if everything:", *indented(self.kept_lines(part, later, further, known))]
         return Sampled(lines, margin_name, following)
 
     def kept_lines(
         self,
         part: PartCode,
-        kept: Sequence[SignalId],
-        places: Mapping[SignalId, str],
+        outputs: Sequence[SignalId],
+        targets: Mapping[SignalId, str],
         known: Mapping[Node, str],
     ) -> list[str]:
-        """Lines that keep some numbers of a part, behind its sample."""
-        nodes = [node for each in kept for node in self.kept_nodes(part, each)]
+        """Lines that keep some numbers of a part, after its sample."""
+        nodes = [node for output in outputs for node in self.kept_nodes(part, output)]
         # nothing waits for these, and branches take long to compile
         block = self.printed(part, nodes, known=known, branches=False)
-        lines, texts = block.lines, iter(block.texts)
-        for each in kept:
-            lines += self.stored(part, each, places[each], texts)
+        lines = block.lines
+        texts = iter(block.texts)
+        for output in outputs:
+            lines += self.stored(part, output, targets[output], texts)
         return lines
 
     def kept_nodes(self, part: PartCode, stored: SignalId) -> list[Node]:
@@ -284,13 +302,13 @@ class SampleCode:
         return part.limits if stored.kind == "limits" else [self.observed(part, stored)]
 
     def stored(
-        self, part: PartCode, stored: SignalId, place: str, texts: Iterator[str]
+        self, part: PartCode, stored: SignalId, target: str, texts: Iterator[str]
     ) -> list[str]:
         """Lines that keep a number, from the texts of what it is made of."""
         if stored.kind != "limits":
-            return assigned(place, next(texts))
+            return assigned(target, next(texts))
         bits = [f"choose({next(texts)}, {1 << k}, 0)" for k in range(len(part.limits))]
-        return assigned(place, " | ".join(bits))
+        return assigned(target, " | ".join(bits))
 
     def observed(self, part: PartCode, stored: SignalId) -> Node:
         """A number that is kept, of what is known at its part's end."""
@@ -298,20 +316,24 @@ class SampleCode:
             return part.node(stored)
         link = self.model.links[stored.path]
         sources: dict[str, Value] = {
-            each.signal: graph.name(part.source(each)) for each in link.sources
+            source.signal: graph.name(part.source(source)) for source in link.sources
         }
         assert link.equation is not None
         return part.link(link.equation, link.name, sources)
 
     def states(self, part: PartCode, steps: Sequence[str]) -> States:
         """How a part's state is taken out of a flat array, to the next sample, and back."""
-        carried, places = self.carried[part.part], self.model.places("state")
-        names = dict(leaves(part.state))
-        own = [names[path].value for path in carried]
+        carried = self.carried[part.part]
+        places = self.model.places("state")
+        nodes = dict(leaves(part.state))
+        names = [nodes[path].value for path in carried]
         flat = [f"states[{places.index((part.part, path))}]" for path in carried]
-        step = assigned(", ".join(own), ", ".join(steps)) if carried else []
-        pairs = [*zip(own, flat, strict=True)]
-        return States([f"{a} = {b}" for a, b in pairs], step, [f"{b} = {a}" for a, b in pairs])
+        pairs = [*zip(names, flat, strict=True)]
+        return States(
+            load=[f"{name} = {element}" for name, element in pairs],
+            step=assigned(", ".join(names), ", ".join(steps)) if carried else [],
+            save=[f"{element} = {name}" for name, element in pairs],
+        )
 
 
 class Sampled(NamedTuple):
@@ -332,33 +354,33 @@ class States(NamedTuple):
     save: list[str]
 
 
-def lower(one: Node, two: Node) -> Node:
-    """The lower of two margins; not a number once one of them was none."""
-    test = graph.either(graph.make("<=", one, two), graph.make("!=", one, one))
-    return graph.choose(test, one, two)
+def lower(a: Node, b: Node) -> Node:
+    """The lower of two margins; not a number if one of them is not."""
+    test = graph.either(graph.make("<=", a, b), graph.make("!=", a, a))
+    return graph.choose(test, a, b)
 
 
 def march_source(
     model: Model,
     signals: Sequence[str],
     options: Sequence[Any],
-    places: Mapping[SignalId, str],
-    more: Mapping[SignalId, str] = MappingProxyType({}),
+    targets: Mapping[SignalId, str],
+    further: Mapping[SignalId, str] = MappingProxyType({}),
 ) -> str:
     """Text of a module with the march over samples as a `kernel`.
 
-    `places` says what is kept, and where it goes at sample ``n``; `more` what is kept, too, if the
-    second number of ``worst_margin`` is not zero.
+    `targets` says what is kept, and where it goes at sample ``n``; `further` what is kept, too, if
+    the second number of ``worst_margin`` is not zero.
     """
-    sample_code = SampleCode(model, signals, options, [*places, *more])
+    sample_code = SampleCode(model, signals, options, [*targets, *further])
     parts = sample_code.used
     lines, saved, samples = ["last = first + count"], list[str](), list[list[str]]()
     for k, signal in enumerate(sample_code.signals):
         lines += [f"{signal} = records[{k}]", f"{signal}_before = before[{k}]"]
-    lines += ["everything = worst_margin[1] != 0.0"] if more else []
+    lines += ["everything = worst_margin[1] != 0.0"] if further else []
     for part in parts:
         ahead, known = sample_code.ahead(part, sample_code.ends[part.part])
-        sample = sample_code.body(part, places, known, more)
+        sample = sample_code.body(part, targets, known, further)
         states = sample_code.states(part, sample.following)
         lines += [*sample_code.delays(part), *ahead, *states.load]
         saved += states.save
@@ -374,7 +396,8 @@ def march_source(
         samples.append([*inner, *states.step])
     margins = any(part.margin is not None for part in parts)
     lines += ["worst, total = inf, 0.0"] if margins else []
-    passed = [parts[-1].source(each) for each in sample_code.sources if each.part != parts[-1].part]
+    last = parts[-1]
+    passed = [last.source(source) for source in sample_code.sources if source.part != last.part]
     if passed and any(sample_code.carried[part.part] for part in parts[:-1]):
         # the last part is a sample behind the others, so that neither waits for the other
         late = re.compile(rf"\b({'|'.join(passed)})\b")
@@ -410,13 +433,13 @@ def step_source(
     sample_code = SampleCode(model, signals, options, stored)
     row = sample_code.signals.index
     tapped = sorted({row(tap.tap.signal) for part in sample_code.used for tap in part.taps})
-    lines = [f"{each} = context.{each}" for each in CONTEXT_FIELDS]
+    lines = [f"{name} = context.{name}" for name in CONTEXT_FIELDS]
     prepare, ends, count = list[str](), ["worst = inf"], 0
     if tapped:
         lines += ["for j in range(lines.shape[1] - 1, 0, -1):"]
         lines += [f"    lines[{k}, j] = lines[{k}, j - 1]" for k in tapped]
         lines += [f"lines[{k}, 0] = inputs[{k}]" for k in tapped]
-    places = {each: f"outputs[{k}]" for k, each in enumerate(stored)}
+    targets = {signal: f"outputs[{k}]" for k, signal in enumerate(stored)}
     for part in sample_code.used:
         ends_of_part = sample_code.ends[part.part]
         ahead, known = sample_code.ahead(part, ends_of_part)
@@ -425,7 +448,7 @@ def step_source(
             prepare.append(f"constants[{count}] = {known[node]}")
             lines.append(f"{known[node]} = constants[{count}]")
             count += 1
-        sample = sample_code.body(part, places, known)
+        sample = sample_code.body(part, targets, known)
         states = sample_code.states(part, sample.following)
         lines += [
             *sample_code.delays(part),
@@ -457,10 +480,10 @@ def output_of(model: Model, output: str) -> tuple[SignalId, bool]:
     if name in model.links:
         return SignalId(model.links[name].after, "link", name), integral
     for i in range(len(model.parts) - 1, -1, -1):
-        own = model.parts[i]
-        if own.signals is not None and name in floats_of(own.signals):
+        part = model.parts[i]
+        if part.signals is not None and name in floats_of(part.signals):
             return SignalId(i, "signals", name), integral
-        if name in floats_of(own.state):
+        if name in floats_of(part.state):
             return SignalId(i, "state", name), integral
     known = [name for part in model.parts for name in part.signal_names]
     raise InputError(

@@ -151,20 +151,24 @@ class Instance:
 
     def number_at(self, stored: SignalId, before: Mapping[str, float], h: float) -> float:
         """Number that is known ahead of a sample, of constant records; 0 for a tap's fraction."""
-        own, kind, path = self.parts[stored.part], stored.kind, stored.path
-        if kind in ("p", "given"):
-            return float(value_at(own.p if kind == "p" else own.given, path))
+        numbers = self.parts[stored.part]
+        kind = stored.kind
+        if kind == "p":
+            return float(value_at(numbers.p, stored.path))
+        if kind == "given":
+            return float(value_at(numbers.given, stored.path))
         if kind in ("tap", "input"):
-            part, name = self.model.parts[stored.part], path.partition(".")[0]
+            part = self.model.parts[stored.part]
+            name, _, _ = stored.path.partition(".")
             return before.get(part.tap(name).signal, 0.0)
         return h if kind == "h" else 0.0
 
     def check_inputs(self, signals: Collection[str]) -> None:
         """Refuse external signals that the model does not know, and the lack of those it needs."""
-        known = self.model.external
+        inputs = self.model.external
         for signal in signals:
-            if signal not in known:
-                has = ", ".join(known) or "none"
+            if signal not in inputs:
+                has = ", ".join(inputs) or "none"
                 raise InputError(f"{self.name} has no input '{signal}'; it has {has}.")
         for i, part in enumerate(self.model.parts):
             for name in part.input_types:
@@ -235,16 +239,16 @@ class Instance:
             arguments_of_parts.append(arguments)
         return InitialStates(tuple(states), before, tuple(arguments_of_parts))
 
-    def _state(self, part: Model, known: Mapping[str, Any], start: Start) -> Any:
+    def _state(self, part: Model, arguments: Mapping[str, Any], start: Start) -> Any:
         equation = part.rest if start == "rest" else part.settled
         if equation is not None:
-            found = self._called(part, equation, known)
-            if not isinstance(found, part.state):
+            state = self._called(part, equation, arguments)
+            if not isinstance(state, part.state):
                 raise InputError(
                     f"{self.name}: {plain(equation).__name__} must return a "
-                    f"{part.state.__name__}, not {found!r}."
+                    f"{part.state.__name__}, not {state!r}."
                 )
-            return found
+            return state
         if start == "steady" and floats_of(part.state):
             raise InputError(
                 f"{self.name}: {part.name} has no equation for its steady state ('settled'), so "
@@ -254,9 +258,11 @@ class Instance:
         empty = [path for path in floats_of(part.state) if path.split(".")[0] not in defaults]
         return made(part.state, dict.fromkeys(empty, 0.0))
 
-    def _called(self, part: Model, equation: Callable[..., Any], known: Mapping[str, Any]) -> Any:
+    def _called(
+        self, part: Model, equation: Callable[..., Any], arguments: Mapping[str, Any]
+    ) -> Any:
         try:
-            return called(part, equation, known)
+            return called(part, equation, arguments)
         except NO_NUMBER as error:
             raise DomainError(
                 f"{self.name}: {plain(equation).__name__} cannot be computed for these numbers "
@@ -412,13 +418,13 @@ def march_of(
     further: tuple[SignalId, ...] = (),
 ) -> PlannedCode:
     """The march over whole records: rows for the numbers that are kept, then for `further` ones."""
-    rows = {each: f"flat[{row} * count + n]" for row, each in enumerate((*stored, *further))}
-    always = {each: rows[each] for each in stored}
-    later = {each: rows[each] for each in further}
+    rows = {signal: f"flat[{row} * count + n]" for row, signal in enumerate((*stored, *further))}
+    always = {signal: rows[signal] for signal in stored}
+    if_everything = {signal: rows[signal] for signal in further}
     text = kept(
         f"{model.name}_march",
         (key_of(model), signals, options, stored, further),
-        lambda: march_source(model, signals, options, always, later),
+        lambda: march_source(model, signals, options, always, if_everything),
     )
     return PlannedKernel(f"{model.name}_march", "march", text)
 
@@ -437,17 +443,18 @@ def marched(
 ) -> Array:
     """(r, n) numbers in the order of `stored`, marched over whole records; limits as sums of bits.
 
-    From where `initial` begins, or from states by path; `cause` is what drives the model, for the
-    sentence if it leaves its domain or a number overflows. The same march can leave
-    `further` numbers, which follow in the table if it is to leave `everything`.
+    The march starts from `initial`, apart from the states that `begin` gives by path. `cause` is
+    what drives the model, for the message if it leaves its domain or a number overflows. The same
+    march computes `further` numbers if `everything` is wanted; they follow in the table.
     """
-    signals, size = tuple(records), next(iter(records.values())).size
+    signals = tuple(records)
+    size = next(iter(records.values())).size
     planned = march_of(instance.model, signals, instance.options, stored, further)
     stored = (*stored, *further) if everything else stored
     table = np.empty((len(stored), size))
     worst_margin = np.array([np.inf, float(everything)])
     states = initial_states(instance, initial, begin)
-    values = tuple(np.ascontiguousarray(each, dtype=np.float64) for each in records.values())
+    values = tuple(np.ascontiguousarray(record, dtype=np.float64) for record in records.values())
     arrays = arrays_of(
         instance,
         values,
@@ -468,7 +475,7 @@ def check_outputs(
 ) -> None:
     """Refuse samples that are not finite; of (r, n) or (r,) numbers the first one is named."""
     with np.errstate(all="ignore"):
-        if math.isfinite(table.sum()):  # of finite numbers it may overflow, of others it is none
+        if math.isfinite(table.sum()):  # a sum of finite numbers may overflow: see below
             return
     samples = table.reshape(len(stored), -1)
     bad = ~np.isfinite(samples)
@@ -487,14 +494,14 @@ def initial_states(instance: Instance, initial: InitialStates, begin: Mapping[st
     """States as numbers, some of them as given by path."""
     check_mapping("begin", begin)
     states = initial.flat
-    known = state_paths(instance.model) if begin else ()
+    paths = state_paths(instance.model) if begin else ()
     for path, value in begin.items():
-        if path not in known:
-            has = ", ".join(known) or "none"
+        if path not in paths:
+            has = ", ".join(paths) or "none"
             raise InputError(f"{instance.name} has no state '{path}' to start from; it has {has}.")
         if not is_real(value) or not np.isfinite(value):
             raise InputError(f"{path} begins at {value!r}, but must be a finite number.")
-        states[known.index(path)] = value
+        states[paths.index(path)] = value
     return states
 
 
@@ -540,12 +547,12 @@ def check_domain(instance: Instance, states: Array, worst: float, cause: str) ->
 
 
 def outside(model: Model, worst: float, cause: str) -> str:
-    """What has happened where the margin is not above 0."""
+    """What has happened if the margin is not above 0."""
     parts = [part for part in model.parts if part.domain is not None]
-    said = [
-        each.outside(worst, cause)
-        if callable(each.outside)
-        else f"{each.outside} under this {cause}."
-        for each in parts or [model]
-    ]
-    return " Or: ".join(said)
+    sentences: list[str] = []
+    for part in parts or [model]:
+        if callable(part.outside):
+            sentences.append(part.outside(worst, cause))
+        else:
+            sentences.append(f"{part.outside} under this {cause}.")
+    return " Or: ".join(sentences)

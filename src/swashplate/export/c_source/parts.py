@@ -102,7 +102,7 @@ class PartInC:
 
     def traced(self, equation: Equation, trace: Trace) -> Value:
         """What an equation of the part returns."""
-        known = dict(self.part.known)
+        known = dict(self.part.arguments)
         if (options := fixed(self._symbols)) is not None:
             known["options"] = options
         given = {name: known[name] for name in arguments_of(equation) if name in known}
@@ -113,7 +113,7 @@ class PartInC:
         part, own = self.part, self.own
         limits = Tuple(None, ()) if own.limits is None else self.traced(own.limits, part.trace)
         return {
-            "signals": [*leaves(part.known.get("signals", Tuple(None, ())))],
+            "signals": [*leaves(part.arguments.get("signals", Tuple(None, ())))],
             "limits": [*leaves(limits)],
             "next": [*leaves(part.following)],
         }
