@@ -16,7 +16,7 @@ from swashplate.drive import PUMP_COLUMNS, bound_drive, drive_instance
 from swashplate.equations.marching.observation import Observation, ObservedRecord
 from swashplate.equations.marching.part_code import SignalId
 from swashplate.equations.marching.record import record_of
-from swashplate.equations.marching.run import arrays_of, march_of
+from swashplate.equations.marching.run import arrays_of, planned_march
 
 Array = NDArray[np.float64]
 
@@ -31,7 +31,7 @@ class Kernel:
         initial = self.instance.start({signal: float(values[0])}, STEP)
         self.at_rest, self.states = initial.flat, initial.flat.copy()
         kept = (SignalId(1, "signals", "shaft_speed"),)
-        planned = march_of(self.instance.model, (signal,), self.instance.options, kept)
+        planned = planned_march(self.instance.model, (signal,), self.instance.options, kept)
         self.march = planned()
         self.out, self.worst_margin = np.empty((1, values.size)), np.empty(1)
         self.values = (values,)

@@ -12,9 +12,9 @@ from .instance import card_of as card_of
 from .instance import card_options as card_options
 from .instance import check_filter_stability as check_filter_stability
 from .instance import drive_instance as drive_instance
+from .instance import filter_step_limit as filter_step_limit
 from .instance import models_of as models_of
 from .instance import pump_of as pump_of
-from .instance import step_limit as step_limit
 from .linear_drive import LinearDrive as LinearDrive
 from .linear_drive import model_tables as model_tables
 from .march import Sample as Sample

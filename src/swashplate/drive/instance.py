@@ -153,7 +153,7 @@ def without_ripple(instance: Instance) -> Instance:
     return Instance(instance.model, (card, smooth), instance.name)
 
 
-def step_limit(zeta: ArrayLike, exact: bool) -> Array:
+def filter_step_limit(zeta: ArrayLike, exact: bool) -> Array:
     """Largest ωh that the card's filter bears, for each ζ; see the equation of that name."""
     damping = np.asarray(zeta, dtype=np.float64)
     limit = interpreted(filter_limit)
@@ -178,7 +178,7 @@ def unstable_filters(numbers: Mapping[str, Array], step: float, exact: bool) -> 
     )
     for side in SIDES:
         zeta, omega = numbers[f"zeta_{side}"], numbers[f"omega_{side}"]
-        steps = omega * step / step_limit(zeta, exact)
+        steps = omega * step / filter_step_limit(zeta, exact)
         values = {
             "side": side,
             "zeta": zeta,

@@ -14,7 +14,7 @@ from .declaration import source as source
 from .fields import Definition as Definition
 from .library import soft_threshold as soft_threshold
 from .marching.derivatives import BoundModel as BoundModel
-from .marching.lanes import report as report
+from .marching.lanes import vectorisation_report as vectorisation_report
 from .marching.run import Instance as Instance
 from .marching.run import instance_of as instance_of
 from .marching.sensitivity import Sensitivities as Sensitivities

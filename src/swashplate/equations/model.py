@@ -345,12 +345,12 @@ def _wrong(model: Model) -> Iterator[str]:
             yield f"{says}{word} must be an equation, not {member!r}."
     input_names = [*model.input_types]
     parameters = floats_of(model.parameters)
-    for equation in model.equations:
-        for name in arguments_of(equation):
+    for asking in model.equations:
+        for name in arguments_of(asking):
             if name not in (*ARGUMENTS, *input_names):
                 choice = ", ".join((*ARGUMENTS, *input_names))
-                asking = plain(equation).__name__
-                yield f"{says}{asking} asks for '{name}', which is none of {choice}."
+                name_of = plain(asking).__name__
+                yield f"{says}{name_of} asks for '{name}', which is none of {choice}."
     for name, tap in model.taps.items():
         if name not in input_names:
             yield f"{says}there is a tap on '{name}', but no input."

@@ -414,6 +414,6 @@ def word(path: str) -> str:
     return path.replace(".", "_").replace("[", "_").replace("]", "")
 
 
-def listing(inputs: Sequence[str]) -> str:
+def listed(inputs: Sequence[str]) -> str:
     """Inputs, as far as one wants to read them."""
     return ", ".join(inputs) if len(inputs) <= 6 else f"{len(inputs)} inputs"

@@ -66,7 +66,7 @@ def lowers(function: Any) -> Callable[[F], F]:
     return declared
 
 
-def definition_of(function: Any) -> FunctionDefinition:
+def function_definition_of(function: Any) -> FunctionDefinition:
     """A Python function, by its source."""
     function = plain(function)
     return FunctionDefinition(unchecked(function).node, function.__globals__)
@@ -102,7 +102,7 @@ def lowered(function: FunctionDefinition, kinds: Sequence[str], symbol: str) -> 
             continue
 
 
-def type_of(kind: str) -> str:
+def llvm_type(kind: str) -> str:
     """LLVM's type of a kind."""
     return "ptr" if kind.startswith("*") else TYPES[kind]
 
@@ -158,7 +158,7 @@ class Lowering:
         """Text of the module."""
         scope, formals = Scope(0, function.space, "return"), []
         for argument, kind in zip(function.tree.args.args, kinds, strict=True):
-            formals.append(f"{type_of(kind)} %{argument.arg}")
+            formals.append(f"{llvm_type(kind)} %{argument.arg}")
             self._store(scope.key(argument.arg), Operand(kind, f"%{argument.arg}"))
         if self._body(function.tree.body, scope):
             self._jump(scope.end)
@@ -194,11 +194,11 @@ class Lowering:
     def load(self, pointer: Operand, index: Operand) -> Operand:
         """An element of what a pointer points to."""
         kind = pointer.kind[1:]
-        return self.operand(kind, f"load {type_of(kind)}, ptr {self.offset(pointer, index).text}")
+        return self.operand(kind, f"load {llvm_type(kind)}, ptr {self.offset(pointer, index).text}")
 
     def offset(self, pointer: Operand, index: Operand) -> Operand:
         """A pointer to an element."""
-        kind = type_of(pointer.kind[1:])
+        kind = llvm_type(pointer.kind[1:])
         text = f"getelementptr inbounds {kind}, ptr {pointer.text}, i64 {index.text}"
         return self.operand(pointer.kind, text)
 
@@ -225,13 +225,13 @@ class Lowering:
         if kind != value.kind and KINDS.index(value.kind) > KINDS.index(kind):
             self._kinds[key] = value.kind
             raise _WidenedError
-        self._allocate(key, type_of(kind))
-        self.emit(f"store {type_of(kind)} {self.cast(value, kind).text}, ptr %{key}")
+        self._allocate(key, llvm_type(kind))
+        self.emit(f"store {llvm_type(kind)} {self.cast(value, kind).text}, ptr %{key}")
 
     def _load(self, key: str) -> Operand:
         kind = self._kinds[key]
-        self._allocate(key, type_of(kind))
-        return self.operand(kind, f"load {type_of(kind)}, ptr %{key}")
+        self._allocate(key, llvm_type(kind))
+        return self.operand(kind, f"load {llvm_type(kind)}, ptr %{key}")
 
     def _allocate(self, key: str, kind: str) -> None:
         self._variables.setdefault(key, f"  %{key} = alloca {kind}")
@@ -288,7 +288,7 @@ class Lowering:
                 place = self.offset(self._value(array, scope), self._value(index, scope))
                 kind = place.kind[1:]
                 value = self.cast(value, kind)
-                self.emit(f"store {type_of(kind)} {value.text}, ptr {place.text}")
+                self.emit(f"store {llvm_type(kind)} {value.text}, ptr {place.text}")
             case _:
                 raise NotImplementedError(ast.unparse(target))
 
@@ -503,7 +503,7 @@ class Lowering:
             return self._written_out(function, given)
         if function in LOWERED:
             return LOWERED[function](self, *given)
-        return self._written_out(definition_of(function), given)
+        return self._written_out(function_definition_of(function), given)
 
     def _written_out(self, function: FunctionDefinition, given: list[Any]) -> Any:
         """A function in the place of its call."""

@@ -126,7 +126,7 @@ class Schedule:
             return -depth[node], self._is_branch(node), -self._index[node]
 
         for node in sorted(self._order, key=last_first):
-            regions = merged(needed[node])
+            regions = outermost_regions(needed[node])
             if node.op == "result":  # made together with all others, where the call is
                 needed.setdefault(node.args[0], {}).update(dict.fromkeys(regions))
                 continue
@@ -235,7 +235,7 @@ class Schedule:
                 yield from self.uses(branch, side)
 
 
-def merged(regions: Iterable[Region]) -> list[Region]:
+def outermost_regions(regions: Iterable[Region]) -> list[Region]:
     """The outermost of some regions; both sides of a branch become the region around it."""
     outermost: list[Region] = []
     for region in regions:

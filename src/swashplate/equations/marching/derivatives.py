@@ -18,7 +18,7 @@ from swashplate.equations.marching.rows import (
     Sink,
     aligned,
     compiled_march,
-    march_of,
+    march_struct,
     upright,
 )
 from swashplate.equations.marching.run import (
@@ -284,7 +284,7 @@ def _march(
         room.fields.block,
     )
     kernels = addresses(structure.facts.kernels, layout.kernels)
-    structs = march_of(program, plan, sink, room)
+    structs = march_struct(program, plan, sink, room)
     march = compiled_march()
     march(kernels, pointers(arrays), values[0].size, h, structs.address)
     layout.give_back(room)

@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 from swashplate.equations.code_generation.lowering import (
     Lowering,
     Operand,
-    definition_of,
+    function_definition_of,
+    llvm_type,
     lowers,
     number,
-    type_of,
 )
 from swashplate.equations.code_generation.machine_code import machine_code
 from swashplate.equations.declaration import JIT_OFF
@@ -54,14 +54,15 @@ PlannedCode = Callable[[], Kernel]
 def routine(function: Callable[..., None]) -> Kernel:
     """Compile a function of numbers and arrays that is part of the engine, by its annotations.
 
-    Arrays become pointers, which do not know their shapes. Other routines `run` it by its address.
+    Arrays become pointers, which do not know their shapes. Other routines run it by its address:
+    see `run_routine`.
     """
     if JIT_OFF:
         return function
     hints = {k: v for k, v in function.__annotations__.items() if k != "return"}
     kinds = tuple(_kind_of(hint) for hint in hints.values())
     name = function.__name__
-    return machine_code(name, name, kinds, lambda: definition_of(function))
+    return machine_code(name, name, kinds, lambda: function_definition_of(function))
 
 
 def _kind_of(hint: Any) -> str:
@@ -74,7 +75,7 @@ def _kind_of(hint: Any) -> str:
 
 
 def addresses(kernels: Sequence[PlannedCode], needed: Container[int]) -> Any:
-    """What `call` is given of each kernel; the kernels themselves must be kept as well."""
+    """What `call_kernel` is given of each kernel; the kernels themselves must be kept as well."""
     compiled = [kernel() if k in needed else None for k, kernel in enumerate(kernels)]
     if JIT_OFF:
         return compiled
@@ -171,23 +172,23 @@ def _pointer(code: Lowering, kind: str, address: Operand) -> Operand:
     return code.operand(kind, f"inttoptr i64 {address.text} to ptr")
 
 
-def run(routine: Kernel, arguments: tuple[Any, ...]) -> None:
+def run_routine(routine: Kernel, arguments: tuple[Any, ...]) -> None:
     """Run a routine."""
     routine(*arguments)
 
 
-@lowers(run)
+@lowers(run_routine)
 def _run(code: Lowering, address: Operand, arguments: tuple[Operand, ...]) -> None:
-    texts = ", ".join(f"{type_of(operand.kind)} {operand.text}" for operand in arguments)
+    texts = ", ".join(f"{llvm_type(operand.kind)} {operand.text}" for operand in arguments)
     code.emit(f"call void {_pointer(code, INTS, address).text}({texts})")
 
 
-def call(kernel: Kernel, count: int, first: int, h: float, arrays: Any) -> None:
+def call_kernel(kernel: Kernel, count: int, first: int, h: float, arrays: Any) -> None:
     """Call a kernel with arrays, see `pointers`."""
     kernel(count, first, h, *arrays)
 
 
-@lowers(call)
+@lowers(call_kernel)
 def _call(code: Lowering, address: Operand, *arguments: Operand) -> None:
     count, first, h, arrays = arguments
     _run(code, address, (count, first, h, *_array_pointers(code, arrays)))

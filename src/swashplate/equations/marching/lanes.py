@@ -38,7 +38,7 @@ from swashplate.equations.marching.kernels import FLOATS, INTS, pointers
 from swashplate.equations.marching.march import SampleCode, lower, output_of
 from swashplate.equations.marching.part_code import PartCode, SignalId, taps_of
 from swashplate.equations.marching.rows import aligned
-from swashplate.equations.marching.run import compiled
+from swashplate.equations.marching.run import compiled_kernel
 from swashplate.equations.model import Model
 
 Array = NDArray[np.float64]
@@ -141,7 +141,7 @@ def over_lanes(lines: Sequence[str]) -> list[str]:
     return ["for lane in range(LANES):", *indented(lines)] if lines else []
 
 
-def report(model: Model, output: str | None = None, *, options: Any = None) -> str:
+def vectorisation_report(model: Model, output: str | None = None, *, options: Any = None) -> str:
     """What keeps many sets of a model from being marched side by side in vector instructions.
 
     Parameters
@@ -403,8 +403,8 @@ class Lanes:
         self._taps = taps_of(model, signals)
         self.text = facts.text
         names, file = {"LANES": LANES, **CALLED}, f"{model.name}_lanes"
-        self.prepare = compiled(file, self.text, "prepare", PREPARE_KINDS, names)
-        self.march = compiled(file, self.text, "march", MARCH_KINDS, names)
+        self.prepare = compiled_kernel(file, self.text, "prepare", PREPARE_KINDS, names)
+        self.march = compiled_kernel(file, self.text, "march", MARCH_KINDS, names)
 
     def __call__(
         self,

@@ -18,11 +18,11 @@ from swashplate.equations.code_generation.functions import generating
 from swashplate.equations.marching.kernels import (
     Struct,
     behind,
-    call,
+    call_kernel,
     call_recurrence,
     fields_of,
     routine,
-    run,
+    run_routine,
 )
 
 Array = NDArray[np.float64]
@@ -292,11 +292,11 @@ def place(structs: int, r: int, first: int, size: int, at: int, count: int, to: 
         column = behind(sink.rows, sink.to[c] * sink.length + to)
         t = program.first_observed + r * sink.derived + c
         if plan.regular[r]:
-            run(march.combine, (march.program, flat, t, begin - first, count, column))
+            run_routine(march.combine, (march.program, flat, t, begin - first, count, column))
             for i in range(0 if not plan.even[r] else count, count):
                 column[i] *= weight[i]
         else:
-            run(march.combine, (march.program, flat, t, begin - first, width, aside))
+            run_routine(march.combine, (march.program, flat, t, begin - first, width, aside))
             aside[width] = aside[width - 1]
             for i in range(count):
                 n, f = cell[i] - begin, fraction[i]
@@ -331,7 +331,7 @@ def routines() -> tuple[Any, ...]:
     return routine(combine), routine(place), routine(absorb)
 
 
-def march_of(
+def march_struct(
     program: Struct[Program], plan: Struct[Plan], sink: Struct[Sink], room: Struct[Room]
 ) -> Struct[March]:
     """What `march_observed` is given, with routines, and structs, which must be kept as well."""
@@ -366,11 +366,11 @@ def march_observed(kernels: Indices, arrays: Indices, size: int, h: float, struc
             todo = behind(program.todo, 4 * step)
             what, a, b = todo[0], todo[1], todo[2]
             if what == CALL:
-                call(kernels[a], count, first, h, arrays)
+                call_kernel(kernels[a], count, first, h, arrays)
             elif what == COMBINE:
                 for t in range(a, b):
                     row = behind(flat, program.target[t])
-                    run(march.combine, (march.program, flat, t, 0, count, row))
+                    run_routine(march.combine, (march.program, flat, t, 0, count, row))
             elif what == INTEGRATE:
                 integrate(behind(flat, a), count, h, behind(room.integral_states, 3 * b))
             else:
@@ -397,18 +397,18 @@ def march_observed(kernels: Indices, arrays: Indices, size: int, h: float, struc
                         many = i
                         break
                 to = used if sink.folded else at
-                run(march.place, (structs, r, first, count, at, many, to))
+                run_routine(march.place, (structs, r, first, count, at, many, to))
                 at += many
                 used += many if sink.folded else 0
                 if sink.folded and used == sink.length:
-                    run(march.absorb, (march.sink, march.room))
+                    run_routine(march.absorb, (march.sink, march.room))
                     used = 0
     if used > 0:
         for c in range(sink.columns):
             column = behind(sink.rows, c * sink.length)
             for i in range(used, sink.length):
                 column[i] = 0.0
-        run(march.absorb, (march.sink, march.room))
+        run_routine(march.absorb, (march.sink, march.room))
 
 
 @generating

@@ -391,10 +391,10 @@ class PlannedKernel:
 
 @generating
 def _compiled(planned: PlannedKernel) -> Kernel:
-    return compiled(planned.file, planned.text, planned.member, KERNEL_KINDS, {})
+    return compiled_kernel(planned.file, planned.text, planned.member, KERNEL_KINDS, {})
 
 
-def compiled(
+def compiled_kernel(
     file: str, text: str, member: str, kinds: tuple[str, ...], names: Mapping[str, Any]
 ) -> Kernel:
     """A function of a generated module, compiled: it takes numbers and arrays, and fills arrays.
@@ -410,7 +410,7 @@ def compiled(
 
 
 @generating
-def march_of(
+def planned_march(
     model: Model,
     signals: tuple[str, ...],
     options: tuple[Any, ...],
@@ -449,7 +449,7 @@ def marched(
     """
     signals = tuple(records)
     size = next(iter(records.values())).size
-    planned = march_of(instance.model, signals, instance.options, stored, further)
+    planned = planned_march(instance.model, signals, instance.options, stored, further)
     stored = (*stored, *further) if everything else stored
     table = np.empty((len(stored), size))
     worst_margin = np.array([np.inf, float(everything)])
