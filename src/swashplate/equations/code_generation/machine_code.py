@@ -54,7 +54,7 @@ class Code:
 _loaded: dict[tuple[str, str, tuple[str, ...]], Code] = {}
 
 
-def machine_code(
+def code_of_function(
     name: str, text: str, kinds: tuple[str, ...], definition: Callable[[], FunctionDefinition]
 ) -> Code:
     """Machine code of a function that returns nothing.

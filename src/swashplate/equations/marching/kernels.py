@@ -23,7 +23,7 @@ from swashplate.equations.code_generation.lowering import (
     lowers,
     number,
 )
-from swashplate.equations.code_generation.machine_code import machine_code
+from swashplate.equations.code_generation.machine_code import code_of_function
 from swashplate.equations.declaration import JIT_OFF
 
 KERNEL_ARGUMENTS = (
@@ -62,7 +62,7 @@ def routine(function: Callable[..., None]) -> Kernel:
     hints = {k: v for k, v in function.__annotations__.items() if k != "return"}
     kinds = tuple(_kind_of(hint) for hint in hints.values())
     name = function.__name__
-    return machine_code(name, name, kinds, lambda: function_definition_of(function))
+    return code_of_function(name, name, kinds, lambda: function_definition_of(function))
 
 
 def _kind_of(hint: Any) -> str:

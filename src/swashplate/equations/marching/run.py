@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from swashplate.equations.cache import generated, kernel
 from swashplate.equations.code_generation.functions import FUNCTIONS, generating
 from swashplate.equations.code_generation.lowering import definition_in
-from swashplate.equations.code_generation.machine_code import machine_code
+from swashplate.equations.code_generation.machine_code import code_of_function
 from swashplate.equations.declaration import JIT_OFF, Replacements, inlined, interpreted
 from swashplate.equations.fields import (
     check_mapping,
@@ -406,7 +406,7 @@ def compiled_kernel(
         return module(file, text, **names)[member]
     title = file if file.endswith(member) else f"{file}_{member}"
     library = LIBRARY | {**names}
-    return machine_code(title, text, kinds, lambda: definition_in(text, member, library))
+    return code_of_function(title, text, kinds, lambda: definition_in(text, member, library))
 
 
 @generating
