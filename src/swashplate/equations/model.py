@@ -164,7 +164,7 @@ class Model:
     limits: Equation | None = None
     """Named tuple of bool: which limits act."""
     domain: Equation | None = None
-    """Margin that is above 0 where the equations hold."""
+    """Margin that is above 0 if the equations hold."""
     outside: str | Callable[[float, str], str] = "the model's equations do not hold"
     """What has happened if the margin is not above 0, for the message."""
     outputs: Sequence[str] = ()

@@ -150,19 +150,19 @@ class FullOrderSimulation(Run, Tabular):
 
     @property
     def spool_hold(self) -> Flags:
-        """1 or -1 where the spool is at its stroke."""
+        """1 or -1 while the spool is at its stroke."""
         stroke = self.plant.machine.spool_stroke
         return _beyond(self.spool_position, -stroke, stroke)
 
     @property
     def relief_hold(self) -> Flags:
-        """1 or -1 where the relief valve holds the stroker pressure."""
+        """1 or -1 while the relief valve holds the stroker pressure."""
         pressure = self.sampled(self.fine("piston_pressure"))
         return _beyond(pressure, *interpreted(relief_pressures)(self.plant.machine))
 
     @property
     def plate_hold(self) -> Flags:
-        """1 or -1 where the swash plate rests on a stop."""
+        """1 or -1 while the swash plate rests on a stop."""
         m = self.plant.machine
         return _beyond(self.swash_angle, -m.swash_stop_minus, m.swash_stop_plus)
 

@@ -121,7 +121,7 @@ class FrequencyResponse(Tabular):
 
     @property
     def phase(self) -> Array:
-        """Phase of the output, negative where it lags, followed from low to high frequencies. [rad]
+        """Phase of the output, negative if it lags, followed from low to high frequencies. [rad]
 
         The lowest frequency's is within ±π. NaN marks what `moves` denies: nothing has no phase.
         """

@@ -113,7 +113,7 @@ class Contribution(NamedTuple):
 
     @property
     def zero_elsewhere(self) -> Node:
-        """The amount, zero where it does not count."""
+        """The amount; zero if it does not count."""
         return self.amount if self.masked else _masked(self.test, self.amount)
 
 
@@ -236,7 +236,7 @@ class Gradients:
     def _multiplied(
         self, slope: Callable[[Node], Node], contribution: Contribution
     ) -> Contribution:
-        """A contribution times a derivative, which need not be finite where it does not count."""
+        """A contribution times a derivative, which need not be finite if it does not count."""
         amount = slope(contribution.amount)
         light = contribution.masked and self._stays_finite(slope(ONE))
         return Contribution(contribution.test, amount, light)

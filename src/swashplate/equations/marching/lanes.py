@@ -44,7 +44,7 @@ from swashplate.equations.model import Model
 Array = NDArray[np.float64]
 
 LANES = 16
-"""Sets marched side by side: two vectors of eight where the processor has them, else four of 4."""
+"""Sets marched side by side: two vectors of eight if the processor has them, else four of four."""
 
 
 # a root that nobody asks for may be one of a number below zero, which compiled code allows

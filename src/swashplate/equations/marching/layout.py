@@ -1,4 +1,4 @@
-"""What is done in every block of a Jacobian: rows that are made, recurrences, where results go."""
+"""Program of a Jacobian for each block of samples: computed rows, recurrences, results."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One sample of a part of a model as a graph, and where the part starts."""
+"""One sample of a part of a model as a graph, and the state that the part starts from."""
 
 from __future__ import annotations
 

@@ -103,7 +103,7 @@ class Sink(NamedTuple):
     columns: int
     """k + 1, residuals counted."""
     length: int
-    """From one row to the next: m, or ROWS where a triangle is wanted."""
+    """From one row to the next: m, or ROWS for a triangle."""
     rows: Array
     """(k + 1, length) all rows, or as many as are rotated at once."""
     derived: int
@@ -115,7 +115,7 @@ class Sink(NamedTuple):
     folded: int
     """Whether a triangle is wanted."""
     factor: Array
-    """(k + 1, k + 1) triangle, (0, 0) where all rows are wanted."""
+    """(k + 1, k + 1) triangle, (0, 0) if all rows are wanted."""
     offset: Array
     """(r,) offset that is assumed in the measured values of each observation."""
     offset_row: Indices

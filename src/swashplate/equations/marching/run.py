@@ -53,7 +53,7 @@ T = TypeVar("T")
 MOST_CACHED = 128
 """Results that an instance keeps before it forgets all."""
 NO_NUMBER = (ValueError, ZeroDivisionError, OverflowError)
-"""What an equation raises where it gives no number."""
+"""What an equation raises if it gives no number."""
 
 
 def check_start(start: str) -> None:
