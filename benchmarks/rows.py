@@ -14,9 +14,9 @@ from timing import Timing, cores_used, in_turns, one_core
 from swashplate import Drive, Serial, SquaredError, maneuvers
 from swashplate.drive import PUMP_COLUMNS, bound_drive, drive_instance
 from swashplate.equations.marching.observation import Observation, ObservedRecord
-from swashplate.equations.marching.part import Stored
+from swashplate.equations.marching.part_code import SignalId
 from swashplate.equations.marching.record import record_of
-from swashplate.equations.marching.run import arrays_of, march_of
+from swashplate.equations.marching.run import arrays_of, planned_march
 
 Array = NDArray[np.float64]
 
@@ -28,27 +28,27 @@ class Kernel:
 
     def __init__(self, drive: Drive, signal: str, values: Array) -> None:
         self.instance = drive_instance(drive.parameters, by_voltage=signal == "voltage")
-        started = self.instance.start({signal: float(values[0])}, STEP)
-        self.at_rest, self.states = started.flat, started.flat.copy()
-        kept = (Stored(1, "signals", "shaft_speed"),)
-        planned = march_of(self.instance.model, (signal,), self.instance.options, kept)
+        initial = self.instance.start({signal: float(values[0])}, STEP)
+        self.at_rest, self.states = initial.flat, initial.flat.copy()
+        kept = (SignalId(1, "signals", "shaft_speed"),)
+        planned = planned_march(self.instance.model, (signal,), self.instance.options, kept)
         self.march = planned()
-        self.out, self.met = np.empty((1, values.size)), np.empty(1)
+        self.out, self.worst_margin = np.empty((1, values.size)), np.empty(1)
         self.values = (values,)
-        places = self.instance.places((signal,), STEP)
+        delays = self.instance.tap_delays((signal,), STEP)
         self.arrays = arrays_of(
             self.instance,
             self.values,
-            started,
-            places,
+            initial,
+            delays,
             self.states,
-            self.met,
+            self.worst_margin,
             self.out.reshape(-1),
         )
 
     def __call__(self) -> Array:
         """The shaft speed from rest."""
-        self.states[:], self.met[:] = self.at_rest, np.inf
+        self.states[:], self.worst_margin[:] = self.at_rest, np.inf
         self.march(self.out.size, 0, STEP, *self.arrays)
         return self.out[0]
 

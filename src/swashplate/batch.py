@@ -22,7 +22,7 @@ from swashplate.equations.marching.march import output_of
 from swashplate.equations.marching.observation import Observation
 from swashplate.equations.marching.record import Record, Sampling
 from swashplate.equations.marching.run import Instance, outside
-from swashplate.equations.marching.use import Command, inputs_of
+from swashplate.equations.marching.simulation import Command, inputs_of
 from swashplate.errors import FileError, InputError
 from swashplate.executors import Executor, Threads
 from swashplate.results import Result

@@ -7,9 +7,9 @@ import numpy as np
 from swashplate import ParameterSet, maneuvers
 from swashplate.drive import bound_drive, requested_columns
 from swashplate.equations.marching.derivatives import Jacobian, Triangle
-from swashplate.equations.marching.observation import ObservedRecord, Own
+from swashplate.equations.marching.observation import ObservedRecord, RunValues
 
-NOTHING = Own()
+NOTHING = RunValues()
 RATE = 512.0
 
 
@@ -34,7 +34,9 @@ SWING = maneuvers.sine(3.0, 0.8, start=0.05, length=3.0, settle=0.4).sample(RATE
 HARD = steps(9.0, 9.0, 0.0, -9.0, -9.0, 0.0, 3.0)
 
 
-def residuals(parameters: ParameterSet, observed: ObservedRecord, own: Own = NOTHING) -> np.ndarray:
+def residuals(
+    parameters: ParameterSet, observed: ObservedRecord, own: RunValues = NOTHING
+) -> np.ndarray:
     return bound_drive(parameters, observed, (), own).residuals(observed)
 
 
@@ -42,7 +44,7 @@ def jacobian(
     parameters: ParameterSet,
     observed: ObservedRecord,
     columns: Sequence[str],
-    own: Own = NOTHING,
+    own: RunValues = NOTHING,
     out: np.ndarray | None = None,
 ) -> Jacobian:
     found = bound_drive(parameters, observed, columns, own).jacobian(observed, out)
@@ -52,7 +54,10 @@ def jacobian(
 
 
 def triangle(
-    parameters: ParameterSet, observed: ObservedRecord, columns: Sequence[str], own: Own = NOTHING
+    parameters: ParameterSet,
+    observed: ObservedRecord,
+    columns: Sequence[str],
+    own: RunValues = NOTHING,
 ) -> Triangle:
     found = bound_drive(parameters, observed, columns, own).triangle(observed)
     return found._replace(

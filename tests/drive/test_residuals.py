@@ -12,7 +12,7 @@ from tests.drive.experiments import HARD, RATE, SWING, jacobian, residuals, tria
 
 from swashplate import DomainError, Drive, InputError, ParameterError, maneuvers
 from swashplate.drive import ALL_COLUMNS, PUMP_COLUMNS, simulate_drive
-from swashplate.equations.marching.observation import Observation, ObservedRecord, Own
+from swashplate.equations.marching.observation import Observation, ObservedRecord, RunValues
 from swashplate.equations.marching.record import record_of
 
 CARD = ("current", "current_sum", "current_positive", "current_negative")
@@ -101,7 +101,7 @@ def everything_observed(command: np.ndarray, start: str = "rest") -> ObservedRec
     return ObservedRecord(record_of(command, RATE, what="voltage"), seen, start=start)
 
 
-OWN = Own({"pump.pressure": 2e4}, offsets=(0.0, 0.0, 0.0, 0.0, 0.1, -0.2, 0.0, 0.0, 0.0))
+OWN = RunValues({"pump.pressure": 2e4}, offsets=(0.0, 0.0, 0.0, 0.0, 0.1, -0.2, 0.0, 0.0, 0.0))
 
 
 def test_derivatives_by_what_is_an_experiments_own(hoist: Drive) -> None:
@@ -145,7 +145,7 @@ def test_residuals_at_any_stamps(hoist: Drive) -> None:
     )
     assert observed.own_columns == ("offset of shaft_speed [0]", "offset of shaft_speed [1]")
     assert observed.rows_of(1) == slice(7, 14)
-    found = residuals(hoist.parameters, observed, Own({}, (0.5, 0.0)))
+    found = residuals(hoist.parameters, observed, RunValues({}, (0.5, 0.0)))
     seen = np.interp(time, fine.time, fine.shaft_speed)
     expected = 2.0 * (seen + 0.5 - np.arange(7.0))
     np.testing.assert_allclose(found[:7], expected, rtol=0.0, atol=1e-12)
@@ -155,7 +155,7 @@ def test_residuals_at_any_stamps(hoist: Drive) -> None:
 @pytest.mark.traced
 @pytest.mark.parametrize("start", ["rest", "steady"])
 def test_a_start_pressure_is_that_of_a_simulation(hoist: Drive, start: str) -> None:
-    observed, own = observed_at_samples(3.0 + SWING, start), Own({"pump.pressure": -5e4})
+    observed, own = observed_at_samples(3.0 + SWING, start), RunValues({"pump.pressure": -5e4})
     found = residuals(hoist.parameters, observed, own)
     run = simulate_drive(hoist.parameters, {"voltage": observed.record}, start, -5e4)
     assert run.stroker_pressure[0] == -5e4
@@ -231,4 +231,4 @@ def test_refusals(hoist: Drive) -> None:
     with pytest.raises(ParameterError, match="no parameter 'Z99'"):
         triangle(hoist.parameters, observed, ["Z99"])
     with pytest.raises(DomainError, match="the pressure at the start is 1e\\+07 Pa, but"):
-        residuals(hoist.parameters, observed, Own({"pump.pressure": 1e7}))
+        residuals(hoist.parameters, observed, RunValues({"pump.pressure": 1e7}))

@@ -71,8 +71,8 @@ def test_bad_command_leaves_the_state(hoist: Drive) -> None:
         with pytest.raises(InputError, match="must be a finite number within ±10"):
             stepper.step(bad)
     assert (stepper.state.inputs == before.inputs).all()
-    assert (stepper.state.machine.states == before.machine.states).all()
-    assert (stepper.state.machine.lines == before.machine.lines).all()
+    assert (stepper.state.context.states == before.context.states).all()
+    assert (stepper.state.context.lines == before.context.lines).all()
 
 
 @pytest.mark.parametrize("rate", [512.0, 200.0])

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from swashplate.equations.code_generation.functions import FUNCTIONS
 from swashplate.equations.code_generation.loops import blank, root
 from swashplate.equations.code_generation.lowering import definition_in, lowered
-from swashplate.equations.code_generation.machine_code import code_of
+from swashplate.equations.code_generation.machine_code import code_of_function
 from swashplate.equations.declaration import JIT_OFF
 from swashplate.equations.language import plain
 
@@ -30,7 +30,7 @@ pytestmark = pytest.mark.skipif(JIT_OFF, reason="nothing is compiled")
 def both(text: str, *numbers: float, count: int = 4, size: int = 4) -> list[NDArray[np.float64]]:
     """What ``function(x, count, out)`` leaves in `out`, compiled and in Python."""
     definition = lambda: definition_in(text, "function", LIBRARY)  # noqa: E731
-    code = code_of("function", text, KINDS, definition)
+    code = code_of_function("function", text, KINDS, definition)
     space: dict[str, Any] = dict(UNCOMPILED)
     exec(text, space)
     left = []

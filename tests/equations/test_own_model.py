@@ -16,10 +16,10 @@ from swashplate.equations import (
     equation,
     join,
     replaced,
-    report,
     sensitivities,
     simulate,
     stepper,
+    vectorisation_report,
 )
 from swashplate.errors import EquationError
 from swashplate.models.drive import pump_drive
@@ -534,10 +534,10 @@ def test_a_margin_that_is_no_number_at_one_sample_is_outside(sets: int) -> None:
 
 
 def test_a_report_names_what_is_not_vector_instructions() -> None:
-    assert report(valve) == "Nothing keeps valve from vector instructions."
-    assert report(pump_drive) == "Nothing keeps pump_drive from vector instructions."
+    assert vectorisation_report(valve) == "Nothing keeps valve from vector instructions."
+    assert vectorisation_report(pump_drive) == "Nothing keeps pump_drive from vector instructions."
     swinging = Model("swinging", parameters=Outlet, state=Fill, step=swung)
-    assert report(swinging).splitlines()[1:] == ["swung calls sin"]
+    assert vectorisation_report(swinging).splitlines()[1:] == ["swung calls sin"]
 
 
 def test_of_two_models_in_series_both_say_what_may_have_happened() -> None:

@@ -9,21 +9,21 @@ from swashplate import DomainError, Drive, InputError, Limit
 from swashplate.equations import Model, Tap, compiled_step, equation, kernel, simulate
 
 
-def marched(compiled, machine, records):
+def marched(compiled, context, records):
     """Outputs of a kernel that takes a step for each row of inputs, (n, outputs)."""
     step = compiled.step
 
     @kernel
-    def march(machine, records, out):
+    def march(context, records, out):
         worst = np.inf
         for n in range(records.shape[0]):
-            machine.inputs[:] = records[n]
-            worst = min(worst, step(machine))
-            out[n] = machine.outputs
+            context.inputs[:] = records[n]
+            worst = min(worst, step(context))
+            out[n] = context.outputs
         return worst
 
-    out = np.empty((len(records), machine.outputs.size))
-    compiled.check(machine, march(machine, np.ascontiguousarray(records), out), "command")
+    out = np.empty((len(records), context.outputs.size))
+    compiled.check(context, march(context, np.ascontiguousarray(records), out), "command")
     return out
 
 
@@ -37,7 +37,7 @@ VOLTAGE = 6.0 * np.sin(np.arange(700) / 90.0) ** 3
 def test_step_of_a_drive_gives_the_numbers_of_its_simulation(name, rate):
     drive = Drive.preset(name).at_every_rate()
     compiled = drive.compiled_step(("shaft_speed", "swash_angle", "current"), rate=rate)
-    out = marched(compiled, compiled.machine(), VOLTAGE[:, None])
+    out = marched(compiled, compiled.context(), VOLTAGE[:, None])
     run = drive.simulate(VOLTAGE, rate)
     for k, signal in enumerate((run.shaft_speed, run.swash_angle, run.current)):
         np.testing.assert_array_equal(out[:, k], signal)
@@ -52,8 +52,8 @@ def test_step_takes_measured_inputs_and_begins_settled():
     torque = 3e4 * (1.0 + np.sin(np.arange(VOLTAGE.size) / 40.0))
     compiled = drive.compiled_step(inputs=("voltage", "load_torque"))
     command = VOLTAGE + 4.0
-    machine = compiled.machine({"voltage": 4.0, "load_torque": torque[0]}, "steady")
-    out = marched(compiled, machine, np.stack([command, torque], axis=1))
+    context = compiled.context({"voltage": 4.0, "load_torque": torque[0]}, "steady")
+    out = marched(compiled, context, np.stack([command, torque], axis=1))
     run = drive.simulate(command, load_torque=torque, start="steady")
     np.testing.assert_array_equal(out[:, 0], run.shaft_speed)
 
@@ -61,7 +61,7 @@ def test_step_takes_measured_inputs_and_begins_settled():
 def test_limits_of_the_pump_are_bits():
     drive = Drive.preset("luff")
     compiled = drive.compiled_step(("limits",))
-    out = marched(compiled, compiled.machine(), VOLTAGE[:, None])
+    out = marched(compiled, compiled.context(), VOLTAGE[:, None])
     run = drive.simulate(VOLTAGE)
     names = (Limit.DEAD_ZONE, Limit.ORIFICE, Limit.SPOOL, Limit.SWASH_STOP, Limit.RELIEF)
     acting = [(out[:, 0].astype(int) >> k) & 1 for k in range(5)]
@@ -90,7 +90,7 @@ lag = Model("lag", Lag, Level, approach, taps={"command": Tap("command", delay="
 def test_step_of_ones_own_model_waits_as_its_simulation_does():
     p = Lag(0.3, 0.0377)
     compiled = compiled_step(lag, p, ("command",), ("level",), 100.0)
-    out = marched(compiled, compiled.machine(), VOLTAGE[:, None])
+    out = marched(compiled, compiled.context(), VOLTAGE[:, None])
     run = simulate(lag, p, {"command": VOLTAGE}, 100.0)
     np.testing.assert_array_equal(out[:, 0], run["level"])
 
@@ -107,4 +107,4 @@ def test_what_no_step_has_is_refused():
         hoist.compiled_step(rate=20.0)
     compiled = compiled_step(lag, Lag(0.001, 0.0), ("command",), ("level",), 100.0)
     with pytest.raises(DomainError, match="lag: lag's level is .* at the end of the record"):
-        marched(compiled, compiled.machine(), np.ones((700, 1)))
+        marched(compiled, compiled.context(), np.ones((700, 1)))

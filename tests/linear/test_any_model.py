@@ -11,8 +11,8 @@ from swashplate import DomainError, Drive, InputError
 from swashplate.drive import drive_instance
 from swashplate.equations import instance_of
 from swashplate.equations.declaration import equation
-from swashplate.equations.marching.part import Stored
-from swashplate.equations.marching.run import Instance, Part, marched
+from swashplate.equations.marching.part_code import SignalId
+from swashplate.equations.marching.run import Instance, PartNumbers, marched
 from swashplate.equations.model import Model, Tap, discretised, join
 from swashplate.linear import LinearModel, linearize
 
@@ -94,7 +94,7 @@ VALVE = Valve(0.05, 2.0, 3.0, 0.0237)
 
 def machine(hold: str = "linear") -> Instance:
     whole = join("machine", valve(hold), rod, links={"doubled": twice})
-    return Instance(whole, (Part(VALVE), Part(Rod(0.5))), "mine")
+    return Instance(whole, (PartNumbers(VALVE), PartNumbers(Rod(0.5))), "mine")
 
 
 @pytest.mark.parametrize("hold", ["linear", "previous", "mean"])
@@ -118,7 +118,7 @@ def test_a_machine_of_one_s_own(hold: str) -> None:
         records,
         H,
         started,
-        (Stored(1, "state", "position"), Stored(0, "signals", "flow")),
+        (SignalId(1, "state", "position"), SignalId(0, "signals", "flow")),
     )
     x, y = np.zeros(model.A.shape[0]), np.empty((200, 3))
     command = np.concatenate((np.zeros(late), moved[:, 0]))[:200]
@@ -135,7 +135,7 @@ def test_a_machine_of_one_s_own(hold: str) -> None:
 
 
 def test_feedthrough_and_the_settled_state() -> None:
-    instance = Instance(valve("linear"), (Part(VALVE._replace(delay=0.0)),), "mine")
+    instance = Instance(valve("linear"), (PartNumbers(VALVE._replace(delay=0.0)),), "mine")
     model = linearize(instance, {"command": 0.2}, RATE)
     assert model.outputs == ("flow", "opening")
     np.testing.assert_allclose(model.D[:, 0], [0.1, 0.0])
@@ -217,7 +217,7 @@ def test_two_integrators_need_a_lead() -> None:
 
 
 def test_refusals() -> None:
-    alone = Instance(valve("linear"), (Part(VALVE),), "mine")
+    alone = Instance(valve("linear"), (PartNumbers(VALVE),), "mine")
     with pytest.raises(InputError, match="'wind' is not an input"):
         linearize(alone, {"command": 0.2}, RATE, inputs=("wind",))
     with pytest.raises(DomainError, match="the valve is wide open under this operating point"):

@@ -5,7 +5,7 @@ import pytest
 
 from swashplate import Drive, maneuvers
 from swashplate.batch import SquaredError
-from swashplate.equations.model import place
+from swashplate.equations.model import tap_delay
 from swashplate.models.amplifier import card
 
 H = 1.0 / 512.0
@@ -26,8 +26,8 @@ def settled(volts: float, p: dict[str, float]) -> float:
 
 def test_eq_3_4_delay_is_no_whole_number_of_samples(hoist: Drive) -> None:
     """14 ms are 7.168 samples; a delay longer by three samples moves the current by three."""
-    delay = place(card.tap("at"), 0.014, H)
-    assert delay.whole + delay.fraction == pytest.approx(0.014 * 512.0, rel=1e-12)
+    delay = tap_delay(card.tap("at"), 0.014, H)
+    assert delay.samples + delay.fraction == pytest.approx(0.014 * 512.0, rel=1e-12)
     voltage = maneuvers.sine(6.0, 0.3, length=8.0).sample(512.0)
     early, late = (hoist.replace(tau=0.014 + k * H).simulate(voltage).current for k in (0, 3))
     np.testing.assert_allclose(late[3:], early[:-3], atol=1e-12)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from swashplate.drive import Drive, drive_instance
 from swashplate.equations.declaration import interpreted
 from swashplate.equations.marching.record import SOURCE_RATE
-from swashplate.equations.marching.run import Instance, Part, called
+from swashplate.equations.marching.run import Instance, PartNumbers, called
 from swashplate.models.displacement_control import PumpOptions, pressure_limits
 from swashplate.models.pump import PumpState
 from swashplate.parameters.rules import FULL_VOLTAGE
@@ -182,7 +182,7 @@ def _curve(drive: Drive, voltage: float, pressure: Array) -> AccelerationCurve:
     # a line at rest leaks as a stiff one does
     leaks = options.leakage if options.line is None else options.line
     forms = PumpOptions(symmetric=options.symmetric, steep=options.steep, leakage=leaks)
-    still = Part(p._replace(Z12=0.0, load_inertia=0.0), forms)
+    still = PartNumbers(p._replace(Z12=0.0, load_inertia=0.0), forms)
     instance = Instance(instance.model, (front, still), instance.name)
     arguments = instance.start({"current": drive.steady_current(voltage)}, 1.0).arguments[1]
     pump: Any = instance.model.parts[1]

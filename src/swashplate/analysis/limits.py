@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from swashplate.analysis.capability import farthest_stop
 from swashplate.analysis.outcomes import checked_speed, rms_difference
-from swashplate.drive import Drive, Given, Limit, Simulation, simulate_drive
+from swashplate.drive import Drive, Limit, RunKeywords, Simulation, simulate_drive
 from swashplate.equations.marching.record import SOURCE_RATE
 from swashplate.equations.marching.run import Start
 from swashplate.errors import DomainError, ParameterError, SwashplateError
@@ -211,7 +211,7 @@ def limit_shares(
     *,
     start: Start = "rest",
     reference: ArrayLike | None = None,
-    **given: Unpack[Given],
+    **keywords: Unpack[RunKeywords],
 ) -> LimitShares:
     """Share of time and of error due to each limit of a drive under a command, ranked.
 
@@ -219,7 +219,7 @@ def limit_shares(
     ----------
     drive : Drive
         The drive.
-    voltage, rate, start, **given :
+    voltage, rate, start, **keywords :
         The command and what was measured beside it, as in `Drive.simulate`.
     reference : (n,) array_like, optional
         Reference speed at the samples; by default what the drive would do without any of its
@@ -248,7 +248,7 @@ def limit_shares(
     lags of the card's filter and of the valve, so that only the limits make an error. A measured
     pump speed or supply pressure is a limit, too: without it the value of the parameter set counts.
     """
-    return shares_of(drive, drive.simulate(voltage, rate, start=start, **given), reference)
+    return shares_of(drive, drive.simulate(voltage, rate, start=start, **keywords), reference)
 
 
 def shares_of(drive: Drive, run: Simulation, reference: ArrayLike | None = None) -> LimitShares:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from swashplate.campaign.experiment import Channel, Experiment, InputSignal
 from swashplate.drafting.plain_drive import MODEL, Edge, PlainDrive
 from swashplate.equations.marching.derivatives import jacobian, residuals
-from swashplate.equations.marching.observation import ObservedRecord, Own, every_sample
+from swashplate.equations.marching.observation import ObservedRecord, RunValues, every_sample
 from swashplate.equations.marching.record import Record
 from swashplate.equations.marching.run import Instance, instance_of
 
@@ -139,11 +139,11 @@ class MovingRun(NamedTuple):
     """Of the way, 0 if it is fine."""
 
 
-def _model(run: MovingRun, numbers: Array) -> tuple[Instance, Own]:
+def _model(run: MovingRun, numbers: Array) -> tuple[Instance, RunValues]:
     """The plain drive with numbers, and the speed that it begins with."""
     finite = PlainDrive(*np.minimum(numbers[:12], UNLIMITED).tolist())
     instance = instance_of(MODEL, finite, given=Edge(run.edge))
-    return instance, Own({"speed": run.start})
+    return instance, RunValues({"speed": run.start})
 
 
 def _delayed(run: MovingRun, positions: Array, start: Array | float, delay: float) -> Course:

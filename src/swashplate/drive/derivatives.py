@@ -7,7 +7,7 @@ from dataclasses import replace
 from functools import lru_cache
 
 from swashplate.drive.instance import (
-    PRESSURE,
+    PRESSURE_PATH,
     START,
     check_filter_stability,
     drive_instance,
@@ -15,8 +15,8 @@ from swashplate.drive.instance import (
 from swashplate.drive.march import start_states
 from swashplate.drive.signals import check_output
 from swashplate.drive.simulation import Simulation
-from swashplate.equations.marching.derivatives import NOTHING_OWN, BoundModel
-from swashplate.equations.marching.observation import ObservedRecord, Own
+from swashplate.equations.marching.derivatives import NO_RUN_VALUES, BoundModel
+from swashplate.equations.marching.observation import ObservedRecord, RunValues
 from swashplate.equations.marching.record import Record
 from swashplate.equations.marching.run import Start
 from swashplate.equations.marching.sensitivity import Sensitivities
@@ -49,15 +49,16 @@ def bound_drive(
     parameters: ParameterSet,
     observed: ObservedRecord,
     columns: Sequence[str] = (),
-    own: Own = NOTHING_OWN,
+    own: RunValues = NO_RUN_VALUES,
 ) -> BoundModel:
     """The drive's model with its numbers, for some columns.
 
     These are symbols (``"Z16"`` stands for both directions), columns (``"Z16_plus"``) and states
-    at the first sample whose values are among the starts of `own`, ``"start.pump.pressure"``. [Pa]
+    at the first sample, ``"start.pump.pressure"`` [Pa]. Keys of ``own.start`` are paths without
+    ``start.``; it has a value for each of these states.
     """
-    for each in observed.observations:
-        check_output(each.signal)
+    for observation in observed.observations:
+        check_output(observation.signal)
     by_voltage = observed.driven_by == "voltage"
     return _bound(
         parameters,
@@ -65,7 +66,7 @@ def bound_drive(
         by_voltage=by_voltage,
         step=observed.record.step,
         extremes=observed.extremes if by_voltage else (0.0, 0.0),
-        pump_is_seen=any(each.signal not in CURRENTS for each in observed.observations),
+        pump_is_observed=any(o.signal not in CURRENTS for o in observed.observations),
         own=own,
     )
 
@@ -77,28 +78,29 @@ def _bound(
     by_voltage: bool,
     step: float,
     extremes: tuple[float, float],
-    pump_is_seen: bool = True,
-    own: Own = NOTHING_OWN,
+    pump_is_observed: bool = True,
+    own: RunValues = NO_RUN_VALUES,
 ) -> BoundModel:
     """The model with numbers for some columns, under a command between two extremes."""
     if by_voltage:
         check_filter_stability(parameters, step)
-    # what is differentiated by counts, at 0 as well, unless equations have derivatives for that
+    # a refinement whose parameter is a column is switched on even if the parameter is 0;
+    # the equations of "leaky" and "loaded" have derivatives while they are off
     switches = frozenset(SWITCHES[name] for name in names if name in SWITCHES)
     switched = _switched_on(parameters, switches - {"leaky", "loaded"})
     instance = drive_instance(switched, by_voltage=by_voltage)
     start = dict(own.start)
-    if PRESSURE in start:
-        start |= start_states(instance, start[PRESSURE])
+    if PRESSURE_PATH in start:
+        start |= start_states(instance, start[PRESSURE_PATH])
     # whether anything observed can depend on a column: on a driven channel, on the pump
     low, high = extremes
     moved = {
         "card.plus": high > parameters.numbers["V_dz_plus"],
         "card.minus": -low > parameters.numbers["V_dz_minus"],
-        "pump": pump_is_seen,
+        "pump": pump_is_observed,
         "start.card.plus": True,
         "start.card.minus": True,
-        "start.pump": pump_is_seen,
+        "start.pump": pump_is_observed,
     }
     moved["card"] = moved["card.plus"] or moved["card.minus"]
     paths = _paths(parameters.definitions, names)
@@ -111,11 +113,11 @@ def _bound(
 
 
 @lru_cache(maxsize=64)
-def _switched_on(parameters: ParameterSet, asked: frozenset[str]) -> ParameterSet:
-    """The set with some options on, itself where they are."""
-    if asked <= parameters.options:
+def _switched_on(parameters: ParameterSet, options: frozenset[str]) -> ParameterSet:
+    """The set with some options on, itself if they are."""
+    if options <= parameters.options:
         return parameters
-    return replace(parameters, options=parameters.options | asked)
+    return replace(parameters, options=parameters.options | options)
 
 
 # --- over a whole run -----------------------------------------------------------------------------
@@ -138,7 +140,8 @@ def drive_sensitivities(
     names: Sequence[str] | None,
 ) -> Sensitivities[Simulation]:
     """Derivatives by some columns; see `Drive.sensitivities` and `Drive.sensitivities_current`."""
-    by_voltage, definitions = "voltage" in records, parameters.definitions
+    by_voltage = "voltage" in records
+    definitions = parameters.definitions
     columns = ALL_COLUMNS if by_voltage else PUMP_COLUMNS
     if names is not None:
         if isinstance(names, str) or not names:

@@ -18,12 +18,12 @@ from swashplate.drive.instance import (
     with_equation,
 )
 from swashplate.drive.march import Sample, drive_stepper, simulate_drive
-from swashplate.drive.records import Given, drive_records
+from swashplate.drive.records import RunKeywords, drive_records
 from swashplate.drive.simulation import Simulation
 from swashplate.equations.marching.record import SOURCE_RATE, Interpolation, check_rate
 from swashplate.equations.marching.run import Start
+from swashplate.equations.marching.simulation import Stepper
 from swashplate.equations.marching.stepping import CompiledStep, stored_of
-from swashplate.equations.marching.use import Stepper
 from swashplate.equations.model import Equation
 from swashplate.equations.replacement import Replacement
 from swashplate.errors import InputError
@@ -65,15 +65,15 @@ class Drive(Result, Mapping[str, Parameter]):
 
     def __post_init__(self) -> None:
         """Refuse what is not a parameter set, with the call that takes it."""
-        given: object = self.parameters
-        if isinstance(given, ParameterSet):
+        parameters: object = self.parameters
+        if isinstance(parameters, ParameterSet):
             return
         way = "Drive(parameters) takes a ParameterSet"
-        if isinstance(given, str) and given in preset_names():
-            way = f'the packaged drive is Drive.preset("{given}")'
-        elif isinstance(given, str | Path):
-            way = f'a parameter file is read with Drive.from_toml("{given}")'
-        raise InputError(f"A Drive cannot be made of {given!r}: {way}.")
+        if isinstance(parameters, str) and parameters in preset_names():
+            way = f'the packaged drive is Drive.preset("{parameters}")'
+        elif isinstance(parameters, str | Path):
+            way = f'a parameter file is read with Drive.from_toml("{parameters}")'
+        raise InputError(f"A Drive cannot be made of {parameters!r}: {way}.")
 
     @classmethod
     def preset(cls, name: str) -> Drive:
@@ -189,8 +189,9 @@ class Drive(Result, Mapping[str, Parameter]):
         """The same drive under another name, which is not empty, and perhaps another title."""
         if not str(name or "").strip():
             raise InputError(f"A drive's name is text, not {name!r}.")
-        kept = self.parameters.title if title is None else title
-        return Drive(replace(self.parameters, name=name, title=kept))
+        if title is None:
+            title = self.parameters.title
+        return Drive(replace(self.parameters, name=name, title=title))
 
     @property
     def plain(self) -> Drive:
@@ -217,7 +218,7 @@ class Drive(Result, Mapping[str, Parameter]):
         rate: float = SOURCE_RATE,
         *,
         start: Start = "rest",
-        **given: Unpack[Given],
+        **keywords: Unpack[RunKeywords],
     ) -> Simulation:
         """Simulate the whole drive over a command.
 
@@ -255,7 +256,7 @@ class Drive(Result, Mapping[str, Parameter]):
         DomainError
             If the solenoid overpowers the feedback spring.
         """
-        records = drive_records("voltage", voltage, rate, **given)
+        records = drive_records("voltage", voltage, rate, **keywords)
         return simulate_drive(self.parameters, records, start)
 
     def simulate_current(
@@ -264,7 +265,7 @@ class Drive(Result, Mapping[str, Parameter]):
         rate: float = SOURCE_RATE,
         *,
         start: Start = "rest",
-        **given: Unpack[Given],
+        **keywords: Unpack[RunKeywords],
     ) -> Simulation:
         """Simulate pump and motor alone over a signed current.
 
@@ -272,7 +273,7 @@ class Drive(Result, Mapping[str, Parameter]):
         ----------
         current : (n,) array_like
             Signed current. [A]
-        rate, start, **given :
+        rate, start, **keywords :
             As in `simulate`.
 
         Returns
@@ -285,7 +286,7 @@ class Drive(Result, Mapping[str, Parameter]):
         InputError, DomainError
             As in `simulate`.
         """
-        records = drive_records("current", current, rate, **given)
+        records = drive_records("current", current, rate, **keywords)
         return simulate_drive(self.parameters, records, start)
 
     def sensitivities(
@@ -295,13 +296,13 @@ class Drive(Result, Mapping[str, Parameter]):
         *,
         parameters: Sequence[str] | None = None,
         start: Start = "rest",
-        **given: Unpack[Given],
+        **keywords: Unpack[RunKeywords],
     ) -> Sensitivities[Simulation]:
         """Simulate with exact derivatives of any signal.
 
         Parameters
         ----------
-        voltage, rate, start, **given :
+        voltage, rate, start, **keywords :
             As in `simulate`.
         parameters : sequence of str, optional
             Symbols (``"Z16"`` stands for both directions) or columns (``"Z16_plus"``) to
@@ -322,7 +323,7 @@ class Drive(Result, Mapping[str, Parameter]):
         """
         from swashplate.drive.derivatives import drive_sensitivities
 
-        records = drive_records("voltage", voltage, rate, **given)
+        records = drive_records("voltage", voltage, rate, **keywords)
         return drive_sensitivities(self.parameters, records, start, parameters)
 
     def sensitivities_current(
@@ -332,7 +333,7 @@ class Drive(Result, Mapping[str, Parameter]):
         *,
         parameters: Sequence[str] | None = None,
         start: Start = "rest",
-        **given: Unpack[Given],
+        **keywords: Unpack[RunKeywords],
     ) -> Sensitivities[Simulation]:
         """The same for pump and motor alone over a signed current.
 
@@ -340,7 +341,7 @@ class Drive(Result, Mapping[str, Parameter]):
         ----------
         current : (n,) array_like
             Signed current. [A]
-        rate, parameters, start, **given :
+        rate, parameters, start, **keywords :
             As in `sensitivities`; by default all parameters of pump and motor.
 
         Returns
@@ -355,7 +356,7 @@ class Drive(Result, Mapping[str, Parameter]):
         """
         from swashplate.drive.derivatives import drive_sensitivities
 
-        records = drive_records("current", current, rate, **given)
+        records = drive_records("current", current, rate, **keywords)
         return drive_sensitivities(self.parameters, records, start, parameters)
 
     def simulate_many(
@@ -369,7 +370,7 @@ class Drive(Result, Mapping[str, Parameter]):
         output: str = "shaft_speed",
         to: str | Path | None = None,
         executor: Executor | None = None,
-        **given: Unpack[Given],
+        **keywords: Unpack[RunKeywords],
     ) -> Batch:
         """Simulate many parameter sets over one record, from rest, on all cores.
 
@@ -379,7 +380,7 @@ class Drive(Result, Mapping[str, Parameter]):
             Symbol or column to (m,) values, one for each set; other parameters are this drive's.
         voltage, current : (n,) array_like
             The record, one of the two. [V or A]
-        rate, **given :
+        rate, **keywords :
             As in `simulate`.
         output : str
             Without `cost`: the signal to return, such as ``"shaft_speed"`` or ``"current"``.
@@ -401,10 +402,11 @@ class Drive(Result, Mapping[str, Parameter]):
         from swashplate.drive.batch import simulate_drives
 
         commands = {"voltage": voltage, "current": current}
-        chosen = [(driver, each) for driver, each in commands.items() if each is not None]
-        if len(chosen) != 1:
+        given = {driver: record for driver, record in commands.items() if record is not None}
+        if len(given) != 1:
             raise InputError("A batch needs either a voltage or a current.")
-        records = drive_records(*chosen[0], rate, **given)
+        ((driver, command),) = given.items()
+        records = drive_records(driver, command, rate, **keywords)
         return simulate_drives(self.parameters, changes, records, output, cost, to, executor)
 
     def stepper(
@@ -464,7 +466,7 @@ class Drive(Result, Mapping[str, Parameter]):
         Returns
         -------
         CompiledStep
-            Its ``step(machine)`` advances one sample inside a compiled kernel.
+            Its ``step(context)`` advances one sample inside a compiled kernel.
 
         Raises
         ------

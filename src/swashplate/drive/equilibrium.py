@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from swashplate.drive.instance import card_of, drive_instance, models_of, without_ripple
 from swashplate.equations.declaration import interpreted
 from swashplate.equations.fields import is_real
-from swashplate.equations.marching.part import Stored
+from swashplate.equations.marching.part_code import SignalId
 from swashplate.equations.marching.record import SOURCE_RATE
-from swashplate.equations.marching.run import Started, called, marched
+from swashplate.equations.marching.run import InitialStates, called, marched
 from swashplate.errors import DomainError, InputError
 from swashplate.models.displacement_control import moment_sine, solenoid_force
 from swashplate.models.pump import overpowered
@@ -38,9 +38,9 @@ def steady_states(parameters: ParameterSet, voltage: Array) -> tuple[Array, Arra
     """Signed current [A] and speed [rad/s] that each of many constant voltages settles at."""
     whole = without_ripple(drive_instance(parameters, by_voltage=True))
     settled = replace(whole, model=models_of(parameters.equations).settled_drive)
-    stored = (Stored(0, "signals", "current"), Stored(1, "signals", "shaft_speed"))
-    started = Started((), {"voltage": 0.0}, ())
-    current, speed = marched(settled, {"voltage": voltage}, 1.0, started, stored)
+    stored = (SignalId(0, "signals", "current"), SignalId(1, "signals", "shaft_speed"))
+    initial = InitialStates((), {"voltage": 0.0}, ())
+    current, speed = marched(settled, {"voltage": voltage}, 1.0, initial, stored)
     return current, speed
 
 

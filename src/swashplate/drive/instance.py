@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from swashplate.equations.declaration import interpreted
 from swashplate.equations.language import plain
-from swashplate.equations.marching.run import Instance, Part
+from swashplate.equations.marching.run import Instance, PartNumbers
 from swashplate.equations.model import Model
 from swashplate.equations.replacement import Replacement, again, check_members, uses
 from swashplate.errors import InputError
@@ -40,8 +40,8 @@ MOST_SUBSTEPS = 1000
 
 START = "start."
 """What the column of a number of the state at the first sample begins with, before its path."""
-PRESSURE = "pump.pressure"
-"""Path of δP; at the first sample the column ``start.pump.pressure``."""
+PRESSURE_PATH = "pump.pressure"
+"""Path of δP. Its value at the first sample is the column ``start.pump.pressure``."""
 
 
 class Models(NamedTuple):
@@ -70,24 +70,25 @@ def with_equation(parameters: ParameterSet, replacement: Replacement) -> Paramet
     """The set with a user-defined equation; see `Drive.with_equation`."""
     members = replacement._asdict()
     check_members(members, {what: repr(member) for what, member in members.items()})
-    models, name = models_of(parameters.equations), plain(replacement.old).__name__
+    equations = (*parameters.equations, replacement)
+    models = models_of(parameters.equations)
     if not uses(models.drive, replacement.old):
         raise InputError(
-            f"{name} is not an equation of the drive: those are in "
+            f"{plain(replacement.old).__name__} is not an equation of the drive: those are in "
             "swashplate.models.amplifier, swashplate.models.displacement_control, "
             "swashplate.models.pump and swashplate.models.refinements."
         )
     if replacement.parameters is not None and not uses(models.pump_drive, replacement.old):
         raise InputError(
-            f"{name} is an equation of the card: one of your own in its place has the same "
-            "arguments; parameters of your own go with the pump's equations."
+            f"{plain(replacement.old).__name__} is an equation of the card: one of your own in its "
+            "place has the same arguments; parameters of your own go with the pump's equations."
         )
-    equations = (*parameters.equations, replacement)
     models_of(equations)  # refuses what does not fit
     changed = replace(parameters, equations=equations)
     if replacement.parameters is None:
         return changed
-    return changed.with_numbers(replacement.parameters._field_defaults, changed.options)
+    defaults = replacement.parameters._field_defaults
+    return changed.with_numbers(defaults, changed.options)
 
 
 def card_of(parameters: ParameterSet) -> Card:
@@ -137,12 +138,12 @@ def drive_instance(parameters: ParameterSet, *, by_voltage: bool) -> Instance:
     by_voltage : bool
         Whether a voltage drives the card, or a signed current the pump alone.
     """
-    pump = Part(pump_of(parameters), pump_options(parameters))
+    pump = PartNumbers(pump_of(parameters), pump_options(parameters))
     if by_voltage:
-        card = Part(card_of(parameters), card_options(parameters))
+        card = PartNumbers(card_of(parameters), card_options(parameters))
         return Instance(models_of(parameters.equations).drive, (card, pump), parameters.name)
     model = models_of(parameters.equations).pump_drive
-    return Instance(model, (Part(CurrentSource()), pump), parameters.name)
+    return Instance(model, (PartNumbers(CurrentSource()), pump), parameters.name)
 
 
 def without_ripple(instance: Instance) -> Instance:
@@ -152,16 +153,17 @@ def without_ripple(instance: Instance) -> Instance:
     return Instance(instance.model, (card, smooth), instance.name)
 
 
-def step_limit(zeta: ArrayLike, exact: bool) -> Array:
+def filter_step_limit(zeta: ArrayLike, exact: bool) -> Array:
     """Largest ωh that the card's filter bears, for each ζ; see the equation of that name."""
     damping = np.asarray(zeta, dtype=np.float64)
     limit = interpreted(filter_limit)
-    found = [limit(each, True if exact else None) for each in damping.reshape(-1).tolist()]
-    return np.array(found).reshape(damping.shape)
+    form = True if exact else None
+    limits = [limit(value, form) for value in damping.reshape(-1).tolist()]
+    return np.array(limits).reshape(damping.shape)
 
 
 def unstable_filters(numbers: Mapping[str, Array], step: float, exact: bool) -> Iterator[Broken]:
-    """Sets at whose step the filter would settle on wrong values without a word, as rules are."""
+    """For each rule the sets whose filter gives wrong values at this step; see `broken_rules`."""
     words = (
         "the current filter of the {side} channel (zeta = {zeta:g}, omega = {omega:g} rad/s) "
         f"{'swings too fast for' if exact else 'is unstable at'} a step of 1/{1.0 / step:g} s; "
@@ -176,15 +178,21 @@ def unstable_filters(numbers: Mapping[str, Array], step: float, exact: bool) -> 
     )
     for side in SIDES:
         zeta, omega = numbers[f"zeta_{side}"], numbers[f"omega_{side}"]
-        steps = omega * step / step_limit(zeta, exact)
-        own = {"zeta": zeta, "omega": omega, "steps": steps, "least": steps // 1.0 + 1.0}
+        steps = omega * step / filter_step_limit(zeta, exact)
+        values = {
+            "side": side,
+            "zeta": zeta,
+            "omega": omega,
+            "steps": steps,
+            "least": steps // 1.0 + 1.0,
+        }
         for rule in rules:
-            yield applied(rule, {"side": side, **own})
+            yield applied(rule, values)
 
 
 @lru_cache(maxsize=256)
 def check_filter_stability(parameters: ParameterSet, step: float) -> None:
-    """Refuse a step at which the filter would settle on wrong values without a word."""
+    """Refuse a step at which the filter would give wrong values."""
     names = [f"{name}_{side}" for name in ("zeta", "omega") for side in SIDES]
     numbers = {name: np.array([parameters.numbers[name]]) for name in names}
     for broken, sentence in unstable_filters(numbers, step, parameters.rate is None):
@@ -219,8 +227,8 @@ def at_every_rate(parameters: ParameterSet) -> ParameterSet:
                 "to sample, as no filter of another rate does; lower omega."
             )
         first, second = (parameters.rate * log(each) for each in poles)
-        made = float(sqrt(first * second).real)
-        changes[f"omega_{side}"] = made
-        changes[f"zeta_{side}"] = -float((first + second).real) / (2.0 * made)
-        changes[f"C_{side}"] = C * (made / omega) ** 2
+        replacement = float(sqrt(first * second).real)
+        changes[f"omega_{side}"] = replacement
+        changes[f"zeta_{side}"] = -float((first + second).real) / (2.0 * replacement)
+        changes[f"C_{side}"] = C * (replacement / omega) ** 2
     return replace(parameters.with_numbers(changes, parameters.options), rate=None)

@@ -14,7 +14,7 @@ from swashplate.drive.signals import UNITS
 from swashplate.drive.small_motion import Coulomb, lifted, small_motion_model
 from swashplate.equations.marching.record import Interpolation, least_substeps
 from swashplate.errors import DomainError, InputError
-from swashplate.linear import LinearModel, with_line
+from swashplate.linear import LinearModel, with_delay_line
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.results import Result
 from swashplate.tables import UNIT, Cell, Column, Table
@@ -119,13 +119,13 @@ class LinearDrive(LinearModel, Result):
         )
         if substeps == 1:
             return sampled
-        whole = round(fine.delay * rate * substeps)
-        line = tuple(f"{self.input}_{k}" for k in range(1, whole + 1))
+        delay_samples = round(fine.delay * rate * substeps)
+        line = tuple(f"{self.input}_{k}" for k in range(1, delay_samples + 1))
         last = tuple(f"{name}_last" for name in self.inputs)
         # what is measured beside the command goes straight from sample to sample
-        held = [interpolation == "previous", *(False for _ in self.inputs[1:])]
-        delayed = with_line((fine.A, fine.B, fine.C, fine.D), whole)
-        A, B, C, D = lifted(*delayed, substeps, held)
+        zero_order = [interpolation == "previous", *(False for _ in self.inputs[1:])]
+        delayed = with_delay_line((fine.A, fine.B, fine.C, fine.D), delay_samples)
+        A, B, C, D = lifted(*delayed, substeps, zero_order)
         return replace(
             sampled,
             A=A,
@@ -150,17 +150,19 @@ def model_tables(
     are given at `frequency` [Hz]; `loop_gain` is that of a proportional speed loop
     [V, A or N / (rad/s)].
     """
-    point, unit = model.operating_point, UNITS[model.input]
-    answer, at = complex(model.response(frequency)[0]), f"at {frequency:g} Hz"
-    made = _key_values("Operating point")
+    point = model.operating_point
+    unit = UNITS[model.input]
+    answer = complex(model.response(frequency)[0])
+    at = f"at {frequency:g} Hz"
+    operating = _key_values("Operating point")
     if point.voltage is not None:
-        made.add("voltage", point.voltage, unit="V")
-    made.add("current", Cell(point.current, f"{point.current:z.4f}"), unit="A")
-    made.add("swash angle", point.swash_angle, unit="rad", spec="z.3f")
-    made.add("shaft speed", point.shaft_speed, unit="rad/s", spec="z.3f")
+        operating.add("voltage", point.voltage, unit="V")
+    operating.add("current", Cell(point.current, f"{point.current:z.4f}"), unit="A")
+    operating.add("swash angle", point.swash_angle, unit="rad", spec="z.3f")
+    operating.add("shaft speed", point.shaft_speed, unit="rad/s", spec="z.3f")
 
     if model.outputs[0] != "shaft_speed":
-        return [made, _poles_table(model)]
+        return [operating, _poles_table(model)]
     moving = _key_values("Small motion")
     moving.add("steady gain", model.gain, unit=f"rad/s/{unit}", spec="z.5g")
     try:
@@ -179,14 +181,15 @@ def model_tables(
 
     poles = _poles_table(model)
     if loop_gain is None:
-        return [made, moving, poles]
-    margins, shown = model.margins(loop_gain), display_unit(f"{unit}/(rad/s)")
+        return [operating, moving, poles]
+    margins = model.margins(loop_gain)
+    shown = display_unit(f"{unit}/(rad/s)")
     loop = _key_values(f"Proportional loop, {shown.factor * loop_gain:g} {shown.name}")
     loop.add("crossover", margins.crossover or Cell(None, "none"), unit="Hz", spec=".4g")
     loop.add("phase margin", _finite(np.degrees(margins.phase_margin)), unit="deg", spec=".1f")
     loop.add("delay margin", _finite(1e3 * margins.delay_margin), unit="ms", spec=".2f")
     loop.add("gain margin", _finite(margins.gain_margin), spec=".3g")
-    return [made, moving, poles, loop]
+    return [operating, moving, poles, loop]
 
 
 def _poles_table(model: LinearDrive) -> Table:

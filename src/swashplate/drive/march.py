@@ -14,7 +14,7 @@ from swashplate.drive.simulation import Simulation
 from swashplate.equations.declaration import interpreted
 from swashplate.equations.marching.record import Interpolation, Record, least_substeps
 from swashplate.equations.marching.run import Instance, Start
-from swashplate.equations.marching.use import Stepper
+from swashplate.equations.marching.simulation import Stepper
 from swashplate.errors import DomainError, InputError
 from swashplate.models.displacement_control import pressure_limits
 from swashplate.parameters.parameter_set import ParameterSet

@@ -21,7 +21,7 @@ from swashplate.units import in_si
 Array = NDArray[np.float64]
 
 
-class Given(TypedDict, total=False):
+class RunKeywords(TypedDict, total=False):
     """How inputs are given, and what was measured beside the command; see `Drive.simulate`."""
 
     clip: bool
@@ -68,7 +68,8 @@ def drive_records(
     are turned into SI.
     """
     command = in_si(command, UNITS[driver], f"The {driver}")
-    rate, time = in_si(rate, "Hz", "The rate"), in_si(time, "s", "The time")
+    rate = in_si(rate, "Hz", "The rate")
+    time = in_si(time, "s", "The time")
     if is_real(command):
         instead = f", or a maneuver such as maneuvers.step({command:g})"
         raise InputError(
@@ -84,12 +85,12 @@ def drive_records(
     between |= dict.fromkeys(beside, "linear")
     steps = least_substeps(rate, substeps)
     inputs = {driver: sampled(command, rate), **beside}
-    found = on_grid(inputs, rate, time=time, interpolation=between, substeps=steps)
+    records = on_grid(inputs, rate, time=time, interpolation=between, substeps=steps)
     if driver == "voltage":
-        found["voltage"] = check_voltage(found["voltage"], clip)
+        records["voltage"] = check_voltage(records["voltage"], clip)
     for name in beside:
-        _check_measured(name, found[name].values)
-    return found
+        _check_measured(name, records[name].values)
+    return records
 
 
 def _check_measured(name: str, values: Array) -> None:

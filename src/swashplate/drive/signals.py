@@ -30,8 +30,14 @@ UNITS = {name: unit for name, (unit, _) in {**CHAIN, **MOTOR, **MEASURED}.items(
 SIGNALS = tuple(CHAIN)
 OUTPUTS = ("current_sum", *SIGNALS[1:], *MOTOR)
 """Signals that can be observed, or returned and compared by a batch."""
-KEPT = ("current", "current_positive", "current_negative", "stroker_pressure", "shaft_speed")
-"""What a march leaves; for all else it is marched again when it is first asked for."""
+FIRST_SIGNALS = (
+    "current",
+    "current_positive",
+    "current_negative",
+    "stroker_pressure",
+    "shaft_speed",
+)
+"""Signals of the first march; the drive is marched again when another is first asked for."""
 
 
 def check_output(signal: str) -> None:

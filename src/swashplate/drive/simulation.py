@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Literal, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.drive.signals import KEPT, MOTOR, SIGNALS, UNITS
-from swashplate.equations.marching.use import Run, read_only
+from swashplate.drive.signals import FIRST_SIGNALS, MOTOR, SIGNALS, UNITS
+from swashplate.equations.marching.simulation import Run, read_only
 from swashplate.errors import InputError
 from swashplate.models.displacement_control import Pump
 from swashplate.results import Named, figures
@@ -69,8 +69,8 @@ class Simulation(Run):
     hoists, slews right, lifts the boom. The record is a voltage, or without a card a current.
     """
 
-    kept = KEPT
-    shown = ("shaft_speed",)
+    first_signals = FIRST_SIGNALS
+    plotted = ("shaft_speed",)
 
     limit_names = tuple(str(each.name).lower() for each in Limit)
 

@@ -87,13 +87,20 @@ def small_motion_model(
     by_voltage = inputs[0] == "voltage"
     instance = without_ripple(drive_instance(parameters, by_voltage=by_voltage))
     front, machine = instance.parts
-    command, side, sign, at = "current", "", 1.0, {"current": point.current}
+    command = "current"
+    side = ""
+    sign = 1.0
+    at = {"current": point.current}
     if by_voltage:
         assert point.voltage is not None
         side, sign = ("plus", 1.0) if point.voltage >= 0.0 else ("minus", -1.0)
         if coulomb == "ignored":
-            plus, minus = (each._replace(C=0.0) for each in (front.p.plus, front.p.minus))
-            front = front._replace(p=Card(plus, minus, front.p.tau))
+            card = Card(
+                plus=front.p.plus._replace(C=0.0),
+                minus=front.p.minus._replace(C=0.0),
+                tau=front.p.tau,
+            )
+            front = front._replace(p=card)
         # at a dead zone without width, by a hair
         command = "voltage"
         at = {command: point.voltage or nextafter(0.0, 1.0)}
@@ -118,46 +125,48 @@ def small_motion_model(
         models = models_of(parameters.equations)
         flowing = models.flowing_drive if by_voltage else models.flowing_pump_drive
         instance = replace(instance, model=flowing)
-    card = instance.start(at, step, "steady").states[0]
+    card_state = instance.start(at, step, "steady").states[0]
     model = linearize(
         instance,
         at,
         rate,
-        states=(card, state),
+        states=(card_state, state),
         inputs=tuple(command if name in COMMANDS else name for name in inputs),
         outputs=outputs,
     )
-    A, B, C, states = model.A, model.B, model.C, model.states
+    A, B, C = model.A, model.B, model.C
+    states = model.states
     names = _names(side, step, front.options)
     if options.friction is not None and step > 0.0:
         # the next sample knows the spool's place x and its deflection d as d e^(-h/T) - x w/x_s
         # alone, the deflection that would be left if it came back to where it was balanced
-        spool, deflection = (states.index(f"pump.{each}") for each in ("spool", "deflection"))
+        spool = states.index("pump.spool")
+        deflection = states.index("pump.deflection")
         width_of = interpreted(friction_width, pump.replacements)
-        left_of = interpreted(dither_factor, pump.replacements)
+        remaining_of = interpreted(dither_factor, pump.replacements)
         friction = width_of(p.spool_friction, p.Z4, p.Z5) / p.spool_presliding
-        left = left_of(p.dither_time, step)
+        remaining = remaining_of(p.dither_time, step)
         for matrix in (A, C):
             matrix[:, deflection] = -matrix[:, spool] / friction
         for matrix in (A, B):
-            matrix[deflection] = left * matrix[deflection] - friction * matrix[spool]
+            matrix[deflection] = remaining * matrix[deflection] - friction * matrix[spool]
     if not isfinite(p.dither_time):
         del names["pump.deflection"]  # without dither nothing is left of it
-    names |= {each: each for each in model.memory}
+    names |= {name: name for name in model.memory}
     moving = np.asarray(B.any(axis=1))
     moving[states.index("pump.pressure")] = True
     for _ in states:
         moving |= A[:, moving].any(axis=1)
-    kept = [path for path in names if moving[states.index(path)]]
-    places = [states.index(path) for path in kept]
+    paths = [path for path in names if moving[states.index(path)]]
+    indices = [states.index(path) for path in paths]
     # a channel counts in its own direction, the model in that of the speed
-    signs = np.array([sign if path.startswith("card.") else 1.0 for path in kept])
+    signs = np.array([sign if path.startswith("card.") else 1.0 for path in paths])
     return replace(
         model,
-        A=A[np.ix_(places, places)] * np.outer(signs, signs),
-        B=B[places] * signs[:, np.newaxis],
-        C=C[:, places] * signs,
-        states=tuple(names[path] for path in kept),
+        A=A[np.ix_(indices, indices)] * np.outer(signs, signs),
+        B=B[indices] * signs[:, np.newaxis],
+        C=C[:, indices] * signs,
+        states=tuple(names[path] for path in paths),
         inputs=inputs,
     )
 
@@ -183,18 +192,21 @@ def _names(side: str, step: float, options: Any) -> dict[str, str]:
 # --- several steps a sample -----------------------------------------------------------------------
 
 
-def lifted(A: Array, B: Array, C: Array, D: Array, substeps: int, held: Sequence[bool]) -> Matrices:
+def lifted(
+    A: Array, B: Array, C: Array, D: Array, substeps: int, zero_order: Sequence[bool]
+) -> Matrices:
     """Several steps as one sample.
 
     The state is that of the step after the sample before, together with the inputs at that sample:
-    from there on the steps up to this sample know their inputs.
+    from there on the steps up to this sample know their inputs. Inputs with `zero_order` keep their
+    last value between samples, the others follow a straight line.
     """
     n, k = B.shape
     # columns: the state, the last inputs, the present ones
     z = np.eye(n, n + 2 * k)
     y = np.empty(0)
     for j in range(1, substeps + 1):
-        rise = np.array([float(j == substeps) if each else j / substeps for each in held])
+        rise = np.where(zero_order, float(j == substeps), j / substeps)
         u = np.hstack((np.zeros((k, n)), np.diag(1.0 - rise), np.diag(rise)))
         y = C @ z + D @ u
         z = A @ z + B @ u

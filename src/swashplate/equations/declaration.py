@@ -74,7 +74,7 @@ def equation(function: F) -> F:
 
 
 def module_of(function: FunctionType) -> str:
-    """Name of a function's module, or of its file where that says more."""
+    """Name of a function's module, or of its file if that says more."""
     module = function.__module__ or ""
     return Path(function.__code__.co_filename).name if module == "__main__" else module
 
@@ -231,37 +231,40 @@ def closure(function: Any) -> dict[str, Any]:
     The function is the first entry. Of two things of one name, the second has its module's name
     before its own.
     """
-    found: dict[str, Any] = {plain(function).__name__: function}
-    met, pending = {plain(function)}, [function]
+    members: dict[str, Any] = {plain(function).__name__: function}
+    visited = {plain(function)}
+    pending = [function]
     while pending:
-        thing = pending.pop()
-        for name, each in _reached(thing):
-            number = not (is_function(each) or is_named_tuple(each))
-            if not number and plain(each) in met:
+        reaching = pending.pop()
+        for name, member in _reached(reaching):
+            is_constant = not (is_function(member) or is_named_tuple(member))
+            if not is_constant and plain(member) in visited:
                 continue
-            if name in found:
-                if number and repr(found[name]) == repr(each):
+            if name in members:
+                if is_constant and repr(members[name]) == repr(member):
                     continue
-                name = f"{getattr(each, '__module__', None) or plain(thing).__module__}.{name}"
-            found[name] = each
-            if not number:
-                met.add(plain(each))
-                pending.append(each)
-    return found
+                module = getattr(member, "__module__", None) or plain(reaching).__module__
+                name = f"{module}.{name}"
+            members[name] = member
+            if not is_constant:
+                visited.add(plain(member))
+                pending.append(member)
+    return members
 
 
 def reached(functions: Iterable[Any], replacements: Replacements) -> set[FunctionType]:
     """Plain functions of all equations that are run if some are called, those among them."""
-    found: set[FunctionType] = set()
-    met, pending = set(), [(each, replacements) for each in functions]
+    functions_run: set[FunctionType] = set()
+    visited = set()
+    pending = [(function, replacements) for function in functions]
     while pending:
         function, within = standing(*pending.pop())
-        state = (plain(function), *(each for each in within.items() if each[1]))
-        if state not in met:
-            met.add(state)
-            found.add(plain(function))
-            pending += [(each, within) for _, each in _reached(function) if is_function(each)]
-    return found
+        state = (plain(function), *((old, chain) for old, chain in within.items() if chain))
+        if state not in visited:
+            visited.add(state)
+            functions_run.add(plain(function))
+            pending += [(called, within) for _, called in _reached(function) if is_function(called)]
+    return functions_run
 
 
 def closure_hash(function: Any) -> str:
@@ -294,7 +297,7 @@ def _fingerprint(thing: Any) -> str:
 
 
 def _code(code: CodeType, doc: str | None) -> tuple[Any, ...]:
-    """All of a code object but where it stands and what is said about it."""
+    """All of a code object apart from its place in the file and its docstring."""
 
     def written(each: Any) -> Any:
         if isinstance(each, CodeType):

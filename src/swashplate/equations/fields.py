@@ -42,11 +42,11 @@ class Definition:
     can_be_off: bool = False
     """Infinity is allowed and switches the limit off."""
     default: float | None = None
-    """What it is where a set does not give it; None: every set must."""
+    """Its value if a set does not give it; None: every set must."""
     switch: str = ""
-    """Option of the model that it belongs to, and that is off where it is zero."""
+    """Option of the model that it belongs to, and that is off if it is zero."""
     least: float | None = None
-    """Lowest value that an estimate may take where `lower` itself would switch the term off."""
+    """Lowest value that an estimate may take if `lower` itself would switch the term off."""
     plausible: tuple[float, float] | None = None
     """Least and largest size, whatever the sign, of a number that somebody can mean; 0 and infinity
     apart, which stand for "none". None: any size."""
@@ -113,13 +113,13 @@ class Definition:
         return f"{low:g} to {high:g}" if low > 0.0 else f"at most {high:g}"
 
 
-class Direction(Enum):
+class OtherDirection(Enum):
     """Marks the other direction of a parameter with two values."""
 
     MINUS = "minus"
 
 
-MINUS = Direction.MINUS
+MINUS = OtherDirection.MINUS
 """On a field ``Z16_minus``: the definition stands on ``Z16_plus``."""
 
 

@@ -109,15 +109,18 @@ class Tap(NamedTuple):
         return self.width or (3 if self.hold == "mean" else 2)
 
 
-class Place(NamedTuple):
-    """Where a tap reads at one step: whole samples back, the rest, and d(rest)/d(delay)."""
+class TapDelay(NamedTuple):
+    """Where a tap reads at one step."""
 
-    whole: int
+    samples: int
+    """Whole samples back."""
     fraction: float
+    """Further back by this fraction of a sample."""
     slope: float
+    """d(fraction)/d(delay). [1/s]"""
 
 
-class Source(NamedTuple):
+class SignalSource(NamedTuple):
     """A signal of a part, or of its state."""
 
     part: int
@@ -128,7 +131,7 @@ class Link(NamedTuple):
     """A signal between parts: that of one part, or an equation over signals of several."""
 
     name: str
-    sources: tuple[Source, ...]
+    sources: tuple[SignalSource, ...]
     equation: Equation | None = None
 
     @property
@@ -155,15 +158,15 @@ class Model:
     taps: Mapping[str, Tap] = field(default_factory=dict)
     """How each input is looked at; one that is not listed is read at n."""
     defaults: Mapping[str, str] = field(default_factory=dict)
-    """Path of the parameter that stands for an input where no signal is given."""
+    """Path of the parameter that stands for an input if no signal is given."""
     options: type[Any] | None = None
     given: type[Any] | None = None
     limits: Equation | None = None
     """Named tuple of bool: which limits act."""
     domain: Equation | None = None
-    """Margin that is above 0 where the equations hold."""
+    """Margin that is above 0 if the equations hold."""
     outside: str | Callable[[float, str], str] = "the model's equations do not hold"
-    """What has happened where the margin is not above 0, for the sentence."""
+    """What has happened if the margin is not above 0, for the message."""
     outputs: Sequence[str] = ()
     """Signals of most use; by default all."""
     integrals: Mapping[str, str] = field(default_factory=dict)
@@ -215,50 +218,50 @@ class Model:
         """Inputs of a single model with their types, float or Window."""
         if self.inputs is not None:
             return dict(get_type_hints(self.inputs))
-        asked = [name for each in self.equations for name in arguments_of(each)]
+        names = [name for equation in self.equations for name in arguments_of(equation)]
         windows = {name for name, tap in self.taps.items() if tap.width}
-        return {n: Window if n in windows else float for n in asked if n not in ARGUMENTS}
+        return {n: Window if n in windows else float for n in names if n not in ARGUMENTS}
 
     @cached_property
     def signals(self) -> type[Any] | None:
         """Type of what ``sample`` returns."""
         if self.sample is None:
             return None
-        made = get_type_hints(plain(self.sample)).get("return")
-        if not is_named_tuple(made):
+        returned = get_type_hints(plain(self.sample)).get("return")
+        if not is_named_tuple(returned):
             raise InputError(
                 f"Model {self.name}: {plain(self.sample).__name__} must return a named tuple, and "
                 "say so, as in '-> Signals'."
             )
-        return made
+        return returned
 
     @cached_property
     def signal_names(self) -> tuple[str, ...]:
         """Signals that a simulation of a single model has, integrals apart."""
-        own = floats_of(self.signals) if self.signals is not None else ()
-        return tuple(dict.fromkeys((*own, *floats_of(self.state))))
+        signals = floats_of(self.signals) if self.signals is not None else ()
+        return tuple(dict.fromkeys((*signals, *floats_of(self.state))))
 
     @cached_property
     def every_signal(self) -> tuple[str, ...]:
         """Signals of all parts, numbers of their states, and links; integrals apart."""
-        own = [name for part in self.parts for name in part.signal_names]
-        return tuple(dict.fromkeys([*own, *self.links]))
+        signals = [name for part in self.parts for name in part.signal_names]
+        return tuple(dict.fromkeys([*signals, *self.links]))
 
     @cached_property
     def limit_bits(self) -> dict[str, tuple[int, int]]:
         """Part and bit of every limit, by its name."""
-        found: dict[str, tuple[int, int]] = {}
+        bits: dict[str, tuple[int, int]] = {}
         for i, part in enumerate(self.parts):
             if part.limits is not None:
                 fields = get_type_hints(plain(part.limits))["return"]._fields
-                found |= {name: (i, bit) for bit, name in enumerate(fields)}
-        return found
+                bits |= {name: (i, bit) for bit, name in enumerate(fields)}
+        return bits
 
     @cached_property
     def external(self) -> tuple[str, ...]:
-        """Signals that come from outside, in the order in which the parts ask for them."""
-        asked = [(i, name) for i, part in enumerate(self.parts) for name in part.input_types]
-        outside = [self.parts[i].tap(name) for i, name in asked if self.link_of(i, name) is None]
+        """Signals that come from outside, in the order of the parts' inputs."""
+        inputs = [(i, name) for i, part in enumerate(self.parts) for name in part.input_types]
+        outside = [self.parts[i].tap(name) for i, name in inputs if self.link_of(i, name) is None]
         return tuple(dict.fromkeys(tap.signal for tap in outside))
 
     def link_of(self, part: int, name: str) -> Link | None:
@@ -277,13 +280,16 @@ class Model:
     def places(self, kind: str) -> tuple[tuple[int, str], ...]:
         """Part and path of every number of its parameters, given or state, in flat order."""
         kinds = [getattr(part, kind) for part in self.parts]
-        return tuple((i, p) for i, each in enumerate(kinds) if each for p in floats_of(each))
+        return tuple((i, path) for i, kind in enumerate(kinds) if kind for path in floats_of(kind))
 
     @cached_property
     def ranges(self) -> dict[str, Definition]:
         """Definitions of the parameters that have a range, by path."""
-        found = [(i, ranges_of(part.parameters)) for i, part in enumerate(self.parts)]
-        return {f"{self.prefix(i)}{p}": each for i, own in found for p, each in own.items()}
+        return {
+            f"{self.prefix(i)}{path}": definition
+            for i, part in enumerate(self.parts)
+            for path, definition in ranges_of(part.parameters).items()
+        }
 
     @cached_property
     def definitions(self) -> dict[str, Definition]:
@@ -314,7 +320,7 @@ class Model:
     def equations(self) -> tuple[Equation, ...]:
         """Its equations that may ask for inputs."""
         all_of_them = (self.sample, self.step, self.limits, self.domain, self.rest, self.settled)
-        return tuple(each for each in all_of_them if each is not None)
+        return tuple(equation for equation in all_of_them if equation is not None)
 
 
 def _wrong(model: Model) -> Iterator[str]:
@@ -333,17 +339,20 @@ def _wrong(model: Model) -> Iterator[str]:
             must = "but must be a float or a named tuple of floats"
             yield f"{says}{field_} is of type {kind}, {must}."
     for word in ("step", "sample", "rest", "settled", "limits", "domain"):
-        made = getattr(model, word)
-        if not isinstance(plain(made), FunctionType) and not (made is None and word != "step"):
-            yield f"{says}{word} must be an equation, not {made!r}."
-    known, parameters = [*model.input_types], floats_of(model.parameters)
-    for each in model.equations:
-        for name in arguments_of(each):
-            if name not in (*ARGUMENTS, *known):
-                choice = ", ".join((*ARGUMENTS, *known))
-                yield f"{says}{plain(each).__name__} asks for '{name}', which is none of {choice}."
+        member = getattr(model, word)
+        is_left_out = member is None and word != "step"
+        if not isinstance(plain(member), FunctionType) and not is_left_out:
+            yield f"{says}{word} must be an equation, not {member!r}."
+    input_names = [*model.input_types]
+    parameters = floats_of(model.parameters)
+    for asking in model.equations:
+        for name in arguments_of(asking):
+            if name not in (*ARGUMENTS, *input_names):
+                choice = ", ".join((*ARGUMENTS, *input_names))
+                name_of = plain(asking).__name__
+                yield f"{says}{name_of} asks for '{name}', which is none of {choice}."
     for name, tap in model.taps.items():
-        if name not in known:
+        if name not in input_names:
             yield f"{says}there is a tap on '{name}', but no input."
         if tap.hold not in get_args(Hold):
             yield f"{says}'{name}' is held as '{tap.hold}'; there are {', '.join(get_args(Hold))}."
@@ -354,7 +363,7 @@ def _wrong(model: Model) -> Iterator[str]:
     for name in [path for paths in model.free_start.values() for path in paths]:
         if name not in states:
             yield f"{says}free_start names '{name}', but the state has {', '.join(states)}."
-    inputs = {model.tap(name).signal for name in known}
+    inputs = {model.tap(name).signal for name in input_names}
     if "time" in inputs:
         yield f"{says}an input cannot be called 'time', as the time stamps are: rename it."
     for name, where in _own_names(model):
@@ -390,27 +399,27 @@ def _address(model: Model) -> tuple[str, str] | None:
     """Module in which a model has a name, and this name, dotted for an attribute of an object."""
     # the main module last: that of another process may be another one
     modules = sorted(sys.modules, key=lambda name: name == "__main__")
-    things = [
-        (module, name, thing)
+    objects = [
+        (module, name, value)
         for module in modules
-        for name, thing in list(getattr(sys.modules[module], "__dict__", {}).items())
+        for name, value in list(getattr(sys.modules[module], "__dict__", {}).items())
     ]
-    for module, name, thing in things:
-        if thing is model:
+    for module, name, value in objects:
+        if value is model:
             return module, name
-    for module, name, thing in things:
-        if isinstance(thing, ModuleType | type):
+    for module, name, owner in objects:
+        if isinstance(owner, ModuleType | type):
             continue
-        for attribute, value in _attributes(thing):
+        for attribute, value in _attributes(owner):
             if value is model:
                 return module, f"{name}.{attribute}"
     return None
 
 
-def _attributes(thing: Any) -> list[tuple[str, Any]]:
+def _attributes(owner: Any) -> list[tuple[str, Any]]:
     """Attributes that an object itself stores; no code of the object is executed."""
     try:
-        return list(object.__getattribute__(thing, "__dict__").items())
+        return list(object.__getattribute__(owner, "__dict__").items())
     except AttributeError:
         return []
 
@@ -441,8 +450,8 @@ def join(
     Raises
     ------
     InputError
-        If two parts have one name, an equation asks for a signal that there is not, or a part for
-        one that is only known behind it.
+        If two parts have the same name, an equation asks for a signal that no part has, or a part
+        for one that is only known after it.
 
     Notes
     -----
@@ -456,39 +465,48 @@ def join(
     if len(set(names)) != len(names):
         raise InputError(f"Joined models need names of their own, not {', '.join(names)}.")
     linked = {}
-    for signal, made_by in (links or {}).items():
-        sources = [_source(single, each) for each in arguments_of(made_by)]
-        if None in sources:
-            asked = arguments_of(made_by)[sources.index(None)]
-            known = ", ".join(each for part in single for each in part.signal_names)
-            raise InputError(
-                f"Model {name}: a link asks for '{asked}', but the parts have {known}."
-            )
-        linked[signal] = Link(signal, tuple(each for each in sources if each), made_by)
+    for signal, link_equation in (links or {}).items():
+        sources = []
+        for argument in arguments_of(link_equation):
+            source = _source(single, argument)
+            if source is None:
+                names_of_parts = ", ".join(name for part in single for name in part.signal_names)
+                raise InputError(
+                    f"Model {name}: a link asks for '{argument}', but the parts have "
+                    f"{names_of_parts}."
+                )
+            sources.append(source)
+        linked[signal] = Link(signal, tuple(sources), link_equation)
 
     def gathered(attribute: str) -> Any:
         present = [(p.name, getattr(p, attribute)) for p in single if getattr(p, attribute)]
         return NamedTuple(f"{name.title()}{attribute.title()}", present)
 
-    kinds = {each: gathered(each) for each in ("parameters", "state", "options", "given")}
-    made = Model(name, step=single[0].step, parts=single, links=linked, **kinds, **changes)
-    for wrong in _too_late(made):
+    kinds = {kind: gathered(kind) for kind in ("parameters", "state", "options", "given")}
+    model = Model(name, step=single[0].step, parts=single, links=linked, **kinds, **changes)
+    for wrong in _too_late(model):
         raise InputError(wrong)
-    return made
+    return model
 
 
 def _too_late(model: Model) -> Iterator[str]:
-    """What a part of a joined model would take from outside, although it is known behind it."""
+    """What a part of a joined model would take from outside, although it is known after it."""
     before = [set[int]() for _ in model.parts]
-    asked = [(i, name) for i, part in enumerate(model.parts) for name in part.input_types]
-    for i, name in asked:
-        known = model.link_of(i, name)
-        for each in known.sources if known else ():
-            before[i] |= {each.part, *before[each.part]}
-    for i, name in asked:
-        signal, part = model.parts[i].tap(name).signal, model.parts[i].name
-        link, source = model.links.get(signal), _source(model.parts[i + 1 :], signal)
-        after = link.after if link else i + 1 + source.part if source else -1
+    inputs = [(i, name) for i, part in enumerate(model.parts) for name in part.input_types]
+    for i, name in inputs:
+        link = model.link_of(i, name)
+        for source in link.sources if link else ():
+            before[i] |= {source.part, *before[source.part]}
+    for i, name in inputs:
+        signal = model.parts[i].tap(name).signal
+        part = model.parts[i].name
+        signal_link = model.links.get(signal)
+        later = _source(model.parts[i + 1 :], signal)
+        after = -1
+        if signal_link:
+            after = signal_link.after
+        elif later:
+            after = i + 1 + later.part
         passed_on = signal in model.parts[i].signal_names and _packaged(model.parts[after])
         if after < i or passed_on or model.link_of(i, name) is not None:
             continue
@@ -502,11 +520,11 @@ def _too_late(model: Model) -> Iterator[str]:
         )
 
 
-def _source(parts: Sequence[Model], signal: str) -> Source | None:
+def _source(parts: Sequence[Model], signal: str) -> SignalSource | None:
     """Where a signal of some parts comes from: of the last that has it."""
     for j in range(len(parts) - 1, -1, -1):
         if signal in parts[j].signal_names:
-            return Source(j, signal)
+            return SignalSource(j, signal)
     return None
 
 
@@ -520,12 +538,13 @@ def state_paths(model: Model) -> tuple[str, ...]:
     return tuple(f"{model.prefix(i)}{path}" for i, path in model.places("state"))
 
 
-def place(tap: Tap, delay: float, h: float) -> Place:
+def tap_delay(tap: Tap, delay: float, h: float) -> TapDelay:
     """Where a tap reads at a step of `h` for a delay [s]."""
-    samples = delay / h
-    end = max(samples, tap.ahead) - tap.ahead
-    whole = int(end // 1.0)
-    return Place(whole, end - whole, 1.0 / h if samples >= tap.ahead else 0.0)
+    steps = delay / h
+    back = max(steps, tap.ahead) - tap.ahead
+    samples = int(back // 1.0)
+    slope = 1.0 / h if steps >= tap.ahead else 0.0
+    return TapDelay(samples, back - samples, slope)
 
 
 def arguments_of(equation: Equation) -> tuple[str, ...]:

@@ -29,7 +29,7 @@ from swashplate.errors import InputError
 
 
 class Replacement(NamedTuple):
-    """One's own equation in the place of a model's."""
+    """A user-defined equation in place of a model's."""
 
     old: Equation
     new: Equation
@@ -53,7 +53,7 @@ def _sent(places: Mapping[str, str]) -> Replacement:
     return found_at(places)
 
 
-OURS = "swashplate.models."
+PACKAGE_MODELS = "swashplate.models."
 """What the modules begin with that are imported to find an equation; all others must be already."""
 
 
@@ -72,12 +72,12 @@ def found_at(places: Mapping[str, str]) -> Replacement:
     for what, place in places.items():
         module, _, name = place.partition(":")
         home = sys.modules.get(module)
-        if home is None and module.startswith(OURS):
+        if home is None and module.startswith(PACKAGE_MODELS):
             home = import_module(module)
         members[what] = vars(home).get(name) if isinstance(home, ModuleType) else None
         if members[what] is None:
             raise InputError(
-                f"an equation of one's own is {name} of the module {module}: import that first."
+                f"a user-defined equation is {name} of the module {module}: import that first."
             )
     check_members(members, places)
     return Replacement(**members)
@@ -146,10 +146,10 @@ def replaced(
     InputError
         If the model does not use the equation, or the arguments do not fit.
     """
-    made = Replacement(old, new, parameters)
+    replacement = Replacement(old, new, parameters)
     if not uses(model, old):
         raise InputError(f"Model {model.name} does not use {plain(old).__name__}.")
-    parts = [_part(part, made) for part in model.parts]
+    parts = [_part(part, replacement) for part in model.parts]
     if model.parts == (model,):
         return parts[0]
     links, replacements = _link_equations(model), model.replacements
@@ -169,88 +169,95 @@ def replaced(
         outputs=model.outputs,
         free_start=model.free_start,
         replacements=replacements,
-        recipe=(again, (model, made)),
+        recipe=(again, (model, replacement)),
     )
 
 
 @cache
-def again(model: Model, made: Replacement) -> Model:
+def again(model: Model, replacement: Replacement) -> Model:
     """What `replaced` gives, once in a process."""
-    return replaced(model, *made)
+    return replaced(
+        model,
+        replacement.old,
+        replacement.new,
+        replacement.parameters,
+    )
 
 
-def _part(part: Model, made: Replacement) -> Model:
+def _part(part: Model, replacement: Replacement) -> Model:
     """A part with the replacement, itself if it does not use the equation."""
-    if not _calls(part.equations, part.replacements, made.old):
+    if not _calls(part.equations, part.replacements, replacement.old):
         return part
-    own: Any = part.parameters
-    more: Any = made.parameters
-    kind = own if more is None else _extended(own, more)
-    new = _called_like(made.old, made.new, part.name, kind)
+    kind: Any = part.parameters
+    if replacement.parameters is not None:
+        further: Any = replacement.parameters
+        kind = _extended(kind, further)
+    new = _called_like(replacement.old, replacement.new, part.name, kind)
     changes: dict[str, Any] = {
-        each.name: new
-        for each in fields(part)
-        if plain(getattr(part, each.name)) is plain(made.old)
+        field.name: new
+        for field in fields(part)
+        if plain(getattr(part, field.name)) is plain(replacement.old)
     }
-    changes["replacements"] = _with(part.replacements, made.old, new)
-    changes["recipe"] = again, (part, made)
+    changes["replacements"] = _with(part.replacements, replacement.old, new)
+    changes["recipe"] = again, (part, replacement)
     return replace(part, parts=(), parameters=kind, **changes)
 
 
 def _with(replacements: Replacements, old: Equation, new: Equation) -> Replacements:
     """Replacements with one more, also in the place of what already stands for another."""
-    found = {
-        each: tuple(new if plain(stands) is plain(old) else stands for stands in chain)
-        for each, chain in replacements.items()
+    chains = {
+        equation: tuple(new if plain(stands) is plain(old) else stands for stands in chain)
+        for equation, chain in replacements.items()
     }
-    found[plain(old)] = (*found.get(plain(old), ()), new)
-    return found
+    chains[plain(old)] = (*chains.get(plain(old), ()), new)
+    return chains
 
 
 @cache
-def _extended(kind: Any, more: Any) -> type[Any]:
+def _extended(kind: Any, further: Any) -> type[Any]:
     """A class of named tuples with the fields of two."""
     hints: dict[str, Any] = {}
     defaults: dict[str, Any] = {}
-    for each in (kind, more):
-        twice = sorted(set(hints) & set(each._fields))
+    for part in (kind, further):
+        twice = sorted(set(hints) & set(part._fields))
         if twice:
             raise InputError(f"{kind.__name__} has a parameter {twice[0]} already.")
-        hints |= get_type_hints(each, include_extras=True)
-        defaults |= each._field_defaults
-    bare = [name for name in more._fields if name not in more._field_defaults]
+        hints |= get_type_hints(part, include_extras=True)
+        defaults |= part._field_defaults
+    bare = [name for name in further._fields if name not in further._field_defaults]
     if bare:
-        raise InputError(f"{more.__name__}.{bare[0]} needs a default: old numbers lack it.")
+        raise InputError(f"{further.__name__}.{bare[0]} needs a default: old numbers lack it.")
     order = sorted(hints, key=lambda name: name in defaults)
     make: Any = namedtuple
-    made = make(kind.__name__, order, defaults=[defaults[n] for n in order if n in defaults])
-    made.__annotations__ = {name: hints[name] for name in order}
-    made.__module__ = more.__module__
-    return made  # type: ignore[no-any-return]
+    extended = make(kind.__name__, order, defaults=[defaults[n] for n in order if n in defaults])
+    extended.__annotations__ = {name: hints[name] for name in order}
+    extended.__module__ = further.__module__
+    return extended  # type: ignore[no-any-return]
 
 
 def _called_like(old: Equation, new: Equation, part: str, kind: type[Any]) -> Equation:
     """The new equation with the arguments of the old one."""
-    taken, wanted = arguments_of(old), arguments_of(new)
+    taken = arguments_of(old)
+    requested = arguments_of(new)
     name = plain(old).__name__
-    if wanted[: len(taken)] != taken:
+    if requested[: len(taken)] != taken:
         raise InputError(
             f"{plain(new).__name__} must begin with the arguments of {name}: {', '.join(taken)}."
         )
-    more = wanted[len(taken) :]
-    if not more:
+    further = requested[len(taken) :]
+    if not further:
         return new
-    unknown = [each for each in more if each not in kind._fields]
+    unknown = [path for path in further if path not in kind._fields]
     if unknown:
         raise InputError(f"{plain(new).__name__} asks for {unknown[0]}, no parameter of {part}.")
     if "p" not in taken:
         raise InputError(
             f"{name} does not take the parameters p, so {plain(new).__name__} cannot have "
-            f"{more[0]}; replace an equation that calls it and takes p."
+            f"{further[0]}; replace an equation that calls it and takes p."
         )
     hints = get_type_hints(plain(old)) | {"p": kind}
-    names: dict[str, Any] = {f"Type_{each}": hints[each] for each in (*taken, "return")}
-    arguments = ", ".join(f"{each}: Type_{each}" for each in taken)
-    passed = ", ".join((*taken, *(f"p.{each}" for each in more)))
+    names: dict[str, Any] = {f"Type_{argument}": hints[argument] for argument in (*taken, "return")}
+    arguments = ", ".join(f"{argument}: Type_{argument}" for argument in taken)
+    passed = ", ".join((*taken, *(f"p.{path}" for path in further)))
     text = f"def {name}({arguments}) -> Type_return:\n    return own_equation({passed})\n"
     return equation_of_text(text, name, names | {"own_equation": new})  # type: ignore[no-any-return]

@@ -3,10 +3,10 @@
 from swashplate.full_order.drive import SIGNAL_UNITS as SIGNAL_UNITS
 from swashplate.full_order.drive import SIGNALS as SIGNALS
 from swashplate.full_order.drive import TABLE_MANEUVERS as TABLE_MANEUVERS
-from swashplate.full_order.drive import Comparison as Comparison
 from swashplate.full_order.drive import FullOrderDrive as FullOrderDrive
 from swashplate.full_order.drive import FullOrderSimulation as FullOrderSimulation
 from swashplate.full_order.drive import Modes as Modes
+from swashplate.full_order.drive import OrderComparison as OrderComparison
 from swashplate.full_order.drive import compare as compare
 from swashplate.full_order.drive import validity as validity
 from swashplate.full_order.drive import validity_table as validity_table

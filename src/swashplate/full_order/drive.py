@@ -30,14 +30,14 @@ from swashplate.equations.marching.record import (
     Interpolation,
     least_substeps,
 )
-from swashplate.equations.marching.run import Instance, Part, Start
-from swashplate.equations.marching.use import Run, read_only
+from swashplate.equations.marching.run import Instance, PartNumbers, Start
+from swashplate.equations.marching.simulation import Run, read_only
 from swashplate.errors import DomainError, InputError
 from swashplate.full_order.physical_set import QUANTITIES, PhysicalSet, from_lumped
 from swashplate.linear import linearize
 from swashplate.models import full_order as model
 from swashplate.models.displacement_control import Solenoids
-from swashplate.models.drive import Source
+from swashplate.models.drive import Source as CurrentSource
 from swashplate.models.full_order import PlantOptions, PlantSignals
 from swashplate.models.machine import fastest_rate, relief_pressures
 from swashplate.parameters.definitions import CATALOGUE, DEFINITIONS, Definition, Definitions
@@ -150,19 +150,19 @@ class FullOrderSimulation(Run, Tabular):
 
     @property
     def spool_hold(self) -> Flags:
-        """1 or -1 where the spool is at its stroke."""
+        """1 or -1 while the spool is at its stroke."""
         stroke = self.plant.machine.spool_stroke
         return _beyond(self.spool_position, -stroke, stroke)
 
     @property
     def relief_hold(self) -> Flags:
-        """1 or -1 where the relief valve holds the stroker pressure."""
+        """1 or -1 while the relief valve holds the stroker pressure."""
         pressure = self.sampled(self.fine("piston_pressure"))
         return _beyond(pressure, *interpreted(relief_pressures)(self.plant.machine))
 
     @property
     def plate_hold(self) -> Flags:
-        """1 or -1 where the swash plate rests on a stop."""
+        """1 or -1 while the swash plate rests on a stop."""
         m = self.plant.machine
         return _beyond(self.swash_angle, -m.swash_stop_minus, m.swash_stop_plus)
 
@@ -222,19 +222,21 @@ class FullOrderDrive:
         return cls(Drive.preset(name), physical)
 
     @classmethod
-    def from_drive(cls, drive: Drive, like: str | None = None, **chosen: Change) -> FullOrderDrive:
+    def from_drive(
+        cls, drive: Drive, like: str | None = None, **quantities: Change
+    ) -> FullOrderDrive:
         """A full-order drive for any parameters, a fitted set's for example.
 
         The drive gives card, solenoids and the lumps that the machine shall have, Z6 apart; the
-        physical set is completed from them and what is chosen in SI, e.g. ``oil_volume=1e-4``, as
-        `swashplate.full_order.from_lumped` says.
+        physical set is completed from them and from `quantities` in SI, e.g. ``oil_volume=1e-4``;
+        see `swashplate.full_order.from_lumped`.
 
         Raises
         ------
         ParameterError
             For an unknown name, or if lumps contradict each other or a choice.
         """
-        return cls(drive, from_lumped(drive.parameters, like, **chosen))
+        return cls(drive, from_lumped(drive.parameters, like, **quantities))
 
     def replace(self, **changes: Change) -> FullOrderDrive:
         """With other physical values in SI, e.g. ``replace(load_torque=2e3)``."""
@@ -255,21 +257,23 @@ class FullOrderDrive:
         )
 
     def instance(self, step: float, *, substeps: int | None = None, card: bool = True) -> Instance:
-        """The model with numbers, for the engine: behind a voltage, or without a card a current.
+        """The model with numbers, for the engine; a voltage drives it, or a current without `card`.
 
-        At a distance of the samples [s]; `substeps` as in `follow`.
+        `step` is the distance of the samples [s]; `substeps` as in `follow`.
         """
         parameters = self.drive.parameters
         symmetric = parameters.pressure_root == "symmetric"
         options = PlantOptions(symmetric or None, self.physical.air)
         given = model.Substeps(float(self.substeps(step, substeps)))
-        plant, front, kind = Part(self.plant, options, given), Part(Source()), model.full_machine
-        if card:
-            check_filter_stability(parameters, step)
-            front, kind = Part(card_of(parameters), card_options(parameters)), model.full_drive
-        return Instance(kind, (front, plant), self.physical.name)
+        plant = PartNumbers(self.plant, options, given)
+        if not card:
+            source = PartNumbers(CurrentSource())
+            return Instance(model.full_machine, (source, plant), self.physical.name)
+        check_filter_stability(parameters, step)
+        front = PartNumbers(card_of(parameters), card_options(parameters))
+        return Instance(model.full_drive, (front, plant), self.physical.name)
 
-    def substeps(self, step: float, wanted: int | None = None) -> int:
+    def substeps(self, step: float, requested: int | None = None) -> int:
         """Sub-steps that a step [s] of the record takes.
 
         By default 8, or so many that the fastest mode takes six a turn.
@@ -279,18 +283,18 @@ class FullOrderDrive:
         DomainError
             If the machine is too stiff for the march.
         InputError
-            If so few are wanted that the march would be unstable.
+            If so few are requested that the march would be unstable.
         """
         fastest = float(interpreted(fastest_rate)(self.physical.machine))
         needed = max(ceil(fastest * step / RESOLUTION), LEAST_SUBSTEPS)
-        if wanted is not None:
+        if requested is not None:
             least = floor(fastest * step / STABLE) + 1
-            if wanted < least:
+            if requested < least:
                 raise InputError(
-                    f"substeps is {wanted}, but the fastest mode, at {fastest:.3g} rad/s, needs "
+                    f"substeps is {requested}, but the fastest mode, at {fastest:.3g} rad/s, needs "
                     f"at least {least} to be stable and {needed} to be followed."
                 )
-            return wanted
+            return requested
         if needed > MOST_SUBSTEPS:
             raise DomainError(
                 f"{self.physical.name}: the fastest mode, at {fastest:.3g} rad/s, would take "
@@ -323,7 +327,7 @@ class FullOrderDrive:
     def follow(
         self, run: Simulation, *, start: Start = "rest", substeps: int | None = None
     ) -> FullOrderSimulation:
-        """Simulate the machine over the current of a run that there is.
+        """Simulate the machine over the current of an earlier run.
 
         Parameters
         ----------
@@ -361,7 +365,7 @@ class FullOrderDrive:
         at = {"current": float(current)}
         motion = instance.start(at, step, "steady").states[1].motion
         flowing = Instance(
-            model.flowing_plant, (Part(self.plant, instance.options[1]),), self.physical.name
+            model.flowing_plant, (PartNumbers(self.plant, instance.options[1]),), self.physical.name
         )
         matrix = linearize(flowing, at, None, states=(motion,), outputs=("swash_angle",)).A
         values, right = np.linalg.eig(matrix)
@@ -370,11 +374,11 @@ class FullOrderDrive:
         others = [k for k in range(5) if k != slow]
         by_spool = sorted(others, key=lambda k: -float(parts[:2, k].sum() / parts[:, k].sum()))
         return Modes(
-            values.astype(np.complex128),
-            complex(values[slow]),
-            _upper(values[by_spool[:2]]),
-            _upper(values[by_spool[2:]]),
-            _upper(np.linalg.eigvals(matrix[3:, 3:])),
+            eigenvalues=values.astype(np.complex128),
+            slow=complex(values[slow]),
+            spool=_upper(values[by_spool[:2]]),
+            swash=_upper(values[by_spool[2:]]),
+            swash_at_held_pressure=_upper(np.linalg.eigvals(matrix[3:, 3:])),
         )
 
     def sensitivities(
@@ -490,7 +494,7 @@ TABLE_MANEUVERS: tuple[tuple[str, Maneuver], ...] = (
 
 
 @dataclass(frozen=True, eq=False)
-class Comparison(Tabular):
+class OrderComparison(Tabular):
     """Both models over one command, driven by the same current.
 
     The reduced one is marched in fine steps, so that what is compared are the equations.
@@ -500,7 +504,7 @@ class Comparison(Tabular):
     reduced_speed: Array
     """Shaft speed of the reduced model. [rad/s]"""
     voltage: Array | None
-    """Command, None where a current was given instead. [V]"""
+    """Command; None if a current was given instead. [V]"""
 
     @property
     def time(self) -> Array:
@@ -531,31 +535,34 @@ class Comparison(Tabular):
     def table(self) -> Table:
         """Top speed, and the largest and the rms difference of the reduced model."""
         columns = (Column("Shaft speed"), Column("", ".4g"), UNIT, Column("share", ".2%"))
-        made = Table("", columns)
+        table = Table("", columns)
         largest = float(np.abs(self.error).max())
         rms = float(np.sqrt(np.mean(self.error**2)))
         relative = self.relative  # NaN, shown as nothing, if it does not move
-        made.add("top speed, five states", self.top_speed, None, unit="rad/s")
-        made.add("largest difference", largest, relative[0], unit="rad/s")
-        made.add("rms difference", rms, relative[1], unit="rad/s")
-        return made
+        table.add("top speed, five states", self.top_speed, None, unit="rad/s")
+        table.add("largest difference", largest, relative[0], unit="rad/s")
+        table.add("rms difference", rms, relative[1], unit="rad/s")
+        return table
 
     def plot(self, *, title: str | None = None) -> Figure:
         """Figure of both speeds, their difference, and what lies between command and speed."""
         return cast("Figure", figures().plot_full_order(self, title=title))
 
     def to_polars(self) -> polars.DataFrame:
-        """Table of the full-order model's signals, with command and reduced model's speed."""
+        """Table of the full-order model's signals, with command and reduced model's speed.
+
+        The full-order model is marched again for signals that were not computed so far.
+        """
         import polars as pl
 
         speed = pl.Series("reduced_shaft_speed", self.reduced_speed)
-        made = self.full.to_polars().with_columns(speed)
+        frame = self.full.to_polars().with_columns(speed)
         if self.voltage is not None:
-            made.insert_column(1, pl.Series("voltage", self.voltage))
-        return made
+            frame.insert_column(1, pl.Series("voltage", self.voltage))
+        return frame
 
 
-def compare(full: FullOrderDrive, run: Simulation, *, start: Start = "rest") -> Comparison:
+def compare(full: FullOrderDrive, run: Simulation, *, start: Start = "rest") -> OrderComparison:
     """Simulate both models over the current of a run of ``full.drive``.
 
     The reduced model has the lumps of the full-order one; `start` as in `FullOrderDrive.follow`.
@@ -571,7 +578,7 @@ def compare(full: FullOrderDrive, run: Simulation, *, start: Start = "rest") -> 
         substeps=max(steps, LEAST_FINE_STEPS, least_substeps(rate)),
     )
     speed = np.ascontiguousarray(fine.shaft_speed[:: record.substeps])
-    return Comparison(followed, read_only(speed), run.voltage)
+    return OrderComparison(followed, read_only(speed), run.voltage)
 
 
 def validity(full: FullOrderDrive, rate: float = SOURCE_RATE) -> Table:
@@ -580,13 +587,13 @@ def validity(full: FullOrderDrive, rate: float = SOURCE_RATE) -> Table:
     return validity_table(full.physical.name, ((name, compare(full, run)) for name, run in runs))
 
 
-def validity_table(axis: str, compared: Iterable[tuple[str, Comparison]]) -> Table:
+def validity_table(axis: str, compared: Iterable[tuple[str, OrderComparison]]) -> Table:
     """Differences in shaft speed under some commands, and whether one state is enough for them.
 
     A row for each command: top speed, largest and rms difference in per cent of it, and whether the
     largest difference is within 1 %; none without motion.
     """
-    made = Table(
+    table = Table(
         "Reduced model less full-order one, in % of the top speed",
         (
             Column("axis", of="f"),
@@ -597,14 +604,15 @@ def validity_table(axis: str, compared: Iterable[tuple[str, Comparison]]) -> Tab
             Column("within 1 %", key="within_1_percent"),
         ),
     )
-    for name, each in compared:
-        if each.moves:
-            enough = each.relative[0] <= ENOUGH
+    for name, comparison in compared:
+        if comparison.moves:
+            largest, rms = comparison.relative
+            enough = largest <= ENOUGH
             cell = Cell(enough, "yes" if enough else "no")
-            made.add(axis, name, each.top_speed, *(100.0 * x for x in each.relative), cell)
+            table.add(axis, name, comparison.top_speed, 100.0 * largest, 100.0 * rms, cell)
         else:
-            made.add(axis, name, each.top_speed, None, None, Cell(None, "does not move"))
-    return made
+            table.add(axis, name, comparison.top_speed, None, None, Cell(None, "does not move"))
+    return table
 
 
 def validity_verdict(table: Table) -> str:

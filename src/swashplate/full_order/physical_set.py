@@ -12,7 +12,7 @@ from difflib import get_close_matches
 from functools import cache
 from importlib.resources import files
 from math import pi, sqrt
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -96,15 +96,16 @@ class PhysicalSet(Entries):
     def __post_init__(self) -> None:
         for name in self.parameters:
             quantity_of(name)
-        found = {
-            name: Parameter(each, each.default, status="assumed")
-            for name, each in QUANTITIES.items()
-            if each.default is not None
-        } | dict(self.parameters)
-        missing = [name for name in QUANTITIES if name not in found]
+        defaults = {
+            name: Parameter(quantity, quantity.default, status="assumed")
+            for name, quantity in QUANTITIES.items()
+            if quantity.default is not None
+        }
+        parameters = defaults | dict(self.parameters)
+        missing = [name for name in QUANTITIES if name not in parameters]
         if missing:
             raise ParameterError(f"{self.name}: no value for {', '.join(missing)}.")
-        self._keep({name: found[name] for name in QUANTITIES})
+        self._keep({name: parameters[name] for name in QUANTITIES})
         refuse(self.name, _broken_rules(self))
 
     @classmethod
@@ -133,8 +134,8 @@ class PhysicalSet(Entries):
         """
         m = self.machine
         rest, stiffness = _rest(m)
-        own = m.piston_area**2 * stiffness / m.return_spring_rate
-        gauge = 1.0 if Z6 is None else (1.0 + Z6) / (1.0 + own)
+        physical_Z6 = m.piston_area**2 * stiffness / m.return_spring_rate
+        gauge = 1.0 if Z6 is None else (1.0 + Z6) / (1.0 + physical_Z6)
         accelerating = m.motor_leakage * m.motor_constant * m.pump_flow_gain
         return {
             "Z1": m.piston_area / (m.return_spring_rate * m.swash_arm),
@@ -143,7 +144,7 @@ class PhysicalSet(Entries):
             "Z3": m.swash_arm / m.control_arm,
             "Z4": (m.feedback_spring_rate * m.feedback_spring_arm**2) ** 2,
             "Z5": m.spool_arm,
-            "Z6": own if Z6 is None else Z6,
+            "Z6": physical_Z6 if Z6 is None else Z6,
             "Z7": m.piston_leakage * stiffness * gauge,
             "Z8": m.valve_flow_gain * stiffness * gauge,
             "Z9": m.supply_pressure - rest,
@@ -159,11 +160,11 @@ class PhysicalSet(Entries):
 
     def replace(self, **changes: Change) -> PhysicalSet:
         """A set with other values in SI, ``replace(load_torque=2e3)``, marked as the user's."""
-        made = {
+        changed = {
             name: Parameter(quantity_of(name), meant_value(name, quantity_of(name), change))
             for name, change in changes.items()
         }
-        return replace(self, parameters={**self.parameters, **made})
+        return replace(self, parameters={**self.parameters, **changed})
 
     def __getitem__(self, name: str) -> Parameter:
         quantity_of(name)
@@ -182,12 +183,11 @@ def quantity_of(name: str) -> Definition:
         return QUANTITIES[name]
     close = get_close_matches(name, QUANTITIES, n=1)
     hint = f" (did you mean {close[0]}?)" if close else ""
-    choice = (
-        "; it is chosen only where a set is completed from lumped parameters"
-        if name in CHOICES
-        else f"{hint}; the quantities are {', '.join(QUANTITIES)}"
-    )
-    raise UnknownParameterError(f"A physical set has no quantity '{name}'{choice}.")
+    if name in CHOICES:
+        advice = "; it is chosen only where a set is completed from lumped parameters"
+    else:
+        advice = f"{hint}; the quantities are {', '.join(QUANTITIES)}"
+    raise UnknownParameterError(f"A physical set has no quantity '{name}'{advice}.")
 
 
 def chosen_quantity(name: str) -> Definition:
@@ -209,10 +209,10 @@ def _rest(machine: Machine) -> tuple[float, float]:
 def _broken_rules(parameters: Mapping[str, Parameter]) -> Iterator[Broken]:
     """Rules of single quantities, and those of a whole set."""
     n: dict[str, Any] = {}
-    for each in parameters.values():
-        for column, value in each.numbers.items():
+    for parameter in parameters.values():
+        for column, value in parameter.numbers.items():
             n[column] = np.array([value])
-            yield range_rule(each.definition, column, n[column])
+            yield range_rule(parameter.definition, column, n[column])
     if not n.keys() >= set(Machine._fields):
         return  # not yet completed
     for side in ("plus", "minus"):
@@ -257,7 +257,7 @@ def from_lumped(
     lumped : ParameterSet or Drive
         The lumped parameters that the set shall have, Z6 apart.
     like : str, optional
-        Packaged set whose assumed values count where nothing is chosen; by default see
+        Packaged set whose assumed values count if nothing is chosen; by default see
         `nearest_set`.
     **chosen : float, (float, float) or Parameter
         Chosen values in SI: those that packaged sets assume, or any other quantity: an inertia or
@@ -277,26 +277,45 @@ def from_lumped(
     parameters = set_of(lumped)
     owner = parameters.name
     _, assumed = _assumed(nearest_set(parameters.name) if like is None else like)
-    given = chosen_over(assumed, chosen)
-    for made_from, choice in IN_PLACE_OF.items():
-        if made_from in given and choice in given:
+    entries = chosen_over(assumed, chosen)
+    for quantity, choice in IN_PLACE_OF.items():
+        if quantity in entries and choice in entries:
             raise ParameterError(
-                f"{owner}: {made_from} and {choice} are both given, but either follows from the "
+                f"{owner}: {quantity} and {choice} are both given, but either follows from the "
                 "other; leave one out."
             )
-    refuse(owner, _broken_rules(given))
-    found = {name: each for name, each in given.items() if name in QUANTITIES}
-    known = {k: v for each in given.values() for k, v in each.numbers.items()}
-    for symbol, (follows, origin) in _completed(owner, parameters.numbers, known).items():
-        made = Parameter(QUANTITIES[symbol], follows, f"from {origin}", "assumed")
-        entry = found.setdefault(symbol, made)
-        for (column, value), expected in zip(entry.numbers.items(), made.values, strict=True):
+    refuse(owner, _broken_rules(entries))
+    quantities = {name: entry for name, entry in entries.items() if name in QUANTITIES}
+    numbers = {
+        column: value for entry in entries.values() for column, value in entry.numbers.items()
+    }
+    for symbol, (value_of_lumps, origin) in _completed(owner, parameters.numbers, numbers).items():
+        lumped_entry = Parameter(QUANTITIES[symbol], value_of_lumps, f"from {origin}", "assumed")
+        entry = quantities.setdefault(symbol, lumped_entry)
+        pairs = zip(entry.numbers.items(), lumped_entry.values, strict=True)
+        for (column, value), expected in pairs:
             if value != expected and not abs(value - expected) <= AGREES * abs(expected):
                 raise ParameterError(
                     f"{owner}: {column} is given as {value:.9g} {entry.unit}, but "
-                    f"{expected:.9g} follows {made.source}; leave it out or change one of these."
+                    f"{expected:.9g} follows {lumped_entry.source}; leave it out or change one of "
+                    "these."
                 )
-    return PhysicalSet(owner, parameters.title, found)
+    return PhysicalSet(owner, parameters.title, quantities)
+
+
+class SwingingPart(NamedTuple):
+    """A part that turns against a spring, with a mass on an arm: what its quantities are called."""
+
+    inertia: str
+    damping: str
+    mass: str
+    arm_name: str
+    arm: float
+    """[m]"""
+    stiffness: float
+    """Of the spring, in the angle. [N m]"""
+    origin: str
+    """What its inertia follows from."""
 
 
 def _completed(
@@ -315,7 +334,7 @@ def _completed(
     _, stiffness = _rest(machine._replace(supply_pressure=supply))
     spring_rate, spring_moment = area / (Z["Z1"] * arm), Z["Z4"] ** 0.5
     gauge = (1.0 + area**2 * stiffness / spring_rate) / (1.0 + Z["Z6"]) / stiffness
-    made: dict[str, tuple[Value, str]] = {
+    completed: dict[str, tuple[Value, str]] = {
         "spool_arm": (Z["Z5"], "Z5"),
         "feedback_spring_rate": (
             spring_moment / n["feedback_spring_arm"] ** 2,
@@ -337,33 +356,43 @@ def _completed(
             "Z11 and Z12, load_torque and load_inertia",
         ),
     }
-    # of both modes: inertia, damping, mass at an arm, stiffness of the spring in the angle
-    for inertia, damping, mass, arm_name, at, spring, origin in (
-        (
-            *("feedback_arm_inertia", "spool_damping", "spool_mass", "spool_arm"),
-            *(Z["Z5"], spring_moment, "Z4, Z5, spool_frequency and spool_mass"),
-        ),
-        (
-            *("swash_inertia", "piston_damping", "piston_mass", "swash_arm"),
-            *(arm, spring_rate * arm**2),
-            "Z1, swash_frequency, piston_area, swash_arm and piston_mass",
-        ),
-    ):
-        lever, turning = n[mass] * at**2, n.get(inertia)
-        if turning is None:
-            total = spring / n[IN_PLACE_OF[inertia]] ** 2
-            if lever > total:
+    spool = SwingingPart(
+        inertia="feedback_arm_inertia",
+        damping="spool_damping",
+        mass="spool_mass",
+        arm_name="spool_arm",
+        arm=Z["Z5"],
+        stiffness=spring_moment,
+        origin="Z4, Z5, spool_frequency and spool_mass",
+    )
+    swash = SwingingPart(
+        inertia="swash_inertia",
+        damping="piston_damping",
+        mass="piston_mass",
+        arm_name="swash_arm",
+        arm=arm,
+        stiffness=spring_rate * arm**2,
+        origin="Z1, swash_frequency, piston_area, swash_arm and piston_mass",
+    )
+    for part in (spool, swash):
+        inertia_of_mass = n[part.mass] * part.arm**2
+        inertia = n.get(part.inertia)
+        if inertia is None:
+            frequency = IN_PLACE_OF[part.inertia]
+            total = part.stiffness / n[frequency] ** 2
+            if inertia_of_mass > total:
                 raise ParameterError(
-                    f"{owner}: {mass} on {arm_name} alone has {lever:.4g} kg m², but "
-                    f"{IN_PLACE_OF[inertia]} leaves {total:.4g} kg m² for everything that swings "
+                    f"{owner}: {part.mass} on {part.arm_name} alone has {inertia_of_mass:.4g} "
+                    f"kg m², but {frequency} leaves {total:.4g} kg m² for everything that swings "
                     "with it; choose a smaller mass or a lower frequency."
                 )
-            turning = total - lever
-            made[inertia] = turning, origin
-        if damping not in n:
-            ratio = IN_PLACE_OF[damping]
-            made[damping] = 2.0 * n[ratio] * sqrt(spring * (turning + lever)) / at**2, ratio
-    return made
+            inertia = total - inertia_of_mass
+            completed[part.inertia] = inertia, part.origin
+        if part.damping not in n:
+            ratio = IN_PLACE_OF[part.damping]
+            critical = sqrt(part.stiffness * (inertia + inertia_of_mass))
+            completed[part.damping] = 2.0 * n[ratio] * critical / part.arm**2, ratio
+    return completed
 
 
 def _motor_leakage(owner: str, Z: Mapping[str, float], n: Mapping[str, float]) -> float:

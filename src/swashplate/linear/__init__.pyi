@@ -9,4 +9,4 @@ from .model import LinearModel as LinearModel
 from .model import LoopMargins as LoopMargins
 from .model import Matrices as Matrices
 from .model import loop_margins as loop_margins
-from .model import with_line as with_line
+from .model import with_delay_line as with_delay_line

@@ -121,7 +121,7 @@ class FrequencyResponse(Tabular):
 
     @property
     def phase(self) -> Array:
-        """Phase of the output, negative where it lags, followed from low to high frequencies. [rad]
+        """Phase of the output, negative if it lags, followed from low to high frequencies. [rad]
 
         The lowest frequency's is within ±π. NaN marks what `moves` denies: nothing has no phase.
         """
@@ -322,9 +322,9 @@ def _cycles(
     instance: Instance, input: str, output: str, record: Array, step: float, steps: int
 ) -> Array:
     """Answer from the steady state under the first sample, a row for each cycle."""
-    started = instance.start({input: float(record[0])}, step, "steady")
+    initial = instance.start({input: float(record[0])}, step, "steady")
     seen, _ = output_of(instance.model, output)
-    (signal,) = marched(instance, {input: record}, step, started, (seen,), input)
+    (signal,) = marched(instance, {input: record}, step, initial, (seen,), input)
     return np.asarray(signal.reshape(-1, steps))
 
 

@@ -10,9 +10,9 @@ import numpy as np
 from swashplate.equations.fields import check_mapping, floats_of, is_real, value_at
 from swashplate.equations.marching.march import output_of
 from swashplate.equations.marching.one_step import step_derivatives
-from swashplate.equations.marching.part import taps_of
+from swashplate.equations.marching.part_code import taps_of
 from swashplate.equations.marching.record import check_rate
-from swashplate.equations.marching.run import Instance, Started, called, outside
+from swashplate.equations.marching.run import InitialStates, Instance, called, outside
 from swashplate.equations.model import state_paths
 from swashplate.errors import DomainError, InputError
 from swashplate.linear.model import LinearModel
@@ -110,13 +110,13 @@ def linearize(
         states = [
             called(part, part.step, each) for part, each in zip(model.parts, known, strict=True)
         ]
-    started = instance.start(at, h, "steady", states)
+    initial = instance.start(at, h, "steady", states)
     named = tuple(model.outputs) or tuple(model.parts[-1].outputs)
     named = tuple(each for each in named if each not in model.integrals)
-    wanted = (named or model.parts[-1].signal_names) if outputs is None else tuple(outputs)
-    if not wanted:
+    requested = tuple(outputs) if outputs is not None else named or model.parts[-1].signal_names
+    if not requested:
         raise InputError(f"{instance.name}: a linear model needs an output.")
-    return _linear_model(instance, started, rate, moving, wanted)
+    return _linear_model(instance, initial, rate, moving, requested)
 
 
 def _are(states: Any, kinds: Sequence[Any]) -> bool:
@@ -131,7 +131,7 @@ def _are(states: Any, kinds: Sequence[Any]) -> bool:
 
 def _linear_model(
     instance: Instance,
-    started: Started,
+    initial: InitialStates,
     rate: float | None,
     inputs: tuple[str, ...],
     outputs: tuple[str, ...],
@@ -142,9 +142,9 @@ def _linear_model(
     read, the memory. The delay is in whole samples: those by which all that is read of the first
     input is late.
     """
-    model, signals = instance.model, tuple(started.before)
+    model, signals = instance.model, tuple(initial.before)
     h = 0.0 if rate is None else 1.0 / rate
-    for part, known in zip(model.parts, started.arguments, strict=True):
+    for part, known in zip(model.parts, initial.arguments, strict=True):
         if part.domain is None:
             continue
         margin = called(part, part.domain, known)
@@ -158,20 +158,24 @@ def _linear_model(
             )
     seen = tuple(output_of(model, name)[0] for name in outputs)
     arguments, derived = step_derivatives(model, signals, instance.options, seen)
-    places, states = instance.places(signals, h), state_paths(model)
-    n, values = len(states), []
+    delays = instance.tap_delays(signals, h)
+    states = state_paths(model)
+    n = len(states)
+    values = []
     for stored in arguments.values():
         if stored.kind == "fraction":
-            values.append(float(places.fraction[int(stored.path)]))
+            values.append(float(delays.fraction[int(stored.path)]))
         elif stored.kind == "state":
-            values.append(float(value_at(started.states[stored.part], stored.path)))
+            values.append(float(value_at(initial.states[stored.part], stored.path)))
         else:
-            values.append(instance.number_at(stored, started.before, h))
-    whole = {(t.part, t.input): int(places.whole[t.number]) for t in taps_of(model, signals)}
+            values.append(instance.number_at(stored, initial.before, h))
+    delay_samples = {
+        (tap.part, tap.input): int(delays.samples[tap.number]) for tap in taps_of(model, signals)
+    }
     moved: list[Any] = []  # of each derivative the state, or the input and its age in samples
     for i, kind, path in map(arguments.__getitem__, derived.inputs):
         name, _, sample = path.partition(".")
-        late = whole[i, name] + int(sample) if kind == "tap" else 0
+        late = delay_samples[i, name] + int(sample) if kind == "tap" else 0
         signal = model.parts[i].tap(name).signal
         moved.append(f"{model.prefix(i)}{path}" if kind == "state" else (signal, late))
     ages = {each for each in moved if isinstance(each, tuple) and each[0] in inputs}

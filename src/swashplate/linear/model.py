@@ -160,29 +160,33 @@ class LinearModel:
             raise InputError(
                 f"The model of {self.name} has no input '{input}'; it has {', '.join(self.inputs)}."
             )
-        at = 0 if input is None else self.inputs.index(input)
+        column = 0 if input is None else self.inputs.index(input)
         steady = (f == 0.0) & (self._slowest > 0.0)
         s = 2j * np.pi * np.where(steady, self._slowest, f)
         point = s if h is None else np.exp(s * h)
         n = self.A.shape[0]
         system = point[:, np.newaxis, np.newaxis] * np.eye(n) - self.A
-        into = np.broadcast_to(self.B[:, at : at + 1], (f.size, n, 1))
-        found = (self.C @ np.linalg.solve(system, into))[:, :, 0].T + self.D[:, at : at + 1]
-        if at == 0:
-            found = found * np.exp(-s * self.delay)
+        into = np.broadcast_to(self.B[:, column : column + 1], (f.size, n, 1))
+        states = np.linalg.solve(system, into)
+        response = (self.C @ states)[:, :, 0].T + self.D[:, column : column + 1]
+        if column == 0:
+            response = response * np.exp(-s * self.delay)
         if steady.any():
             # halving with the frequency, an output integrates once; a quarter of it, twice
-            near, twice = found[:, steady], self.response([2.0 * self._slowest], input)
+            near = response[:, steady]
+            twice = self.response([2.0 * self._slowest], input)
             ratio = np.maximum(np.abs(near), 1e-300) / np.maximum(np.abs(twice), 1e-300)
             order = np.maximum(np.rint(np.log2(ratio)), 0.0)
             growth = (near * s[steady] ** order).real
-            found[:, steady] = np.where(order > 0.0, np.copysign(inf, growth), near.real)
-        return np.asarray(found[:, 0] if np.ndim(frequency) == 0 else found, dtype=np.complex128)
+            response[:, steady] = np.where(order > 0.0, np.copysign(inf, growth), near.real)
+        if np.ndim(frequency) == 0:
+            response = response[:, 0]
+        return np.asarray(response, dtype=np.complex128)
 
     # --- loops ------------------------------------------------------------------------------------
 
-    def _fastest(self) -> float:
-        """Frequency far beyond all poles, or half the rate of a sampled model. [Hz]"""
+    def _refuse_unstable(self) -> None:
+        """Refuse a model with a pole that grows; one that integrates is fine."""
         sampled = self.rate is not None
         growth = np.abs(self.poles) - 1.0 if sampled else self.poles.real
         integrates = np.abs(self.poles - sampled) <= INTEGRATES * self._scale
@@ -191,17 +195,22 @@ class LinearModel:
                 f"{self.name}: the linear model is unstable (poles {self.poles}), so that a "
                 "bandwidth or margin means nothing."
             )
+
+    def _search_end(self) -> float:
+        """Frequency far beyond all poles, or half the rate of a sampled model. [Hz]"""
         return 1e3 * self._scale if self.rate is None else 0.5 * self.rate
 
     def _largest(self, grid: Array) -> float:
-        """Largest magnitude of the response of an output that follows a steady input."""
-        largest = float(np.abs(self.response(grid)[0]).max())
+        """Largest magnitude of the first output's response."""
+        return float(np.abs(self.response(grid)[0]).max())
+
+    def _refuse_without_gain(self, largest: float) -> None:
+        """Refuse a first output that does not follow a steady input."""
         if abs(self.gain) <= 1e-9 * largest:
             raise DomainError(
                 "The output does not follow a steady input (its gain is 0), so it has neither a "
                 "bandwidth nor a largest gain; ask for another output."
             )
-        return largest
 
     @property
     def bandwidth(self) -> float:
@@ -212,10 +221,11 @@ class LinearModel:
         Raises
         ------
         DomainError
-            If the output integrates or does not follow a steady input, or the model is unstable.
+            If the model is unstable, or the output does not follow a steady input or integrates.
         """
-        grid = _grid(self._fastest())
-        self._largest(grid)
+        self._refuse_unstable()
+        grid = _grid(self._search_end())
+        self._refuse_without_gain(self._largest(grid))
         level = abs(self.gain) / np.sqrt(2.0)
         if level == inf:
             raise DomainError(
@@ -230,8 +240,16 @@ class LinearModel:
         """Proportional gain at which the loop u = K (r - y) of the first output begins to swing.
 
         In the input's unit by the output's, positive; infinite if none does.
+
+        Raises
+        ------
+        DomainError
+            If the model is unstable, or the output does not follow a steady input.
         """
-        small = 0.5 / self._largest(_grid(self._fastest()))
+        self._refuse_unstable()
+        largest = self._largest(_grid(self._search_end()))
+        self._refuse_without_gain(largest)
+        small = 0.5 / largest
         return small * self.margins(copysign(small, self.gain)).gain_margin
 
     def margins(self, controller: float | Response) -> LoopMargins:
@@ -244,7 +262,7 @@ class LinearModel:
         Raises
         ------
         DomainError
-            If the closed loop is unstable; it then has no margin.
+            If the closed loop is unstable, as it then has no margin, or the model is.
         """
 
         def loop(frequency: Array) -> ComplexArray:
@@ -256,7 +274,8 @@ class LinearModel:
                 )
             return np.asarray(factor * self.response(frequency)[0])
 
-        return loop_margins(loop, self.delay, self._fastest(), self.name)
+        self._refuse_unstable()
+        return loop_margins(loop, self.delay, self._search_end(), self.name)
 
     # --- other forms ------------------------------------------------------------------------------
 
@@ -272,7 +291,7 @@ class LinearModel:
         matrices = self.A, self.B, self.C, self.D
         if self.rate is not None:
             late = round(self.delay * self.rate)
-            return StateSpace(*with_line(matrices, late), dt=1.0 / self.rate)
+            return StateSpace(*with_delay_line(matrices, late), dt=1.0 / self.rate)
         if self.delay != 0.0 and not without_delay:
             raise InputError(
                 f"The model has a delay of {self.delay:g} s, which no state space holds exactly; "
@@ -312,14 +331,17 @@ class LinearModel:
             write_text(dump_toml(self.content()), path)
 
 
-def with_line(matrices: Matrices, whole: int) -> Matrices:
-    """Matrices with whole samples of delay before the first input as states, the newest first."""
-    if whole == 0:
+def with_delay_line(matrices: Matrices, samples: int) -> Matrices:
+    """Matrices with samples of delay before the first input as states, the newest first."""
+    if samples == 0:
         return matrices
     A, B, C, D = matrices
-    n, others = A.shape[0], np.zeros((whole, B.shape[1] - 1))
-    line, last, first = np.eye(whole, k=-1), np.eye(1, whole, whole - 1), np.eye(whole, 1)
-    longer = np.block([[line, np.zeros((whole, n))], [B[:, :1] @ last, A]])
+    n = A.shape[0]
+    others = np.zeros((samples, B.shape[1] - 1))
+    line = np.eye(samples, k=-1)
+    last = np.eye(1, samples, samples - 1)
+    first = np.eye(samples, 1)
+    longer = np.block([[line, np.zeros((samples, n))], [B[:, :1] @ last, A]])
     into = np.block([[first, others], [np.zeros((n, 1)), B[:, 1:]]])
     out = np.hstack((D[:, :1] @ last, C)), np.hstack((np.zeros_like(D[:, :1]), D[:, 1:]))
     return longer, into, *out
@@ -340,9 +362,12 @@ class LoopMargins(NamedTuple):
 
     crossover: float
     """Frequency at which |L| = 1 that leaves the smallest delay margin, 0 if there is none. [Hz]"""
-    phase_margin: float  # Phase of L above -180° there, infinite without a crossover. [rad]
-    delay_margin: float  # Further delay that makes the loop swing. [s]
-    gain_margin: float  # Factor on L that makes the loop swing. [1]
+    phase_margin: float
+    """Phase of L above -180° there, infinite without a crossover. [rad]"""
+    delay_margin: float
+    """Further delay that makes the loop swing. [s]"""
+    gain_margin: float
+    """Factor on L that makes the loop swing. [1]"""
 
 
 def loop_margins(loop: Response, delay: float, fastest: float, name: str) -> LoopMargins:

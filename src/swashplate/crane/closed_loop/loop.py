@@ -52,7 +52,7 @@ from swashplate.crane.rope import (
     rope_step,
     set_off,
 )
-from swashplate.equations import Machine, equation, inlined, kernel
+from swashplate.equations import StepContext, equation, inlined, kernel
 from swashplate.equations.code_generation.functions import generating
 from swashplate.parameters.rules import FULL_VOLTAGE
 
@@ -114,8 +114,8 @@ class Fixed(NamedTuple):
 class Plant(NamedTuple):
     """What the loop drives, and what is remembered of it in arrays."""
 
-    drives: tuple[Machine, Machine, Machine]
-    law: Machine
+    drives: tuple[StepContext, StepContext, StepContext]
+    law: StepContext
     picks: NDArray[np.int64]
     """Which of `SEEN` the law takes."""
     memory: Array

@@ -28,7 +28,7 @@ from swashplate.crane.rope import (
     too_fast,
 )
 from swashplate.drive import Drive, drive_instance
-from swashplate.equations import CompiledStep, Machine, compiled_step
+from swashplate.equations import CompiledStep, StepContext, compiled_step
 from swashplate.equations.marching.run import marched
 from swashplate.equations.marching.stepping import stored_of
 from swashplate.errors import DomainError, InputError
@@ -134,12 +134,12 @@ class CraneStepper:
         given = ("voltage", "load_torque") if fixed.loaded else ("voltage",)
         compiled = [_compiled(getattr(crane, axis), given) for axis in AXES]
         self._steps = [step for step, _ in compiled]
-        hoist, slew, luff = (machine.copied() for _, machine in compiled)
+        hoist, slew, luff = (context.copied() for _, context in compiled)
         own, picks = hoist, np.zeros(0, dtype=np.int64)
         if law is not None:
             seen = law.model.external
             self._steps.append(compiled_step(law.model, law.values, seen, GIVES, RATE))
-            own = self._steps[3].machine()
+            own = self._steps[3].context()
             picks = np.array([SEEN.index(each) for each in seen], dtype=np.int64)
         # in open loop nothing acts back on the drives
         self._open = (
@@ -250,8 +250,8 @@ class CraneStepper:
         if ended != loop.FINE:
             raise self._stopped(ended)
         machines, margins = (*self._plant.drives, self._plant.law), self._plant.margins.tolist()
-        for step, machine, worst in zip(self._steps, machines, margins, strict=False):
-            step.check(machine, worst, "command")
+        for step, context, worst in zip(self._steps, machines, margins, strict=False):
+            step.check(context, worst, "command")
         return out
 
     def _next_noise(self, samples: int) -> Array:
@@ -406,10 +406,10 @@ def _check_loaded(crane: Crane, actuation: str, mass: float, suspension: Suspens
 
 
 @lru_cache(maxsize=64)
-def _compiled(drive: Drive, inputs: tuple[str, ...]) -> tuple[CompiledStep, Machine]:
-    """A drive's step, and a machine at its start to copy."""
+def _compiled(drive: Drive, inputs: tuple[str, ...]) -> tuple[CompiledStep, StepContext]:
+    """A drive's step, and its context at its start to copy."""
     made = drive.compiled_step(OUTPUTS, inputs=inputs, rate=RATE)
-    return made, made.machine()
+    return made, made.context()
 
 
 def feels_load(crane: Crane) -> bool:

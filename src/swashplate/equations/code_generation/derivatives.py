@@ -7,7 +7,7 @@ from hashlib import blake2b
 from typing import Any, TypeVar
 
 from swashplate.equations.code_generation.functions import GENERATING
-from swashplate.equations.code_generation.gradients import Derived, derived_function, listing
+from swashplate.equations.code_generation.gradients import Derived, derived_function, listed
 from swashplate.equations.code_generation.tracing import Trace
 from swashplate.equations.code_generation.values import Value, arguments, leaves
 from swashplate.equations.declaration import RULES, inlined, module_of
@@ -117,7 +117,7 @@ def _derived(function: Any, by: tuple[str, ...], given: Mapping[str, Value], mar
     label = "_".join(path.rpartition(".")[2] for path in inputs)
     label = label if len(label) <= 32 else f"{len(inputs)}"
     name = f"{source.name}_by_{label}{mark}" if inputs else f"{source.name}_decided{mark}"
-    says = f"derivatives by {listing([*inputs])}" if inputs else "options decided"
+    says = f"derivatives by {listed([*inputs])}" if inputs else "options decided"
     return derived_function(
         name,
         f"{source.name} with its {says} ({module_of(source.function)}, line {source.node.lineno}).",

@@ -24,18 +24,18 @@ GENERATING = RLock()
 """Held while equations are read or code is written: nodes are compared by identity."""
 
 
-def _choose(test: bool, one: Any, two: Any) -> Any:
-    return one if test else two
+def _choose(test: bool, a: Any, b: Any) -> Any:
+    return a if test else b
 
 
-def _selected(typing: Any, test: Any, one: Any, two: Any) -> Any:
-    kind = typing.unify_types(one, two)
+def _selected(typing: Any, test: Any, a: Any, b: Any) -> Any:
+    kind = typing.unify_types(a, b)
 
     def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
         sides = (context.cast(builder, values[k], signature.args[k], kind) for k in (1, 2))
         return builder.select(values[0], *sides)
 
-    return kind(types.boolean, one, two), generate
+    return kind(types.boolean, a, b), generate
 
 
 choose: Any = _choose if JIT_OFF else intrinsic(_selected)
@@ -44,8 +44,8 @@ b`` the compiler makes branches, or a choice between two addresses, and gathers.
 
 
 @lowers(choose)
-def _lowered_choice(code: Lowering, test: Operand, one: Operand, two: Operand) -> Operand:
-    return code.choice(test, one, two)
+def _lowered_choice(code: Lowering, test: Operand, a: Operand, b: Operand) -> Operand:
+    return code.choice(test, a, b)
 
 
 FUNCTIONS: dict[str, Any] = {name: each for each, name in [*MATH.items(), *CHOICES.items()]}
@@ -65,13 +65,14 @@ def generating(function: Callable[P, R]) -> Callable[P, R]:
     @wraps(function)
     def alone(*args: P.args, **kwargs: P.kwargs) -> R:
         with GENERATING:
-            begun, _clock["depth"] = perf_counter(), _clock["depth"] + 1.0
+            start = perf_counter()
+            _clock["depth"] += 1.0
             try:
                 return remembered(*args, **kwargs)  # type: ignore[arg-type]
             finally:
                 _clock["depth"] -= 1.0
                 if not _clock["depth"]:
-                    _clock["seconds"] += perf_counter() - begun
+                    _clock["seconds"] += perf_counter() - start
 
     return alone
 
@@ -100,24 +101,26 @@ class Function:
     @property
     def texts(self) -> dict[str, str]:
         """Texts of this function and of all that it calls, those first, by name."""
-        inner = [each.texts for each in self.names.values()]
-        return {k: v for each in [*inner, {self.name: self.source}] for k, v in each.items()}
+        texts: dict[str, str] = {}
+        for function in self.names.values():
+            texts |= function.texts
+        return texts | {self.name: self.source}
 
     @cached_property
     def python(self) -> Callable[..., Any]:
         """The function, as plain Python throughout."""
-        library = {name: interpreted(each) for name, each in FUNCTIONS.items()}
-        own = {name: each.python for name, each in self.names.items()}
-        made: Callable[..., Any] = self._made({**library, "choose": _choose, **own})
-        return made
+        library = {name: interpreted(function) for name, function in FUNCTIONS.items()}
+        called = {name: function.python for name, function in self.names.items()}
+        function: Callable[..., Any] = self._executed({**library, "choose": _choose, **called})
+        return function
 
     @cached_property
     def compiled(self) -> Any:
         """The function, compiled so that callers inline it."""
-        own = {name: each.compiled for name, each in self.names.items()}
-        return inlined(self._made({**FUNCTIONS, **own}))
+        called = {name: function.compiled for name, function in self.names.items()}
+        return inlined(self._executed({**FUNCTIONS, **called}))
 
-    def _made(self, space: dict[str, Any]) -> Any:
+    def _executed(self, space: dict[str, Any]) -> Any:
         file = remember_text(self.name, self.source)
         space |= {"inf": math.inf, "nan": math.nan}
         exec(compile(self.source, file, "exec"), space)

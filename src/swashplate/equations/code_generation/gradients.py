@@ -74,19 +74,20 @@ def derived_function(
     of what that is differentiated by; `name` may have `UNNAMED` in it.
     """
     values = [node for _, node in results]
-    found = Gradients(values, [graph.name(n) for _, n in by], chained=chained)
-    hints = {**labels, **found.hints([p for p, _ in results], [p for p, _ in by], labels)}
+    gradients = Gradients(values, [graph.name(argument) for _, argument in by], chained=chained)
+    outputs = tuple(path for path, _ in results)
+    inputs = tuple(path for path, _ in by)
+    hints = {**labels, **gradients.hints(outputs, inputs, labels)}
     text, functions = function_text(
-        name, says, formals, [*found.values, *found.partials.values()], hints, flat=True
+        name, says, formals, [*gradients.values, *gradients.partials.values()], hints, flat=True
     )
-    for each in formals:
-        if each in FUNCTIONS and re.search(rf"\b{each}\(", text):
+    for argument in formals:
+        if argument in FUNCTIONS and re.search(rf"\b{argument}\(", text):
             raise EquationError(
-                f"An argument is called {each}, and so is the function that its derivatives need: "
-                "give the argument another name."
+                f"An argument is called {argument}, and so is the function that its derivatives "
+                "need: give the argument another name."
             )
-    outputs, inputs = tuple(path for path, _ in results), tuple(path for path, _ in by)
-    entries = tuple(found.partials)
+    entries = tuple(gradients.partials)
     return Derived(*named_by_text(name, text), dict(functions), outputs, inputs, entries)
 
 
@@ -103,7 +104,7 @@ def partials_of(
 class Contribution(NamedTuple):
     """An amount of an adjoint, which counts if `test` is true.
 
-    It is `masked` if it is zero already where the test is false.
+    It is `masked` if it is zero already whenever the test is false.
     """
 
     test: Node
@@ -112,7 +113,7 @@ class Contribution(NamedTuple):
 
     @property
     def zero_elsewhere(self) -> Node:
-        """The amount, zero where it does not count."""
+        """The amount; zero if it does not count."""
         return self.amount if self.masked else _masked(self.test, self.amount)
 
 
@@ -162,27 +163,27 @@ class Gradients:
             if self.adjoints[o].get(node, ZERO) is not ZERO
         ]
         partials = [self.adjoints[o][by[i]] for o, i in pairs]
-        made = graph.rewritten([*results, *partials], plain)
-        self.values = made[: len(results)]
-        self.partials = dict(zip(pairs, made[len(results) :], strict=True))
+        nodes = graph.rewritten([*results, *partials], plain)
+        self.values = nodes[: len(results)]
+        self.partials = dict(zip(pairs, nodes[len(results) :], strict=True))
 
     def hints(
         self, outputs: Sequence[str], inputs: Sequence[str], labels: Mapping[Node, str]
     ) -> dict[Node, str]:
         """Names for derivatives, should they need one."""
-        found: dict[Node, str] = {}
-        spoken = {*self._order}
+        names: dict[Node, str] = {}
+        computed = {*self._order}
         for (o, i), node in self.partials.items():
             label = "" if len(outputs) == 1 else f"{word(outputs[o])}_"
-            if node not in spoken:
-                found.setdefault(node, f"d_{label}{word(inputs[i])}")
+            if node not in computed:
+                names.setdefault(node, f"d_{label}{word(inputs[i])}")
         for o, pending in enumerate(self.adjoints):
             label = "" if len(outputs) == 1 else f"{word(outputs[o])}_"
             for node, contribution in pending.items():
                 name = labels.get(graph.plain_value(node))
-                if name and contribution not in spoken:
-                    found.setdefault(contribution, f"d_{label}{name}")
-        return found
+                if name and contribution not in computed:
+                    names.setdefault(contribution, f"d_{label}{name}")
+        return names
 
     # -- what moves --------------------------------------------------------------------------------
 
@@ -201,13 +202,13 @@ class Gradients:
         if result in self._links:
             return self._links[result]
         pending: dict[Node, list[Contribution]] = {result: [Contribution(TRUE, ONE, False)]}
-        found: dict[Node, Node] = {}
+        adjoints: dict[Node, Node] = {}
         for node in reversed(self._order):
             if node not in pending or node not in self._active:
                 continue
             total = _total(pending.pop(node))
-            found[node] = total.zero_elsewhere
-            if found[node] is ZERO or node in self._by:
+            adjoints[node] = total.zero_elsewhere
+            if adjoints[node] is ZERO or node in self._by:
                 continue
             if node in self._links:
                 for below, slope in self._links[node].items():
@@ -220,7 +221,7 @@ class Gradients:
                     contribution = push(total)
                     if contribution.amount is not ZERO:
                         pending.setdefault(argument, []).append(contribution)
-        return found
+        return adjoints
 
     def _pushed(self, node: Node) -> Iterator[tuple[Node, Callable[[Contribution], Contribution]]]:
         """Operands of a node, each with what an adjoint becomes on the way to it."""
@@ -235,7 +236,7 @@ class Gradients:
     def _multiplied(
         self, slope: Callable[[Node], Node], contribution: Contribution
     ) -> Contribution:
-        """A contribution times a derivative, which need not be finite where it does not count."""
+        """A contribution times a derivative, which need not be finite if it does not count."""
         amount = slope(contribution.amount)
         light = contribution.masked and self._stays_finite(slope(ONE))
         return Contribution(contribution.test, amount, light)
@@ -298,13 +299,13 @@ class Gradients:
         """Derivatives of a call's results by its arguments that move, by their indices."""
         if call not in self._calls:
             by = tuple(k for k, node in enumerate(call.args) if node in self._active)
-            own: Call = call.value
-            if not by or own.derivative is None:
+            function: Call = call.value
+            if not by or function.derivative is None:
                 return {}
-            derived = own.derivative(by)
+            derived = function.derivative(by)
             count = len(derived.outputs)
-            own = Call(derived, count + len(derived.entries))
-            again = make("call", *call.args, value=own)
+            with_derivatives = Call(derived, count + len(derived.entries))
+            again = make("call", *call.args, value=with_derivatives)
             partials = {
                 (o, by[i]): make("result", again, value=count + k)
                 for k, (o, i) in enumerate(derived.entries)
@@ -414,6 +415,6 @@ def word(path: str) -> str:
     return path.replace(".", "_").replace("[", "_").replace("]", "")
 
 
-def listing(inputs: Sequence[str]) -> str:
+def listed(inputs: Sequence[str]) -> str:
     """Inputs, as far as one wants to read them."""
     return ", ".join(inputs) if len(inputs) <= 6 else f"{len(inputs)} inputs"

@@ -14,7 +14,7 @@ from swashplate.equations.code_generation.functions import FUNCTIONS, RESERVED, 
 from swashplate.equations.code_generation.gradients import (
     Derived,
     derived_function,
-    listing,
+    listed,
     partials_of,
 )
 from swashplate.equations.code_generation.lowering import Lowering, Operand, lowers
@@ -376,7 +376,7 @@ def _tangent_loop(
     every = [*now, *(each for each in inputs if each not in now)]
     step = derived_function(
         f"{inner.name}_{UNNAMED}",
-        f"{inner.name} of scalars with its derivatives by {listing(every)}.",
+        f"{inner.name} of scalars with its derivatives by {listed(every)}.",
         [*inner.leading, *inner.formals],
         [*leaves(inner.result)],
         [(each, each) for each in every],
@@ -421,7 +421,7 @@ def _tangent_loop(
         f"return {', '.join([*now, *(f'{place[each]}]' for each in entries)])},",
     ]
     moved = [given[k] for k in by]
-    says = f"{inner.name}, repeated, with its derivatives by {listing(moved)}."
+    says = f"{inner.name}, repeated, with its derivatives by {listed(moved)}."
     name = f"{loop}_{UNNAMED}"
     text = function_source(f"{name}({', '.join(given)})", says, lines, "")
     return Derived(

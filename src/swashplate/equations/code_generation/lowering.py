@@ -40,7 +40,7 @@ class Operand:
     text: str
 
 
-class Definition(NamedTuple):
+class FunctionDefinition(NamedTuple):
     """A function that can be called: its tree, and what the names in it stand for."""
 
     tree: ast.FunctionDef
@@ -65,28 +65,28 @@ def lowers(function: Any) -> Callable[[F], F]:
     return declared
 
 
-def definition_of(function: Any) -> Definition:
+def function_definition_of(function: Any) -> FunctionDefinition:
     """A Python function, by its source."""
     function = plain(function)
-    return Definition(unchecked(function).node, function.__globals__)
+    return FunctionDefinition(unchecked(function).node, function.__globals__)
 
 
-def definition_in(text: str, name: str, library: Mapping[str, Any]) -> Definition:
+def definition_in(text: str, name: str, library: Mapping[str, Any]) -> FunctionDefinition:
     """A function of a module's text, in which other names stand for what is in a library."""
     space = dict(library)
     for node in ast.parse(text).body:
         if isinstance(node, ast.FunctionDef):
-            space[node.name] = Definition(node, space)
-    found: Definition = space[name]
+            space[node.name] = FunctionDefinition(node, space)
+    found: FunctionDefinition = space[name]
     return found
 
 
-def lowered(function: Definition, kinds: Sequence[str], symbol: str) -> str:
+def lowered(function: FunctionDefinition, kinds: Sequence[str], symbol: str) -> str:
     """Text of a module in LLVM's language with a function that returns nothing.
 
     Parameters
     ----------
-    function : Definition
+    function : FunctionDefinition
         The function.
     kinds : sequence of str
         Of its arguments: "float", "int", or "*float" for a pointer to floats.
@@ -101,7 +101,7 @@ def lowered(function: Definition, kinds: Sequence[str], symbol: str) -> str:
             continue
 
 
-def type_of(kind: str) -> str:
+def llvm_type(kind: str) -> str:
     """LLVM's type of a kind."""
     return "ptr" if kind.startswith("*") else TYPES[kind]
 
@@ -153,12 +153,12 @@ class Lowering:
         self._loops: list[tuple[str, str]] = []
         """Of each loop around, where it goes on and where it ends."""
 
-    def function(self, function: Definition, kinds: Sequence[str], symbol: str) -> str:
+    def function(self, function: FunctionDefinition, kinds: Sequence[str], symbol: str) -> str:
         """Text of the module."""
         scope, formals = Scope(0, function.space, "return"), list[str]()
         for argument, kind in zip(function.tree.args.args, kinds, strict=True):
             value = Operand(kind, f"%argument{len(formals)}")
-            formals.append(f"{type_of(kind)} {value.text}")
+            formals.append(f"{llvm_type(kind)} {value.text}")
             self._store(scope.key(argument.arg), value)
         if self._body(function.tree.body, scope):
             self._jump(scope.end)
@@ -194,11 +194,11 @@ class Lowering:
     def load(self, pointer: Operand, index: Operand) -> Operand:
         """An element of what a pointer points to."""
         kind = pointer.kind[1:]
-        return self.operand(kind, f"load {type_of(kind)}, ptr {self.offset(pointer, index).text}")
+        return self.operand(kind, f"load {llvm_type(kind)}, ptr {self.offset(pointer, index).text}")
 
     def offset(self, pointer: Operand, index: Operand) -> Operand:
         """A pointer to an element."""
-        kind = type_of(pointer.kind[1:])
+        kind = llvm_type(pointer.kind[1:])
         text = f"getelementptr inbounds {kind}, ptr {pointer.text}, i64 {index.text}"
         return self.operand(pointer.kind, text)
 
@@ -225,13 +225,13 @@ class Lowering:
         if kind != value.kind and KINDS.index(value.kind) > KINDS.index(kind):
             self._kinds[key] = value.kind
             raise _WidenedError
-        self._allocate(key, type_of(kind))
-        self.emit(f'store {type_of(kind)} {self.cast(value, kind).text}, ptr %"{key}"')
+        self._allocate(key, llvm_type(kind))
+        self.emit(f'store {llvm_type(kind)} {self.cast(value, kind).text}, ptr %"{key}"')
 
     def _load(self, key: str) -> Operand:
         kind = self._kinds[key]
-        self._allocate(key, type_of(kind))
-        return self.operand(kind, f'load {type_of(kind)}, ptr %"{key}"')
+        self._allocate(key, llvm_type(kind))
+        return self.operand(kind, f'load {llvm_type(kind)}, ptr %"{key}"')
 
     def _allocate(self, key: str, kind: str) -> None:
         # in quotes, as Python knows other letters, too
@@ -290,7 +290,7 @@ class Lowering:
                 place = self.offset(self._value(array, scope), self._value(index, scope))
                 kind = place.kind[1:]
                 value = self.cast(value, kind)
-                self.emit(f"store {type_of(kind)} {value.text}, ptr {place.text}")
+                self.emit(f"store {llvm_type(kind)} {value.text}, ptr {place.text}")
             case _:
                 raise NotImplementedError(ast.unparse(target))
 
@@ -504,13 +504,13 @@ class Lowering:
     # -- calls -------------------------------------------------------------------------------------
 
     def _call(self, function: Any, given: list[Any]) -> Any:
-        if isinstance(function, Definition):
+        if isinstance(function, FunctionDefinition):
             return self._written_out(function, given)
         if function in LOWERED:
             return LOWERED[function](self, *given)
-        return self._written_out(definition_of(function), given)
+        return self._written_out(function_definition_of(function), given)
 
-    def _written_out(self, function: Definition, given: list[Any]) -> Any:
+    def _written_out(self, function: FunctionDefinition, given: list[Any]) -> Any:
         """A function in the place of its call."""
         self._scopes += 1
         scope, formals = Scope(self._scopes, function.space, self._label("end")), function.tree.args

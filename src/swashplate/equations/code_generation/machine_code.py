@@ -19,7 +19,7 @@ from numba.core.registry import cpu_target
 
 from swashplate import progress
 from swashplate.equations.cache import COMPILING
-from swashplate.equations.code_generation.lowering import Definition, lowered
+from swashplate.equations.code_generation.lowering import FunctionDefinition, lowered
 from swashplate.equations.keeping import kept
 
 SYMBOL = "code"
@@ -54,8 +54,8 @@ class Code:
 _loaded: dict[tuple[str, str, tuple[str, ...]], Code] = {}
 
 
-def code_of(
-    name: str, text: str, kinds: tuple[str, ...], definition: Callable[[], Definition]
+def code_of_function(
+    name: str, text: str, kinds: tuple[str, ...], definition: Callable[[], FunctionDefinition]
 ) -> Code:
     """Machine code of a function that returns nothing.
 

@@ -16,7 +16,7 @@ from textwrap import TextWrapper
 from typing import Any, NamedTuple
 
 from swashplate.equations.code_generation.functions import FUNCTIONS, RESERVED, Function, fresh_name
-from swashplate.equations.code_generation.scheduling import Branch, Flat, Region, Schedule
+from swashplate.equations.code_generation.scheduling import Conditional, Flat, Region, Schedule
 from swashplate.equations.graph import COMPARISONS, FALSE, LEAVES, TRUE, Node, plain_value
 
 WIDTH = 96
@@ -167,7 +167,7 @@ class Statement(NamedTuple):
     """What is computed in it."""
 
 
-class Block:
+class CodeBlock:
     """Lines that compute some results.
 
     Parameters
@@ -217,7 +217,7 @@ class Block:
         self._reads: set[str] = set()
         self._written_nodes: list[Node] = []
         self._named: dict[tuple[Node, Region], str] = {}
-        self._outlive: dict[Branch | None, dict[str, Node]] = {}
+        self._outlive: dict[Conditional | None, dict[str, Node]] = {}
         """Names of each branch that are read after it, while its test is known to hold."""
         self._uses = self._counted(results)
         whole = self._schedule.whole
@@ -318,7 +318,7 @@ class Block:
     def _steps(self, region: Region, pad: str) -> Iterator[Statement]:
         """Statements of what is computed together."""
         for step in self._schedule.steps(region):
-            if isinstance(step, Branch):
+            if isinstance(step, Conditional):
                 write = partial(self._branch, step, region, pad)
                 yield from self._statement(step.members[0], write, pad)
             elif step.op == "call":
@@ -370,7 +370,7 @@ class Block:
         lines = self._language.called(call, targets, given, declared, pad)
         return lines, [each for each in targets if each]
 
-    def _branch(self, branch: Branch, region: Region, pad: str) -> tuple[list[str], list[str]]:
+    def _branch(self, branch: Conditional, region: Region, pad: str) -> tuple[list[str], list[str]]:
         """Lines of a branch; none if it is a choice that stands in an expression."""
         if len(branch.members) == 1 and not any(map(self._has_lines, branch.sides)):
             (member,) = branch.members
@@ -515,7 +515,7 @@ def function_text(
     It returns a tuple of the results; of a single one the number, unless it is to be `flat`.
     """
     arguments = {formal.partition(".")[0] for formal in formals}
-    block = Block(results, labels, {*FUNCTIONS, *arguments, *RESERVED, name})
+    block = CodeBlock(results, labels, {*FUNCTIONS, *arguments, *RESERVED, name})
     back = ", ".join(block.texts) or "()"
     if len(results) == 1 and flat:
         back += ","

@@ -16,7 +16,7 @@ from typing import Any
 from swashplate.equations import graph
 from swashplate.equations.code_generation.functions import fresh_name
 from swashplate.equations.code_generation.loops import PRECISION, STEPS, TINY, Inner
-from swashplate.equations.code_generation.printing import ATOM, Block, Language, Text, grouped
+from swashplate.equations.code_generation.printing import ATOM, CodeBlock, Language, Text, grouped
 from swashplate.equations.code_generation.values import leaves
 from swashplate.equations.graph import COMPARISONS, FALSE, TRUE, Node
 from swashplate.equations.language import MATH, Parsed
@@ -484,7 +484,7 @@ def scalar_function(
     language = C(functions, origins, taken)
     named = {node: c_name(label) for node, label in labels.items()}
     nodes = [node for _, node in results]
-    block = Block(nodes, named, taken, known=known, language=language)
+    block = CodeBlock(nodes, named, taken, known=known, language=language)
     lines = language.headed(block.lines, source)
     used = without_comments("\n".join([*block.lines, *block.texts]))
     idle = [f"(void){each};" for each in names.values() if not mentions(used, each)]

@@ -12,7 +12,7 @@ from heapq import heappop, heappush
 from swashplate.equations.graph import CHEAP, LEAVES, Node, ordered
 
 FEW = 8
-"""Operations that may be done in vain, so that a branch becomes a conditional expression."""
+"""Most operations that are computed without need instead of a branch."""
 Flat = Callable[[Sequence[Node]], bool]
 """Whether what both sides of a branch compute may be computed whatever the test says."""
 
@@ -20,29 +20,45 @@ Flat = Callable[[Sequence[Node]], bool]
 class Region:
     """What is computed together: the whole, or one side of a branch."""
 
-    def __init__(self, branch: Branch | None = None, side: int = 0) -> None:
+    def __init__(self, branch: Conditional | None = None, side: int = 0) -> None:
         self.branch, self.side = branch, side
         self.enclosing: tuple[Region, ...] = (self,)
         """The region and those that it lies in, the innermost first."""
         if branch is not None:
             self.enclosing = (self, *branch.region.enclosing)
         self.nodes: list[Node] = []
-        self.branches: list[Branch] = []
+        self.branches: list[Conditional] = []
 
     @property
     def earlier(self) -> Iterator[Region]:
         """Sides of earlier branches that are taken whenever this one is."""
         if self.branch is not None:
             for branch in self.branch.region.branches:
-                if branch.test is self.branch.test and branch.level < self.branch.level:
+                if branch.test is self.branch.test and branch.depth < self.branch.depth:
                     yield branch.sides[self.side]
 
 
-class Branch:
-    """An `if` with its `else`, and the choices that get their values in it."""
+class Conditional:
+    """An `if` with its `else`, and the choices that get their values in it.
 
-    def __init__(self, test: Node, level: int, region: Region) -> None:
-        self.test, self.level, self.region = test, level, region
+    Attributes
+    ----------
+    test : Node
+        What decides.
+    depth : int
+        How many branches it waits for, one after the other.
+    region : Region
+        Where it stands.
+    sides : (Region, Region)
+        What is computed if the test is true, and if it is not.
+    members : list of Node
+        The choices.
+    """
+
+    def __init__(self, test: Node, depth: int, region: Region) -> None:
+        self.test = test
+        self.depth = depth
+        self.region = region
         self.sides = Region(self, 0), Region(self, 1)
         self.members: list[Node] = []
 
@@ -97,20 +113,20 @@ class Schedule:
     def _place(self) -> None:
         """Give every node its regions: the outermost of those that need it."""
         self.whole = Region()
-        self._all: list[Branch] = []
+        self._all: list[Conditional] = []
         self._of: dict[Node, list[Region]] = {}
-        self._branch_of: dict[tuple[Node, Region], Branch] = {}
-        branches: dict[tuple[int, Node, Region], Branch] = {}
-        level = self._levels()
+        self._branch_of: dict[tuple[Node, Region], Conditional] = {}
+        branches: dict[tuple[int, Node, Region], Conditional] = {}
+        depth = self._depths()
         needed: dict[Node, dict[Region, None]] = {}
         for node in self._results:
             needed.setdefault(node, {})[self.whole] = None
 
         def last_first(node: Node) -> tuple[int, bool, int]:
-            return -level[node], self._is_branch(node), -self._index[node]
+            return -depth[node], self._is_branch(node), -self._index[node]
 
         for node in sorted(self._order, key=last_first):
-            regions = merged(needed[node])
+            regions = outermost_regions(needed[node])
             if node.op == "result":  # made together with all others, where the call is
                 needed.setdefault(node.args[0], {}).update(dict.fromkeys(regions))
                 continue
@@ -123,10 +139,10 @@ class Schedule:
                         needed.setdefault(operand, {})[region] = None
                     continue
                 test, one, two = node.args
-                key = level[node], test, region
+                key = depth[node], test, region
                 branch = branches.get(key)
                 if branch is None:
-                    branch = branches[key] = Branch(test, level[node], region)
+                    branch = branches[key] = Conditional(test, depth[node], region)
                     region.branches.append(branch)
                     self._all.append(branch)
                     needed.setdefault(test, {})[region] = None
@@ -138,13 +154,13 @@ class Schedule:
     def _is_branch(self, node: Node) -> bool:
         return node.op == "if" and node not in self.selects
 
-    def _levels(self) -> dict[Node, int]:
+    def _depths(self) -> dict[Node, int]:
         """How many branches each node waits for, one after the other."""
-        level: dict[Node, int] = {}
+        depth: dict[Node, int] = {}
         for node in self._order:
-            below = max((level.get(a, 0) for a in node.args), default=0)
-            level[node] = below + self._is_branch(node)
-        return level
+            deepest = max((depth.get(operand, 0) for operand in node.args), default=0)
+            depth[node] = deepest + self._is_branch(node)
+        return depth
 
     def region_of(self, node: Node, region: Region) -> Region | None:
         """Where a node is computed that is needed in some region; None if it was known before."""
@@ -152,31 +168,31 @@ class Schedule:
         if regions is None:
             return None
         for enclosing in region.enclosing:
-            for each in (enclosing, *enclosing.earlier):
-                if each in regions:
-                    return each
+            for candidate in (enclosing, *enclosing.earlier):
+                if candidate in regions:
+                    return candidate
         raise AssertionError(node)
 
-    def branch_of(self, node: Node, region: Region) -> Branch | None:
+    def branch_of(self, node: Node, region: Region) -> Conditional | None:
         """The branch that gives a choice its value in a region; None of anything else."""
         return self._branch_of.get((node, region))
 
     # -- order -------------------------------------------------------------------------------------
 
-    def steps(self, region: Region) -> Iterator[Node | Branch]:
+    def steps(self, region: Region) -> Iterator[Node | Conditional]:
         """Nodes and branches of a region, each after those that it needs."""
-        items: list[Node | Branch] = [*region.nodes, *region.branches]
-        at: dict[Node | Branch, int] = {}
-        waits: dict[Node | Branch, set[Node | Branch]] = {}
+        items: list[Node | Conditional] = [*region.nodes, *region.branches]
+        at: dict[Node | Conditional, int] = {}
+        waits: dict[Node | Conditional, set[Node | Conditional]] = {}
         for item in items:
             waits[item] = {*self._needs(item, region)} - {item}
             nodes = [item] if isinstance(item, Node) else item.members
             at[item] = min(self._index[node] for node in nodes)
-        behind: dict[Node | Branch, list[Node | Branch]] = {}
+        behind: dict[Node | Conditional, list[Node | Conditional]] = {}
         for item, others in waits.items():
             for other in others:
                 behind.setdefault(other, []).append(item)
-        ready: list[tuple[int, int, Node | Branch]] = []
+        ready: list[tuple[int, int, Node | Conditional]] = []
         for k, item in enumerate(items):
             if not waits[item]:
                 heappush(ready, (at[item], k, item))
@@ -189,14 +205,14 @@ class Schedule:
                 if not waits[later]:
                     heappush(ready, (at[later], number[later], later))
 
-    def _needs(self, item: Node | Branch, region: Region) -> Iterator[Node | Branch]:
+    def _needs(self, item: Node | Conditional, region: Region) -> Iterator[Node | Conditional]:
         """Items of a region that one of its items needs."""
         for node, where in self.uses(item, region):
-            found = self.region_of(node, where)
-            if found is None or region not in found.enclosing:
+            computed_in = self.region_of(node, where)
+            if computed_in is None or region not in computed_in.enclosing:
                 continue
-            if found is not region:  # within a branch of the region
-                inner = found.enclosing[found.enclosing.index(region) - 1]
+            if computed_in is not region:  # within a branch of the region
+                inner = computed_in.enclosing[computed_in.enclosing.index(region) - 1]
                 assert inner.branch is not None
                 yield inner.branch
             elif self._is_branch(node):
@@ -204,7 +220,7 @@ class Schedule:
             else:
                 yield node
 
-    def uses(self, item: Node | Branch, region: Region) -> Iterator[tuple[Node, Region]]:
+    def uses(self, item: Node | Conditional, region: Region) -> Iterator[tuple[Node, Region]]:
         """What an item of a region reads, all that lies within it included, and from where."""
         if isinstance(item, Node):
             yield from ((operand, region) for operand in item.args)
@@ -219,41 +235,45 @@ class Schedule:
                 yield from self.uses(branch, side)
 
 
-def merged(regions: Iterable[Region]) -> list[Region]:
-    """The outermost of some regions; both sides of one branch are what is around it."""
-    kept: list[Region] = []
+def outermost_regions(regions: Iterable[Region]) -> list[Region]:
+    """The outermost of some regions; both sides of a branch become the region around it."""
+    outermost: list[Region] = []
     for region in regions:
-        kept.append(region)
+        outermost.append(region)
         changed = True
         while changed:
             changed = False
-            last = kept[-1]
-            for k, other in enumerate(kept[:-1]):
+            last = outermost[-1]
+            for k, other in enumerate(outermost[:-1]):
                 both = common_region(other, last)
                 if both is not None:
-                    del kept[k]
-                    kept[-1] = both
+                    del outermost[k]
+                    outermost[-1] = both
                     changed = True
                     break
-    return kept
+    return outermost
 
 
-def common_region(one: Region, two: Region) -> Region | None:
-    """A region of which both know the names, and that does nothing in vain; None without one."""
-    if one in two.enclosing:
-        return one
-    if two in one.enclosing:
-        return two
-    common = next(region for region in one.enclosing if region in two.enclosing)
-    first = one.enclosing[one.enclosing.index(common) - 1]
-    second = two.enclosing[two.enclosing.index(common) - 1]
-    assert first.branch is not None
-    assert second.branch is not None
-    if first.branch is second.branch:
-        return common if first is one and second is two else None
-    if first.branch.test is second.branch.test and first.side == second.side:
-        earlier, use = (first, one) if first.branch.level < second.branch.level else (second, two)
-        return earlier if earlier is use else None
+def common_region(a: Region, b: Region) -> Region | None:
+    """The region in which to compute a node that two regions need; None if there is none.
+
+    Both see the node's name there, and no run computes the node without need.
+    """
+    if a in b.enclosing:
+        return a
+    if b in a.enclosing:
+        return b
+    common = next(region for region in a.enclosing if region in b.enclosing)
+    side_a = a.enclosing[a.enclosing.index(common) - 1]
+    side_b = b.enclosing[b.enclosing.index(common) - 1]
+    assert side_a.branch is not None
+    assert side_b.branch is not None
+    if side_a.branch is side_b.branch:
+        return common if side_a is a and side_b is b else None
+    if side_a.branch.test is side_b.branch.test and side_a.side == side_b.side:
+        if side_a.branch.depth < side_b.branch.depth:
+            return side_a if side_a is a else None
+        return side_b if side_b is b else None
     return None
 
 
@@ -272,6 +292,6 @@ def all_vector(nodes: Sequence[Node]) -> bool:
 
 
 def is_cheap(node: Node) -> bool:
-    """Whether an operation can be done for nothing on any numbers."""
+    """Whether an operation costs little, and is defined for all numbers."""
     divided = node.op == "/" and node.args[1].op == "number" and node.args[1].value != 0.0
     return node.op in CHEAP or divided

@@ -72,8 +72,8 @@ class Callee(NamedTuple):
 
 def callee_of(equation: Any, replacements: Replacements) -> Callee:
     """What is run if an equation is called."""
-    found, within = standing(equation, replacements)
-    return Callee(parsed(found), within)
+    function, within = standing(equation, replacements)
+    return Callee(parsed(function), within)
 
 
 class Trace:
@@ -113,32 +113,37 @@ class Trace:
         """What is run if an equation is called."""
         return callee_of(equation, self.replacements)
 
-    def call(self, equation: Any, given: Mapping[str, Value]) -> Value:
-        """What an equation returns; arguments that are not `given` by name have their defaults."""
-        return self.run(self.callee(equation), given)
+    def call(self, equation: Any, arguments: Mapping[str, Value]) -> Value:
+        """What an equation returns; arguments that are left out have their defaults."""
+        return self.run(self.callee(equation), arguments)
 
-    def run(self, callee: Callee, given: Mapping[str, Value]) -> Value:
+    def run(self, callee: Callee, arguments: Mapping[str, Value]) -> Value:
         """What an equation returns, and not what might stand for it."""
         source = callee.source
         if callee in self.under_way:
             source.refuse(None, "a call of itself", "write a loop over a literal range")
-        defaults = {name: fixed(each) for name, each in source.defaults.items()}
-        known = {name: each for name, each in defaults.items() if each is not None} | dict(given)
-        known = {each.arg: known[each.arg] for each in source.arguments if each.arg in known}
+        values: dict[str, Value] = {}
+        for argument in source.arguments:
+            name = argument.arg
+            default = fixed(source.defaults[name]) if name in source.defaults else None
+            if name in arguments:
+                values[name] = arguments[name]
+            elif default is not None:
+                values[name] = default
         if source in self.outlined:
-            return called_apart(self, callee, [*known.values()])
+            return called_apart(self, callee, [*values.values()])
         with self.running(callee):
-            result = _Tracer(source, self).result(known)
-            scalars = tuple(node for value in known.values() for _, node in leaves(value))
+            result = _Tracer(source, self).result(values)
+            scalars = tuple(node for value in values.values() for _, node in leaves(value))
             back = tuple(node for _, node in leaves(result))
             self.calls.setdefault(source, set()).add((scalars, back))
             rule = RULES.get(source.function)
             if rule is None or _is_changed(callee):
                 return result
-            return self._ruled(source, parsed(rule), known, result)
+            return self._ruled(source, parsed(rule), values, result)
 
     def inner(self, source: Parsed) -> Trace:
-        """A trace of its own for an equation that is run within another, again and again."""
+        """A separate trace for an equation that is run within another, again and again."""
         trace = Trace({*self.outlined} - {source}, self._replacements)
         trace.under_way = [*self.under_way]
         return trace
@@ -180,12 +185,12 @@ class Trace:
                 self.labels.setdefault(plain_node, name)
 
     def _ruled(
-        self, source: Parsed, rule: Parsed, known: Mapping[str, Value], result: Value
+        self, source: Parsed, rule: Parsed, arguments: Mapping[str, Value], result: Value
     ) -> Value:
         """The result of an equation with declared derivatives."""
         by = {
             ".".join(filter(None, (name, path))): node
-            for name, value in known.items()
+            for name, value in arguments.items()
             for path, node in leaves(value)
             if node.kind == "float"
         }
@@ -195,7 +200,7 @@ class Trace:
         def slopes() -> tuple[Node, ...]:
             # a rule is that of the equation as it is written
             with self.within(chain), self.running(Callee(rule, NO_REPLACEMENTS)):
-                partials = [node for _, node in leaves(_Tracer(rule, self).result(known))]
+                partials = [node for _, node in leaves(_Tracer(rule, self).result(arguments))]
             if len(partials) != len(by) * len(results):
                 rule.refuse(
                     None,
@@ -204,7 +209,7 @@ class Trace:
                 )
             return tuple(partials)
 
-        decided = tuple((name, _options_in(value)) for name, value in known.items())
+        decided = tuple((name, _options_in(value)) for name, value in arguments.items())
         key = (source.function, decided, *by.values(), *(node for _, node in results))
         whole = self._rules.setdefault(key, Rule(tuple(by.values()), slopes))
         nodes = []
@@ -246,10 +251,10 @@ class _Tracer:
         self.local = source.local
         self.names: Names = {}
 
-    def result(self, given: Mapping[str, Value]) -> Value:
+    def result(self, arguments: Mapping[str, Value]) -> Value:
         """What the equation returns for some arguments."""
-        self.names = dict(given)
-        for name, value in given.items():
+        self.names = dict(arguments)
+        for name, value in arguments.items():
             self.trace.label(value, name)
         return self.returned(self.source.node.body)
 
@@ -273,9 +278,9 @@ class _Tracer:
                     if test.op == "number":
                         pending[:0] = each.body if test.value else each.orelse
                     elif has_return([each]):
-                        one, _ = self.in_branch(self.returned, [*each.body, *pending])
-                        two, _ = self.in_branch(self.returned, [*each.orelse, *pending])
-                        return self.select(each, test, one, two)
+                        if_true, _ = self.in_branch(self.returned, [*each.body, *pending])
+                        if_false, _ = self.in_branch(self.returned, [*each.orelse, *pending])
+                        return self.select(each, test, if_true, if_false)
                     else:
                         self.merge(test, each)
                 case ast.For(target=target, iter=ast.Call(args=args)):
@@ -284,9 +289,9 @@ class _Tracer:
                         set_counter = ast.copy_location(ast.Assign([target], number), each)
                         pending[:0] = [set_counter, *each.body]
                 case ast.Assign(targets=targets, value=value):
-                    made = self.value(value)
+                    assigned = self.value(value)
                     for target in targets:
-                        self.bind(target, made)
+                        self.bind(target, assigned)
                 case ast.AnnAssign(target=target, value=ast.expr() as value):
                     self.bind(target, self.value(value))
                 case ast.AugAssign(target=ast.Name(id=name) as target):
@@ -303,28 +308,32 @@ class _Tracer:
         finally:
             self.names = outer
 
-    def merge(self, test: Node, each: ast.If) -> None:
+    def merge(self, test: Node, statement: ast.If) -> None:
         """An `if` that does not return: what both of its ways set is merged."""
-        _, one = self.in_branch(self.block, each.body)
-        _, two = self.in_branch(self.block, each.orelse)
-        for name in {**one, **two}:
-            if name not in one or name not in two:
-                self.names.pop(name, None)  # without a value one way: refused where it is read
-            elif one[name] is two[name]:
-                self.names[name] = one[name]
-            else:
-                if not alike(one[name], two[name]):
-                    self.refuse(each, f"{name} of two structures", "give it the same kind of value")
-                self.names[name] = self.select(each, test, one[name], two[name])
-                self.trace.label(self.names[name], name)
+        _, if_true = self.in_branch(self.block, statement.body)
+        _, if_false = self.in_branch(self.block, statement.orelse)
+        for name in {**if_true, **if_false}:
+            if name not in if_true or name not in if_false:
+                self.names.pop(name, None)  # without a value on one way: refused if it is read
+                continue
+            a, b = if_true[name], if_false[name]
+            if a is b:
+                self.names[name] = a
+                continue
+            if not alike(a, b):
+                self.refuse(
+                    statement, f"{name} of two structures", "give it the same kind of value"
+                )
+            self.names[name] = self.select(statement, test, a, b)
+            self.trace.label(self.names[name], name)
 
-    def select(self, at: ast.AST, test: Node, one: Value, two: Value) -> Value:
+    def select(self, at: ast.AST, test: Node, if_true: Value, if_false: Value) -> Value:
         """The value of one of two ways."""
-        if not alike(one, two):
+        if not alike(if_true, if_false):
             self.refuse(at, "results of different structure", "give the same tuple on every way")
-        pairs = zip(leaves(one), leaves(two), strict=True)
-        chosen = (self.trace.noted(choose(test, a, b)) for (_, a), (_, b) in pairs)
-        return rebuilt(one, chosen)
+        pairs = zip(leaves(if_true), leaves(if_false), strict=True)
+        choices = (self.trace.noted(choose(test, a, b)) for (_, a), (_, b) in pairs)
+        return rebuilt(if_true, choices)
 
     def bind(self, target: ast.expr, value: Value) -> None:
         """Give a name its value, or each of several in a tuple."""
@@ -420,11 +429,11 @@ class _Tracer:
         except (NameError, AttributeError):
             self.refuse(node, f"the unknown name {ast.unparse(node)}", "define or import it")
 
-    def constant(self, node: ast.AST, text: str, found: Any) -> Value:
+    def constant(self, node: ast.AST, text: str, constant: Any) -> Value:
         """Value of something that stands outside the equation."""
-        value = fixed(found)
+        value = fixed(constant)
         if value is None:
-            what = f"{text}, which is {type(found).__name__}"
+            what = f"{text}, which is {type(constant).__name__}"
             self.refuse(node, what, "of what stands outside, an equation reads numbers only")
         return value
 
@@ -447,8 +456,8 @@ class _Tracer:
             self.refuse(node.slice, "an index that is no whole number", "write the number")
         if not isinstance(value, Tuple) or not -len(value.items) <= index.value < len(value.items):
             self.refuse(node, f"the element {index.value}, which is not there", "count from 0")
-        found: Value = value.items[index.value]
-        return found
+        element: Value = value.items[index.value]
+        return element
 
     def negated(self, test: Node) -> Node:
         """`not` of a test."""
@@ -473,17 +482,18 @@ class _Tracer:
 
     def comparison(self, node: ast.Compare) -> Node:
         """A comparison, also of several terms, and `is None`."""
-        left, found = self.value(node.left), TRUE
+        left = self.value(node.left)
+        test = TRUE
         for op, right_node in zip(node.ops, node.comparators, strict=True):
             if isinstance(op, ast.Is | ast.IsNot):
-                found = graph.both(found, self.missing(node, left, isinstance(op, ast.Is)))
+                test = graph.both(test, self.missing(node, left, isinstance(op, ast.Is)))
                 continue
             right = self.scalar(right_node)
             if not isinstance(left, Node):
                 self.refuse(node, "a comparison of a tuple", "compare its elements")
-            found = graph.both(found, self.trace.make(COMPARISONS[type(op)], left, right))
+            test = graph.both(test, self.trace.make(COMPARISONS[type(op)], left, right))
             left = right
-        return found
+        return test
 
     def missing(self, node: ast.AST, value: Value, off: bool) -> Node:
         """Whether a value `is None` (`off`), or is not."""
@@ -496,33 +506,31 @@ class _Tracer:
         """`and` and `or`, which are choices: the second test only counts after the first."""
         conjunction = isinstance(node.op, ast.And)
         test = TRUE if conjunction else FALSE
-        for each in node.values:
+        for operand in node.values:
             if test.op == "number" and bool(test.value) != conjunction:
                 return test
-            more = self.test(each)
-            test = self.trace.noted(
-                graph.both(test, more) if conjunction else graph.either(test, more)
-            )
+            join = graph.both if conjunction else graph.either
+            test = self.trace.noted(join(test, self.test(operand)))
         return test
 
     # -- calls -------------------------------------------------------------------------------------
 
     def call(self, node: ast.Call) -> Value:
         """Value of a call."""
-        found = self.outside(node.func)
-        if found in MATH or found in CHOICES:
-            return self.function(node, MATH.get(found) or CHOICES[found])
-        if is_named_tuple(found):
-            return Tuple(found, tuple(self.arguments(node, found._fields, ()).values()))
-        kind = plain(found)
+        called = self.outside(node.func)
+        if called in MATH or called in CHOICES:
+            return self.function(node, MATH.get(called) or CHOICES[called])
+        if is_named_tuple(called):
+            return Tuple(called, tuple(self.arguments(node, called._fields, ()).values()))
+        kind = plain(called)
         if kind is plain(root) or kind is plain(repeated):
             return self.loop(node, kind.__name__)
         if kind is plain(interpolate):
             return self.table(self.arguments(node, ("x", "knots", "values"), ()), node)
-        if not _is_equation(found):
+        if not _is_equation(called):
             text = ast.unparse(node.func)
             self.refuse(node, f"a call of {text}", f"make {text} an @equation")
-        callee = self.trace.callee(found)
+        callee = self.trace.callee(called)
         names = [each.arg for each in callee.source.arguments]
         return self.trace.run(callee, self.arguments(node, names, callee.source.defaults))
 
@@ -554,23 +562,24 @@ class _Tracer:
 
     def loop(self, node: ast.Call, word: str) -> Value:
         """Value of `root` or `repeated`: the equation by its name, and the other arguments."""
-        takes, own, make_of = LOOPS[word]
+        takes, own_arguments, make_of = LOOPS[word]
         if len(node.args) < 3 or node.keywords:
             self.refuse(node, f"{word} with other arguments", f"write {word}({takes}, a, b, ...)")
         first = node.args[0]
         named = isinstance(first, ast.Name | ast.Attribute) and ast.unparse(first) not in self.local
-        found = self.outside(first) if named else None
-        if not _is_equation(found):
+        equation = self.outside(first) if named else None
+        if not _is_equation(equation):
             self.refuse(node, f"{word} of something else", "give it the name of an @equation")
-        inner, values = self.trace.callee(found), [self.value(each) for each in node.args[1:]]
-        if len(inner.source.arguments) != len(own) + len(values) - 2:
+        inner = self.trace.callee(equation)
+        values = [self.value(argument) for argument in node.args[1:]]
+        if len(inner.source.arguments) != len(own_arguments) + len(values) - 2:
             what = f"{word} of {inner.source.name} with other arguments"
-            self.refuse(node, what, f"let it take {', '.join(own)} and the rest")
+            self.refuse(node, what, f"let it take {', '.join(own_arguments)} and the rest")
         return make_of(self.trace, inner, values[0], values[1], values[2:])
 
-    def table(self, given: Mapping[str, Value], node: ast.Call) -> Value:
+    def table(self, arguments: Mapping[str, Value], node: ast.Call) -> Value:
         """Value of `interpolate`."""
-        x, knots, values = given.values()
+        x, knots, values = arguments.values()
         if not (
             isinstance(x, Node)
             and isinstance(knots, Tuple)
@@ -603,6 +612,8 @@ class _Tracer:
         return make("+", low, make("*", inside, make("-", high, low)))
 
 
-def _is_equation(found: Any) -> bool:
+def _is_equation(function: Any) -> bool:
     """Whether something may be an equation: a function that is compiled, if any is."""
-    return isinstance(plain(found), FunctionType) and (plain(found) is not found or JIT_OFF)
+    return isinstance(plain(function), FunctionType) and (
+        plain(function) is not function or JIT_OFF
+    )

@@ -54,14 +54,14 @@ def rebuilt(value: Value, nodes: Iterator[Node]) -> Value:
     return next(nodes) if isinstance(value, Node) else value
 
 
-def alike(one: Value, two: Value) -> bool:
+def alike(a: Value, b: Value) -> bool:
     """Whether two values can be one: whole numbers are numbers."""
-    if isinstance(one, Node) and isinstance(two, Node):
-        return one.kind == two.kind or {one.kind, two.kind} == {"int", "float"}
-    if isinstance(one, Tuple) and isinstance(two, Tuple):
-        same = one.cls is two.cls and len(one.items) == len(two.items)
-        return same and all(map(alike, one.items, two.items))
-    return isinstance(one, Flag) and isinstance(two, Flag) and one.value == two.value
+    if isinstance(a, Node) and isinstance(b, Node):
+        return a.kind == b.kind or {a.kind, b.kind} == {"int", "float"}
+    if isinstance(a, Tuple) and isinstance(b, Tuple):
+        same = a.cls is b.cls and len(a.items) == len(b.items)
+        return same and all(map(alike, a.items, b.items))
+    return isinstance(a, Flag) and isinstance(b, Flag) and a.value == b.value
 
 
 def fixed(value: Any) -> Value | None:
@@ -96,18 +96,18 @@ def arguments(
             f"{source.file}, line {source.node.lineno}: the types of {source.name} are not all "
             f"known ({error}): define them above, at the top of the file."
         ) from None
-    said = None if options is None else dict(_said(options.items(), ""))
-    names = [each.arg for each in source.arguments]
-    return {name: _argument(hints[name], name, name, said, lengths) for name in names}
+    by_path = None if options is None else dict(_options_by_path(options.items(), ""))
+    names = [argument.arg for argument in source.arguments]
+    return {name: _argument(hints[name], name, name, by_path, lengths) for name in names}
 
 
-def _said(options: Iterable[tuple[str, Any]], prefix: str) -> Iterator[tuple[str, Any]]:
+def _options_by_path(options: Iterable[tuple[str, Any]], prefix: str) -> Iterator[tuple[str, Any]]:
     """Values of options, and of all below those that are tuples, by their paths."""
     for name, value in options:
         yield f"{prefix}{name}", value
         if isinstance(value, tuple):
             fields = getattr(value, "_fields", map(str, range(len(value))))
-            yield from _said(zip(fields, value, strict=True), f"{prefix}{name}.")
+            yield from _options_by_path(zip(fields, value, strict=True), f"{prefix}{name}.")
 
 
 def undecided(hint: Any, path: str, text: str) -> Flag:

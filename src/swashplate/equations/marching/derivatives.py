@@ -9,16 +9,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.equations.code_generation.functions import generating
-from swashplate.equations.marching.layout import Layout, layout_of, started_by
-from swashplate.equations.marching.observation import ObservedRecord, Own
-from swashplate.equations.marching.pieces import Struct, addresses, pointers
+from swashplate.equations.marching.kernels import Struct, addresses, pointers
+from swashplate.equations.marching.layout import JacobianLayout, layout_of, started_by
+from swashplate.equations.marching.observation import ObservedRecord, RunValues
 from swashplate.equations.marching.rows import (
     ROWS,
     Program,
     Sink,
     aligned,
     compiled_march,
-    march_of,
+    march_struct,
     upright,
 )
 from swashplate.equations.marching.run import (
@@ -26,8 +26,8 @@ from swashplate.equations.marching.run import (
     Instance,
     Start,
     arrays_of,
-    begun,
     check_domain,
+    initial_states,
 )
 from swashplate.equations.marching.structure import Moved, Structure, structure_of
 from swashplate.errors import DomainError, InputError
@@ -39,22 +39,23 @@ def _slopes(
     structure: Structure, instance: Instance, first: Mapping[str, float], h: float, start: Start
 ) -> dict[Moved, float]:
     """Derivatives of constants and of states at the start by all parameters that move them."""
-    starting, before = structure.starting(start), dict.fromkeys(first, 0.0)
+    code = structure.start_code(start)
+    before = dict.fromkeys(first, 0.0)
     if start == "steady":
         before.update(first)
-    values = [instance.number_at(each, before, h) for each in starting.arguments]
+    values = [instance.number_at(argument, before, h) for argument in code.arguments]
     try:
-        found = starting.derived.python(*values)
+        results = code.derived.python(*values)
     except NO_NUMBER as error:
         raise DomainError(
             f"{instance.name}: what follows from the parameters alone cannot be computed for these "
             f"numbers ({error})."
         ) from None
-    return dict(zip(starting.moves, found[len(found) - len(starting.moves) :], strict=True))
+    return dict(zip(code.moves, results[len(results) - len(code.moves) :], strict=True))
 
 
-def _begun(
-    layout: Layout,
+def _initialised(
+    layout: JacobianLayout,
     instance: Instance,
     first: Mapping[str, float],
     h: float,
@@ -64,29 +65,35 @@ def _begun(
     """The layout's program with its numbers, and derivatives of the states at the first sample.
 
     `own` are paths of states that the run starts from as its own unknowns: nothing else moves them.
+    The code that computes the derivatives is generated when it is first needed.
     """
-    structure, slopes = layout.structure, dict[Moved, float]()
+    structure = layout.structure
+    slopes = dict[Moved, float]()
     if layout.columns:
         slopes = _slopes(structure, instance, first, h, start)
     tangent = np.zeros(layout.tangents)
-    for (state, column), at in layout.places.items():
+    for (state, column), index in layout.tangent_of.items():
         if f"{structure.model.prefix(state.part)}{state.path}" in own:
-            tangent[at] = state.path in started_by(structure.model, state.part, column)
+            tangent[index] = state.path in started_by(structure.model, state.part, column)
         else:
-            tangent[at] = slopes.get((state, column), 0.0)
-    places, scale = instance.places(structure.signals, h), layout.program.scale.copy()
-    for at, slot in layout.slots:
-        is_tap = slot[0].kind == "fraction"
-        scale[at] *= places.slope[int(slot[0].path)] if is_tap else slopes[slot]
+            tangent[index] = slopes.get((state, column), 0.0)
+    delays = instance.tap_delays(structure.signals, h)
+    scale = layout.program.scale.copy()
+    for term, factor in layout.factors:
+        moved, _ = factor
+        if moved.kind == "fraction":
+            scale[term] *= delays.slope[int(moved.path)]
+        else:
+            scale[term] *= slopes[factor]
     return Struct(layout.program._replace(scale=scale)), tangent
 
 
 @generating
 def _at_rest(
-    layout: Layout, instance: Instance, h: float, own: tuple[str, ...]
+    layout: JacobianLayout, instance: Instance, h: float, own: tuple[str, ...]
 ) -> tuple[Struct[Program], Array]:
     """Those of a start at rest, which depends on no record."""
-    return _begun(layout, instance, {}, h, "rest", own)
+    return _initialised(layout, instance, {}, h, "rest", own)
 
 
 # --- what a fit asks for --------------------------------------------------------------------------
@@ -121,17 +128,19 @@ class Triangle(NamedTuple):
     negative."""
 
 
-NOTHING_OWN = Own()
+NO_RUN_VALUES = RunValues()
 
 
-def residuals(instance: Instance, observed: ObservedRecord, own: Own = NOTHING_OWN) -> Array:
-    """(m,) weighted residuals of all observations, one after the other, 0 where the weight is.
+def residuals(
+    instance: Instance, observed: ObservedRecord, own: RunValues = NO_RUN_VALUES
+) -> Array:
+    """(m,) weighted residuals of all observations, one after the other; 0 if the weight is 0.
 
-    Of each weight · (simulated + offset - measured) in its signal's SI unit; `own` are values of
-    the experiment's own unknowns.
+    Each is weight · (simulated + offset - measured) in its signal's SI unit; `own` are values of
+    the run's own unknowns.
     """
     rows = np.empty((1, observed.rows))
-    _march(instance, observed, own, (), (), rows, 0)
+    _march(instance, observed, own, columns=(), to=(), rows=rows, before=0)
     return np.asarray(rows[0])
 
 
@@ -139,7 +148,7 @@ def jacobian(
     instance: Instance,
     observed: ObservedRecord,
     columns: Sequence[str],
-    own: Own = NOTHING_OWN,
+    own: RunValues = NO_RUN_VALUES,
     *,
     moved: Sequence[bool] | None = None,
     out: Array | None = None,
@@ -159,7 +168,15 @@ def jacobian(
         raise InputError(f"out must be a plain array of floats of shape {shape}.")
     for c in set(range(len(columns))).difference(to):
         out[c] = 0.0
-    _march(instance, observed, own, [columns[c] for c in to.tolist()], to, out, len(columns))
+    _march(
+        instance,
+        observed,
+        own,
+        columns=[columns[c] for c in to.tolist()],
+        to=to,
+        rows=out,
+        before=len(columns),
+    )
     return Jacobian(names, out)
 
 
@@ -167,7 +184,7 @@ def triangle(
     instance: Instance,
     observed: ObservedRecord,
     columns: Sequence[str],
-    own: Own = NOTHING_OWN,
+    own: RunValues = NO_RUN_VALUES,
     *,
     moved: Sequence[bool] | None = None,
 ) -> Triangle:
@@ -177,12 +194,20 @@ def triangle(
     """
     to = np.flatnonzero(np.ones(len(columns)) if moved is None else moved)
     names = (*columns, *observed.own_columns)
-    places = np.concatenate([to, np.arange(len(columns), len(names) + 1)])
-    rows, some = aligned(places.size, ROWS), np.zeros((places.size, places.size))
-    asked = [columns[c] for c in to.tolist()]
-    _march(instance, observed, own, asked, range(to.size), rows, to.size, some)
+    used = np.concatenate([to, np.arange(len(columns), len(names) + 1)])
+    factor_of_used = np.zeros((used.size, used.size))
+    _march(
+        instance,
+        observed,
+        own,
+        columns=[columns[c] for c in to.tolist()],
+        to=range(to.size),
+        rows=aligned(used.size, ROWS),
+        before=to.size,
+        factor=factor_of_used,
+    )
     factor = np.zeros((len(names) + 1, len(names) + 1))
-    factor[np.ix_(places, places)] = upright(some)
+    factor[np.ix_(used, used)] = upright(factor_of_used)
     if not np.isfinite(factor).all():
         overflown = np.asarray(~np.isfinite(factor)).any(axis=0)
         bad = [*names, "the residuals"][int(np.argmax(overflown))]
@@ -199,7 +224,8 @@ NO_FACTOR = np.zeros((0, 0))
 def _march(
     instance: Instance,
     observed: ObservedRecord,
-    own: Own,
+    own: RunValues,
+    *,
     columns: Sequence[str],
     to: ArrayLike,
     rows: Array,
@@ -208,24 +234,27 @@ def _march(
 ) -> None:
     """March, and fill rows, or fold them into a `factor`.
 
-    `to` are the places of the columns' rows; those of free offsets are behind the first `before`.
+    ``to[i]`` is the row of column i. Rows of free offsets begin at row `before`.
     """
-    records, h, start = observed.records, observed.record.step, observed.start
-    signals, seen = tuple(records), tuple(dict.fromkeys(o.signal for o in observed.observations))
+    records = observed.records
+    h = observed.record.step
+    start = observed.start
+    signals = tuple(records)
+    outputs = tuple(dict.fromkeys(o.signal for o in observed.observations))
     missing = [c for c in columns if c.startswith("start.") and c[6:] not in own.start]
     if missing:
-        raise InputError(f"{missing[0]} is a column, so Own needs a value of it.")
-    structure = structure_of(instance.model, signals, instance.options, seen)
-    plan, offsets = observed.plan, observed.offsets(own.offsets)
-    numbers = tuple(seen.index(each.signal) for each in observed.observations)
+        raise InputError(f"{missing[0]} is a column, so RunValues needs a value of it.")
+    structure = structure_of(instance.model, signals, instance.options, outputs)
+    plan = observed.plan
+    numbers = tuple(outputs.index(each.signal) for each in observed.observations)
     layout = layout_of(structure, tuple(columns), numbers, start)
     first = {name: float(values[0]) for name, values in records.items()}
-    started = instance.start(first, h, start)
-    states, places = begun(instance, started, own.start), instance.places(signals, h)
+    initial = instance.start(first, h, start)
+    states = initial_states(instance, initial, own.start)
     if start == "rest":
         program, tangent = _at_rest(layout, instance, h, tuple(own.start))
     else:
-        program, tangent = _begun(layout, instance, first, h, start, own.start)
+        program, tangent = _initialised(layout, instance, first, h, start, own.start)
     fields = Sink(
         columns=len(rows),
         length=rows.shape[1],
@@ -235,21 +264,31 @@ def _march(
         own=before,
         folded=int(factor.size > 0),
         factor=factor,
-        offset=offsets,
+        offset=observed.offsets(own.offsets),
         offset_row=observed.offset_rows(before),
     )
-    sink, room = Struct(fields), layout.taken()
+    sink = Struct(fields)
+    room = layout.take_room()
     room.fields.tangent[:] = tangent
-    room.fields.integrals[:] = 0.0
-    room.fields.progress[:] = plan.fields.first[:-1]
-    values, met = tuple(records.values()), np.array([np.inf])
-    arrays = arrays_of(instance, values, started, places, states, met, room.fields.block)
-    pieces = addresses(structure.facts.pieces, layout.pieces)
-    structs = march_of(program, plan, sink, room)
+    room.fields.integral_states[:] = 0.0
+    room.fields.next_sample[:] = plan.fields.first[:-1]
+    values = tuple(records.values())
+    worst_margin = np.array([np.inf])
+    arrays = arrays_of(
+        instance,
+        values,
+        initial,
+        instance.tap_delays(signals, h),
+        states,
+        worst_margin,
+        room.fields.block,
+    )
+    kernels = addresses(structure.facts.kernels, layout.kernels)
+    structs = march_struct(program, plan, sink, room)
     march = compiled_march()
-    march(pieces, pointers(arrays), values[0].size, h, structs.address)
+    march(kernels, pointers(arrays), values[0].size, h, structs.address)
     layout.give_back(room)
-    check_domain(instance, states, float(met[0]), observed.driven_by)
+    check_domain(instance, states, float(worst_margin[0]), observed.driven_by)
 
 
 # --- a model with numbers, differentiated ---------------------------------------------------------
@@ -259,8 +298,8 @@ class BoundModel(NamedTuple):
     """A model with numbers, and what it is differentiated by."""
 
     instance: Instance
-    own: Own = NOTHING_OWN
-    """Values of the experiment's own unknowns."""
+    own: RunValues = NO_RUN_VALUES
+    """Values of the run's own unknowns."""
     paths: Sequence[str] = ()
     """Columns of derivatives."""
     moved: Sequence[bool] | None = None

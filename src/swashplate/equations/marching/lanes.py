@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from swashplate.equations import graph
 from swashplate.equations.code_generation.functions import generating
 from swashplate.equations.code_generation.printing import (
-    Block,
+    CodeBlock,
     Statement,
     function_source,
     indented,
@@ -34,17 +34,17 @@ from swashplate.equations.code_generation.values import leaves
 from swashplate.equations.declaration import JIT_OFF
 from swashplate.equations.graph import Node
 from swashplate.equations.keeping import kept, key_of
-from swashplate.equations.marching.march import Sampler, lower, output_of
-from swashplate.equations.marching.part import PartCode, Stored, taps_of
-from swashplate.equations.marching.pieces import FLOATS, INTS, pointers
+from swashplate.equations.marching.kernels import FLOATS, INTS, pointers
+from swashplate.equations.marching.march import SampleCode, lower, output_of
+from swashplate.equations.marching.part_code import PartCode, SignalId, taps_of
 from swashplate.equations.marching.rows import aligned
-from swashplate.equations.marching.run import compiled
+from swashplate.equations.marching.run import compiled_kernel
 from swashplate.equations.model import Model
 
 Array = NDArray[np.float64]
 
 LANES = 16
-"""Sets marched side by side: two vectors of eight where the processor has them, else four of 4."""
+"""Sets marched side by side: two vectors of eight if the processor has them, else four of four."""
 
 
 # a root that nobody asks for may be one of a number below zero, which compiled code allows
@@ -52,7 +52,7 @@ CALLED: dict[str, Any] = {"sqrt": np.sqrt} if JIT_OFF else {}
 """What the text calls in place of the library's."""
 
 PREPARE_KINDS = ("float", FLOATS)
-MARCH = "count, h, length, records, whole, flat, measured, weight, outputs"
+MARCH = "count, h, length, records, delay_samples, flat, measured, weight, outputs"
 """Arguments of a march: samples, step, length of a row of the outputs, 0 without any, and arrays
 without shapes."""
 MARCH_KINDS = ("int", "float", "int", f"*{FLOATS}", INTS, *(FLOATS,) * 4)
@@ -120,12 +120,19 @@ class Straight:
         """Text of the loops over lanes; the names in `shared` are the same for all lanes."""
         lines: list[str] = []
         for k, loop in enumerate(self.loops):
-            made = {name for each in loop for name in each.names}
-            read = {name for each in loop for name in each.reads}
-            later = {name for after in self.loops[k + 1 :] for each in after for name in each.reads}
-            body = [line for each in loop for line in each.lines]
-            loads, saves = self.loads(read - made - shared), self.saves(made & later)
-            lines += over_lanes([*loads, *body, *saves])
+            computed = {name for statement in loop for name in statement.names}
+            read = {name for statement in loop for name in statement.reads}
+            read_later = {
+                name
+                for later_loop in self.loops[k + 1 :]
+                for statement in later_loop
+                for name in statement.reads
+            }
+            body = self.loads(read - computed - shared)
+            for statement in loop:
+                body += statement.lines
+            body += self.saves(computed & read_later)
+            lines += over_lanes(body)
         return lines
 
 
@@ -134,7 +141,7 @@ def over_lanes(lines: Sequence[str]) -> list[str]:
     return ["for lane in range(LANES):", *indented(lines)] if lines else []
 
 
-def report(model: Model, output: str | None = None, *, options: Any = None) -> str:
+def vectorisation_report(model: Model, output: str | None = None, *, options: Any = None) -> str:
     """What keeps many sets of a model from being marched side by side in vector instructions.
 
     Parameters
@@ -142,37 +149,44 @@ def report(model: Model, output: str | None = None, *, options: Any = None) -> s
     model : Model
         A single model, or a joined one.
     output : str, optional
-        Signal that is wanted; by default the last that the model names.
+        Signal to return; by default the last that the model names.
     options : named tuple, optional
         Its options; all off if omitted.
 
     Returns
     -------
     str
-        A line for each operation that is done set by set, with the equation that it stands in; or
-        that there is none. `simulate_many` works either way, and slower in the first.
+        A line for each operation that is done set by set, with the equation that it stands in, or a
+        sentence if there is none. `simulate_many` works in both cases, but slower in the first.
     """
-    signals, chosen, found = list[str](), list[Any](), dict[str, None]()
+    signals = list[str]()
+    options_of_parts = list[Any]()
+    calls = dict[str, None]()
     for i, part in enumerate(model.parts):
         outside = [name for name in part.input_types if model.link_of(i, name) is None]
         signals += [part.tap(name).signal for name in outside if name not in part.defaults]
-        own = options if len(model.parts) == 1 else getattr(options, part.name, None)
-        chosen.append(part.options() if own is None and part.options is not None else own)
+        own_options = options if len(model.parts) == 1 else getattr(options, part.name, None)
+        if own_options is None and part.options is not None:
+            own_options = part.options()
+        options_of_parts.append(own_options)
     names = (*model.outputs, *model.parts[-1].outputs) or model.parts[-1].signal_names
-    sampler = Sampler(model, signals, chosen, [output_of(model, output or names[-1])[0]])
-    for used in sampler.used:
-        ends = sampler.ends[used.part]
-        _, known = sampler.ahead(used, ends, still=fractions_of(used))
-        block = sampler.printed(used, ends, known=known, flat=all_vector)
-        for statement in [each for each in block.statements if not is_vector(each)]:
+    signal, _ = output_of(model, output or names[-1])
+    sample_code = SampleCode(model, signals, options_of_parts, [signal])
+    for used in sample_code.used:
+        ends = sample_code.ends[used.part]
+        _, known = sample_code.ahead(used, ends, still=fractions_of(used))
+        block = sample_code.printed(used, ends, known=known, flat=all_vector)
+        for statement in block.statements:
+            if is_vector(statement):
+                continue
             for node in statement.nodes:
                 if node.op not in VECTOR:
                     source = used.trace.origins.get(node)
                     where = used.own.name if source is None else source.name
-                    found[f"{where} calls {_called(node)}"] = None
-    if not found:
+                    calls[f"{where} calls {_called(node)}"] = None
+    if not calls:
         return f"Nothing keeps {model.name} from vector instructions."
-    return "\n".join([f"{model.name} is not all vector instructions:", *found])
+    return "\n".join([f"{model.name} is not all vector instructions:", *calls])
 
 
 def _called(node: Node) -> str:
@@ -184,17 +198,21 @@ def _called(node: Node) -> str:
 
 
 def fractions_of(part: PartCode) -> list[str]:
-    """Names of the places of a part's taps, which do not change during a march."""
-    return [part.fraction(tap) for tap in part.taps]
+    """Names of the fractions in the delays of a part's taps, which do not change during a march."""
+    return [part.delay_fraction(tap) for tap in part.taps]
 
 
 class Marched(NamedTuple):
-    """What LANES sets leave."""
+    """Results of LANES sets."""
 
-    cost: Array  # (LANES,) sum of weighted squared errors.
-    worst: Array  # (LANES,) worst margin of the domain, infinite without one.
-    end: Array  # (LANES,) a sum that is finite where all numbers are.
-    outputs: Array  # (LANES, n) the output, or (LANES, 0).
+    cost: Array
+    """(LANES,) sum of weighted squared errors."""
+    worst: Array
+    """(LANES,) worst margin of the domain, infinite without one."""
+    end: Array
+    """(LANES,) a sum that is finite if all numbers are."""
+    outputs: Array
+    """(LANES, n) the output, or (LANES, 0)."""
 
 
 class LanePart(NamedTuple):
@@ -205,7 +223,7 @@ class LanePart(NamedTuple):
     """Path of each parameter by the name of its row; `given` likewise."""
     given: dict[str, str]
     fractions: dict[int, str]
-    """By the number of a tap, the row of the rest of its place."""
+    """By the number of a tap, the row of the fraction in its delay."""
     states: dict[str, str]
     """By path, the row of each number of the state that is carried."""
 
@@ -225,12 +243,12 @@ class _Writer:
     def __init__(
         self, model: Model, signals: Sequence[str], options: Sequence[Any], output: str
     ) -> None:
-        place, is_rate = output_of(model, output)
-        self._sampler = Sampler(model, signals, options, [place])
+        signal, is_rate = output_of(model, output)
+        self._sample_code = SampleCode(model, signals, options, [signal])
         self._straight = Straight()
-        self._ahead: list[tuple[PartCode, Block]] = []
-        text = self._sampler.module(*self._texts(place, is_rate))
-        parts = [self._part_of(part) for part in self._sampler.used]
+        self._ahead: list[tuple[PartCode, CodeBlock]] = []
+        text = self._sample_code.module(*self._texts(signal, is_rate))
+        parts = [self._part_of(part) for part in self._sample_code.used]
         self.facts = LaneFacts(text, self._straight.number, parts)
 
     def _part_of(self, part: PartCode) -> LanePart:
@@ -239,19 +257,19 @@ class _Writer:
             part.part,
             part.parameters,
             {node.value: path for path, node in leaves(part.given)},
-            {tap.number: part.fraction(tap) for tap in part.taps},
-            {path: states[path].value for path in self._sampler.carried[part.part]},
+            {tap.number: part.delay_fraction(tap) for tap in part.taps},
+            {path: states[path].value for path in self._sample_code.carried[part.part]},
         )
 
-    def _texts(self, place: Stored, is_rate: bool) -> list[str]:
+    def _texts(self, signal: SignalId, is_rate: bool) -> list[str]:
         """Texts of both functions."""
-        sampler, straight, model = self._sampler, self._straight, self._sampler.model
+        sample_code, straight, model = self._sample_code, self._straight, self._sample_code.model
         following: list[tuple[str, str, frozenset[str]]] = []
         """What rows become at the end of a sample."""
         worst = ""
-        for part in sampler.used:
+        for part in sample_code.used:
             straight.cut()
-            worst = self._part(part, place, following, worst)
+            worst = self._part(part, signal, following, worst)
         if worst:
             following.append(("worst", worst, frozenset((worst,))))
         shown = "value"
@@ -269,12 +287,12 @@ class _Writer:
         # row that was just written number by number cannot be read as a whole at once
         first: list[str] = []
         fetched: list[str] = []
-        for part in sampler.used:
+        for part in sample_code.used:
             for tap in part.taps:
-                record = f"records[{sampler.signals.index(tap.tap.signal)}]"
-                queue = [f"{part.fraction(tap)}_coming", *part.tap_samples(tap)]
+                record = f"records[{sample_code.signals.index(tap.tap.signal)}]"
+                queue = [f"{part.delay_fraction(tap)}_coming", *part.tap_samples(tap)]
                 for lines, name, n in ((first, queue[1], "0"), (fetched, queue[0], "coming")):
-                    index = f"{n} - whole[{tap.number} * LANES + lane]"
+                    index = f"{n} - delay_samples[{tap.number} * LANES + lane]"
                     lines.append(f"at = {index}")
                     lines.append(f"{straight.row(name)} = {record}[at] if at >= 0 else 0.0")
                 following += [(old, new, frozenset((new,))) for new, old in pairwise(queue)]
@@ -283,7 +301,7 @@ class _Writer:
         read = {name for loop in straight.loops for each in loop for name in each.reads}
         shared = {"target": "measured[n]", "counts": "weight[n]"}
         shared["half"] = "0.5 * h if n > 0 else 0.0"
-        shared |= {f"x_{name}": f"records[{k}][n]" for k, name in enumerate(sampler.signals)}
+        shared |= {f"x_{name}": f"records[{k}][n]" for k, name in enumerate(sample_code.signals)}
         inner = [f"{name} = {value}" for name, value in shared.items() if name in read]
         if fetched:
             inner += ["coming = min(n + 1, last)", *over_lanes(fetched)]
@@ -307,28 +325,28 @@ class _Writer:
     def _part(
         self,
         part: PartCode,
-        place: Stored,
+        signal: SignalId,
         following: list[tuple[str, str, frozenset[str]]],
         worst: str,
     ) -> str:
         """Append a part's sample; the name of the worst margin so far."""
-        sampler, straight = self._sampler, self._straight
-        head = sampler.printed(
-            part, part.ahead(sampler.ends[part.part], fractions_of(part)), named=True
+        sample_code, straight = self._sample_code, self._straight
+        head = sample_code.printed(
+            part, part.ahead(sample_code.ends[part.part], fractions_of(part)), named=True
         )
         self._ahead.append((part, head))
-        own = [(source, n) for source, n in sampler.sources.items() if source.part == part.part]
+        own = [(source, n) for source, n in sample_code.sources.items() if source.part == part.part]
         steps = dict(leaves(part.following))
         results = {part.source(source): node for source, node in own}
         if part.margin is not None:
             before = graph.name(worst or "worst")
             worst = part.fresh("lowest")
             results[worst] = lower(before, part.margin)
-        if place.part == part.part and place.kind != "link":
-            results["value"] = part.node(place)
+        if signal.part == part.part and signal.kind != "link":
+            results["value"] = part.node(signal)
         states = dict(leaves(part.state))
-        carried = {states[path].value: steps[path] for path in sampler.carried[part.part]}
-        block = sampler.printed(
+        carried = {states[path].value: steps[path] for path in sample_code.carried[part.part]}
+        block = sample_code.printed(
             part, [*results.values(), *carried.values()], known=head.names, flat=all_vector
         )
         for statement in block.statements:
@@ -336,8 +354,10 @@ class _Writer:
         texts = iter(block.results)
         for name in results:
             straight.let(name, *next(texts))
-        if place.part == part.part and place.kind == "link":
-            observed = sampler.printed(part, [sampler.observed(part, place)], known=block.names)
+        if signal.part == part.part and signal.kind == "link":
+            observed = sample_code.printed(
+                part, [sample_code.observed(part, signal)], known=block.names
+            )
             for statement in observed.statements:
                 straight.add(statement)
             straight.let("value", *observed.results[0])
@@ -346,24 +366,27 @@ class _Writer:
 
     def _prepared(self, read: set[str]) -> list[str]:
         """Lines of a lane ahead of the march, from what is known to what is read in it."""
-        sampler, straight = self._sampler, self._straight
+        sample_code, straight = self._sample_code, self._straight
         lines: list[str] = []
         used = set[str]()
         for part, head in self._ahead:
             lines += head.lines
-            made = {name for each in head.statements for name in each.names}
-            lines += straight.saves(read & made)
-            used |= {name for each in head.statements for name in each.reads} - made
-            states, begun = dict(leaves(part.state)), dict(leaves(part.begun()))
-            carried = sampler.carried[part.part]
-            at_rest = sampler.printed(part, [begun[path] for path in carried], known=head.names)
+            computed = {name for statement in head.statements for name in statement.names}
+            lines += straight.saves(read & computed)
+            used |= {name for statement in head.statements for name in statement.reads} - computed
+            states = dict(leaves(part.state))
+            initial = dict(leaves(part.initial_state()))
+            carried = sample_code.carried[part.part]
+            at_rest = sample_code.printed(
+                part, [initial[path] for path in carried], known=head.names
+            )
             lines += at_rest.lines
             for path, (text, reads) in zip(carried, at_rest.results, strict=True):
                 lines.append(f"{straight.row(states[path].value)} = {text}")
                 used |= reads
-            made |= {name for each in at_rest.statements for name in each.names}
-            used |= {name for each in at_rest.statements for name in each.reads}
-            used -= made
+            computed |= {name for statement in at_rest.statements for name in statement.names}
+            used |= {name for statement in at_rest.statements for name in statement.reads}
+            used -= computed
         return [*straight.loads(used - {"h"}), *lines]
 
 
@@ -380,8 +403,8 @@ class Lanes:
         self._taps = taps_of(model, signals)
         self.text = facts.text
         names, file = {"LANES": LANES, **CALLED}, f"{model.name}_lanes"
-        self.prepare = compiled(file, self.text, "prepare", PREPARE_KINDS, names)
-        self.march = compiled(file, self.text, "march", MARCH_KINDS, names)
+        self.prepare = compiled_kernel(file, self.text, "prepare", PREPARE_KINDS, names)
+        self.march = compiled_kernel(file, self.text, "march", MARCH_KINDS, names)
 
     def __call__(
         self,
@@ -402,7 +425,7 @@ class Lanes:
         """
         rows, model = self._facts.rows, self._model
         block = aligned(len(rows), LANES)
-        whole = np.zeros((max(len(self._taps), 1), LANES), dtype=np.int64)
+        delay_samples = np.zeros((max(len(self._taps), 1), LANES), dtype=np.int64)
         starts: dict[str, int] = {}
         for part in self._facts.parts:
             prefix, own = model.prefix(part.part), model.parts[part.part]
@@ -416,10 +439,10 @@ class Lanes:
             for tap in (each for each in self._taps if each.part == part.part):
                 late = numbers[f"{prefix}{tap.tap.delay}"] / h if tap.tap.delay else np.zeros(LANES)
                 end = np.maximum(late, tap.tap.ahead) - tap.tap.ahead
-                whole[tap.number] = np.floor(end)
+                delay_samples[tap.number] = np.floor(end)
                 fraction = part.fractions[tap.number]
                 if fraction in rows:
-                    block[rows[fraction]] = end - whole[tap.number]
+                    block[rows[fraction]] = end - delay_samples[tap.number]
             for path, name in part.states.items():
                 starts[f"start.{prefix}{path}"] = rows[name]
         worst = block[rows["worst"]] if "worst" in rows else np.empty(LANES)
@@ -433,9 +456,17 @@ class Lanes:
             self.prepare(h, block.reshape(-1))
             for path in starts.keys() & numbers.keys():
                 block[starts[path]] = numbers[path]
-            flat, left = block.reshape(-1), outputs.reshape(-1)
-            length, own = outputs.shape[1], pointers(values)
-            self.march(size, h, length, own, whole.reshape(-1), flat, measured, weight, left)
+            self.march(
+                size,
+                h,
+                outputs.shape[1],
+                pointers(values),
+                delay_samples.reshape(-1),
+                block.reshape(-1),
+                measured,
+                weight,
+                outputs.reshape(-1),
+            )
         end = block[[rows["cost"], *starts.values()]].sum(axis=0)
         return Marched(block[rows["cost"]], worst, end, outputs[:, :size])
 

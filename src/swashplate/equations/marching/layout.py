@@ -1,4 +1,4 @@
-"""What is done in every block of a Jacobian: rows that are made, recurrences, where results go."""
+"""Program of a Jacobian for each block of samples: computed rows, recurrences, results."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from swashplate.equations.code_generation.functions import generating
 from swashplate.equations.fields import floats_of
-from swashplate.equations.marching.part import Stored, taps_of
-from swashplate.equations.marching.pieces import Struct
+from swashplate.equations.marching.kernels import Struct
+from swashplate.equations.marching.part_code import SignalId, taps_of
 from swashplate.equations.marching.rows import (
     CALL,
     COMBINE,
@@ -39,60 +39,77 @@ Todo = tuple[int, int, int, int]
 """A row of `Program.todo`."""
 
 
-class Layout:
+class JacobianLayout:
     """A program without the numbers that depend on parameters, and the memory it needs.
 
-    `pieces` are the numbers of those that are called, `slots` the numbers of terms with a factor of
-    their kind, `tangents` counts the vector of tangents, of which the first belongs to idle
-    columns, and `places` has the place of the tangent of a state by a column.
+    Attributes
+    ----------
+    program : Program
+        What is done in every block.
+    kernels : set of int
+        Numbers of the kernels that it calls.
+    factors : list of (int, Moved)
+        Terms with a factor that is known only with the parameters, and which factor that is.
+    tangents : int
+        Length of the vector of tangents, of which the first belongs to idle columns.
+    tangent_of : dict of Moved to int
+        Index in that vector of the derivative of a state by a column.
     """
 
     def __init__(
         self, structure: Structure, columns: tuple[str, ...], observed: tuple[int, ...], start: str
     ) -> None:
-        self.structure, self.columns = structure, columns
-        self._size, self.tangents = structure.facts.size, 1
-        self._constant: dict[float, int] = {}  # Rows that hold just one value.
+        self.structure = structure
+        self.columns = columns
+        self.tangents = 1
+        self._size = structure.facts.size
+        self._constant: dict[float, int] = {}
+        """Rows that hold just one value."""
         self._observations = len(observed)
         self._spare: deque[Struct[Room]] = deque(maxlen=8)
-        self.places: dict[Moved, int] = {}
-        self._by: dict[Stored, dict[int, Term]] = {}
+        self.tangent_of: dict[Moved, int] = {}
+        self._by: dict[SignalId, dict[int, Term]] = {}
         """Derivatives of what is known, by the number of each column that moves it."""
-        self._begun: set[Moved] = set()  # States that a column moves at the first sample.
-        self._sums: list[tuple[int, list[Term]]] = []  # Rows that are made, and of what.
+        self._start_moves: set[Moved] = set()
+        """States that a column moves at the first sample."""
+        self._sums: list[tuple[int, list[Term]]] = []
+        """Rows that are computed, and of what."""
         self._lanes: list[int] = []
         self._seed(start)
-        done = [(part, self._part(part)) for part in structure.facts.parts]
+        todo_of_parts = [(part, self._part(part)) for part in structure.facts.parts]
         integrals: list[Todo] = []
-        values, seen = zip(*(self._observed(each, integrals) for each in observed), strict=True)
-        made, todo = len(self._sums), [(CALL, 0, 0, 0)]
-        self._sums += [(0, terms) for each in seen for terms in each]
-        read = {row for _, terms in self._sums for term in terms for row in term.rows}
-        for part, own in done:
-            if part.fill is not None and (own or any(row in part.rows for row in read)):
-                todo.append((CALL, part.fill, 0, 0))
-            todo += own
+        observations = [self._observed(number, integrals) for number in observed]
+        first_observed = len(self._sums)
+        for _, derivatives in observations:
+            self._sums += [(0, summands) for summands in derivatives]
+        read = {row for _, summands in self._sums for term in summands for row in term.rows}
+        todo: list[Todo] = [(CALL, 0, 0, 0)]
+        for part, todo_of_part in todo_of_parts:
+            is_read = bool(todo_of_part) or any(row in part.factor_rows for row in read)
+            if part.fill_kernel is not None and is_read:
+                todo.append((CALL, part.fill_kernel, 0, 0))
+            todo += todo_of_part
         todo += integrals
-        terms = [term for _, each in self._sums for term in each]
+        terms = [term for _, summands in self._sums for term in summands]
         ones = self._value(1.0)
         pairs = [(*term.rows, *(ones, -1)[len(term.rows) :]) for term in terms]
         self.program = Program(
             steps=len(todo),
             todo=np.array(todo, dtype=np.int64),
             target=np.array([row for row, _ in self._sums], dtype=np.int64),
-            first=np.cumsum([0, *(len(each) for _, each in self._sums)]).astype(np.int64),
+            first=np.cumsum([0, *(len(summands) for _, summands in self._sums)]).astype(np.int64),
             a=np.array([pair[0] for pair in pairs], dtype=np.int64),
             b=np.array([pair[1] for pair in pairs], dtype=np.int64),
             scale=np.array([term.scale for term in terms], dtype=np.float64),
             lanes=np.array(self._lanes, dtype=np.int64),
-            seen=made,
-            value=np.array(values, dtype=np.int64),
-            integrals=sum(what == INTEGRATE for what, *_ in todo),
+            first_observed=first_observed,
+            value=np.array([row for row, _ in observations], dtype=np.int64),
+            integral_count=sum(what == INTEGRATE for what, *_ in todo),
         )
-        self.pieces = {piece for what, piece, *_ in todo if what in (CALL, RECUR)}
-        self.slots = [(k, term.slot) for k, term in enumerate(terms) if term.slot is not None]
+        self.kernels = {kernel for what, kernel, *_ in todo if what in (CALL, RECUR)}
+        self.factors = [(k, term.factor) for k, term in enumerate(terms) if term.factor is not None]
 
-    def taken(self) -> Struct[Room]:
+    def take_room(self) -> Struct[Room]:
         """Memory for a march, of an earlier one if it can be: new memory takes longer to get."""
         with suppress(IndexError):  # another thread may be faster
             return self._spare.pop()
@@ -105,8 +122,8 @@ class Layout:
             tangent=np.zeros(self.tangents),
             aside=aligned(STRIDE),
             products=aligned(EIGHTH),
-            integrals=np.zeros((self.program.integrals, 3)),
-            progress=np.zeros(self._observations, dtype=np.int64),
+            integral_states=np.zeros((self.program.integral_count, 3)),
+            next_sample=np.zeros(self._observations, dtype=np.int64),
         )
         return Struct(room)
 
@@ -125,30 +142,32 @@ class Layout:
         return self._constant[value]
 
     def _seed(self, start: str) -> None:
-        """What the columns move at once: parameters, constants, places of taps, starts."""
-        model, number = self.structure.model, {column: c for c, column in enumerate(self.columns)}
-        moves = self.structure.starting(start).moves if self.columns else ()
-        for known, column in moves:
-            if known.kind == "state":
-                self._begun.add((known, column))
+        """Note what the columns move directly: parameters, constants, delays, starts."""
+        model = self.structure.model
+        number = {column: c for c, column in enumerate(self.columns)}
+        moves = self.structure.start_code(start).moves if self.columns else ()
+        for moved, column in moves:
+            if moved.kind == "state":
+                self._start_moves.add((moved, column))
             elif column in number:
-                by = self._by.setdefault(known, {})
-                by[number[column]] = Term(slot=(known, column))
+                by = self._by.setdefault(moved, {})
+                by[number[column]] = Term(factor=(moved, column))
         taps = taps_of(model, self.structure.signals)
         for part in self.structure.facts.parts:
             i, prefix = part.part, model.prefix(part.part)
             for path in floats_of(model.parts[i].parameters):
                 if f"{prefix}{path}" in number:
-                    self._by[Stored(i, "p", path)] = {number[f"{prefix}{path}"]: Term()}
-            for tap in (each for each in taps if each.part == i):
-                column, known = f"{prefix}{tap.tap.delay}", Stored(i, "fraction", str(tap.number))
-                if tap.tap.delay and column in number:
-                    self._by[known] = {number[column]: Term(slot=(known, column))}
+                    self._by[SignalId(i, "p", path)] = {number[f"{prefix}{path}"]: Term()}
+            for tap in taps:
+                column = f"{prefix}{tap.tap.delay}"
+                if tap.part == i and tap.tap.delay and column in number:
+                    fraction = SignalId(i, "fraction", str(tap.number))
+                    self._by[fraction] = {number[column]: Term(factor=(fraction, column))}
             for column in self.columns:
                 for path in started_by(model, i, column):
-                    self._begun.add((Stored(i, "state", path), column))
+                    self._start_moves.add((SignalId(i, "state", path), column))
 
-    def _terms(self, result: Stored, c: int) -> list[Term]:
+    def _terms(self, result: SignalId, c: int) -> list[Term]:
         """What a derivative by a column is the sum of."""
         if result in self._by:
             return [self._by[result][c]] if c in self._by[result] else []
@@ -158,15 +177,16 @@ class Layout:
             if c in self._by.get(by, ())
         ]
 
-    def _sum(self, terms: list[Term], whole: bool = False) -> Term:
-        """A sum of terms as one that needs no slot: there already, or of a row that is made.
+    def _sum(self, terms: list[Term], as_row: bool = False) -> Term:
+        """A sum of terms as one term: the only one itself if it will do, or a new row.
 
-        With `whole` it is a row without a factor.
+        With `as_row` it is a row without a number that multiplies it.
         """
-        if len(terms) == 1 and terms[0].slot is None:
-            rows, scale, _ = only = terms[0]
-            if len(rows) < 2 and (not whole or (rows and scale == 1.0)):
-                return only
+        if len(terms) == 1 and terms[0].factor is None:
+            term = terms[0]
+            is_row = len(term.rows) == 1 and term.scale == 1.0
+            if is_row or (len(term.rows) < 2 and not as_row):
+                return term
         if not terms or terms == [Term((), terms[0].scale)]:
             return Term((self._value(terms[0].scale if terms else 0.0),))
         return Term((self._make(terms),))
@@ -182,68 +202,75 @@ class Layout:
         todo: list[Todo] = []
         for group in part.groups:
             todo += self._group(group)
-        for signal, state in part.behind.items():
+        for signal, state in part.next_state_of.items():
             by = self._by[state].items()
             self._by[signal] = {c: Term((term.rows[0] + 1,)) for c, term in by}
         since = len(self._sums)
         for signal in part.needed:
-            found = {c: self._terms(signal, c) for c in range(len(self.columns))}
-            self._by[signal] = {c: self._sum(terms) for c, terms in found.items() if terms}
-        return todo + self._made(since)
+            derivatives = {c: self._terms(signal, c) for c in range(len(self.columns))}
+            self._by[signal] = {c: self._sum(terms) for c, terms in derivatives.items() if terms}
+        return todo + self._combined(since)
 
-    def _made(self, since: int) -> list[Todo]:
-        """Have the rows made that are new since then."""
-        return [(COMBINE, since, len(self._sums), 0)] if len(self._sums) > since else []
+    def _combined(self, since: int) -> list[Todo]:
+        """Have the rows computed that are new since then."""
+        if len(self._sums) == since:
+            return []
+        return [(COMBINE, since, len(self._sums), 0)]
 
     def _group(self, group: Group) -> list[Todo]:
         """Columns of a recurrence, and rows that they need, if there are any."""
-        since, begin = len(self._sums), len(self._lanes)
-        found: list[list[tuple[int, int, int]]] = []
-        made: dict[Stored, dict[int, Term]] = {state: {} for state in group.states}
+        since = len(self._sums)
+        begin = len(self._lanes)
+        columns: list[list[tuple[int, int, int]]] = []
+        """Of each column and state: rows of input and result, and the index of the tangent."""
+        derivatives: dict[SignalId, dict[int, Term]] = {state: {} for state in group.states}
         for c, column in enumerate(self.columns):
-            terms = [self._terms(state, c) for state in group.states]
-            if any(terms) or any((state, column) in self._begun for state in group.states):
-                found.append([])
-                for state, each in zip(group.states, terms, strict=True):
-                    row, taken = self._sum(each, whole=True).rows[0], self._row()
-                    self.places[state, column] = self.tangents
-                    found[-1].append((row, taken, self.tangents))
-                    made[state][c] = Term((taken,))
+            inputs = [self._terms(state, c) for state in group.states]
+            if any(inputs) or any((state, column) in self._start_moves for state in group.states):
+                columns.append([])
+                for state, terms in zip(group.states, inputs, strict=True):
+                    row = self._sum(terms, as_row=True).rows[0]
+                    result = self._row()
+                    self.tangent_of[state, column] = self.tangents
+                    columns[-1].append((row, result, self.tangents))
+                    derivatives[state][c] = Term((result,))
                     self.tangents += 1
-        self._by |= made
-        if not found:
+        self._by |= derivatives
+        if not columns:
             return []
         idle = [(self._value(0.0), 0, 0)] * len(group.states)
-        found += [idle] * (-len(found) % interleaved(len(group.states)))
+        columns += [idle] * (-len(columns) % interleaved(len(group.states)))
         self._lanes += group.factors
-        for lanes in zip(*found, strict=True):
-            self._lanes += [place for each in zip(*lanes, strict=True) for place in each]
-        return [*self._made(since), (RECUR, group.piece, begin, len(self._lanes))]
+        for lanes in zip(*columns, strict=True):
+            for offsets in zip(*lanes, strict=True):
+                self._lanes += offsets
+        return [*self._combined(since), (RECUR, group.kernel, begin, len(self._lanes))]
 
     def _observed(self, number: int, integrals: list[Todo]) -> tuple[int, list[list[Term]]]:
         """Row of an observed signal, and what its derivatives are."""
-        place, integral = self.structure.observed[number]
-        value = self.structure.facts.row_of[place]
-        seen = [self._terms(place, c) for c in range(len(self.columns))]
-        if not integral:
-            return value, seen
-        since, begun = len(self._sums), sum(what == INTEGRATE for what, *_ in integrals)
-        rows = [self._make(terms) if terms else 0 for terms in ([Term((value,))], *seen)]
-        integrals += self._made(since)
-        integrals += [(INTEGRATE, row, begun + k, 0) for k, row in enumerate(filter(None, rows))]
+        signal, is_integral = self.structure.observed[number]
+        value = self.structure.facts.row_of[signal]
+        derivatives = [self._terms(signal, c) for c in range(len(self.columns))]
+        if not is_integral:
+            return value, derivatives
+        since = len(self._sums)
+        earlier = sum(what == INTEGRATE for what, *_ in integrals)
+        rows = [self._make(terms) if terms else 0 for terms in ([Term((value,))], *derivatives)]
+        integrals += self._combined(since)
+        integrals += [(INTEGRATE, row, earlier + k, 0) for k, row in enumerate(filter(None, rows))]
         return rows[0], [[Term((row,))] if row else [] for row in rows[1:]]
 
 
 @generating
 def layout_of(
     structure: Structure, columns: tuple[str, ...], observed: tuple[int, ...], start: str
-) -> Layout:
+) -> JacobianLayout:
     """What to do in every block for some columns: paths of parameters, and ``start.`` of a state.
 
     `observed` says for each observation which of the structure's observed signals it is, and
     `start` where the record begins.
     """
-    return Layout(structure, columns, observed, start)
+    return JacobianLayout(structure, columns, observed, start)
 
 
 def started_by(model: Model, part: int, column: str) -> tuple[str, ...]:

@@ -25,7 +25,7 @@ from swashplate.equations.code_generation.functions import Function
 from swashplate.equations.code_generation.printing import (
     BRANCHING,
     PYTHON,
-    Block,
+    CodeBlock,
     assigned,
     function_source,
     indented,
@@ -34,24 +34,25 @@ from swashplate.equations.code_generation.scheduling import Flat
 from swashplate.equations.code_generation.values import Value, leaves
 from swashplate.equations.fields import floats_of
 from swashplate.equations.graph import Node, names_in
-from swashplate.equations.marching.part import PartCode, Stored
-from swashplate.equations.marching.pieces import PIECE
-from swashplate.equations.model import Model, Source
+from swashplate.equations.marching.kernels import KERNEL_ARGUMENTS
+from swashplate.equations.marching.part_code import PartCode, SignalId
+from swashplate.equations.model import Model, SignalSource
 from swashplate.errors import InputError
 
 _OWN = """
 n m j c lane first last worst h half value error total count size used progress values lines
-whole fraction params given constants states out flags records before measured weight outputs flat
-inputs table kept tangent lanes columns program plan sink room block met machine volts current speed
-at everything voltage target counts coming cost rate integral shown choose width
+delay_samples delay_fraction params given constants states out flags records before measured weight
+outputs flat inputs table kept tangent lanes columns program plan sink room block
+worst_margin lower context volts current speed at everything voltage target counts coming cost rate
+integral shown choose width
 """
 RESERVED = {*_OWN.split(), *(name for name in vars(math) if not name.startswith("_"))}
 """Names that the kernels use themselves."""
-MACHINE = [
+CONTEXT_FIELDS = [
     "inputs",
     "lines",
-    "whole",
-    "fraction",
+    "delay_samples",
+    "delay_fraction",
     "params",
     "given",
     "h",
@@ -59,13 +60,13 @@ MACHINE = [
     "states",
     "outputs",
 ]
-"""What a step takes from a `Machine`."""
+"""What a step takes from a `StepContext`."""
 
 
-class Sampler:
+class SampleCode:
     """One sample of a whole model: the code of its parts, and what of it is needed.
 
-    `wanted` are numbers that are kept at every sample; parts that none of them needs are left out.
+    `outputs` are numbers that are kept at every sample; parts that none of them needs are left out.
 
     Attributes
     ----------
@@ -73,7 +74,7 @@ class Sampler:
         All parts, and those that are needed.
     ends, carried : list
         Of each part the results that are needed, and the paths of the states.
-    sources : dict of Source to Node
+    sources : dict of SignalSource to Node
         Signals that other parts or links need.
     functions : dict of str to Function
         Generated functions that what was printed calls.
@@ -84,21 +85,27 @@ class Sampler:
         model: Model,
         signals: Sequence[str],
         options: Sequence[Any],
-        wanted: Sequence[Stored],
+        outputs: Sequence[SignalId],
     ) -> None:
-        self.model, self.signals = model, tuple(signals)
-        taken = {*RESERVED, *self.signals, *(f"{each}_before" for each in self.signals)}
-        self.parts = [PartCode(model, i, signals, each, taken) for i, each in enumerate(options)]
+        self.model = model
+        self.signals = tuple(signals)
+        taken = {*RESERVED, *self.signals, *(f"{signal}_before" for signal in self.signals)}
+        self.parts = [
+            PartCode(model, i, signals, options_of_part, taken)
+            for i, options_of_part in enumerate(options)
+        ]
         self.ends: list[list[Node]] = [[] for _ in self.parts]
         self.carried: list[list[str]] = [[] for _ in self.parts]
-        self.sources: dict[Source, Node] = {}
+        self.sources: dict[SignalSource, Node] = {}
         self.functions: dict[str, Function] = {}
-        for each in wanted:
-            if each.kind == "link":
-                self._need(model.links[each.path].sources)
+        for output in outputs:
+            part = self.parts[output.part]
+            if output.kind == "link":
+                self._need(model.links[output.path].sources)
+            elif output.kind == "limits":
+                self.ends[output.part] += part.limits
             else:
-                part = self.parts[each.part]
-                self.ends[each.part] += part.limits if each.kind == "limits" else [part.node(each)]
+                self.ends[output.part].append(part.node(output))
         for part in reversed(self.parts):
             if self.ends[part.part]:
                 self._settle(part)
@@ -119,25 +126,27 @@ class Sampler:
         self.carried[part.part] = [path for path in state if path in carried]
         for name in part.own.input_types:
             link = self.model.link_of(part.part, name)
-            if link is not None and any(part.source(each) in read for each in link.sources):
+            if link is not None and any(part.source(source) in read for source in link.sources):
                 self._need(link.sources)
 
-    def _need(self, sources: Sequence[Source]) -> None:
-        for source in (each for each in sources if each not in self.sources):
-            node = self.sources[source] = self.parts[source.part].signal(source.signal)
-            self.ends[source.part].append(node)
+    def _need(self, sources: Sequence[SignalSource]) -> None:
+        for source in sources:
+            if source not in self.sources:
+                node = self.parts[source.part].signal(source.signal)
+                self.sources[source] = node
+                self.ends[source.part].append(node)
 
-    def outside(self) -> dict[str, Stored]:
-        """What is known ahead of a sample, by name: numbers, the state, places and records."""
-        known = {"h": Stored(0, "h")}
+    def outside(self) -> dict[str, SignalId]:
+        """What is known ahead of a sample, by name: numbers, the state, delays and records."""
+        ids = {"h": SignalId(0, "h")}
         for part in self.used:
             i = part.part
             for kind, value in (("p", part.p), ("given", part.given), ("state", part.state)):
-                known |= {node.value: Stored(i, kind, path) for path, node in leaves(value)}
-            known |= part.outside
+                ids |= {node.value: SignalId(i, kind, path) for path, node in leaves(value)}
+            ids |= part.outside
             for tap in part.taps:
-                known[part.fraction(tap)] = Stored(i, "fraction", str(tap.number))
-        return known
+                ids[part.delay_fraction(tap)] = SignalId(i, "fraction", str(tap.number))
+        return ids
 
     def module(self, *texts: str) -> str:
         """Text of a module of some functions, with the generated ones that they call."""
@@ -162,15 +171,15 @@ class Sampler:
         named: bool = False,
         flat: Flat | None = None,
         branches: bool = True,
-    ) -> Block:
-        """Lines that compute some nodes of a part; `hints` are names for some, see `Block`.
+    ) -> CodeBlock:
+        """Lines that compute some nodes of a part; `hints` are names for some, see `CodeBlock`.
 
         Choices are not branches with `flat`, for loops of vector instructions, or if there are to
         be none but those that save work.
         """
         labels = {**part.trace.labels, **(hints or {})}
         language = BRANCHING if branches and flat is None else PYTHON
-        block = Block(
+        block = CodeBlock(
             results, labels, part.taken, known=known, named=named, flat=flat, language=language
         )
         self.functions |= block.functions
@@ -200,112 +209,131 @@ class Sampler:
             if node.value in read
         ]
 
-    def places(self, part: PartCode) -> list[str]:
-        """Lines that take the places of a part's taps from arrays."""
+    def delays(self, part: PartCode) -> list[str]:
+        """Lines that take the delays of a part's taps from arrays."""
         return [
             f"{name} = {array}[{tap.number}]"
             for tap in part.taps
-            for name, array in ((part.whole(tap), "whole"), (part.fraction(tap), "fraction"))
+            for name, array in (
+                (part.delay_samples(tap), "delay_samples"),
+                (part.delay_fraction(tap), "delay_fraction"),
+            )
         ]
 
     def fetched(
         self, part: PartCode, past: Callable[[str, str], str], now: Callable[[str], str]
     ) -> list[str]:
         """Lines that read a part's inputs: what a signal was some samples ago, and what it is."""
-        lines, read = [], self.read(part)
+        lines = []
+        read = self.read(part)
         for tap in part.taps:
             for j, name in enumerate(part.tap_samples(tap)):
                 if name in read:
-                    back = f"{part.whole(tap)} + {j}" if j else part.whole(tap)
+                    back = f"{part.delay_samples(tap)} + {j}" if j else part.delay_samples(tap)
                     lines.append(f"{name} = {past(tap.tap.signal, back)}")
         inputs = [part.own.tap(name).signal for name in part.own.input_types]
-        known = [each for each in dict.fromkeys(inputs) if each in self.signals]
-        return lines + [f"x_{each} = {now(each)}" for each in known if f"x_{each}" in read]
+        lines += [
+            f"x_{signal} = {now(signal)}"
+            for signal in dict.fromkeys(inputs)
+            if signal in self.signals and f"x_{signal}" in read
+        ]
+        return lines
 
     def body(
         self,
         part: PartCode,
-        places: Mapping[Stored, str],
+        targets: Mapping[SignalId, str],
         known: Mapping[Node, str],
-        more: Mapping[Stored, str] = MappingProxyType({}),
+        further: Mapping[SignalId, str] = MappingProxyType({}),
     ) -> Sampled:
         """A part's sample, with signals that other parts need and what is kept.
 
-        `places` are the texts of where numbers are kept, and `more` of those that are kept if
-        ``everything`` is; limits are one, a bit for each. `known` nodes have names already.
+        `targets` are the texts of where numbers are kept, and `further` of those that are kept if
+        ``everything`` is; limits are one number, a bit for each. `known` nodes have names already.
         """
-        own = [(source, n) for source, n in self.sources.items() if source.part == part.part]
+        sources = {
+            source: node for source, node in self.sources.items() if source.part == part.part
+        }
         steps = dict(leaves(part.following))
         margin = [] if part.margin is None else [part.margin]
-        kept = [each for each in places if each.part == part.part and each.kind != "link"]
-        results = [node for _, node in own] + margin
-        results += [node for each in kept for node in self.kept_nodes(part, each)]
+        outputs = [
+            output for output in targets if output.part == part.part and output.kind != "link"
+        ]
+        results = [*sources.values(), *margin]
+        results += [node for output in outputs for node in self.kept_nodes(part, output)]
         results += [steps[path] for path in self.carried[part.part]]
         block = self.printed(part, results, known=known)
         texts = iter(block.texts)
         lines = block.lines
-        lines += [f"{part.source(source)} = {next(texts)}" for source, _ in own]
+        lines += [f"{part.source(source)} = {next(texts)}" for source in sources]
         margin_name = part.fresh("margin") if margin else ""
         if margin:
             lines += assigned(margin_name, next(texts))
-        for each in kept:
-            lines += self.stored(part, each, places[each], texts)
+        for output in outputs:
+            lines += self.stored(part, output, targets[output], texts)
         following = [*texts]
         known = {**known, **block.names}
-        links = [each for each in places if each.part == part.part and each.kind == "link"]
-        lines += self.kept_lines(part, links, places, known)
-        later = [each for each in more if each.part == part.part]
+        links = [output for output in targets if output.part == part.part and output.kind == "link"]
+        lines += self.kept_lines(part, links, targets, known)
+        later = [output for output in further if output.part == part.part]
         if later:
-            lines += ["if everything:", *indented(self.kept_lines(part, later, more, known))]
+            lines += ["if everything:", *indented(self.kept_lines(part, later, further, known))]
         return Sampled(lines, margin_name, following)
 
     def kept_lines(
         self,
         part: PartCode,
-        kept: Sequence[Stored],
-        places: Mapping[Stored, str],
+        outputs: Sequence[SignalId],
+        targets: Mapping[SignalId, str],
         known: Mapping[Node, str],
     ) -> list[str]:
-        """Lines that keep some numbers of a part, behind its sample."""
-        nodes = [node for each in kept for node in self.kept_nodes(part, each)]
+        """Lines that keep some numbers of a part, after its sample."""
+        nodes = [node for output in outputs for node in self.kept_nodes(part, output)]
         # nothing waits for these, and branches take long to compile
         block = self.printed(part, nodes, known=known, branches=False)
-        lines, texts = block.lines, iter(block.texts)
-        for each in kept:
-            lines += self.stored(part, each, places[each], texts)
+        lines = block.lines
+        texts = iter(block.texts)
+        for output in outputs:
+            lines += self.stored(part, output, targets[output], texts)
         return lines
 
-    def kept_nodes(self, part: PartCode, stored: Stored) -> list[Node]:
+    def kept_nodes(self, part: PartCode, stored: SignalId) -> list[Node]:
         """What a number that is kept is made of: limits of a bit each."""
         return part.limits if stored.kind == "limits" else [self.observed(part, stored)]
 
-    def stored(self, part: PartCode, stored: Stored, place: str, texts: Iterator[str]) -> list[str]:
+    def stored(
+        self, part: PartCode, stored: SignalId, target: str, texts: Iterator[str]
+    ) -> list[str]:
         """Lines that keep a number, from the texts of what it is made of."""
         if stored.kind != "limits":
-            return assigned(place, next(texts))
+            return assigned(target, next(texts))
         bits = [f"choose({next(texts)}, {1 << k}, 0)" for k in range(len(part.limits))]
-        return assigned(place, " | ".join(bits))
+        return assigned(target, " | ".join(bits))
 
-    def observed(self, part: PartCode, stored: Stored) -> Node:
+    def observed(self, part: PartCode, stored: SignalId) -> Node:
         """A number that is kept, of what is known at its part's end."""
         if stored.kind != "link":
             return part.node(stored)
         link = self.model.links[stored.path]
         sources: dict[str, Value] = {
-            each.signal: graph.name(part.source(each)) for each in link.sources
+            source.signal: graph.name(part.source(source)) for source in link.sources
         }
         assert link.equation is not None
         return part.link(link.equation, link.name, sources)
 
     def states(self, part: PartCode, steps: Sequence[str]) -> States:
         """How a part's state is taken out of a flat array, to the next sample, and back."""
-        carried, places = self.carried[part.part], self.model.places("state")
-        names = dict(leaves(part.state))
-        own = [names[path].value for path in carried]
+        carried = self.carried[part.part]
+        places = self.model.places("state")
+        nodes = dict(leaves(part.state))
+        names = [nodes[path].value for path in carried]
         flat = [f"states[{places.index((part.part, path))}]" for path in carried]
-        step = assigned(", ".join(own), ", ".join(steps)) if carried else []
-        pairs = [*zip(own, flat, strict=True)]
-        return States([f"{a} = {b}" for a, b in pairs], step, [f"{b} = {a}" for a, b in pairs])
+        pairs = [*zip(names, flat, strict=True)]
+        return States(
+            load=[f"{name} = {element}" for name, element in pairs],
+            step=assigned(", ".join(names), ", ".join(steps)) if carried else [],
+            save=[f"{element} = {name}" for name, element in pairs],
+        )
 
 
 class Sampled(NamedTuple):
@@ -326,37 +354,37 @@ class States(NamedTuple):
     save: list[str]
 
 
-def lower(one: Node, two: Node) -> Node:
-    """The lower of two margins; not a number once one of them was none."""
-    test = graph.either(graph.make("<=", one, two), graph.make("!=", one, one))
-    return graph.choose(test, one, two)
+def lower(a: Node, b: Node) -> Node:
+    """The lower of two margins; not a number if one of them is not."""
+    test = graph.either(graph.make("<=", a, b), graph.make("!=", a, a))
+    return graph.choose(test, a, b)
 
 
 def march_source(
     model: Model,
     signals: Sequence[str],
     options: Sequence[Any],
-    places: Mapping[Stored, str],
-    more: Mapping[Stored, str] = MappingProxyType({}),
+    targets: Mapping[SignalId, str],
+    further: Mapping[SignalId, str] = MappingProxyType({}),
 ) -> str:
-    """Text of a module with the march over samples as a `piece`.
+    """Text of a module with the march over samples as a `kernel`.
 
-    `places` says what is kept, and where it goes at sample ``n``; `more` what is kept, too, if the
-    second number of ``met`` is not zero.
+    `targets` says what is kept, and where it goes at sample ``n``; `further` what is kept, too, if
+    the second number of ``worst_margin`` is not zero.
     """
-    sampler = Sampler(model, signals, options, [*places, *more])
-    parts = sampler.used
+    sample_code = SampleCode(model, signals, options, [*targets, *further])
+    parts = sample_code.used
     lines, saved, samples = ["last = first + count"], list[str](), list[list[str]]()
-    for k, signal in enumerate(sampler.signals):
+    for k, signal in enumerate(sample_code.signals):
         lines += [f"{signal} = records[{k}]", f"{signal}_before = before[{k}]"]
-    lines += ["everything = met[1] != 0.0"] if more else []
+    lines += ["everything = worst_margin[1] != 0.0"] if further else []
     for part in parts:
-        ahead, known = sampler.ahead(part, sampler.ends[part.part])
-        sample = sampler.body(part, places, known, more)
-        states = sampler.states(part, sample.following)
-        lines += [*sampler.places(part), *ahead, *states.load]
+        ahead, known = sample_code.ahead(part, sample_code.ends[part.part])
+        sample = sample_code.body(part, targets, known, further)
+        states = sample_code.states(part, sample.following)
+        lines += [*sample_code.delays(part), *ahead, *states.load]
         saved += states.save
-        fetched = sampler.fetched(
+        fetched = sample_code.fetched(
             part,
             lambda signal, back: f"{signal}[n - ({back})] if n >= {back} else {signal}_before",
             lambda signal: f"{signal}[n]",
@@ -368,8 +396,9 @@ def march_source(
         samples.append([*inner, *states.step])
     margins = any(part.margin is not None for part in parts)
     lines += ["worst, total = inf, 0.0"] if margins else []
-    passed = [parts[-1].source(each) for each in sampler.sources if each.part != parts[-1].part]
-    if passed and any(sampler.carried[part.part] for part in parts[:-1]):
+    last = parts[-1]
+    passed = [last.source(source) for source in sample_code.sources if source.part != last.part]
+    if passed and any(sample_code.carried[part.part] for part in parts[:-1]):
         # the last part is a sample behind the others, so that neither waits for the other
         late = re.compile(rf"\b({'|'.join(passed)})\b")
         lines += [*(f"{name} = 0.0" for name in passed), "for m in range(first, last + 1):"]
@@ -384,44 +413,49 @@ def march_source(
         # a sum is no number once a margin was none
         lines += [
             "worst = worst if total == total or worst <= 0.0 else total",
-            "met[0] = worst if worst < met[0] or worst != worst else met[0]",
+            "lower = worst < worst_margin[0] or worst != worst",
+            "worst_margin[0] = worst if lower else worst_margin[0]",
         ]
     says = f"March {model.name} over its inputs."
-    return sampler.module(function_source(f"march({PIECE})", says, lines, ""))
+    return sample_code.module(function_source(f"march({KERNEL_ARGUMENTS})", says, lines, ""))
 
 
 def step_source(
-    model: Model, signals: Sequence[str], options: Sequence[Any], stored: Sequence[Stored]
+    model: Model, signals: Sequence[str], options: Sequence[Any], stored: Sequence[SignalId]
 ) -> tuple[str, int]:
     """Text of a module of one sample, for steppers and loops, and how many constants it has.
 
-    ``prepare(params, given, h, constants)`` computes constants once. ``step(machine)`` shifts the
+    ``prepare(params, given, h, constants)`` computes constants once. ``step(context)`` shifts the
     newest inputs into the delay lines (a row for each signal, newest first), fills the outputs with
     the numbers of this sample in the order of `stored`, takes the states to the next one, and
     returns the margin of the domain.
     """
-    sampler = Sampler(model, signals, options, stored)
-    row = sampler.signals.index
-    tapped = sorted({row(tap.tap.signal) for part in sampler.used for tap in part.taps})
-    lines = [f"{each} = machine.{each}" for each in MACHINE]
+    sample_code = SampleCode(model, signals, options, stored)
+    row = sample_code.signals.index
+    tapped = sorted({row(tap.tap.signal) for part in sample_code.used for tap in part.taps})
+    lines = [f"{name} = context.{name}" for name in CONTEXT_FIELDS]
     prepare, ends, count = list[str](), ["worst = inf"], 0
     if tapped:
         lines += ["for j in range(lines.shape[1] - 1, 0, -1):"]
         lines += [f"    lines[{k}, j] = lines[{k}, j - 1]" for k in tapped]
         lines += [f"lines[{k}, 0] = inputs[{k}]" for k in tapped]
-    places = {each: f"outputs[{k}]" for k, each in enumerate(stored)}
-    for part in sampler.used:
-        ends_of_part = sampler.ends[part.part]
-        ahead, known = sampler.ahead(part, ends_of_part)
+    targets = {signal: f"outputs[{k}]" for k, signal in enumerate(stored)}
+    for part in sample_code.used:
+        ends_of_part = sample_code.ends[part.part]
+        ahead, known = sample_code.ahead(part, ends_of_part)
         prepare += ahead
         for node in part.ahead(ends_of_part):
             prepare.append(f"constants[{count}] = {known[node]}")
             lines.append(f"{known[node]} = constants[{count}]")
             count += 1
-        sample = sampler.body(part, places, known)
-        states = sampler.states(part, sample.following)
-        lines += [*sampler.places(part), *sampler.given(part, sampler.read(part)), *states.load]
-        lines += sampler.fetched(
+        sample = sample_code.body(part, targets, known)
+        states = sample_code.states(part, sample.following)
+        lines += [
+            *sample_code.delays(part),
+            *sample_code.given(part, sample_code.read(part)),
+            *states.load,
+        ]
+        lines += sample_code.fetched(
             part,
             lambda signal, back: f"lines[{row(signal)}, {back}]",
             lambda signal: f"inputs[{row(signal)}]",
@@ -429,28 +463,28 @@ def step_source(
         lines += sample.lines
         if sample.margin:
             lowest = lower(graph.name("worst"), graph.name(sample.margin))
-            compared = sampler.printed(part, [lowest])
+            compared = sample_code.printed(part, [lowest])
             ends += [*compared.lines, f"worst = {compared.texts[0]}"]
         ends += [*states.step, *states.save]
     head, says = "prepare(params, given, h, constants)", f"Constants of {model.name}."
     prepared = function_source(head, says, [*prepare, "return"])
     says, lines = f"One sample of {model.name}.", [*lines, *ends, "return worst"]
-    stepped = function_source("step(machine)", says, lines, "@inlined")
-    return sampler.module(prepared, stepped), count
+    stepped = function_source("step(context)", says, lines, "@inlined")
+    return sample_code.module(prepared, stepped), count
 
 
-def output_of(model: Model, output: str) -> tuple[Stored, bool]:
+def output_of(model: Model, output: str) -> tuple[SignalId, bool]:
     """Where a signal comes from, and whether it is that signal's integral."""
     integral = output in model.integrals
     name = model.integrals[output] if integral else output
     if name in model.links:
-        return Stored(model.links[name].after, "link", name), integral
+        return SignalId(model.links[name].after, "link", name), integral
     for i in range(len(model.parts) - 1, -1, -1):
-        own = model.parts[i]
-        if own.signals is not None and name in floats_of(own.signals):
-            return Stored(i, "signals", name), integral
-        if name in floats_of(own.state):
-            return Stored(i, "state", name), integral
+        part = model.parts[i]
+        if part.signals is not None and name in floats_of(part.signals):
+            return SignalId(i, "signals", name), integral
+        if name in floats_of(part.state):
+            return SignalId(i, "state", name), integral
     known = [name for part in model.parts for name in part.signal_names]
     raise InputError(
         f"{model.name} has no signal '{output}'; it has "

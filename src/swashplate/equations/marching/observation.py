@@ -9,7 +9,7 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swashplate.equations.marching.pieces import Struct
+from swashplate.equations.marching.kernels import Struct
 from swashplate.equations.marching.record import Record, column
 from swashplate.equations.marching.rows import Plan
 from swashplate.equations.marching.run import Start, check_start
@@ -78,7 +78,7 @@ class Observation:
         return f"Observation({self.signal!r}, {np.size(self.time)} samples)"
 
 
-class Own(NamedTuple):
+class RunValues(NamedTuple):
     """Values of what belongs to one experiment alone, not to the machine."""
 
     start: Mapping[str, float] = MappingProxyType({})
@@ -93,7 +93,8 @@ class ObservedRecord:
 
     record: Record
     observations: Sequence[Observation]
-    driven_by: str = "voltage"  # The signal that the record is of.
+    driven_by: str = "voltage"
+    """The signal that the record is of."""
     start: Start = "rest"
     others: Mapping[str, Array] = field(default_factory=dict)
     """Further signals from outside, on the grid of the record."""
@@ -113,19 +114,22 @@ class ObservedRecord:
     @property
     def records(self) -> dict[str, Array]:
         """All signals from outside, on the grid, by name."""
-        found = {self.driven_by: self.record.values, **self.others}
+        signals = {self.driven_by: self.record.values, **self.others}
         # the kernels are compiled for arrays that can be written to
-        return {name: np.require(v, np.float64, ["C", "W"]) for name, v in found.items()}
+        return {name: np.require(v, np.float64, ["C", "W"]) for name, v in signals.items()}
 
     @property
     def own_columns(self) -> tuple[str, ...]:
         """Labels of the observations' free offsets, in the order of their columns."""
-        seen = enumerate(self.observations)
-        return tuple(f"offset of {each.signal} [{r}]" for r, each in seen if each.free_offset)
+        return tuple(
+            f"offset of {observation.signal} [{r}]"
+            for r, observation in enumerate(self.observations)
+            if observation.free_offset
+        )
 
     @cached_property
     def _first(self) -> Indices:
-        sizes = [np.size(each.time) for each in self.observations]
+        sizes = [np.size(observation.time) for observation in self.observations]
         return np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
 
     @property
@@ -142,42 +146,45 @@ class ObservedRecord:
         """Lowest and highest value of the record. [V or A]"""
         return float(self.record.values.min()), float(self.record.values.max())
 
-    def offsets(self, given: Sequence[float]) -> Array:
-        """(r,) offset of each observation, 0 if none is given.
+    def offsets(self, offsets: Sequence[float]) -> Array:
+        """(r,) offset of each observation as an array, zeros if there are no `offsets`.
 
         An `InputError` says if there are not as many as observations.
         """
         count = len(self.observations)
-        if len(given) not in (0, count) or not np.isfinite(given).all():
+        if len(offsets) not in (0, count) or not np.isfinite(offsets).all():
             raise InputError(
                 f"There are {count} observations, which need as many finite offsets, not "
-                f"{tuple(given)}."
+                f"{tuple(offsets)}."
             )
-        return np.array(given, dtype=np.float64) if len(given) else np.zeros(count)
+        return np.array(offsets, dtype=np.float64) if len(offsets) else np.zeros(count)
 
     def offset_rows(self, first: int) -> Indices:
-        """(r,) row of the derivative by each offset, from `first` on, -1 for those not wanted."""
-        free = np.array([each.free_offset for each in self.observations])
+        """(r,) row of the derivative by each offset, from `first` on; -1 for fixed ones."""
+        free = np.array([observation.free_offset for observation in self.observations])
         return np.where(free, first + np.cumsum(free) - 1, -1).astype(np.int64)
 
     @cached_property
     def plan(self) -> Struct[Plan]:
         """What the march needs to know of the observations."""
-        places = [_cells(self.record, np.asarray(each.time)) for each in self.observations]
-        weights = [np.asarray(each.weight) for each in self.observations]
-        measured = _joined([np.asarray(each.values) for each in self.observations])
+        positions = [_cells(self.record, np.asarray(o.time)) for o in self.observations]
+        weights = [np.asarray(o.weight) for o in self.observations]
+        measured = _joined([np.asarray(o.values) for o in self.observations])
         weight = _joined(weights)
         if not weight.all():
             measured = np.where(weight > 0.0, measured, 0.0)
-        regular = [bool((at == 0.0).all() and (np.diff(cell) == 1).all()) for cell, at in places]
-        cells = [
-            _in_a_row(int(cell[0]), cell.size) if even else cell
-            for (cell, _), even in zip(places, regular, strict=True)
-        ]
-        fractions = [
-            _alike(0.0, at.size) if even else at
-            for (_, at), even in zip(places, regular, strict=True)
-        ]
+        regular: list[bool] = []
+        cells: list[Indices] = []
+        fractions: list[Array] = []
+        for cell, fraction in positions:
+            if (fraction == 0.0).all() and (np.diff(cell) == 1).all():
+                regular.append(True)
+                cells.append(_in_a_row(int(cell[0]), cell.size))
+                fractions.append(_alike(0.0, fraction.size))
+            else:
+                regular.append(False)
+                cells.append(cell)
+                fractions.append(fraction)
         plan = Plan(
             observations=len(regular),
             first=self._first,
@@ -185,7 +192,7 @@ class ObservedRecord:
             fraction=_joined(fractions),
             measured=measured,
             weight=weight,
-            even=np.array([(each == 1.0).all() for each in weights], dtype=np.int64),
+            even=np.array([(weight == 1.0).all() for weight in weights], dtype=np.int64),
             regular=np.array(regular, dtype=np.int64),
         )
         return Struct(plan)
@@ -221,8 +228,8 @@ def every_sample(
 ) -> ObservedRecord:
     """A record under which a signal was observed as zero, at every sample and with weight 1."""
     size = record.values.size
-    seen, plan = _every_sample(signal, record.start, record.rate, record.substeps, size)
-    observed = ObservedRecord(record, (seen,), driven_by, start, others)
+    observation, plan = _every_sample(signal, record.start, record.rate, record.substeps, size)
+    observed = ObservedRecord(record, (observation,), driven_by, start, others)
     observed.__dict__["plan"] = plan
     return observed
 
@@ -232,12 +239,12 @@ def _every_sample(
     signal: str, start: float, rate: float, substeps: int, size: int
 ) -> tuple[Observation, Struct[Plan]]:
     record = Record(np.zeros(size), start, rate, substeps)
-    seen = Observation(signal, record.time, np.zeros(record.time.size))
-    return seen, ObservedRecord(record, (seen,)).plan
+    observation = Observation(signal, record.time, np.zeros(record.time.size))
+    return observation, ObservedRecord(record, (observation,)).plan
 
 
 def _cells(record: Record, time: Array) -> tuple[Indices, Array]:
-    """Where stamps lie on the grid: (m,) point at or before each, how far behind it, in steps."""
+    """Where stamps lie on the grid: (m,) point at or before each, and steps from it."""
     at = (time - record.start) * (record.rate * record.substeps)
     nearest = np.rint(at)
     at = np.where(np.abs(at - nearest) < ON_GRID, nearest, at)

@@ -10,15 +10,15 @@ from swashplate.equations.code_generation.gradients import Derived, derived_func
 from swashplate.equations.code_generation.values import leaves
 from swashplate.equations.graph import Node, names_in, rewritten
 from swashplate.equations.keeping import kept, key_of
-from swashplate.equations.marching.march import Sampler
-from swashplate.equations.marching.part import Stored
+from swashplate.equations.marching.march import SampleCode
+from swashplate.equations.marching.part_code import SignalId
 from swashplate.equations.model import Model
 
 
 class StepDerivatives(NamedTuple):
-    """Next states of a model, then what is seen of it, with their derivatives."""
+    """Next states of a model, then what is outputs of it, with their derivatives."""
 
-    arguments: dict[str, Stored]
+    arguments: dict[str, SignalId]
     """What the function takes, by name."""
     derived: Derived
     """By all states and samples of inputs among them."""
@@ -26,38 +26,45 @@ class StepDerivatives(NamedTuple):
 
 @generating
 def step_derivatives(
-    model: Model, signals: tuple[str, ...], options: tuple[Any, ...], seen: tuple[Stored, ...]
+    model: Model, signals: tuple[str, ...], options: tuple[Any, ...], outputs: tuple[SignalId, ...]
 ) -> StepDerivatives:
-    """A model's next states, then what is `seen`, with their derivatives."""
+    """A model's next states, then its `outputs`, with their derivatives."""
     return kept(
         f"{model.name}_linear",
-        (key_of(model), signals, options, seen),
-        lambda: _derived(model, signals, options, seen),
+        (key_of(model), signals, options, outputs),
+        lambda: _derived(model, signals, options, outputs),
     )
 
 
 def _derived(
-    model: Model, signals: tuple[str, ...], options: tuple[Any, ...], seen: tuple[Stored, ...]
+    model: Model, signals: tuple[str, ...], options: tuple[Any, ...], outputs: tuple[SignalId, ...]
 ) -> StepDerivatives:
     """The same, made of the equations."""
-    states = [Stored(i, "state", path) for i, path in model.places("state")]
-    sampler = Sampler(model, signals, options, [*states, *seen])
-    results, labels = list[Node](), dict[Node, str]()
+    states = [SignalId(i, "state", path) for i, path in model.places("state")]
+    sample_code = SampleCode(model, signals, options, [*states, *outputs])
+    results = list[Node]()
+    labels = dict[Node, str]()
     passed: dict[Node, Node] = {}
     """What the names of signals between parts stand for."""
-    for part in sampler.used:
+    for part in sample_code.used:
         results += rewritten([node for _, node in leaves(part.following)], passed)
-        for source, node in sampler.sources.items():
+        for source, node in sample_code.sources.items():
             if source.part == part.part:
                 passed[graph.name(part.source(source))] = rewritten([node], passed)[0]
         labels |= part.trace.labels
-    for place in seen:
-        results += rewritten([sampler.observed(sampler.parts[place.part], place)], passed)
-    outside = sampler.outside()
-    known = {name: outside[name] for name in sorted(names_in(results) & outside.keys())}
-    by = [name for name, each in known.items() if each.kind in ("state", "tap", "input")]
-    name, says = f"{model.name}_linear", f"Next states and outputs of {model.name}."
-    paths = [(str(k), node) for k, node in enumerate(results)]
-    pairs = [(each, each) for each in by]
-    derived = derived_function(name, says, [*known], paths, pairs, labels, chained=True)
-    return StepDerivatives(known, derived)
+    for signal in outputs:
+        part = sample_code.parts[signal.part]
+        results += rewritten([sample_code.observed(part, signal)], passed)
+    outside = sample_code.outside()
+    arguments = {name: outside[name] for name in sorted(names_in(results) & outside.keys())}
+    by = [name for name, signal in arguments.items() if signal.kind in ("state", "tap", "input")]
+    derived = derived_function(
+        f"{model.name}_linear",
+        f"Next states and outputs of {model.name}.",
+        [*arguments],
+        [(str(k), node) for k, node in enumerate(results)],
+        [(name, name) for name in by],
+        labels,
+        chained=True,
+    )
+    return StepDerivatives(arguments, derived)

@@ -91,8 +91,8 @@ def on_grid(
     if time is None:
         _check_length(size * substeps, f"{size} samples at {rate:g} Hz")
         return {
-            name: Record(_refined(each, between[name], substeps), 0.0, float(rate), substeps)
-            for name, each in columns.items()
+            name: Record(_refined(samples, between[name], substeps), 0.0, float(rate), substeps)
+            for name, samples in columns.items()
         }
     stamps = column(time, "The time")
     if stamps.size != size:
@@ -109,8 +109,8 @@ def on_grid(
             "'linear' (a straight line between them)."
         )
     return {
-        name: gridded(each, stamps, rate, between[name] or "linear", substeps)
-        for name, each in columns.items()
+        name: gridded(samples, stamps, rate, between[name] or "linear", substeps)
+        for name, samples in columns.items()
     }
 
 
@@ -124,24 +124,24 @@ def record_of(
 ) -> Record:
     """A drive's input, `what` by name, on the march's grid: see `on_grid` and `least_substeps`."""
     steps = least_substeps(rate)
-    made = on_grid({what: values}, rate, time=time, interpolation=interpolation, substeps=steps)
-    return made[what]
+    records = on_grid({what: values}, rate, time=time, interpolation=interpolation, substeps=steps)
+    return records[what]
 
 
-def least_substeps(rate: float, wanted: int | None = None) -> int:
-    """Steps a sample that keep a drive's h at or below 1/512 s, or those that are wanted."""
+def least_substeps(rate: float, requested: int | None = None) -> int:
+    """Steps a sample that keep a drive's h at or below 1/512 s, or those that are requested."""
     if not is_real(rate) or not SLOWEST <= rate <= FASTEST:
         shown = f"{rate:g}" if is_real(rate) else repr(rate)
         raise InputError(
             f"The rate is {shown} Hz, but must be between {SLOWEST:g} and {FASTEST:g} Hz."
         )
     least = max(ceil(SOURCE_RATE / rate - 1e-9), 1)
-    if is_real(wanted) and wanted < least:
+    if is_real(requested) and requested < least:
         raise InputError(
-            f"substeps is {wanted}, but at {rate:g} Hz at least {least} are needed to keep the "
+            f"substeps is {requested}, but at {rate:g} Hz at least {least} are needed to keep the "
             "step at or below 1/512 s."
         )
-    return least if wanted is None else wanted
+    return least if requested is None else requested
 
 
 def check_rate(value: float, what: str = "rate", unit: str = "Hz") -> None:
@@ -153,7 +153,7 @@ def check_rate(value: float, what: str = "rate", unit: str = "Hz") -> None:
 def checked_sampling(
     names: Iterable[str], rate: float, interpolation: Between, substeps: int | None
 ) -> tuple[dict[str, Interpolation | None], int]:
-    """What each input is between two samples, and the steps a sample, one where none are said."""
+    """What each input is between two samples, and the steps a sample, one by default."""
     check_rate(rate)
     counts = is_real(substeps) and 1 <= substeps < np.inf and substeps == int(substeps)
     if substeps is not None and not counts:
@@ -164,28 +164,28 @@ def checked_sampling(
             raise InputError(
                 f"interpolation names '{strange}', but the inputs are {', '.join(names)}."
             )
-        found = {name: interpolation.get(name) for name in names}
+        between = {name: interpolation.get(name) for name in names}
     else:
-        found = dict.fromkeys(names, interpolation)
-    for way in found.values():
+        between = dict.fromkeys(names, interpolation)
+    for way in between.values():
         if way not in (None, "linear", "previous"):
             raise InputError(f"interpolation is '{way}'; it is 'linear' or 'previous'.")
-    return found, int(substeps or 1)
+    return between, int(substeps or 1)
 
 
 def column(values: ArrayLike, what: str, *, finite: bool = True) -> Array:
     """A copy of one column of real numbers; an `InputError` names by `what` anything else."""
     try:
-        given = np.asarray(values)
+        array = np.asarray(values)
     except ValueError:  # rows of different lengths
-        given = np.array("")
-    if given.dtype.kind not in "fiub":
+        array = np.array("")
+    if array.dtype.kind not in "fiub":
         raise InputError(f"{what} must be a sequence of real numbers.")
-    if given.ndim != 1:
-        raise InputError(f"{what} must be one column, not {given.ndim}-dimensional.")
-    if given.size == 0:
+    if array.ndim != 1:
+        raise InputError(f"{what} must be one column, not {array.ndim}-dimensional.")
+    if array.size == 0:
         raise InputError(f"{what} is empty.")
-    data = np.array(given, dtype=np.float64, order="C")  # not changed with the user's array
+    data = np.array(array, dtype=np.float64, order="C")  # not changed with the user's array
     # one pass: a sum is finite if and only if no sample is NaN or infinite, overflow apart
     with np.errstate(all="ignore"):
         total = data.sum()
@@ -222,8 +222,8 @@ def gridded(
     if interpolation == "linear":
         return Record(np.interp(fine, stamps, data), start, float(rate), substeps)
     # a stamp counts from the grid point that it falls on, rounding errors apart
-    seen = np.searchsorted(stamps, fine + 1e-9 / rate, side="right") - 1
-    return Record(data[seen], start, float(rate), substeps)
+    last = np.searchsorted(stamps, fine + 1e-9 / rate, side="right") - 1
+    return Record(data[last], start, float(rate), substeps)
 
 
 def _refined(data: Array, interpolation: Interpolation | None, substeps: int) -> Array:

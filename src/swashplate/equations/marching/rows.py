@@ -15,14 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.equations.code_generation.functions import generating
-from swashplate.equations.marching.pieces import (
+from swashplate.equations.marching.kernels import (
     Struct,
     behind,
-    call,
+    call_kernel,
     call_recurrence,
     fields_of,
     routine,
-    run,
+    run_routine,
 )
 
 Array = NDArray[np.float64]
@@ -35,31 +35,42 @@ STRIDE = BLOCK + 16
 room before and behind a row for the samples next to the block."""
 
 
-# Routines read these named tuples as structs (see `pieces.Struct`), whose arrays do not know their
+# Routines read these named tuples as structs (see `kernels.Struct`), whose arrays do not know their
 # shapes.
 
 
 class Program(NamedTuple):
     """What is done in every block, in order, and what is observed then."""
 
-    steps: int  # Rows of `todo`: w.
+    steps: int
+    """Rows of `todo`: w."""
     todo: Indices
     """(w, 4) in each row one of
 
-    - CALL, number of a piece: call it;
+    - CALL, number of a kernel: call it;
     - COMBINE, first and end of the sums: make rows of the block;
     - INTEGRATE, place of a row, its number among all: make it its integral;
-    - RECUR, number of a piece, first place and end in `lanes`: run a recurrence.
+    - RECUR, number of a kernel, first place and end in `lanes`: run a recurrence.
     """
-    target: Indices  # (t,) rows that are sums; those that are observed last, which have no place.
-    first: Indices  # (t + 1,) first term of each, and how many there are.
-    a: Indices  # (s,) row of a term's first factor.
-    b: Indices  # (s,) row of its second factor, -1 for none.
-    scale: Array  # (s,) number that multiplies a term.
-    lanes: Indices  # For each recurrence its `graph.recurrence`'s.
-    seen: int  # Number of the first sum that is observed: of each observation one for each column.
-    value: Indices  # (r,) row of each observation's signal.
-    integrals: int  # Rows that become integrals.
+    target: Indices
+    """(t,) rows that are sums; those that are observed last, which have no place."""
+    first: Indices
+    """(t + 1,) first term of each, and how many there are."""
+    a: Indices
+    """(s,) row of a term's first factor."""
+    b: Indices
+    """(s,) row of its second factor, -1 for none."""
+    scale: Array
+    """(s,) number that multiplies a term."""
+    lanes: Indices
+    """For each recurrence its `graph.recurrence`'s."""
+    first_observed: (
+        int  # Number of the first sum that is observed: of each observation one for each column.
+    )
+    value: Indices
+    """(r,) row of each observation's signal."""
+    integral_count: int
+    """Rows that become integrals."""
 
 
 CALL, COMBINE, INTEGRATE, RECUR = range(4)
@@ -68,43 +79,65 @@ CALL, COMBINE, INTEGRATE, RECUR = range(4)
 class Plan(NamedTuple):
     """Where all observations look, one after the other; m samples in all, r observations."""
 
-    observations: int  # How many: r.
-    first: Indices  # (r + 1,) first sample of each, and m.
+    observations: int
+    """How many: r."""
+    first: Indices
+    """(r + 1,) first sample of each, and m."""
     cell: Indices
     """(m,) point of the grid at or before the stamp, never falling within an observation."""
-    fraction: Array  # (m,) how far behind it the stamp lies, in steps, 0 to 1.
-    measured: Array  # (m,) measured values.
-    weight: Array  # (m,)
-    even: Indices  # (r,) whether all weights of an observation are 1.
-    regular: Indices  # (r,) whether its stamps are successive points of the grid.
+    fraction: Array
+    """(m,) how far behind it the stamp lies, in steps, 0 to 1."""
+    measured: Array
+    """(m,) measured values."""
+    weight: Array
+    """(m,)"""
+    even: Indices
+    """(r,) whether all weights of an observation are 1."""
+    regular: Indices
+    """(r,) whether its stamps are successive points of the grid."""
 
 
 class Sink(NamedTuple):
     """Where weighted rows go: all residuals or derivatives of a column each, residuals last."""
 
-    columns: int  # k + 1, residuals counted.
-    length: int  # From one row to the next: m, or ROWS where a triangle is wanted.
-    rows: Array  # (k + 1, length) all rows, or as many as are rotated at once.
-    derived: int  # Derivatives that the march gives: d.
-    to: Indices  # (d,) rows where they go.
-    own: int  # First row of those by the observations' own offsets; residuals come behind them.
-    folded: int  # Whether a triangle is wanted.
-    factor: Array  # (k + 1, k + 1) triangle, (0, 0) where all rows are wanted.
-    offset: Array  # (r,) offset that is assumed in the measured values of each observation.
-    offset_row: Indices  # (r,) row of the derivative by the offset, -1 if not wanted.
+    columns: int
+    """k + 1, residuals counted."""
+    length: int
+    """From one row to the next: m, or ROWS for a triangle."""
+    rows: Array
+    """(k + 1, length) all rows, or as many as are rotated at once."""
+    derived: int
+    """Derivatives that the march gives: d."""
+    to: Indices
+    """(d,) rows where they go."""
+    own: int
+    """First row of those by the observations' own offsets; residuals come behind them."""
+    folded: int
+    """Whether a triangle is wanted."""
+    factor: Array
+    """(k + 1, k + 1) triangle, (0, 0) if all rows are wanted."""
+    offset: Array
+    """(r,) offset that is assumed in the measured values of each observation."""
+    offset_row: Indices
+    """(r,) row of the derivative by the offset, -1 if not wanted."""
 
 
 class Room(NamedTuple):
     """Memory that a march writes to."""
 
-    size: int  # Of the block, in numbers.
+    size: int
+    """Of the block, in numbers."""
     block: Array
     tangent: Array
     """Derivatives of the states at the first sample, replaced by those behind the last."""
-    aside: Array  # (STRIDE,) a row before it is interpolated.
-    products: Array  # (EIGHTH,) see `absorb`.
-    integrals: Array  # (i, 3) states of integrals, zeros before the first sample.
-    progress: Indices  # (r,) next sample of each observation.
+    aside: Array
+    """(STRIDE,) a row before it is interpolated."""
+    products: Array
+    """(EIGHTH,) see `absorb`."""
+    integral_states: Array
+    """(i, 3) states of integrals, zeros before the first sample."""
+    next_sample: Indices
+    """(r,) next sample of each observation."""
 
 
 # --- the triangle ---------------------------------------------------------------------------------
@@ -257,13 +290,13 @@ def place(structs: int, r: int, first: int, size: int, at: int, count: int, to: 
     width = min(behind_last, end) - begin
     for c in range(sink.derived):
         column = behind(sink.rows, sink.to[c] * sink.length + to)
-        t = program.seen + r * sink.derived + c
+        t = program.first_observed + r * sink.derived + c
         if plan.regular[r]:
-            run(march.combine, (march.program, flat, t, begin - first, count, column))
+            run_routine(march.combine, (march.program, flat, t, begin - first, count, column))
             for i in range(0 if not plan.even[r] else count, count):
                 column[i] *= weight[i]
         else:
-            run(march.combine, (march.program, flat, t, begin - first, width, aside))
+            run_routine(march.combine, (march.program, flat, t, begin - first, width, aside))
             aside[width] = aside[width - 1]
             for i in range(count):
                 n, f = cell[i] - begin, fraction[i]
@@ -281,7 +314,7 @@ def place(structs: int, r: int, first: int, size: int, at: int, count: int, to: 
 
 
 class March(NamedTuple):
-    """Addresses of structs, and of routines, which are compiled alone (see `pieces.routine`)."""
+    """Addresses of structs, and of routines, which are compiled alone (see `kernels.routine`)."""
 
     program: int
     plan: int
@@ -298,7 +331,7 @@ def routines() -> tuple[Any, ...]:
     return routine(combine), routine(place), routine(absorb)
 
 
-def march_of(
+def march_struct(
     program: Struct[Program], plan: Struct[Plan], sink: Struct[Sink], room: Struct[Room]
 ) -> Struct[March]:
     """What `march_observed` is given, with routines, and structs, which must be kept as well."""
@@ -306,12 +339,12 @@ def march_of(
     return Struct(March(*structs, *routines()))
 
 
-def march_observed(pieces: Indices, arrays: Indices, size: int, h: float, structs: int) -> None:
+def march_observed(kernels: Indices, arrays: Indices, size: int, h: float, structs: int) -> None:
     """March block by block, and compare what comes with what was observed.
 
-    `pieces` are addresses, of the march first, and `arrays` what they take from ``records`` on (see
-    `pieces.PIECE`), of a record of `size` samples with step `h`; `structs` is the address of a
-    `March`.
+    `kernels` are addresses, of the march first. `arrays` is what they take from ``records`` on (see
+    `kernels.KERNEL_ARGUMENTS`), of a record of `size` samples with step `h`. `structs` is the
+    address of a `March`.
     """
     march = fields_of(structs, March)
     program = fields_of(march.program, Program)
@@ -333,26 +366,26 @@ def march_observed(pieces: Indices, arrays: Indices, size: int, h: float, struct
             todo = behind(program.todo, 4 * step)
             what, a, b = todo[0], todo[1], todo[2]
             if what == CALL:
-                call(pieces[a], count, first, h, arrays)
+                call_kernel(kernels[a], count, first, h, arrays)
             elif what == COMBINE:
                 for t in range(a, b):
                     row = behind(flat, program.target[t])
-                    run(march.combine, (march.program, flat, t, 0, count, row))
+                    run_routine(march.combine, (march.program, flat, t, 0, count, row))
             elif what == INTEGRATE:
-                integrate(behind(flat, a), count, h, behind(room.integrals, 3 * b))
+                integrate(behind(flat, a), count, h, behind(room.integral_states, 3 * b))
             else:
                 lanes = behind(program.lanes, b)
-                call_recurrence(pieces[a], count, lanes, todo[3] - b, room.tangent, arrays)
+                call_recurrence(kernels[a], count, lanes, todo[3] - b, room.tangent, arrays)
         for r in range(plan.observations):
             # off the grid the point behind the stamp must be known as well
             known = first + count - (first + count < size and plan.regular[r] == 0)
             row = behind(flat, program.value[r])
             row[count] = row[count - 1]
-            at = room.progress[r]
+            at = room.next_sample[r]
             end = at
             while end < plan.first[r + 1] and plan.cell[end] < known:
                 end += 1
-            room.progress[r] = end
+            room.next_sample[r] = end
             while at < end:
                 if sink.folded and plan.weight[at] == 0.0:
                     at += 1
@@ -364,18 +397,18 @@ def march_observed(pieces: Indices, arrays: Indices, size: int, h: float, struct
                         many = i
                         break
                 to = used if sink.folded else at
-                run(march.place, (structs, r, first, count, at, many, to))
+                run_routine(march.place, (structs, r, first, count, at, many, to))
                 at += many
                 used += many if sink.folded else 0
                 if sink.folded and used == sink.length:
-                    run(march.absorb, (march.sink, march.room))
+                    run_routine(march.absorb, (march.sink, march.room))
                     used = 0
     if used > 0:
         for c in range(sink.columns):
             column = behind(sink.rows, c * sink.length)
             for i in range(used, sink.length):
                 column[i] = 0.0
-        run(march.absorb, (march.sink, march.room))
+        run_routine(march.absorb, (march.sink, march.room))
 
 
 @generating

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from swashplate.equations.cache import generated, kernel
 from swashplate.equations.code_generation.functions import FUNCTIONS, generating
 from swashplate.equations.code_generation.lowering import definition_in
-from swashplate.equations.code_generation.machine_code import code_of
+from swashplate.equations.code_generation.machine_code import code_of_function
 from swashplate.equations.declaration import JIT_OFF, Replacements, inlined, interpreted
 from swashplate.equations.fields import (
     check_mapping,
@@ -27,22 +27,22 @@ from swashplate.equations.fields import (
 )
 from swashplate.equations.keeping import kept, key_of
 from swashplate.equations.language import plain
-from swashplate.equations.marching.march import march_source
-from swashplate.equations.marching.part import Stored, taps_of
-from swashplate.equations.marching.pieces import (
-    PIECE_KINDS,
-    Piece,
-    Planned,
+from swashplate.equations.marching.kernels import (
+    KERNEL_KINDS,
+    Kernel,
+    PlannedCode,
     pointers,
 )
+from swashplate.equations.marching.march import march_source
+from swashplate.equations.marching.part_code import SignalId, taps_of
 from swashplate.equations.model import (
     Link,
     Model,
     Window,
     arguments_of,
     parameter_paths,
-    place,
     state_paths,
+    tap_delay,
 )
 from swashplate.errors import DomainError, InputError, ParameterError
 
@@ -50,8 +50,10 @@ Array = NDArray[np.float64]
 Start = Literal["rest", "steady"]
 T = TypeVar("T")
 
+MOST_CACHED = 128
+"""Results that an instance keeps before it forgets all."""
 NO_NUMBER = (ValueError, ZeroDivisionError, OverflowError)
-"""What an equation raises where it gives no number."""
+"""What an equation raises if it gives no number."""
 
 
 def check_start(start: str) -> None:
@@ -60,7 +62,7 @@ def check_start(start: str) -> None:
         raise InputError(f"start is '{start}'; it is 'rest' or 'steady'.")
 
 
-class Part(NamedTuple):
+class PartNumbers(NamedTuple):
     """Numbers of a part of a model."""
 
     p: Any
@@ -68,11 +70,12 @@ class Part(NamedTuple):
     given: Any = None
 
 
-class Started(NamedTuple):
+class InitialStates(NamedTuple):
     """States of all parts at the first sample, and what they follow from."""
 
     states: tuple[Any, ...]
-    before: Mapping[str, float]  # External signals before the record.
+    before: Mapping[str, float]
+    """External signals before the record."""
     arguments: tuple[Mapping[str, Any], ...]
     """Of each part what its equations take, by the arguments' names."""
 
@@ -82,10 +85,10 @@ class Started(NamedTuple):
         return np.array([number for state in self.states for number in numbers_of(state)])
 
 
-class Places(NamedTuple):
-    """Where the taps read, all of them."""
+class TapDelays(NamedTuple):
+    """Where all taps read, an element each; see `TapDelay`."""
 
-    whole: NDArray[np.int64]
+    samples: NDArray[np.int64]
     fraction: Array
     slope: Array
 
@@ -95,8 +98,9 @@ class Instance:
     """A model with its numbers."""
 
     model: Model
-    parts: tuple[Part, ...]
+    parts: tuple[PartNumbers, ...]
     name: str
+    """Of the numbers: a parameter set's, or the model's own."""
 
     @cached_property
     def options(self) -> tuple[Any, ...]:
@@ -111,54 +115,60 @@ class Instance:
     @cached_property
     def given(self) -> Array:
         """All givens as numbers."""
-        found = [part.given for part in self.parts if part.given is not None]
-        return np.array([number for each in found for number in numbers_of(each)])
+        givens = [part.given for part in self.parts if part.given is not None]
+        return np.array([number for given in givens for number in numbers_of(given)])
 
     @cached_property
-    def _lately(self) -> dict[Any, Any]:
-        """What was found lately: a fit asks for the same with every set."""
+    def _cache(self) -> dict[Any, Any]:
+        """Recent results: a fit asks for the same ones with every set."""
         return {}
 
-    def _kept(self, key: tuple[Any, ...], find: Callable[[], T]) -> T:
-        if key not in self._lately:
-            if len(self._lately) > 128:
-                self._lately.clear()
-            self._lately[key] = find()
-        found: T = self._lately[key]
-        return found
+    def _cached(self, key: tuple[Any, ...], compute: Callable[[], T]) -> T:
+        if key not in self._cache:
+            if len(self._cache) > MOST_CACHED:
+                self._cache.clear()
+            self._cache[key] = compute()
+        result: T = self._cache[key]
+        return result
 
-    def places(self, signals: Sequence[str], h: float) -> Places:
+    def tap_delays(self, signals: Sequence[str], h: float) -> TapDelays:
         """Where every tap reads at a step of `h`."""
-        return self._kept(("places", *signals, h), lambda: self._places(tuple(signals), h))
+        return self._cached(("taps", *signals, h), lambda: self._tap_delays(tuple(signals), h))
 
-    def _places(self, signals: tuple[str, ...], h: float) -> Places:
-        found = []
-        for each in taps_of(self.model, signals):
-            name = each.tap.delay
-            delay = float(value_at(self.parts[each.part].p, name)) if name else 0.0
+    def _tap_delays(self, signals: tuple[str, ...], h: float) -> TapDelays:
+        delays = []
+        for tap in taps_of(self.model, signals):
+            name = tap.tap.delay
+            delay = float(value_at(self.parts[tap.part].p, name)) if name else 0.0
             if not 0.0 <= delay < math.inf:
                 raise InputError(f"{self.name}: {name} is {delay:g} s, but a delay is at least 0.")
-            found.append(place(each.tap, delay, h))
-        whole = np.array([each.whole for each in found], dtype=np.int64)
-        rest = [[each.fraction, each.slope] for each in found]
-        return Places(whole, *np.array(rest).reshape(-1, 2).T.copy())
+            delays.append(tap_delay(tap.tap, delay, h))
+        return TapDelays(
+            samples=np.array([delay.samples for delay in delays], dtype=np.int64),
+            fraction=np.array([delay.fraction for delay in delays], dtype=np.float64),
+            slope=np.array([delay.slope for delay in delays], dtype=np.float64),
+        )
 
-    def number_at(self, stored: Stored, before: Mapping[str, float], h: float) -> float:
-        """Number that is known ahead of a sample, of constant records; 0 for the place of a tap."""
-        own, kind, path = self.parts[stored.part], stored.kind, stored.path
-        if kind in ("p", "given"):
-            return float(value_at(own.p if kind == "p" else own.given, path))
+    def number_at(self, stored: SignalId, before: Mapping[str, float], h: float) -> float:
+        """Number that is known ahead of a sample, of constant records; 0 for a tap's fraction."""
+        numbers = self.parts[stored.part]
+        kind = stored.kind
+        if kind == "p":
+            return float(value_at(numbers.p, stored.path))
+        if kind == "given":
+            return float(value_at(numbers.given, stored.path))
         if kind in ("tap", "input"):
-            part, name = self.model.parts[stored.part], path.partition(".")[0]
+            part = self.model.parts[stored.part]
+            name, _, _ = stored.path.partition(".")
             return before.get(part.tap(name).signal, 0.0)
         return h if kind == "h" else 0.0
 
     def check_inputs(self, signals: Collection[str]) -> None:
         """Refuse external signals that the model does not know, and the lack of those it needs."""
-        known = self.model.external
+        inputs = self.model.external
         for signal in signals:
-            if signal not in known:
-                has = ", ".join(known) or "none"
+            if signal not in inputs:
+                has = ", ".join(inputs) or "none"
                 raise InputError(f"{self.name} has no input '{signal}'; it has {has}.")
         for i, part in enumerate(self.model.parts):
             for name in part.input_types:
@@ -172,63 +182,73 @@ class Instance:
         first: Mapping[str, float],
         h: float,
         start: Start = "rest",
-        chosen: Sequence[Any] | None = None,
-    ) -> Started:
+        states: Sequence[Any] | None = None,
+    ) -> InitialStates:
         """States at the first sample, under the `first` values of the external signals.
 
         At rest signals that are read through taps were zero before; ``"steady"`` is settled at the
-        first values, which then held before, too. `chosen` are states of the parts in place of
-        that.
+        first values, which then held before, too. `states` are those of the parts if they are known
+        already.
         """
-        if chosen is not None:
-            return self._start(first, h, start, chosen)
-        return self._kept((*first.items(), h, start), lambda: self._start(first, h, start, None))
+        if states is not None:
+            return self._start(first, h, start, states)
+        return self._cached((*first.items(), h, start), lambda: self._start(first, h, start, None))
 
     def _start(
-        self, first: Mapping[str, float], h: float, start: Start, chosen: Sequence[Any] | None
-    ) -> Started:
+        self, first: Mapping[str, float], h: float, start: Start, given: Sequence[Any] | None
+    ) -> InitialStates:
         check_start(start)
         self.check_inputs(first)
         before = {name: value if start == "steady" else 0.0 for name, value in first.items()}
         states: list[Any] = []
-        found: list[Mapping[str, Any]] = []
-        for i, (part, own) in enumerate(zip(self.model.parts, self.parts, strict=True)):
-            known: dict[str, Any] = {"p": own.p, "options": own.options, "given": own.given}
-            known["h"] = h
+        arguments_of_parts: list[Mapping[str, Any]] = []
+        for i, (part, numbers) in enumerate(zip(self.model.parts, self.parts, strict=True)):
+            arguments: dict[str, Any] = {
+                "p": numbers.p,
+                "options": numbers.options,
+                "given": numbers.given,
+                "h": h,
+            }
             for name in part.input_types:
-                tap, link = part.tap(name), self.model.link_of(i, name)
+                tap = part.tap(name)
+                link = self.model.link_of(i, name)
                 if link is not None:
-                    known[name] = linked(link, states, found, self.model.replacements)
+                    arguments[name] = linked(
+                        link, states, arguments_of_parts, self.model.replacements
+                    )
                     continue
                 if tap.signal in first:
                     value = (before if name in part.taps else first)[tap.signal]
                 else:
-                    value = float(value_at(own.p, part.defaults[name]))
-                known[name] = Window((value,) * tap.width, 0.0) if tap.width else value
+                    value = float(value_at(numbers.p, part.defaults[name]))
+                arguments[name] = Window((value,) * tap.width, 0.0) if tap.width else value
             if part.inputs is not None:
-                known["inputs"] = part.inputs(*(known[name] for name in part.input_types))
-            known["state"] = self._state(part, known, start) if chosen is None else chosen[i]
-            states.append(known["state"])
+                arguments["inputs"] = part.inputs(*(arguments[name] for name in part.input_types))
+            if given is None:
+                arguments["state"] = self._state(part, arguments, start)
+            else:
+                arguments["state"] = given[i]
+            states.append(arguments["state"])
             if part.sample is not None:
                 try:
-                    known["signals"] = called(part, part.sample, known)
+                    arguments["signals"] = called(part, part.sample, arguments)
                 except NO_NUMBER:
                     # outside the domain; the march, which asks for its margin, says what is wrong
                     none = dict.fromkeys(floats_of(part.signals or tuple), math.nan)
-                    known["signals"] = made(part.signals or tuple, none)
-            found.append(known)
-        return Started(tuple(states), before, tuple(found))
+                    arguments["signals"] = made(part.signals or tuple, none)
+            arguments_of_parts.append(arguments)
+        return InitialStates(tuple(states), before, tuple(arguments_of_parts))
 
-    def _state(self, part: Model, known: Mapping[str, Any], start: Start) -> Any:
+    def _state(self, part: Model, arguments: Mapping[str, Any], start: Start) -> Any:
         equation = part.rest if start == "rest" else part.settled
         if equation is not None:
-            found = self._called(part, equation, known)
-            if not isinstance(found, part.state):
+            state = self._called(part, equation, arguments)
+            if not isinstance(state, part.state):
                 raise InputError(
                     f"{self.name}: {plain(equation).__name__} must return a "
-                    f"{part.state.__name__}, not {found!r}."
+                    f"{part.state.__name__}, not {state!r}."
                 )
-            return found
+            return state
         if start == "steady" and floats_of(part.state):
             raise InputError(
                 f"{self.name}: {part.name} has no equation for its steady state ('settled'), so "
@@ -238,9 +258,11 @@ class Instance:
         empty = [path for path in floats_of(part.state) if path.split(".")[0] not in defaults]
         return made(part.state, dict.fromkeys(empty, 0.0))
 
-    def _called(self, part: Model, equation: Callable[..., Any], known: Mapping[str, Any]) -> Any:
+    def _called(
+        self, part: Model, equation: Callable[..., Any], arguments: Mapping[str, Any]
+    ) -> Any:
         try:
-            return called(part, equation, known)
+            return called(part, equation, arguments)
         except NO_NUMBER as error:
             raise DomainError(
                 f"{self.name}: {plain(equation).__name__} cannot be computed for these numbers "
@@ -248,22 +270,22 @@ class Instance:
             ) from None
 
 
-def called(part: Model, equation: Callable[..., Any], known: Mapping[str, Any]) -> Any:
-    """What an equation of a part gives for what is known by the names of its arguments."""
-    arguments = (known[name] for name in arguments_of(equation))
-    return interpreted(equation, part.replacements)(*arguments)
+def called(part: Model, equation: Callable[..., Any], arguments: Mapping[str, Any]) -> Any:
+    """What an equation of a part returns; it takes those of the arguments that it names."""
+    values = (arguments[name] for name in arguments_of(equation))
+    return interpreted(equation, part.replacements)(*values)
 
 
 def linked(
     link: Link,
     states: Sequence[Any],
-    found: Sequence[Mapping[str, Any]],
+    arguments: Sequence[Mapping[str, Any]],
     replacements: Replacements,
 ) -> float:
-    """A signal between parts, from the states and signals of those before."""
+    """A signal between parts, from the states and the equations' `arguments` of those before."""
     values = []
     for source in link.sources:
-        signals = found[source.part].get("signals")
+        signals = arguments[source.part].get("signals")
         inside = signals is not None and source.signal in floats_of(type(signals))
         values.append(value_at(signals if inside else states[source.part], source.signal))
     if link.equation is None:
@@ -290,45 +312,49 @@ def instance_of(model: Model, p: Any, *, options: Any = None, given: Any = None)
     """
     parts = []
     for part in model.parts:
-        own = Part(p, options, given)
+        numbers = PartNumbers(p, options, given)
         if len(model.parts) > 1:
-            own = Part(*(getattr(each, part.name, None) for each in own))
-        if own.options is None and part.options is not None:
-            own = own._replace(options=part.options())
+            numbers = PartNumbers(
+                p=getattr(p, part.name, None),
+                options=getattr(options, part.name, None),
+                given=getattr(given, part.name, None),
+            )
+        if numbers.options is None and part.options is not None:
+            numbers = numbers._replace(options=part.options())
         kinds = {"parameters": part.parameters, "options": part.options, "given": part.given}
-        for (what, kind), number in zip(kinds.items(), own, strict=True):
+        for (what, kind), value in zip(kinds.items(), numbers, strict=True):
             if kind is None:
-                if number is not None and len(model.parts) == 1:
-                    raise InputError(f"Model {part.name} has no {what}, but is passed {number!r}.")
+                if value is not None and len(model.parts) == 1:
+                    raise InputError(f"Model {part.name} has no {what}, but is passed {value!r}.")
                 continue
-            if not isinstance(number, kind):
-                whole = ""
+            if not isinstance(value, kind):
+                hint = ""
                 if len(model.parts) > 1:
                     fields = ", ".join(f"{each}=..." for each in getattr(model, what)._fields)
-                    whole = f": those of {model.name} are its {what}({fields})"
+                    hint = f": those of {model.name} are its {what}({fields})"
                 raise InputError(
-                    f"Model {part.name}: its {what} must be a {kind.__name__}, not {number!r}"
-                    f"{whole}."
+                    f"Model {part.name}: its {what} must be a {kind.__name__}, not {value!r}{hint}."
                 )
-            if what == "options" and any(each not in (None, True, False) for each in number):
+            if what == "options" and any(each not in (None, True, False) for each in value):
                 raise InputError(
                     f"Model {part.name}: its options are None or False (off) or True (on), not "
-                    f"{number!r}."
+                    f"{value!r}."
                 )
             for path in () if what == "options" else floats_of(kind):
-                value = value_at(number, path)
-                if not is_real(value):
+                number = value_at(value, path)
+                if not is_real(number):
                     raise InputError(
-                        f"Model {part.name}: {path} is {value!r}, but must be a real number."
+                        f"Model {part.name}: {path} is {number!r}, but must be a real number."
                     )
-        if own.options is not None:  # off is None, so that code is made for one form of it
-            own = own._replace(options=type(own.options)(*(each or None for each in own.options)))
-        parts.append(own)
+        if numbers.options is not None:  # off is None, so that code is made for one form of it
+            forms = [option or None for option in numbers.options]
+            numbers = numbers._replace(options=type(numbers.options)(*forms))
+        parts.append(numbers)
     instance = Instance(model, tuple(parts), model.name)
-    numbers = dict(zip(parameter_paths(model), instance.params.tolist(), strict=True))
+    values = dict(zip(parameter_paths(model), instance.params.tolist(), strict=True))
     for path, definition in model.ranges.items():
-        if not definition.holds(numbers[path]):
-            raise ParameterError(f"{instance.name}: {definition.broken(path, numbers[path])}.")
+        if not definition.holds(values[path]):
+            raise ParameterError(f"{instance.name}: {definition.broken(path, values[path])}.")
     return instance
 
 
@@ -344,33 +370,33 @@ LIBRARY: dict[str, Any] = {
 """What generated modules call besides their own functions."""
 
 
-def module(name: str, text: str, **more: Any) -> dict[str, Any]:
+def module(name: str, text: str, **further: Any) -> dict[str, Any]:
     """A generated module, compiled."""
-    return generated(name, text, LIBRARY | more)
+    return generated(name, text, LIBRARY | further)
 
 
 @dataclass(frozen=True)
-class PlannedPiece:
-    """A piece as text, which is compiled when it is first called for."""
+class PlannedKernel:
+    """A kernel as text, which is compiled when it is first called for."""
 
     file: str
     """How the name of its module begins."""
     member: str
     text: str
 
-    def __call__(self) -> Piece:
-        """The piece, compiled."""
+    def __call__(self) -> Kernel:
+        """The kernel, compiled."""
         return _compiled(self)
 
 
 @generating
-def _compiled(planned: PlannedPiece) -> Piece:
-    return compiled(planned.file, planned.text, planned.member, PIECE_KINDS, {})
+def _compiled(planned: PlannedKernel) -> Kernel:
+    return compiled_kernel(planned.file, planned.text, planned.member, KERNEL_KINDS, {})
 
 
-def compiled(
+def compiled_kernel(
     file: str, text: str, member: str, kinds: tuple[str, ...], names: Mapping[str, Any]
-) -> Piece:
+) -> Kernel:
     """A function of a generated module, compiled: it takes numbers and arrays, and fills arrays.
 
     `file` is how the module's name begins, `kinds` are those of the arguments (see `lowering`), and
@@ -380,67 +406,76 @@ def compiled(
         return module(file, text, **names)[member]
     title = file if file.endswith(member) else f"{file}_{member}"
     library = LIBRARY | {**names}
-    return code_of(title, text, kinds, lambda: definition_in(text, member, library))
+    return code_of_function(title, text, kinds, lambda: definition_in(text, member, library))
 
 
 @generating
-def march_of(
+def planned_march(
     model: Model,
     signals: tuple[str, ...],
     options: tuple[Any, ...],
-    stored: tuple[Stored, ...],
-    more: tuple[Stored, ...] = (),
-) -> Planned:
-    """The march over whole records, a row for each number that is kept, then for each of `more`."""
-    rows = {each: f"flat[{row} * count + n]" for row, each in enumerate((*stored, *more))}
-    always = {each: rows[each] for each in stored}
-    later = {each: rows[each] for each in more}
+    stored: tuple[SignalId, ...],
+    further: tuple[SignalId, ...] = (),
+) -> PlannedCode:
+    """The march over whole records: rows for the numbers that are kept, then for `further` ones."""
+    rows = {signal: f"flat[{row} * count + n]" for row, signal in enumerate((*stored, *further))}
+    always = {signal: rows[signal] for signal in stored}
+    if_everything = {signal: rows[signal] for signal in further}
     text = kept(
         f"{model.name}_march",
-        (key_of(model), signals, options, stored, more),
-        lambda: march_source(model, signals, options, always, later),
+        (key_of(model), signals, options, stored, further),
+        lambda: march_source(model, signals, options, always, if_everything),
     )
-    return PlannedPiece(f"{model.name}_march", "march", text)
+    return PlannedKernel(f"{model.name}_march", "march", text)
 
 
 def marched(
     instance: Instance,
     records: Mapping[str, Array],
     h: float,
-    started: Started,
-    stored: tuple[Stored, ...],
+    initial: InitialStates,
+    stored: tuple[SignalId, ...],
     cause: str = "input",
     begin: Mapping[str, float] = MappingProxyType({}),
     *,
-    more: tuple[Stored, ...] = (),
+    further: tuple[SignalId, ...] = (),
     everything: bool = False,
 ) -> Array:
     """(r, n) numbers in the order of `stored`, marched over whole records; limits as sums of bits.
 
-    From where `started` begins, or from states by path; `cause` is what drives the model, for the
-    sentence where it leaves its domain or a number overflows. One and the same march can leave
-    `more` numbers, which follow in the table if it is to leave `everything`.
+    The march starts from `initial`, apart from the states that `begin` gives by path. `cause` is
+    what drives the model, for the message if it leaves its domain or a number overflows. The same
+    march computes `further` numbers if `everything` is wanted; they follow in the table.
     """
-    signals, size = tuple(records), next(iter(records.values())).size
-    planned = march_of(instance.model, signals, instance.options, stored, more)
-    stored = (*stored, *more) if everything else stored
-    table, met = np.empty((len(stored), size)), np.array([np.inf, float(everything)])
-    states = begun(instance, started, begin)
-    values = tuple(np.ascontiguousarray(each, dtype=np.float64) for each in records.values())
-    places = instance.places(signals, h)
-    arrays = arrays_of(instance, values, started, places, states, met, table.reshape(-1))
+    signals = tuple(records)
+    size = next(iter(records.values())).size
+    planned = planned_march(instance.model, signals, instance.options, stored, further)
+    stored = (*stored, *further) if everything else stored
+    table = np.empty((len(stored), size))
+    worst_margin = np.array([np.inf, float(everything)])
+    states = initial_states(instance, initial, begin)
+    values = tuple(np.ascontiguousarray(record, dtype=np.float64) for record in records.values())
+    arrays = arrays_of(
+        instance,
+        values,
+        initial,
+        instance.tap_delays(signals, h),
+        states,
+        worst_margin,
+        table.reshape(-1),
+    )
     planned()(size, 0, h, *arrays)
-    check_domain(instance, states, float(met[0]), cause)
+    check_domain(instance, states, float(worst_margin[0]), cause)
     check_outputs(instance, stored, table, h, cause)
     return table
 
 
 def check_outputs(
-    instance: Instance, stored: Sequence[Stored], table: Array, h: float, cause: str
+    instance: Instance, stored: Sequence[SignalId], table: Array, h: float, cause: str
 ) -> None:
     """Refuse samples that are not finite; of (r, n) or (r,) numbers the first one is named."""
     with np.errstate(all="ignore"):
-        if math.isfinite(table.sum()):  # of finite numbers it may overflow, of others it is none
+        if math.isfinite(table.sum()):  # a sum of finite numbers may overflow: see below
             return
     samples = table.reshape(len(stored), -1)
     bad = ~np.isfinite(samples)
@@ -455,34 +490,45 @@ def check_outputs(
     )
 
 
-def begun(instance: Instance, started: Started, begin: Mapping[str, float]) -> Array:
+def initial_states(instance: Instance, initial: InitialStates, begin: Mapping[str, float]) -> Array:
     """States as numbers, some of them as given by path."""
     check_mapping("begin", begin)
-    states = started.flat
-    known = state_paths(instance.model) if begin else ()
+    states = initial.flat
+    paths = state_paths(instance.model) if begin else ()
     for path, value in begin.items():
-        if path not in known:
-            has = ", ".join(known) or "none"
+        if path not in paths:
+            has = ", ".join(paths) or "none"
             raise InputError(f"{instance.name} has no state '{path}' to start from; it has {has}.")
         if not is_real(value) or not np.isfinite(value):
             raise InputError(f"{path} begins at {value!r}, but must be a finite number.")
-        states[known.index(path)] = value
+        states[paths.index(path)] = value
     return states
 
 
 def arrays_of(
     instance: Instance,
     values: tuple[Array, ...],
-    started: Started,
-    places: Places,
+    initial: InitialStates,
+    delays: TapDelays,
     states: Array,
-    met: Array,
+    worst_margin: Array,
     flat: Array,
 ) -> tuple[Any, ...]:
-    """What pieces take from ``records`` on (see `pieces.PIECE`); `values` must be kept as well."""
-    before = np.array([*started.before.values()])
-    numbers = instance.params, instance.given
-    return (pointers(values), before, places.whole, places.fraction, *numbers, states, met, flat)
+    """What kernels take from ``records`` on (see `kernels.KERNEL_ARGUMENTS`).
+
+    The caller must keep `values` as well: what is made of them are addresses.
+    """
+    return (
+        pointers(values),
+        np.array([*initial.before.values()]),
+        delays.samples,
+        delays.fraction,
+        instance.params,
+        instance.given,
+        states,
+        worst_margin,
+        flat,
+    )
 
 
 def check_domain(instance: Instance, states: Array, worst: float, cause: str) -> None:
@@ -501,12 +547,12 @@ def check_domain(instance: Instance, states: Array, worst: float, cause: str) ->
 
 
 def outside(model: Model, worst: float, cause: str) -> str:
-    """What has happened where the margin is not above 0."""
+    """What has happened if the margin is not above 0."""
     parts = [part for part in model.parts if part.domain is not None]
-    said = [
-        each.outside(worst, cause)
-        if callable(each.outside)
-        else f"{each.outside} under this {cause}."
-        for each in parts or [model]
-    ]
-    return " Or: ".join(said)
+    sentences: list[str] = []
+    for part in parts or [model]:
+        if callable(part.outside):
+            sentences.append(part.outside(worst, cause))
+        else:
+            sentences.append(f"{part.outside} under this {cause}.")
+    return " Or: ".join(sentences)

@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.equations.marching.derivatives import BoundModel
-from swashplate.equations.marching.observation import Own, every_sample
+from swashplate.equations.marching.observation import RunValues, every_sample
 from swashplate.equations.marching.record import Sampling
-from swashplate.equations.marching.run import Start, begun, instance_of
-from swashplate.equations.marching.use import Command, Run, inputs_of
+from swashplate.equations.marching.run import Start, initial_states, instance_of
+from swashplate.equations.marching.simulation import Command, Run, inputs_of
 from swashplate.equations.model import Model, parameter_paths
 from swashplate.errors import DomainError, InputError
 
@@ -44,8 +44,8 @@ class Sensitivities(Generic[R]):
     """Columns, in the order asked for."""
     bound: BoundModel
     """The model with its numbers, and the columns as its paths."""
-    found: dict[str, Array] = field(default_factory=dict)
-    """Derivatives that were asked for."""
+    computed: dict[str, Array] = field(default_factory=dict)
+    """Derivatives of the signals that were read so far."""
 
     def __repr__(self) -> str:
         count = f"{len(self.names)} parameter{'' if len(self.names) == 1 else 's'}"
@@ -53,14 +53,14 @@ class Sensitivities(Generic[R]):
 
     def __getitem__(self, signal: str) -> Array:
         """(n, k) derivatives of a signal behind the input, by its name."""
-        if signal not in self.found:
+        if signal not in self.computed:
             (driver, record), *others = self.run.records.items()
             beside = {name: each.values for name, each in others}
             observed = every_sample(record, signal, driver, self.run.start, beside)
             columns = self.bound.jacobian(observed).columns
             self._check(signal, columns)
-            self.found[signal] = columns
-        return self.found[signal]
+            self.computed[signal] = columns
+        return self.computed[signal]
 
     def _check(self, signal: str, columns: Array) -> None:
         """Refuse derivatives that are not finite; the first is named."""
@@ -114,7 +114,7 @@ def sensitivities(
     instance = instance_of(model, p, options=options, given=given)
     records = inputs_of(instance, inputs, rate, **sampling)
     run = Run(instance, records, start, begin or {})
-    begun(instance, run.started, run.begin)  # refuses what does not fit
+    initial_states(instance, run.initial, run.begin)  # refuses what does not fit
     known = (*parameter_paths(model), *(f"start.{path}" for path in run.begin))
     columns = tuple(parameters) if parameters is not None else parameter_paths(model)
     for path in columns:
@@ -122,4 +122,4 @@ def sensitivities(
             raise InputError(
                 f"{model.name} has no parameter '{path}'; it has {', '.join(known) or 'none'}."
             )
-    return Sensitivities(run, columns, BoundModel(instance, Own(run.begin), columns))
+    return Sensitivities(run, columns, BoundModel(instance, RunValues(run.begin), columns))

@@ -5,15 +5,15 @@ Examples
 >>> valve = compiled_step(model, Valve(0.05, 0.1), ("command",), ("position",), rate=512.0)
 >>> step = valve.step
 >>> @kernel
-... def positioned(machine, target, path):
+... def positioned(context, target, path):
 ...     worst = inf
 ...     for n in range(path.size):
-...         machine.inputs[0] = 5.0 * (target - machine.outputs[0])
-...         worst = min(worst, step(machine))
-...         path[n] = machine.outputs[0]
+...         context.inputs[0] = 5.0 * (target - context.outputs[0])
+...         worst = min(worst, step(context))
+...         path[n] = context.outputs[0]
 ...     return worst
->>> machine = valve.machine()
->>> valve.check(machine, positioned(machine, 0.2, path))
+>>> context = valve.context()
+>>> valve.check(context, positioned(context, 0.2, path))
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from swashplate.equations.code_generation.functions import generating
 from swashplate.equations.keeping import kept, key_of
 from swashplate.equations.marching.march import output_of, step_source
-from swashplate.equations.marching.part import Stored
+from swashplate.equations.marching.part_code import SignalId
 from swashplate.equations.marching.record import check_rate
 from swashplate.equations.marching.run import (
     Instance,
@@ -43,44 +43,48 @@ from swashplate.errors import InputError
 Array = NDArray[np.float64]
 
 
-class Machine(NamedTuple):
-    """A model's numbers in a loop: what a compiled step takes, and all that it remembers."""
+class StepContext(NamedTuple):
+    """What a compiled step takes in a loop: a model's numbers, and all that it remembers."""
 
     inputs: Array
     """Newest sample of each input; the loop sets them before each step."""
     outputs: Array
-    """Outputs at that sample, behind the step."""
+    """Outputs at that sample, filled by the step."""
     states: Array
     lines: Array
-    """Inputs of late, newest first: what delays look at."""
-    whole: NDArray[np.int64]
-    fraction: Array
+    """Past samples of the inputs, newest first, for the delays."""
+    delay_samples: NDArray[np.int64]
+    """Whole samples of each tap's delay."""
+    delay_fraction: Array
+    """What its delay has besides, as a fraction of a sample."""
     params: Array
     given: Array
     constants: Array
     h: float
     """[s]"""
 
-    def copied(self) -> Machine:
-        """The machine with a memory of its own: both go on from here apart."""
-        own = {
-            name: getattr(self, name).copy() for name in ("inputs", "outputs", "states", "lines")
-        }
-        return self._replace(**own)
+    def copied(self) -> StepContext:
+        """A copy that remembers for itself: both go on from here independently."""
+        return self._replace(
+            inputs=self.inputs.copy(),
+            outputs=self.outputs.copy(),
+            states=self.states.copy(),
+            lines=self.lines.copy(),
+        )
 
 
 @generating
 def _kernels(
-    model: Model, inputs: tuple[str, ...], options: tuple[Any, ...], stored: tuple[Stored, ...]
-) -> tuple[Callable[..., None], Callable[[Machine], float], int]:
+    model: Model, inputs: tuple[str, ...], options: tuple[Any, ...], stored: tuple[SignalId, ...]
+) -> tuple[Callable[..., None], Callable[[StepContext], float], int]:
     """Compiled constants of a model, its step, and how many constants there are."""
     text, count = kept(
         f"{model.name}_step",
         (key_of(model), inputs, options, stored),
         lambda: step_source(model, inputs, options, stored),
     )
-    made = module(f"{model.name}_step", text)
-    return made["prepare"], made["step"], count
+    functions = module(f"{model.name}_step", text)
+    return functions["prepare"], functions["step"], count
 
 
 class CompiledStep:
@@ -91,7 +95,7 @@ class CompiledStep:
     Attributes
     ----------
     step : callable
-        ``step(machine) -> margin``: reads ``machine.inputs``, fills ``machine.outputs`` with the
+        ``step(context) -> margin``: reads ``context.inputs``, fills ``context.outputs`` with the
         same sample, takes the state to the next one, and returns the margin of the model's domain.
         A `kernel` that calls it inlines it; numbers are those of `simulate` to the last bit.
     inputs, outputs : tuple of str
@@ -99,11 +103,13 @@ class CompiledStep:
     """
 
     def __init__(
-        self, instance: Instance, inputs: Sequence[str], stored: Sequence[Stored], h: float
+        self, instance: Instance, inputs: Sequence[str], stored: Sequence[SignalId], h: float
     ) -> None:
-        self._instance, self._h, self._stored = instance, h, tuple(stored)
+        self._instance = instance
+        self._h = h
+        self._stored = tuple(stored)
         self.inputs = tuple(inputs)
-        self.outputs = tuple(each.path or each.kind for each in stored)
+        self.outputs = tuple(signal.path or signal.kind for signal in stored)
         instance.check_inputs(self.inputs)
         self._prepare, self.step, self._count = _kernels(
             instance.model, self.inputs, instance.options, tuple(stored)
@@ -115,26 +121,38 @@ class CompiledStep:
             f"{', '.join(self.outputs)}, {1.0 / self._h:g} Hz)"
         )
 
-    def machine(self, first: Mapping[str, float] | None = None, start: Start = "rest") -> Machine:
-        """A machine at its start, at rest or settled under the `first` inputs, by default zero."""
-        found, first = self._instance, first or {}
+    def context(
+        self, first: Mapping[str, float] | None = None, start: Start = "rest"
+    ) -> StepContext:
+        """A context at its start: at rest, or settled under the `first` inputs (default: 0)."""
+        instance = self._instance
+        first = first or {}
         values = {name: float(first.get(name, 0.0)) for name in self.inputs}
         newest = np.array([*values.values()])
-        places = found.places(self.inputs, self._h)
+        delays = instance.tap_delays(self.inputs, self._h)
         constants = np.zeros(self._count)
-        self._prepare(found.params, found.given, self._h, constants)
-        longest = int(places.whole.max()) if places.whole.size else 0
+        self._prepare(instance.params, instance.given, self._h, constants)
+        longest = int(delays.samples.max(initial=0))
         lines = np.zeros((len(self.inputs), longest + 3))
         if start == "steady":
             lines[:] = newest[:, None]
-        outputs, states = np.zeros(len(self.outputs)), found.start(values, self._h, start).flat
-        own = places.whole, places.fraction, found.params, found.given, constants, self._h
-        return Machine(newest, outputs, states, lines, *own)
+        return StepContext(
+            inputs=newest,
+            outputs=np.zeros(len(self.outputs)),
+            states=instance.start(values, self._h, start).flat,
+            lines=lines,
+            delay_samples=delays.samples,
+            delay_fraction=delays.fraction,
+            params=instance.params,
+            given=instance.given,
+            constants=constants,
+            h=self._h,
+        )
 
-    def check(self, machine: Machine, margin: float, cause: str = "input") -> None:
+    def check(self, context: StepContext, margin: float, cause: str = "input") -> None:
         """Refuse what a loop has computed outside the model's equations.
 
-        `machine` is as the loop has left it, `margin` the least that the steps have returned, and
+        `context` is as the loop has left it, `margin` the least that the steps have returned, and
         `cause` what has driven the model, for the sentence.
 
         Raises
@@ -143,8 +161,8 @@ class CompiledStep:
             If the margin is not above 0, or a number of the state or of the newest outputs is not
             finite.
         """
-        check_domain(self._instance, machine.states, margin, cause)
-        check_outputs(self._instance, self._stored, machine.outputs, self._h, cause)
+        check_domain(self._instance, context.states, margin, cause)
+        check_outputs(self._instance, self._stored, context.outputs, self._h, cause)
 
 
 def compiled_step(
@@ -157,7 +175,7 @@ def compiled_step(
     options: Any = None,
     given: Any = None,
 ) -> CompiledStep:
-    """Compiled step of a model of one's own, for kernels that close loops around it.
+    """Compiled step of a user-defined model, for kernels that close loops around it.
 
     Parameters
     ----------
@@ -179,13 +197,13 @@ def compiled_step(
     return CompiledStep(instance, inputs, stored_of(model, outputs), 1.0 / rate)
 
 
-def stored_of(model: Model, outputs: Sequence[str]) -> tuple[Stored, ...]:
+def stored_of(model: Model, outputs: Sequence[str]) -> tuple[SignalId, ...]:
     """Where the outputs of a step come from; ``"limits"`` of the last part that has any."""
-    found = []
+    ids = []
     limited = [i for i, part in enumerate(model.parts) if part.limits is not None]
     for output in outputs:
         if output == "limits" and limited:
-            found.append(Stored(limited[-1], "limits"))
+            ids.append(SignalId(limited[-1], "limits"))
             continue
         stored, integral = output_of(model, output)
         if integral:
@@ -193,5 +211,5 @@ def stored_of(model: Model, outputs: Sequence[str]) -> tuple[Stored, ...]:
                 f"{output} is the integral of {stored.path}, and not known within a step: take "
                 f"{stored.path} and add it up in the loop."
             )
-        found.append(stored)
-    return tuple(found)
+        ids.append(stored)
+    return tuple(ids)

@@ -1,4 +1,4 @@
-"""Which derivative flows into which: the structure behind a model's Jacobian, and its pieces.
+"""Which derivative flows into which: the structure behind a model's Jacobian, and its kernels.
 
 A column of the Jacobian is the derivative of every state by one parameter, over all samples. It
 follows the linear recurrence ds[n+1] = A[n] ds[n] + b[n]. The partial derivatives A and b are known
@@ -25,55 +25,62 @@ from swashplate.equations.code_generation.values import leaves
 from swashplate.equations.declaration import JIT_OFF
 from swashplate.equations.graph import Node, names_in, rewritten
 from swashplate.equations.keeping import kept, key_of
-from swashplate.equations.marching.march import Sampler, march_source, output_of
-from swashplate.equations.marching.part import PartCode, Stored
-from swashplate.equations.marching.pieces import PIECE
+from swashplate.equations.marching.kernels import KERNEL_ARGUMENTS
+from swashplate.equations.marching.march import SampleCode, march_source, output_of
+from swashplate.equations.marching.part_code import PartCode, SignalId
 from swashplate.equations.marching.rows import STRIDE
-from swashplate.equations.marching.run import PlannedPiece
-from swashplate.equations.model import Model, Source
+from swashplate.equations.marching.run import PlannedKernel
+from swashplate.equations.model import Model, SignalSource
 from swashplate.errors import InputError
 
-Moved = tuple[Stored, str]
+Moved = tuple[SignalId, str]
 """A number, and the column that it is derived by."""
 
 
 class Term(NamedTuple):
     """A product of rows of the block and a number: a partial derivative, a derivative, or both."""
 
-    rows: tuple[int, ...] = ()  # First place of each.
+    rows: tuple[int, ...] = ()
+    """First place of each."""
     scale: float = 1.0
-    slot: Moved | None = None
+    factor: Moved | None = None
     """A further factor, known only with the parameters."""
 
     def times(self, other: Term) -> Term:
         """The product of both."""
-        assert self.slot is None or other.slot is None
-        return Term(self.rows + other.rows, self.scale * other.scale, self.slot or other.slot)
+        assert self.factor is None or other.factor is None
+        return Term(self.rows + other.rows, self.scale * other.scale, self.factor or other.factor)
 
 
 class Group(NamedTuple):
     """States of a part that wait for each other, in one recurrence."""
 
-    states: tuple[Stored, ...]
-    factors: list[int]  # Places of their partial derivatives by each other.
-    piece: int  # See `recurrence`.
+    states: tuple[SignalId, ...]
+    factors: list[int]
+    """First places of the rows of their partial derivatives by each other."""
+    kernel: int
+    """Number of its kernel, see `recurrence`."""
 
 
 class PartStructure(NamedTuple):
-    """What is done for a part behind the march."""
+    """What is done for a part after the march."""
 
     part: int
-    fill: int | None  # Piece that fills in its partial derivatives.
-    rows: range  # Places of these.
+    fill_kernel: int | None
+    """Number of the kernel that fills in its partial derivatives, None if there are none."""
+    factor_rows: range
+    """First places of the rows of these."""
     groups: list[Group]
-    needed: list[Stored]  # Signals that other parts or links need.
-    behind: dict[Stored, Stored]  # Signals that equal a state at the next sample.
+    needed: list[SignalId]
+    """Signals that other parts or links need."""
+    next_state_of: dict[SignalId, SignalId]
+    """Of each signal that equals a state at the next sample that state."""
 
 
-class Starting(NamedTuple):
+class StartCode(NamedTuple):
     """Constants and states at the start with their derivatives, as a function of scalars."""
 
-    arguments: tuple[Stored, ...]
+    arguments: tuple[SignalId, ...]
     moves: tuple[Moved, ...]
     """What is derived, by which column: the last numbers that `derived` gives."""
     derived: Derived
@@ -84,12 +91,12 @@ class Facts(NamedTuple):
 
     size: int
     """Of the block; its first row is for what nobody reads."""
-    row_of: dict[Stored, int]
+    row_of: dict[SignalId, int]
     """First place of each number that the march leaves in the block."""
-    partials: dict[Stored, dict[Stored, Term]]
+    partials: dict[SignalId, dict[SignalId, Term]]
     """Of each result (signal, or state at the next sample) its partial derivatives by parameters
     (``p``), constants (``k``), places of taps (``fraction``), states and signals."""
-    pieces: list[PlannedPiece]
+    kernels: list[PlannedKernel]
     """The march comes first."""
     parts: list[PartStructure]
     """Parts that are needed."""
@@ -97,7 +104,7 @@ class Facts(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Structure:
-    """A model's whole structure for some observed signals, and the pieces of its march."""
+    """A model's whole structure for some observed signals, and the kernels of its march."""
 
     model: Model
     signals: tuple[str, ...]
@@ -108,23 +115,30 @@ class Structure:
     facts: Facts
 
     @cached_property
-    def observed(self) -> list[tuple[Stored, bool]]:
+    def observed(self) -> list[tuple[SignalId, bool]]:
         """What is observed, and whether as an integral."""
         return [output_of(self.model, each) for each in self.outputs]
 
-    def starting(self, start: str) -> Starting:
-        """Constants and states where a record begins at rest or settled; within `generating`."""
-        if start not in self._starting:
-            model, asked = self.model, (self.signals, self.options, self.outputs)
-            self._starting[start] = kept(
-                f"{model.name}_start",
-                (key_of(model), *asked, start),
-                lambda: _structured(model, *asked).started(start),
+    def start_code(self, start: str) -> StartCode:
+        """Constants and states where a record begins, ``"rest"`` or ``"steady"``.
+
+        Generated, written to the cache folder and kept in the structure when it is first asked for;
+        to be called within `generating`.
+        """
+        if start not in self._start_codes:
+            self._start_codes[start] = kept(
+                f"{self.model.name}_start",
+                (key_of(self.model), self.signals, self.options, self.outputs, start),
+                lambda: self._generated_start(start),
             )
-        return self._starting[start]
+        return self._start_codes[start]
+
+    def _generated_start(self, start: str) -> StartCode:
+        structuring = _structured(self.model, self.signals, self.options, self.outputs)
+        return structuring.start_code(start)
 
     @cached_property
-    def _starting(self) -> dict[str, Starting]:
+    def _start_codes(self) -> dict[str, StartCode]:
         return {}
 
 
@@ -161,39 +175,39 @@ class _Structuring:
     ) -> None:
         self.model = model
         self.observed = [output_of(model, each)[0] for each in observed]
-        self.sampler = Sampler(model, signals, options, self.observed)
+        self.sample_code = SampleCode(model, signals, options, self.observed)
         self.size = STRIDE
-        self.row_of: dict[Stored, int] = {}
+        self.row_of: dict[SignalId, int] = {}
         self._named: dict[str, int] = {}  # Place of each number's row by its name in the code.
-        self.partials: dict[Stored, dict[Stored, Term]] = {}
-        self.pieces: list[PlannedPiece] = []
+        self.partials: dict[SignalId, dict[SignalId, Term]] = {}
+        self.kernels: list[PlannedKernel] = []
         self._constants: dict[int, dict[Node, str]] = {}
         """By part, what follows from parameters alone, with its names."""
-        # part by part, so that the pieces of the first ones are the same whatever follows
-        self.parts = [self._part(part) for part in self.sampler.used]
-        for place in self.observed:
-            if place.kind == "link":
-                self._keep(place)
-                self.partials[place] = self._link(place)
-        left = {each: f"flat[{row} + n - first]" for each, row in self.row_of.items()}
-        text = march_source(model, signals, options, left)
-        self.pieces.insert(0, PlannedPiece(f"{model.name}_march", "march", text))
+        # part by part, so that the kernels of the first ones are the same whatever follows
+        self.parts = [self._part(part) for part in self.sample_code.used]
+        for signal in self.observed:
+            if signal.kind == "link":
+                self._keep(signal)
+                self.partials[signal] = self._link(signal)
+        outputs = {signal: f"flat[{row} + n - first]" for signal, row in self.row_of.items()}
+        text = march_source(model, signals, options, outputs)
+        self.kernels.insert(0, PlannedKernel(f"{model.name}_march", "march", text))
 
     @property
     def facts(self) -> Facts:
         """What was found out."""
-        return Facts(self.size, self.row_of, self.partials, self.pieces, self.parts)
+        return Facts(self.size, self.row_of, self.partials, self.kernels, self.parts)
 
-    def as_stored(self, source: Source) -> Stored:
+    def signal_id_of(self, source: SignalSource) -> SignalId:
         """A signal of a part, or of its state."""
-        state = source.signal in dict(leaves(self.sampler.parts[source.part].state))
-        return Stored(source.part, "state" if state else "signals", source.signal)
+        state = source.signal in dict(leaves(self.sample_code.parts[source.part].state))
+        return SignalId(source.part, "state" if state else "signals", source.signal)
 
     def _row(self) -> int:
         self.size += STRIDE
         return self.size - STRIDE
 
-    def _keep(self, stored: Stored, name: str = "") -> None:
+    def _keep(self, stored: SignalId, name: str = "") -> None:
         """Have the march leave a number, which has a name in the code."""
         if stored not in self.row_of:
             self.row_of[stored] = self._row()
@@ -203,32 +217,34 @@ class _Structuring:
     # -- what flows ----------------------------------------------------------------------------
 
     def _part(self, part: PartCode) -> PartStructure:
-        """Differentiate what is needed of a part, and plan its pieces."""
-        i, sampler = part.part, self.sampler
-        observed = [place for place in self.observed if place.part == i]
-        needed = [self.as_stored(source) for source in sampler.sources if source.part == i]
-        states = {path: Stored(i, "state", path) for path in sampler.carried[i]}
-        following, here = dict(leaves(part.following)), dict(leaves(part.state))
+        """Differentiate what is needed of a part, and plan its kernels."""
+        i, sample_code = part.part, self.sample_code
+        observed = [signal for signal in self.observed if signal.part == i]
+        sources = [source for source in sample_code.sources if source.part == i]
+        needed = [self.signal_id_of(source) for source in sources]
+        states = {path: SignalId(i, "state", path) for path in sample_code.carried[i]}
+        following = dict(leaves(part.following))
+        names = dict(leaves(part.state))
         results = {state: following[path] for path, state in states.items()}
-        behind: dict[Stored, Stored] = {}
-        for each in dict.fromkeys([*needed, *observed]):
-            if each.kind == "signals":
-                node = part.signal(each.path)
+        next_state_of: dict[SignalId, SignalId] = {}
+        for signal in dict.fromkeys([*needed, *observed]):
+            if signal.kind == "signals":
+                node = part.signal(signal.path)
                 same = [state for state in states.values() if results[state] is node]
                 if same:
-                    behind[each] = same[0]
+                    next_state_of[signal] = same[0]
                 else:
-                    results[each] = node
-                self._keep(each)
+                    results[signal] = node
+                self._keep(signal)
         for path, state in states.items():
-            self._keep(state, here[path].value)
-        for source, number in zip((s for s in sampler.sources if s.part == i), needed, strict=True):
-            self._keep(number, part.source(source))
-        read = sampler.read(part)
-        for name, number in part.outside.items():
+            self._keep(state, names[path].value)
+        for source, signal in zip(sources, needed, strict=True):
+            self._keep(signal, part.source(source))
+        read = sample_code.read(part)
+        for name, signal in part.outside.items():
             if name in read:
-                self._keep(number, name)
-        filled, rows = self._fill(part, results)
+                self._keep(signal, name)
+        fill_kernel, factor_rows = self._plan_fill(part, results)
         flows = {
             state: [by for by in self.partials[state] if by in states.values()]
             for state in states.values()
@@ -236,100 +252,124 @@ class _Structuring:
         groups = []
         for group in _strongly_connected(flows):
             none = Term((), 0.0)
-            own = [[self.partials[into].get(by, none) for by in group] for into in group]
-            pattern = tuple(tuple(None if t.rows else t.scale for t in row) for row in own)
-            factors = [place for row in own for term in row for place in term.rows]
-            self.pieces.append(recurrence(pattern))
-            groups.append(Group(group, factors, len(self.pieces)))
-        return PartStructure(i, filled, rows, groups, needed, behind)
+            terms = [[self.partials[into].get(by, none) for by in group] for into in group]
+            pattern = tuple(tuple(None if t.rows else t.scale for t in row) for row in terms)
+            factors = [first for row in terms for term in row for first in term.rows]
+            number = self._plan(recurrence(pattern))
+            groups.append(Group(group, factors, number))
+        return PartStructure(
+            part=i,
+            fill_kernel=fill_kernel,
+            factor_rows=factor_rows,
+            groups=groups,
+            needed=needed,
+            next_state_of=next_state_of,
+        )
 
-    def _fill(self, part: PartCode, results: Mapping[Stored, Node]) -> tuple[int | None, range]:
-        """Piece that writes partial derivatives at known states into rows; places of these."""
+    def _plan(self, kernel: PlannedKernel) -> int:
+        """Add a kernel; its number among all, once the march stands before them as number 0."""
+        self.kernels.append(kernel)
+        return len(self.kernels)
+
+    def _plan_fill(
+        self, part: PartCode, results: Mapping[SignalId, Node]
+    ) -> tuple[int | None, range]:
+        """Plan the kernel that writes partial derivatives at known states into rows.
+
+        Returns its number, None if nothing is to be written, and the first places of these rows.
+        """
         i, ends = part.part, [*results.values()]
-        by: dict[Node, Stored] = {
-            graph.name(name): Stored(i, "p", path) for name, path in part.parameters.items()
+        by: dict[Node, SignalId] = {
+            graph.name(name): SignalId(i, "p", path) for name, path in part.parameters.items()
         }
-        _, known = self.sampler.ahead(part, ends)
+        _, known = self.sample_code.ahead(part, ends)
         self._constants[i] = {node: known[node] for node in part.ahead(ends)}
-        by |= {node: Stored(i, "k", name) for node, name in self._constants[i].items()}
-        by |= {node: Stored(i, "state", path) for path, node in leaves(part.state)}
+        by |= {node: SignalId(i, "k", name) for node, name in self._constants[i].items()}
+        by |= {node: SignalId(i, "state", path) for path, node in leaves(part.state)}
         for tap in part.taps:
             if tap.tap.delay:
-                by[graph.name(part.fraction(tap))] = Stored(i, "fraction", str(tap.number))
-        for source in self.sampler.sources:
-            by[graph.name(part.source(source))] = self.as_stored(source)
-        found, order, moving = Gradients(ends, [*by]), [*results], [*by.values()]
-        self.partials |= {each: {} for each in order}
-        first, wanted = self.size, dict[int, Node]()
-        for (out, inp), node in found.partials.items():
+                by[graph.name(part.delay_fraction(tap))] = SignalId(i, "fraction", str(tap.number))
+        for source in self.sample_code.sources:
+            by[graph.name(part.source(source))] = self.signal_id_of(source)
+        gradients = Gradients(ends, [*by])
+        order = [*results]
+        moving = [*by.values()]
+        self.partials |= {result: {} for result in order}
+        first = self.size
+        node_of_row = dict[int, Node]()
+        for (out, inp), node in gradients.partials.items():
             term = Term((), float(node.value)) if node.op == "number" else Term((self._row(),))
             self.partials[order[out]][moving[inp]] = term
-            wanted |= dict.fromkeys(term.rows, node)
-        if not wanted:
+            node_of_row |= dict.fromkeys(term.rows, node)
+        if not node_of_row:
             return None, range(0)
-        nodes = [*wanted.values()]
-        ahead, known = self.sampler.ahead(part, nodes)
-        hints = found.hints([each.path for each in order], [each.path for each in moving], {})
+        nodes = [*node_of_row.values()]
+        ahead, known = self.sample_code.ahead(part, nodes)
+        hints = gradients.hints([into.path for into in order], [by.path for by in moving], {})
         # a loop without branches becomes vector instructions; plain Python refuses roots and
         # quotients that nobody asks for
         flat = None if JIT_OFF else all_vector
-        block = self.sampler.printed(part, nodes, known=known, hints=hints, flat=flat)
+        block = self.sample_code.printed(part, nodes, known=known, hints=hints, flat=flat)
         read = names_in(nodes)
         lines = ahead
         lines += [
-            f"{part.fraction(tap)} = fraction[{tap.number}]"
+            f"{part.delay_fraction(tap)} = delay_fraction[{tap.number}]"
             for tap in part.taps
-            if part.fraction(tap) in read
+            if part.delay_fraction(tap) in read
         ]
         inner = [f"{n} = flat[{self._named[n]} + m]" for n in sorted(read & self._named.keys())]
         inner += block.lines
-        inner += [f"flat[{k} + m] = {t}" for k, t in zip(wanted, block.texts, strict=True)]
-        says = "Partial derivatives at known states."
+        inner += [f"flat[{k} + m] = {t}" for k, t in zip(node_of_row, block.texts, strict=True)]
         lines += ["for m in range(count):", *indented(inner)]
         name = f"fill_{part.own.name}"
-        text = function_source(f"{name}({PIECE})", says, lines, "")
+        text = function_source(
+            f"{name}({KERNEL_ARGUMENTS})", "Partial derivatives at known states.", lines, ""
+        )
         file = f"{self.model.name}_{name}"
-        self.pieces.append(PlannedPiece(file, name, self.sampler.module(text)))
-        return len(self.pieces), range(first, self.size)
+        number = self._plan(PlannedKernel(file, name, self.sample_code.module(text)))
+        return number, range(first, self.size)
 
-    def _link(self, place: Stored) -> dict[Stored, Term]:
+    def _link(self, signal: SignalId) -> dict[SignalId, Term]:
         """Partial derivatives of a link: numbers, or refused."""
-        part, link = self.sampler.parts[place.part], self.model.links[place.path]
-        made = self.sampler.observed(part, place)
-        by = {graph.name(part.source(each)): self.as_stored(each) for each in link.sources}
-        partials = Gradients([made], [*by]).partials
+        part = self.sample_code.parts[signal.part]
+        link = self.model.links[signal.path]
+        node = self.sample_code.observed(part, signal)
+        by = {graph.name(part.source(each)): self.signal_id_of(each) for each in link.sources}
+        partials = Gradients([node], [*by]).partials
         if any(node.op != "number" for node in partials.values()):
             raise InputError(
                 f"Model {self.model.name}: the link {link.name} must be a sum of signals with "
                 "constant factors; put anything else into a part's sample."
             )
-        known = [*by.values()]
-        return {known[inp]: Term((), float(node.value)) for (_, inp), node in partials.items()}
+        sources = [*by.values()]
+        return {sources[inp]: Term((), float(node.value)) for (_, inp), node in partials.items()}
 
     # -- where it starts -----------------------------------------------------------------------
 
-    def started(self, start: str) -> Starting:
+    def start_code(self, start: str) -> StartCode:
         """Constants and states where a record begins, with their derivatives."""
-        sampler = self.sampler
-        outside = {n: each for n, each in sampler.outside().items() if each.kind != "state"}
-        results: dict[Stored, Node] = {}
+        sample_code = self.sample_code
+        outside = {n: each for n, each in sample_code.outside().items() if each.kind != "state"}
+        results: dict[SignalId, Node] = {}
         by: dict[str, str] = {}
         begins: dict[Node, Node] = {}
         """What names stand for where the record begins."""
         labels: dict[Node, str] = {}
-        for part in sampler.used:
+        for part in sample_code.used:
             i, prefix = part.part, self.model.prefix(part.part)
-            begun = dict(leaves(part.begun(start)))
+            initial = dict(leaves(part.initial_state(start)))
             states = dict(leaves(part.state))
-            starts = dict(zip(begun, rewritten(begun.values(), begins), strict=True))
+            starts = dict(zip(initial, rewritten(initial.values(), begins), strict=True))
             begins |= {states[path]: node for path, node in starts.items()}
-            own = [(source, n) for source, n in sampler.sources.items() if source.part == i]
-            signals = rewritten([node for _, node in own], begins)
+            own_sources = [
+                (source, node) for source, node in sample_code.sources.items() if source.part == i
+            ]
+            signals = rewritten([node for _, node in own_sources], begins)
             begins |= {
                 graph.name(part.source(source)): node
-                for (source, _), node in zip(own, signals, strict=True)
+                for (source, _), node in zip(own_sources, signals, strict=True)
             }
-            results |= {Stored(i, "k", name): node for node, name in self._constants[i].items()}
+            results |= {SignalId(i, "k", name): node for node, name in self._constants[i].items()}
             carried = [each for each in self.partials if each[:2] == (i, "state")]
             results |= {state: starts[state.path] for state in carried}
             by |= {name: f"{prefix}{path}" for name, path in part.parameters.items()}
@@ -347,7 +387,7 @@ class _Structuring:
         )
         keys = [*results]
         moves = tuple((keys[out], by[active[inp]]) for out, inp in derived.entries)
-        return Starting(tuple(outside[name] for name in arguments), moves, derived)
+        return StartCode(tuple(outside[name] for name in arguments), moves, derived)
 
 
 def interleaved(states: int) -> int:
@@ -356,14 +396,15 @@ def interleaved(states: int) -> int:
 
 
 @generating
-def recurrence(pattern: tuple[tuple[float | None, ...], ...]) -> PlannedPiece:
-    """Piece that runs y[n+1] = A[n] y[n] + g[n] for some columns, a few side by side.
+def recurrence(pattern: tuple[tuple[float | None, ...], ...]) -> PlannedKernel:
+    """Kernel that runs y[n+1] = A[n] y[n] + g[n] for some columns, a few side by side.
 
-    `pattern` holds the entries of A that do not change, and None for the others. The second
-    argument is the length of `lanes`, which stand in place of ``whole``: offsets into ``flat``,
-    first of the changing entries of A, row by row; then, for each state and all columns, of its
-    input g and its result y, from the block's first sample to the one after it, and of y in
-    ``tangent``, in place of ``params``. There are a multiple of `interleaved` columns.
+    `pattern` holds the entries of A that do not change, and None for the others. ``size`` is the
+    length of ``lanes``: offsets into ``flat``, first of the changing entries of A, row by row;
+    then, for each state and all columns, of its input g and its result y, from the block's first
+    sample to the one after it, and of y in ``tangent``. These three arguments stand in place of
+    ``first``, ``delay_samples`` and ``params``. The number of columns is a multiple of
+    `interleaved`.
     """
     size, together = len(pattern), range(interleaved(len(pattern)))
     changing = [(i, l) for i in range(size) for l in range(size) if pattern[i][l] is None]
@@ -387,8 +428,10 @@ def recurrence(pattern: tuple[tuple[float | None, ...], ...]) -> PlannedPiece:
     lines += [f"for c in range(0, width, {len(together)}):"]
     lines += indented([*ahead, "for m in range(count):", *indented(inner), *after])
     name, says = f"recurrence_{size}", f"Derivatives of {size} states that wait for each other."
-    head = PIECE.replace("first", "size").replace("whole", "lanes").replace("params", "tangent")
-    return PlannedPiece(name, name, function_source(f"{name}({head})", says, lines, ""))
+    head = KERNEL_ARGUMENTS
+    for argument, instead in (("first", "size"), ("delay_samples", "lanes"), ("params", "tangent")):
+        head = head.replace(argument, instead)
+    return PlannedKernel(name, name, function_source(f"{name}({head})", says, lines, ""))
 
 
 def _sum(terms: Sequence[str]) -> str:
@@ -397,7 +440,7 @@ def _sum(terms: Sequence[str]) -> str:
     return terms[0] if not half else f"({_sum(terms[:half])} + {_sum(terms[half:])})"
 
 
-def _strongly_connected(flows: Mapping[Stored, list[Stored]]) -> Iterable[tuple[Stored, ...]]:
+def _strongly_connected(flows: Mapping[SignalId, list[SignalId]]) -> Iterable[tuple[SignalId, ...]]:
     """States in groups that wait for each other, each group behind those that it needs."""
     reach = {each: {each} for each in flows}
     for _ in flows:  # no way is longer
@@ -407,7 +450,7 @@ def _strongly_connected(flows: Mapping[Stored, list[Stored]]) -> Iterable[tuple[
         each: tuple(other for other in flows if other in reach[each] and each in reach[other])
         for each in flows
     }
-    order: TopologicalSorter[tuple[Stored, ...]] = TopologicalSorter()
+    order: TopologicalSorter[tuple[SignalId, ...]] = TopologicalSorter()
     for each in flows:
         others = dict.fromkeys(group[i] for i in flows[each])
         order.add(group[each], *(other for other in others if other != group[each]))

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from swashplate.equations import graph
 from swashplate.equations.code_generation.functions import GENERATING, Function
-from swashplate.equations.code_generation.printing import Block, function_source
+from swashplate.equations.code_generation.printing import CodeBlock, function_source
 from swashplate.equations.code_generation.printing_c import (
     C,
     Loops,
@@ -30,10 +30,10 @@ from swashplate.equations.code_generation.tracing import Trace
 from swashplate.equations.fields import Definition, declared_by, floats_of, value_at
 from swashplate.equations.graph import Node, names_in
 from swashplate.equations.language import plain
-from swashplate.equations.marching.march import Sampler, output_of
-from swashplate.equations.marching.part import TapOf, taps_of
+from swashplate.equations.marching.march import SampleCode, output_of
+from swashplate.equations.marching.part_code import TapOf, taps_of
 from swashplate.equations.marching.run import Instance, module
-from swashplate.equations.model import Equation, Link, Model, Source
+from swashplate.equations.model import Equation, Link, Model, SignalSource
 from swashplate.export.c_source.parts import PartInC, path_of
 from swashplate.export.c_source.structs import Structs, struct
 
@@ -256,7 +256,7 @@ class Writer:
         ends = [self._finite_states(), self._finite_outputs(), self._sample()]
         return [*self.loops.texts, *self.links.values(), *made, *ends]
 
-    def place(self, source: Source, state: str) -> str:
+    def place(self, source: SignalSource, state: str) -> str:
         """Where a signal of a part stands, or a number of its state."""
         part, member = self.model.parts[source.part], self.e.members[source.part]
         inside = part.signals is not None and source.signal in floats_of(part.signals)
@@ -276,7 +276,7 @@ class Writer:
             taken = {*self.loops.taken, "m"}
             labels = {node: c_name(label) for node, label in trace.labels.items()}
             language = C(self.loops, trace.origins, taken)
-            block = Block([value], labels, taken, language=language)
+            block = CodeBlock([value], labels, taken, language=language)
             function_name = self.loops.fresh(name)
             lines = [*language.headed(block.lines), f"return {block.texts[0]};"]
             says = first_line(trace.callee(link.equation).source)
@@ -405,7 +405,7 @@ class Writer:
         stored, _ = output_of(self.model, name)
         if stored.kind == "link":
             return self._link(self.model.links[stored.path])
-        return self.place(Source(stored.part, stored.path), "before")
+        return self.place(SignalSource(stored.part, stored.path), "before")
 
     def ranges(self) -> Iterator[tuple[str, str, Definition]]:
         """Name, place and definition of each parameter."""
@@ -484,18 +484,20 @@ def feedthrough(exported: Exported, instance: Instance, step: float) -> dict[str
     """
     model, at_once = exported.model, newest(exported, instance, step)
     places = [output_of(model, name)[0] for name in exported.names]
-    sampler = Sampler(model, model.external, instance.options, places)
+    sample_code = SampleCode(model, model.external, instance.options, places)
     signals = {f"x_{name}": name for name in model.external}
-    for part in sampler.used:
+    for part in sample_code.used:
         signals |= {
             part.tap_samples(each)[0]: each.tap.signal
             for each in part.taps
             if each.tap.signal in at_once
         }
-    sources = {sampler.parts[each.part].source(each): n for each, n in sampler.sources.items()}
+    sources = {
+        sample_code.parts[each.part].source(each): n for each, n in sample_code.sources.items()
+    }
     found = {}
     for name, place in zip(exported.names, places, strict=True):
-        read, pending = set[str](), [sampler.observed(sampler.parts[place.part], place)]
+        read, pending = set[str](), [sample_code.observed(sample_code.parts[place.part], place)]
         while pending:
             names = names_in([pending.pop()])
             pending += [sources[each] for each in (names & sources.keys()) - read]

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, get_type_hints
 
 from swashplate.equations import graph
 from swashplate.equations.code_generation.functions import FUNCTIONS, RESERVED, Function, fresh_name
-from swashplate.equations.code_generation.printing import STEMS, Block, assigned
+from swashplate.equations.code_generation.printing import STEMS, CodeBlock, assigned
 from swashplate.equations.code_generation.printing_c import (
     C,
     as_double,
@@ -27,8 +27,8 @@ from swashplate.equations.code_generation.tracing import Trace
 from swashplate.equations.code_generation.values import Tuple, Value, fixed, leaves, undecided
 from swashplate.equations.graph import LEAVES, MATH_FUNCTIONS, Node, names_in, ordered
 from swashplate.equations.language import Parsed
-from swashplate.equations.marching.part import PartCode
-from swashplate.equations.model import Equation, Source, arguments_of
+from swashplate.equations.marching.part_code import PartCode
+from swashplate.equations.model import Equation, SignalSource, arguments_of
 
 if TYPE_CHECKING:
     from swashplate.export.c_source.model import Writer
@@ -102,7 +102,7 @@ class PartInC:
 
     def traced(self, equation: Equation, trace: Trace) -> Value:
         """What an equation of the part returns."""
-        known = dict(self.part.known)
+        known = dict(self.part.arguments)
         if (options := fixed(self._symbols)) is not None:
             known["options"] = options
         given = {name: known[name] for name in arguments_of(equation) if name in known}
@@ -113,7 +113,7 @@ class PartInC:
         part, own = self.part, self.own
         limits = Tuple(None, ()) if own.limits is None else self.traced(own.limits, part.trace)
         return {
-            "signals": [*leaves(part.known.get("signals", Tuple(None, ())))],
+            "signals": [*leaves(part.arguments.get("signals", Tuple(None, ())))],
             "limits": [*leaves(limits)],
             "next": [*leaves(part.following)],
         }
@@ -171,7 +171,7 @@ class PartInC:
         known |= {node: f"k->{name}" for node, name in self.constants.items()}
         for i, part in enumerate(self.w.e.model.parts[: self.number]):
             for path in part.signal_names:
-                source = Source(i, path)
+                source = SignalSource(i, path)
                 known[graph.name(self.part.source(source))] = self.w.place(source, "before")
         return known
 
@@ -209,7 +209,7 @@ class PartInC:
         nodes += [last] if last is not None else []
         language = C(self.w.loops, trace.origins, taken)
         labels = self.labels(trace, nodes)
-        block = Block(nodes, labels, taken, known={**known, **names}, language=language)
+        block = CodeBlock(nodes, labels, taken, known={**known, **names}, language=language)
         lines, texts = language.headed(block.lines), iter(block.texts)
         for word, each in results.items():
             lines += [""] if each and lines else []
@@ -241,7 +241,7 @@ class PartInC:
             for j, name in enumerate(self.part.tap_samples(tap)):
                 signal = tap.tap.signal
                 places[graph.name(name)] = before[signal] if start else f"{window}->s[{j}]"
-            places[graph.name(self.part.fraction(tap))] = "0.0" if start else f"{window}->f"
+            places[graph.name(self.part.delay_fraction(tap))] = "0.0" if start else f"{window}->f"
         for name in self.own.input_types:
             node, signal = self.part.inputs[name], self.own.tap(name).signal
             link, default = model.link_of(self.number, name), self.own.defaults.get(name)
@@ -262,7 +262,7 @@ class PartInC:
 
     def _looked(self, value: Node, places: Mapping[Node, str]) -> str:
         """What a tap makes of its window, as one expression."""
-        block = Block([value], {}, set(), known=places, language=C(self.w.loops, {}, set()))
+        block = CodeBlock([value], {}, set(), known=places, language=C(self.w.loops, {}, set()))
         assert not block.lines
         return block.texts[0]
 
@@ -351,7 +351,7 @@ class PartInC:
                 known[node] = f"{array}[{places.index((self.number, path))}]"
         for name, node in self.options.items():
             known[node] = f"options[{self.w.e.options.index((self.number, name))}]"
-        block = Block([*self.constants], self._labels, taken, known=known)
+        block = CodeBlock([*self.constants], self._labels, taken, known=known)
         first = self.w.first_constant(self.number)
         lines = [*block.lines]
         for k, text in enumerate(block.texts):

@@ -18,7 +18,7 @@ from swashplate.campaign.samples import signed_by_command
 from swashplate.campaign.schema import CURRENTS as CURRENTS
 from swashplate.campaign.schema import SIGNALS as SIGNALS
 from swashplate.drive import (
-    PRESSURE,
+    PRESSURE_PATH,
     START,
     Limit,
     Simulation,
@@ -28,7 +28,7 @@ from swashplate.drive import (
     simulate_drive,
 )
 from swashplate.equations import BoundModel
-from swashplate.equations.marching.observation import Observation, ObservedRecord, Own
+from swashplate.equations.marching.observation import Observation, ObservedRecord, RunValues
 from swashplate.equations.marching.record import (
     SLOWEST,
     SOURCE_RATE,
@@ -337,7 +337,7 @@ class DriveModel(Result, EquationModel):
             if name in values
             for state in self._states_started_by(name)
         }
-        parameters, own = self.parameters_at(values), Own(states, asked.offsets)
+        parameters, own = self.parameters_at(values), RunValues(states, asked.offsets)
         try:
             return bound_drive(parameters, asked.observed, asked.columns, own)
         except InputError as error:  # a filter that is unstable at this step
@@ -357,7 +357,7 @@ class DriveModel(Result, EquationModel):
         A pump alone has no card that could begin with a current.
         """
         if name == START_PRESSURE:
-            return [PRESSURE]
+            return [PRESSURE_PATH]
         if name not in START_CURRENTS or self.part == "pump":
             return []
         # I*, that of a sample before, and I; with the differential equation no sample before

@@ -16,7 +16,7 @@ from swashplate.equations import BoundModel, instance_of, parameter_paths, state
 from swashplate.equations import Model as Equations
 from swashplate.equations.fields import made
 from swashplate.equations.marching.layout import started_by
-from swashplate.equations.marching.observation import Observation, ObservedRecord, Own
+from swashplate.equations.marching.observation import Observation, ObservedRecord, RunValues
 from swashplate.equations.marching.record import Record, even_rate, on_grid
 from swashplate.errors import DomainError, InputError
 from swashplate.results import Result, short
@@ -377,4 +377,4 @@ class OwnModel(Result, EquationModel):
                 raise InputError(f"{model.name} has no given numbers for {experiment.name}.")
             given = given[experiment.name]
         instance = instance_of(model, p, options=self.options, given=given)
-        return BoundModel(instance, Own(begin, asked.offsets), asked.columns)
+        return BoundModel(instance, RunValues(begin, asked.offsets), asked.columns)

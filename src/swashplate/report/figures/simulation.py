@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from swashplate.drive import Limit, Simulation
 from swashplate.equations import Definition, Run
 from swashplate.errors import InputError
-from swashplate.full_order import SIGNAL_UNITS, Comparison, FullOrderSimulation
+from swashplate.full_order import SIGNAL_UNITS, FullOrderSimulation, OrderComparison
 from swashplate.maneuvers import Maneuver
 from swashplate.report.lines import (
     COLUMNS,
@@ -334,12 +334,12 @@ def _looks(run: Run) -> dict[str, Shade]:
 # --- two models of one drive ----------------------------------------------------------------------
 
 
-def plot_full_order(found: Comparison, *, title: str | None = None) -> Figure:
+def plot_full_order(found: OrderComparison, *, title: str | None = None) -> Figure:
     """Figure of both models over one command: speeds, their difference, and what lies between.
 
     Parameters
     ----------
-    found : Comparison
+    found : OrderComparison
         What `swashplate.full_order.compare` found. Limits that hold are shaded.
     """
     full = found.full

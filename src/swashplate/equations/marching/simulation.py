@@ -1,4 +1,4 @@
-"""A model with numbers in use: simulated, differentiated, one sample at a time."""
+"""A model with numbers simulated: over whole inputs, or one sample at a time."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ from swashplate.equations.cache import kernel
 from swashplate.equations.code_generation.functions import generating
 from swashplate.equations.fields import check_mapping
 from swashplate.equations.marching.march import output_of
-from swashplate.equations.marching.part import Stored
+from swashplate.equations.marching.part_code import SignalId
 from swashplate.equations.marching.record import (
     Between,
     Record,
@@ -40,14 +40,14 @@ from swashplate.equations.marching.record import (
     on_grid,
 )
 from swashplate.equations.marching.run import (
+    InitialStates,
     Instance,
     Start,
-    Started,
     check_start,
     instance_of,
     marched,
 )
-from swashplate.equations.marching.stepping import CompiledStep, Machine
+from swashplate.equations.marching.stepping import CompiledStep, StepContext
 from swashplate.equations.model import Model
 from swashplate.errors import DomainError, InputError, UnknownNameError
 from swashplate.results import GivenAxes, Tabular, figures, pandas_frame
@@ -63,21 +63,24 @@ S = TypeVar("S")
 T = TypeVar("T", bound=np.generic)
 
 
-class Left(NamedTuple):
-    """What a march leaves, by name: at first, and besides if it is to leave everything."""
+class MarchOutputs(NamedTuple):
+    """What a march computes, by name."""
 
-    first: dict[str, Stored]
-    more: dict[str, Stored]
+    first: dict[str, SignalId]
+    """Signals of the first march."""
+    further: dict[str, SignalId]
+    """Other signals, and limits, if it is to compute everything."""
 
 
 @lru_cache(maxsize=256)
-def left_by(model: Model, kept: tuple[str, ...]) -> Left:
-    """What a march leaves of a model of which some signals are kept from the first march."""
-    first = {name: output_of(model, name)[0] for name in kept or model.every_signal}
-    more = {name: output_of(model, name)[0] for name in model.every_signal if name not in first}
+def march_outputs(model: Model, first_signals: tuple[str, ...]) -> MarchOutputs:
+    """What the marches of a model compute; the first one all signals if none is named."""
+    names = model.every_signal
+    first = {name: output_of(model, name)[0] for name in first_signals or names}
+    further = {name: output_of(model, name)[0] for name in names if name not in first}
     limited = dict.fromkeys(part for part, _ in model.limit_bits.values())
-    more |= {f"limits {part}": Stored(part, "limits") for part in limited}
-    return Left(first, more)
+    further |= {f"limits {part}": SignalId(part, "limits") for part in limited}
+    return MarchOutputs(first, further)
 
 
 def read_only(array: NDArray[T]) -> NDArray[T]:
@@ -91,9 +94,9 @@ def read_only(array: NDArray[T]) -> NDArray[T]:
 class Run(Tabular):
     """Signals of a model over its inputs, read by name: ``run["position"]``.
 
-    Arrays are read-only, of the inputs' length. Some signals are kept from the first march; for
-    the others it is marched again when one of them is first asked for. `to_polars`, `to_pandas` and
-    `to_xarray` give all of them, `write` a file.
+    Arrays are read-only, of the inputs' length. The first march computes some of the signals; the
+    model is marched again when one of the others, or a limit, is first asked for. `to_polars`,
+    `to_pandas` and `to_xarray` give all of them, `write` a file.
     """
 
     instance: Instance = field(repr=False)
@@ -101,20 +104,20 @@ class Run(Tabular):
     records: Mapping[str, Record] = field(repr=False)
     """Inputs by name, on the march's grid; what drives the model comes first."""
     start: Start = "rest"
-    """How it began,"""
+    """State at the first sample."""
     begin: Mapping[str, float] = field(default_factory=dict, repr=False)
-    """but for these numbers of the state, by path."""
-    found: dict[str, Array] = field(default_factory=dict, repr=False)
-    """Signals on the march's grid, as far as they were asked for,"""
+    """Numbers of the state that differ from that, by path."""
+    on_grid: dict[str, Array] = field(default_factory=dict, repr=False)
+    """Signals on the march's grid that were computed so far."""
     samples: dict[str, Array] = field(default_factory=dict, repr=False)
-    """and at the samples."""
+    """Signals at the samples that were asked for so far."""
     maneuver: str = ""
     """Names of the maneuvers among the inputs; empty if there is none."""
 
-    shown: ClassVar[tuple[str, ...]] = ()
+    plotted: ClassVar[tuple[str, ...]] = ()
     """Signals that `plot` shows unless others are named; all of them if none is here."""
-    kept: ClassVar[tuple[str, ...]] = ()
-    """Signals that the first march leaves; all of them if none is named."""
+    first_signals: ClassVar[tuple[str, ...]] = ()
+    """Signals that the first march computes; all of them if none is named."""
 
     def marched(self) -> Self:
         """The run with its first march done."""
@@ -122,27 +125,29 @@ class Run(Tabular):
         return self
 
     def _march(self, *, everything: bool = False) -> None:
-        """Find the signals that are kept from the first march, or all of them and the limits."""
-        first, more = left_by(self.instance.model, self.kept)
-        records = {name: each.values for name, each in self.records.items()}
+        """Compute the signals of the first march, or all of them and the limits."""
+        outputs = march_outputs(self.instance.model, self.first_signals)
+        records = {name: record.values for name, record in self.records.items()}
         table = marched(
             self.instance,
             records,
             self.record.step,
-            self.started,
-            tuple(first.values()),
+            self.initial,
+            tuple(outputs.first.values()),
             self.driven_by,
             self.begin,
-            more=tuple(more.values()),
+            further=tuple(outputs.further.values()),
             everything=everything,
         )
-        names = (*first, *more) if everything else (*first,)
-        self.found.update(zip(names, table, strict=True))
+        names = [*outputs.first]
+        if everything:
+            names += outputs.further
+        self.on_grid.update(zip(names, table, strict=True))
 
     @property
-    def started(self) -> Started:
+    def initial(self) -> InitialStates:
         """States at the first sample, `begin` apart, and what they follow from."""
-        first = {name: float(each.values[0]) for name, each in self.records.items()}
+        first = {name: float(record.values[0]) for name, record in self.records.items()}
         return self.instance.start(first, self.record.step, self.start)
 
     @property
@@ -157,12 +162,12 @@ class Run(Tabular):
 
     @property
     def name(self) -> str:
-        """Name of the model, or of its numbers."""
+        """Name of the model's numbers: a parameter set's, or the model's own."""
         return self.instance.name
 
     @property
     def title(self) -> str:
-        """Names of the model, or of its numbers, and of the maneuver: of a figure."""
+        """Title of a figure: `name` and that of the maneuver."""
         return f"{self.name}: {self.maneuver}" if self.maneuver else self.name
 
     @property
@@ -172,7 +177,7 @@ class Run(Tabular):
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """All signals, behind ``"time"`` and the inputs."""
+        """``"time"``, the inputs, and all signals."""
         model = self.instance.model
         every = ("time", *self.records, *model.every_signal, *model.integrals)
         return tuple(dict.fromkeys(every))
@@ -243,22 +248,23 @@ class Run(Tabular):
         Raises
         ------
         InputError
-            For a signal that there is not, another number of axes, or a window with fewer than two
-            samples.
+            For a signal that the run does not have, another number of axes, or a window with fewer
+            than two samples.
         """
-        chosen = (signals,) if isinstance(signals, str) else tuple(signals)
-        if not chosen and ax is None:
+        names = (signals,) if isinstance(signals, str) else tuple(signals)
+        if not names and ax is None:
             return self._overview(label=label, window=window, title=title)
-        chosen = chosen or self.shown or self._usual
+        names = names or self.plotted or self._usual
         draw = figures().plot_signals
-        return cast("Figure", draw(self, chosen, ax=ax, label=label, window=window, title=title))
+        return cast("Figure", draw(self, names, ax=ax, label=label, window=window, title=title))
 
     def _overview(
         self, *, label: str, window: tuple[float, float] | None, title: str | None
     ) -> Figure:
         """Figure of what is shown if no signals are named."""
-        chosen, draw = self.shown or self._usual, figures().plot_signals
-        return cast("Figure", draw(self, chosen, label=label, window=window, title=title))
+        names = self.plotted or self._usual
+        draw = figures().plot_signals
+        return cast("Figure", draw(self, names, label=label, window=window, title=title))
 
     @property
     def _usual(self) -> tuple[str, ...]:
@@ -270,10 +276,13 @@ class Run(Tabular):
     def to_polars(self, units: Literal["SI", "display"] = "SI") -> polars.DataFrame:
         """Table of time, all signals and a true/false column ``limit_NAME`` for each limit, SI.
 
+        The model is marched again for signals and limits that were not computed so far; the run
+        keeps them.
+
         Parameters
         ----------
         units : "SI"
-            No others are known of a model's signals; a `Simulation` of a drive knows them.
+            A model's signals have no other units; those of a `Simulation` of a drive do.
 
         Raises
         ------
@@ -321,29 +330,31 @@ class Run(Tabular):
                 f"A run of {self.name} has no signal '{signal}': {meant} has "
                 f"{', '.join(self.names)}."
             )
-        time = signal == "time"
-        made = read_only(self.record.time) if time else self.sampled(self.fine(signal))
-        return self.samples.setdefault(signal, made)
+        if signal == "time":
+            samples = read_only(self.record.time)
+        else:
+            samples = self.sampled(self.fine(signal))
+        return self.samples.setdefault(signal, samples)
 
     def fine(self, signal: str) -> Array:
         """A signal on the march's grid, `substeps` points a sample."""
         if signal in self.records:
             return self.records[signal].values
-        found, integrals = self.found, self.instance.model.integrals
-        if signal in integrals and signal not in found:
-            rate, step = self.fine(integrals[signal]), self.record.step
+        integrals = self.instance.model.integrals
+        if signal in integrals and signal not in self.on_grid:
+            rate = self.fine(integrals[signal])
             total = np.zeros_like(rate)
             with np.errstate(all="ignore"):
-                np.cumsum(0.5 * step * (rate[:-1] + rate[1:]), out=total[1:])
-            if not np.isfinite(total[-1]):  # what is not finite stays so
+                np.cumsum(0.5 * self.record.step * (rate[:-1] + rate[1:]), out=total[1:])
+            if not np.isfinite(total[-1]):  # a sum that is not finite stays so
                 raise DomainError(
                     f"{self.name}: {signal} overflows under this {self.driven_by}; check the size "
                     "of the parameters and of what was measured."
                 )
-            found[signal] = total
-        if signal not in found:
+            self.on_grid[signal] = total
+        if signal not in self.on_grid:
             self._march(everything=True)
-        return found[signal]
+        return self.on_grid[signal]
 
     def sampled(self, fine: NDArray[T]) -> NDArray[T]:
         """Samples of the inputs out of the march's grid."""
@@ -359,12 +370,12 @@ class Run(Tabular):
         """
         limits = self.instance.model.limit_bits
         if limit not in limits:
-            known = ", ".join(limits) or "none"
-            raise InputError(f"There is no limit '{limit}'; there are {known}.")
+            names = ", ".join(limits) or "none"
+            raise InputError(f"There is no limit '{limit}'; there are {names}.")
         part, bit = limits[limit]
-        if f"limits {part}" not in self.found:
+        if f"limits {part}" not in self.on_grid:
             self._march(everything=True)
-        bits = self.found[f"limits {part}"]
+        bits = self.on_grid[f"limits {part}"]
         acts = (bits if fine else self.sampled(bits)).astype(np.uint32) & np.uint32(1 << bit)
         return np.asarray(acts != 0)
 
@@ -404,12 +415,12 @@ def inputs_of(
     check_mapping("inputs", inputs)
     instance.check_inputs(inputs)
     samples: dict[str, ArrayLike] = {
-        name: given.sample(rate) if isinstance(given, Command) else given
-        for name, given in inputs.items()
+        name: signal.sample(rate) if isinstance(signal, Command) else signal
+        for name, signal in inputs.items()
     }
     if not inputs:
-        wanted = ", ".join(instance.model.external) or "an input, but its equations take none"
-        raise InputError(f"{instance.name} needs a record of {wanted}.")
+        needed = ", ".join(instance.model.external) or "an input, but its equations take none"
+        raise InputError(f"{instance.name} needs a record of {needed}.")
     return on_grid(samples, rate, **sampling)
 
 
@@ -432,7 +443,7 @@ def simulate(
     Parameters
     ----------
     model : Model
-        Of one's own, or one of the package's.
+        A user-defined one, or one of the package's.
     p, options, given : named tuple
         Its numbers, see `instance_of`.
     inputs : mapping of str to (n,) array_like, float or Maneuver
@@ -464,7 +475,9 @@ def simulate(
     records = inputs_of(
         instance, inputs, rate, time=time, interpolation=interpolation, substeps=substeps
     )
-    maneuver = ", ".join(each.name for each in inputs.values() if isinstance(each, Command))
+    maneuver = ", ".join(
+        command.name for command in inputs.values() if isinstance(command, Command)
+    )
     return Run(instance, records, start, begin or {}, maneuver=maneuver).marched()
 
 
@@ -472,12 +485,12 @@ def simulate(
 
 
 @generating
-def _steps(step: Callable[[Machine], float]) -> Callable[..., tuple[float, bool]]:
-    """The compiled march over the steps of one sample."""
+def _sample_kernel(step: Callable[[StepContext], float]) -> Callable[..., tuple[float, bool]]:
+    """Compiled function that advances by one sample, in several steps."""
 
     @kernel
     def steps(
-        inputs: Array, held: NDArray[np.bool_], substeps: int, machine: Machine,
+        inputs: Array, zero_order: NDArray[np.bool_], substeps: int, context: StepContext,
         rates: NDArray[np.int64], totals: Array,
     ) -> tuple[float, bool]:  # fmt: skip
         """Advance by one sample, from the inputs before to these; `totals` as in `StepperState`.
@@ -486,21 +499,21 @@ def _steps(step: Callable[[Machine], float]) -> Callable[..., tuple[float, bool]
         """
         worst = np.inf
         for j in range(substeps):
-            for i in range(held.size):
-                machine.inputs[i] = inputs[1, i]
+            for i in range(zero_order.size):
+                context.inputs[i] = inputs[1, i]
                 if j < substeps - 1:
-                    rise = 0.0 if held[i] else (j + 1) / substeps
-                    machine.inputs[i] = inputs[0, i] + rise * (inputs[1, i] - inputs[0, i])
-            worst = min(worst, step(machine))
+                    rise = 0.0 if zero_order[i] else (j + 1) / substeps
+                    context.inputs[i] = inputs[0, i] + rise * (inputs[1, i] - inputs[0, i])
+            worst = min(worst, step(context))
             for r in range(rates.size):
-                rate = machine.outputs[rates[r]]
-                totals[0, r] = totals[0, r] + 0.5 * machine.h * (totals[1, r] + rate)
+                rate = context.outputs[rates[r]]
+                totals[0, r] = totals[0, r] + 0.5 * context.h * (totals[1, r] + rate)
                 totals[1, r] = rate
         inputs[0] = inputs[1]
         finite = True
-        for state in machine.states:
+        for state in context.states:
             finite = finite and np.isfinite(state)
-        for output in machine.outputs:
+        for output in context.outputs:
             finite = finite and np.isfinite(output)
         for total in totals[0]:
             finite = finite and np.isfinite(total)
@@ -510,20 +523,24 @@ def _steps(step: Callable[[Machine], float]) -> Callable[..., tuple[float, bool]
 
 
 class StepperState(NamedTuple):
-    """All that a stepper remembers, good to keep and to return to."""
+    """All that a stepper remembers; one that was kept can be returned to."""
 
-    machine: Machine
+    context: StepContext
     totals: Array
     """Integrals so far, and their rates at the sample."""
     inputs: Array
     """Inputs of the sample before, and of this one."""
-    begun: bool
+    initialised: bool
     """Whether there was a sample."""
 
     def copied(self) -> StepperState:
-        """The state with a memory of its own."""
-        machine, totals, inputs, begun = self
-        return StepperState(machine.copied(), totals.copy(), inputs.copy(), begun)
+        """A copy that shares no memory with this one."""
+        return StepperState(
+            context=self.context.copied(),
+            totals=self.totals.copy(),
+            inputs=self.inputs.copy(),
+            initialised=self.initialised,
+        )
 
 
 class Stepper(Generic[S]):
@@ -550,29 +567,38 @@ class Stepper(Generic[S]):
         if len(set(inputs)) < len(inputs):
             raise InputError(f"A step takes each input once, not {', '.join(inputs)}.")
         between, self._substeps = checked_sampling(inputs, rate, interpolation, substeps)
-        self._start, self._sample, self._name = start, sample, instance.name
+        self._start = start
+        self._sample = sample
+        self._name = instance.name
         self._ranges = [ranges.get(name, (-LARGEST, LARGEST)) for name in inputs]
-        self.inputs, limits = tuple(inputs), instance.model.limit_bits
-        found = [
-            (Stored(limits[name][0], "limits"), False)
-            if name in limits
-            else output_of(instance.model, name)
-            for name in outputs
-        ]
-        stored = list(dict.fromkeys(place for place, _ in found))
-        rates = [stored.index(place) for place, integral in found if integral]
+        self.inputs = tuple(inputs)
+        limits = instance.model.limit_bits
+        signals: list[tuple[SignalId, bool]] = []
+        for name in outputs:
+            if name in limits:
+                part, _ = limits[name]
+                signals.append((SignalId(part, "limits"), False))
+            else:
+                signals.append(output_of(instance.model, name))
+        stored = list(dict.fromkeys(signal for signal, _ in signals))
+        rates = [stored.index(signal) for signal, is_integral in signals if is_integral]
         self._rates = np.array(rates, dtype=np.int64)
-        # of each output its place among inputs, numbers of the step and integrals in a row
-        integrals = iter(range(len(inputs) + len(stored), len(inputs) + len(stored) + len(rates)))
+        # of each output its index in a row of inputs, numbers of the step and integrals
+        first_integral = len(inputs) + len(stored)
+        integrals = iter(range(first_integral, first_integral + len(rates)))
         self._order = [*range(len(inputs))]
-        for place, integral in found:
-            at = next(integrals) if integral else len(inputs) + stored.index(place)
-            self._order.append(at)
-        self._held = np.array([between[name] == "previous" for name in inputs])
+        for signal, is_integral in signals:
+            index = next(integrals) if is_integral else len(inputs) + stored.index(signal)
+            self._order.append(index)
+        self._zero_order = np.array([between[name] == "previous" for name in inputs])
         self._compiled = CompiledStep(instance, inputs, stored, 1.0 / (rate * self._substeps))
-        self._steps = _steps(self._compiled.step)
-        totals, values = np.zeros((2, len(rates))), np.zeros((2, len(inputs)))
-        self._state = StepperState(self._compiled.machine(), totals, values, False)
+        self._advance = _sample_kernel(self._compiled.step)
+        self._state = StepperState(
+            context=self._compiled.context(),
+            totals=np.zeros((2, len(rates))),
+            inputs=np.zeros((2, len(inputs))),
+            initialised=False,
+        )
 
     def __repr__(self) -> str:
         return f"Stepper({self._compiled!r})"
@@ -584,11 +610,17 @@ class Stepper(Generic[S]):
 
     @state.setter
     def state(self, state: StepperState) -> None:
-        own, given = self._state.machine, state.machine
-        if given.lines.shape != own.lines.shape or given.states.size != own.states.size:
+        present, earlier = self._state.context, state.context
+        same_lines = earlier.lines.shape == present.lines.shape
+        if not same_lines or earlier.states.size != present.states.size:
             raise InputError("This state belongs to a stepper of another model, delay or rate.")
-        memory = {name: getattr(given, name) for name in ("states", "outputs", "lines", "inputs")}
-        self._state = state._replace(machine=own._replace(**memory)).copied()
+        context = present._replace(
+            states=earlier.states,
+            outputs=earlier.outputs,
+            lines=earlier.lines,
+            inputs=earlier.inputs,
+        )
+        self._state = state._replace(context=context).copied()
 
     def step(self, *inputs: float) -> S:
         """Advance by one sample interval.
@@ -622,25 +654,32 @@ class Stepper(Generic[S]):
             except (TypeError, ValueError):
                 within = False
             if not within:
-                room = f" within ±{high:g}" if low == -high else f" from {low:g} to {high:g}"
-                room = "" if low == -LARGEST else room
-                raise InputError(f"The {name} is {value!r}, but must be a finite number{room}.")
-        machine, totals, values, begun = self._state
+                within_range = ""
+                if low == -high and high < LARGEST:
+                    within_range = f" within ±{high:g}"
+                elif low > -LARGEST:
+                    within_range = f" from {low:g} to {high:g}"
+                raise InputError(
+                    f"The {name} is {value!r}, but must be a finite number{within_range}."
+                )
+        context, totals, values, initialised = self._state
         values[1] = inputs
-        if not begun:
+        if not initialised:
             if self._start == "steady":
                 first = dict(zip(self.inputs, inputs, strict=True))
-                machine = self._compiled.machine(first, "steady")
-            self._state = StepperState(machine, totals, values, True)
-        substeps = self._substeps if begun else 1
-        worst, finite = self._steps(values, self._held, substeps, machine, self._rates, totals)
-        if not begun:
+                context = self._compiled.context(first, "steady")
+            self._state = StepperState(context, totals, values, True)
+        substeps = self._substeps if initialised else 1
+        worst, finite = self._advance(
+            values, self._zero_order, substeps, context, self._rates, totals
+        )
+        if not initialised:
             totals[0] = 0.0
         if not (worst > 0.0 and finite):
-            self._compiled.check(machine, worst, self.inputs[0])
+            self._compiled.check(context, worst, self.inputs[0])
             raise DomainError(f"{self._name}: an integral overflows under this {self.inputs[0]}.")
-        row = [*inputs, *machine.outputs.tolist(), *totals[0].tolist()]
-        return self._sample([row[at] for at in self._order])
+        row = [*inputs, *context.outputs.tolist(), *totals[0].tolist()]
+        return self._sample([row[index] for index in self._order])
 
 
 def stepper(
@@ -665,17 +704,21 @@ def stepper(
     inputs : sequence of str
         Signals that go in.
     outputs : sequence of str, optional
-        Signals that come out, and limits by their names, true where they act; by default all.
+        Signals that come out, and limits by their names, true if they act; by default all.
     """
-    instance, limits = instance_of(model, p, options=options, given=given), model.limit_bits
+    instance = instance_of(model, p, options=options, given=given)
+    limits = model.limit_bits
     if outputs is None:
         outputs = (*model.every_signal, *model.integrals, *limits)
     names = (*inputs, *outputs)
 
     def sample(values: list[float]) -> dict[str, float]:
-        found = dict(zip(names, values, strict=True))
-        acting = {name: limits[name][1] for name in names if name in limits}
-        return found | {name: bool(int(found[name]) >> bit & 1) for name, bit in acting.items()}
+        named = dict(zip(names, values, strict=True))
+        for name in names:
+            if name in limits:
+                _, bit = limits[name]
+                named[name] = bool(int(named[name]) >> bit & 1)
+        return named
 
     return Stepper(
         instance,

@@ -1,4 +1,4 @@
-"""One sample of a part of a model as a graph, and where the part starts."""
+"""One sample of a part of a model as a graph, and the state that the part starts from."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from swashplate.equations.model import (
     Equation,
     Link,
     Model,
-    Source,
+    SignalSource,
     Tap,
     Window,
     arguments_of,
@@ -34,21 +34,21 @@ HOLDS: dict[str, Equation] = {
 }
 
 
-class Stored(NamedTuple):
-    """A number of a part: what a march can keep, and what that is derived by."""
+class SignalId(NamedTuple):
+    """A number of a part: what a march can keep, or what that is derived by."""
 
     part: int
     kind: str
     """``signals``, ``state``, ``limits``, ``input``, ``link``, ``tap`` for a tap's sample; ``p``,
-    ``given`` and ``fraction`` for a parameter, given and the place of a tap; ``k`` for what follows
-    from parameters, givens and the step alone."""
+    ``given`` and ``fraction`` for a parameter, a given and the fraction in a tap's delay; ``k`` for
+    what follows from parameters, givens and the step alone."""
     path: str = ""
     """Of the number; name of the input or link; input and number of a tap's sample, ``at.0``;
     number of the tap; name in the code of what follows from parameters."""
 
 
 class TapOf(NamedTuple):
-    """A tap of a part, with the number of its place among all taps of the model."""
+    """A tap of a part, with its number among all taps of the model."""
 
     part: int
     input: str
@@ -59,14 +59,14 @@ class TapOf(NamedTuple):
 @lru_cache(maxsize=256)
 def taps_of(model: Model, signals: tuple[str, ...]) -> tuple[TapOf, ...]:
     """All taps on signals that are given as records, numbered."""
-    found: list[TapOf] = []
+    taps: list[TapOf] = []
     for i, part in enumerate(model.parts):
         for name in part.input_types:
             tap = part.tap(name)
             outside = model.link_of(i, name) is None and tap.signal in signals
             if outside and name in part.taps:
-                found.append(TapOf(i, name, len(found), tap))
-    return tuple(found)
+                taps.append(TapOf(i, name, len(taps), tap))
+    return tuple(taps)
 
 
 class PartCode:
@@ -91,27 +91,31 @@ class PartCode:
         self.taken: set[str] = set() if taken is None else taken
         self.prefix = f"{self.own.name}_" if len(model.parts) > 1 else ""
         self.taken.add("h")
-        self.taps = [each for each in taps_of(model, self.records) if each.part == part]
+        self.taps = [tap for tap in taps_of(model, self.records) if tap.part == part]
         for tap in self.taps:
-            self.taken |= {*self.tap_samples(tap), self.fraction(tap), self.whole(tap)}
+            self.taken |= {
+                *self.tap_samples(tap),
+                self.delay_fraction(tap),
+                self.delay_samples(tap),
+            }
         own = self.own
         self.p = _named(own.parameters, self._fresh("p"))
         self.given = _named(own.given, self._fresh("given")) if own.given else Tuple(None, ())
         self.state = _named(own.state, self._fresh("s"))
         self.parameters = {node.value: path for path, node in leaves(self.p)}
         """Path of each parameter by the name that stands for it."""
-        self.known: dict[str, Value] = {"p": self.p, "h": graph.name("h"), "given": self.given}
-        self.known["state"] = self.state
+        self.arguments: dict[str, Value] = {"p": self.p, "h": graph.name("h"), "given": self.given}
+        self.arguments["state"] = self.state
         self.inputs = {name: self._input(name) for name in own.input_types}
-        self.known |= self.inputs
+        self.arguments |= self.inputs
         if own.inputs is not None:
-            self.known["inputs"] = Tuple(own.inputs, tuple(self.inputs.values()))
+            self.arguments["inputs"] = Tuple(own.inputs, tuple(self.inputs.values()))
         if own.sample is not None:
-            self.known["signals"] = self._call(own.sample)
+            self.arguments["signals"] = self._call(own.sample)
         self.following = self._call(own.step)
         cls = self.following.cls if isinstance(self.following, Tuple) else None
-        made = tuple(path for path, n in leaves(self.following) if n.kind in ("float", "int"))
-        if cls is not own.state or made != floats_of(own.state):
+        numbers = tuple(path for path, n in leaves(self.following) if n.kind in ("float", "int"))
+        if cls is not own.state or numbers != floats_of(own.state):
             raise InputError(
                 f"Model {own.name}: {plain(own.step).__name__} must return a "
                 f"{own.state.__name__} of numbers on every way."
@@ -125,15 +129,15 @@ class PartCode:
         """What gives the numbers of a named tuple their names."""
         return lambda path: self.fresh(f"{letter}_{self.prefix}{path}")
 
-    def _call(self, equation: Equation, **more: Value) -> Value:
-        """What one of the part's equations returns, of what is known by argument."""
-        known = {**self.known, **more}
-        given = {name: known[name] for name in arguments_of(equation) if name in known}
+    def _call(self, equation: Equation, **inputs: Value) -> Value:
+        """What one of the part's equations returns; `inputs` stand in place of the part's own."""
+        values = {**self.arguments, **inputs}
+        arguments = {name: values[name] for name in arguments_of(equation) if name in values}
         if "options" in arguments_of(equation):
-            given["options"] = fixed(self.options) or Flag("unknown", "options")
-        made = self.trace.call(equation, given)
-        self.trace.label(made, plain(equation).__name__ if isinstance(made, Node) else "")
-        return made
+            arguments["options"] = fixed(self.options) or Flag("unknown", "options")
+        result = self.trace.call(equation, arguments)
+        self.trace.label(result, plain(equation).__name__ if isinstance(result, Node) else "")
+        return result
 
     def _input(self, name: str) -> Value:
         """An input as a name, a window of names, or what a hold makes of one."""
@@ -141,33 +145,34 @@ class PartCode:
         if link is not None:
             return self._linked(link)
         tap = self.own.tap(name)
-        found = next((each for each in self.taps if each.input == name), None)
-        if found is None:
+        record_tap = next((each for each in self.taps if each.input == name), None)
+        if record_tap is None:
             if tap.signal in self.records:
                 return graph.name(f"x_{tap.signal}")
             if name not in self.own.defaults:
-                # refused where the model is given its numbers; a constant keeps the code whole
+                # refused when the model gets its numbers; until then a constant stands for it
                 return graph.ZERO
             return dict(leaves(self.p))[self.own.defaults[name]]
-        samples = tuple(map(graph.name, self.tap_samples(found)))
-        window = Tuple(Window, (Tuple(None, samples), graph.name(self.fraction(found))))
+        samples = tuple(map(graph.name, self.tap_samples(record_tap)))
+        fraction = graph.name(self.delay_fraction(record_tap))
+        window = Tuple(Window, (Tuple(None, samples), fraction))
         return window if tap.width else self._call(HOLDS[tap.hold], window=window)
 
     def _linked(self, link: Link) -> Node:
         """A signal between parts, from the names of its sources."""
-        sources = {each.signal: graph.name(self.source(each)) for each in link.sources}
+        sources = {source.signal: graph.name(self.source(source)) for source in link.sources}
         if link.equation is None:
             return next(iter(sources.values()))
         return self.link(link.equation, link.name, sources)
 
     def link(self, equation: Equation, name: str, sources: Mapping[str, Value]) -> Node:
         """A signal that an equation makes of several."""
-        made = self.trace.run(callee_of(equation, self.model.replacements), sources)
-        assert isinstance(made, Node)
-        self.trace.label(made, name)
-        return made
+        signal = self.trace.run(callee_of(equation, self.model.replacements), sources)
+        assert isinstance(signal, Node)
+        self.trace.label(signal, name)
+        return signal
 
-    def source(self, source: Source) -> str:
+    def source(self, source: SignalSource) -> str:
         """Name of a signal that another part needs."""
         return f"x_{self.model.parts[source.part].name}_{source.signal.replace('.', '_')}"
 
@@ -175,12 +180,12 @@ class PartCode:
         """Names of a tap's samples, newest first."""
         return [f"{self.prefix}{tap.input}_{j}" for j in range(tap.tap.samples)]
 
-    def fraction(self, tap: TapOf) -> str:
-        """Name of the rest of a tap's place."""
+    def delay_fraction(self, tap: TapOf) -> str:
+        """Name of the fraction of a sample in a tap's delay."""
         return f"{self.prefix}{tap.input}_f"
 
-    def whole(self, tap: TapOf) -> str:
-        """Name of the whole samples of a tap's place."""
+    def delay_samples(self, tap: TapOf) -> str:
+        """Name of the whole samples in a tap's delay."""
         return f"{self.prefix}{tap.input}_whole"
 
     @cached_property
@@ -188,13 +193,13 @@ class PartCode:
         """Margin of the domain."""
         if self.own.domain is None:
             return None
-        made = self._call(self.own.domain)
-        if not isinstance(made, Node):
+        margin = self._call(self.own.domain)
+        if not isinstance(margin, Node):
             raise InputError(
                 f"Model {self.own.name}: {plain(self.own.domain).__name__} must return one number, "
                 "the margin."
             )
-        return made
+        return margin
 
     @cached_property
     def limits(self) -> list[Node]:
@@ -208,47 +213,48 @@ class PartCode:
 
         The last nodes on the way that do; `still` are further names that do not change.
         """
-        own = {node.value for _, node in (*leaves(self.p), *leaves(self.given))}
-        still = {"h", *own, *still}
+        numbers = {node.value for _, node in (*leaves(self.p), *leaves(self.given))}
+        constant_names = {"h", *numbers, *still}
         moves = dict[Node, bool]()
-        found = dict[Node, None]()
+        constants = dict[Node, None]()
         ends = [*ends]
         order = ordered(ends)
         for node in order:
-            named = node.op == "name" and node.value not in still
-            moves[node] = named or any(moves[a] for a in node.args)
-        for node in [*(a for n in order if moves[n] for a in n.args), *ends]:
-            worth = node.op not in (*LEAVES, "call") and node.kind == "float"
-            if worth and not moves[node] and names_in([node]):
-                found[graph.plain_value(node)] = None
-        return [node for node in found if node.op not in LEAVES]
+            is_moving_name = node.op == "name" and node.value not in constant_names
+            moves[node] = is_moving_name or any(moves[operand] for operand in node.args)
+        read_by_moving = [operand for node in order if moves[node] for operand in node.args]
+        for node in [*read_by_moving, *ends]:
+            is_computed = node.op not in (*LEAVES, "call") and node.kind == "float"
+            if is_computed and not moves[node] and names_in([node]):
+                constants[graph.plain_value(node)] = None
+        return [node for node in constants if node.op not in LEAVES]
 
     @cached_property
-    def outside(self) -> dict[str, Stored]:
+    def outside(self) -> dict[str, SignalId]:
         """Names of what is read of records: samples of taps, and inputs as they come."""
-        found = {}
+        signals = {}
         for tap in self.taps:
             for j, name in enumerate(self.tap_samples(tap)):
-                found[name] = Stored(self.part, "tap", f"{tap.input}.{j}")
+                signals[name] = SignalId(self.part, "tap", f"{tap.input}.{j}")
         for name, node in self.inputs.items():
             if node == graph.name(f"x_{self.own.tap(name).signal}"):
-                found[node.value] = Stored(self.part, "input", name)
-        return found
+                signals[node.value] = SignalId(self.part, "input", name)
+        return signals
 
     def signal(self, path: str) -> Node:
         """A signal, or a number of the state, by its path."""
-        signals = self.known.get("signals", Tuple(None, ()))
+        signals = self.arguments.get("signals", Tuple(None, ()))
         return {**dict(leaves(self.state)), **dict(leaves(signals))}[path]
 
-    def node(self, stored: Stored) -> Node:
+    def node(self, stored: SignalId) -> Node:
         """A number that is kept."""
         if stored.kind in ("tap", "input"):
-            return next(graph.name(n) for n, each in self.outside.items() if each == stored)
+            return next(graph.name(n) for n, signal in self.outside.items() if signal == stored)
         if stored.kind == "state":
             return dict(leaves(self.state))[stored.path]
         return self.signal(stored.path)
 
-    def begun(self, start: str = "rest") -> Value:
+    def initial_state(self, start: str = "rest") -> Value:
         """State at the start.
 
         At rest every signal is zero, or what its default parameter is; ``steady`` is the steady

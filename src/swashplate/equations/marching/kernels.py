@@ -1,10 +1,10 @@
-"""Pieces of a march, compiled one by one and called by address.
+"""Kernels of a march, compiled one by one and called by address.
 
 A Jacobian runs some generated functions over every block of samples. What called them by name would
-be compiled together with them, for every model and every choice of its options. So all pieces have
-one signature, ``piece(count, first, h, records, before, whole, fraction, params, given, states,
-met, flat) -> None``, and the routine that calls them, by address, is the same for all: compiled
-once, kept on disk, as is each piece for all models that share it.
+be compiled together with them, for every model and every choice of its options. So all kernels have
+one signature, ``kernel(count, first, h, records, before, delay_samples, delay_fraction, params,
+given, states, worst_margin, flat) -> None``, and the routine that calls them, by address, is the
+same for all: compiled once, kept on disk, as is each kernel for all models that share it.
 """
 
 from collections.abc import Callable, Container, Sequence
@@ -18,46 +18,51 @@ from numpy.typing import NDArray
 from swashplate.equations.code_generation.lowering import (
     Lowering,
     Operand,
-    definition_of,
+    function_definition_of,
+    llvm_type,
     lowers,
     number,
-    type_of,
 )
-from swashplate.equations.code_generation.machine_code import code_of
+from swashplate.equations.code_generation.machine_code import code_of_function
 from swashplate.equations.declaration import JIT_OFF
 
-PIECE = "count, first, h, records, before, whole, fraction, params, given, states, met, flat"
-"""Arguments of a piece.
+KERNEL_ARGUMENTS = (
+    "count, first, h, records, before, delay_samples, delay_fraction, params, given, states, "
+    "worst_margin, flat"
+)
+"""Arguments of a kernel.
 
 ``count, first`` samples of the block, and the first of them; ``h`` step; ``records`` a record for
-each signal, ``before`` what it was before; ``whole, fraction`` delays of the taps; ``params,
-given`` numbers; ``states`` at the first sample, replaced by those behind the last; ``met`` the
-worst margin, in one place; ``flat`` the block, a row for each number.
+each signal, ``before`` what it was before; ``delay_samples, delay_fraction`` delays of the taps;
+``params, given`` numbers; ``states`` at the first sample, replaced by those after the last;
+``worst_margin`` the worst margin of the domain so far, an array of one number; ``flat`` the block,
+a row for each number.
 """
 
 FLOATS, INTS = "*float", "*int"
-PIECE_KINDS = ("int", "int", "float", f"*{FLOATS}", FLOATS, INTS, *(FLOATS,) * 6)
+KERNEL_KINDS = ("int", "int", "float", f"*{FLOATS}", FLOATS, INTS, *(FLOATS,) * 6)
 """Kinds of these arguments, see `lowering`."""
 
 Fields = TypeVar("Fields", bound=tuple[Any, ...])
 
-Piece = Any
+Kernel = Any
 """What is called: machine code (`Code`), or a plain function if nothing is compiled."""
-Planned = Callable[[], Piece]
-"""Compiles a piece when it is first needed (`generating`): residuals alone need no derivatives."""
+PlannedCode = Callable[[], Kernel]
+"""Compiles a kernel when it is first needed (`generating`): residuals alone need no derivatives."""
 
 
-def routine(function: Callable[..., None]) -> Piece:
+def routine(function: Callable[..., None]) -> Kernel:
     """Compile a function of numbers and arrays that is part of the engine, by its annotations.
 
-    Arrays become pointers, which do not know their shapes. Other routines `run` it by its address.
+    Arrays become pointers, which do not know their shapes. Other routines run it by its address:
+    see `run_routine`.
     """
     if JIT_OFF:
         return function
     hints = {k: v for k, v in function.__annotations__.items() if k != "return"}
     kinds = tuple(_kind_of(hint) for hint in hints.values())
     name = function.__name__
-    return code_of(name, name, kinds, lambda: definition_of(function))
+    return code_of_function(name, name, kinds, lambda: function_definition_of(function))
 
 
 def _kind_of(hint: Any) -> str:
@@ -69,19 +74,20 @@ def _kind_of(hint: Any) -> str:
     return INTS if np.issubdtype(element, np.integer) else FLOATS
 
 
-def addresses(pieces: Sequence[Planned], needed: Container[int]) -> Any:
-    """What `call` is given of each piece; the pieces themselves must be kept as well."""
-    made = [each() if k in needed else None for k, each in enumerate(pieces)]
+def addresses(kernels: Sequence[PlannedCode], needed: Container[int]) -> Any:
+    """What `call_kernel` is given of each kernel; the kernels themselves must be kept as well."""
+    compiled = [kernel() if k in needed else None for k, kernel in enumerate(kernels)]
     if JIT_OFF:
-        return made
-    return np.array([0 if each is None else each.address for each in made], dtype=np.int64)
+        return compiled
+    words = [0 if kernel is None else kernel.address for kernel in compiled]
+    return np.array(words, dtype=np.int64)
 
 
 def pointers(arrays: tuple[NDArray[Any], ...]) -> Any:
     """What compiled code is given of several arrays, which must be kept as well."""
     if JIT_OFF:
         return arrays
-    return np.array([each.ctypes.data for each in arrays], dtype=np.int64)
+    return np.array([array.ctypes.data for array in arrays], dtype=np.int64)
 
 
 class Struct(Generic[Fields]):
@@ -118,17 +124,18 @@ def _word(field: Any, kind: str) -> int:
     if not isinstance(field, np.ndarray):
         return int(field.address)
     # compiled code cannot tell what it finds at an address
-    found = field.__array_interface__
-    if found["typestr"] != kind or found["strides"] is not None:
+    interface = field.__array_interface__
+    if interface["typestr"] != kind or interface["strides"] is not None:
         raise ValueError(f"An array of a struct must be C-contiguous and of type {kind}.")
-    return int(found["data"][0])
+    address, _ = interface["data"]
+    return int(address)
 
 
 # --- what routines call ---------------------------------------------------------------------------
 
 
 def behind(array: Any, start: int) -> Any:
-    """Numbers of an array from a place on, as one row."""
+    """Numbers of an array from an index on, as one row."""
     return array.reshape(-1)[start:]
 
 
@@ -165,44 +172,44 @@ def _pointer(code: Lowering, kind: str, address: Operand) -> Operand:
     return code.operand(kind, f"inttoptr i64 {address.text} to ptr")
 
 
-def run(routine: Piece, arguments: tuple[Any, ...]) -> None:
+def run_routine(routine: Kernel, arguments: tuple[Any, ...]) -> None:
     """Run a routine."""
     routine(*arguments)
 
 
-@lowers(run)
+@lowers(run_routine)
 def _run(code: Lowering, address: Operand, arguments: tuple[Operand, ...]) -> None:
-    texts = ", ".join(f"{type_of(each.kind)} {each.text}" for each in arguments)
+    texts = ", ".join(f"{llvm_type(operand.kind)} {operand.text}" for operand in arguments)
     code.emit(f"call void {_pointer(code, INTS, address).text}({texts})")
 
 
-def call(piece: Piece, count: int, first: int, h: float, arrays: Any) -> None:
-    """Call a piece with arrays, see `pointers`."""
-    piece(count, first, h, *arrays)
+def call_kernel(kernel: Kernel, count: int, first: int, h: float, arrays: Any) -> None:
+    """Call a kernel with arrays, see `pointers`."""
+    kernel(count, first, h, *arrays)
 
 
-@lowers(call)
+@lowers(call_kernel)
 def _call(code: Lowering, address: Operand, *arguments: Operand) -> None:
     count, first, h, arrays = arguments
-    _run(code, address, (count, first, h, *_each(code, arrays)))
+    _run(code, address, (count, first, h, *_array_pointers(code, arrays)))
 
 
-def _each(code: Lowering, arrays: Operand) -> list[Operand]:
-    """Pointers to the arrays that a piece takes."""
-    words = [code.load(arrays, number(k)) for k in range(len(PIECE_KINDS) - 3)]
+def _array_pointers(code: Lowering, arrays: Operand) -> list[Operand]:
+    """Pointers to the arrays that a kernel takes."""
+    words = [code.load(arrays, number(k)) for k in range(len(KERNEL_KINDS) - 3)]
     return [_pointer(code, INTS, word) for word in words]
 
 
 def call_recurrence(
-    piece: Piece, count: int, lanes: Any, size: int, tangent: Any, arrays: Any
+    kernel: Kernel, count: int, lanes: Any, size: int, tangent: Any, arrays: Any
 ) -> None:
     """Call a recurrence, which takes lanes, how many they are, and tangents."""
-    piece(count, size, 0.0, *arrays[:2], lanes, arrays[3], tangent, *arrays[5:])
+    kernel(count, size, 0.0, *arrays[:2], lanes, arrays[3], tangent, *arrays[5:])
 
 
 @lowers(call_recurrence)
 def _call_recurrence(code: Lowering, address: Operand, *arguments: Operand) -> None:
     count, lanes, size, tangent, arrays = arguments
-    taken = _each(code, arrays)
+    taken = _array_pointers(code, arrays)
     taken[2], taken[4] = lanes, tangent
     _run(code, address, (count, size, number(0.0), *taken))
