@@ -11,9 +11,9 @@ from timing import Run, alone
 
 from swashplate.crane import (
     Crane,
+    OperatorCommand,
     Scatter,
     Seaway,
-    Stick,
     control,
     judge,
     load_motion,
@@ -31,7 +31,7 @@ CLIPPED = control.DelayedFeedback(0.2, 0.2) | control.ShipCompensation() | contr
 
 def crane_rows() -> Iterator[Row]:
     """60 s at 512 Hz unless said otherwise, in processor time but for what says so."""
-    crane, stick = Crane.preset("tg3637"), Stick.rest(60.0)
+    crane, stick = Crane.preset("tg3637"), OperatorCommand.rest(60.0)
     how = {"slew_deg": 90.0, "rope_m": 27.0}
     ship = Seaway("ss3", seed=1).motion(60 * 512 + 1)
     tip = simulate(crane, stick, sea=ship, **how).tip

@@ -11,7 +11,7 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.crane import Crane, Stick, control, simulate
+from swashplate.crane import Crane, OperatorCommand, control, simulate
 from swashplate.crane.closed_loop.stepper import Actuation
 from swashplate.crane.control import Control
 from swashplate.crane.sea import extremes
@@ -67,7 +67,7 @@ def slew_tables(crane: Crane) -> Iterator[str]:
     ):
         yield f"\n### {title}\n\n| stick | {heads} |\n|--:|{'--:|' * len(variants)}"
         for part, numbers in others.items():
-            stick = Stick.trapezoid(slew=part, until={"slew_deg": 45.0}, length=160.0)
+            stick = OperatorCommand.trapezoid(slew=part, until={"slew_deg": 45.0}, length=160.0)
             cells = []
             for (actuation, law), other in zip(variants, numbers, strict=True):
                 run = simulate(

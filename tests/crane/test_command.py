@@ -8,7 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 from swashplate.cli import app
-from swashplate.crane import Crane, Seaway, Spectrum, Stick, Suspension, simulate
+from swashplate.crane import Crane, OperatorCommand, Seaway, Spectrum, Suspension, simulate
 from swashplate.errors import FileError, InputError, ParameterError
 
 
@@ -76,7 +76,7 @@ def test_run_takes_sea_ship_and_load_as_they_are_given(tmp_path):
     )
     run = simulate(
         Crane.preset("tg3637"),
-        Stick.rest(6.0),
+        OperatorCommand.rest(6.0),
         sea=sea,
         slew_deg=90.0,
         suspension=Suspension(stiffness=6e7, bounce_damping=0.05),

@@ -8,7 +8,7 @@ from typer.testing import CliRunner
 
 from swashplate import Drive
 from swashplate.cli import app
-from swashplate.crane import Crane, Stick, control, judge, simulate, upgraded
+from swashplate.crane import Crane, OperatorCommand, control, judge, simulate, upgraded
 from swashplate.crane.crane import preset_text
 from swashplate.identification import Verdict, load_setup
 from swashplate.identification.assessment import FitFile, StoredVerdict
@@ -213,7 +213,7 @@ def test_judgment_and_page_say_the_verdict(fit, tmp_path, usable, look):
 
 def test_a_scene_says_the_verdict(fit, tmp_path):
     crane = Crane.preset("tg3637").with_drive(hoist=fit(False))
-    write_scene(simulate(crane, Stick.rest(2.0)), tmp_path / "scene.html")
+    write_scene(simulate(crane, OperatorCommand.rest(2.0)), tmp_path / "scene.html")
     text = tmp_path.joinpath("scene.html").read_text("utf-8")
     for words in (f"{HEADLINES[False]} {VALIDITY}", UNREACHED):
         assert words.replace("'", "&#39;") in text

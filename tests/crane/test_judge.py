@@ -11,9 +11,9 @@ from swashplate import Campaign, Drive, rig
 from swashplate.analysis.monte_carlo import Draws, stored_draws
 from swashplate.crane import (
     Crane,
+    OperatorCommand,
     Seaway,
     Spectrum,
-    Stick,
     Study,
     control,
     drawn_cranes,
@@ -81,9 +81,9 @@ def test_place_is_where_the_tip_hangs_without_waves(crane):
     seaway = Seaway("ss2", list_deg=3.0)
     case = Study.of(crane, CLIPPED, seeds=[0], sea=seaway).cases["no control"]
     lean = np.tile(seaway.lean, (1025, 1))
-    run = simulate(crane, Stick.rest(2.0), sea=lean, slew_deg=90.0, rope_m=27.0)
+    run = simulate(crane, OperatorCommand.rest(2.0), sea=lean, slew_deg=90.0, rope_m=27.0)
     assert case.wanted(seaway) == pytest.approx(tuple(run.tip[-1, :2]), abs=1e-9)
-    moving = Study.of(crane, CLIPPED, seeds=[0], stick=Stick.trapezoid(slew=0.5, duration=30.0,
+    moving = Study.of(crane, CLIPPED, seeds=[0], stick=OperatorCommand.trapezoid(slew=0.5, duration=30.0,
                                                                        length=200.0))  # fmt: skip
     assert moving.cases["no control"].wanted(seaway) is None
 
@@ -299,7 +299,7 @@ def test_intervals_against_published_tables():
 
 def test_a_stopped_run_is_counted(crane):
     # lowering while the load is held 3 m above the longest rope ends beyond it
-    stick = Stick.trapezoid(hoist=-0.5, duration=30.0, length=80.0)
+    stick = OperatorCommand.trapezoid(hoist=-0.5, duration=30.0, length=80.0)
     found = judge(
         crane, {"none": control.Clip()}, seeds=[0], stick=stick, run_in=5.0, rope_m=47.0,
         remedies=False, turns=False,
@@ -360,7 +360,9 @@ SLEWS = {
 
 @pytest.mark.parametrize("part", SLEWS)
 def test_residual_swing_over_the_stick_is_that_of_the_independent_crane(crane, part):
-    stick = Stick.trapezoid(slew=part, until={"slew_deg": 45.0}, length=45.0 / (4.2 * part) + 60.0)
+    stick = OperatorCommand.trapezoid(
+        slew=part, until={"slew_deg": 45.0}, length=45.0 / (4.2 * part) + 60.0
+    )
     runs = [
         simulate(crane, stick, actuation=actuation, swing_damping=0.0)
         for actuation in ("ideal", "volts", "inverse")
@@ -446,7 +448,7 @@ def test_draws_of_two_axes_from_one_seed_are_not_correlated(crane):
 
 def test_control_does_not_know_the_draw_that_moves_the_crane(crane):
     weaker = crane.slew.scale(Z17=1.05)
-    stick = Stick.trapezoid(slew=0.5, until={"slew_deg": 30.0}, length=30.0)
+    stick = OperatorCommand.trapezoid(slew=0.5, until={"slew_deg": 30.0}, length=30.0)
     (drawn,) = drawn_cranes(crane, slew=Draws((weaker,), 0))
     known, unknown = crane.with_drive(slew=weaker), crane.with_drive(slew=weaker, known=False)
     runs = [simulate(each, stick) for each in (crane, drawn, unknown, known)]
@@ -478,8 +480,8 @@ def test_what_makes_no_study_is_said(crane):
     refuse("3. are 3, but must be a name, a crane or a list of cranes", drives=[3])
     refuse("drives is 3, but must be a list of names", drives=3)
     refuse("counts for 30 s after a run-in of 120 s, but must count for at least 60 s", length=30.0)
-    refuse("stick is 100 s long, but a run counts from 120 s on", stick=Stick.rest(100.0))
-    moving = Stick.record(np.full((153_600, 3), [0.0, 0.01, 0.0]))
+    refuse("stick is 100 s long, but a run counts from 120 s on", stick=OperatorCommand.rest(100.0))
+    moving = OperatorCommand.record(np.full((153_600, 3), [0.0, 0.01, 0.0]))
     refuse("Ideal drives follow at once, .* put a row of zeros before it", stick=moving)
     refuse("seeds is 3, but must be a sequence, as range", seeds=3)
     refuse("A sea is a name, as 'ss3', or a Spectrum, not of type ndarray", sea=np.zeros((9, 6)))

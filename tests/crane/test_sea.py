@@ -12,9 +12,9 @@ from swashplate.crane import (
     SEA_STATES,
     Crane,
     Hull,
+    OperatorCommand,
     Seaway,
     Spectrum,
-    Stick,
     read_ship,
     ship_motion,
     simulate,
@@ -167,7 +167,8 @@ def test_a_listed_ship_carries_the_boom_to_the_side_that_is_down():
     crane = Crane.preset("tg3637")
     lists = [Seaway(Spectrum(1e-6, 7.5), list_deg=angle) for angle in (0.0, 5.0)]
     runs = [
-        simulate(crane, Stick.rest(1.0), sea=sea, slew_deg=90.0, actuation="ideal") for sea in lists
+        simulate(crane, OperatorCommand.rest(1.0), sea=sea, slew_deg=90.0, actuation="ideal")
+        for sea in lists
     ]
     upright, listed = (run.tip[0] for run in runs)
     # starboard, where the boom points, goes down by a turn of 5 degrees about the x axis
@@ -379,7 +380,7 @@ def test_measured_motion_comes_from_a_log(tmp_path):
     np.testing.assert_allclose(made[:, 2], 0.5 * np.sin(0.7 * fine), atol=1e-5)
     np.testing.assert_allclose(made[:, 3], np.radians(2.0) * np.sin(0.5 * fine + 1.0), atol=1e-6)
     assert not made[:, [0, 1, 4, 5]].any()
-    run = simulate(Crane.preset("tg3637"), Stick.rest(20.0), sea=made, actuation="ideal")
+    run = simulate(Crane.preset("tg3637"), OperatorCommand.rest(20.0), sea=made, actuation="ideal")
     assert run.swing_deg.max() > 0.05
     with pytest.raises(InputError, match="no column .surge.; it has .*: name the one"):
         ship_motion(path)
@@ -391,7 +392,9 @@ def test_measured_motion_comes_from_a_log(tmp_path):
         ship_motion(path, {"roll": "roll"})
     with pytest.raises(InputError, match="The sea's motion: pitch reaches 3 rad, which no ship"):
         simulate(
-            Crane.preset("tg3637"), Stick.rest(1.0), sea=np.full((600, 6), 3.0) * [0, 0, 0, 0, 1, 0]
+            Crane.preset("tg3637"),
+            OperatorCommand.rest(1.0),
+            sea=np.full((600, 6), 3.0) * [0, 0, 0, 0, 1, 0],
         )
     path.write_text("\n".join(["time [s];heave [m];roll [deg]", *rows[:100], *rows[301:]]), "utf-8")
     with pytest.raises(InputError, match="has no heave from 9.9 to 30.1 s"):

@@ -20,10 +20,10 @@ from swashplate.crane import (
     Followable,
     Hull,
     Operability,
+    OperatorCommand,
     Scatter,
     Seaway,
     Spectrum,
-    Stick,
     Sweep,
     Turn,
     control,
@@ -50,7 +50,9 @@ def crane():
 @pytest.fixture(scope="module")
 def runs(crane):
     return {
-        name: simulate(crane, Stick.rest(20.0), sea=Seaway("ss3", seed=1), control=law, slew_deg=90)
+        name: simulate(
+            crane, OperatorCommand.rest(20.0), sea=Seaway("ss3", seed=1), control=law, slew_deg=90
+        )
         for name, law in (("no control", None), ("</script><b>", MEANT))
     }
 
@@ -221,7 +223,7 @@ def test_nothing_runs_in_a_page_but_its_own_scripts(tmp_path, scene, judged, yea
 def test_scenes_that_cannot_be_are_refused(tmp_path, crane, runs):
     with pytest.raises(InputError, match="shows 1 to 4 runs of a crane, not 0"):
         write_scene({}, tmp_path / "scene.html")
-    longer = simulate(crane, Stick.rest(21.0))
+    longer = simulate(crane, OperatorCommand.rest(21.0))
     with pytest.raises(InputError, match="must be of one length"):
         write_scene({**runs, "longer": longer}, tmp_path / "scene.html")
     assert not list(tmp_path.iterdir())
@@ -408,13 +410,13 @@ def test_figures_of_one_panel_draw_in_given_axes(crane, judged):
 
 
 def test_figure_of_runs_shows_them_by_name_what_moves_and_the_sea(crane, runs):
-    calm = {name: simulate(crane, Stick.rest(20.0), slew_deg=90) for name in runs}
+    calm = {name: simulate(crane, OperatorCommand.rest(20.0), slew_deg=90) for name in runs}
     figure = figures.plot_crane(calm, sea=runs)
     labels = [ax.get_ylabel() for ax in figure.axes]
     assert labels == ["swing (deg)", "in sea (deg)", "limits"]
     names = [each.get_text() for each in figure.axes[0].get_legend().get_texts()]
     assert names == list(runs)
-    stick = Stick.trapezoid(slew=0.5, luff=0.5, duration=9.0, length=12.0)
+    stick = OperatorCommand.trapezoid(slew=0.5, luff=0.5, duration=9.0, length=12.0)
     figure = simulate(crane, stick).plot()
     labels = [ax.get_ylabel() for ax in figure.axes]
     assert labels == ["swing (deg)", "slew (deg)", "boom (deg)", "limits"]

@@ -154,12 +154,12 @@ def run(
     if out is not None and len(variant or ()) > 1:
         raise InputError("--out writes one run's signals: take one --variant.")
     with working("Simulating"):
-        from swashplate.crane import Stick, run_tables, simulate
+        from swashplate.crane import OperatorCommand, run_tables, simulate
         from swashplate.crane.axes import RATE
 
         crane, seaway = operated.chosen, operated.seaway(seed=seed, length=length)
         targets = numbers_of("--until", until, "slew_deg=45")
-        stick = Stick.trapezoid(
+        stick = OperatorCommand.trapezoid(
             hoist=hoist, slew=slew, luff=luff, until=targets, duration=duration, length=length
         )
         ship = seaway or operated.motion(round(stick.length * RATE) + 1)

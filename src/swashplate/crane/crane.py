@@ -61,7 +61,7 @@ class Crane:
     Examples
     --------
     >>> crane = Crane.preset("tg3637")
-    >>> run = simulate(crane, Stick.trapezoid(slew=1.0, until={"slew_deg": 45}))
+    >>> run = simulate(crane, OperatorCommand.trapezoid(slew=1.0, until={"slew_deg": 45}))
     >>> run.residual_deg
     """
 

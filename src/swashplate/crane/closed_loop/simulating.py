@@ -8,9 +8,9 @@ from numpy.typing import ArrayLike
 
 from swashplate.crane.axes import RATE
 from swashplate.crane.closed_loop.loop import DIRECT, IDEAL
+from swashplate.crane.closed_loop.operator_command import Array, OperatorCommand
 from swashplate.crane.closed_loop.result import CraneRun
 from swashplate.crane.closed_loop.stepper import CraneStepper, Setup
-from swashplate.crane.closed_loop.stick import Array, Stick
 from swashplate.crane.crane import Crane
 from swashplate.crane.sea.seaway import Seaway, motion_of
 from swashplate.errors import InputError
@@ -18,7 +18,7 @@ from swashplate.errors import InputError
 
 def simulate(
     crane: Crane,
-    stick: Stick,
+    stick: OperatorCommand,
     *,
     sea: Seaway | ArrayLike | None = None,
     **setup: Unpack[Setup],
@@ -29,7 +29,7 @@ def simulate(
     ----------
     crane : Crane
         The crane with its drives.
-    stick : Stick
+    stick : OperatorCommand
         What the operator asks for; its length is that of the run.
     sea : Seaway or (n, 6) array_like, optional
         A seaway, or the ship's motion at 512 Hz: surge, sway, heave [m], roll, pitch, yaw [rad], as
@@ -52,7 +52,7 @@ def simulate(
     return CraneRun(crane, commands, ship, signals, stepper.fixed, end)
 
 
-def begun(crane: Crane, stick: Stick, setup: Setup) -> tuple[CraneStepper, Array, float]:
+def begun(crane: Crane, stick: OperatorCommand, setup: Setup) -> tuple[CraneStepper, Array, float]:
     """A run at its start: stepper, commands, and when the last one ends; as `simulate` refuses."""
     stepper = CraneStepper(crane, **setup)
     if stepper.fixed.actuation == DIRECT:
@@ -60,8 +60,10 @@ def begun(crane: Crane, stick: Stick, setup: Setup) -> tuple[CraneStepper, Array
             "With direct actuation commands are voltages, but a stick gives parts of the full "
             "speed: take a CraneStepper, or actuation='volts'."
         )
-    if not isinstance(stick, Stick):
-        raise InputError(f"The stick is {stick!r}, but must be a Stick, as Stick.rest(60).")
+    if not isinstance(stick, OperatorCommand):
+        raise InputError(
+            f"The stick is {stick!r}, but must be an OperatorCommand, as OperatorCommand.rest(60)."
+        )
     commands, end = stick.sample(crane, stepper.fixed.home, RATE)
     if stepper.fixed.actuation == IDEAL and commands[0].any():
         raise InputError(

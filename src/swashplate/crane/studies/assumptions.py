@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swashplate.crane.closed_loop.stick import Stick
+from swashplate.crane.closed_loop.operator_command import OperatorCommand
 from swashplate.crane.crane import Crane
 from swashplate.crane.sea.extremes import largest_of_peaks
 from swashplate.crane.sea.seaway import Seaway
@@ -85,7 +85,7 @@ def turns_of(study: Study, judged: str, limits: Mapping[str, float]) -> tuple[Tu
     case = study.cases[judged]
     if case.stick.samples is not None or case.stick.parts:
         return ()  # what the operator does takes as long as it takes
-    case = case._replace(stick=Stick.rest(study.run_in + LENGTH))
+    case = case._replace(stick=OperatorCommand.rest(study.run_in + LENGTH))
     short = replace(study, seeds=study.seeds[:SEAWAYS], progress=None)
     base = _passes(short, study.seaway, case, limits)
     turns = []

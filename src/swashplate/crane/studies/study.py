@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.crane.axes import RATE, check_names
+from swashplate.crane.closed_loop.operator_command import OperatorCommand
 from swashplate.crane.closed_loop.result import FARTHEST_SWING, CraneRun
 from swashplate.crane.closed_loop.simulating import begun, simulate
 from swashplate.crane.closed_loop.stepper import Actuation, Setup, feels_load
-from swashplate.crane.closed_loop.stick import Stick
 from swashplate.crane.control import Clip, Control
 from swashplate.crane.crane import Crane
 from swashplate.crane.kinematics import Vector, boom_at, rotation, tip_of, to_inertial
@@ -62,7 +62,7 @@ class Case(NamedTuple):
     cranes: tuple[Crane, ...]
     """One, or cranes of which each seaway takes the next."""
     setup: Setup
-    stick: Stick
+    stick: OperatorCommand
 
     @property
     def driven(self) -> bool:
@@ -172,7 +172,7 @@ class Study(Result):
         seeds: Sequence[int],
         sea: str | Spectrum | Seaway = "ss3",
         drives: Drives = (IDEAL, BUILT),
-        stick: Stick | None = None,
+        stick: OperatorCommand | None = None,
         length: float = LENGTH,
         run_in: float = RUN_IN,
         executor: Executor | None = None,
@@ -193,7 +193,7 @@ class Study(Result):
             ``"ideal"``, which follow at once within their limits of speed; ``"identified"``, the
             crane's own; ``"volts"``, these without their inverse maps; by name also other cranes,
             or several of which each seaway takes the next, see `drawn_cranes`.
-        stick : Stick, optional
+        stick : OperatorCommand, optional
             What the operator does; by default nothing, the crane keeps its load in place. Its
             length is then that of each run.
         length : float
@@ -227,7 +227,7 @@ class Study(Result):
                 f"at least {SHORTEST:g} s, eight swings, after a run-in of 0 s or more."
             )
         if stick is None:
-            stick = Stick.rest(run_in + length)
+            stick = OperatorCommand.rest(run_in + length)
         elif stick.length < run_in + SHORTEST:
             raise InputError(
                 f"The stick is {stick.length:g} s long, but a run counts from {run_in:g} s on for "

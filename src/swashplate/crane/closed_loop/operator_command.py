@@ -24,7 +24,7 @@ TARGETS = {"hoist": "rope_m", "slew": "slew_deg", "luff": "boom_deg"}
 
 
 @dataclass(frozen=True, eq=False)
-class Stick(Result):
+class OperatorCommand(Result):
     """Commands of hoist, slew and luff, each from -1 to 1.
 
     Positive ones hoist, slew to starboard, lift the boom. Made by `trapezoid`, `record`, `rest`.
@@ -55,7 +55,7 @@ class Stick(Result):
         start: float = 1.0,
         ramp: float = 0.5,
         length: float = 60.0,
-    ) -> Stick:
+    ) -> OperatorCommand:
         """Trapezoids of all axes from one moment on.
 
         Parameters
@@ -92,7 +92,7 @@ class Stick(Result):
         return cls(length, start, ramp, moving, targets, duration)
 
     @classmethod
-    def record(cls, commands: ArrayLike, rate: float = 512.0) -> Stick:
+    def record(cls, commands: ArrayLike, rate: float = 512.0) -> OperatorCommand:
         """Commands as they were recorded at a rate [Hz], straight between samples.
 
         They are (n, 3), of hoist, slew and luff, -1 to 1.
@@ -116,7 +116,7 @@ class Stick(Result):
         return cls(length, samples=made, rate=float(rate))
 
     @classmethod
-    def rest(cls, length: float = 60.0) -> Stick:
+    def rest(cls, length: float = 60.0) -> OperatorCommand:
         """Nothing, for so long. [s]"""
         return cls.trapezoid(length=length)
 
