@@ -1,4 +1,4 @@
-"""Rows of the table for the crane: rope, seaway, runs, a judgment, a year of operability."""
+"""Rows of the table for the crane: rope, seaway, runs, an assessment, a year of operability."""
 
 from collections.abc import Iterator
 from statistics import median
@@ -14,8 +14,8 @@ from swashplate.crane import (
     OperatorCommand,
     Scatter,
     Seaway,
+    assess,
     control,
-    judge,
     load_motion,
     operability,
     simulate,
@@ -24,8 +24,8 @@ from swashplate.crane import (
 ROPE, SEAWAY = 1e-3, 12e-3
 IDEAL, OPEN, CLOSED = 4.0, 9.0, 17.0
 """Targets, times of the rope's march."""
-JUDGED, YEAR = 20.0, 60.0
-"""Targets: processor time of a judgment, and time of a year on two cores. [s]"""
+ASSESSED, YEAR = 20.0, 60.0
+"""Targets: processor time of an assessment, and time of a year on two cores. [s]"""
 CLIPPED = control.DelayedFeedback(0.2, 0.2) | control.ShipCompensation() | control.Clip()
 
 
@@ -68,8 +68,8 @@ def crane_rows() -> Iterator[Row]:
         CLOSED,
     )
     short = {"remedies": False, "turns": False}
-    judged = processor_time(lambda: judge(crane, CLIPPED, seeds=range(20), **short), 1)
-    yield row("crane: judgment, 20 seaways of 10 min, 3 variants", judged, JUDGED)
+    assessed = processor_time(lambda: assess(crane, CLIPPED, seeds=range(20), **short), 1)
+    yield row("crane: assessment, 20 seaways of 10 min, 3 variants", assessed, ASSESSED)
     year = alone(lambda: operability(crane, CLIPPED, Scatter.packaged()), 1)
     yield row(
         "crane: operability, a year, 8 headings, 3 variants, all cores, wall clock", year, YEAR

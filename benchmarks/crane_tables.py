@@ -82,7 +82,7 @@ def slew_tables(crane: Crane) -> Iterator[str]:
 RATE, FREQUENCY = 8.0, 0.6
 """Samples a second [Hz], and natural frequency of what is driven by white noise [rad/s]."""
 RUNS, RUN = 80, 600.0
-"""Runs of a judgment, and the time for which each counts. [s]"""
+"""Runs of an assessment, and the time for which each counts. [s]"""
 SETS = 20
 PARTS = (0.499, 0.1)
 """Parts of the peaks that the tail is fitted to; a whole half would have too few below it."""

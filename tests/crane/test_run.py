@@ -15,8 +15,8 @@ from swashplate.crane import (
     OperatorCommand,
     Seaway,
     Suspension,
+    assess,
     control,
-    judge,
     linearize,
     simulate,
 )
@@ -515,7 +515,7 @@ def test_noise_of_the_ropes_direction_is_white_and_held_between_measurements(cra
 def test_noise_is_the_same_on_any_number_of_cores(crane):
     law = control.DelayedFeedback() | control.Clip() | control.Sensors(seed=2)
     how = {"seeds": range(3), "length": 60.0, "run_in": 0.0, "remedies": False, "turns": False}
-    one, two = (judge(crane, law, executor=Threads(count), **how) for count in (1, 2))
+    one, two = (assess(crane, law, executor=Threads(count), **how) for count in (1, 2))
     np.testing.assert_array_equal(one.swing("identified"), two.swing("identified"))
 
 

@@ -26,15 +26,15 @@ from swashplate.crane import (
     Spectrum,
     Sweep,
     Turn,
+    assess,
     control,
     follow,
-    judge,
     simulate,
 )
 from swashplate.crane.studies.operating import Cell
 from swashplate.report import figures
 from swashplate.report.figures.crane import seaway_words
-from swashplate.report.scene import write_judgment, write_operability, write_scene
+from swashplate.report.scene import write_assessment, write_operability, write_scene
 from swashplate.report.scene.pages import COLUMNS
 from swashplate.report.style import BLUE, GREEN, VERMILION
 
@@ -58,8 +58,8 @@ def runs(crane):
 
 
 @pytest.fixture(scope="module")
-def judged(crane):
-    return judge(crane, MEANT, seeds=range(3), **SHORT)
+def assessed(crane):
+    return assess(crane, MEANT, seeds=range(3), **SHORT)
 
 
 @pytest.fixture
@@ -99,16 +99,16 @@ BEYOND = "the load swings beyond 30 deg"
 
 
 @pytest.fixture(scope="module")
-def harming(judged):
-    """The same as if the judged variant had left the model twice, and swung more in the third."""
-    left = judged.outcomes[0][-1]._replace(rms_swing=np.nan, left=BEYOND)
-    none = judged.outcomes[2][0]
-    more = judged.outcomes[2][-1]._replace(rms_swing=1.5 * none.rms_swing)
+def harming(assessed):
+    """The same as if the assessed variant had left the model twice, and swung more in the third."""
+    left = assessed.outcomes[0][-1]._replace(rms_swing=np.nan, left=BEYOND)
+    none = assessed.outcomes[2][0]
+    more = assessed.outcomes[2][-1]._replace(rms_swing=1.5 * none.rms_swing)
     changed = [left, left, more]
     outcomes = tuple(
-        (*seaway[:-1], last) for seaway, last in zip(judged.outcomes, changed, strict=True)
+        (*seaway[:-1], last) for seaway, last in zip(assessed.outcomes, changed, strict=True)
     )
-    return replace(judged, outcomes=outcomes)
+    return replace(assessed, outcomes=outcomes)
 
 
 @pytest.fixture(scope="module")
@@ -140,13 +140,13 @@ def words_of(figure):
 # --- pages ----------------------------------------------------------------------------------------
 
 
-def test_verdicts_page_has_both_answers_with_a_light_of_their_own(tmp_path, judged, harming):
-    text = written(write_judgment, judged, tmp_path)
+def test_verdicts_page_has_both_answers_with_a_light_of_their_own(tmp_path, assessed, harming):
+    text = written(write_assessment, assessed, tmp_path)
     summary, _, rest = text.partition('<section id="hangs">')
     looks = {"yes": "good", "not decided": "look", "no": "bad"}
     for subject, decision, sentence in (
-        ("Harm", judged.harmless, judged.harm_sentence()),
-        ("Sufficiency", judged.sufficient, judged.sufficiency_sentence()),
+        ("Harm", assessed.harmless, assessed.harm_sentence()),
+        ("Sufficiency", assessed.sufficient, assessed.sufficiency_sentence()),
     ):
         assert f'<dt class="{looks[decision]}">{subject}</dt>' in summary
         assert sentence in summary
@@ -155,14 +155,14 @@ def test_verdicts_page_has_both_answers_with_a_light_of_their_own(tmp_path, judg
     assert "3 seaways of 1 min" in summary
     assert summary.count("<svg") == 1
     assert rest.count("<svg") == 2
-    failed = written(write_judgment, harming, tmp_path)
+    failed = written(write_assessment, harming, tmp_path)
     assert '<div class="headline bad">' in failed
     assert f"'identified' is not an operation in 2 of 3 seaways: {BEYOND}." in failed
 
 
-def test_verdicts_page_says_what_the_answer_hangs_on(tmp_path, judged):
+def test_verdicts_page_says_what_the_answer_hangs_on(tmp_path, assessed):
     turn = Turn("the ship's roll period", "13 s", "10.4 s", True, False)
-    text = written(write_judgment, replace(judged, turns=(turn,)), tmp_path)
+    text = written(write_assessment, replace(assessed, turns=(turn,)), tmp_path)
     hangs = text.partition('<section id="hangs">')[2].partition("</section>")[0]
     for words in (
         "The load's swing has a damping of 0.5 %, assumed.",
@@ -177,14 +177,14 @@ def test_verdicts_page_says_what_the_answer_hangs_on(tmp_path, judged):
     assert "roll period 13 s with a damping of 6 %" in text
 
 
-def test_verdicts_page_of_harm_alone_says_what_was_not_asked(tmp_path, judged):
-    text = written(write_judgment, replace(judged, asked=("harm",)), tmp_path)
+def test_verdicts_page_of_harm_alone_says_what_was_not_asked(tmp_path, assessed):
+    text = written(write_assessment, replace(assessed, asked=("harm",)), tmp_path)
     assert text.count("This was not asked") == 1
     assert "suffice" not in text.partition('<div class="headline')[2].partition("</div>")[0]
 
 
-def test_pages_are_one_file_each_without_an_outside_link(tmp_path, judged, year):
-    for write, result in ((write_judgment, judged), (write_operability, year)):
+def test_pages_are_one_file_each_without_an_outside_link(tmp_path, assessed, year):
+    for write, result in ((write_assessment, assessed), (write_operability, year)):
         text = written(write, result, tmp_path)
         assert not re.search(r"(src|href)\s*=\s*[\"']?(https?:)?//", text)
         assert "min-width: 600px" not in text  # figures are whole on a narrow screen
@@ -206,16 +206,16 @@ def test_operabilitys_page_has_one_figure_the_shares_and_what_is_assumed(tmp_pat
 
 
 @pytest.mark.slow
-def test_verdicts_page_shows_in_a_browser_without_errors(tmp_path, judged, browsed):
-    write_judgment(judged, tmp_path / "judge.html")
-    assert "Limits of the drives" in browsed(tmp_path / "judge.html")
+def test_verdicts_page_shows_in_a_browser_without_errors(tmp_path, assessed, browsed):
+    write_assessment(assessed, tmp_path / "assessment.html")
+    assert "Limits of the drives" in browsed(tmp_path / "assessment.html")
 
 
 @pytest.mark.slow
-def test_nothing_runs_in_a_page_but_its_own_scripts(tmp_path, scene, judged, year, browsed):
+def test_nothing_runs_in_a_page_but_its_own_scripts(tmp_path, scene, assessed, year, browsed):
     assert "data-drawn=" in injected(scene, tmp_path, browsed)
-    write_judgment(judged, tmp_path / "judge.html")
-    assert "Limits of the drives" in injected(tmp_path / "judge.html", tmp_path, browsed)
+    write_assessment(assessed, tmp_path / "assessment.html")
+    assert "Limits of the drives" in injected(tmp_path / "assessment.html", tmp_path, browsed)
     write_operability(year, tmp_path / "year.html")
     assert "What it rests on" in injected(tmp_path / "year.html", tmp_path, browsed)
 
@@ -240,17 +240,17 @@ def test_seaways_in_words_have_height_period_heading_and_roll():
     assert seaway_words(Seaway(heading_deg=-180.0), height=False).startswith("peak at 7.5 s, head")
 
 
-def test_figure_of_a_judgment_tells_seaways_from_the_means_interval(judged, assert_legible):
-    figure = judged.plot()
+def test_figure_of_an_assessment_tells_seaways_from_the_means_interval(assessed, assert_legible):
+    figure = assessed.plot()
     assert_legible(figure)
     title = figure.get_suptitle()
     assert title == "3 seaways of 1 min, ss3 0.88 m, 7.5 s, abeam from starboard, roll 13 s"
     swing = figure.axes[0]
     diamonds = [patch for patch in swing.patches if isinstance(patch, Polygon)]
     for name, points, diamond in zip(
-        reversed(judged.names), swing.collections, diamonds, strict=False
+        reversed(assessed.names), swing.collections, diamonds, strict=False
     ):
-        expected = np.degrees(judged.swing(name))
+        expected = np.degrees(assessed.swing(name))
         np.testing.assert_allclose(np.sort(points.get_offsets()[:, 0]), np.sort(expected))
         # the root of the mean square, and of its interval
         squares = expected**2
@@ -259,10 +259,10 @@ def test_figure_of_a_judgment_tells_seaways_from_the_means_interval(judged, asse
         assert across.max() == pytest.approx(np.sqrt(squares.mean() + half))
         assert across.min() == pytest.approx(np.sqrt(max(squares.mean() - half, 0.0)))
     (line,) = swing.collections[3].get_segments()
-    assert line[0, 0] == pytest.approx(np.degrees(judged.linear.values["swing"].rms))
+    assert line[0, 0] == pytest.approx(np.degrees(assessed.linear.values["swing"].rms))
 
 
-def test_figure_of_a_judgment_counts_runs_that_left_the_model(harming, assert_legible):
+def test_figure_of_an_assessment_counts_runs_that_left_the_model(harming, assert_legible):
     figure = harming.plot()
     assert_legible(figure)
     swing = figure.axes[0]
@@ -284,9 +284,9 @@ def test_figure_of_a_judgment_counts_runs_that_left_the_model(harming, assert_le
     assert_legible(replace(harming, outcomes=nobody, linear=None).plot())
 
 
-def test_figure_of_a_judgment_has_shares_of_limits(judged, crane):
-    limits = judged.plot().axes[1]
-    limited = judged.limited(judged.judged)
+def test_figure_of_an_assessment_has_shares_of_limits(assessed, crane):
+    limits = assessed.plot().axes[1]
+    limited = assessed.limited(assessed.assessed_variant)
     labels = [text.get_text().partition("\n")[0] for text in limits.get_yticklabels()]
     assert labels[0] == "saturation"
     assert labels[-1] == "swing"
@@ -295,7 +295,7 @@ def test_figure_of_a_judgment_has_shares_of_limits(judged, crane):
         if one.largest.value == one.largest.value:  # not of too few peaks
             share = one.largest.value / one.limit
             assert shown[row] == pytest.approx(np.clip(share, 0.1, limits.get_xlim()[1]))
-    unlimited = replace(judged, study=replace(judged.study, crane=replace(crane, limits={})))
+    unlimited = replace(assessed, study=replace(assessed.study, crane=replace(crane, limits={})))
     assert len(replace(unlimited, asked=("harm",)).plot().axes) == 1
 
 
@@ -401,8 +401,8 @@ def entries(figure):
     return zip(legend.get_texts(), legend.get_patches(), strict=True)
 
 
-def test_figures_of_one_panel_draw_in_given_axes(crane, judged):
-    for result in (judged, follow(crane, [5.0, 8.0, 12.0])):
+def test_figures_of_one_panel_draw_in_given_axes(crane, assessed):
+    for result in (assessed, follow(crane, [5.0, 8.0, 12.0])):
         ax = Figure().subplots()
         assert result.plot(ax=ax, title="here") is ax
         assert ax.get_title(loc="left") == "here"

@@ -35,7 +35,7 @@ from swashplate.errors import InputError
 from swashplate.tables import PAGE, Column, Form, Table
 
 if TYPE_CHECKING:
-    from swashplate.crane import Crane, Judgment, Operability, Seaway, Sweep
+    from swashplate.crane import Assessment, Crane, Operability, Seaway, Sweep
 
 VERDICT = Form("a verdict", (".html", ".csv", ".parquet"))
 OPERABILITY = Form("an operability", (".html", ".csv", ".parquet"))
@@ -184,15 +184,15 @@ def run(
 
 @command(
     cranes,
-    "judge",
+    "assess",
     examples="""
-        swashplate crane judge tg3637 --sea ss3
-        swashplate crane judge tg3637 --control feedback=0.2/0.2+ship+clip --ask harm
-        swashplate crane judge tg3637 --scale luff.orifice=3 --out judge.html
-        swashplate crane judge tg3637 --drive luff=fitted --drives identified,drawn
+        swashplate crane assess tg3637 --sea ss3
+        swashplate crane assess tg3637 --control feedback=0.2/0.2+ship+clip --ask harm
+        swashplate crane assess tg3637 --scale luff.orifice=3 --out assessment.html
+        swashplate crane assess tg3637 --drive luff=fitted --drives identified,drawn
     """,
 )
-def judge(
+def assess(
     study: Studied,
     *,
     allowed: Annotated[
@@ -254,19 +254,19 @@ def judge(
         from swashplate.executors import Dask
 
         more["executor"] = Dask(dask)
-    from swashplate.crane import judge as judge_control
-    from swashplate.crane.studies.judging import SEAWAYS, seaways_needed
+    from swashplate.crane import assess as assess_control
+    from swashplate.crane.studies.assessing import SEAWAYS, seaways_needed
 
     crane = study.chosen
     side.print(seaways_needed(study.seeds or SEAWAYS, allowed / 100.0))
-    found: Judgment = study.through(judge_control, crane, **more)
+    found: Assessment = study.through(assess_control, crane, **more)
     what, write = "Numbers of every seaway, in SI", found.write
     if out is not None and out.suffix.lower() == ".html":
-        from swashplate.report.scene import write_judgment
+        from swashplate.report.scene import write_assessment
 
-        what, write = "Verdict", partial(write_judgment, found)
+        what, write = "Verdict", partial(write_assessment, found)
     save(out, what, write)
-    draw(plot, "plot_judgment", found)
+    draw(plot, "plot_assessment", found)
     _end(study.chosen, found.tables(), *found.sentences()[1:])
     say_saved()
     if not found.passed:

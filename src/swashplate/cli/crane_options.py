@@ -285,7 +285,7 @@ class Studied(Operated):
     ] = "feedback=0.2/0.2+ship+loop=1.5"
     seeds: Annotated[
         int | None,
-        typer.Option(metavar="N", help="Number of seaways (judge: 120 by default)."),
+        typer.Option(metavar="N", help="Number of seaways (assess: 120 by default)."),
     ] = None
     length: Annotated[
         float | None,

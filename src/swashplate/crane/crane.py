@@ -144,7 +144,7 @@ class Crane:
         **drives
             Each is a drive, ``luff=crane.luff.scale(Z16=1.5)``; the result of a fit; or a place: a
             packaged name, a parameter file, or the folder that a fit wrote. The verdict on a fit
-            stands in `sources`; a drive that is not usable is taken, and judgments say so.
+            stands in `sources`; a drive that is not usable is taken, and assessments say so.
         """
         check_names("A crane has no drive", drives, AXES, "it has")
         replacements, new_sources = drives_of(drives, Path())

@@ -40,7 +40,7 @@ class DriveSource(NamedTuple):
     """Its file, or how it was given."""
     fit: Path | None
     """Folder of the fit that found it; None if there is none, or it was changed since."""
-    judged_usable: bool | None
+    fit_usable: bool | None
     """Whether that fit's verdict calls it usable; None if no verdict is known."""
     verdict: str
     """Headline of the verdict, or the clause why none is known."""
@@ -52,14 +52,14 @@ class DriveSource(NamedTuple):
     @property
     def usable(self) -> bool:
         """Whether no verdict says that it is not."""
-        return self.judged_usable is not False
+        return self.fit_usable is not False
 
     def words(self) -> str:
         """Where the drive comes from, what the verdict was and what it holds for.
 
         It ends a sentence, and may go on with another one.
         """
-        if self.judged_usable is None:
+        if self.fit_usable is None:
             return f"{self.place}; no verdict on it is known, as {self.verdict}."
         return f"{self.place}; the verdict on its fit is: {self.verdict} {self.validity}".rstrip()
 
@@ -137,12 +137,12 @@ def _source(given: DriveLike, drive: Drive, path: Path | None) -> DriveSource | 
         return DriveSource(f"'{drive.name}'", None, False, stated) if stated else None
     verdict = getattr(given, "verdict", None)
     if verdict is None:
-        return DriveSource("that of a fit", None, None, "the fit was not judged")
-    return _judged_source("that of a fit", None, verdict)
+        return DriveSource("that of a fit", None, None, "the fit was not assessed")
+    return _assessed_source("that of a fit", None, verdict)
 
 
-def _judged_source(place: str, fit: Path | None, verdict: Verdict) -> DriveSource:
-    """The source of a drive whose fit was judged."""
+def _assessed_source(place: str, fit: Path | None, verdict: Verdict) -> DriveSource:
+    """The source of a drive whose fit was assessed."""
     return DriveSource(
         place,
         fit,
@@ -161,7 +161,7 @@ def _source_of_file(path: Path, drive: Drive) -> DriveSource:
         fit = path.parent
         verdict, why = _stored_verdict(stored, drive)
         if verdict is not None:
-            return _judged_source(str(path), fit, verdict)
+            return _assessed_source(str(path), fit, verdict)
     stated = _stated_in_title(drive)
     if stated:
         return DriveSource(str(path), fit, False, stated)

@@ -1,7 +1,7 @@
 """What an operation may reach: swing, off-lead, side-lead, hook load, hook speed, place, drives.
 
 A crane's file gives limits in its table ``[limits]``, each with unit, status and source as its
-geometry; what it does not give is not judged.
+geometry; what it does not give is not assessed.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ LIMITED: Mapping[str, Limited] = {
         "saturation", "1", "share of time for which a drive is at a limit of its own", 0.0, 1.0
     ),
 }
-"""Quantities that have a limit, by name. All but `saturation` are judged by their most probable
+"""Quantities that have a limit, by name. All but `saturation` are assessed by their most probable
 largest value in three hours."""
 
 

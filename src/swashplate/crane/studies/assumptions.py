@@ -71,18 +71,18 @@ class _Trial(NamedTuple):
     case: Case
 
 
-def turns_of(study: Study, judged: str, limits: Mapping[str, float]) -> tuple[Turn, ...]:
+def turns_of(study: Study, assessed: str, limits: Mapping[str, float]) -> tuple[Turn, ...]:
     """Numbers that would turn the answer on a variant; none if short runs do not agree with it.
 
     Parameters
     ----------
     study : Study
-    judged : str
+    assessed : str
         The variant.
     limits : mapping of str to float
         In SI, by name; without them only harm counts.
     """
-    case = study.cases[judged]
+    case = study.cases[assessed]
     if case.stick.samples is not None or case.stick.parts:
         return ()  # what the operator does takes as long as it takes
     case = case._replace(stick=OperatorCommand.rest(study.run_in + LENGTH))

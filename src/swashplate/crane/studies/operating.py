@@ -199,7 +199,7 @@ def operability(
     headings : sequence of float
         Of the waves, as likely as each other. [deg]
     drives
-        As of `judge`.
+        As of `assess`.
     sea : Seaway, optional
         Ship, peak factor, spreading, speed; its height, period and heading do not count.
     executor : Executor, optional

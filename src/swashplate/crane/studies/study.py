@@ -179,7 +179,7 @@ class Study(Result):
         progress: Callable[[int, int], None] | None = None,
         **setup: Any,
     ) -> Study:
-        """A study; these are the keywords of `judge` and `sweep`.
+        """A study; these are the keywords of `assess` and `sweep`.
 
         Parameters
         ----------

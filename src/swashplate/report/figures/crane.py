@@ -28,7 +28,7 @@ MOST_RUNS = 6
 MOVED = 2.0
 """Travel of slew and boom that gets a panel of its own. [deg]"""
 ACTING = (Limit.ORIFICE, Limit.SWASH_STOP)
-"""Limits that a crane's drives are judged by: of acceleration and of speed."""
+"""Limits that a crane's drives are assessed by: of acceleration and of speed."""
 LEAST = 0.01
 """Least swing on a logarithmic scale. [deg]"""
 LETTERS = 118

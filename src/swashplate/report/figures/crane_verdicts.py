@@ -1,4 +1,4 @@
-"""Figures of what is decided on a crane: judgment of its control, operability over a year."""
+"""Figures of what is decided on a crane: assessment of its control, operability over a year."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from matplotlib.patches import Patch, Polygon, Rectangle
 from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, NullLocator
 from numpy.typing import NDArray
 
-from swashplate.crane import LIMITED, Hull, Judged, Judgment, Operability
+from swashplate.crane import LIMITED, AssessedQuantity, Assessment, Hull, Operability
 from swashplate.crane.sea.confidence import rms_of
 from swashplate.crane.studies.operating import WORKABLE, label_of
 from swashplate.crane.studies.study import NONE
@@ -27,7 +27,7 @@ from swashplate.tables import count
 
 Array = NDArray[np.float64]
 
-# --- judgment -------------------------------------------------------------------------------------
+# --- assessment -----------------------------------------------------------------------------------
 
 SWING = "swing, RMS of a seaway (deg)"
 NAME, ROOM = 30, style.WIDTH - 2.4
@@ -47,17 +47,19 @@ FACES = {"yes": style.BLUE, "no": style.VERMILION, "not decided": "white"}
 
 
 @overload
-def plot_judgment(result: Judgment, *, ax: None = None, title: str | None = None) -> Figure: ...
+def plot_assessment(result: Assessment, *, ax: None = None, title: str | None = None) -> Figure: ...
 
 
 @overload
-def plot_judgment(result: Judgment, *, ax: GivenAxes, title: str | None = None) -> GivenAxes: ...
+def plot_assessment(
+    result: Assessment, *, ax: GivenAxes, title: str | None = None
+) -> GivenAxes: ...
 
 
-def plot_judgment(
-    result: Judgment, *, ax: Axes | Sequence[Axes] | None = None, title: str | None = None
+def plot_assessment(
+    result: Assessment, *, ax: Axes | Sequence[Axes] | None = None, title: str | None = None
 ) -> Figure | Axes | Sequence[Axes]:
-    """Figure of a judgment: swing of each variant in each seaway, and what has a limit.
+    """Figure of an assessment: swing of each variant in each seaway, and what has a limit.
 
     The first panel has a point for each seaway and a diamond as wide as the 95 % interval of their
     root mean square; runs that left the model are counted beyond a break of the axis. The second
@@ -70,7 +72,7 @@ def plot_judgment(
         (panel,) = style.dress_given(ax, title, [""], SWING, what="panel")
         _swings(panel, result)
         return ax
-    study, limited = result.study, result.limited(result.judged)
+    study, limited = result.study, result.limited(result.assessed_variant)
     legends = [_swing_legend(result)]
     heights = [0.46 * len(result.names) + 0.2]
     if limited:
@@ -85,7 +87,7 @@ def plot_judgment(
     style.write_title(figure, title or f"{seaways}, {seaway_words(study.seaway)}")
     above = [
         assumed(study.crane),
-        f"'{result.judged}' and its limits; bars: 95 % intervals",
+        f"'{result.assessed_variant}' and its limits; bars: 95 % intervals",
     ]
     for panel, legend, words in zip(panels, legends, above, strict=False):
         style.dress(panel)
@@ -112,7 +114,7 @@ def _mark(name: str, marker: str, color: str, *, face: str = "", size: float = 5
     )
 
 
-def _swing_legend(result: Judgment) -> list[Line2D]:
+def _swing_legend(result: Assessment) -> list[Line2D]:
     handles = [
         _mark("a seaway", "o", style.BLUE, size=4.0),
         _mark("more swing than without control", "o", style.VERMILION, size=4.0),
@@ -125,7 +127,7 @@ def _swing_legend(result: Judgment) -> list[Line2D]:
     return handles
 
 
-def _swings(ax: Axes, result: Judgment) -> None:
+def _swings(ax: Axes, result: Assessment) -> None:
     """A row for each variant: its seaways, their mean, how many left the model."""
     names = list(reversed(result.names))
     swings = {name: np.degrees(result.swing(name)) for name in names}
@@ -156,7 +158,7 @@ def _swings(ax: Axes, result: Judgment) -> None:
     ax.set_ylim(-0.5, len(names) - 0.5)
 
 
-def _largest_swing(result: Judgment, swings: Sequence[Array]) -> float:
+def _largest_swing(result: Assessment, swings: Sequence[Array]) -> float:
     """Largest number of a panel of swings [deg]; 1 if all runs left the model."""
     largest = max(float(np.nanmax(np.append(swing, 0.0))) for swing in swings)
     ends = [rms_of(swing).high for swing in swings]
@@ -192,7 +194,7 @@ def _diamond(ax: Axes, row: float, swing: Array) -> None:
     ax.add_patch(Polygon(corners, facecolor=style.INK, edgecolor=style.INK, lw=0.8, zorder=3.0))
 
 
-def _limit_legend(result: Judgment, limited: Sequence[Judged]) -> list[Line2D]:
+def _limit_legend(result: Assessment, limited: Sequence[AssessedQuantity]) -> list[Line2D]:
     decisions = [decision for decision in WITHIN if decision in {one.within for one in limited}]
     handles = []
     for decision in decisions:
@@ -206,7 +208,7 @@ def _limit_legend(result: Judgment, limited: Sequence[Judged]) -> list[Line2D]:
     return handles
 
 
-def _limits(ax: Axes, result: Judgment, limited: Sequence[Judged]) -> None:
+def _limits(ax: Axes, result: Assessment, limited: Sequence[AssessedQuantity]) -> None:
     """A row for each quantity that has a limit: its largest value as a share of that."""
     others = {name: result.limited(name) for name in result.names[:-1]}
     shares = [_share(one.largest.high, one.limit) for one in limited]

@@ -1,4 +1,4 @@
-"""Judging control over many seaways, and looking for what would do if it fails."""
+"""Assessing control over many seaways, and looking for what would do if it fails."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from swashplate.crane.rope import GRAVITY
 from swashplate.crane.sea.confidence import fewest_seaways, rms_of
 from swashplate.crane.studies.assumptions import turns_of
 from swashplate.crane.studies.changed_drives import upgraded
-from swashplate.crane.studies.following import follow
-from swashplate.crane.studies.judgment import (
+from swashplate.crane.studies.crane_assessment import (
     LOOP,
     QUESTIONS,
-    Judgment,
+    Assessment,
     Question,
     Remedy,
     all_of,
-    judged_limits,
+    assessed_limits,
     share_worse,
 )
+from swashplate.crane.studies.following import follow
 from swashplate.crane.studies.outcome import Outcome
 from swashplate.crane.studies.spectral import linear_response
 from swashplate.crane.studies.study import NONE, Case, Controllers, Study
@@ -35,7 +35,7 @@ from swashplate.errors import InputError
 from swashplate.tables import count
 
 SEAWAYS = 120
-"""Seaways that are judged by default: 72 are the least that can tell an allowed share of 5 %, 110
+"""Seaways that are assessed by default: 72 are the least that can tell an allowed share of 5 %, 110
 if one of them leaves the model with and without control."""
 FACTORS = (1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0)
 """Factors on an in-line orifice that are tried, the smallest first."""
@@ -47,7 +47,7 @@ BLOCK = 20
 """Seaways of a trial after which it is given up if it has failed already."""
 
 
-def judge(
+def assess(
     crane: Crane,
     control: Controllers,
     *,
@@ -56,8 +56,8 @@ def judge(
     remedies: bool = True,
     turns: bool = True,
     **study: Any,
-) -> Judgment:
-    """Judge control on several sets of drives over seeded seaways, by default 120 of ten minutes.
+) -> Assessment:
+    """Assess control on sets of drives over seeded seaways, by default 120 of ten minutes.
 
     Parameters
     ----------
@@ -67,8 +67,8 @@ def judge(
     allowed : float
         Share of seaways in which control may be worse than none.
     asked : sequence of {"harm", "sufficiency"}, optional
-        Questions that `Judgment.passed` answers; by default both, or harm alone if the crane has no
-        limits.
+        Questions that `Assessment.passed` answers; by default both, or harm alone if the crane has
+        no limits.
     remedies : bool
         Whether to look for a larger orifice and for a clip that would do on the crane's own drives,
         if control fails: the least of each that surely does, else the least that may.
@@ -91,13 +91,15 @@ def judge(
     linear = None
     if none.swing_damping > 0.0:
         linear = linear_response(crane, asked_study.seaway, **none.pose, **none.hangs)
-    judgment = Judgment(asked_study, outcomes, allowed, questions, linear)
+    assessment = Assessment(asked_study, outcomes, allowed, questions, linear)
     if turns and none.swing_damping > 0.0:  # of an undamped swing there is no stationary answer
         limits = crane.limits_si if "sufficiency" in questions else {}
-        judgment = replace(judgment, turns=turns_of(asked_study, judgment.judged, limits))
-    if judgment.outcome == "fails" and remedies:
-        return _with_remedies(judgment)
-    return judgment
+        assessment = replace(
+            assessment, turns=turns_of(asked_study, assessment.assessed_variant, limits)
+        )
+    if assessment.outcome == "fails" and remedies:
+        return _with_remedies(assessment)
+    return assessment
 
 
 def _check_allowed(allowed: float) -> None:
@@ -134,25 +136,25 @@ def seaways_needed(seaways: int, allowed: float) -> str:
     )
 
 
-def _with_remedies(judgment: Judgment) -> Judgment:
-    """The judgment with what would do, of larger orifices and of clips."""
-    study, case = judgment.study, judgment.study.cases[judgment.judged]
+def _with_remedies(assessment: Assessment) -> Assessment:
+    """The assessment with what would do, of larger orifices and of clips."""
+    study, case = assessment.study, assessment.study.cases[assessment.assessed_variant]
     law = case.setup["control"]
     if not case.driven or law is None:
-        return judgment
-    # factors are of the crane as it is built, whatever was judged
+        return assessment
+    # factors are of the crane as it is built, whatever was assessed
     cranes = (study.crane,) if len(case.cranes) == 1 else case.cranes
     found: list[Remedy] = []
     tried: list[str] = []
-    for trials in (_larger_orifices(judgment, cranes, law), _clips(case, cranes, law)):
-        remedies = _tried(judgment, trials)
+    for trials in (_larger_orifices(assessment, cranes, law), _clips(case, cranes, law)):
+        remedies = _tried(assessment, trials)
         tried += [what for what, *_ in trials[: len(remedies)]]
         passing = [remedy for remedy in remedies if remedy is not None and remedy.passes]
         tried = tried[: len(tried) - len(passing)]
         found += _least([remedy for remedy in remedies if remedy is not None])
     named = [remedy.what for remedy in found]
     others = [what for what in tried if what not in named]
-    return replace(judgment, remedies=tuple(found), tried=tuple(others))
+    return replace(assessment, remedies=tuple(found), tried=tuple(others))
 
 
 def _least(remedies: list[Remedy]) -> list[Remedy]:
@@ -167,10 +169,14 @@ def _least(remedies: list[Remedy]) -> list[Remedy]:
 Trial = tuple[str, float, Case]
 
 
-def _larger_orifices(judgment: Judgment, cranes: tuple[Crane, ...], law: Control) -> list[Trial]:
+def _larger_orifices(
+    assessment: Assessment, cranes: tuple[Crane, ...], law: Control
+) -> list[Trial]:
     """Larger orifices of the drive whose acceleration limit acts the longest, if one does."""
-    case = judgment.study.cases[judgment.judged]
-    shares = {axis: judgment.acting(judgment.judged, axis, Limit.ORIFICE) for axis in AXES}
+    case = assessment.study.cases[assessment.assessed_variant]
+    shares = {
+        axis: assessment.acting(assessment.assessed_variant, axis, Limit.ORIFICE) for axis in AXES
+    }
     axis = max(shares, key=lambda name: float(np.nan_to_num(shares[name])))
     if not shares[axis] >= ACTS:
         return []
@@ -191,19 +197,19 @@ def _clips(case: Case, cranes: tuple[Crane, ...], law: Control) -> list[Trial]:
     trials = []
     for share in SHARES:
         if present and share >= present[0]:
-            continue  # what is judged has that clip already
+            continue  # what is assessed has that clip already
         control = Chain((*stages, Clip(share=share), LOOP))
         trial = case.changed(control=control)._replace(cranes=cranes)
         trials.append((f"a clip of {share * reach:.2g} m", share * reach, trial))
     return trials
 
 
-def _tried(judgment: Judgment, trials: Sequence[Trial]) -> list[Remedy | None]:
+def _tried(assessment: Assessment, trials: Sequence[Trial]) -> list[Remedy | None]:
     """Trials up to the first that passes; None for one that harms, or does not help on."""
     remedies: list[Remedy | None] = []
     harmless = False
     for what, size, case in trials:
-        remedy = _trial(judgment, what, size, case, only_if_sufficient=harmless)
+        remedy = _trial(assessment, what, size, case, only_if_sufficient=harmless)
         remedies.append(remedy)
         if remedy is not None and remedy.passes:
             break
@@ -212,20 +218,20 @@ def _tried(judgment: Judgment, trials: Sequence[Trial]) -> list[Remedy | None]:
 
 
 def _trial(
-    judgment: Judgment, what: str, size: float, case: Case, *, only_if_sufficient: bool
+    assessment: Assessment, what: str, size: float, case: Case, *, only_if_sufficient: bool
 ) -> Remedy | None:
     """A trial in all seaways; None as soon as it surely harms, or surely is not sufficient."""
-    none, seaways = judgment.of(NONE), len(judgment.study.seeds)
-    asked = "sufficiency" in judgment.asked
-    limits = judgment.study.crane.limits_si if asked else {}
+    none, seaways = assessment.of(NONE), len(assessment.study.seeds)
+    asked = "sufficiency" in assessment.asked
+    limits = assessment.study.crane.limits_si if asked else {}
     outcomes: list[Outcome] = []
     for first in range(0, seaways, BLOCK):
         block = range(first, min(first + BLOCK, seaways))
-        outcomes += [found for (found,) in judgment.study.outcomes([case], block)]
+        outcomes += [found for (found,) in assessment.study.outcomes([case], block)]
         worse = share_worse(outcomes, none[: len(outcomes)])
-        limited = judged_limits(outcomes, limits)
+        limited = assessed_limits(outcomes, limits)
         decisions = [quantity.within for quantity in limited]
-        if worse.value * len(outcomes) > judgment.allowed * seaways:
+        if worse.value * len(outcomes) > assessment.allowed * seaways:
             return None
         if only_if_sufficient and "no" in decisions:
             return None
@@ -233,7 +239,7 @@ def _trial(
     return Remedy(
         what=what,
         size=size,
-        harmless="yes" if worse.high <= judgment.allowed else "not decided",
+        harmless="yes" if worse.high <= assessment.allowed else "not decided",
         sufficient=all_of(decisions) if asked else None,
         worse=worse,
         swing=swing,

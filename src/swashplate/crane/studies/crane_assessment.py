@@ -1,4 +1,4 @@
-"""Judgment of control over many seaways: does it harm, does it suffice, and what would?
+"""Assessment of control over many seaways: does it harm, does it suffice, and what would?
 
 Two questions have two answers. *Harm*: in which share of seaways is the swing larger than without
 control? *Sufficiency*: does all that has a limit stay within it in a sea of three hours?
@@ -54,7 +54,7 @@ IDLE = 1e-3
 """Relative difference of the swing below which control changes nothing."""
 
 
-class Judged(NamedTuple):
+class AssessedQuantity(NamedTuple):
     """A quantity with a limit, of one variant."""
 
     name: str
@@ -112,10 +112,10 @@ class Remedy(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Judgment(Tabular, Drawn):
+class Assessment(Tabular, Drawn):
     """Variants of control and drives in the same seaways, and what follows."""
 
-    drawn_by: ClassVar[str] = "plot_judgment"
+    drawn_by: ClassVar[str] = "plot_assessment"
 
     study: Study
     """Crane, variants, seaways, and for how long each counts."""
@@ -135,7 +135,7 @@ class Judgment(Tabular, Drawn):
     looked for."""
 
     def __repr__(self) -> str:
-        return f"Judgment({count(len(self.study.seeds), 'seaway')}, {', '.join(self.names)})"
+        return f"Assessment({count(len(self.study.seeds), 'seaway')}, {', '.join(self.names)})"
 
     # --- numbers of variants ----------------------------------------------------------------------
 
@@ -145,7 +145,7 @@ class Judgment(Tabular, Drawn):
         return tuple(self.study.cases)
 
     @property
-    def judged(self) -> str:
+    def assessed_variant(self) -> str:
         """The variant that the verdict is on: the last one."""
         return self.names[-1]
 
@@ -175,10 +175,10 @@ class Judgment(Tabular, Drawn):
         """
         return share_worse(self.of(name), self.of(NONE))
 
-    def limited(self, name: str) -> tuple[Judged, ...]:
+    def limited(self, name: str) -> tuple[AssessedQuantity, ...]:
         """All that has a limit, of a variant."""
         outcomes = self.of(name)
-        return judged_limits(outcomes, self.study.crane.limits_si)
+        return assessed_limits(outcomes, self.study.crane.limits_si)
 
     def acting(self, name: str, axis: str, limit: Limit) -> float:
         """Mean share of time for which a limit of a drive acts; NaN if every run was stopped."""
@@ -189,8 +189,8 @@ class Judgment(Tabular, Drawn):
 
     @property
     def harmless(self) -> Decision:
-        """Whether the judged variant is worse than none as seldom as allowed."""
-        share = self.worse(self.judged)
+        """Whether the assessed variant is worse than none as seldom as allowed."""
+        share = self.worse(self.assessed_variant)
         if share.low > self.allowed:
             return "no"
         return "yes" if share.high <= self.allowed else "not decided"
@@ -199,22 +199,22 @@ class Judgment(Tabular, Drawn):
     def sufficient(self) -> Decision | None:
         """Whether all stays within its limits in three hours; None if the crane has no limits.
 
-        No, if the judged variant leaves the model once in three hours or more often.
+        No, if the assessed variant leaves the model once in three hours or more often.
         """
         if not self.study.crane.limits:
             return None
-        decisions = [judged.within for judged in self.limited(self.judged)]
+        decisions = [quantity.within for quantity in self.limited(self.assessed_variant)]
         return "no" if self._leaves_often else all_of(decisions)
 
     @property
     def _leaves_often(self) -> bool:
-        left = sum(self.left(self.judged).values())
+        left = sum(self.left(self.assessed_variant).values())
         return left * THREE_HOURS >= len(self.study.seeds) * self.study.length
 
     @property
     def idle(self) -> bool:
-        """Whether the judged variant swings as no control does, in every seaway."""
-        own, none = self.swing(self.judged), self.swing(NONE)
+        """Whether the assessed variant swings as no control does, in every seaway."""
+        own, none = self.swing(self.assessed_variant), self.swing(NONE)
         same = np.allclose(own, none, rtol=IDLE, equal_nan=True)
         return bool(same and np.isfinite(own).any())
 
@@ -244,8 +244,8 @@ class Judgment(Tabular, Drawn):
         return " ".join(filter(None, [words, self.unusable_sentence()]))
 
     def unusable_sentence(self) -> str:
-        """Which fits are not usable that the judged variant rests on; empty if there is none."""
-        case = self.study.cases[self.judged]
+        """Which fits are not usable that the assessed variant rests on; empty if there is none."""
+        case = self.study.cases[self.assessed_variant]
         unusable = {
             axis
             for crane in case.cranes
@@ -258,15 +258,17 @@ class Judgment(Tabular, Drawn):
         return f"It rests on the fit of the {axes}, which is not usable."
 
     def verdict(self) -> str:
-        """Both answers on the judged variant, and what would do if it fails."""
+        """Both answers on the assessed variant, and what would do if it fails."""
         sentences = [self.harm_sentence(), self.sufficiency_sentence(), *self.remedy_sentences()]
         return " ".join(filter(None, sentences))
 
     def harm_sentence(self) -> str:
-        """Whether the judged variant harms, and by how much it changes the swing."""
-        share, seaways = self.worse(self.judged), len(self.study.seeds)
-        none, own = (np.degrees(rms_of(self.swing(name)).value) for name in (NONE, self.judged))
-        drives = f"With the drives '{self.judged}' the controller"
+        """Whether the assessed variant harms, and by how much it changes the swing."""
+        share, seaways = self.worse(self.assessed_variant), len(self.study.seeds)
+        none, own = (
+            np.degrees(rms_of(self.swing(name)).value) for name in (NONE, self.assessed_variant)
+        )
+        drives = f"With the drives '{self.assessed_variant}' the controller"
         if self.idle:
             return (
                 f"{drives} changes nothing: {none:.2f} deg RMS without it, {own:.2f} with it, in "
@@ -279,7 +281,7 @@ class Judgment(Tabular, Drawn):
             return f"{drives} harms: it makes {worse}{_rms_words(none, own)}{self._cause()}."
         both = sum(
             bool(own.left and other.left)
-            for own, other in zip(self.of(self.judged), self.of(NONE), strict=True)
+            for own, other in zip(self.of(self.assessed_variant), self.of(NONE), strict=True)
         )
         if both:
             return (
@@ -293,13 +295,13 @@ class Judgment(Tabular, Drawn):
         )
 
     def sufficiency_sentence(self) -> str:
-        """Whether the judged variant stays within all limits; empty if the crane has none."""
+        """Whether the assessed variant stays within all limits; empty if the crane has none."""
         if self.sufficient is None:
             return ""
-        limited = self.limited(self.judged)
-        beyond = [judged.words() for judged in limited if judged.within == "no"]
-        open_ = [judged.words() for judged in limited if judged.within == "not decided"]
-        left = sum(self.left(self.judged).values())
+        limited = self.limited(self.assessed_variant)
+        beyond = [quantity.words() for quantity in limited if quantity.within == "no"]
+        open_ = [quantity.words() for quantity in limited if quantity.within == "not decided"]
+        left = sum(self.left(self.assessed_variant).values())
         if self.sufficient == "yes":
             return "It suffices: in 3 h all stays within its limits."
         if self.sufficient == "no":
@@ -333,11 +335,13 @@ class Judgment(Tabular, Drawn):
 
     def _cause(self) -> str:
         """The limit that acts for the longest time."""
-        if not self.study.cases[self.judged].driven:
+        if not self.study.cases[self.assessed_variant].driven:
             return ""
         names = {Limit.ORIFICE: "acceleration limit", Limit.SWASH_STOP: "speed limit"}
         shares = [
-            (self.acting(self.judged, axis, limit), axis, limit) for axis in AXES for limit in names
+            (self.acting(self.assessed_variant, axis, limit), axis, limit)
+            for axis in AXES
+            for limit in names
         ]
         share, axis, limit = max(shares, key=lambda entry: float(np.nan_to_num(entry[0])))
         if np.isnan(share):
@@ -352,8 +356,8 @@ class Judgment(Tabular, Drawn):
 
     @property
     def typical(self) -> int:
-        """Seed of the seaway in which the judged variant swings as in half of them."""
-        order = np.argsort(self.swing(self.judged))
+        """Seed of the seaway in which the assessed variant swings as in half of them."""
+        order = np.argsort(self.swing(self.assessed_variant))
         return self.study.seeds[int(order[len(order) // 2])]
 
     def tables(self) -> list[Table]:
@@ -411,19 +415,21 @@ class Judgment(Tabular, Drawn):
         return table
 
     def _limit_table(self) -> Table:
-        """What has a limit, of the judged variant."""
+        """What has a limit, of the assessed variant."""
         heads = ("limit", "in 3 h", "from", "to")
         numbers = [Column(head, ".3g", none="–") for head in heads]
         last = (Column("within"), Column(NONE, ".3g", none="–"))
         columns = (Column("quantity"), Column("unit"), *numbers, *last)
-        table = Table(f"Limits, '{self.judged}'", columns, "in 3 h: most probable largest value")
-        none = {judged.name: judged.largest.value for judged in self.limited(NONE)}
-        for judged in self.limited(self.judged):
-            unit, factor = judged.shown
+        table = Table(
+            f"Limits, '{self.assessed_variant}'", columns, "in 3 h: most probable largest value"
+        )
+        none = {quantity.name: quantity.largest.value for quantity in self.limited(NONE)}
+        for quantity in self.limited(self.assessed_variant):
+            unit, factor = quantity.shown
             # a side-lead without waves across the boom is 0, not a millionth of a degree
-            values = [round(factor * number, 3) for number in (judged.limit, *judged.largest)]
-            label, within = LIMITED[judged.name].label, judged.within
-            without = round(factor * none.get(judged.name, nan), 3)
+            values = [round(factor * number, 3) for number in (quantity.limit, *quantity.largest)]
+            label, within = LIMITED[quantity.name].label, quantity.within
+            without = round(factor * none.get(quantity.name, nan), 3)
             table.add(label, unit, *values, within, without, look=within != "yes")
         return table
 
@@ -493,7 +499,7 @@ class Judgment(Tabular, Drawn):
         damping, given = none.swing_damping, "swing_damping" in none.hangs
         assumed = not given and crane.quantities["swing_damping"].status == "assumed"
         words = f"The load's swing has a damping of {100.0 * damping:g} %"
-        case = study.cases[self.judged].words()
+        case = study.cases[self.assessed_variant].words()
         sentences = [case, rule, waves, f"{words}, assumed." if assumed else f"{words}."]
         ship = study.seaway.ship
         if isinstance(ship, Hull):
@@ -517,7 +523,7 @@ def _rms_words(none: float, own: float) -> str:
 
 
 def share_worse(own: Sequence[Outcome], none: Sequence[Outcome]) -> Estimate:
-    """Share of seaways in which control swings more than none; see `Judgment.worse`."""
+    """Share of seaways in which control swings more than none; see `Assessment.worse`."""
     worse = unknown = 0
     for one, other in zip(own, none, strict=True):
         if one.left and other.left:
@@ -534,17 +540,19 @@ def largest_of(outcomes: Sequence[Outcome], name: str) -> Estimate:
     return largest_of_peaks(runs, max(observed, 1.0))
 
 
-def judged_limits(outcomes: Sequence[Outcome], limits: Mapping[str, float]) -> tuple[Judged, ...]:
+def assessed_limits(
+    outcomes: Sequence[Outcome], limits: Mapping[str, float]
+) -> tuple[AssessedQuantity, ...]:
     """All that has a limit; what the runs do not have, as a place if the operator moves, is not."""
-    judged = []
+    quantities = []
     for name, limit in limits.items():
         if name == "saturation":
             shares = np.array([outcome.saturation for outcome in outcomes])
             if np.isfinite(shares).any():
-                judged.append(Judged(name, limit, mean_of(shares, 0.0)))
+                quantities.append(AssessedQuantity(name, limit, mean_of(shares, 0.0)))
         elif any(name in outcome.peaks for outcome in outcomes):
-            judged.append(Judged(name, limit, largest_of(outcomes, name)))
-    return tuple(judged)
+            quantities.append(AssessedQuantity(name, limit, largest_of(outcomes, name)))
+    return tuple(quantities)
 
 
 def all_of(decisions: Sequence[Decision]) -> Decision:

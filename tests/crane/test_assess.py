@@ -1,4 +1,4 @@
-"""Judgment over seaways, sweeps, and what the axes can follow."""
+"""Assessment over seaways, sweeps, and what the axes can follow."""
 
 from dataclasses import replace
 from math import pi
@@ -15,10 +15,10 @@ from swashplate.crane import (
     Seaway,
     Spectrum,
     Study,
+    assess,
     control,
     drawn_cranes,
     follow,
-    judge,
     simulate,
     sweep,
     upgraded,
@@ -26,7 +26,7 @@ from swashplate.crane import (
 from swashplate.crane.closed_loop.result import PUMPS
 from swashplate.crane.rope import GRAVITY
 from swashplate.crane.sea.confidence import fewest_seaways, mean_of, more_seaways, share_of
-from swashplate.crane.studies.judging import seaways_needed
+from swashplate.crane.studies.assessing import seaways_needed
 from swashplate.crane.studies.outcome import STOPPED
 from swashplate.drive import Limit
 from swashplate.errors import InputError, ParameterError
@@ -48,13 +48,13 @@ def crane():
 
 
 @pytest.fixture(scope="module")
-def judged(crane):
-    return judge(crane, CLIPPED, seeds=range(12), allowed=0.3, **QUICK)
+def assessed(crane):
+    return assess(crane, CLIPPED, seeds=range(12), allowed=0.3, **QUICK)
 
 
-def test_numbers_are_those_of_whole_runs(judged):
-    run = judged.run("identified", 3)
-    outcome = judged.of("identified")[3]
+def test_numbers_are_those_of_whole_runs(assessed):
+    run = assessed.run("identified", 3)
+    outcome = assessed.of("identified")[3]
     some = slice(round(20.0 * 512), None, 32)
     swing = np.radians(run.swing_deg[some])
     assert outcome.rms_swing == pytest.approx(np.sqrt(np.mean(swing**2)), rel=1e-12)
@@ -83,8 +83,8 @@ def test_place_is_where_the_tip_hangs_without_waves(crane):
     lean = np.tile(seaway.lean, (1025, 1))
     run = simulate(crane, OperatorCommand.rest(2.0), sea=lean, slew_deg=90.0, rope_m=27.0)
     assert case.wanted(seaway) == pytest.approx(tuple(run.tip[-1, :2]), abs=1e-9)
-    moving = Study.of(crane, CLIPPED, seeds=[0], stick=OperatorCommand.trapezoid(slew=0.5, duration=30.0,
-                                                                       length=200.0))  # fmt: skip
+    stick = OperatorCommand.trapezoid(slew=0.5, duration=30.0, length=200.0)
+    moving = Study.of(crane, CLIPPED, seeds=[0], stick=stick)
     assert moving.cases["no control"].wanted(seaway) is None
 
 
@@ -93,10 +93,10 @@ def test_place_is_where_the_tip_hangs_without_waves(crane):
     [Serial(), Threads(3), pytest.param(Processes(2), marks=pytest.mark.slow)],
     ids=["one", "threads", "processes"],
 )
-def test_numbers_do_not_depend_on_who_runs_them(crane, judged, executor):
-    again = judge(crane, CLIPPED, seeds=[3, 5], executor=executor, **QUICK)
-    for name in judged.names:
-        np.testing.assert_array_equal(again.swing(name), judged.swing(name)[[3, 5]])
+def test_numbers_do_not_depend_on_who_runs_them(crane, assessed, executor):
+    again = assess(crane, CLIPPED, seeds=[3, 5], executor=executor, **QUICK)
+    for name in assessed.names:
+        np.testing.assert_array_equal(again.swing(name), assessed.swing(name)[[3, 5]])
 
 
 def test_runs_begin_in_the_stationary_swing_without_control(crane):
@@ -119,28 +119,28 @@ def test_runs_begin_in_the_stationary_swing_without_control(crane):
 
 def test_control_that_changes_nothing_does_not_pass(crane):
     idle = control.TipShaper("zv")  # there is no stick to shape
-    found = judge(crane, idle, seeds=range(3), drives=("ideal",), **QUICK)
+    found = assess(crane, idle, seeds=range(3), drives=("ideal",), **QUICK)
     assert not found.passed
     assert "the controller changes nothing: " in found.verdict()
 
 
-def test_two_questions_have_two_answers(crane, judged):
-    assert judged.names == ("no control", "ideal", "identified")
-    assert judged.asked == ("harm", "sufficiency")
+def test_two_questions_have_two_answers(crane, assessed):
+    assert assessed.names == ("no control", "ideal", "identified")
+    assert assessed.asked == ("harm", "sufficiency")
     # the clip does no harm, and the load still wanders
-    assert judged.harmless == "yes"
-    assert judged.sufficient == "no"
-    assert judged.outcome == "fails"
-    verdict = judged.verdict()
+    assert assessed.harmless == "yes"
+    assert assessed.sufficient == "no"
+    assert assessed.outcome == "fails"
+    verdict = assessed.verdict()
     assert "does no harm: it makes swing worse than none in 0 of 12 seaways" in verdict
     assert "It does not suffice: in 3 h " in verdict
-    harm = judge(crane, CLIPPED, seeds=range(12), allowed=0.3, asked=["harm"], **QUICK)
+    harm = assess(crane, CLIPPED, seeds=range(12), allowed=0.3, asked=["harm"], **QUICK)
     assert harm.passed
-    assert replace(judged, asked=("harm",)).passed
+    assert replace(assessed, asked=("harm",)).passed
     # limits far beyond all that happens in a small sea: it suffices
     wide = crane.with_limits(swing=0.5, off_lead=0.5, side_lead=0.5, dynamic_factor=5.0,
                              hoist_demand=10.0, placement=100.0, saturation=1.0)  # fmt: skip
-    passed = judge(wide, CLIPPED, seeds=range(12), allowed=0.3, sea=Spectrum(0.1, 7.0), **QUICK)
+    passed = assess(wide, CLIPPED, seeds=range(12), allowed=0.3, sea=Spectrum(0.1, 7.0), **QUICK)
     assert passed.sufficient == "yes"
     assert passed.passed
     assert "It suffices: in 3 h all stays within its limits." in passed.verdict()
@@ -148,22 +148,22 @@ def test_two_questions_have_two_answers(crane, judged):
 
 def test_a_crane_without_limits_is_asked_for_harm_alone(crane):
     bare = replace(crane, limits={})
-    found = judge(bare, CLIPPED, seeds=range(3), drives=("identified",), **QUICK)
+    found = assess(bare, CLIPPED, seeds=range(3), drives=("identified",), **QUICK)
     assert found.asked == ("harm",)
     assert found.sufficient is None
     with pytest.raises(InputError, match="has no limits to suffice for"):
-        judge(bare, CLIPPED, seeds=range(3), asked=["sufficiency"], **QUICK)
+        assess(bare, CLIPPED, seeds=range(3), asked=["sufficiency"], **QUICK)
     with pytest.raises(InputError, match="no question 'safety'; there are harm, sufficiency"):
-        judge(crane, CLIPPED, seeds=range(3), asked=["safety"], **QUICK)
+        assess(crane, CLIPPED, seeds=range(3), asked=["safety"], **QUICK)
 
 
 def outcome(rms, left=""):
     return STOPPED._replace(rms_swing=rms, left=left)
 
 
-def test_a_run_that_leaves_the_model_loses_to_one_that_does_not(judged):
+def test_a_run_that_leaves_the_model_loses_to_one_that_does_not(assessed):
     """If both leave it, nobody knows: the interval holds whatever that seaway is."""
-    study = replace(judged.study, seeds=tuple(range(6)))
+    study = replace(assessed.study, seeds=tuple(range(6)))
     cases = {"no control": study.cases["no control"], "own": study.cases["identified"]}
     pairs = [
         (outcome(0.10), outcome(0.05)),
@@ -173,7 +173,7 @@ def test_a_run_that_leaves_the_model_loses_to_one_that_does_not(judged):
         (outcome(np.nan, "slack"), outcome(np.nan, "slack")),
         (outcome(0.10), outcome(0.05)),
     ]
-    found = replace(judged, study=replace(study, cases=cases), outcomes=tuple(pairs), linear=None)
+    found = replace(assessed, study=replace(study, cases=cases), outcomes=tuple(pairs), linear=None)
     share = found.worse("own")
     assert share.value == pytest.approx(2.0 / 6.0)
     assert share.low == pytest.approx(binomtest(2, 6).proportion_ci(0.95, "exact").low)
@@ -186,7 +186,7 @@ def test_a_run_that_leaves_the_model_loses_to_one_that_does_not(judged):
 
 def test_no_seaway_in_the_model_is_no_verdict_for_control(crane):
     """In waves of 6 m both leave the model at once: not decided, and never a number."""
-    found = judge(crane, MEANT, seeds=range(4), sea=Spectrum(6.0, 10.0),
+    found = assess(crane, MEANT, seeds=range(4), sea=Spectrum(6.0, 10.0),
                   drives=("identified",), **QUICK)  # fmt: skip
     assert found.harmless == "not decided"
     assert found.sufficient == "no"
@@ -196,7 +196,7 @@ def test_no_seaway_in_the_model_is_no_verdict_for_control(crane):
 
 
 def test_what_would_do(crane):
-    found = judge(crane, MEANT, seeds=range(8), allowed=0.4, asked=["harm"], turns=False,
+    found = assess(crane, MEANT, seeds=range(8), allowed=0.4, asked=["harm"], turns=False,
                   drives=("identified",), **SHORT)  # fmt: skip
     assert found.harmless == "no"
     assert "luff at its acceleration limit" in found.verdict()
@@ -204,17 +204,17 @@ def test_what_would_do(crane):
     assert clip.harmless == "yes"
     assert clip.sufficient is None
     assert f"{clip.what.capitalize()} would do." in found.verdict()
-    # a remedy, judged by itself, is what it was said to be
-    alone = judge(crane, CLIPPED, seeds=range(8), allowed=0.4, drives=("identified",), **QUICK)
+    # a remedy, assessed by itself, is what it was said to be
+    alone = assess(crane, CLIPPED, seeds=range(8), allowed=0.4, drives=("identified",), **QUICK)
     assert alone.worse("identified") == clip.worse
-    both = judge(crane, MEANT, seeds=range(8), allowed=0.4, turns=False, drives=("identified",),
+    both = assess(crane, MEANT, seeds=range(8), allowed=0.4, turns=False, drives=("identified",),
                  **SHORT)  # fmt: skip
     assert f"{clip.what.capitalize()} would do no harm, " in both.verdict()
     assert "Nothing that was tried surely does all that is asked." in both.verdict()
 
 
 def test_few_seaways_decide_nothing(crane):
-    one = judge(crane, CLIPPED, seeds=[0], drives=("ideal",), asked=["harm"], **QUICK)
+    one = assess(crane, CLIPPED, seeds=[0], drives=("ideal",), asked=["harm"], **QUICK)
     assert one.worse("ideal") == (0.0, 0.0, pytest.approx(0.975))
     assert one.outcome == "not decided"
     assert not one.passed
@@ -240,35 +240,35 @@ def test_more_seaways_are_those_that_tell_if_the_share_stays():
     ]
 
 
-def test_differences_are_paired(judged):
-    found = judged.difference("identified", "ideal")
+def test_differences_are_paired(assessed):
+    found = assessed.difference("identified", "ideal")
     assert found.value == pytest.approx(
-        judged.swing("identified").mean() - judged.swing("ideal").mean(), rel=1e-12
+        assessed.swing("identified").mean() - assessed.swing("ideal").mean(), rel=1e-12
     )
     assert found.low < found.value < found.high
-    titled = {table.title: table for table in judged.tables()}
+    titled = {table.title: table for table in assessed.tables()}
     table = titled["Differences of RMS swing within each seaway"]
     rows = {(row.cells[0], row.cells[1]): row.cells[2] for row in table.rows}
     assert rows["identified", "ideal"] == found.value
-    frame = judged.to_polars()
+    frame = assessed.to_polars()
     assert frame.height == 36
     assert frame.filter(variant="ideal")["rms_swing"].to_numpy() == pytest.approx(
-        judged.swing("ideal")
+        assessed.swing("ideal")
     )
 
 
-def test_what_the_answer_hangs_on_stands_with_it(crane, judged):
-    words = " ".join(judged.sentences())
+def test_what_the_answer_hangs_on_stands_with_it(crane, assessed):
+    words = " ".join(assessed.sentences())
     assert "Each seaway counts for 60 s after 20 s from a stationary swing." in words
     assert "a damping of 0.5 %, assumed." in words
     assert "14 of 15 quantities of the crane are assumed." in words
     assert "Limits that are assumed: swing, off-lead" in words
-    given = judge(crane, CLIPPED, seeds=range(2), swing_damping=0.01, drives=("ideal",), **QUICK)
+    given = assess(crane, CLIPPED, seeds=range(2), swing_damping=0.01, drives=("ideal",), **QUICK)
     assert "a damping of 1 %." in " ".join(given.sentences())
 
 
 def test_an_undamped_swing_has_no_stationary_answer(crane):
-    found = judge(crane, CLIPPED, seeds=range(2), swing_damping=0.0, drives=("ideal",),
+    found = assess(crane, CLIPPED, seeds=range(2), swing_damping=0.0, drives=("ideal",),
                   **{**QUICK, "turns": True})  # fmt: skip
     assert found.linear is None
     assert found.turns is None
@@ -278,7 +278,7 @@ def test_an_undamped_swing_has_no_stationary_answer(crane):
 @pytest.mark.slow
 def test_what_would_turn_the_answer(crane):
     """Control that harms in sea state 3 passes in waves a quarter as high, and a turn says so."""
-    found = judge(crane, CLIPPED, seeds=range(6), drives=("identified",), remedies=False)
+    found = assess(crane, CLIPPED, seeds=range(6), drives=("identified",), remedies=False)
     turned = {(turn.what, turn.other): turn for turn in found.turns}
     for turn in found.turns:
         assert turn.passes is not found.passed
@@ -300,7 +300,7 @@ def test_intervals_against_published_tables():
 def test_a_stopped_run_is_counted(crane):
     # lowering while the load is held 3 m above the longest rope ends beyond it
     stick = OperatorCommand.trapezoid(hoist=-0.5, duration=30.0, length=80.0)
-    found = judge(
+    found = assess(
         crane, {"none": control.Clip()}, seeds=[0], stick=stick, run_in=5.0, rope_m=47.0,
         remedies=False, turns=False,
     )  # fmt: skip
@@ -343,7 +343,7 @@ def test_swing_without_control_is_proportional_to_small_waves(crane):
 def test_orifice_is_that_of_another_luff_drive(crane):
     found = sweep(crane, "orifice", CLIPPED, points=[1.0, 3.0], seeds=[1], **SHORT)
     larger = crane.with_drive(luff=crane.luff.scale(Z16=3.0))
-    alone = judge(crane, CLIPPED, seeds=[1], drives={"larger": larger}, **QUICK)
+    alone = assess(crane, CLIPPED, seeds=[1], drives={"larger": larger}, **QUICK)
     assert found.values[0, 1, 2] == alone.swing("larger")[0]
     assert found.values[0, 0, 0] == found.values[0, 1, 0] == alone.swing("no control")[0]
 
@@ -389,10 +389,10 @@ def fitted(tmp_path_factory):
     free = {"Z16": Free(relative=(0.5, 2.0))}
     setup = Setup(stages=(stage.model_copy(update={"free": free, "forces": None}),))
     result = fit(Drive.preset("luff").parameters, campaign.experiments, setup)
-    judged = Identification(campaign, result)
-    judged.save(place)
+    identified = Identification(campaign, result)
+    identified.save(place)
     result.drive.to_toml(place / "drive.toml")
-    return place, result, judged.verdict
+    return place, result, identified.verdict
 
 
 @pytest.mark.slow
@@ -409,14 +409,14 @@ def test_own_logs_lead_to_the_verdict_on_the_own_crane(crane, fitted):
     assert len(drawn) == 3
     source = own.sources["luff"]
     assert source.fit == place
-    assert (source.judged_usable, source.verdict) == (verdict.usable, verdict.headline)
+    assert (source.fit_usable, source.verdict) == (verdict.usable, verdict.headline)
     assert {each.sources["luff"].verdict for each in drawn} == {verdict.headline}
     assert crane.with_drive(luff=place / "drive.toml").sources["luff"].fit == place
     assert not own.with_drive(luff=crane.luff).sources
     assert {each.luff for each in drawn_cranes(own)} == set(stored_draws(place).drives)
-    found = judge(own, CLIPPED, seeds=range(4), drives={"drawn": drawn}, **QUICK)
+    found = assess(own, CLIPPED, seeds=range(4), drives={"drawn": drawn}, **QUICK)
     # the first and the fourth seaway have the first crane
-    alone = judge(own, CLIPPED, seeds=[3], drives={"one": drawn[0]}, **QUICK)
+    alone = assess(own, CLIPPED, seeds=[3], drives={"one": drawn[0]}, **QUICK)
     assert found.swing("drawn")[3] == alone.swing("one")[0]
     assert found.swing("drawn")[1] != alone.swing("one")[0]
 
@@ -472,7 +472,7 @@ def test_control_does_not_know_the_draw_that_moves_the_crane(crane):
 def test_what_makes_no_study_is_said(crane):
     def refuse(message, **how):
         with pytest.raises(InputError, match=message):
-            judge(crane, MEANT, **{"seeds": [0], **how})
+            assess(crane, MEANT, **{"seeds": [0], **how})
 
     refuse("needs a controller, a set of drives and a seed", seeds=[])
     refuse("needs a controller, a set of drives and a seed", drives=())
