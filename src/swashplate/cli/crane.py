@@ -167,7 +167,9 @@ def run(
             drives, _, law = first.partition(":")
             how: dict[str, Any] = {"control": control_of(law)}
             how["actuation"] = "inverse" if drives == "identified" else drives
-            runs[first] = simulate(crane, stick, sea=ship, brake=brake, **how, **operated.setup)
+            runs[first] = simulate(
+                crane, stick, sea=ship, brake=brake, **how, **operated.run_options
+            )
         tables = run_tables(runs)
     save(out, "All signals, in SI", runs[first].write)
     draw(plot, "plot_crane", runs)
@@ -487,10 +489,10 @@ def _stationary_words(operated: Operated, seaway: Seaway, damping: float) -> str
 
     from swashplate.crane import linear_response
 
-    setup = operated.setup
+    options = operated.run_options
     names = ("slew_deg", "boom_deg", "rope_m", "swing_damping", "load", "suspension")
     start = {"slew_deg": 0.0, "boom_deg": 45.0, "rope_m": 20.0}
-    hung = start | {name: setup[name] for name in names if name in setup}
+    hung = start | {name: options[name] for name in names if name in options}
     found = linear_response(operated.chosen, seaway, **hung)
     return (
         f"Without control the load swings by {degrees(found.values['swing'].rms):.2f} deg RMS in "

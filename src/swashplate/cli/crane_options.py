@@ -249,24 +249,24 @@ class Operated(AtSea):
     ] = None
 
     @property
-    def setup(self) -> dict[str, Any]:
+    def run_options(self) -> dict[str, Any]:
         """Where a run begins, and what hangs on the crane, as far as it is given."""
         from swashplate.crane import Suspension
 
-        setup = self.pose | _given(
+        options = self.pose | _given(
             drag_area=self.drag_area, load=self.load, swing_damping=self.swing_damping
         )
         names = [each.name for each in fields(Suspension)]
         values = numbers_of("--suspension", self.suspension, "stiffness=6e7", names)
         if values:
-            setup["suspension"] = Suspension(**values)
+            options["suspension"] = Suspension(**values)
         if self.wind is not None:
             if self.drag_area is None:
                 raise InputError(
                     f"--wind {self.wind} needs the load's drag area: give --drag-area, such as 12."
                 )
-            setup["wind"] = _vector("--wind", self.wind, "10,-5")
-        return setup
+            options["wind"] = _vector("--wind", self.wind, "10,-5")
+        return options
 
 
 @dataclass(frozen=True)
@@ -329,7 +329,7 @@ class Studied(Operated):
         law = control_of(self.control)
         if law is None:
             raise InputError("--control is empty: there is nothing to assess.")
-        how = self.setup | _given(length=self.length, run_in=self.run_in) | more
+         self.options=how = self.run_options= self.run_options | _given(length=self.length, run_in=self.run_in) | more
         if self.waters is not None:
             how["sea"] = self.waters
         if self.seeds is not None:

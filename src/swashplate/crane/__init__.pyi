@@ -4,7 +4,7 @@ from .closed_loop.result import CraneRun as CraneRun
 from .closed_loop.result import run_tables as run_tables
 from .closed_loop.simulating import simulate as simulate
 from .closed_loop.stepper import CraneStepper as CraneStepper
-from .closed_loop.stepper import Setup as Setup
+from .closed_loop.stepper import RunOptions as RunOptions
 from .crane import Crane as Crane
 from .drives import DriveSource as DriveSource
 from .free_swing import FreeSwing as FreeSwing

@@ -133,7 +133,7 @@ class CraneRun(Tabular):
 
     @property
     def actuation(self) -> str:
-        """What made speeds of wanted speeds, as of `Setup`."""
+        """What made speeds of wanted speeds, as of `RunOptions`."""
         return ACTUATIONS[self.fixed.actuation]
 
     @cached_property

@@ -10,7 +10,7 @@ from swashplate.crane.axes import RATE
 from swashplate.crane.closed_loop.loop import DIRECT, IDEAL
 from swashplate.crane.closed_loop.operator_command import Array, OperatorCommand
 from swashplate.crane.closed_loop.result import CraneRun
-from swashplate.crane.closed_loop.stepper import CraneStepper, Setup
+from swashplate.crane.closed_loop.stepper import CraneStepper, RunOptions
 from swashplate.crane.crane import Crane
 from swashplate.crane.sea.seaway import Seaway, motion_of
 from swashplate.errors import InputError
@@ -21,7 +21,7 @@ def simulate(
     stick: OperatorCommand,
     *,
     sea: Seaway | ArrayLike | None = None,
-    **setup: Unpack[Setup],
+    **options: Unpack[RunOptions],
 ) -> CraneRun:
     """Simulate a whole crane.
 
@@ -34,8 +34,8 @@ def simulate(
     sea : Seaway or (n, 6) array_like, optional
         A seaway, or the ship's motion at 512 Hz: surge, sway, heave [m], roll, pitch, yaw [rad], as
         `ship_motion` reads it from a log; by default the ship is at rest.
-    **setup
-        Where it begins, what controls it, what hangs on it: see `Setup`.
+    **options
+        Where it begins, what controls it, what hangs on it: see `RunOptions`.
 
     Raises
     ------
@@ -46,15 +46,17 @@ def simulate(
     DomainError
         If boom or rope meet a limit, or a drive leaves its domain.
     """
-    stepper, commands, end = begun(crane, stick, setup)
+    stepper, commands, end = begun(crane, stick, options)
     ship = motion_of(sea, len(commands), RATE)
     signals = stepper.run(commands, ship)
     return CraneRun(crane, commands, ship, signals, stepper.fixed, end)
 
 
-def begun(crane: Crane, stick: OperatorCommand, setup: Setup) -> tuple[CraneStepper, Array, float]:
+def begun(
+    crane: Crane, stick: OperatorCommand, options: RunOptions
+) -> tuple[CraneStepper, Array, float]:
     """A run at its start: stepper, commands, and when the last one ends; as `simulate` refuses."""
-    stepper = CraneStepper(crane, **setup)
+    stepper = CraneStepper(crane, **options)
     if stepper.fixed.actuation == DIRECT:
         raise InputError(
             "With direct actuation commands are voltages, but a stick gives parts of the full "

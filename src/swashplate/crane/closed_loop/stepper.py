@@ -1,4 +1,4 @@
-"""Steppers: a crane with its setup, one sample after the other or a whole run at once."""
+"""Steppers: a crane with its options, one sample after the other or a whole run at once."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ QUICKEST = 0.4
 would swing against each other from sample to sample."""
 
 
-class Setup(TypedDict, total=False):
+class RunOptions(TypedDict, total=False):
     """How a run is set up: keywords of `simulate` and `CraneStepper`, each optional.
 
     Parameters
@@ -118,13 +118,13 @@ class CraneStepper:
     ----------
     crane : Crane
         The crane with its drives.
-    **setup
-        Where it begins, what controls it, what hangs on it: see `Setup`.
+    **options
+        Where it begins, what controls it, what hangs on it: see `RunOptions`.
     """
 
-    def __init__(self, crane: Crane, **setup: Unpack[Setup]) -> None:
-        how: dict[str, Any] = dict(setup)
-        check_names("A crane's run has no", how, Setup.__annotations__, "it has")
+    def __init__(self, crane: Crane, **options: Unpack[RunOptions]) -> None:
+        how: dict[str, Any] = dict(options)
+        check_names("A crane's run has no", how, RunOptions.__annotations__, "it has")
         control = how.pop("control", None)
         settings, law, self._sensors = stages_of(control)
         self._crane, self.fixed = crane, _fixed(crane, settings, **how)
@@ -300,7 +300,7 @@ def _fixed(
     wind: tuple[float, float] = (0.0, 0.0),
     brake: bool = True,
 ) -> Fixed:
-    """What stays as it is during a run, of a `Setup`; refuses one that cannot be."""
+    """What stays as it is during a run, of `RunOptions`; refuses one that cannot be."""
     if actuation not in ACTUATIONS:
         raise InputError(f"actuation is '{actuation}'; it is {', '.join(ACTUATIONS[:-1])}.")
     load = crane.safe_load if load is None else load

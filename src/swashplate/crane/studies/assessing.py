@@ -139,7 +139,7 @@ def seaways_needed(seaways: int, allowed: float) -> str:
 def _with_remedies(assessment: Assessment) -> Assessment:
     """The assessment with what would do, of larger orifices and of clips."""
     study, case = assessment.study, assessment.study.cases[assessment.assessed_variant]
-    law = case.setup["control"]
+    law = case.options["control"]
     if not case.driven or law is None:
         return assessment
     # factors are of the crane as it is built, whatever was assessed

@@ -184,7 +184,7 @@ def operability(
     drives: Drives = (IDEAL, BUILT),
     sea: Seaway | None = None,
     executor: Executor | None = None,
-    **setup: Any,
+    **options: Any,
 ) -> Operability:
     """Share of a year that a crane can work with control, by its limits.
 
@@ -204,7 +204,7 @@ def operability(
         Ship, peak factor, spreading, speed; its height, period and heading do not count.
     executor : Executor, optional
         Threads by default; the numbers do not depend on it.
-    **setup
+    **options
         As of `Study.of`, without a stick.
 
     Raises
@@ -221,7 +221,7 @@ def operability(
     if not headings:
         raise InputError("Operability needs one heading of the waves at least.")
     base = Seaway() if sea is None else sea
-    study = Study.of(crane, control, sea=base, drives=drives, **{"seeds": SEEDS, **setup})
+    study = Study.of(crane, control, sea=base, drives=drives, **{"seeds": SEEDS, **options})
     if study.length < SHORTEST:
         raise InputError(
             f"A sea is simulated for {study.length:g} s, but its largest values in three hours "
@@ -323,7 +323,7 @@ class _Linear(NamedTuple):
 
 def _linear(case: Case, sea: Seaway, limits: Mapping[str, float]) -> _Linear:
     """The first of a case's cranes in a sea of 1 m, in the frequency domain."""
-    control = case.setup["control"]
+    control = case.options["control"]
     response = linear_response(case.cranes[0], sea, control, **case.pose, **case.hangs)
     values = response.values
     named = {*limits, "hoist_demand"}

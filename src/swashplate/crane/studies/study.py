@@ -19,7 +19,7 @@ from swashplate.crane.axes import RATE, check_names
 from swashplate.crane.closed_loop.operator_command import OperatorCommand
 from swashplate.crane.closed_loop.result import FARTHEST_SWING, CraneRun
 from swashplate.crane.closed_loop.simulating import begun, simulate
-from swashplate.crane.closed_loop.stepper import Actuation, Setup, feels_load
+from swashplate.crane.closed_loop.stepper import Actuation, RunOptions, feels_load
 from swashplate.crane.control import Clip, Control
 from swashplate.crane.crane import Crane
 from swashplate.crane.kinematics import Vector, boom_at, rotation, tip_of, to_inertial
@@ -61,55 +61,55 @@ class Case(NamedTuple):
 
     cranes: tuple[Crane, ...]
     """One, or cranes of which each seaway takes the next."""
-    setup: Setup
+    options: RunOptions
     stick: OperatorCommand
 
     @property
     def driven(self) -> bool:
         """Whether it has drives that have limits, not ideal ones."""
-        return self.setup["actuation"] != IDEAL
+        return self.options["actuation"] != IDEAL
 
     @property
     def pose(self) -> dict[str, Any]:
         """Where it begins: keywords of `Crane.home`."""
-        return {name: self._setup[name] for name in ("slew_deg", "boom_deg", "rope_m")}
+        return {name: self._options[name] for name in ("slew_deg", "boom_deg", "rope_m")}
 
     @property
     def hangs(self) -> dict[str, Any]:
         """What hangs on it, as far as it is given: keywords of `linear_response`."""
         names = ("swing_damping", "load", "suspension")
-        return {name: self._setup[name] for name in names if name in self._setup}
+        return {name: self._options[name] for name in names if name in self._options}
 
     @property
     def swing_damping(self) -> float:
         """Damping ratio of the load's swing."""
-        given = self.setup.get("swing_damping")
+        given = self.options.get("swing_damping")
         return self.cranes[0].swing_damping if given is None else given
 
     @property
-    def _setup(self) -> dict[str, Any]:
-        return dict(self.setup)
+    def _options(self) -> dict[str, Any]:
+        return dict(self.options)
 
-    def changed(self, **setup: Unpack[Setup]) -> Case:
+    def changed(self, **options: Unpack[RunOptions]) -> Case:
         """The case set up in another way."""
-        return self._replace(setup=self.setup | setup)
+        return self._replace(options=self.options | options)
 
     def run(self, number: int, seaway: Seaway, motion: Array | None = None) -> CraneRun:
         """Its run in a seaway by the seaway's number; the ship's motion, if it is known already."""
         crane = self.cranes[number % len(self.cranes)]
         if motion is None:
             motion = seaway.motion(round(self.stick.length * RATE) + 1, RATE)
-        setup = self.setup | self._start(seaway)
-        return simulate(crane, self.stick, sea=motion, **setup)
+        options = self.options | self._start(seaway)
+        return simulate(crane, self.stick, sea=motion, **options)
 
-    def _start(self, seaway: Seaway) -> Setup:
+    def _start(self, seaway: Seaway) -> RunOptions:
         """The stationary swing without control at time 0, at most a part of the model's edge."""
         if self.swing_damping <= 0.0:
             return {}
         offset, velocity = stationary_start(
             self.cranes[0], seaway, damping=self.swing_damping, **self.pose
         )
-        largest = LARGEST_START * self.setup["rope_m"] * sin(radians(FARTHEST_SWING))
+        largest = LARGEST_START * self.options["rope_m"] * sin(radians(FARTHEST_SWING))
         share = min(largest / max(float(np.hypot(*offset)), 1e-9), 1.0)
         return {
             "load_offset": (share * offset[0], share * offset[1]),
@@ -118,7 +118,7 @@ class Case(NamedTuple):
 
     def words(self) -> str:
         """Where the crane stands, what hangs on it and what controls it, in a sentence."""
-        crane, pose, control = self.cranes[0], self.pose, self.setup["control"]
+        crane, pose, control = self.cranes[0], self.pose, self.options["control"]
         load = self.hangs.get("load")
         mass = crane.safe_load if load is None else load
         stands = (
@@ -177,7 +177,7 @@ class Study(Result):
         run_in: float = RUN_IN,
         executor: Executor | None = None,
         progress: Callable[[int, int], None] | None = None,
-        **setup: Any,
+        **options: Any,
     ) -> Study:
         """A study; these are the keywords of `assess` and `sweep`.
 
@@ -204,8 +204,8 @@ class Study(Result):
             Of `swashplate.executors`; threads by default. The numbers do not depend on it.
         progress : callable, optional
             Called with seaways done and their number.
-        **setup
-            Where each run begins, what hangs on it: see `Setup`, whose control and actuation follow
+        **options
+            Where each run begins, what hangs on it: see `RunOptions`, whose control and actuation follow
             from controllers and drives. By default the load hangs abeam on 27 m of rope.
         """
         controllers = control if isinstance(control, Mapping) else {"": control}
@@ -218,9 +218,9 @@ class Study(Result):
         if not (controllers and sets and seeds):
             raise InputError("A study needs a controller, a set of drives and a seed at least.")
         apart = ("control", "actuation", "load_offset", "load_velocity")
-        poses = [name for name in Setup.__annotations__ if name not in apart]
+        poses = [name for name in RunOptions.__annotations__ if name not in apart]
         words = ("seeds", "sea", "drives", "stick", "length", "run_in", *poses)
-        check_names("A study has no", setup, words, "it has")
+        check_names("A study has no", options, words, "it has")
         if not (length >= SHORTEST and run_in >= 0.0):
             raise InputError(
                 f"A run counts for {length:g} s after a run-in of {run_in:g} s, but must count for "
@@ -233,7 +233,7 @@ class Study(Result):
                 f"The stick is {stick.length:g} s long, but a run counts from {run_in:g} s on for "
                 f"at least {SHORTEST:g} s: take a longer stick, or a shorter run_in."
             )
-        pose: Any = {"slew_deg": 90.0, "boom_deg": 45.0, "rope_m": 27.0, **setup}
+        pose: Any = {"slew_deg": 90.0, "boom_deg": 45.0, "rope_m": 27.0, **options}
         none = Case((crane,), pose | {"control": None, "actuation": "inverse"}, stick)
         cases = {NONE: none}
         for controller, stages in controllers.items():
@@ -275,7 +275,7 @@ class Study(Result):
         An `InputError` or `ParameterError` if a case cannot begin as it is asked to.
         """
         for case in cases:  # said here, once, and not by a worker
-            begun(case.cranes[0], case.stick, case.setup)
+            begun(case.cranes[0], case.stick, case.options)
         chosen = range(len(self.seeds)) if numbers is None else numbers
         outcomes: list[tuple[Outcome, ...]] = [()] * len(chosen)
         items = [(number, self.seeds[number]) for number in chosen]

@@ -46,7 +46,7 @@ def _at_height(seaway: Seaway, case: Case, point: float) -> tuple[Seaway, Case]:
 
 
 def _at_orifice(seaway: Seaway, case: Case, point: float) -> tuple[Seaway, Case]:
-    if case.setup["control"] is None or not case.driven:
+    if case.options["control"] is None or not case.driven:
         return seaway, case  # no control and ideal drives do not know the orifice
     cranes = tuple(upgraded(crane, "luff", {"orifice": point}) for crane in case.cranes)
     return seaway, case._replace(cranes=cranes)

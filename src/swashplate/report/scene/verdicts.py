@@ -194,7 +194,7 @@ def _basis(assessment: Assessment) -> list[Block]:
         _ship_sentence(study.seaway),
     ]
     for name, case in study.cases.items():
-        control = case.setup["control"]
+        control = case.options["control"]
         if name != NONE:
             drives = count(len(case.cranes), "crane") if case.driven else "ideal drives"
             words = control.words() if control is not None else "no control"
