@@ -329,7 +329,7 @@ class Studied(Operated):
         law = control_of(self.control)
         if law is None:
             raise InputError("--control is empty: there is nothing to assess.")
-         self.options=how = self.run_options= self.run_options | _given(length=self.length, run_in=self.run_in) | more
+        how = self.run_options | _given(length=self.length, run_in=self.run_in) | more
         if self.waters is not None:
             how["sea"] = self.waters
         if self.seeds is not None:

@@ -14,7 +14,7 @@ from .linear_crane import linearize as linearize
 from .rope import LoadMotion as LoadMotion
 from .rope import Suspension as Suspension
 from .rope import load_motion as load_motion
-from .sea.confidence import Estimate as Estimate
+from .sea.confidence import ConfidenceInterval as ConfidenceInterval
 from .sea.scatter import Scatter as Scatter
 from .sea.seaway import SEA_STATES as SEA_STATES
 from .sea.seaway import Seaway as Seaway

@@ -16,7 +16,7 @@ ENOUGH = (10, 20, 30, 50, 75, 100, 150, 200, 300, 500, 700, 1000, 1500, 2000, 30
 """Numbers of seaways that are advised where fewer do not decide."""
 
 
-class Estimate(NamedTuple):
+class ConfidenceInterval(NamedTuple):
     """A number with its 95 % confidence interval."""
 
     value: float
@@ -24,7 +24,7 @@ class Estimate(NamedTuple):
     high: float
 
 
-def mean_of(values: Array, least: float = -inf) -> Estimate:
+def mean_of(values: Array, least: float = -inf) -> ConfidenceInterval:
     """Mean of independent values with Student's interval; NaN are left out.
 
     Values that cannot be below `least`, as a swing not below 0, have no interval that reaches
@@ -41,23 +41,23 @@ def mean_of(values: Array, least: float = -inf) -> Estimate:
     known = values[np.isfinite(values)]
     mean = float(known.mean()) if known.size else np.nan
     if known.size < 2:
-        return Estimate(mean, np.nan, np.nan)
+        return ConfidenceInterval(mean, np.nan, np.nan)
     t = float(stdtrit(known.size - 1, 0.975))
     half = t * float(known.std(ddof=1)) / sqrt(known.size)
-    return Estimate(mean, max(mean - half, least), mean + half)
+    return ConfidenceInterval(mean, max(mean - half, least), mean + half)
 
 
-def rms_of(values: Array) -> Estimate:
+def rms_of(values: Array) -> ConfidenceInterval:
     """Root mean square over independent seaways of a root mean square in each; NaN are left out.
 
     Its square is what a spectrum gives: the mean of the roots is smaller. The interval is the root
     of Student's for the mean of the squares.
     """
     squares = mean_of(values**2, 0.0)
-    return Estimate(*np.sqrt(np.array(squares)).tolist())
+    return ConfidenceInterval(*np.sqrt(np.array(squares)).tolist())
 
 
-def share_of(hits: int, of: int, unknown: int = 0) -> Estimate:
+def share_of(hits: int, of: int, unknown: int = 0) -> ConfidenceInterval:
     """Share of independent seaways with its exact interval (Clopper and Pearson 1934).
 
     Parameters
@@ -73,10 +73,10 @@ def share_of(hits: int, of: int, unknown: int = 0) -> Estimate:
     most = hits + unknown
     low = float(betaincinv(hits, of - hits + 1, 0.025)) if hits > 0 else 0.0
     high = float(betaincinv(most + 1, of - most, 0.975)) if most < of else 1.0
-    return Estimate(hits / of, low, high)
+    return ConfidenceInterval(hits / of, low, high)
 
 
-def counted_words(share: Estimate, seaways: int) -> str:
+def counted_words(share: ConfidenceInterval, seaways: int) -> str:
     """A share of seaways in words: ``"2 of 37 seaways (95 % interval 0.7 to 18.2 %)"``."""
     low, high = 100.0 * share.low, 100.0 * share.high
     of = f"{round(share.value * seaways)} of {count(seaways, 'seaway')}"

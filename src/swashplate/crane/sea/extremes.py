@@ -13,7 +13,7 @@ from math import pi
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swashplate.crane.sea.confidence import Estimate
+from swashplate.crane.sea.confidence import ConfidenceInterval
 
 Array = NDArray[np.float64]
 
@@ -106,7 +106,7 @@ def peaks_of(signal: Array) -> Array:
 
 def largest_of_peaks(
     runs: Sequence[Array], observed: float, duration: float = THREE_HOURS
-) -> Estimate:
+) -> ConfidenceInterval:
     """Most probable largest value in a duration, from the peaks of independent runs.
 
     Parameters
@@ -120,7 +120,7 @@ def largest_of_peaks(
 
     Returns
     -------
-    Estimate
+    ConfidenceInterval
         With a 95 % interval by the jackknife over groups of runs; the interval is NaN for fewer
         than two groups, and all is NaN for fewer than 40 peaks.
 
@@ -134,7 +134,7 @@ def largest_of_peaks(
     value = _weibull_level(np.concatenate([np.zeros(0), *runs]), observed, duration)
     groups = min(GROUPS, len(runs))
     if groups < 2 or not np.isfinite(value):
-        return Estimate(value, np.nan, np.nan)
+        return ConfidenceInterval(value, np.nan, np.nan)
     numbers = np.arange(len(runs)) % groups
     left_out = np.empty(groups)
     for group in range(groups):
@@ -143,7 +143,7 @@ def largest_of_peaks(
         left_out[group] = _weibull_level(np.concatenate(rest), share * observed, duration)
     variance = (groups - 1) / groups * float(np.sum((left_out - left_out.mean()) ** 2))
     half = float(stdtrit(groups - 1, 0.975)) * variance**0.5
-    return Estimate(value, max(value - half, 0.0), value + half)
+    return ConfidenceInterval(value, max(value - half, 0.0), value + half)
 
 
 def _weibull_level(peaks: Array, observed: float, duration: float) -> float:

@@ -19,7 +19,7 @@ from swashplate.crane.closed_loop.result import PUMPS, CraneRun, limit_table
 from swashplate.crane.control import PositionLoop
 from swashplate.crane.limits import LIMITED
 from swashplate.crane.sea.confidence import (
-    Estimate,
+    ConfidenceInterval,
     counted_words,
     mean_of,
     more_seaways,
@@ -59,7 +59,7 @@ class AssessedQuantity(NamedTuple):
 
     name: str
     limit: float
-    largest: Estimate
+    largest: ConfidenceInterval
     """Most probable largest value in three hours; of the saturation its mean."""
 
     @property
@@ -98,9 +98,9 @@ class Remedy(NamedTuple):
     """Whether control is worse than none as seldom as allowed then."""
     sufficient: Decision | None
     """Whether all stays within its limits then; None if that was not asked."""
-    worse: Estimate
+    worse: ConfidenceInterval
     """Share of seaways in which control is then worse than none."""
-    swing: Estimate
+    swing: ConfidenceInterval
     """Root mean square swing then. [rad]"""
     beyond: tuple[str, ...]
     """What is beyond its limit then, in words."""
@@ -163,11 +163,11 @@ class Assessment(Tabular, Drawn):
         reasons = [outcome.left for outcome in self.of(name) if outcome.left]
         return {reason: reasons.count(reason) for reason in dict.fromkeys(reasons)}
 
-    def difference(self, name: str, other: str = NONE) -> Estimate:
+    def difference(self, name: str, other: str = NONE) -> ConfidenceInterval:
         """Mean paired difference of the root mean square swing to another variant. [rad]"""
         return mean_of(self.swing(name) - self.swing(other))
 
-    def worse(self, name: str) -> Estimate:
+    def worse(self, name: str) -> ConfidenceInterval:
         """Share of seaways in which a variant swings more than no control.
 
         One that leaves the model, or is stopped, is worse than one that does not; if both do, that
@@ -522,7 +522,7 @@ def _rms_words(none: float, own: float) -> str:
     return f": {without} without it, {with_it} with it"
 
 
-def share_worse(own: Sequence[Outcome], none: Sequence[Outcome]) -> Estimate:
+def share_worse(own: Sequence[Outcome], none: Sequence[Outcome]) -> ConfidenceInterval:
     """Share of seaways in which control swings more than none; see `Assessment.worse`."""
     worse = unknown = 0
     for one, other in zip(own, none, strict=True):
@@ -533,7 +533,7 @@ def share_worse(own: Sequence[Outcome], none: Sequence[Outcome]) -> Estimate:
     return share_of(worse, len(own), unknown)
 
 
-def largest_of(outcomes: Sequence[Outcome], name: str) -> Estimate:
+def largest_of(outcomes: Sequence[Outcome], name: str) -> ConfidenceInterval:
     """Most probable largest value of a quantity in three hours, from its peaks in many runs."""
     runs = [outcome.peaks[name] for outcome in outcomes if name in outcome.peaks]
     observed = sum(outcome.counted for outcome in outcomes)

@@ -205,8 +205,8 @@ class Study(Result):
         progress : callable, optional
             Called with seaways done and their number.
         **options
-            Where each run begins, what hangs on it: see `RunOptions`, whose control and actuation follow
-            from controllers and drives. By default the load hangs abeam on 27 m of rope.
+            Where each run begins, what hangs on it: see `RunOptions`, whose control and actuation
+            follow from controllers and drives. By default the load hangs abeam on 27 m of rope.
         """
         controllers = control if isinstance(control, Mapping) else {"": control}
         named = [drives] if isinstance(drives, str) else drives
