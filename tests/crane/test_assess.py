@@ -27,7 +27,7 @@ from swashplate.crane.closed_loop.result import PUMPS
 from swashplate.crane.rope import GRAVITY
 from swashplate.crane.sea.confidence import fewest_seaways, mean_of, more_seaways, share_of
 from swashplate.crane.studies.assessing import seaways_needed
-from swashplate.crane.studies.outcome import STOPPED
+from swashplate.crane.studies.run_outcome import STOPPED
 from swashplate.drive import Limit
 from swashplate.errors import InputError, ParameterError
 from swashplate.executors import Processes, Serial, Threads

@@ -35,7 +35,7 @@ from .studies.following import Followable as Followable
 from .studies.following import follow as follow
 from .studies.operating import Operability as Operability
 from .studies.operating import operability as operability
-from .studies.outcome import Outcome as Outcome
+from .studies.run_outcome import RunOutcome as RunOutcome
 from .studies.spectral import LinearResponse as LinearResponse
 from .studies.spectral import linear_response as linear_response
 from .studies.study import Study as Study

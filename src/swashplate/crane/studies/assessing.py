@@ -27,7 +27,7 @@ from swashplate.crane.studies.crane_assessment import (
     share_worse,
 )
 from swashplate.crane.studies.following import follow
-from swashplate.crane.studies.outcome import Outcome
+from swashplate.crane.studies.run_outcome import RunOutcome
 from swashplate.crane.studies.spectral import linear_response
 from swashplate.crane.studies.study import NONE, Case, Controllers, Study
 from swashplate.drive import Limit
@@ -224,7 +224,7 @@ def _trial(
     none, seaways = assessment.of(NONE), len(assessment.study.seeds)
     asked = "sufficiency" in assessment.asked
     limits = assessment.study.crane.limits_si if asked else {}
-    outcomes: list[Outcome] = []
+    outcomes: list[RunOutcome] = []
     for first in range(0, seaways, BLOCK):
         block = range(first, min(first + BLOCK, seaways))
         outcomes += [found for (found,) in assessment.study.outcomes([case], block)]

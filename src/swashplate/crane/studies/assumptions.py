@@ -18,7 +18,7 @@ from swashplate.crane.crane import Crane
 from swashplate.crane.sea.extremes import largest_of_peaks
 from swashplate.crane.sea.seaway import Seaway
 from swashplate.crane.sea.transfer_functions import Hull
-from swashplate.crane.studies.outcome import Outcome
+from swashplate.crane.studies.run_outcome import RunOutcome
 from swashplate.crane.studies.spectral import linear_response
 from swashplate.crane.studies.study import Case, Study
 from swashplate.errors import SwashplateError
@@ -163,7 +163,7 @@ def _passes(study: Study, seaway: Seaway, case: Case, limits: Mapping[str, float
     return worst <= 1.0
 
 
-def _over_none(seaway: Seaway, case: Case, found: list[Outcome]) -> float:
+def _over_none(seaway: Seaway, case: Case, found: list[RunOutcome]) -> float:
     """Root mean square swing over that without control."""
     linear = linear_response(case.cranes[0], seaway, **case.pose, **case.hangs)
     own = np.sqrt(np.mean([outcome.rms_swing**2 for outcome in found]))

@@ -29,7 +29,7 @@ from swashplate.crane.sea.confidence import (
 from swashplate.crane.sea.extremes import THREE_HOURS, largest_of_peaks
 from swashplate.crane.sea.transfer_functions import CRANE_SHIP, Hull
 from swashplate.crane.studies.assumptions import Turn
-from swashplate.crane.studies.outcome import Outcome
+from swashplate.crane.studies.run_outcome import RunOutcome
 from swashplate.crane.studies.spectral import LinearResponse
 from swashplate.crane.studies.study import NONE, Study, assumed_words
 from swashplate.drive import Limit
@@ -119,7 +119,7 @@ class Assessment(Tabular, Drawn):
 
     study: Study
     """Crane, variants, seaways, and for how long each counts."""
-    outcomes: tuple[tuple[Outcome, ...], ...]
+    outcomes: tuple[tuple[RunOutcome, ...], ...]
     """Of every seaway, in the order of the variants."""
     allowed: float
     """Share of seaways in which control may be worse than none."""
@@ -149,7 +149,7 @@ class Assessment(Tabular, Drawn):
         """The variant that the verdict is on: the last one."""
         return self.names[-1]
 
-    def of(self, name: str) -> list[Outcome]:
+    def of(self, name: str) -> list[RunOutcome]:
         """Outcomes of a variant in each seaway."""
         check_names("There is no variant", [name], self.names)
         return [outcomes[self.names.index(name)] for outcomes in self.outcomes]
@@ -522,7 +522,7 @@ def _rms_words(none: float, own: float) -> str:
     return f": {without} without it, {with_it} with it"
 
 
-def share_worse(own: Sequence[Outcome], none: Sequence[Outcome]) -> ConfidenceInterval:
+def share_worse(own: Sequence[RunOutcome], none: Sequence[RunOutcome]) -> ConfidenceInterval:
     """Share of seaways in which control swings more than none; see `Assessment.worse`."""
     worse = unknown = 0
     for one, other in zip(own, none, strict=True):
@@ -533,7 +533,7 @@ def share_worse(own: Sequence[Outcome], none: Sequence[Outcome]) -> ConfidenceIn
     return share_of(worse, len(own), unknown)
 
 
-def largest_of(outcomes: Sequence[Outcome], name: str) -> ConfidenceInterval:
+def largest_of(outcomes: Sequence[RunOutcome], name: str) -> ConfidenceInterval:
     """Most probable largest value of a quantity in three hours, from its peaks in many runs."""
     runs = [outcome.peaks[name] for outcome in outcomes if name in outcome.peaks]
     observed = sum(outcome.counted for outcome in outcomes)
@@ -541,7 +541,7 @@ def largest_of(outcomes: Sequence[Outcome], name: str) -> ConfidenceInterval:
 
 
 def assessed_limits(
-    outcomes: Sequence[Outcome], limits: Mapping[str, float]
+    outcomes: Sequence[RunOutcome], limits: Mapping[str, float]
 ) -> tuple[AssessedQuantity, ...]:
     """All that has a limit; what the runs do not have, as a place if the operator moves, is not."""
     quantities = []

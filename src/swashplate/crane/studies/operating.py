@@ -24,7 +24,7 @@ from swashplate.crane.limits import LIMITED
 from swashplate.crane.sea.extremes import largest_of_peaks
 from swashplate.crane.sea.scatter import Scatter
 from swashplate.crane.sea.seaway import Seaway, Spectrum
-from swashplate.crane.studies.outcome import Outcome
+from swashplate.crane.studies.run_outcome import RunOutcome
 from swashplate.crane.studies.spectral import DEMANDS, linear_response
 from swashplate.crane.studies.study import BUILT, IDEAL, NONE, Case, Drives, Study, assumed_words
 from swashplate.drive import Limit
@@ -370,7 +370,7 @@ def _by_simulation(study: Study, case: Case, seaway: Seaway, limits: Mapping[str
     return Cell(_drive_limit(outcomes) or worst, ratios[worst], True)
 
 
-def _drive_limit(outcomes: Sequence[Outcome]) -> str:
+def _drive_limit(outcomes: Sequence[RunOutcome]) -> str:
     """Drive and limit that act for the longest time, in words; empty if none acts for long."""
     shares = np.mean([np.nan_to_num(outcome.limits) for outcome in outcomes], axis=0)
     longest, words = ACTS, ""

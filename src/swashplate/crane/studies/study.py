@@ -2,7 +2,7 @@
 
 Differences between variants are within each seaway. Every run begins in the stationary swing
 without control of its seaway, has a run-in in which control does what it can, and counts after it.
-Of a run only its `Outcome` is kept.
+Of a run only its `RunOutcome` is kept.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from swashplate.crane.limits import LIMITED
 from swashplate.crane.rope import GRAVITY
 from swashplate.crane.sea.seaway import Seaway, Spectrum
 from swashplate.crane.studies.following import follow
-from swashplate.crane.studies.outcome import STOPPED, Outcome, outcome_of
+from swashplate.crane.studies.run_outcome import STOPPED, RunOutcome, outcome_of
 from swashplate.crane.studies.spectral import stationary_start
 from swashplate.errors import DomainError, InputError
 from swashplate.executors import Executor, Threads
@@ -269,7 +269,7 @@ class Study(Result):
 
     def outcomes(
         self, cases: Sequence[Case], numbers: range | None = None
-    ) -> list[tuple[Outcome, ...]]:
+    ) -> list[tuple[RunOutcome, ...]]:
         """Outcomes of all cases, a tuple for each seaway, or for some by their numbers.
 
         An `InputError` or `ParameterError` if a case cannot begin as it is asked to.
@@ -277,7 +277,7 @@ class Study(Result):
         for case in cases:  # said here, once, and not by a worker
             begun(case.cranes[0], case.stick, case.options)
         chosen = range(len(self.seeds)) if numbers is None else numbers
-        outcomes: list[tuple[Outcome, ...]] = [()] * len(chosen)
+        outcomes: list[tuple[RunOutcome, ...]] = [()] * len(chosen)
         items = [(number, self.seeds[number]) for number in chosen]
         runs = self.executor.run(_of_seaway, (tuple(cases), self.seaway, self.run_in), items)
         seaways = counted(runs, len(chosen), "seaways", f"Simulating {self.crane.name}")
@@ -327,7 +327,7 @@ def _driven(case: Case, name: str, given: str | Crane | Sequence[Crane]) -> Case
 
 def _of_seaway(
     work: tuple[tuple[Case, ...], Seaway, float], item: tuple[int, int]
-) -> tuple[Outcome, ...]:
+) -> tuple[RunOutcome, ...]:
     """Outcomes of all cases in one seaway."""
     (cases, of, run_in), (number, seed) = work, item
     seaway = replace(of, seed=seed)

@@ -26,7 +26,7 @@ SATURATED = (1 << PUMPS.index(Limit.ORIFICE)) | (1 << PUMPS.index(Limit.SWASH_ST
 """Bits of the limits at which a drive does not do what it is asked to: acceleration and speed."""
 
 
-class Outcome(NamedTuple):
+class RunOutcome(NamedTuple):
     """What counts of one run, in SI."""
 
     rms_swing: float
@@ -46,13 +46,13 @@ class Outcome(NamedTuple):
 
 LEAST = 10.0
 """Time below which nothing counts. [s]"""
-STOPPED = Outcome(
+STOPPED = RunOutcome(
     np.nan, np.nan, np.full((3, len(PUMPS)), np.nan), np.nan, {}, 0.0, "stopped at a limit"
 )
 """Of a run that met a limit of the crane's travel, or left the domain of a drive's model."""
 
 
-def outcome_of(run: CraneRun, start: float, wanted: tuple[float, float] | None) -> Outcome:
+def outcome_of(run: CraneRun, start: float, wanted: tuple[float, float] | None) -> RunOutcome:
     """What counts of a run from a time [s] on.
 
     Parameters
@@ -95,7 +95,7 @@ def outcome_of(run: CraneRun, start: float, wanted: tuple[float, float] | None) 
     saturation = _saturated(run, slice(first, last))
     rms = float(np.sqrt(np.mean(swing**2))) if left is None else np.nan
     largest = float(swing.max()) if left is None else np.nan
-    return Outcome(rms, largest, limits, saturation, peaks, counted, reason)
+    return RunOutcome(rms, largest, limits, saturation, peaks, counted, reason)
 
 
 def _acting(run: CraneRun, some: slice) -> Array:
