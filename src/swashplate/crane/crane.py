@@ -21,7 +21,7 @@ from swashplate.crane.quantities import (
     DEFAULTS,
     GEOMETRY,
     MAY_LACK,
-    Quantity,
+    CraneQuantity,
     check_sources,
     in_si,
     quantity_of,
@@ -50,8 +50,8 @@ class CraneFile(BaseModel):
     name: str
     title: str = ""
     drives: Annotated[dict[Literal["hoist", "slew", "luff"], str], Field(min_length=3)]
-    geometry: dict[str, Quantity]
-    limits: dict[str, Quantity] = Field(default_factory=dict)
+    geometry: dict[str, CraneQuantity]
+    limits: dict[str, CraneQuantity] = Field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +67,7 @@ class Crane:
 
     name: str
     title: str
-    quantities: Mapping[str, Quantity]
+    quantities: Mapping[str, CraneQuantity]
     """Geometry by name."""
     hoist: Drive
     slew: Drive
@@ -76,7 +76,7 @@ class Crane:
     """Drives that the controller counts on, by axis, if they are not those that move the crane."""
     sources: Mapping[str, DriveSource] = field(default_factory=dict)
     """Where drives come from that are neither packaged nor made in Python, by axis."""
-    limits: Mapping[str, Quantity] = field(default_factory=dict)
+    limits: Mapping[str, CraneQuantity] = field(default_factory=dict)
     """What an operation may reach, by names of `swashplate.crane.LIMITED`."""
 
     def __post_init__(self) -> None:
@@ -192,7 +192,9 @@ class Crane:
         A `ParameterError` for an unknown name, or a value out of its plausible range.
         """
         quantities = {
-            name: Quantity(value=float(value), unit=LIMITED[name].unit if name in LIMITED else "1")
+            name: CraneQuantity(
+                value=float(value), unit=LIMITED[name].unit if name in LIMITED else "1"
+            )
             for name, value in limits.items()
         }
         return replace(self, limits={**self.limits, **quantities})
@@ -286,7 +288,7 @@ class Crane:
         return _table("Limits of an operation", self.limits, names)
 
 
-def _table(title: str, quantities: Mapping[str, Quantity], names: Mapping[str, str]) -> Table:
+def _table(title: str, quantities: Mapping[str, CraneQuantity], names: Mapping[str, str]) -> Table:
     """Quantities with unit, status and source, by what they are called."""
     heads = ("quantity", "value", "unit", "status")
     table = Table(title, (*map(Column, heads), Column("source", wrap=True)))
@@ -320,7 +322,7 @@ def preset_text(name: str) -> str:
     return (SETS / f"{name}.toml").read_text("utf-8")
 
 
-def _geometry_of(content: CraneFile, origin: str) -> dict[str, Quantity]:
+def _geometry_of(content: CraneFile, origin: str) -> dict[str, CraneQuantity]:
     """All quantities of a crane's file; refuses a name that is missing or unknown."""
     given = {**DEFAULTS, **content.geometry}
     lacks = [name for name in GEOMETRY if name not in given and name not in MAY_LACK]

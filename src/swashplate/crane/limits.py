@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from swashplate.crane.quantities import Definition, Quantity, values_of
+from swashplate.crane.quantities import CraneQuantity, QuantityDefinition, values_of
 from swashplate.errors import ParameterError
 
 
@@ -53,19 +53,19 @@ LIMITED: Mapping[str, Limited] = {
 largest value in three hours."""
 
 
-DEFINITIONS: Mapping[str, Definition] = {
-    name: Definition(limited.unit, 1, limited.low, limited.high)
+DEFINITIONS: Mapping[str, QuantityDefinition] = {
+    name: QuantityDefinition(limited.unit, 1, limited.low, limited.high)
     for name, limited in LIMITED.items()
 }
 """The same as quantities of a crane's file."""
 
 
-def limits_of(limits: Mapping[str, Quantity], origin: str) -> dict[str, float]:
+def limits_of(limits: Mapping[str, CraneQuantity], origin: str) -> dict[str, float]:
     """Limits in SI by name.
 
     Parameters
     ----------
-    limits : mapping of str to Quantity
+    limits : mapping of str to CraneQuantity
         The table ``[limits]`` of a crane's file.
     origin : str
         File or crane, as errors name it.
