@@ -112,8 +112,8 @@ def cells(count: int) -> None:
         study = Study.of(crane, CLIPPED, seeds=[77], sea=sea, drives=drives, length=HOURS)
         case = list(study.cases.values())[0 if name == "no control" else 1]
         outcomes = [one for (one,) in study.outcomes([case])]
-        if outcomes[0].left:
-            worst, ratio = outcomes[0].left, np.inf
+        if outcomes[0].departure_reason:
+            worst, ratio = outcomes[0].departure_reason, np.inf
         else:
             ratios = {
                 limited: largest_of(outcomes, limited).value / limit
@@ -191,7 +191,7 @@ def controllers(seaways: int) -> None:
     for name in assessed.names:
         words = name.partition(", ")[0]
         swing = np.degrees(rms_of(assessed.swing(name)))
-        left = sum(assessed.left(name).values())
+        left = sum(assessed.departures(name).values())
         worse = "" if name == "no control" else f"{assessed.worse(name).value:.0%}"
         limited = {each.name: each.largest.value for each in assessed.limited(name)}
         rms = "–" if np.isnan(swing[0]) else f"{swing[0]:.2f}°"

@@ -157,8 +157,8 @@ def test_a_crane_without_limits_is_asked_for_harm_alone(crane):
         assess(crane, CLIPPED, seeds=range(3), asked=["safety"], **QUICK)
 
 
-def outcome(rms, left=""):
-    return STOPPED._replace(rms_swing=rms, left=left)
+def outcome(rms, departure_reason=""):
+    return STOPPED._replace(rms_swing=rms, departure_reason=departure_reason)
 
 
 def test_a_run_that_leaves_the_model_loses_to_one_that_does_not(assessed):
@@ -178,7 +178,7 @@ def test_a_run_that_leaves_the_model_loses_to_one_that_does_not(assessed):
     assert share.value == pytest.approx(2.0 / 6.0)
     assert share.low == pytest.approx(binomtest(2, 6).proportion_ci(0.95, "exact").low)
     assert share.high == pytest.approx(binomtest(3, 6).proportion_ci(0.95, "exact").high)
-    assert found.left("own") == {"slack": 2}
+    assert found.departures("own") == {"slack": 2}
     # what left the model is in no number
     rms = np.sqrt((0.05**2 + 0.2**2 + 0.2**2 + 0.05**2) / 4.0)
     assert found.tables()[0].rows[1].cells[1] == pytest.approx(rms)
@@ -305,7 +305,7 @@ def test_a_stopped_run_is_counted(crane):
         remedies=False, turns=False,
     )  # fmt: skip
     assert np.isnan(found.swing("no control")).all()
-    assert found.left("no control") == {"stopped at a limit": 1}
+    assert found.departures("no control") == {"stopped at a limit": 1}
 
 
 def test_axes_follow_what_speed_and_acceleration_allow(crane):

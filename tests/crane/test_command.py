@@ -133,7 +133,7 @@ def test_judge_ends_with_the_verdict_as_its_exit_code(tmp_path):
         found.filter(pl.col("variant") == "identified")["rms_swing"].to_numpy()
         > found.filter(pl.col("variant") == "no control")["rms_swing"].to_numpy()
     )
-    left = (found.filter(pl.col("variant") == "identified")["left"].fill_null("") != "").sum()
+    left = (found.filter(pl.col("variant") == "identified")["departure"].fill_null("") != "").sum()
     assert f"in {worse.sum() + left} of 3 seaways" in " ".join(fails.stderr.split())
     # 3 of 3 seaways say that less than 71 % are worse, but not that less than 5 % are
     clipped = ["--control", "feedback=0.2/0.2+ship+clip", "--ask", "harm"]

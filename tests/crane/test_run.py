@@ -600,7 +600,7 @@ def test_snap_of_an_elastic_rope_is_that_of_an_independent_integration(crane):
     slack = np.flatnonzero(tension == 0.0)
     assert run.snap == pytest.approx(tension[slack[0] :].max(), rel=5e-3)
     assert run.dynamic_factor.max() == pytest.approx(run.snap / (mass * G), rel=1e-12)
-    assert run.left_model == (pytest.approx(path.t[slack[0]], abs=0.01), "the rope is slack")
+    assert run.departure == (pytest.approx(path.t[slack[0]], abs=0.01), "the rope is slack")
 
 
 def test_snap_of_a_rigid_rope_is_not_computed(crane):
@@ -626,8 +626,8 @@ def test_snap_of_a_rigid_rope_is_not_computed(crane):
 )
 def test_a_run_that_is_not_an_operation_any_more_says_since_when(crane, how, why):
     run = simulate(crane, OperatorCommand.rest(0.1), **how)
-    assert run.left_model is not None
-    time, reason = run.left_model
+    assert run.departure is not None
+    time, reason = run.departure
     assert time == 0.0
     assert reason.startswith(why)
     assert run.sentences()
@@ -639,8 +639,8 @@ def test_a_load_beside_the_ship_or_on_a_crane_without_a_deck_is_not_in_the_deck(
     quantities = {name: value for name, value in crane.quantities.items() if name != "deck"}
     bare = replace(crane, quantities=quantities)
     assert bare.deck is None
-    assert beside.left_model is None
-    assert simulate(bare, OperatorCommand.rest(0.1), **low).left_model is None
+    assert beside.departure is None
+    assert simulate(bare, OperatorCommand.rest(0.1), **low).departure is None
 
 
 def test_the_deck_turns_and_heaves_with_the_ship(crane):
@@ -657,7 +657,7 @@ def test_the_deck_turns_and_heaves_with_the_ship(crane):
 
 def test_a_run_within_the_model_has_not_left_it(crane):
     run = simulate(crane, OperatorCommand.rest(1.0), load_offset=(8.0, 0.0), boom_deg=70.0)
-    assert run.left_model is None
+    assert run.departure is None
     assert run.sentences() == ()
 
 

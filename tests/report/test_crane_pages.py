@@ -101,7 +101,7 @@ BEYOND = "the load swings beyond 30 deg"
 @pytest.fixture(scope="module")
 def harming(assessed):
     """The same as if the assessed variant had left the model twice, and swung more in the third."""
-    left = assessed.outcomes[0][-1]._replace(rms_swing=np.nan, left=BEYOND)
+    left = assessed.outcomes[0][-1]._replace(rms_swing=np.nan, departure_reason=BEYOND)
     none = assessed.outcomes[2][0]
     more = assessed.outcomes[2][-1]._replace(rms_swing=1.5 * none.rms_swing)
     changed = [left, left, more]
@@ -278,7 +278,7 @@ def test_figure_of_an_assessment_counts_runs_that_left_the_model(harming, assert
     rows = [text.get_text() for text in swing.get_yticklabels()]
     assert rows[0] == "identified\nworse than none: 3 of 3"
     nobody = tuple(
-        tuple(one._replace(rms_swing=np.nan, left=BEYOND) for one in seaway)
+        tuple(one._replace(rms_swing=np.nan, departure_reason=BEYOND) for one in seaway)
         for seaway in harming.outcomes
     )
     assert_legible(replace(harming, outcomes=nobody, linear=None).plot())

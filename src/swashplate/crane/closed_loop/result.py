@@ -51,8 +51,8 @@ THREES = {
 """Signals of three columns, and how their names in `ROWS` begin."""
 
 
-class Left(NamedTuple):
-    """When and why a run has left the model."""
+class Departure(NamedTuple):
+    """When and why a run left what the model holds for."""
 
     time: float
     """[s]"""
@@ -228,7 +228,7 @@ class CraneRun(Tabular):
         return np.asarray(np.gradient(self.hook[:, 2], 1.0 / RATE))
 
     @cached_property
-    def left_model(self) -> Left | None:
+    def departure(self) -> Departure | None:
         """When and why a run is not an operation any more; None if it stays one.
 
         The first time at which the load swings beyond 30 degrees, the rope is slack or lies on the
@@ -255,7 +255,7 @@ class CraneRun(Tabular):
         if not (self.actuation == "ideal" and self.fixed.settings.path):
             times["the rope is slack"] = _first(self.slack, 1)
         reason = min(times, key=times.__getitem__)
-        return Left(times[reason], reason) if np.isfinite(times[reason]) else None
+        return Departure(times[reason], reason) if np.isfinite(times[reason]) else None
 
     @property
     def settling(self) -> slice:
@@ -321,8 +321,8 @@ class CraneRun(Tabular):
                 f"The load is down to z = {lowest:.1f} m, below the point of the ship that its "
                 "motion is given for, near the waterline. Water is not in the model."
             )
-        if self.left_model is not None and self.left_model[1] != IN_WATER:
-            time, why = self.left_model
+        if self.departure is not None and self.departure[1] != IN_WATER:
+            time, why = self.departure
             said.append(f"From {time:.2f} s on the run is not an operation any more: {why}.")
         jumps = self.actuation == "ideal" and self.fixed.settings.path
         if self.snap is None and not jumps:

@@ -147,7 +147,7 @@ def _assumed(crane: Crane, name: str) -> bool:
 def _passes(study: Study, seaway: Seaway, case: Case, limits: Mapping[str, float]) -> bool | None:
     """Whether control passes, shortly; None if it is too close to say."""
     found = [outcome for (outcome,) in replace(study, seaway=seaway).outcomes([case])]
-    if any(outcome.left for outcome in found):
+    if any(outcome.departure_reason for outcome in found):
         return False
     ratios = [_over_none(seaway, case, found)]
     observed = sum(outcome.counted for outcome in found)

@@ -158,9 +158,11 @@ class Assessment(Tabular, Drawn):
         """(n,) root mean square swing in each seaway [rad]; NaN where it left the model."""
         return np.array([outcome.rms_swing for outcome in self.of(name)])
 
-    def left(self, name: str) -> dict[str, int]:
+    def departures(self, name: str) -> dict[str, int]:
         """Number of seaways in which a variant is not an operation any more, by reason."""
-        reasons = [outcome.left for outcome in self.of(name) if outcome.left]
+        reasons = [
+            outcome.departure_reason for outcome in self.of(name) if outcome.departure_reason
+        ]
         return {reason: reasons.count(reason) for reason in dict.fromkeys(reasons)}
 
     def difference(self, name: str, other: str = NONE) -> ConfidenceInterval:
@@ -208,7 +210,7 @@ class Assessment(Tabular, Drawn):
 
     @property
     def _leaves_often(self) -> bool:
-        left = sum(self.left(self.assessed_variant).values())
+        left = sum(self.departures(self.assessed_variant).values())
         return left * THREE_HOURS >= len(self.study.seeds) * self.study.length
 
     @property
@@ -280,7 +282,7 @@ class Assessment(Tabular, Drawn):
         if self.harmless == "no":
             return f"{drives} harms: it makes {worse}{_rms_words(none, own)}{self._cause()}."
         both = sum(
-            bool(own.left and other.left)
+            bool(own.departure_reason and other.departure_reason)
             for own, other in zip(self.of(self.assessed_variant), self.of(NONE), strict=True)
         )
         if both:
@@ -301,7 +303,7 @@ class Assessment(Tabular, Drawn):
         limited = self.limited(self.assessed_variant)
         beyond = [quantity.words() for quantity in limited if quantity.within == "no"]
         open_ = [quantity.words() for quantity in limited if quantity.within == "not decided"]
-        left = sum(self.left(self.assessed_variant).values())
+        left = sum(self.departures(self.assessed_variant).values())
         if self.sufficient == "yes":
             return "It suffices: in 3 h all stays within its limits."
         if self.sufficient == "no":
@@ -395,7 +397,7 @@ class Assessment(Tabular, Drawn):
                 name,
                 *rms_of(self.swing(name)),
                 largest_of(self.of(name), "swing").value,
-                sum(self.left(name).values()),
+                sum(self.departures(name).values()),
                 look=name != NONE and self.worse(name).value > self.allowed,
             )
             if name == NONE and self.linear is not None:
@@ -460,7 +462,10 @@ class Assessment(Tabular, Drawn):
         for seed, outcomes in zip(self.study.seeds, self.outcomes, strict=True):
             for name, outcome in zip(self.names, outcomes, strict=True):
                 row = {"seed": seed, "variant": name, "rms_swing": outcome.rms_swing}
-                row |= {"largest_swing": outcome.largest_swing, "left": outcome.left}
+                row |= {
+                    "largest_swing": outcome.largest_swing,
+                    "departure": outcome.departure_reason,
+                }
                 row |= dict(zip(limits, outcome.limits.ravel().tolist(), strict=True))
                 rows.append(row)
         return pl.DataFrame(rows)
@@ -473,7 +478,7 @@ class Assessment(Tabular, Drawn):
         study = self.study
         sentences = [self.verdict(), *self._rests()]
         for name in self.names:
-            for reason, seaways in self.left(name).items():
+            for reason, seaways in self.departures(name).items():
                 of = count(len(study.seeds), "seaway")
                 sentences.append(f"'{name}' is not an operation in {seaways} of {of}: {reason}.")
         if self.turns is not None:
@@ -526,9 +531,11 @@ def share_worse(own: Sequence[RunOutcome], none: Sequence[RunOutcome]) -> Confid
     """Share of seaways in which control swings more than none; see `Assessment.worse`."""
     worse = unknown = 0
     for one, other in zip(own, none, strict=True):
-        if one.left and other.left:
+        if one.departure_reason and other.departure_reason:
             unknown += 1
-        elif one.left or (not other.left and one.rms_swing > other.rms_swing):
+        elif one.departure_reason or (
+            not other.departure_reason and one.rms_swing > other.rms_swing
+        ):
             worse += 1
     return share_of(worse, len(own), unknown)
 

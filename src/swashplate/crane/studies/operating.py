@@ -66,7 +66,7 @@ class Cell(NamedTuple):
     """A sea of one height, period and heading, for one variant."""
 
     limited_by: str
-    """Quantity of `LIMITED`, or drive and its limit, ``"luff orifice"``; empty if workable."""
+    """A name of `LIMITED`, or drive and its limit, ``"luff orifice"``; empty if workable."""
     ratio: float
     """Largest ratio of a value to its limit; inf if the run left the model, NaN if it was not asked
     for, as lower than a sea that is workable."""
@@ -355,7 +355,7 @@ def _by_simulation(study: Study, case: Case, seaway: Seaway, limits: Mapping[str
     """A cell by simulated seaways."""
     one = replace(study, seaway=seaway, executor=Serial(), progress=None)
     outcomes = [found for (found,) in one.outcomes([case])]
-    if any(outcome.left for outcome in outcomes):
+    if any(outcome.departure_reason for outcome in outcomes):
         return Cell(_drive_limit(outcomes) or LEFT, np.inf, True)
     observed = sum(outcome.counted for outcome in outcomes)
     ratios = {

@@ -40,7 +40,7 @@ class RunOutcome(NamedTuple):
     """Peaks of quantities by names of `limits.LIMITED`, until the run left the model."""
     counted: float
     """Time for which peaks count. [s]"""
-    left: str
+    departure_reason: str
     """Why the run is not an operation any more from some time on; empty if it is one."""
 
 
@@ -63,12 +63,12 @@ def outcome_of(run: CraneRun, start: float, wanted: tuple[float, float] | None) 
     wanted : (float, float), optional
         Where the load shall be, horizontal and inertial [m]; None if it shall move.
     """
-    first, left = round(start * RATE), run.left_model
-    last = len(run.stored) if left is None else round(left.time * RATE)
-    reason = "" if left is None else left.reason
+    first, departure = round(start * RATE), run.departure
+    last = len(run.stored) if departure is None else round(left.time * RATE)
+    reason = "" if departure is None else departure.reason
     counted = max(last - first, 0) / RATE
     if counted < LEAST:
-        return STOPPED._replace(left=reason)
+        return STOPPED._replace(departure_reason=reason)
     some = slice(first, last, EVERY)
     load, tip = run.load[some], run.tip[some]
     swing = swing_of(load, tip)
@@ -93,8 +93,8 @@ def outcome_of(run: CraneRun, start: float, wanted: tuple[float, float] | None) 
         peaks["placement"] = peaks_of(np.hypot(away[:, 0], away[:, 1]))
     limits = _acting(run, slice(first, last))
     saturation = _saturated(run, slice(first, last))
-    rms = float(np.sqrt(np.mean(swing**2))) if left is None else np.nan
-    largest = float(swing.max()) if left is None else np.nan
+    rms = float(np.sqrt(np.mean(swing**2))) if departure is None else np.nan
+    largest = float(swing.max()) if departure is None else np.nan
     return RunOutcome(rms, largest, limits, saturation, peaks, counted, reason)
 
 

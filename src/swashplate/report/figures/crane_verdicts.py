@@ -122,7 +122,7 @@ def _swing_legend(result: Assessment) -> list[Line2D]:
     ]
     if result.linear is not None:
         handles.append(style.handle("by its spectrum alone", style.INK, width=1.0))
-    if any(result.left(name) for name in result.names):
+    if any(result.departures(name) for name in result.names):
         handles.append(_mark("left the model, not in the RMS", "x", style.INK))
     return handles
 
@@ -139,7 +139,7 @@ def _swings(ax: Axes, result: Assessment) -> None:
         colors = np.where(swing > swings[NONE], style.VERMILION, style.BLUE)
         ax.scatter(swing, rows, s=10.0, c=colors, alpha=0.55, linewidths=0.0, zorder=2.0)
         _diamond(ax, row - 0.16, swing)
-        left = sum(result.left(name).values())
+        left = sum(result.departures(name).values())
         if left:
             ax.plot(LEFT * edge, row, "x", color=style.INK, ms=6.0)
             style.write(ax, f"{left}", (LEFT * edge, row), (7.0, -3.0), coords="data")
@@ -152,7 +152,7 @@ def _swings(ax: Axes, result: Assessment) -> None:
         by_spectrum = np.degrees(result.linear.values["swing"].rms)
         ends = names.index(NONE) - 0.4, names.index(NONE) + 0.4
         ax.vlines(by_spectrum, *ends, color=style.INK, linewidth=1.0, zorder=4.0)
-    _swing_axis(ax, edge, broken=any(result.left(name) for name in names))
+    _swing_axis(ax, edge, broken=any(result.departures(name) for name in names))
     ax.grid(False, axis="y")
     ax.set_yticks(range(len(names)), labels, fontsize=style.SMALL)
     ax.set_ylim(-0.5, len(names) - 0.5)
