@@ -67,7 +67,7 @@ def crane_rows() -> Iterator[Row]:
         lambda: simulate(crane, stick, control=law, **moving),
         CLOSED,
     )
-    short = {"remedies": False, "turns": False}
+    short = {"remedies": False, "tipping_points": False}
     assessed = processor_time(lambda: assess(crane, CLIPPED, seeds=range(20), **short), 1)
     yield row("crane: assessment, 20 seaways of 10 min, 3 variants", assessed, ASSESSED)
     year = alone(lambda: operability(crane, CLIPPED, Scatter.packaged()), 1)

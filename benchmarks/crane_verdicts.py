@@ -182,7 +182,7 @@ def controllers(seaways: int) -> None:
         seeds=range(seaways),
         drives=("identified",),
         remedies=False,
-        turns=False,
+        tipping_points=False,
     )
     print(
         "| `--control` | swing, RMS | worse than none | largest swing in 3 h | place | saturation |"

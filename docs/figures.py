@@ -32,7 +32,7 @@ FIGURES = {
         "--plot crane.png",
     ),
     "crane-assess.png": (
-        "crane assess tg3637 --scale luff.orifice=2.5 --no-remedies --no-turns "
+        "crane assess tg3637 --scale luff.orifice=2.5 --no-remedies --no-tipping-points "
         "--plot crane-assess.png",
     ),
     "crane-operability.png": (

@@ -39,7 +39,7 @@ from swashplate.maneuvers import source_tests
 MEANT = control.DelayedFeedback(0.2, 0.2) | control.ShipCompensation() | control.PositionLoop(1.5)
 CLIPPED = control.DelayedFeedback(0.2, 0.2) | control.ShipCompensation() | control.Clip()
 SHORT = {"length": 60.0, "run_in": 20.0}
-QUICK = {**SHORT, "remedies": False, "turns": False}
+QUICK = {**SHORT, "remedies": False, "tipping_points": False}
 
 
 @pytest.fixture(scope="module")
@@ -196,7 +196,7 @@ def test_no_seaway_in_the_model_is_no_verdict_for_control(crane):
 
 
 def test_what_would_do(crane):
-    found = assess(crane, MEANT, seeds=range(8), allowed=0.4, asked=["harm"], turns=False,
+    found = assess(crane, MEANT, seeds=range(8), allowed=0.4, asked=["harm"], tipping_points=False,
                   drives=("identified",), **SHORT)  # fmt: skip
     assert found.harmless == "no"
     assert "luff at its acceleration limit" in found.verdict()
@@ -207,7 +207,7 @@ def test_what_would_do(crane):
     # a remedy, assessed by itself, is what it was said to be
     alone = assess(crane, CLIPPED, seeds=range(8), allowed=0.4, drives=("identified",), **QUICK)
     assert alone.worse("identified") == clip.worse
-    both = assess(crane, MEANT, seeds=range(8), allowed=0.4, turns=False, drives=("identified",),
+    both = assess(crane, MEANT, seeds=range(8), allowed=0.4, tipping_points=False, drives=("identified",),
                  **SHORT)  # fmt: skip
     assert f"{clip.what.capitalize()} would do no harm, " in both.verdict()
     assert "Nothing that was tried surely does all that is asked." in both.verdict()
@@ -269,22 +269,22 @@ def test_what_the_answer_hangs_on_stands_with_it(crane, assessed):
 
 def test_an_undamped_swing_has_no_stationary_answer(crane):
     found = assess(crane, CLIPPED, seeds=range(2), swing_damping=0.0, drives=("ideal",),
-                  **{**QUICK, "turns": True})  # fmt: skip
+                  **{**QUICK, "tipping_points": True})  # fmt: skip
     assert found.linear is None
-    assert found.turns is None
+    assert found.tipping_points is None
     assert "from rest, as it is undamped" in " ".join(found.sentences())
 
 
 @pytest.mark.slow
 def test_what_would_turn_the_answer(crane):
-    """Control that harms in sea state 3 passes in waves a quarter as high, and a turn says so."""
+    """Control that harms in sea state 3 passes in waves a quarter as high, and a tipping point says so."""
     found = assess(crane, CLIPPED, seeds=range(6), drives=("identified",), remedies=False)
-    turned = {(turn.what, turn.other): turn for turn in found.turns}
-    for turn in found.turns:
-        assert turn.passes is not found.passed
-        assert turn.words().endswith("by a short run.")
+    points = {(point.what, point.other): point for point in found.tipping_points}
+    for point in found.tipping_points:
+        assert point.passes is not found.passed
+        assert point.words().endswith("by a short run.")
     # along the ship's axis nothing rolls: a heading that is another turns it, if anything does
-    assert all(turn.what in turn.words() for turn in turned.values())
+    assert all(point.what in point.words() for point in points.values())
 
 
 def test_intervals_against_published_tables():
@@ -302,7 +302,7 @@ def test_a_stopped_run_is_counted(crane):
     stick = OperatorCommand.trapezoid(hoist=-0.5, duration=30.0, length=80.0)
     found = assess(
         crane, {"none": control.Clip()}, seeds=[0], stick=stick, run_in=5.0, rope_m=47.0,
-        remedies=False, turns=False,
+        remedies=False, tipping_points=False,
     )  # fmt: skip
     assert np.isnan(found.swing("no control")).all()
     assert found.departures("no control") == {"stopped at a limit": 1}

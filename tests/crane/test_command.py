@@ -114,7 +114,16 @@ def test_follow_takes_a_sea_of_numbers():
     assert "ss3" not in rows
 
 
-ASSESS = ["assess", "tg3637", "--seeds", "3", "--length", "60", "--no-remedies", "--no-turns"]
+ASSESS = [
+    "assess",
+    "tg3637",
+    "--seeds",
+    "3",
+    "--length",
+    "60",
+    "--no-remedies",
+    "--no-tipping-points",
+]
 
 
 @pytest.mark.slow

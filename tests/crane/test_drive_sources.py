@@ -21,7 +21,7 @@ HEADLINES = {
     "required.",
 }
 NONE_KNOWN = "has none: fit again"
-SHORT = {"length": 60.0, "run_in": 0.0, "remedies": False, "turns": False}
+SHORT = {"length": 60.0, "run_in": 0.0, "remedies": False, "tipping_points": False}
 VALIDITY = "Holds for steps from -9 to 9 V; never reached: the swash plate's stop Z13."
 UNREACHED = (
     "No test of the hoist's drive reached Z13_plus and Z13_minus: beyond what was tested it is "

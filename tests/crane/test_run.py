@@ -514,7 +514,13 @@ def test_noise_of_the_ropes_direction_is_white_and_held_between_measurements(cra
 
 def test_noise_is_the_same_on_any_number_of_cores(crane):
     law = control.DelayedFeedback() | control.Clip() | control.Sensors(seed=2)
-    how = {"seeds": range(3), "length": 60.0, "run_in": 0.0, "remedies": False, "turns": False}
+    how = {
+        "seeds": range(3),
+        "length": 60.0,
+        "run_in": 0.0,
+        "remedies": False,
+        "tipping_points": False,
+    }
     one, two = (assess(crane, law, executor=Threads(count), **how) for count in (1, 2))
     np.testing.assert_array_equal(one.swing("identified"), two.swing("identified"))
 

@@ -25,7 +25,7 @@ from swashplate.crane import (
     Seaway,
     Spectrum,
     Sweep,
-    Turn,
+    TippingPoint,
     assess,
     control,
     follow,
@@ -39,7 +39,7 @@ from swashplate.report.scene.pages import COLUMNS
 from swashplate.report.style import BLUE, GREEN, VERMILION
 
 MEANT = control.DelayedFeedback(0.2, 0.2) | control.ShipCompensation()
-SHORT = {"length": 60.0, "run_in": 20.0, "remedies": False, "turns": False}
+SHORT = {"length": 60.0, "run_in": 20.0, "remedies": False, "tipping_points": False}
 
 
 @pytest.fixture(scope="module")
@@ -161,15 +161,15 @@ def test_verdicts_page_has_both_answers_with_a_light_of_their_own(tmp_path, asse
 
 
 def test_verdicts_page_says_what_the_answer_hangs_on(tmp_path, assessed):
-    turn = Turn("the ship's roll period", "13 s", "10.4 s", True, False)
-    text = written(write_assessment, replace(assessed, turns=(turn,)), tmp_path)
+    point = TippingPoint("the ship's roll period", "13 s", "10.4 s", True, False)
+    text = written(write_assessment, replace(assessed, tipping_points=(point,)), tmp_path)
     hangs = text.partition('<section id="hangs">')[2].partition("</section>")[0]
     for words in (
         "The load's swing has a damping of 0.5 %, assumed.",
         "The ship's roll period is 13 s, assumed.",
         "14 of 15 quantities of the crane are assumed.",
         "Limits that are assumed: swing, off-lead, side-lead",
-        turn.words(),
+        point.words(),
     ):
         assert words in hangs
     # of the limits and of the geometry, every assumed row is marked

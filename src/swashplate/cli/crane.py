@@ -220,10 +220,10 @@ def assess(
             "--remedies/--no-remedies", metavar=NO_VALUE, help="Search for changes that suffice."
         ),
     ] = True,
-    turns: Annotated[
+    tipping_points: Annotated[
         bool,
         typer.Option(
-            "--turns/--no-turns",
+            "--tipping-points/--no-tipping-points",
             metavar=NO_VALUE,
             help="Search for inputs, such as the ship's roll period, that would change the answer.",
         ),
@@ -249,7 +249,11 @@ def assess(
             f"--allowed is in percent, and {allowed:g} % of the seaways would ask for thousands of "
             f"them: did you mean --allowed {100.0 * allowed:g}?"
         )
-    more: dict[str, Any] = {"allowed": allowed / 100.0, "remedies": remedies, "turns": turns}
+    more: dict[str, Any] = {
+        "allowed": allowed / 100.0,
+        "remedies": remedies,
+        "tipping_points": tipping_points,
+    }
     if ask is not None:
         more["asked"] = [question.strip() for question in ask.split(",")]
     if dask is not None:

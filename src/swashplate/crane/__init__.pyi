@@ -24,7 +24,7 @@ from .sea.transfer_functions import Hull as Hull
 from .sea.transfer_functions import TransferFunctions as TransferFunctions
 from .sea.transfer_functions import read_ship as read_ship
 from .studies.assessing import assess as assess
-from .studies.assumptions import Turn as Turn
+from .studies.assumptions import TippingPoint as TippingPoint
 from .studies.changed_drives import drawn_cranes as drawn_cranes
 from .studies.changed_drives import upgraded as upgraded
 from .studies.crane_assessment import AssessedQuantity as AssessedQuantity

@@ -14,7 +14,7 @@ from swashplate.crane.control import Chain, Clip, Control, PositionLoop
 from swashplate.crane.crane import Crane
 from swashplate.crane.rope import GRAVITY
 from swashplate.crane.sea.confidence import fewest_seaways, rms_of
-from swashplate.crane.studies.assumptions import turns_of
+from swashplate.crane.studies.assumptions import tipping_points_of
 from swashplate.crane.studies.changed_drives import upgraded
 from swashplate.crane.studies.crane_assessment import (
     LOOP,
@@ -54,7 +54,7 @@ def assess(
     allowed: float = 0.05,
     asked: Sequence[Question] | None = None,
     remedies: bool = True,
-    turns: bool = True,
+    tipping_points: bool = True,
     **study: Any,
 ) -> Assessment:
     """Assess control on sets of drives over seeded seaways, by default 120 of ten minutes.
@@ -72,7 +72,7 @@ def assess(
     remedies : bool
         Whether to look for a larger orifice and for a clip that would do on the crane's own drives,
         if control fails: the least of each that surely does, else the least that may.
-    turns : bool
+    tipping_points : bool
         Whether to look for assumed or given numbers that would turn the answer.
     **study
         Seaways, drives, stick, where each run begins: see `Study.of`. The verdict is on the last of
@@ -92,10 +92,13 @@ def assess(
     if none.swing_damping > 0.0:
         linear = linear_response(crane, asked_study.seaway, **none.pose, **none.hangs)
     assessment = Assessment(asked_study, outcomes, allowed, questions, linear)
-    if turns and none.swing_damping > 0.0:  # of an undamped swing there is no stationary answer
+    if (
+        tipping_points and none.swing_damping > 0.0
+    ):  # of an undamped swing there is no stationary answer
         limits = crane.limits_si if "sufficiency" in questions else {}
         assessment = replace(
-            assessment, turns=turns_of(asked_study, assessment.assessed_variant, limits)
+            assessment,
+            tipping_points=tipping_points_of(asked_study, assessment.assessed_variant, limits),
         )
     if assessment.outcome == "fails" and remedies:
         return _with_remedies(assessment)

@@ -38,7 +38,7 @@ PEAKS = (1.0, 3.3)
 """Peak factors of a fully developed and of a young sea."""
 
 
-class Turn(NamedTuple):
+class TippingPoint(NamedTuple):
     """A number that would turn the answer."""
 
     what: str
@@ -71,7 +71,9 @@ class _Trial(NamedTuple):
     case: Case
 
 
-def turns_of(study: Study, assessed: str, limits: Mapping[str, float]) -> tuple[Turn, ...]:
+def tipping_points_of(
+    study: Study, assessed: str, limits: Mapping[str, float]
+) -> tuple[TippingPoint, ...]:
     """Numbers that would turn the answer on a variant; none if short runs do not agree with it.
 
     Parameters
@@ -88,15 +90,17 @@ def turns_of(study: Study, assessed: str, limits: Mapping[str, float]) -> tuple[
     case = case._replace(stick=OperatorCommand.rest(study.run_in + LENGTH))
     short = replace(study, seeds=study.seeds[:SEAWAYS], progress=None)
     base = _passes(short, study.seaway, case, limits)
-    turns = []
+    tipping_points = []
     for trial in _trials(study, case):
         try:
             passes = _passes(short, trial.seaway, trial.case, limits)
         except SwashplateError:  # a number that this sea, ship or crane cannot have
             continue
         if passes is not base and passes is not None and base is not None:
-            turns.append(Turn(trial.what, trial.used, trial.other, trial.assumed, passes))
-    return tuple(turns)
+            tipping_points.append(
+                TippingPoint(trial.what, trial.used, trial.other, trial.assumed, passes)
+            )
+    return tuple(tipping_points)
 
 
 def _trials(study: Study, case: Case) -> Iterator[_Trial]:

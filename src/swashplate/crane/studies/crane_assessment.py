@@ -28,7 +28,7 @@ from swashplate.crane.sea.confidence import (
 )
 from swashplate.crane.sea.extremes import THREE_HOURS, largest_of_peaks
 from swashplate.crane.sea.transfer_functions import CRANE_SHIP, Hull
-from swashplate.crane.studies.assumptions import Turn
+from swashplate.crane.studies.assumptions import TippingPoint
 from swashplate.crane.studies.run_outcome import RunOutcome
 from swashplate.crane.studies.spectral import LinearResponse
 from swashplate.crane.studies.study import NONE, Study, assumed_words
@@ -46,7 +46,7 @@ Decision = Literal["yes", "no", "not decided"]
 
 LOOP = PositionLoop()
 """What a clip is tried with: a stiffer loop brings back what the clip takes."""
-NOTHING_TURNS = (
+NO_TIPPING_POINT = (
     "No other damping, roll period, height, period, peak factor, heading or drum that was tried, "
     "each alone, surely turns the answer, by short runs."
 )
@@ -130,7 +130,7 @@ class Assessment(Tabular, Drawn):
     remedies: tuple[Remedy, ...] = ()
     tried: tuple[str, ...] = ()
     """What else was tried, and does not pass all that was asked."""
-    turns: tuple[Turn, ...] | None = None
+    tipping_points: tuple[TippingPoint, ...] | None = None
     """Assumed or given numbers that would turn the answer, if they were others; None if none were
     looked for."""
 
@@ -481,8 +481,8 @@ class Assessment(Tabular, Drawn):
             for reason, seaways in self.departures(name).items():
                 of = count(len(study.seeds), "seaway")
                 sentences.append(f"'{name}' is not an operation in {seaways} of {of}: {reason}.")
-        if self.turns is not None:
-            sentences += [turn.words() for turn in self.turns] or [NOTHING_TURNS]
+        if self.tipping_points is not None:
+            sentences += [point.words() for point in self.tipping_points] or [NO_TIPPING_POINT]
         sentences += study.seaway.sentences()
         return (*sentences, *study.provenance())
 

@@ -64,7 +64,7 @@ def outcome_of(run: CraneRun, start: float, wanted: tuple[float, float] | None) 
         Where the load shall be, horizontal and inertial [m]; None if it shall move.
     """
     first, departure = round(start * RATE), run.departure
-    last = len(run.stored) if departure is None else round(left.time * RATE)
+    last = len(run.stored) if departure is None else round(departure.time * RATE)
     reason = "" if departure is None else departure.reason
     counted = max(last - first, 0) / RATE
     if counted < LEAST:
