@@ -21,7 +21,7 @@ from swashplate.crane import (
     follow,
     simulate,
     sweep,
-    upgraded,
+    with_design_change,
 )
 from swashplate.crane.closed_loop.result import PUMPS
 from swashplate.crane.rope import GRAVITY
@@ -207,8 +207,15 @@ def test_what_would_do(crane):
     # a remedy, assessed by itself, is what it was said to be
     alone = assess(crane, CLIPPED, seeds=range(8), allowed=0.4, drives=("identified",), **QUICK)
     assert alone.worse("identified") == clip.worse
-    both = assess(crane, MEANT, seeds=range(8), allowed=0.4, tipping_points=False, drives=("identified",),
-                 **SHORT)  # fmt: skip
+    both = assess(
+        crane,
+        MEANT,
+        seeds=range(8),
+        allowed=0.4,
+        tipping_points=False,
+        drives=("identified",),
+        **SHORT,
+    )
     assert f"{clip.what.capitalize()} would do no harm, " in both.verdict()
     assert "Nothing that was tried surely does all that is asked." in both.verdict()
 
@@ -277,7 +284,7 @@ def test_an_undamped_swing_has_no_stationary_answer(crane):
 
 @pytest.mark.slow
 def test_what_would_turn_the_answer(crane):
-    """Control that harms in sea state 3 passes in waves a quarter as high, and a tipping point says so."""
+    """Control that harms in sea state 3 passes in waves a quarter as high: a tipping point."""
     found = assess(crane, CLIPPED, seeds=range(6), drives=("identified",), remedies=False)
     points = {(point.what, point.other): point for point in found.tipping_points}
     for point in found.tipping_points:
@@ -464,7 +471,7 @@ def test_control_does_not_know_the_draw_that_moves_the_crane(crane):
     assert unknown.known_to_controller == {"slew": crane.slew}
     assert not unknown.with_drive(slew=crane.slew, known=False).known_to_controller
     # what is redesigned is known: the fitted drive moves with the drawn one
-    redesigned = upgraded(drawn, "slew", {"orifice": 2.0})
+    redesigned = with_design_change(drawn, "slew", {"orifice": 2.0})
     assert redesigned.slew == weaker.scale(Z16=2.0)
     assert redesigned.controller_drive("slew") == crane.slew.scale(Z16=2.0)
 

@@ -8,7 +8,7 @@ from typer.testing import CliRunner
 
 from swashplate import Drive
 from swashplate.cli import app
-from swashplate.crane import Crane, OperatorCommand, assess, control, simulate, upgraded
+from swashplate.crane import Crane, OperatorCommand, assess, control, simulate, with_design_change
 from swashplate.crane.crane import preset_text
 from swashplate.identification import Verdict, load_setup
 from swashplate.identification.assessment import FitFile, StoredVerdict
@@ -169,14 +169,14 @@ def test_in_python_the_verdict_is_data_of_the_crane(fit):
     bad = crane.with_drive(hoist=result)
     assert not bad.sources["hoist"].usable
     # a moved lever makes another drive of the same fit
-    moved = upgraded(bad, "hoist", {"orifice": 1.5})
+    moved = with_design_change(bad, "hoist", {"orifice": 1.5})
     assert moved.sources["hoist"].fit_usable is False
     assert not bad.with_drive(hoist="hoist").sources
     unassessed = crane.with_drive(hoist=SimpleNamespace(drive=crane.hoist)).sources["hoist"]
     assert unassessed.fit_usable is None
     # a limit that is given a value is no longer open
     fitted = crane.with_drive(hoist=folder)
-    stopped = upgraded(fitted, "hoist", {"Z13": 1.1})
+    stopped = with_design_change(fitted, "hoist", {"Z13": 1.1})
     assert (fitted.unreached_sentence("hoist"), stopped.unreached_sentence("hoist")) == (
         UNREACHED,
         "",

@@ -158,12 +158,12 @@ def test_feedback_meant_for_ideal_drives_feeds_the_swing_and_the_clip_tames_it(c
 
     none, ideal = run(crane, None), run(crane, quick, "ideal")
     built, clipped = run(crane, quick), run(crane, law | control.Clip())
-    upgraded = run(larger, quick)
-    swing = {each: each.rms_deg(60.0) for each in (none, ideal, built, clipped, upgraded)}
+    larger_orifice = run(larger, quick)
+    swing = {each: each.rms_deg(60.0) for each in (none, ideal, built, clipped, larger_orifice)}
     assert swing[ideal] < 0.4 * swing[none]
     assert swing[built] > 1.5 * swing[none]
     assert swing[clipped] < swing[none]
-    assert swing[upgraded] < 0.6 * swing[none]
+    assert swing[larger_orifice] < 0.6 * swing[none]
     assert built.limits("luff")["orifice"] > clipped.limits("luff")["orifice"]
 
 

@@ -353,7 +353,7 @@ class Studied(Operated):
     def sets(self) -> dict[str, Any]:
         """Sets of drives by name."""
         from swashplate.analysis.design_variables import powers_of
-        from swashplate.crane import drawn_cranes, upgraded
+        from swashplate.crane import drawn_cranes, with_design_change
 
         names = filter(None, map(str.strip, (self.drives or "ideal,identified").split(",")))
         sets: dict[str, Any] = {name: name for name in names}
@@ -376,7 +376,7 @@ class Studied(Operated):
                 )
             powers_of(variable)
             factor = number_of(words, text)
-            crane = upgraded(crane, axis, {variable: factor})
+            crane = with_design_change(crane, axis, {variable: factor})
             changed.append(f"{axis} {variable} ×{factor:g}")
         if changed:
             sets[", ".join(changed)] = crane

@@ -26,7 +26,7 @@ from .sea.transfer_functions import read_ship as read_ship
 from .studies.assessing import assess as assess
 from .studies.assumptions import TippingPoint as TippingPoint
 from .studies.changed_drives import drawn_cranes as drawn_cranes
-from .studies.changed_drives import upgraded as upgraded
+from .studies.changed_drives import with_design_change as with_design_change
 from .studies.crane_assessment import AssessedQuantity as AssessedQuantity
 from .studies.crane_assessment import Assessment as Assessment
 from .studies.crane_assessment import Remedy as Remedy

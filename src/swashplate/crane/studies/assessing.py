@@ -15,7 +15,7 @@ from swashplate.crane.crane import Crane
 from swashplate.crane.rope import GRAVITY
 from swashplate.crane.sea.confidence import fewest_seaways, rms_of
 from swashplate.crane.studies.assumptions import tipping_points_of
-from swashplate.crane.studies.changed_drives import upgraded
+from swashplate.crane.studies.changed_drives import with_design_change
 from swashplate.crane.studies.crane_assessment import (
     LOOP,
     QUESTIONS,
@@ -185,7 +185,7 @@ def _larger_orifices(
         return []
     trials = []
     for factor in FACTORS:
-        larger = tuple(upgraded(crane, axis, {"orifice": factor}) for crane in cranes)
+        larger = tuple(with_design_change(crane, axis, {"orifice": factor}) for crane in cranes)
         trial = case.changed(control=law)._replace(cranes=larger)
         trials.append((f"{axis} orifice ×{factor:g}", factor, trial))
     return trials

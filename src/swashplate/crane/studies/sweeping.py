@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from swashplate.crane.axes import check_names
 from swashplate.crane.crane import Crane
 from swashplate.crane.sea.seaway import HIGHEST, Seaway
-from swashplate.crane.studies.changed_drives import upgraded
+from swashplate.crane.studies.changed_drives import with_design_change
 from swashplate.crane.studies.spectral import linear_response
 from swashplate.crane.studies.study import NONE, Case, Controllers, Study
 from swashplate.errors import InputError
@@ -48,7 +48,7 @@ def _at_height(seaway: Seaway, case: Case, point: float) -> tuple[Seaway, Case]:
 def _at_orifice(seaway: Seaway, case: Case, point: float) -> tuple[Seaway, Case]:
     if case.options["control"] is None or not case.driven:
         return seaway, case  # no control and ideal drives do not know the orifice
-    cranes = tuple(upgraded(crane, "luff", {"orifice": point}) for crane in case.cranes)
+    cranes = tuple(with_design_change(crane, "luff", {"orifice": point}) for crane in case.cranes)
     return seaway, case._replace(cranes=cranes)
 
 
