@@ -68,12 +68,12 @@ PATHS = [
 ]
 
 
-@pytest.mark.parametrize(("part", "actuation", "law", "residual"), PATHS)
+@pytest.mark.parametrize(("part", "actuation", "controller", "residual"), PATHS)
 def test_shaped_paths_leave_what_they_do_on_the_independent_crane(
-    crane, part, actuation, law, residual
+    crane, part, actuation, controller, residual
 ):
     stick = OperatorCommand.trapezoid(slew=part, until={"slew_deg": 45.0}, length=110.0)
-    run = simulate(crane, stick, control=law, actuation=actuation, swing_damping=0.0)
+    run = simulate(crane, stick, control=controller, actuation=actuation, swing_damping=0.0)
     # steps of the shaper's delay and order of a sample differ: 1.5 %, or half a unit as printed
     assert run.residual_deg == pytest.approx(residual, rel=0.015, abs=7e-4)
 
@@ -84,8 +84,10 @@ def test_shaping_the_tips_path_on_ideal_drives_exceeds_40_db(crane):
         length = 45.0 / (4.2 * part) + 60.0
         stick = OperatorCommand.trapezoid(slew=part, until={"slew_deg": 45.0}, length=length)
         plain, shaped = (
-            simulate(crane, stick, control=law, actuation="ideal", swing_damping=0.0).residual_deg
-            for law in (None, TIP)
+            simulate(
+                crane, stick, control=controller, actuation="ideal", swing_damping=0.0
+            ).residual_deg
+            for controller in (None, TIP)
         )
         assert 20.0 * log10(shaped / plain) < -40.0
 
@@ -95,9 +97,9 @@ def test_delayed_feedback_damps_as_its_rightmost_root_says(crane):
     time = np.arange(round(90.0 * 512) + 1) / 512.0
     ship = np.zeros((time.size, 6))
     ship[:, 1] = np.where(time < 1.0, 0.05 * np.sin(pi * time) ** 2, 0.0)
-    law = control.DelayedFeedback(0.2, 0.25)
+    controller = control.DelayedFeedback(0.2, 0.25)
     how = {"actuation": "ideal", "slew_deg": 90.0, "swing_damping": 0.0}
-    run = simulate(crane, OperatorCommand.rest(90.0), sea=ship, control=law, **how)
+    run = simulate(crane, OperatorCommand.rest(90.0), sea=ship, control=controller, **how)
     swing = run.load[:, 1] - run.tip[:, 1]
     peaks = 1 + np.flatnonzero((swing[1:-1] > swing[:-2]) & (swing[1:-1] >= swing[2:]))
     peaks = peaks[time[peaks] > 15.0][:4]
@@ -147,17 +149,19 @@ def test_linear_crane_swings_as_the_whole_one_does_by_little(crane):
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_feedback_meant_for_ideal_drives_feeds_the_swing_and_the_clip_tames_it(crane, seed):
-    law = control.DelayedFeedback(0.2, 0.2) | control.ShipCompensation()
-    quick = law | control.PositionLoop(1.5)
+    controller = control.DelayedFeedback(0.2, 0.2) | control.ShipCompensation()
+    quick = controller | control.PositionLoop(1.5)
     larger = crane.with_drive(luff=crane.luff.scale(Z16=5.0))
 
     how = {"sea": Seaway("ss3", seed=seed), "slew_deg": 90.0, "rope_m": 27.0}
 
-    def run(crane, law, actuation="inverse"):
-        return simulate(crane, OperatorCommand.rest(180.0), control=law, actuation=actuation, **how)
+    def run(crane, controller, actuation="inverse"):
+        return simulate(
+            crane, OperatorCommand.rest(180.0), control=controller, actuation=actuation, **how
+        )
 
     none, ideal = run(crane, None), run(crane, quick, "ideal")
-    built, clipped = run(crane, quick), run(crane, law | control.Clip())
+    built, clipped = run(crane, quick), run(crane, controller | control.Clip())
     larger_orifice = run(larger, quick)
     swing = {each: each.rms_deg(60.0) for each in (none, ideal, built, clipped, larger_orifice)}
     assert swing[ideal] < 0.4 * swing[none]
@@ -197,7 +201,7 @@ def follow(state: Filtered, swing_x: float, swing_y: float, p: Gains, h: float) 
 
 
 lagging = Model("lagging", Gains, Filtered, follow, sample=offset)
-"""A law of one's own: the tip follows the load behind a lag, which damps as a delay does."""
+"""A user-defined controller: the tip follows the load behind a lag, which damps as a delay does."""
 
 
 @equation
@@ -206,22 +210,24 @@ def along_the_swing(state: Filtered, p: Gains) -> Offset:
     return Offset(p.gain * state.x / size, p.gain * state.y / size)
 
 
-def test_a_law_without_a_number_stops_the_run(crane):
+def test_a_controller_without_a_number_stops_the_run(crane):
     # the load hangs straight at first: 0/0
     divides = Model("divides", Gains, Filtered, follow, sample=along_the_swing)
-    law = control.Law(divides, Gains(0.1, 1.0))
-    with pytest.raises(DomainError, match="at 0.00 s the control law gives an offset .* no finite"):
-        simulate(crane, OperatorCommand.rest(0.1), control=law)
+    controller = control.Controller(divides, Gains(0.1, 1.0))
+    with pytest.raises(DomainError, match="at 0.00 s the controller gives an offset .* no finite"):
+        simulate(crane, OperatorCommand.rest(0.1), control=controller)
 
 
 @pytest.mark.slow
-def test_law_of_ones_own_damps_in_the_same_loop(crane, slewed):
-    law = control.Law(lagging, Gains(0.2, 2.0))
+def test_user_defined_controller_damps_in_the_same_loop(crane, slewed):
+    controller = control.Controller(lagging, Gains(0.2, 2.0))
     none, damped = (
-        simulate(crane, slewed, control=each, actuation="ideal") for each in (None, law)
+        simulate(crane, slewed, control=each, actuation="ideal") for each in (None, controller)
     )
     assert damped.residual_deg < 0.8 * none.residual_deg
-    same = simulate(crane, slewed, control=control.Law(lagging, Gains(0.0, 2.0)), actuation="ideal")
+    same = simulate(
+        crane, slewed, control=control.Controller(lagging, Gains(0.0, 2.0)), actuation="ideal"
+    )
     # by way of the path, speeds are differences: half a sample late, 2 mm at 2 m/s
     np.testing.assert_allclose(same.load, none.load, atol=3e-3)
 
@@ -257,10 +263,10 @@ def test_stepper_takes_the_samples_of_a_run(crane):
     stick = OperatorCommand.trapezoid(
         slew=-0.8, luff=0.5, duration=1.0, start=0.1, ramp=0.2, length=1.5
     )
-    law = TIP | control.DelayedFeedback() | control.ShipCompensation() | control.Clip()
-    law |= control.Law(lagging, Gains(0.1, 1.0))
+    controller = TIP | control.DelayedFeedback() | control.ShipCompensation() | control.Clip()
+    controller |= control.Controller(lagging, Gains(0.1, 1.0))
     ship = Seaway("ss3", seed=1).motion(769)
-    same_by_steps(crane, stick, ship, control=law)
+    same_by_steps(crane, stick, ship, control=controller)
 
 
 def test_drives_in_the_loop_are_those_that_are_simulated_alone(crane, slewed):
@@ -275,9 +281,9 @@ def test_drives_in_the_loop_are_those_that_are_simulated_alone(crane, slewed):
 def test_mirrored_crane_on_ideal_drives_mirrors_everything(crane):
     c = crane.geometry.axis
     mirrored = crane.with_geometry(slew_axis=(c.x, -c.y, c.z))
-    law = control.DelayedFeedback() | control.ShipCompensation()
+    controller = control.DelayedFeedback() | control.ShipCompensation()
     ship = Seaway("ss3", heading_deg=60.0, seed=4).motion(30 * 512 + 1)
-    how, stick = {"control": law, "actuation": "ideal"}, OperatorCommand.rest(30.0)
+    how, stick = {"control": controller, "actuation": "ideal"}, OperatorCommand.rest(30.0)
     one = simulate(crane, stick, sea=ship, slew_deg=70.0, **how)
     ship = ship * [1.0, -1.0, 1.0, -1.0, 1.0, -1.0]
     two = simulate(mirrored, stick, sea=ship, slew_deg=-70.0, **how)
@@ -437,9 +443,9 @@ def test_a_load_on_slings_and_an_elastic_rope_starts_straight_and_calm(crane):
 
 
 def test_feedback_begins_without_a_jump_for_a_load_that_starts_off_the_plumb_line(crane):
-    law = control.DelayedFeedback(0.2, 0.25)
+    controller = control.DelayedFeedback(0.2, 0.25)
     how = {"actuation": "ideal", "load_offset": (0.0, 1.0), "slew_deg": 90.0}
-    run = simulate(crane, OperatorCommand.rest(10.0), control=law, **how)
+    run = simulate(crane, OperatorCommand.rest(10.0), control=controller, **how)
     # the position loop alone: 0.7 /s of 0.2 m
     assert np.linalg.norm(np.diff(run.tip, axis=0), axis=1).max() * 512.0 < 0.3
 
@@ -448,13 +454,13 @@ def test_feedback_begins_without_a_jump_for_a_load_that_starts_off_the_plumb_lin
 
 
 def test_perfect_sensors_change_nothing(crane):
-    law = TIP | control.DelayedFeedback() | control.ShipCompensation()
-    law |= control.Law(lagging, Gains(0.1, 1.0))
+    controller = TIP | control.DelayedFeedback() | control.ShipCompensation()
+    controller |= control.Controller(lagging, Gains(0.1, 1.0))
     perfect = control.Sensors(0.0, 0.0, delay=0.0, rate=512.0)
     how = {"sea": Seaway("ss3", seed=1), "slew_deg": 90.0}
     one, two = (
         simulate(crane, OperatorCommand.rest(5.0), control=each, **how)
-        for each in (law, law | perfect)
+        for each in (controller, controller | perfect)
     )
     np.testing.assert_array_equal(one.out, two.out)
     # and without control there is nothing to see
@@ -479,21 +485,23 @@ def test_stepper_takes_the_samples_of_a_run_with_sensors(crane):
     stick = OperatorCommand.trapezoid(
         slew=-0.8, luff=0.5, duration=1.0, start=0.1, ramp=0.2, length=1.5
     )
-    law = TIP | control.DelayedFeedback(0.2, 0.01) | control.ShipCompensation()
-    law |= control.Law(lagging, Gains(0.1, 1.0)) | control.Sensors(rate=30.0, delay=0.07, seed=4)
+    controller = TIP | control.DelayedFeedback(0.2, 0.01) | control.ShipCompensation()
+    controller |= control.Controller(lagging, Gains(0.1, 1.0)) | control.Sensors(
+        rate=30.0, delay=0.07, seed=4
+    )
     ship = Seaway("ss3", seed=1).motion(769)
-    same_by_steps(crane, stick, ship, control=law, slew_deg=90.0)
+    same_by_steps(crane, stick, ship, control=controller, slew_deg=90.0)
 
 
-ECHO = control.Law(lagging, Gains(0.1, 1.0 / 512.0)) | control.PositionLoop(50.0)
+ECHO = control.Controller(lagging, Gains(0.1, 1.0 / 512.0)) | control.PositionLoop(50.0)
 """The tip moves by a tenth of the swing that control sees, within a tenth of a second."""
 
 
 def test_noise_of_the_ropes_direction_is_white_and_held_between_measurements(crane):
     def run(seed, length=300.0):
-        law = ECHO | control.Sensors(0.1, 0.0, delay=0.25, rate=1.0, seed=seed)
+        controller = ECHO | control.Sensors(0.1, 0.0, delay=0.25, rate=1.0, seed=seed)
         return simulate(
-            crane, OperatorCommand.rest(length), control=law, actuation="ideal", rope_m=20.0
+            crane, OperatorCommand.rest(length), control=controller, actuation="ideal", rope_m=20.0
         )
 
     found = run(3)
@@ -513,7 +521,7 @@ def test_noise_of_the_ropes_direction_is_white_and_held_between_measurements(cra
 
 
 def test_noise_is_the_same_on_any_number_of_cores(crane):
-    law = control.DelayedFeedback() | control.Clip() | control.Sensors(seed=2)
+    controller = control.DelayedFeedback() | control.Clip() | control.Sensors(seed=2)
     how = {
         "seeds": range(3),
         "length": 60.0,
@@ -521,14 +529,14 @@ def test_noise_is_the_same_on_any_number_of_cores(crane):
         "remedies": False,
         "tipping_points": False,
     }
-    one, two = (assess(crane, law, executor=Threads(count), **how) for count in (1, 2))
+    one, two = (assess(crane, controller, executor=Threads(count), **how) for count in (1, 2))
     np.testing.assert_array_equal(one.swing("identified"), two.swing("identified"))
 
 
 def test_noise_of_roll_and_pitch_moves_the_compensated_tip(crane):
-    law = control.ShipCompensation() | control.PositionLoop(50.0)
-    law |= control.Sensors(0.0, 0.1, delay=0.0, rate=1.0)
-    run = simulate(crane, OperatorCommand.rest(300.0), control=law, actuation="ideal")
+    controller = control.ShipCompensation() | control.PositionLoop(50.0)
+    controller |= control.Sensors(0.0, 0.1, delay=0.0, rate=1.0)
+    run = simulate(crane, OperatorCommand.rest(300.0), control=controller, actuation="ideal")
     moved = (run.tip - run.tip[0])[np.arange(1, 299) * 512 + 500]
     lever = np.radians(0.1) * run.tip[0, 2]
     np.testing.assert_allclose(moved[:, :2].std(axis=0), lever, rtol=0.15)
@@ -769,9 +777,9 @@ def test_sticks_and_controllers_that_make_no_sense_are_refused():
             stage()
     strange = Model("strange", Gains, Filtered, follow_wind, sample=offset)
     with refuse("asks for 'wind', but a crane's controller sees swing_x"):
-        control.Law(strange, Gains(1.0, 1.0))
+        control.Controller(strange, Gains(1.0, 1.0))
     with refuse("must have the signals tip_x and tip_y"):
-        control.Law(Model("mute", Gains, Filtered, follow), Gains(1.0, 1.0))
+        control.Controller(Model("mute", Gains, Filtered, follow), Gains(1.0, 1.0))
 
 
 @equation

@@ -51,9 +51,13 @@ def crane():
 def runs(crane):
     return {
         name: simulate(
-            crane, OperatorCommand.rest(20.0), sea=Seaway("ss3", seed=1), control=law, slew_deg=90
+            crane,
+            OperatorCommand.rest(20.0),
+            sea=Seaway("ss3", seed=1),
+            control=controller,
+            slew_deg=90,
         )
-        for name, law in (("no control", None), ("</script><b>", MEANT))
+        for name, controller in (("no control", None), ("</script><b>", MEANT))
     }
 
 
@@ -121,8 +125,8 @@ def year(crane):
     own |= {(2, 0.0): bad, (2, 90.0): bad}
     cells = {"no control": none, "identified": own}
     hoist = (0.7, 8.0, 90.0)
-    law, headings = control.Clip(), (0.0, 90.0)
-    return Operability(crane, law, scatter, headings, cells, Seaway(), "The case.", hoist)
+    controller, headings = control.Clip(), (0.0, 90.0)
+    return Operability(crane, controller, scatter, headings, cells, Seaway(), "The case.", hoist)
 
 
 def written(write, result, folder):

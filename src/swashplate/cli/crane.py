@@ -164,8 +164,8 @@ def run(
         )
         ship = seaway or operated.motion(round(stick.length * RATE) + 1)
         for first in variant or ["inverse"]:
-            drives, _, law = first.partition(":")
-            how: dict[str, Any] = {"control": control_of(law)}
+            drives, _, controller = first.partition(":")
+            how: dict[str, Any] = {"control": control_of(controller)}
             how["actuation"] = "inverse" if drives == "identified" else drives
             runs[first] = simulate(
                 crane, stick, sea=ship, brake=brake, **how, **operated.run_options

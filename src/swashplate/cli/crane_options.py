@@ -326,8 +326,8 @@ class Studied(Operated):
 
     def through(self, study: Callable[..., Any], *first: Any, **more: Any) -> Any:
         """A study of the controller, whose progress is shown."""
-        law = control_of(self.control)
-        if law is None:
+        controller = control_of(self.control)
+        if controller is None:
             raise InputError("--control is empty: there is nothing to assess.")
         how = self.run_options | _given(length=self.length, run_in=self.run_in) | more
         if self.waters is not None:
@@ -338,7 +338,7 @@ class Studied(Operated):
             how["drives"] = self.sets()
         with long_work("Seaways") as shown:
             how["progress"] = lambda done, of: shown(f"{done} of {of} seaways", done / of)
-            return study(*first, law, **how)
+            return study(*first, controller, **how)
 
     @cached_property
     def waters(self) -> Seaway | None:

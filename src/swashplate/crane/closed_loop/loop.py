@@ -115,9 +115,9 @@ class Plant(NamedTuple):
     """What the loop drives, and what is remembered of it in arrays."""
 
     drives: tuple[Machine, Machine, Machine]
-    law: Machine
+    controller: Machine
     picks: NDArray[np.int64]
-    """Which of `SEEN` the law takes."""
+    """Which of `SEEN` the controller takes."""
     memory: Array
     """Delayed signals, a row each: the operator's tip x and y, swing x and y."""
     readings: Array
@@ -125,7 +125,7 @@ class Plant(NamedTuple):
     noise: Array
     """(n, 4) of each measurement to come, of root mean square 1: rope x and y, roll, pitch."""
     margins: Array
-    """Worst margins of the domains of the drives and the law."""
+    """Worst margins of the domains of the drives and the controller."""
     marched: tuple[Array, ...]
     """Three voltages, three speeds, three limits of drives that were marched before."""
 
@@ -446,15 +446,17 @@ def open_voltages(stick: Array, inverse: Inverse, actuation: int) -> Array:
 # --- the loop -------------------------------------------------------------------------------------
 
 
-def _no_law(*_: Any) -> float:
+def _no_controller(*_: Any) -> float:
     return inf
 
 
 @generating
-def loop_of(hoist: Any, slew_drive: Any, luff: Any, law: Any) -> Callable[..., tuple[State, int]]:
-    """The compiled loop over given steps of three drives and of a law, None for no law."""
-    own = law is not None
-    advance_law = law if own else inlined(_no_law)
+def loop_of(
+    hoist: Any, slew_drive: Any, luff: Any, controller: Any
+) -> Callable[..., tuple[State, int]]:
+    """The compiled loop over steps of three drives and of a user-defined controller, or None."""
+    own = controller is not None
+    advance_controller = controller if own else inlined(_no_controller)
 
     @kernel
     def loop(
@@ -462,7 +464,7 @@ def loop_of(hoist: Any, slew_drive: Any, luff: Any, law: Any) -> Callable[..., t
     ) -> tuple[State, int]:
         """Take the stick's samples; the state after the last, and how the pass ended."""
         inverses, settings, actuation = fixed.inverses, fixed.settings, fixed.actuation
-        laws, picks, memory, margins = plant.law, plant.picks, plant.memory, plant.margins
+        user, picks, memory, margins = plant.controller, plant.picks, plant.memory, plant.margins
         a, b, c = plant.drives
         g, home, columns, sensing = fixed.geometry, fixed.home, fixed.columns, settings.sensing
         marched, moving, loaded = plant.marched, ship.shape[1] > 1, fixed.loaded
@@ -502,15 +504,15 @@ def loop_of(hoist: Any, slew_drive: Any, luff: Any, law: Any) -> Callable[..., t
                     known[7], known[8], known[9] = seen.shift
                     known[10], known[11], known[12] = seen.angles
                     for i in range(picks.size):
-                        laws.inputs[i] = known[picks[i]]
-                    margin = advance_law(laws)
+                        user.inputs[i] = known[picks[i]]
+                    margin = advance_controller(user)
                     # what is not a number would pass through every limit as one
-                    if not abs(laws.outputs[0]) + abs(laws.outputs[1]) < inf:
+                    if not abs(user.outputs[0]) + abs(user.outputs[1]) < inf:
                         ended = NO_NUMBER
                         break
                     margins[3] = min(margins[3], margin)
-                    x += laws.outputs[0]
-                    y += laws.outputs[1]
+                    x += user.outputs[0]
+                    y += user.outputs[1]
                 if settings.clip > 0.0 or settings.share > 0.0:
                     x, y = clipped_offset((x, y), path, boom, rope, fixed)
                 follow_path(path[0] + x, path[1] + y, axes, wanted, sample, h, fixed)

@@ -126,7 +126,7 @@ class CraneStepper:
         how: dict[str, Any] = dict(options)
         check_names("A crane's run has no", how, RunOptions.__annotations__, "it has")
         control = how.pop("control", None)
-        settings, law, self._sensors = stages_of(control)
+        settings, controller, self._sensors = stages_of(control)
         self._crane, self.fixed = crane, _fixed(crane, settings, **how)
         fixed = self.fixed
         if fixed.actuation == loop.DIRECT and control is not None:
@@ -136,9 +136,11 @@ class CraneStepper:
         self._steps = [step for step, _ in compiled]
         hoist, slew, luff = (machine.copied() for _, machine in compiled)
         own, picks = hoist, np.zeros(0, dtype=np.int64)
-        if law is not None:
-            seen = law.model.external
-            self._steps.append(compiled_step(law.model, law.values, seen, GIVES, RATE))
+        if controller is not None:
+            seen = controller.model.external
+            self._steps.append(
+                compiled_step(controller.model, controller.values, seen, GIVES, RATE)
+            )
             own = self._steps[3].machine()
             picks = np.array([SEEN.index(each) for each in seen], dtype=np.int64)
         # in open loop nothing acts back on the drives
@@ -166,7 +168,7 @@ class CraneStepper:
         self._noise = np.random.default_rng(self._sensors.seed if self._sensors else 0)
         self._plant = Plant(
             drives=(hoist, slew, luff),
-            law=own,
+            controller=own,
             picks=picks,
             memory=memory,
             readings=np.zeros((1 << on_their_way.bit_length(), loop.READINGS)),
@@ -249,7 +251,10 @@ class CraneStepper:
         self._state, ended = self._loop(1.0 / RATE, fixed, self._state, plant, commands, ship, out)
         if ended != loop.FINE:
             raise self._stopped(ended)
-        machines, margins = (*self._plant.drives, self._plant.law), self._plant.margins.tolist()
+        machines, margins = (
+            (*self._plant.drives, self._plant.controller),
+            self._plant.margins.tolist(),
+        )
         for step, machine, worst in zip(self._steps, machines, margins, strict=False):
             step.check(machine, worst, "command")
         return out
@@ -272,7 +277,7 @@ class CraneStepper:
             return InputError(too_fast(rope, time, RATE))
         (short, long), (low, high) = crane.rope_limits, map(degrees, crane.boom_limits)
         said = {
-            loop.NO_NUMBER: "the control law gives an offset of the tip that is no finite number; "
+            loop.NO_NUMBER: "the controller gives an offset of the tip that is no finite number; "
             "look for a division by zero or a root of what is negative in it",
             loop.ROPE_OUT: f"the rope is {rope:.2f} m long, but can be {short:g} to {long:g} m; "
             "hoist or lower less, or start elsewhere",

@@ -142,14 +142,17 @@ def seaways_needed(seaways: int, allowed: float) -> str:
 def _with_remedies(assessment: Assessment) -> Assessment:
     """The assessment with what would do, of larger orifices and of clips."""
     study, case = assessment.study, assessment.study.cases[assessment.assessed_variant]
-    law = case.options["control"]
-    if not case.driven or law is None:
+    controller = case.options["control"]
+    if not case.driven or controller is None:
         return assessment
     # factors are of the crane as it is built, whatever was assessed
     cranes = (study.crane,) if len(case.cranes) == 1 else case.cranes
     found: list[Remedy] = []
     tried: list[str] = []
-    for trials in (_larger_orifices(assessment, cranes, law), _clips(case, cranes, law)):
+    for trials in (
+        _larger_orifices(assessment, cranes, controller),
+        _clips(case, cranes, controller),
+    ):
         remedies = _tried(assessment, trials)
         tried += [what for what, *_ in trials[: len(remedies)]]
         passing = [remedy for remedy in remedies if remedy is not None and remedy.passes]
@@ -173,7 +176,7 @@ Trial = tuple[str, float, Case]
 
 
 def _larger_orifices(
-    assessment: Assessment, cranes: tuple[Crane, ...], law: Control
+    assessment: Assessment, cranes: tuple[Crane, ...], controller: Control
 ) -> list[Trial]:
     """Larger orifices of the drive whose acceleration limit acts the longest, if one does."""
     case = assessment.study.cases[assessment.assessed_variant]
@@ -186,15 +189,15 @@ def _larger_orifices(
     trials = []
     for factor in FACTORS:
         larger = tuple(with_design_change(crane, axis, {"orifice": factor}) for crane in cranes)
-        trial = case.changed(control=law)._replace(cranes=larger)
+        trial = case.changed(control=controller)._replace(cranes=larger)
         trials.append((f"{axis} orifice ×{factor:g}", factor, trial))
     return trials
 
 
-def _clips(case: Case, cranes: tuple[Crane, ...], law: Control) -> list[Trial]:
+def _clips(case: Case, cranes: tuple[Crane, ...], controller: Control) -> list[Trial]:
     """Clips at shares of what the luff can follow at the load's period."""
-    stages = [stage for stage in law.stages if not isinstance(stage, Clip | PositionLoop)]
-    present = [stage.share for stage in law.stages if isinstance(stage, Clip)]
+    stages = [stage for stage in controller.stages if not isinstance(stage, Clip | PositionLoop)]
+    present = [stage.share for stage in controller.stages if isinstance(stage, Clip)]
     period = 2.0 * pi * sqrt(case.pose["rope_m"] / GRAVITY)
     reach = float(follow(cranes[0], [period], seas=(), **case.pose).amplitude[0, 2])
     trials = []

@@ -133,8 +133,8 @@ def linear_response(
     Raises
     ------
     InputError
-        For a user's own law, whose transfer function is not known, a damping of 0 without control,
-        for which the swing has no stationary state, and what `Crane.home` refuses.
+        For a user-defined controller, whose transfer function is not known, for a damping of 0
+        without control, with which the swing has no stationary state, and as of `Crane.home`.
 
     Notes
     -----
@@ -144,11 +144,11 @@ def linear_response(
     the waves.
     """
     seaway = Seaway() if sea is None else sea
-    settings, law, _ = stages_of(control)
-    if law is not None:
+    settings, controller, _ = stages_of(control)
+    if controller is not None:
         raise InputError(
-            "The frequency domain knows delayed feedback and ship compensation, not the user's own "
-            f"law {law.model.name}: simulate it."
+            "The frequency domain knows delayed feedback and ship compensation, not the user-defined "
+            f"controller {controller.model.name}: simulate it."
         )
     damping = crane.swing_damping if swing_damping is None else swing_damping
     if damping <= 0.0 and settings.feedback <= 0.0 and not settings.ship:
