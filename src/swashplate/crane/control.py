@@ -304,8 +304,8 @@ class Controller(Control):
         unknown = [name for name in self.model.external if name not in SEEN]
         if unknown:
             raise InputError(
-                f"The controller {self.model.name} asks for '{unknown[0]}', but a crane's controller "
-                f"sees {', '.join(SEEN)}."
+                f"The controller {self.model.name} asks for '{unknown[0]}', but a crane's "
+                f"controller sees {', '.join(SEEN)}."
             )
         missing = [name for name in GIVES if name not in self.model.signal_names]
         if missing:
@@ -383,7 +383,6 @@ def feedback_damping(gain: ArrayLike, delay: ArrayLike) -> Array:
             s = s - (s * s * (1.0 + late) + 1.0) / (2.0 * s * (1.0 + late) - s * s * tau * late)
         residual = np.abs(s * s * (1.0 + k * np.exp(-s * tau)) + 1.0)
     roots = np.where((residual < 1e-9) & (s.imag > 1e-6) & (np.abs(s) < 2.0), s, -np.inf)
-    rightmost = np.take_along_axis(roots, np.argmax(roots.real, axis=-1)[..., None], axis=-1)[
-        ..., 0
-    ]
+    index = np.argmax(roots.real, axis=-1)[..., None]
+    rightmost = np.take_along_axis(roots, index, axis=-1)[..., 0]
     return np.asarray(-rightmost.real / np.abs(rightmost))

@@ -147,8 +147,8 @@ def linear_response(
     settings, controller, _ = stages_of(control)
     if controller is not None:
         raise InputError(
-            "The frequency domain knows delayed feedback and ship compensation, not the user-defined "
-            f"controller {controller.model.name}: simulate it."
+            "The frequency domain knows delayed feedback and ship compensation, not the "
+            f"user-defined controller {controller.model.name}: simulate it."
         )
     damping = crane.swing_damping if swing_damping is None else swing_damping
     if damping <= 0.0 and settings.feedback <= 0.0 and not settings.ship:
