@@ -31,7 +31,7 @@ from swashplate.crane import (
     follow,
     simulate,
 )
-from swashplate.crane.studies.operating import Cell
+from swashplate.crane.studies.operating import SeaCell
 from swashplate.report import figures
 from swashplate.report.figures.crane import seaway_words
 from swashplate.report.scene import write_assessment, write_operability, write_scene
@@ -119,9 +119,9 @@ def harming(assessed):
 def year(crane):
     """Two heights at two periods, one sea missing; headings 0 and 90."""
     scatter = Scatter.of([0.5, 0.5, 1.5], [6.0, 8.0, 8.0], [50.0, 30.0, 20.0], "Made for a test.")
-    good, bad = Cell("", 0.2, False), Cell("side_lead", 2.0, True)
+    good, bad = SeaCell("", 0.2, False), SeaCell("side_lead", 2.0, True)
     none = {(row, heading): bad for row in range(3) for heading in (0.0, 90.0)}
-    own = {**dict.fromkeys(none, good), (1, 90.0): Cell("luff orifice", 1.2, True)}
+    own = {**dict.fromkeys(none, good), (1, 90.0): SeaCell("luff orifice", 1.2, True)}
     own |= {(2, 0.0): bad, (2, 90.0): bad}
     cells = {"no control": none, "identified": own}
     hoist = (0.7, 8.0, 90.0)

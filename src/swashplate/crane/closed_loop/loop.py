@@ -111,7 +111,7 @@ class Fixed(NamedTuple):
     columns: Columns
 
 
-class Plant(NamedTuple):
+class LoopArrays(NamedTuple):
     """What the loop drives, and what is remembered of it in arrays."""
 
     drives: tuple[Machine, Machine, Machine]
@@ -460,14 +460,25 @@ def loop_of(
 
     @kernel
     def loop(
-        h: float, fixed: Fixed, state: State, plant: Plant, stick: Array, ship: Array, out: Array
+        h: float,
+        fixed: Fixed,
+        state: State,
+        arrays: LoopArrays,
+        stick: Array,
+        ship: Array,
+        out: Array,
     ) -> tuple[State, int]:
         """Take the stick's samples; the state after the last, and how the pass ended."""
         inverses, settings, actuation = fixed.inverses, fixed.settings, fixed.actuation
-        user, picks, memory, margins = plant.controller, plant.picks, plant.memory, plant.margins
-        a, b, c = plant.drives
+        user, picks, memory, margins = (
+            arrays.controller,
+            arrays.picks,
+            arrays.memory,
+            arrays.margins,
+        )
+        a, b, c = arrays.drives
         g, home, columns, sensing = fixed.geometry, fixed.home, fixed.columns, settings.sensing
-        marched, moving, loaded = plant.marched, ship.shape[1] > 1, fixed.loaded
+        marched, moving, loaded = arrays.marched, ship.shape[1] > 1, fixed.loaded
         sample, axes, tip, hung, still, brake = state
         shafts = shafts_of(axes, ANGLE)
         boom, rope = boom_at(shafts.luff, g, home), rope_length(shafts, g, home)
@@ -491,7 +502,7 @@ def loop_of(
                 seen = Seen(swing.x, swing.y, rope, slew, boom, tip.z - shift.z, shift, angles)
                 seen_r = r
                 if sensing.rate > 0.0:
-                    seen = measured(seen, sample, first, sensing, plant.readings, plant.noise)
+                    seen = measured(seen, sample, first, sensing, arrays.readings, arrays.noise)
                     seen_r = rotation(seen.angles.x, seen.angles.y, seen.angles.z)
                 # 2. path, offsets, clip, wanted speeds
                 half = pi * sqrt(rope / GRAVITY) / h

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from swashplate.analysis.compensation import InverseMap
 from swashplate.crane.axes import AXES, RATE, check_names
 from swashplate.crane.closed_loop import loop
-from swashplate.crane.closed_loop.loop import Fixed, Inverse, Plant, State
+from swashplate.crane.closed_loop.loop import Fixed, Inverse, LoopArrays, State
 from swashplate.crane.closed_loop.signals import ROWS, Signals, columns_of
 from swashplate.crane.control import GIVES, SEEN, Control, stages_of
 from swashplate.crane.crane import Crane
@@ -166,7 +166,7 @@ class CraneStepper:
         sensing = settings.sensing
         on_their_way = int(sensing.delay * sensing.rate) + 2
         self._noise = np.random.default_rng(self._sensors.seed if self._sensors else 0)
-        self._plant = Plant(
+        self._arrays = LoopArrays(
             drives=(hoist, slew, luff),
             controller=own,
             picks=picks,
@@ -241,19 +241,19 @@ class CraneStepper:
                 voltages.append(volts)
                 speeds.append(np.ascontiguousarray(made[0]))
                 limits.append(np.ascontiguousarray(made[1]))
-            self._plant = self._plant._replace(marched=(*voltages, *speeds, *limits))
+            self._arrays = self._arrays._replace(marched=(*voltages, *speeds, *limits))
             fixed = fixed._replace(actuation=loop.MARCHED)
         return self._advanced(fixed, commands, ship, out)
 
     def _advanced(self, fixed: Fixed, commands: Array, ship: Array, out: Array) -> Array:
         """The rows, filled by the loop; refuses what has stopped it."""
-        plant = self._plant._replace(noise=self._next_noise(len(commands)))
-        self._state, ended = self._loop(1.0 / RATE, fixed, self._state, plant, commands, ship, out)
+        arrays = self._arrays._replace(noise=self._next_noise(len(commands)))
+        self._state, ended = self._loop(1.0 / RATE, fixed, self._state, arrays, commands, ship, out)
         if ended != loop.FINE:
             raise self._stopped(ended)
         machines, margins = (
-            (*self._plant.drives, self._plant.controller),
-            self._plant.margins.tolist(),
+            (*self._arrays.drives, self._arrays.controller),
+            self._arrays.margins.tolist(),
         )
         for step, machine, worst in zip(self._steps, machines, margins, strict=False):
             step.check(machine, worst, "command")
@@ -263,7 +263,7 @@ class CraneStepper:
         """Noise of the measurements within the next samples, from one stream for the whole run."""
         sample, rate = self._state.sample, self.fixed.settings.sensing.rate
         if rate == 0.0 or samples == 0:
-            return self._plant.noise
+            return self._arrays.noise
         taken = loop.measurement_at(sample - 1, rate) + 1 if sample > 0 else 0
         due = loop.measurement_at(sample + samples - 1, rate) + 1
         return self._noise.standard_normal((due - taken, loop.NOISY))

@@ -62,7 +62,7 @@ DRIVES_LIMITS: Mapping[Limit, str] = {
 }
 
 
-class Cell(NamedTuple):
+class SeaCell(NamedTuple):
     """A sea of one height, period and heading, for one variant."""
 
     limited_by: str
@@ -82,7 +82,7 @@ class Operability(Tabular):
     scatter: Scatter
     headings: tuple[float, ...]
     """[deg]"""
-    cells: Mapping[str, Mapping[tuple[int, float], Cell]] = field(repr=False)
+    cells: Mapping[str, Mapping[tuple[int, float], SeaCell]] = field(repr=False)
     """By variant, and by row of the scatter diagram and heading."""
     seaway: Seaway
     """Ship, peak factor, spreading."""
@@ -236,7 +236,7 @@ def operability(
         for period in dict.fromkeys(scatter.period.tolist())
     ]
     work = (study, scatter, limits)
-    cells: dict[str, dict[tuple[int, float], Cell]] = {name: {} for name in study.cases}
+    cells: dict[str, dict[tuple[int, float], SeaCell]] = {name: {} for name in study.cases}
     hoist = (np.inf, np.nan, np.nan)
     runs = (executor or Threads()).run(_of_column, work, columns)
     for position, (found, too_slow) in counted(
@@ -265,7 +265,7 @@ class _Column(NamedTuple):
 
 def _of_column(
     work: tuple[Study, Scatter, Mapping[str, float]], column: _Column
-) -> tuple[dict[int, Cell], float]:
+) -> tuple[dict[int, SeaCell], float]:
     """Cells of a column by their row, and the height from which on the hoist is too slow. [m]"""
     study, scatter, limits = work
     case = study.cases[column.variant]
@@ -280,7 +280,7 @@ def _of_column(
     rows = rows[np.argsort(scatter.height[rows])]
     cells = {int(row): _by_spectrum(float(scatter.height[row]), linear, limits) for row in rows}
 
-    def simulated(row: int) -> Cell:
+    def simulated(row: int) -> SeaCell:
         sea = Spectrum(float(scatter.height[row]), column.period, factor)
         return _by_simulation(study, case, replace(unit, sea=sea), limits)
 
@@ -291,11 +291,11 @@ def _of_column(
     return {row: cell for row, cell in found.items() if cell is not None}, too_slow
 
 
-def _boundary(rows: Sequence[int], simulated: Callable[[int], Cell]) -> dict[int, Cell]:
+def _boundary(rows: Sequence[int], simulated: Callable[[int], SeaCell]) -> dict[int, SeaCell]:
     """Cells of rows, the lowest waves first: half of them are decided by each that is simulated."""
-    cells: dict[int, Cell] = {}
+    cells: dict[int, SeaCell] = {}
     low, high = 0, len(rows)
-    limiting = Cell(LEFT, np.inf, True)
+    limiting = SeaCell(LEFT, np.inf, True)
     while low < high:
         middle = (low + high) // 2
         cell = simulated(rows[middle])
@@ -306,7 +306,7 @@ def _boundary(rows: Sequence[int], simulated: Callable[[int], Cell]) -> dict[int
             high, limiting = middle, cell
     for position, row in enumerate(rows):
         if row not in cells:
-            cells[row] = Cell(WORKABLE, np.nan, True) if position < low else limiting
+            cells[row] = SeaCell(WORKABLE, np.nan, True) if position < low else limiting
     return cells
 
 
@@ -334,7 +334,7 @@ def _linear(case: Case, sea: Seaway, limits: Mapping[str, float]) -> _Linear:
     return _Linear(slope, mean, demand if control is not None else 0.0)
 
 
-def _by_spectrum(height: float, linear: _Linear, limits: Mapping[str, float]) -> Cell | None:
+def _by_spectrum(height: float, linear: _Linear, limits: Mapping[str, float]) -> SeaCell | None:
     """A cell by the frequency domain; None if it is too near a limit, of a drive as well."""
     ratios = {
         name: (linear.mean[name] + height * linear.slope[name]) / limit
@@ -343,20 +343,22 @@ def _by_spectrum(height: float, linear: _Linear, limits: Mapping[str, float]) ->
     worst = max(ratios, key=lambda name: ratios[name])
     ratio = ratios[worst]
     if linear.demand == 0.0:  # no drive moves
-        return Cell(worst if ratio > 1.0 else WORKABLE, ratio, False)
+        return SeaCell(worst if ratio > 1.0 else WORKABLE, ratio, False)
     if ratio > NEAR:  # drives that are at their limits do not make it better
-        return Cell(worst, ratio, False)
+        return SeaCell(worst, ratio, False)
     if ratio < 1.0 / NEAR and linear.demand * height < 1.0 / NEAR:
-        return Cell(WORKABLE, ratio, False)
+        return SeaCell(WORKABLE, ratio, False)
     return None
 
 
-def _by_simulation(study: Study, case: Case, seaway: Seaway, limits: Mapping[str, float]) -> Cell:
+def _by_simulation(
+    study: Study, case: Case, seaway: Seaway, limits: Mapping[str, float]
+) -> SeaCell:
     """A cell by simulated seaways."""
     one = replace(study, seaway=seaway, executor=Serial(), progress=None)
     outcomes = [found for (found,) in one.outcomes([case])]
     if any(outcome.departure_reason for outcome in outcomes):
-        return Cell(_drive_limit(outcomes) or LEFT, np.inf, True)
+        return SeaCell(_drive_limit(outcomes) or LEFT, np.inf, True)
     observed = sum(outcome.counted for outcome in outcomes)
     ratios = {
         name: largest_of_peaks([outcome.peaks[name] for outcome in outcomes], observed).value
@@ -366,8 +368,8 @@ def _by_simulation(study: Study, case: Case, seaway: Seaway, limits: Mapping[str
     }
     worst = max(ratios, key=lambda name: ratios[name])
     if ratios[worst] <= 1.0:
-        return Cell(WORKABLE, ratios[worst], True)
-    return Cell(_drive_limit(outcomes) or worst, ratios[worst], True)
+        return SeaCell(WORKABLE, ratios[worst], True)
+    return SeaCell(_drive_limit(outcomes) or worst, ratios[worst], True)
 
 
 def _drive_limit(outcomes: Sequence[RunOutcome]) -> str:
