@@ -185,7 +185,7 @@ def test_a_run_that_leaves_the_model_loses_to_one_that_does_not(assessed):
 
 
 def test_no_seaway_in_the_model_is_no_verdict_for_control(crane):
-    """In waves of 6 m both leave the model at once: not decided, and never a number."""
+    """In waves of 6 m both leave the model at the same time: not decided, and never a number."""
     found = assess(crane, MEANT, seeds=range(4), sea=Spectrum(6.0, 10.0),
                   drives=("identified",), **QUICK)  # fmt: skip
     assert found.harmless == "not decided"
@@ -489,7 +489,7 @@ def test_what_makes_no_study_is_said(crane):
     refuse("counts for 30 s after a run-in of 120 s, but must count for at least 60 s", length=30.0)
     refuse("stick is 100 s long, but a run counts from 120 s on", stick=OperatorCommand.rest(100.0))
     moving = OperatorCommand.record(np.full((153_600, 3), [0.0, 0.01, 0.0]))
-    refuse("Ideal drives follow at once, .* put a row of zeros before it", stick=moving)
+    refuse("Ideal drives follow instantaneously, .* put a row of zeros before it", stick=moving)
     refuse("seeds is 3, but must be a sequence, as range", seeds=3)
     refuse("A sea is a name, as 'ss3', or a Spectrum, not of type ndarray", sea=np.zeros((9, 6)))
     refuse("A study has no 'see'; it has seeds, sea, drives, .*, slew_deg", see="ss3")

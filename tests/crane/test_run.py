@@ -405,7 +405,7 @@ def test_stepper_takes_the_samples_of_a_loaded_run_with_a_hook(leaking):
 def test_loads_that_no_drive_can_take_are_refused(crane, leaking, slewed):
     with refuse("No drive of tg3637 feels a load: give one a motor_leakage"):
         simulate(crane, slewed, loaded=True)
-    with refuse("Ideal drives follow at once, whatever the load"):
+    with refuse("Ideal drives follow instantaneously, whatever the load"):
         simulate(leaking, slewed, loaded=True, actuation="ideal")
     worn = crane.with_drive(hoist=crane.hoist.replace(motor_leakage=3e-6))
     with refuse("The hoist of tg3637 gives way to 35000 kg on a rigid rope within a sample"):
@@ -695,7 +695,10 @@ MOVING = OperatorCommand.record(np.full((600, 3), [0.0, 0.5, 0.0]))
 REFUSED = [
     ({"stick": slew(45.0, length=5.0)}, "stick of the slew ends at 12.11 s, but .* at 5 s"),
     ({"stick": slew(-45.0)}, "The slew leads away from slew_deg = -45"),
-    ({"stick": MOVING, "actuation": "ideal"}, "Ideal drives follow at once, .* a row of zeros"),
+    (
+        {"stick": MOVING, "actuation": "ideal"},
+        "Ideal drives follow instantaneously, .* a row of zeros",
+    ),
     ({"stick": 3}, "The stick is 3, but must be an OperatorCommand"),
     ({"boom_deg": 85.0}, "boom of tg3637 stands at 85 deg, but moves between 15 and 80"),
     ({"load": 36000.0}, "The load is 36000 kg, but tg3637 lifts 35000 kg: take less"),

@@ -38,7 +38,7 @@ stays below that over the widest range of ropes (Singhose, Seering and Singer 19
 SEEN = (
     *("swing_x", "swing_y"),
     *("rope", "slew", "boom"),
-    *("wanted_x", "wanted_y"),
+    *("reference_x", "reference_y"),
     *("surge", "sway", "heave", "roll", "pitch", "yaw"),
 )
 """What a user-defined controller may take as inputs: load less tip, horizontal, inertial [m]; rope
@@ -52,7 +52,7 @@ SENSED = (
 )
 """Plausible ranges of the numbers of sensors."""
 GIVES = ("tip_x", "tip_y")
-"""Signals of a user-defined controller: what is added to the wanted tip in the ship's frame. [m]"""
+"""Signals of a user-defined controller: what it adds to the reference tip, ship's frame. [m]"""
 
 
 class Sensing(NamedTuple):
@@ -169,7 +169,7 @@ class DelayedFeedback(Control):
     """
 
     gain: float = 0.2
-    """k, part of the load's horizontal distance from the tip that is added to the wanted tip; at
+    """k, part of the load's horizontal distance from the tip that is added to the reference tip; at
     most 2, and unstable from 1 on."""
     delay: float = 0.25
     """τ in periods of the present rope, at most 1. The damping ratio is about k/2 at 0.25."""
@@ -183,7 +183,7 @@ class DelayedFeedback(Control):
 
 @dataclass(frozen=True)
 class ShipCompensation(Control):
-    """Compensation of the ship's motion: the wanted tip keeps its place over the sea."""
+    """Compensation of the ship's motion: the reference tip keeps its place over the sea."""
 
     kind = "ship compensation"
 
@@ -214,7 +214,7 @@ class Clip(Control):
 
 @dataclass(frozen=True)
 class PositionLoop(Control):
-    """Loop that brings slew and luff back to the wanted path.
+    """Loop that brings slew and luff back to the reference path.
 
     It belongs to every control of the tip; without this stage its gain is 0.7 /s.
     """
@@ -285,7 +285,7 @@ class Sensors(Control):
 
 @dataclass(frozen=True)
 class Controller(Control):
-    """User-defined controller: a model of the engine whose outputs offset the wanted tip.
+    """User-defined controller: a model of the engine whose outputs offset the reference tip.
 
     The position loop acts beside it, at 0.7 /s unless a `PositionLoop` says otherwise.
     """
@@ -311,7 +311,7 @@ class Controller(Control):
         if missing:
             raise InputError(
                 f"The controller {self.model.name} must have the signals {' and '.join(GIVES)}, "
-                f"which are added to the wanted tip; {missing[0]} is missing."
+                f"which are added to the reference tip; {missing[0]} is missing."
             )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Unpack
+from typing import NamedTuple, Unpack
 
 from numpy.typing import ArrayLike
 
@@ -46,16 +46,30 @@ def simulate(
     DomainError
         If boom or rope meet a limit, or a drive leaves its domain.
     """
-    stepper, commands, end = begun(crane, stick, options)
-    ship = motion_of(sea, len(commands), RATE)
-    signals = stepper.run(commands, ship)
-    return CraneRun(crane, commands, ship, signals, stepper.fixed, end)
+    prepared = prepare(crane, stick, options)
+    ship = motion_of(sea, len(prepared.commands), RATE)
+    return CraneRun(
+        crane=crane,
+        stick=prepared.commands,
+        ship=ship,
+        stored=prepared.stepper.run(prepared.commands, ship),
+        fixed=prepared.stepper.fixed,
+        stick_end=prepared.end,
+    )
 
 
-def begun(
-    crane: Crane, stick: OperatorCommand, options: RunOptions
-) -> tuple[CraneStepper, Array, float]:
-    """A run at its start: stepper, commands, and when the last one ends; as `simulate` refuses."""
+class PreparedRun(NamedTuple):
+    """A run before its first sample."""
+
+    stepper: CraneStepper
+    commands: Array
+    """(n, 3) of hoist, slew and luff, -1 to 1."""
+    end: float
+    """When the last command has returned to zero. [s]"""
+
+
+def prepare(crane: Crane, stick: OperatorCommand, options: RunOptions) -> PreparedRun:
+    """A run before its first sample; it refuses what `simulate` refuses of crane and stick."""
     stepper = CraneStepper(crane, **options)
     if stepper.fixed.actuation == DIRECT:
         raise InputError(
@@ -69,7 +83,7 @@ def begun(
     commands, end = stick.sample(crane, stepper.fixed.home, RATE)
     if stepper.fixed.actuation == IDEAL and commands[0].any():
         raise InputError(
-            "Ideal drives follow at once, and the crane starts at rest: a recorded stick must "
-            "begin at zero, so put a row of zeros before it."
+            "Ideal drives follow instantaneously, and the crane starts at rest: a recorded stick "
+            "must begin at zero, so put a row of zeros before it."
         )
-    return stepper, commands, end
+    return PreparedRun(stepper, commands, end)

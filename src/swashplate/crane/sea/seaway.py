@@ -443,7 +443,7 @@ def ship_motion(
             if 6.0 * seconds * rate > LARGEST:
                 raise InputError(
                     f"{path} lasts {seconds:g} s: at {rate:g} Hz that are more than the "
-                    f"{LARGEST} numbers that are taken at once; cut the log, or take a lower rate."
+                    f"{LARGEST} numbers that are taken together; cut the log, or take a lower rate."
                 )
             made = np.zeros((int(seconds * rate + 1e-6) + 1, 6))
         grid = series.time[0] + np.arange(len(made)) / rate

@@ -550,7 +550,10 @@ def largest_of(outcomes: Sequence[RunOutcome], name: str) -> ConfidenceInterval:
 def assessed_limits(
     outcomes: Sequence[RunOutcome], limits: Mapping[str, float]
 ) -> tuple[AssessedQuantity, ...]:
-    """All that has a limit; what the runs do not have, as a place if the operator moves, is not."""
+    """Quantities that have a limit and that the runs have.
+
+    Limits of quantities that the runs lack, such as a place if the operator moves, are left out.
+    """
     quantities = []
     for name, limit in limits.items():
         if name == "saturation":

@@ -1,10 +1,10 @@
 """Operability: the share of a year that can be worked, and what limits it, sea by sea.
 
-A scatter diagram says how often each significant height comes with each peak period. Of each of its
-cells and each heading the frequency domain says at once what is linear: the crane without control,
-and with control as long as no drive is at a limit. Where that is near a limit, or asks of a drive
-what it cannot do, the cell is simulated. At one period and heading what is beyond a limit stays so
-in higher waves, so that only the boundary is looked for.
+A scatter diagram says how often each significant height comes with each peak period. For each of
+its cells and each heading the frequency domain gives what is linear: the crane without control, and
+with control as long as no drive is at a limit. A cell is simulated if that is near a limit, or asks
+of a drive what it cannot do. At one period and heading, what is beyond a limit stays beyond it in
+higher waves, so that only the boundary is looked for.
 """
 
 from __future__ import annotations

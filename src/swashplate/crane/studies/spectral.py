@@ -1,9 +1,9 @@
 """The crane in waves in the frequency domain: exact for small motion, without a simulation.
 
-The ship's transfer functions move the tip, the tip moves the load, a pendulum with its damping; a
-spectrum of waves gives variances of all that is linear in them. Control is linear as long as its
-drives follow at once: delayed feedback and ship compensation. It is the check of every simulated
-crane without control, and the first answer on every sea of a year.
+The ship's transfer functions move the tip; the tip moves the load, a damped pendulum; a spectrum of
+waves gives the variances of all that is linear in them. Control by delayed feedback and ship
+compensation is linear as long as the drives follow instantaneously. The result checks every
+simulated crane without control, and is the first answer on every sea of a year.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ class LinearValue(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class LinearResponse(Result):
-    """What a sea does to a crane whose drives follow at once, and what it asks of them."""
+    """What a sea does to a crane whose drives follow instantaneously, and what it asks of them."""
 
     values: Mapping[str, LinearValue]
     """By names of `limits.LIMITED`, saturation apart, and of `DEMANDS`."""
@@ -122,9 +122,9 @@ def linear_response(
     sea : Seaway
         By default sea state 3 abeam on the packaged hull.
     control : Control, optional
-        Delayed feedback and ship compensation of drives that follow at once; a shaper, a position
-        loop and a clip change nothing as long as the operator's stick rests and the clip does not
-        act.
+        Delayed feedback and ship compensation of drives that follow instantaneously; a shaper, a
+        position loop and a clip change nothing as long as the operator's stick rests and the clip
+        does not act.
     slew_deg, boom_deg, rope_m, swing_damping, load, suspension
         As of `simulate`.
     duration : float
@@ -218,7 +218,10 @@ def linear_response(
 
 
 def waves_of(seaway: Seaway, width: float) -> Waves:
-    """Waves of a seaway, fine enough for a resonance of half that width. [rad/s]"""
+    """Waves of a seaway, fine enough for a resonance.
+
+    `width` is the half-width ζω₀ of the resonance that they must resolve. [rad/s]
+    """
     step = min(max(2.0 * width / PER_RESONANCE, FINEST), WIDEST)
     omega = np.arange(BAND[0], BAND[1], step) + 0.5 * step
     density = seaway.spectrum.density(omega)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from swashplate.crane.axes import RATE, check_names
 from swashplate.crane.closed_loop.operator_command import OperatorCommand
 from swashplate.crane.closed_loop.result import FARTHEST_SWING, CraneRun
-from swashplate.crane.closed_loop.simulating import begun, simulate
+from swashplate.crane.closed_loop.simulating import prepare, simulate
 from swashplate.crane.closed_loop.stepper import Actuation, RunOptions, feels_load
 from swashplate.crane.control import Clip, Control
 from swashplate.crane.crane import Crane
@@ -42,8 +42,8 @@ Drives = Sequence[str] | Mapping[str, str | Crane | Sequence[Crane]]
 
 IDEAL, BUILT = "ideal", "identified"
 ACTUATED: Mapping[str, Actuation] = {IDEAL: "ideal", BUILT: "inverse", "volts": "volts"}
-"""Drives that follow at once; the crane's own after their inverse maps; the same, 10 V for full
-speed."""
+"""Drives that follow instantaneously; the crane's own after their inverse maps; the same, 10 V for
+full speed."""
 NONE = "no control"
 """The crane as it is built, under the operator's stick alone."""
 LENGTH, RUN_IN = 600.0, 120.0
@@ -190,9 +190,10 @@ class Study(Result):
         sea : str, Spectrum or Seaway
             Sea state; a seaway gives heading, ship and spreading as well.
         drives : sequence of str, or mapping of str to str, Crane or sequence of Crane
-            ``"ideal"``, which follow at once within their limits of speed; ``"identified"``, the
-            crane's own; ``"volts"``, these without their inverse maps; by name also other cranes,
-            or several of which each seaway takes the next, see `drawn_cranes`.
+            ``"ideal"``, which follow instantaneously within their limits of speed;
+            ``"identified"``, the crane's own; ``"volts"``, these without their inverse maps. By
+            name also other cranes, or several of which each seaway takes the next, see
+            `drawn_cranes`.
         stick : OperatorCommand, optional
             What the operator does; by default nothing, the crane keeps its load in place. Its
             length is then that of each run.
@@ -275,7 +276,7 @@ class Study(Result):
         An `InputError` or `ParameterError` if a case cannot begin as it is asked to.
         """
         for case in cases:  # said here, once, and not by a worker
-            begun(case.cranes[0], case.stick, case.options)
+            prepare(case.cranes[0], case.stick, case.options)
         chosen = range(len(self.seeds)) if numbers is None else numbers
         outcomes: list[tuple[RunOutcome, ...]] = [()] * len(chosen)
         items = [(number, self.seeds[number]) for number in chosen]
