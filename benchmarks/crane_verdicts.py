@@ -192,7 +192,7 @@ def controllers(seaways: int) -> None:
         words = name.partition(", ")[0]
         swing = np.degrees(rms_of(assessed.swing(name)))
         left = sum(assessed.departures(name).values())
-        worse = "" if name == "no control" else f"{assessed.worse(name).value:.0%}"
+        worse = "" if name == "no control" else f"{assessed.share_worse(name).value:.0%}"
         limited = {each.name: each.largest.value for each in assessed.limited(name)}
         rms = "–" if np.isnan(swing[0]) else f"{swing[0]:.2f}°"
         gone = f" ({left} left)" if left else ""

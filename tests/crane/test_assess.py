@@ -49,7 +49,7 @@ def crane():
 
 @pytest.fixture(scope="module")
 def assessed(crane):
-    return assess(crane, CLIPPED, seeds=range(12), allowed=0.3, **QUICK)
+    return assess(crane, CLIPPED, seeds=range(12), allowed_share_worse=0.3, **QUICK)
 
 
 def test_numbers_are_those_of_whole_runs(assessed):
@@ -82,10 +82,10 @@ def test_place_is_where_the_tip_hangs_without_waves(crane):
     case = Study.of(crane, CLIPPED, seeds=[0], sea=seaway).cases["no control"]
     lean = np.tile(seaway.lean, (1025, 1))
     run = simulate(crane, OperatorCommand.rest(2.0), sea=lean, slew_deg=90.0, rope_m=27.0)
-    assert case.wanted(seaway) == pytest.approx(tuple(run.tip[-1, :2]), abs=1e-9)
+    assert case.target(seaway) == pytest.approx(tuple(run.tip[-1, :2]), abs=1e-9)
     stick = OperatorCommand.trapezoid(slew=0.5, duration=30.0, length=200.0)
     moving = Study.of(crane, CLIPPED, seeds=[0], stick=stick)
-    assert moving.cases["no control"].wanted(seaway) is None
+    assert moving.cases["no control"].target(seaway) is None
 
 
 @pytest.mark.parametrize(
@@ -126,7 +126,7 @@ def test_control_that_changes_nothing_does_not_pass(crane):
 
 def test_two_questions_have_two_answers(crane, assessed):
     assert assessed.names == ("no control", "ideal", "identified")
-    assert assessed.asked == ("harm", "sufficiency")
+    assert assessed.questions == ("harm", "sufficiency")
     # the clip does no harm, and the load still wanders
     assert assessed.harmless == "yes"
     assert assessed.sufficient == "no"
@@ -134,13 +134,17 @@ def test_two_questions_have_two_answers(crane, assessed):
     verdict = assessed.verdict()
     assert "does no harm: it makes swing worse than none in 0 of 12 seaways" in verdict
     assert "It does not suffice: in 3 h " in verdict
-    harm = assess(crane, CLIPPED, seeds=range(12), allowed=0.3, asked=["harm"], **QUICK)
+    harm = assess(
+        crane, CLIPPED, seeds=range(12), allowed_share_worse=0.3, questions=["harm"], **QUICK
+    )
     assert harm.passed
-    assert replace(assessed, asked=("harm",)).passed
+    assert replace(assessed, questions=("harm",)).passed
     # limits far beyond all that happens in a small sea: it suffices
     wide = crane.with_limits(swing=0.5, off_lead=0.5, side_lead=0.5, dynamic_factor=5.0,
                              hoist_demand=10.0, placement=100.0, saturation=1.0)  # fmt: skip
-    passed = assess(wide, CLIPPED, seeds=range(12), allowed=0.3, sea=Spectrum(0.1, 7.0), **QUICK)
+    passed = assess(
+        wide, CLIPPED, seeds=range(12), allowed_share_worse=0.3, sea=Spectrum(0.1, 7.0), **QUICK
+    )
     assert passed.sufficient == "yes"
     assert passed.passed
     assert "It suffices: in 3 h all stays within its limits." in passed.verdict()
@@ -149,12 +153,12 @@ def test_two_questions_have_two_answers(crane, assessed):
 def test_a_crane_without_limits_is_asked_for_harm_alone(crane):
     bare = replace(crane, limits={})
     found = assess(bare, CLIPPED, seeds=range(3), drives=("identified",), **QUICK)
-    assert found.asked == ("harm",)
+    assert found.questions == ("harm",)
     assert found.sufficient is None
     with pytest.raises(InputError, match="has no limits to suffice for"):
-        assess(bare, CLIPPED, seeds=range(3), asked=["sufficiency"], **QUICK)
+        assess(bare, CLIPPED, seeds=range(3), questions=["sufficiency"], **QUICK)
     with pytest.raises(InputError, match="no question 'safety'; there are harm, sufficiency"):
-        assess(crane, CLIPPED, seeds=range(3), asked=["safety"], **QUICK)
+        assess(crane, CLIPPED, seeds=range(3), questions=["safety"], **QUICK)
 
 
 def outcome(rms, departure_reason=""):
@@ -174,7 +178,7 @@ def test_a_run_that_leaves_the_model_loses_to_one_that_does_not(assessed):
         (outcome(0.10), outcome(0.05)),
     ]
     found = replace(assessed, study=replace(study, cases=cases), outcomes=tuple(pairs), linear=None)
-    share = found.worse("own")
+    share = found.share_worse("own")
     assert share.value == pytest.approx(2.0 / 6.0)
     assert share.low == pytest.approx(binomtest(2, 6).proportion_ci(0.95, "exact").low)
     assert share.high == pytest.approx(binomtest(3, 6).proportion_ci(0.95, "exact").high)
@@ -196,8 +200,16 @@ def test_no_seaway_in_the_model_is_no_verdict_for_control(crane):
 
 
 def test_what_would_do(crane):
-    found = assess(crane, MEANT, seeds=range(8), allowed=0.4, asked=["harm"], tipping_points=False,
-                  drives=("identified",), **SHORT)  # fmt: skip
+    found = assess(
+        crane,
+        MEANT,
+        seeds=range(8),
+        allowed_share_worse=0.4,
+        questions=["harm"],
+        tipping_points=False,
+        drives=("identified",),
+        **SHORT,
+    )
     assert found.harmless == "no"
     assert "luff at its acceleration limit" in found.verdict()
     clip = next(remedy for remedy in found.remedies if "clip" in remedy.what)
@@ -205,13 +217,15 @@ def test_what_would_do(crane):
     assert clip.sufficient is None
     assert f"{clip.what.capitalize()} would do." in found.verdict()
     # a remedy, assessed by itself, is what it was said to be
-    alone = assess(crane, CLIPPED, seeds=range(8), allowed=0.4, drives=("identified",), **QUICK)
-    assert alone.worse("identified") == clip.worse
+    alone = assess(
+        crane, CLIPPED, seeds=range(8), allowed_share_worse=0.4, drives=("identified",), **QUICK
+    )
+    assert alone.share_worse("identified") == clip.share_worse
     both = assess(
         crane,
         MEANT,
         seeds=range(8),
-        allowed=0.4,
+        allowed_share_worse=0.4,
         tipping_points=False,
         drives=("identified",),
         **SHORT,
@@ -221,8 +235,8 @@ def test_what_would_do(crane):
 
 
 def test_few_seaways_decide_nothing(crane):
-    one = assess(crane, CLIPPED, seeds=[0], drives=("ideal",), asked=["harm"], **QUICK)
-    assert one.worse("ideal") == (0.0, 0.0, pytest.approx(0.975))
+    one = assess(crane, CLIPPED, seeds=[0], drives=("ideal",), questions=["harm"], **QUICK)
+    assert one.share_worse("ideal") == (0.0, 0.0, pytest.approx(0.975))
     assert one.outcome == "not decided"
     assert not one.passed
     assert "in 0 of 1 seaway (95 % interval 0.0 to 97.5 %)" in one.verdict()
@@ -457,7 +471,10 @@ def test_control_does_not_know_the_draw_that_moves_the_crane(crane):
     weaker = crane.slew.scale(Z17=1.05)
     stick = OperatorCommand.trapezoid(slew=0.5, until={"slew_deg": 30.0}, length=30.0)
     (drawn,) = drawn_cranes(crane, slew=Draws((weaker,), 0))
-    known, unknown = crane.with_drive(slew=weaker), crane.with_drive(slew=weaker, known=False)
+    known, unknown = (
+        crane.with_drive(slew=weaker),
+        crane.with_drive(slew=weaker, known_to_controller=False),
+    )
     runs = [simulate(each, stick) for each in (crane, drawn, unknown, known)]
     volts, ends = [each.voltage[:, 1] for each in runs], [each.slew_deg[-1] for each in runs]
     # the map of the drive before: the same voltages, and another end
@@ -469,7 +486,7 @@ def test_control_does_not_know_the_draw_that_moves_the_crane(crane):
     assert abs(ends[3] - ends[0]) < 0.1
     # the drive that the controller counts on is put back
     assert unknown.known_to_controller == {"slew": crane.slew}
-    assert not unknown.with_drive(slew=crane.slew, known=False).known_to_controller
+    assert not unknown.with_drive(slew=crane.slew, known_to_controller=False).known_to_controller
     # what is redesigned is known: the fitted drive moves with the drawn one
     redesigned = with_design_change(drawn, "slew", {"orifice": 2.0})
     assert redesigned.slew == weaker.scale(Z16=2.0)

@@ -182,7 +182,7 @@ def test_verdicts_page_says_what_the_answer_hangs_on(tmp_path, assessed):
 
 
 def test_verdicts_page_of_harm_alone_says_what_was_not_asked(tmp_path, assessed):
-    text = written(write_assessment, replace(assessed, asked=("harm",)), tmp_path)
+    text = written(write_assessment, replace(assessed, questions=("harm",)), tmp_path)
     assert text.count("This was not asked") == 1
     assert "suffice" not in text.partition('<div class="headline')[2].partition("</div>")[0]
 
@@ -300,7 +300,7 @@ def test_figure_of_an_assessment_has_shares_of_limits(assessed, crane):
             share = one.largest.value / one.limit
             assert shown[row] == pytest.approx(np.clip(share, 0.1, limits.get_xlim()[1]))
     unlimited = replace(assessed, study=replace(assessed.study, crane=replace(crane, limits={})))
-    assert len(replace(unlimited, asked=("harm",)).plot().axes) == 1
+    assert len(replace(unlimited, questions=("harm",)).plot().axes) == 1
 
 
 def swept(crane, over, points, values):

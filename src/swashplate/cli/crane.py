@@ -250,12 +250,12 @@ def assess(
             f"them: did you mean --allowed {100.0 * allowed:g}?"
         )
     more: dict[str, Any] = {
-        "allowed": allowed / 100.0,
+        "allowed_share_worse": allowed / 100.0,
         "remedies": remedies,
         "tipping_points": tipping_points,
     }
     if ask is not None:
-        more["asked"] = [question.strip() for question in ask.split(",")]
+        more["questions"] = [question.strip() for question in ask.split(",")]
     if dask is not None:
         from swashplate.executors import Dask
 

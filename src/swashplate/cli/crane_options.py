@@ -60,7 +60,7 @@ class Placed:
     def chosen(self) -> Crane:
         """The crane, with its drives; one whose fit is not usable is refused without --force."""
         drives = dict(pairs_of("--drive", self.drive, "luff=mine.toml"))
-        crane = crane_of(self.crane).with_drive(known=True, **drives)
+        crane = crane_of(self.crane).with_drive(**drives)
         if not self.force:
             _refuse_unusable(crane)
         return crane
@@ -490,7 +490,7 @@ def _refuse_unusable(crane: Crane) -> None:
     for axis, source in crane.sources.items():
         if not source.usable:
             raise InputError(
-                f"{axis}={source.place}: the verdict on the fit of this drive is "
+                f"{axis}={source.origin}: the verdict on the fit of this drive is "
                 f"'{source.verdict.rstrip('.')}'; fit again until it is usable, as its report "
                 f"advises, give another drive, or accept this one with --force."
             )

@@ -97,8 +97,8 @@ class Crane:
                 (crane.quantities, packaged.quantities, GEOMETRY),
                 (crane.limits, packaged.limits, DEFINITIONS),
             )
-            for own, of_packaged, definitions in checked:
-                check_sources(own, of_packaged, definitions, str(path), name)
+            for quantities, packaged_quantities, definitions in checked:
+                check_sources(quantities, packaged_quantities, definitions, str(path), name)
         return crane
 
     def __repr__(self) -> str:
@@ -108,7 +108,7 @@ class Crane:
     @property
     def assumed(self) -> str:
         """How much of the geometry is assumed: ``"12 of 13 quantities"``, empty if nothing is."""
-        count = sum(each.status == "assumed" for each in self.quantities.values())
+        count = sum(quantity.status == "assumed" for quantity in self.quantities.values())
         return f"{count} of {len(self.quantities)} quantities" if count else ""
 
     def provenance(self) -> tuple[str, ...]:
@@ -127,43 +127,43 @@ class Crane:
     def unreached_sentence(self, axis: str) -> str:
         """The limits that no test of an axis's drive reached, in a sentence; empty if it has none.
 
-        Limits that were given another value since are none of them.
+        Limits that were given another value since then are left out.
         """
         drive: Drive = getattr(self, axis)
         return drive.parameters.unreached_sentence(f"the {axis}'s drive")
 
-    def with_drive(self, *, known: bool = True, **drives: DriveLike) -> Crane:
+    def with_drive(self, *, known_to_controller: bool = True, **drives: DriveLike) -> Crane:
         """The crane with other drives by axis.
 
         Parameters
         ----------
-        known : bool
+        known_to_controller : bool
             Whether the controller knows the new drives, as after a redesign. If not, it counts on
-            those before, as if a drive has worn: inverse maps, the stick's full speed and the clip
-            are theirs.
+            the drives before, as if a drive has worn: inverse maps, the stick's full speed and the
+            clip are theirs.
         **drives
-            Each is a drive, ``luff=crane.luff.scale(Z16=1.5)``; the result of a fit; or a place: a
-            packaged name, a parameter file, or the folder that a fit wrote. The verdict on a fit
-            stands in `sources`; a drive that is not usable is taken, and assessments say so.
+            Each is a drive, ``luff=crane.luff.scale(Z16=1.5)``; the result of a fit; a packaged
+            name; a parameter file; or the folder that a fit wrote. The verdict on a fit stands in
+            `sources`; a drive that is not usable is taken, and assessments say so.
         """
         check_names("A crane has no drive", drives, AXES, "it has")
         replacements, new_sources = drives_of(drives, Path())
-        known_to_controller = {
+        counted_on = {
             axis: drive
             for axis, drive in self.known_to_controller.items()
             if axis not in replacements
         }
-        if not known:
+        if not known_to_controller:
             for axis, drive in replacements.items():
                 before = self.controller_drive(axis)
                 if before != drive:
-                    known_to_controller[axis] = before
+                    counted_on[axis] = before
         sources = {
             axis: source for axis, source in self.sources.items() if axis not in replacements
         }
         return replace(
             self,
-            known_to_controller=known_to_controller,
+            known_to_controller=counted_on,
             sources=sources | new_sources,
             **replacements,
         )
@@ -209,15 +209,15 @@ class Crane:
         """Lengths as the equations take them, in SI."""
         si = {name: values[0] for name, values in self._si.items()}
         return Geometry(
-            si["boom_length"],
-            si["foot_offset"],
-            Vector(*self._si["slew_axis"]),
-            si["tower_sheave_distance"],
-            cos(si["tower_sheave_angle"]),
-            sin(si["tower_sheave_angle"]),
-            si["hoist_drum_radius"] / si["hoist_falls"],
-            si["luff_drum_radius"] / si["luff_falls"],
-            si["rope_coupling"],
+            boom=si["boom_length"],
+            foot=si["foot_offset"],
+            axis=Vector(*self._si["slew_axis"]),
+            sheave=si["tower_sheave_distance"],
+            sheave_cos=cos(si["tower_sheave_angle"]),
+            sheave_sin=sin(si["tower_sheave_angle"]),
+            hoist=si["hoist_drum_radius"] / si["hoist_falls"],
+            luff=si["luff_drum_radius"] / si["luff_falls"],
+            coupling=si["rope_coupling"],
         )
 
     @cached_property
@@ -324,14 +324,14 @@ def preset_text(name: str) -> str:
 
 def _geometry_of(content: CraneFile, origin: str) -> dict[str, CraneQuantity]:
     """All quantities of a crane's file; refuses a name that is missing or unknown."""
-    given = {**DEFAULTS, **content.geometry}
-    lacks = [name for name in GEOMETRY if name not in given and name not in MAY_LACK]
-    strange = [name for name in content.geometry if name not in GEOMETRY]
-    if lacks or strange:
-        extra = f", and knows no '{strange[0]}'" if strange else ""
-        need = f"needs an entry '{lacks[0]}'" if lacks else f"has {len(GEOMETRY)} quantities"
+    quantities = {**DEFAULTS, **content.geometry}
+    missing = [name for name in GEOMETRY if name not in quantities and name not in MAY_LACK]
+    unknown = [name for name in content.geometry if name not in GEOMETRY]
+    if missing or unknown:
+        extra = f", and knows no '{unknown[0]}'" if unknown else ""
+        need = f"needs an entry '{missing[0]}'" if missing else f"has {len(GEOMETRY)} quantities"
         raise ParameterError(f"{origin}: geometry {need}{extra}.")
-    return {name: given[name] for name in GEOMETRY if name in given}
+    return {name: quantities[name] for name in GEOMETRY if name in quantities}
 
 
 def _read(text: str, origin: str, folder: Path) -> Crane:
@@ -342,9 +342,9 @@ def _read(text: str, origin: str, folder: Path) -> Crane:
     limits_of(content.limits, origin)
     drives, sources = drives_of(content.drives, folder)
     return Crane(
-        content.name,
-        content.title,
-        quantities,
+        name=content.name,
+        title=content.title,
+        quantities=quantities,
         **drives,
         sources=sources,
         limits=content.limits,

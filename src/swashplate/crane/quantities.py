@@ -75,7 +75,7 @@ GEOMETRY: Mapping[str, QuantityDefinition] = {
 }
 """Quantities of a crane by name, with ranges that every crane lies well within."""
 MAY_LACK = ("deck",)
-"""Quantities that a crane may be without: what they decide is then not looked at."""
+"""Quantities that a crane may be without; what depends on them is then left out."""
 DEFAULTS: Mapping[str, CraneQuantity] = {
     "swing_damping": CraneQuantity(
         value=0.005,
@@ -84,7 +84,7 @@ DEFAULTS: Mapping[str, CraneQuantity] = {
         source="not given; loads on ropes have a damping ratio of 0.2 to 1 % (air, sheaves, rope)",
     )
 }
-"""Quantities that a file may leave out, as they then are."""
+"""Quantities that a file may leave out, with the values that then count."""
 ROUNDING = 1e-9
 """By which a number may lie beyond its range."""
 SAME = 1e-9
@@ -127,14 +127,15 @@ def values_of(
     name: str, quantity: CraneQuantity, definition: QuantityDefinition, origin: str
 ) -> tuple[float, ...]:
     """A quantity in SI; a `ParameterError` if it is out of its plausible range."""
-    given = quantity.values
-    if len(given) != definition.size:
-        raise ParameterError(f"{origin}: {name} must be {_shape(definition)}, not {len(given)}.")
-    values = [to_si(each, quantity.unit, definition.unit, f"{origin}: {name}") for each in given]
+    numbers = quantity.values
+    if len(numbers) != definition.size:
+        raise ParameterError(f"{origin}: {name} must be {_shape(definition)}, not {len(numbers)}.")
+    subject = f"{origin}: {name}"
+    values = [to_si(number, quantity.unit, definition.unit, subject) for number in numbers]
     in_degrees = definition.unit == "rad"
-    for number, value in zip(given, values, strict=True):
+    for number, value in zip(numbers, values, strict=True):
         shown = degrees(value) if in_degrees else value
-        # as an angle in degrees may come back a rounding beyond its end
+        # an angle in degrees may come back a rounding beyond its end
         if not definition.low - ROUNDING <= shown <= definition.high + ROUNDING:
             unit = "deg" if in_degrees else definition.unit.replace("1", "")
             written = f"{number:g} {quantity.unit}".removesuffix(" 1")
@@ -156,11 +157,11 @@ def in_si(quantities: Mapping[str, CraneQuantity], origin: str) -> dict[str, tup
     InputError
         For a unit that does not measure the quantity.
     """
-    known = {**DEFAULTS, **quantities}
+    complete = {**DEFAULTS, **quantities}
     si = {
-        name: values_of(name, known[name], definition, origin)
+        name: values_of(name, complete[name], definition, origin)
         for name, definition in GEOMETRY.items()
-        if name in known or name not in MAY_LACK
+        if name in complete or name not in MAY_LACK
     }
     low, high = map(degrees, si["boom_limits"])
     if not 0.0 <= low < high < 90.0:

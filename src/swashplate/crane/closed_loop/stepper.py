@@ -151,8 +151,8 @@ class CraneStepper:
         self._open = (
             not settings.path and not fixed.loaded and fixed.actuation in (loop.VOLTS, loop.INVERSE)
         )
-        drive_steps = [step.step for step, _ in compiled]
-        self._loop = loop.loop_of(*drive_steps, controller_step)
+        hoist_step, slew_step, luff_step = (step.step for step, _ in compiled)
+        self._loop = loop.loop_of(hoist_step, slew_step, luff_step, controller_step)
         g = fixed.geometry
         home = fixed.home
         axes = np.zeros((6, 3))

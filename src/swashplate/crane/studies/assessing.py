@@ -1,11 +1,11 @@
-"""Assessing control over many seaways, and looking for what would do if it fails."""
+"""Assessment of control over many seaways, and a search for what would do if it fails."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
 from math import pi, sqrt
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -24,7 +24,7 @@ from swashplate.crane.studies.crane_assessment import (
     Remedy,
     all_of,
     assessed_limits,
-    share_worse,
+    share_worse_of,
 )
 from swashplate.crane.studies.following import follow
 from swashplate.crane.studies.run_outcome import RunOutcome
@@ -35,12 +35,12 @@ from swashplate.errors import InputError
 from swashplate.tables import count
 
 SEAWAYS = 120
-"""Seaways that are assessed by default: 72 are the least that can tell an allowed share of 5 %, 110
-if one of them leaves the model with and without control."""
+"""Seaways that are assessed by default: an allowed share of 5 % needs 72 at least, and 110 if the
+model is left in one of them with and without control."""
 FACTORS = (1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0)
 """Factors on an in-line orifice that are tried, the smallest first."""
 SHARES = (0.8, 0.6, 0.4)
-"""Shares of what the luff can follow at which control is clipped on trial, the largest first."""
+"""Shares of what the luff can follow at which a clip is tried, the largest first."""
 ACTS = 0.05
 """Share of time from which on a drive's acceleration limit is worth a larger orifice."""
 BLOCK = 20
@@ -51,8 +51,8 @@ def assess(
     crane: Crane,
     control: Controllers,
     *,
-    allowed: float = 0.05,
-    asked: Sequence[Question] | None = None,
+    allowed_share_worse: float = 0.05,
+    questions: Sequence[Question] | None = None,
     remedies: bool = True,
     tipping_points: bool = True,
     **study: Any,
@@ -64,9 +64,9 @@ def assess(
     crane : Crane
     control : Control or mapping of str to Control
         One controller, or several by name.
-    allowed : float
+    allowed_share_worse : float
         Share of seaways in which control may be worse than none.
-    asked : sequence of {"harm", "sufficiency"}, optional
+    questions : sequence of {"harm", "sufficiency"}, optional
         Questions that `Assessment.passed` answers; by default both, or harm alone if the crane has
         no limits.
     remedies : bool
@@ -83,23 +83,26 @@ def assess(
     InputError
         For a share out of range, a question that there is not, or sufficiency without limits.
     """
-    _check_allowed(allowed)
-    questions = _questions(crane, asked)
-    asked_study = Study.of(crane, control, **{"seeds": range(SEAWAYS), **study})
-    none = asked_study.cases[NONE]
-    outcomes = tuple(asked_study.outcomes(list(asked_study.cases.values())))
+    _check_allowed(allowed_share_worse)
+    checked_questions = _questions(crane, questions)
+    variants = Study.of(crane, control, **{"seeds": range(SEAWAYS), **study})
+    none = variants.cases[NONE]
+    damped = none.swing_damping > 0.0  # an undamped swing has no stationary answer
+    outcomes = tuple(variants.outcomes(list(variants.cases.values())))
     linear = None
-    if none.swing_damping > 0.0:
-        linear = linear_response(crane, asked_study.seaway, **none.pose, **none.hangs)
-    assessment = Assessment(asked_study, outcomes, allowed, questions, linear)
-    if (
-        tipping_points and none.swing_damping > 0.0
-    ):  # of an undamped swing there is no stationary answer
-        limits = crane.limits_si if "sufficiency" in questions else {}
-        assessment = replace(
-            assessment,
-            tipping_points=tipping_points_of(asked_study, assessment.assessed_variant, limits),
-        )
+    if damped:
+        linear = linear_response(crane, variants.seaway, **none.pose, **none.hangs)
+    assessment = Assessment(
+        study=variants,
+        outcomes=outcomes,
+        allowed_share_worse=allowed_share_worse,
+        questions=checked_questions,
+        linear=linear,
+    )
+    if tipping_points and damped:
+        limits = crane.limits_si if "sufficiency" in checked_questions else {}
+        points = tipping_points_of(variants, assessment.assessed_variant, limits)
+        assessment = replace(assessment, tipping_points=points)
     if assessment.outcome == "fails" and remedies:
         return _with_remedies(assessment)
     return assessment
@@ -108,20 +111,21 @@ def assess(
 def _check_allowed(allowed: float) -> None:
     if not 0.0 <= allowed < 1.0:
         raise InputError(
-            f"allowed is {allowed:g}, but is a share of seaways: 0 to below 1, or below 100 %."
+            f"allowed_share_worse is {allowed:g}, but must be a share of seaways: 0 to below 1, or "
+            "below 100 %."
         )
 
 
-def _questions(crane: Crane, asked: Sequence[Question] | None) -> tuple[Question, ...]:
-    if asked is None:
+def _questions(crane: Crane, questions: Sequence[Question] | None) -> tuple[Question, ...]:
+    if questions is None:
         return QUESTIONS if crane.limits else QUESTIONS[:1]
-    check_names("There is no question", asked, QUESTIONS)
-    if "sufficiency" in asked and not crane.limits:
+    check_names("There is no question", questions, QUESTIONS)
+    if "sufficiency" in questions and not crane.limits:
         raise InputError(
             f"{crane.name} has no limits to suffice for: give its file a table [limits], as "
             '[limits] with side_lead = { value = 4, unit = "deg" }.'
         )
-    return tuple(asked)
+    return tuple(questions)
 
 
 def seaways_needed(seaways: int, allowed: float) -> str:
@@ -141,26 +145,24 @@ def seaways_needed(seaways: int, allowed: float) -> str:
 
 def _with_remedies(assessment: Assessment) -> Assessment:
     """The assessment with what would do, of larger orifices and of clips."""
-    study, case = assessment.study, assessment.study.cases[assessment.assessed_variant]
-    controller = case.options["control"]
-    if not case.driven or controller is None:
+    case = assessment.study.cases[assessment.assessed_variant]
+    control = case.options["control"]
+    if not case.driven or control is None:
         return assessment
     # factors are of the crane as it is built, whatever was assessed
-    cranes = (study.crane,) if len(case.cranes) == 1 else case.cranes
-    found: list[Remedy] = []
-    tried: list[str] = []
-    for trials in (
-        _larger_orifices(assessment, cranes, controller),
-        _clips(case, cranes, controller),
-    ):
-        remedies = _tried(assessment, trials)
-        tried += [what for what, *_ in trials[: len(remedies)]]
-        passing = [remedy for remedy in remedies if remedy is not None and remedy.passes]
-        tried = tried[: len(tried) - len(passing)]
-        found += _least([remedy for remedy in remedies if remedy is not None])
-    named = [remedy.what for remedy in found]
-    others = [what for what in tried if what not in named]
-    return replace(assessment, remedies=tuple(found), tried=tuple(others))
+    cranes = (assessment.study.crane,) if len(case.cranes) == 1 else case.cranes
+    remedies: list[Remedy] = []
+    failed: list[str] = []
+    for trials in (_larger_orifices(assessment, cranes, control), _clips(case, cranes, control)):
+        results = _results(assessment, trials)
+        remedies += _least([result for result in results if result is not None])
+        # the last one, if it passes, has not failed
+        for trial, result in zip(trials, results, strict=False):
+            if result is None or not result.passes:
+                failed.append(trial.what)
+    named = [remedy.what for remedy in remedies]
+    others = [what for what in failed if what not in named]
+    return replace(assessment, remedies=tuple(remedies), tried=tuple(others))
 
 
 def _least(remedies: list[Remedy]) -> list[Remedy]:
@@ -172,82 +174,91 @@ def _least(remedies: list[Remedy]) -> list[Remedy]:
     return remedies[:1]
 
 
-Trial = tuple[str, float, Case]
+class RemedyTrial(NamedTuple):
+    """A change that is tried."""
+
+    what: str
+    """In words: ``"luff orifice ×1.5"``."""
+    size: float
+    """Factor on the orifice, or size of the clip. [m]"""
+    case: Case
+    """The variant with that change."""
 
 
 def _larger_orifices(
-    assessment: Assessment, cranes: tuple[Crane, ...], controller: Control
-) -> list[Trial]:
+    assessment: Assessment, cranes: tuple[Crane, ...], control: Control
+) -> list[RemedyTrial]:
     """Larger orifices of the drive whose acceleration limit acts the longest, if one does."""
-    case = assessment.study.cases[assessment.assessed_variant]
-    shares = {
-        axis: assessment.acting(assessment.assessed_variant, axis, Limit.ORIFICE) for axis in AXES
-    }
+    variant = assessment.assessed_variant
+    case = assessment.study.cases[variant]
+    shares = {axis: assessment.acting(variant, axis, Limit.ORIFICE) for axis in AXES}
     axis = max(shares, key=lambda name: float(np.nan_to_num(shares[name])))
     if not shares[axis] >= ACTS:
         return []
     trials = []
     for factor in FACTORS:
         larger = tuple(with_design_change(crane, axis, {"orifice": factor}) for crane in cranes)
-        trial = case.changed(control=controller)._replace(cranes=larger)
-        trials.append((f"{axis} orifice ×{factor:g}", factor, trial))
+        changed = case.changed(control=control)._replace(cranes=larger)
+        trials.append(RemedyTrial(f"{axis} orifice ×{factor:g}", factor, changed))
     return trials
 
 
-def _clips(case: Case, cranes: tuple[Crane, ...], controller: Control) -> list[Trial]:
+def _clips(case: Case, cranes: tuple[Crane, ...], control: Control) -> list[RemedyTrial]:
     """Clips at shares of what the luff can follow at the load's period."""
-    stages = [stage for stage in controller.stages if not isinstance(stage, Clip | PositionLoop)]
-    present = [stage.share for stage in controller.stages if isinstance(stage, Clip)]
+    stages = [stage for stage in control.stages if not isinstance(stage, Clip | PositionLoop)]
+    present = [stage.share for stage in control.stages if isinstance(stage, Clip)]
     period = 2.0 * pi * sqrt(case.pose["rope_m"] / GRAVITY)
     reach = float(follow(cranes[0], [period], seas=(), **case.pose).amplitude[0, 2])
     trials = []
     for share in SHARES:
         if present and share >= present[0]:
             continue  # what is assessed has that clip already
-        control = Chain((*stages, Clip(share=share), LOOP))
-        trial = case.changed(control=control)._replace(cranes=cranes)
-        trials.append((f"a clip of {share * reach:.2g} m", share * reach, trial))
+        size = share * reach
+        clipped = Chain((*stages, Clip(share=share), LOOP))
+        changed = case.changed(control=clipped)._replace(cranes=cranes)
+        trials.append(RemedyTrial(f"a clip of {size:.2g} m", size, changed))
     return trials
 
 
-def _tried(assessment: Assessment, trials: Sequence[Trial]) -> list[Remedy | None]:
-    """Trials up to the first that passes; None for one that harms, or does not help on."""
-    remedies: list[Remedy | None] = []
+def _results(assessment: Assessment, trials: Sequence[RemedyTrial]) -> list[Remedy | None]:
+    """Results of trials up to the first that passes; None for one that harms, or helps no more."""
+    results: list[Remedy | None] = []
     harmless = False
-    for what, size, case in trials:
-        remedy = _trial(assessment, what, size, case, only_if_sufficient=harmless)
-        remedies.append(remedy)
-        if remedy is not None and remedy.passes:
+    for trial in trials:
+        result = _result(assessment, trial, only_if_sufficient=harmless)
+        results.append(result)
+        if result is not None and result.passes:
             break
-        harmless = harmless or (remedy is not None and remedy.harmless == "yes")
-    return remedies
+        harmless = harmless or (result is not None and result.harmless == "yes")
+    return results
 
 
-def _trial(
-    assessment: Assessment, what: str, size: float, case: Case, *, only_if_sufficient: bool
+def _result(
+    assessment: Assessment, trial: RemedyTrial, *, only_if_sufficient: bool
 ) -> Remedy | None:
     """A trial in all seaways; None as soon as it surely harms, or surely is not sufficient."""
-    none, seaways = assessment.of(NONE), len(assessment.study.seeds)
-    asked = "sufficiency" in assessment.asked
-    limits = assessment.study.crane.limits_si if asked else {}
+    none = assessment.of(NONE)
+    seaways = len(assessment.study.seeds)
+    sufficiency_asked = "sufficiency" in assessment.questions
+    limits = assessment.study.crane.limits_si if sufficiency_asked else {}
     outcomes: list[RunOutcome] = []
     for first in range(0, seaways, BLOCK):
         block = range(first, min(first + BLOCK, seaways))
-        outcomes += [found for (found,) in assessment.study.outcomes([case], block)]
-        worse = share_worse(outcomes, none[: len(outcomes)])
+        outcomes += [outcome for (outcome,) in assessment.study.outcomes([trial.case], block)]
+        share_worse = share_worse_of(outcomes, none[: len(outcomes)])
         limited = assessed_limits(outcomes, limits)
         decisions = [quantity.within for quantity in limited]
-        if worse.value * len(outcomes) > assessment.allowed * seaways:
+        if share_worse.value * len(outcomes) > assessment.allowed_share_worse * seaways:
             return None
         if only_if_sufficient and "no" in decisions:
             return None
     swing = rms_of(np.array([outcome.rms_swing for outcome in outcomes]))
     return Remedy(
-        what=what,
-        size=size,
-        harmless="yes" if worse.high <= assessment.allowed else "not decided",
-        sufficient=all_of(decisions) if asked else None,
-        worse=worse,
+        what=trial.what,
+        size=trial.size,
+        harmless="yes" if share_worse.high <= assessment.allowed_share_worse else "not decided",
+        sufficient=all_of(decisions) if sufficiency_asked else None,
+        share_worse=share_worse,
         swing=swing,
         beyond=tuple(quantity.words() for quantity in limited if quantity.within == "no"),
     )

@@ -81,7 +81,8 @@ def drawn_cranes(crane: Crane, **draws: Draws) -> tuple[Crane, ...]:
     cranes = list[Crane]()
     for combination in zip(*shuffled.values(), strict=False):
         drives = dict(zip(shuffled, combination, strict=True))
-        cranes.append(replace(crane.with_drive(known=False, **drives), sources=sources))
+        drawn = crane.with_drive(known_to_controller=False, **drives)
+        cranes.append(replace(drawn, sources=sources))
     return tuple(cranes)
 
 

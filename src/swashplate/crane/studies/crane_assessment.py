@@ -98,7 +98,7 @@ class Remedy(NamedTuple):
     """Whether control is worse than none as seldom as allowed then."""
     sufficient: Decision | None
     """Whether all stays within its limits then; None if that was not asked."""
-    worse: ConfidenceInterval
+    share_worse: ConfidenceInterval
     """Share of seaways in which control is then worse than none."""
     swing: ConfidenceInterval
     """Root mean square swing then. [rad]"""
@@ -121,9 +121,9 @@ class Assessment(Tabular, Drawn):
     """Crane, variants, seaways, and for how long each counts."""
     outcomes: tuple[tuple[RunOutcome, ...], ...]
     """Of every seaway, in the order of the variants."""
-    allowed: float
+    allowed_share_worse: float
     """Share of seaways in which control may be worse than none."""
-    asked: tuple[Question, ...]
+    questions: tuple[Question, ...]
     """Questions that `passed` answers."""
     linear: LinearResponse | None
     """The crane without control in the frequency domain; None if its swing is not damped."""
@@ -155,7 +155,7 @@ class Assessment(Tabular, Drawn):
         return [outcomes[self.names.index(name)] for outcomes in self.outcomes]
 
     def swing(self, name: str) -> Array:
-        """(n,) root mean square swing in each seaway [rad]; NaN where it left the model."""
+        """(n,) root mean square swing in each seaway [rad]; NaN if it left the model there."""
         return np.array([outcome.rms_swing for outcome in self.of(name)])
 
     def departures(self, name: str) -> dict[str, int]:
@@ -169,16 +169,16 @@ class Assessment(Tabular, Drawn):
         """Mean paired difference of the root mean square swing to another variant. [rad]"""
         return mean_of(self.swing(name) - self.swing(other))
 
-    def worse(self, name: str) -> ConfidenceInterval:
+    def share_worse(self, name: str) -> ConfidenceInterval:
         """Share of seaways in which a variant swings more than no control.
 
         One that leaves the model, or is stopped, is worse than one that does not; if both do, that
         seaway is not decided.
         """
-        return share_worse(self.of(name), self.of(NONE))
+        return share_worse_of(self.of(name), self.of(NONE))
 
     def limited(self, name: str) -> tuple[AssessedQuantity, ...]:
-        """All that has a limit, of a variant."""
+        """Quantities of a variant that have a limit."""
         outcomes = self.of(name)
         return assessed_limits(outcomes, self.study.crane.limits_si)
 
@@ -192,10 +192,10 @@ class Assessment(Tabular, Drawn):
     @property
     def harmless(self) -> Decision:
         """Whether the assessed variant is worse than none as seldom as allowed."""
-        share = self.worse(self.assessed_variant)
-        if share.low > self.allowed:
+        share = self.share_worse(self.assessed_variant)
+        if share.low > self.allowed_share_worse:
             return "no"
-        return "yes" if share.high <= self.allowed else "not decided"
+        return "yes" if share.high <= self.allowed_share_worse else "not decided"
 
     @property
     def sufficient(self) -> Decision | None:
@@ -210,15 +210,15 @@ class Assessment(Tabular, Drawn):
 
     @property
     def _leaves_often(self) -> bool:
-        left = sum(self.departures(self.assessed_variant).values())
-        return left * THREE_HOURS >= len(self.study.seeds) * self.study.length
+        departures = sum(self.departures(self.assessed_variant).values())
+        return departures * THREE_HOURS >= len(self.study.seeds) * self.study.length
 
     @property
     def idle(self) -> bool:
         """Whether the assessed variant swings as no control does, in every seaway."""
-        own, none = self.swing(self.assessed_variant), self.swing(NONE)
-        same = np.allclose(own, none, rtol=IDLE, equal_nan=True)
-        return bool(same and np.isfinite(own).any())
+        controlled = self.swing(self.assessed_variant)
+        same = np.allclose(controlled, self.swing(NONE), rtol=IDLE, equal_nan=True)
+        return bool(same and np.isfinite(controlled).any())
 
     @property
     def passed(self) -> bool:
@@ -227,15 +227,15 @@ class Assessment(Tabular, Drawn):
             "harm": self.harmless,
             "sufficiency": self.sufficient,
         }
-        return not self.idle and all(answers[question] == "yes" for question in self.asked)
+        return not self.idle and all(answers[question] == "yes" for question in self.questions)
 
     @property
     def outcome(self) -> Literal["passes", "fails", "not decided"]:
-        """`passed`, or whether more seaways could tell."""
+        """Passes if `passed`; not decided if more seaways could decide; else fails."""
         if self.passed:
             return "passes"
-        answers = [self.harmless] if "harm" in self.asked else []
-        if "sufficiency" in self.asked and self.sufficient is not None:
+        answers = [self.harmless] if "harm" in self.questions else []
+        if "sufficiency" in self.questions and self.sufficient is not None:
             answers.append(self.sufficient)
         return "fails" if "no" in answers or self.idle else "not decided"
 
@@ -266,34 +266,34 @@ class Assessment(Tabular, Drawn):
 
     def harm_sentence(self) -> str:
         """Whether the assessed variant harms, and by how much it changes the swing."""
-        share, seaways = self.worse(self.assessed_variant), len(self.study.seeds)
-        none, own = (
-            np.degrees(rms_of(self.swing(name)).value) for name in (NONE, self.assessed_variant)
-        )
+        share = self.share_worse(self.assessed_variant)
+        seaways = len(self.study.seeds)
+        without = np.degrees(rms_of(self.swing(NONE)).value)
+        controlled = np.degrees(rms_of(self.swing(self.assessed_variant)).value)
         drives = f"With the drives '{self.assessed_variant}' the controller"
         if self.idle:
             return (
-                f"{drives} changes nothing: {none:.2f} deg RMS without it, {own:.2f} with it, in "
-                f"{count(seaways, 'seaway')}."
+                f"{drives} changes nothing: {without:.2f} deg RMS without it, {controlled:.2f} "
+                f"with it, in {count(seaways, 'seaway')}."
             )
         worse = f"swing worse than none in {counted_words(share, seaways)}"
         if self.harmless == "yes":
-            return f"{drives} does no harm: it makes {worse}{_rms_words(none, own)}."
+            return f"{drives} does no harm: it makes {worse}{_rms_words(without, controlled)}."
         if self.harmless == "no":
-            return f"{drives} harms: it makes {worse}{_rms_words(none, own)}{self._cause()}."
-        both = sum(
-            bool(own.departure_reason and other.departure_reason)
-            for own, other in zip(self.of(self.assessed_variant), self.of(NONE), strict=True)
-        )
-        if both:
             return (
-                f"{drives} makes {worse}; in {both} both leave the model, so that it is not "
+                f"{drives} harms: it makes {worse}{_rms_words(without, controlled)}{self._cause()}."
+            )
+        pairs = zip(self.of(self.assessed_variant), self.of(NONE), strict=True)
+        undecided = sum(bool(run.departure_reason and none.departure_reason) for run, none in pairs)
+        if undecided:
+            return (
+                f"{drives} makes {worse}; in {undecided} both leave the model, so that it is not "
                 "decided whether control harms: take a smaller sea."
             )
         return (
             f"{drives} makes {worse}: that does not say whether it is more than the "
-            f"{100.0 * self.allowed:g} % allowed. Run more seaways "
-            f"({more_seaways(share.value, seaways, self.allowed)})."
+            f"{100.0 * self.allowed_share_worse:g} % allowed. Run more seaways "
+            f"({more_seaways(share.value, seaways, self.allowed_share_worse)})."
         )
 
     def sufficiency_sentence(self) -> str:
@@ -302,14 +302,16 @@ class Assessment(Tabular, Drawn):
             return ""
         limited = self.limited(self.assessed_variant)
         beyond = [quantity.words() for quantity in limited if quantity.within == "no"]
-        open_ = [quantity.words() for quantity in limited if quantity.within == "not decided"]
-        left = sum(self.departures(self.assessed_variant).values())
+        undecided = [quantity.words() for quantity in limited if quantity.within == "not decided"]
         if self.sufficient == "yes":
             return "It suffices: in 3 h all stays within its limits."
         if self.sufficient == "no":
-            causes = beyond or [f"it leaves the model in {count(left, 'seaway')}"]
+            departures = sum(self.departures(self.assessed_variant).values())
+            causes = beyond or [f"it leaves the model in {count(departures, 'seaway')}"]
             return f"It does not suffice: in 3 h {'; '.join(causes)}."
-        return f"Whether it suffices is not decided: in 3 h {'; '.join(open_)}. Run more seaways."
+        return (
+            f"Whether it suffices is not decided: in 3 h {'; '.join(undecided)}. Run more seaways."
+        )
 
     def remedy_sentences(self) -> list[str]:
         """What would do, or that nothing that was tried would; none if nothing was."""
@@ -324,7 +326,7 @@ class Assessment(Tabular, Drawn):
         what = remedy.what.capitalize()
         if remedy.harmless == "not decided":
             seaways = len(self.study.seeds)
-            more = more_seaways(remedy.worse.value, seaways, self.allowed)
+            more = more_seaways(remedy.share_worse.value, seaways, self.allowed_share_worse)
             if remedy.sufficient == "no":
                 beyond = "; ".join(remedy.beyond)
                 return f"{what} may do no harm, but would not suffice: in 3 h {beyond}."
@@ -380,7 +382,8 @@ class Assessment(Tabular, Drawn):
         return [*tables, self._remedy_table()] if self.remedies else tables
 
     def _swing_table(self) -> Table:
-        seaways, minutes = len(self.study.seeds), self.study.length / 60.0
+        seaways = len(self.study.seeds)
+        minutes = self.study.length / 60.0
         interval = [Column(head, ".2f", "rad", none="–") for head in ("rms", "from", "to")]
         table = Table(
             f"Swing in {count(seaways, 'seaway')} of {minutes:g} min, 95 % intervals",
@@ -398,7 +401,7 @@ class Assessment(Tabular, Drawn):
                 *rms_of(self.swing(name)),
                 largest_of(self.of(name), "swing").value,
                 sum(self.departures(name).values()),
-                look=name != NONE and self.worse(name).value > self.allowed,
+                look=name != NONE and self.share_worse(name).value > self.allowed_share_worse,
             )
             if name == NONE and self.linear is not None:
                 swing = self.linear.values["swing"]
@@ -406,14 +409,14 @@ class Assessment(Tabular, Drawn):
         return table
 
     def _worse_table(self) -> Table:
-        share = [Column("worse than none", ".1%"), Column("from", ".1%"), Column("to", ".1%")]
-        columns = (Column("variant", wrap=True), Column("seaways", "d"), *share)
+        shares = [Column("worse than none", ".1%"), Column("from", ".1%"), Column("to", ".1%")]
+        columns = (Column("variant", wrap=True), Column("seaways", "d"), *shares)
         table = Table("More swing than without control, 95 % intervals", columns)
         seaways = len(self.study.seeds)
         for name in self.names[1:]:
-            found = self.worse(name)
-            look = found.value > self.allowed
-            table.add(name, round(found.value * seaways), *found, look=look)
+            share_worse = self.share_worse(name)
+            look = share_worse.value > self.allowed_share_worse
+            table.add(name, round(share_worse.value * seaways), *share_worse, look=look)
         return table
 
     def _limit_table(self) -> Table:
@@ -430,9 +433,15 @@ class Assessment(Tabular, Drawn):
             unit, factor = quantity.shown
             # a side-lead without waves across the boom is 0, not a millionth of a degree
             values = [round(factor * number, 3) for number in (quantity.limit, *quantity.largest)]
-            label, within = LIMITED[quantity.name].label, quantity.within
             without = round(factor * none.get(quantity.name, nan), 3)
-            table.add(label, unit, *values, within, without, look=within != "yes")
+            table.add(
+                LIMITED[quantity.name].label,
+                unit,
+                *values,
+                quantity.within,
+                without,
+                look=quantity.within != "yes",
+            )
         return table
 
     def _difference_table(self) -> Table:
@@ -450,7 +459,7 @@ class Assessment(Tabular, Drawn):
         note = f"tried on the crane's own drives; a clip with a position loop of {LOOP.gain:g} /s"
         table = Table("Remedies", (Column("remedy"), *share, *interval), note)
         for remedy in self.remedies:
-            table.add(remedy.what, *remedy.worse, *remedy.swing)
+            table.add(remedy.what, *remedy.share_worse, *remedy.swing)
         return table
 
     def to_polars(self) -> polars.DataFrame:
@@ -476,7 +485,7 @@ class Assessment(Tabular, Drawn):
     def sentences(self) -> tuple[str, ...]:
         """The verdict, what it rests on, and what would turn it."""
         study = self.study
-        sentences = [self.verdict(), *self._rests()]
+        sentences = [self.verdict(), *self._basis()]
         for name in self.names:
             for reason, seaways in self.departures(name).items():
                 of = count(len(study.seeds), "seaway")
@@ -486,30 +495,39 @@ class Assessment(Tabular, Drawn):
         sentences += study.seaway.sentences()
         return (*sentences, *study.provenance())
 
-    def _rests(self) -> list[str]:
-        """What the answers hang on, in sentences."""
-        study, crane = self.study, self.study.crane
+    def _basis(self) -> list[str]:
+        """What the answers rest on, in sentences."""
+        study = self.study
+        crane = study.crane
         none = study.cases[NONE]
         start = "a stationary swing" if none.swing_damping > 0.0 else "rest, as it is undamped"
         rule = (
             f"Each seaway counts for {study.length:g} s after {study.run_in:g} s from {start}. "
             "Control harms if it is worse than none in more than "
-            f"{100.0 * self.allowed:g} % of them; the 95 % interval of that share decides."
+            f"{100.0 * self.allowed_share_worse:g} % of them; the 95 % interval of that share decides."
         )
-        seaway, spectrum = study.seaway, study.seaway.spectrum
+        seaway = study.seaway
+        spectrum = seaway.spectrum
         waves = (
             f"Waves of {spectrum.height:g} m with a peak at {spectrum.period:g} s and a peak "
             f"factor of {spectrum.peak_factor:g}, at a heading of {seaway.heading_deg:g} deg."
         )
-        damping, given = none.swing_damping, "swing_damping" in none.hangs
-        assumed = not given and crane.quantities["swing_damping"].status == "assumed"
-        words = f"The load's swing has a damping of {100.0 * damping:g} %"
+        damping_assumed = (
+            "swing_damping" not in none.hangs
+            and crane.quantities["swing_damping"].status == "assumed"
+        )
+        damping = f"The load's swing has a damping of {100.0 * none.swing_damping:g} %"
         case = study.cases[self.assessed_variant].words()
-        sentences = [case, rule, waves, f"{words}, assumed." if assumed else f"{words}."]
-        ship = study.seaway.ship
+        sentences = [
+            case,
+            rule,
+            waves,
+            f"{damping}, assumed." if damping_assumed else f"{damping}.",
+        ]
+        ship = seaway.ship
         if isinstance(ship, Hull):
-            words = f"The ship's roll period is {ship.roll_period:g} s"
-            sentences.append(f"{words}, assumed." if ship == CRANE_SHIP else f"{words}.")
+            roll = f"The ship's roll period is {ship.roll_period:g} s"
+            sentences.append(f"{roll}, assumed." if ship == CRANE_SHIP else f"{roll}.")
         peak = 1.0 / spectrum.period
         for axis, source in crane.sources.items():
             if 0.0 < source.fastest_sine < peak:
@@ -520,24 +538,32 @@ class Assessment(Tabular, Drawn):
         return [*sentences, *assumed_words(crane)]
 
 
-def _rms_words(none: float, own: float) -> str:
-    """Swing without control and with it, as far as either is known."""
-    without = "not an operation" if np.isnan(none) else f"{none:.2f} deg RMS"
-    with_it = "not an operation" if np.isnan(own) else f"{own:.2f}"
-    return f": {without} without it, {with_it} with it"
+def _rms_words(without: float, controlled: float) -> str:
+    """Swing without control and with it [deg], as far as either is known."""
+    without_it = "not an operation" if np.isnan(without) else f"{without:.2f} deg RMS"
+    with_it = "not an operation" if np.isnan(controlled) else f"{controlled:.2f}"
+    return f": {without_it} without it, {with_it} with it"
 
 
-def share_worse(own: Sequence[RunOutcome], none: Sequence[RunOutcome]) -> ConfidenceInterval:
-    """Share of seaways in which control swings more than none; see `Assessment.worse`."""
-    worse = unknown = 0
-    for one, other in zip(own, none, strict=True):
-        if one.departure_reason and other.departure_reason:
-            unknown += 1
-        elif one.departure_reason or (
-            not other.departure_reason and one.rms_swing > other.rms_swing
-        ):
+def share_worse_of(
+    controlled: Sequence[RunOutcome], none: Sequence[RunOutcome]
+) -> ConfidenceInterval:
+    """Share of seaways in which control swings more than none; see `Assessment.share_worse`."""
+    worse = 0
+    undecided = 0
+    for run, uncontrolled in zip(controlled, none, strict=True):
+        if run.departure_reason and uncontrolled.departure_reason:
+            undecided += 1
+        elif _is_worse(run, uncontrolled):
             worse += 1
-    return share_of(worse, len(own), unknown)
+    return share_of(worse, len(controlled), undecided)
+
+
+def _is_worse(run: RunOutcome, uncontrolled: RunOutcome) -> bool:
+    """Whether a run with control is worse than that without, of which one at least was whole."""
+    if run.departure_reason or uncontrolled.departure_reason:
+        return bool(run.departure_reason)
+    return run.rms_swing > uncontrolled.rms_swing
 
 
 def largest_of(outcomes: Sequence[RunOutcome], name: str) -> ConfidenceInterval:

@@ -66,7 +66,7 @@ class Case(NamedTuple):
 
     @property
     def driven(self) -> bool:
-        """Whether it has drives that have limits, not ideal ones."""
+        """Whether its drives have limits, as ideal ones have not."""
         return self.options["actuation"] != IDEAL
 
     @property
@@ -83,15 +83,15 @@ class Case(NamedTuple):
     @property
     def swing_damping(self) -> float:
         """Damping ratio of the load's swing."""
-        given = self.options.get("swing_damping")
-        return self.cranes[0].swing_damping if given is None else given
+        damping = self.options.get("swing_damping")
+        return self.cranes[0].swing_damping if damping is None else damping
 
     @property
     def _options(self) -> dict[str, Any]:
         return dict(self.options)
 
     def changed(self, **options: Unpack[RunOptions]) -> Case:
-        """The case set up in another way."""
+        """The case with other options."""
         return self._replace(options=self.options | options)
 
     def run(self, number: int, seaway: Seaway, motion: Array | None = None) -> CraneRun:
@@ -118,7 +118,9 @@ class Case(NamedTuple):
 
     def words(self) -> str:
         """Where the crane stands, what hangs on it and what controls it, in a sentence."""
-        crane, pose, control = self.cranes[0], self.pose, self.options["control"]
+        crane = self.cranes[0]
+        pose = self.pose
+        control = self.options["control"]
         load = self.hangs.get("load")
         mass = crane.safe_load if load is None else load
         stands = (
@@ -134,7 +136,7 @@ class Case(NamedTuple):
             clip = f"; the clip is {size:.2g} m along the boom, sized for the crane's own drives"
         return f"Control by {control.words()}: {stands}{clip}."
 
-    def wanted(self, seaway: Seaway) -> tuple[float, float] | None:
+    def target(self, seaway: Seaway) -> tuple[float, float] | None:
         """Where the load shall be, horizontal and inertial [m]; None if the operator moves it."""
         if self.stick.samples is not None or self.stick.parts:
             return None
@@ -142,8 +144,8 @@ class Case(NamedTuple):
         home = crane.home(**self.pose)
         tip = tip_of(home.slew, boom_at(0.0, crane.geometry, home), crane.geometry)
         attitude = rotation(radians(seaway.list_deg), radians(seaway.trim_deg), 0.0)
-        place = to_inertial(attitude, tip, Vector(0.0, 0.0, 0.0))
-        return place.x, place.y
+        position = to_inertial(attitude, tip, Vector(0.0, 0.0, 0.0))
+        return position.x, position.y
 
 
 @dataclass(frozen=True, eq=False)
@@ -210,18 +212,21 @@ class Study(Result):
             follow from controllers and drives. By default the load hangs abeam on 27 m of rope.
         """
         controllers = control if isinstance(control, Mapping) else {"": control}
-        named = [drives] if isinstance(drives, str) else drives
-        if not isinstance(named, Iterable):
+        names_or_sets = [drives] if isinstance(drives, str) else drives
+        if not isinstance(names_or_sets, Iterable):
             raise InputError(f"drives is {drives!r}, but must be a list of names, or a mapping.")
-        sets = named if isinstance(named, Mapping) else {name: name for name in named}
+        if isinstance(names_or_sets, Mapping):
+            sets = names_or_sets
+        else:
+            sets = {name: name for name in names_or_sets}
         if isinstance(seeds, int):
             raise InputError(f"seeds is {seeds}, but must be a sequence, as range({seeds}).")
         if not (controllers and sets and seeds):
             raise InputError("A study needs a controller, a set of drives and a seed at least.")
-        apart = ("control", "actuation", "load_offset", "load_velocity")
-        poses = [name for name in RunOptions.__annotations__ if name not in apart]
-        words = ("seeds", "sea", "drives", "stick", "length", "run_in", *poses)
-        check_names("A study has no", options, words, "it has")
+        set_here = ("control", "actuation", "load_offset", "load_velocity")
+        run_options = [name for name in RunOptions.__annotations__ if name not in set_here]
+        keywords = ("seeds", "sea", "drives", "stick", "length", "run_in", *run_options)
+        check_names("A study has no", options, keywords, "it has")
         if not (length >= SHORTEST and run_in >= 0.0):
             raise InputError(
                 f"A run counts for {length:g} s after a run-in of {run_in:g} s, but must count for "
@@ -238,20 +243,20 @@ class Study(Result):
         none = Case((crane,), pose | {"control": None, "actuation": "inverse"}, stick)
         cases = {NONE: none}
         for controller, stages in controllers.items():
-            for name, given in sets.items():
-                case = _driven(none.changed(control=stages), name, given)
+            for name, drives_of_set in sets.items():
+                case = _driven(none.changed(control=stages), name, drives_of_set)
                 cases[f"{controller}, {name}" if controller else name] = case
         seaway = sea if isinstance(sea, Seaway) else Seaway(sea)
-        needed = max(seaway.record, stick.length)
+        record = max(seaway.record, stick.length)
         return cls(
-            crane,
-            cases,
-            replace(seaway, record=needed),
-            tuple(seeds),
-            stick.length - run_in,
-            run_in,
-            executor or Threads(),
-            progress,
+            crane=crane,
+            cases=cases,
+            seaway=replace(seaway, record=record),
+            seeds=tuple(seeds),
+            length=stick.length - run_in,
+            run_in=run_in,
+            executor=executor or Threads(),
+            progress=progress,
         )
 
     def provenance(self) -> tuple[str, ...]:
@@ -275,17 +280,17 @@ class Study(Result):
 
         An `InputError` or `ParameterError` if a case cannot begin as it is asked to.
         """
-        for case in cases:  # said here, once, and not by a worker
+        for case in cases:  # refused here, once, and not by a worker
             prepare(case.cranes[0], case.stick, case.options)
-        chosen = range(len(self.seeds)) if numbers is None else numbers
-        outcomes: list[tuple[RunOutcome, ...]] = [()] * len(chosen)
-        items = [(number, self.seeds[number]) for number in chosen]
+        seaway_numbers = range(len(self.seeds)) if numbers is None else numbers
+        outcomes: list[tuple[RunOutcome, ...]] = [()] * len(seaway_numbers)
+        items = [(number, self.seeds[number]) for number in seaway_numbers]
         runs = self.executor.run(_of_seaway, (tuple(cases), self.seaway, self.run_in), items)
-        seaways = counted(runs, len(chosen), "seaways", f"Simulating {self.crane.name}")
-        for done, (position, found) in enumerate(seaways, 1):
-            outcomes[position] = found
+        seaways = counted(runs, len(seaway_numbers), "seaways", f"Simulating {self.crane.name}")
+        for done, (position, of_seaway) in enumerate(seaways, 1):
+            outcomes[position] = of_seaway
             if self.progress is not None and numbers is None:
-                self.progress(done, len(chosen))
+                self.progress(done, len(seaway_numbers))
         return outcomes
 
 
@@ -313,15 +318,15 @@ def clip_size(clip: Clip, crane: Crane, pose: Mapping[str, Any]) -> float:
     return clip.share * float(reach)
 
 
-def _driven(case: Case, name: str, given: str | Crane | Sequence[Crane]) -> Case:
+def _driven(case: Case, name: str, drives: str | Crane | Sequence[Crane]) -> Case:
     """A case on a set of drives: a name of `ACTUATED`, a crane, or several."""
-    if isinstance(given, str):
-        check_names("There are no drives", [given], ACTUATED)
-        return case.changed(actuation=ACTUATED[given])
-    cranes: tuple[Any, ...] = tuple(given) if isinstance(given, Sequence) else (given,)
+    if isinstance(drives, str):
+        check_names("There are no drives", [drives], ACTUATED)
+        return case.changed(actuation=ACTUATED[drives])
+    cranes: tuple[Any, ...] = tuple(drives) if isinstance(drives, Sequence) else (drives,)
     if not cranes or not all(isinstance(crane, Crane) for crane in cranes):
         raise InputError(
-            f"The drives '{name}' are {given!r}, but must be a name, a crane or a list of cranes."
+            f"The drives '{name}' are {drives!r}, but must be a name, a crane or a list of cranes."
         )
     return case._replace(cranes=cranes)
 
@@ -330,8 +335,9 @@ def _of_seaway(
     work: tuple[tuple[Case, ...], Seaway, float], item: tuple[int, int]
 ) -> tuple[RunOutcome, ...]:
     """Outcomes of all cases in one seaway."""
-    (cases, of, run_in), (number, seed) = work, item
-    seaway = replace(of, seed=seed)
+    cases, unseeded, run_in = work
+    number, seed = item
+    seaway = replace(unseeded, seed=seed)
     longest = max(case.stick.length for case in cases)
     motion = seaway.motion(round(longest * RATE) + 1, RATE)
     outcomes = []
@@ -341,5 +347,5 @@ def _of_seaway(
         except (DomainError, InputError):  # the travel's limits, or a tip too fast for the rope
             outcomes.append(STOPPED)
         else:
-            outcomes.append(outcome_of(run, run_in, case.wanted(seaway)))
+            outcomes.append(outcome_of(run, run_in, case.target(seaway)))
     return tuple(outcomes)

@@ -145,7 +145,7 @@ def _swings(ax: Axes, result: Assessment) -> None:
             style.write(ax, f"{left}", (LEFT * edge, row), (7.0, -3.0), coords="data")
         label = style.in_lines(name, NAME)
         if name != NONE:
-            worse = round(result.worse(name).value * swing.size)
+            worse = round(result.share_worse(name).value * swing.size)
             label += f"\nworse than none: {worse} of {swing.size}"
         labels.append(label)
     if result.linear is not None:

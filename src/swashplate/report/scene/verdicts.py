@@ -107,9 +107,9 @@ def write_assessment(assessment: Assessment, path: str | Path) -> None:
 
 def _headline(assessment: Assessment) -> str:
     """The outcome and the answers to what was asked, in one short sentence."""
-    answers = [HARM[assessment.harmless]] if "harm" in assessment.asked else []
+    answers = [HARM[assessment.harmless]] if "harm" in assessment.questions else []
     joint = "and"
-    if "sufficiency" in assessment.asked and assessment.sufficient is not None:
+    if "sufficiency" in assessment.questions and assessment.sufficient is not None:
         if answers and (assessment.harmless == "yes") != (assessment.sufficient == "yes"):
             joint = "but"
         answers.append(SUFFICES[assessment.sufficient])
@@ -128,7 +128,7 @@ def _answers(assessment: Assessment) -> list[Block]:
         sentence = assessment.sufficiency_sentence()
         terms.append(("Sufficiency", LIGHTS[assessment.sufficient], [sentence]))
     for subject, _, sentences in terms:
-        if subject.lower() not in assessment.asked:
+        if subject.lower() not in assessment.questions:
             sentences.append("This was not asked: it does not count for the outcome.")
     return [Block("terms", terms, "verdict")]
 
