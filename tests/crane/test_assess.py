@@ -109,7 +109,9 @@ def test_runs_begin_in_the_stationary_swing_without_control(crane):
     motion = seaway.response(waves.frequency, waves.heading)
     tip = np.array([run.tip[0] - run.ship[0, :3]]).T
     moved = (motion[:3] + np.cross(motion[3:], tip, axis=0))[:2] * waves.amplitude
-    pendulum = waves.met**2 / (omega**2 - waves.met**2 + 2j * 0.005 * omega * waves.met)
+    pendulum = waves.encounter**2 / (
+        omega**2 - waves.encounter**2 + 2j * 0.005 * omega * waves.encounter
+    )
     expected = (pendulum * moved).sum(axis=1).real
     start = run.load[0] - run.tip[0]
     np.testing.assert_allclose(start[:2], expected, rtol=0.01, atol=0.02)

@@ -108,7 +108,7 @@ def test_motion_at_the_coarse_rate_is_the_plain_sum(how):
     waves = sea.waves
     motion = sea.motion(32 * 300 + 1, rate=32.0)
     some = np.r_[0, 4, 8, 300, 4800, 9600]
-    turned = np.exp(1j * np.outer(some / 32.0, waves.met)) * waves.amplitude
+    turned = np.exp(1j * np.outer(some / 32.0, waves.encounter)) * waves.amplitude
     plain = (turned @ sea.response(waves.frequency, waves.heading).T).real
     plain[:, 3] += radians(sea.list_deg)
     plain[:, 4] += radians(sea.trim_deg)
@@ -116,14 +116,14 @@ def test_motion_at_the_coarse_rate_is_the_plain_sum(how):
     if not sea.spread:
         omega = waves.frequency
         met = omega - omega**2 / G * sea.speed * np.cos(waves.heading)
-        assert np.abs(waves.met - met).max() <= pi / sea.period * (1.0 + 1e-9)
+        assert np.abs(waves.encounter - met).max() <= pi / sea.period * (1.0 + 1e-9)
 
 
 def test_motion_between_the_coarse_points_is_the_plain_sum():
     sea = Seaway("ss4", heading_deg=130.0, seed=2, speed=3.0)
     waves = sea.waves
     some = np.r_[1, 63, 65, 1000, 12345, 30719]
-    turned = np.exp(1j * np.outer(some / 512.0, waves.met)) * waves.amplitude
+    turned = np.exp(1j * np.outer(some / 512.0, waves.encounter)) * waves.amplitude
     plain = (turned @ sea.response(waves.frequency, waves.heading).T).real
     np.testing.assert_allclose(sea.motion(60 * 512 + 1)[some], plain, atol=2e-7)
 

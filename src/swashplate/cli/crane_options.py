@@ -60,7 +60,7 @@ class Placed:
     def chosen(self) -> Crane:
         """The crane, with its drives; one whose fit is not usable is refused without --force."""
         drives = dict(pairs_of("--drive", self.drive, "luff=mine.toml"))
-        crane = crane_of(self.crane).with_drive(**drives)
+        crane = crane_of(self.crane).with_drive(known_to_controller=True, **drives)
         if not self.force:
             _refuse_unusable(crane)
         return crane

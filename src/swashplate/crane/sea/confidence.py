@@ -13,7 +13,7 @@ from swashplate.tables import count
 Array = NDArray[np.float64]
 
 ENOUGH = (10, 20, 30, 50, 75, 100, 150, 200, 300, 500, 700, 1000, 1500, 2000, 3000, 5000, 10_000)
-"""Numbers of seaways that are advised where fewer do not decide."""
+"""Numbers of seaways that are advised if fewer do not decide."""
 
 
 class ConfidenceInterval(NamedTuple):
@@ -27,8 +27,7 @@ class ConfidenceInterval(NamedTuple):
 def mean_of(values: Array, least: float = -inf) -> ConfidenceInterval:
     """Mean of independent values with Student's interval; NaN are left out.
 
-    Values that cannot be below `least`, as a swing not below 0, have no interval that reaches
-    below it.
+    The interval is cut off at `least`, below which the values cannot be.
 
     Notes
     -----
@@ -38,12 +37,12 @@ def mean_of(values: Array, least: float = -inf) -> ConfidenceInterval:
     """
     from scipy.special import stdtrit
 
-    known = values[np.isfinite(values)]
-    mean = float(known.mean()) if known.size else np.nan
-    if known.size < 2:
+    finite = values[np.isfinite(values)]
+    mean = float(finite.mean()) if finite.size else np.nan
+    if finite.size < 2:
         return ConfidenceInterval(mean, np.nan, np.nan)
-    t = float(stdtrit(known.size - 1, 0.975))
-    half = t * float(known.std(ddof=1)) / sqrt(known.size)
+    t = float(stdtrit(finite.size - 1, 0.975))
+    half = t * float(finite.std(ddof=1)) / sqrt(finite.size)
     return ConfidenceInterval(mean, max(mean - half, least), mean + half)
 
 

@@ -504,7 +504,8 @@ class Assessment(Tabular, Drawn):
         rule = (
             f"Each seaway counts for {study.length:g} s after {study.run_in:g} s from {start}. "
             "Control harms if it is worse than none in more than "
-            f"{100.0 * self.allowed_share_worse:g} % of them; the 95 % interval of that share decides."
+            f"{100.0 * self.allowed_share_worse:g} % of them; the 95 % interval of that share "
+            "decides."
         )
         seaway = study.seaway
         spectrum = seaway.spectrum

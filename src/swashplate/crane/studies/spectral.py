@@ -163,17 +163,17 @@ def linear_response(
     arm = np.array(tip_of(home.slew, boom, g))
     motion = seaway.response(waves.frequency, waves.heading)
     tip = tip_motion(motion, arm)
-    moved, load_from_tip = _controlled(tip, waves.met, rope_m, damping, settings)
+    moved, load_from_tip = _controlled(tip, waves.encounter, rope_m, damping, settings)
     c, s = cos(home.slew), sin(home.slew)
     along, across = np.array([c, -s]), np.array([-s, -c])
     # the rope's direction in the ship's axes, which turn by roll and pitch
     direction = load_from_tip / rope_m + np.array([motion[4], -motion[3]])
     rolled, pitched = radians(seaway.list_deg), radians(seaway.trim_deg)
     inclined = np.array([pitched, -rolled])
-    vertical = 1j * waves.met * tip[2]
+    vertical = 1j * waves.encounter * tip[2]
     mass = crane.safe_load if load is None else load
-    lifted = -(waves.met**2) * tip[2] / GRAVITY
-    lifted = lifted * _bounce(waves.met, rope_m, mass, suspension or Suspension())
+    lifted = -(waves.encounter**2) * tip[2] / GRAVITY
+    lifted = lifted * _bounce(waves.encounter, rope_m, mass, suspension or Suspension())
     hoist = crane.geometry.hoist * min(np.abs(crane.inverse("hoist").limits))
     responses: dict[str, tuple[Complex, float]] = {
         "swing": (load_from_tip / rope_m, 0.0),
@@ -191,8 +191,8 @@ def linear_response(
         ("luff", float(reach_rate(boom, g)), along @ asked),
     ):
         inverse = crane.inverse(axis)
-        speed = 1j * waves.met * part / (rate * min(np.abs(inverse.limits)))
-        rise = -(waves.met**2) * part / (rate * min(inverse.acceleration))
+        speed = 1j * waves.encounter * part / (rate * min(np.abs(inverse.limits)))
+        rise = -(waves.encounter**2) * part / (rate * min(inverse.acceleration))
         responses[f"{axis}_speed"] = (speed[None], 0.0)
         responses[f"{axis}_acceleration"] = (rise[None], 0.0)
     if settings.clip > 0.0 or settings.share > 0.0:
@@ -271,7 +271,7 @@ def _bounce(met: Array, rope: float, mass: float, suspension: Suspension) -> Com
 def _value(response: Complex, mean: float, waves: Waves, duration: float) -> LinearValue:
     """Moments of a quantity whose components have those amplitudes for each metre of wave."""
     spread = np.real((response * waves.variance) @ response.conj().T)
-    rates = np.real((response * (waves.variance * waves.met**2)) @ response.conj().T)
+    rates = np.real((response * (waves.variance * waves.encounter**2)) @ response.conj().T)
     widths, axes = np.linalg.eigh(spread)
     speeds = np.diagonal(axes.T @ rates @ axes)
     widths = np.maximum(widths, 0.0)
@@ -289,6 +289,6 @@ def stationary_start(
     arm = np.array(tip_of(home.slew, boom_at(0.0, crane.geometry, home), crane.geometry))
     waves = seaway.waves
     tip = tip_motion(seaway.response(waves.frequency, waves.heading), arm)[:2] * waves.amplitude
-    load = swing_response(waves.met, rope_m, damping) * tip
-    (x, y), (u, v) = load.sum(axis=1).real, (1j * waves.met * load).sum(axis=1).real
+    load = swing_response(waves.encounter, rope_m, damping) * tip
+    (x, y), (u, v) = load.sum(axis=1).real, (1j * waves.encounter * load).sum(axis=1).real
     return (float(x), float(y)), (float(u), float(v))
