@@ -411,7 +411,7 @@ def test_cut_and_strange_files_are_refused_by_their_line(tmp_path, s175):
     with pytest.raises(FileError, match=r"cut.re1, line 501: .* is missing, .*the file is cut"):
         read_ship(cut)
     cut.write_text("\n".join(["something else", *lines[1:]]), "utf-8")
-    with pytest.raises(FileError, match="is no VERES file"):
+    with pytest.raises(FileError, match="is not a VERES file"):
         read_ship(cut)
 
 

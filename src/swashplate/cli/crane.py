@@ -265,20 +265,20 @@ def assess(
 
     crane = study.chosen
     side.print(seaways_needed(study.seeds or SEAWAYS, allowed / 100.0))
-    found: Assessment = study.through(assess_control, crane, **more)
-    what, write = "Numbers of every seaway, in SI", found.write
+    assessment: Assessment = study.through(assess_control, crane, **more)
+    what, write = "Numbers of every seaway, in SI", assessment.write
     if out is not None and out.suffix.lower() == ".html":
         from swashplate.report.scene import write_assessment
 
-        what, write = "Verdict", partial(write_assessment, found)
+        what, write = "Verdict", partial(write_assessment, assessment)
     save(out, what, write)
-    draw(plot, "plot_assessment", found)
-    _end(study.chosen, found.tables(), *found.sentences()[1:])
+    draw(plot, "plot_assessment", assessment)
+    _end(study.chosen, assessment.tables(), *assessment.sentences()[1:])
     say_saved()
-    if not found.passed:
-        side.print(found.headline)
+    if not assessment.passed:
+        side.print(assessment.headline)
         raise typer.Exit(1)
-    say(found.headline)
+    say(assessment.headline)
 
 
 @command(
@@ -340,15 +340,15 @@ def operability(
     if headings is not None:
         words = headings.split(",")
         more["headings"] = [number_of(f"--headings {headings}", word) for word in words]
-    found: Operability = study.through(operable, study.chosen, scatter=diagram, **more)
-    what, write = "Cells of the year, in SI", found.write
+    year: Operability = study.through(operable, study.chosen, scatter=diagram, **more)
+    what, write = "Cells of the year, in SI", year.write
     if out is not None and out.suffix.lower() == ".html":
         from swashplate.report.scene import write_operability
 
-        what, write = "Operability", partial(write_operability, found)
+        what, write = "Operability", partial(write_operability, year)
     save(out, what, write)
-    draw(plot, "plot_operability", found)
-    _end(study.chosen, found.tables(), *found.sentences(), *study.chosen.provenance())
+    draw(plot, "plot_operability", year)
+    _end(study.chosen, year.tables(), *year.sentences(), *study.chosen.provenance())
 
 
 @command(
@@ -373,11 +373,11 @@ def follow(at_sea: AtSea, *, out: TableFile = None, plot: FigureFile = None) -> 
         more: dict[str, Any] = {}
         if at_sea.sea and seaway is not None:
             more["seas"] = (seaway.sea,)
-        found = largest_sines(at_sea.chosen, seaway=seaway, **more, **at_sea.pose)
-    save(out, "Amplitudes, in SI", found.tables()[0].write)
-    draw(plot, "plot_follow", found)
+        followable = largest_sines(at_sea.chosen, seaway=seaway, **more, **at_sea.pose)
+    save(out, "Amplitudes, in SI", followable.tables()[0].write)
+    draw(plot, "plot_follow", followable)
     about_sea = sea_sentences(seaway) if at_sea.sea else ()
-    _end(at_sea.chosen, found.tables(), *about_sea, *at_sea.chosen.provenance())
+    _end(at_sea.chosen, followable.tables(), *about_sea, *at_sea.chosen.provenance())
 
 
 @command(
@@ -410,13 +410,13 @@ def sweep(
     """
     more: dict[str, Any] = {}
     if points is not None:
-        more["points"] = [number_of(f"--points {points}", each) for each in points.split(",")]
+        more["points"] = [number_of(f"--points {points}", word) for word in points.split(",")]
     from swashplate.crane import sweep as swing_over
 
-    found: Sweep = study.through(swing_over, study.chosen, over, **more)
-    save(out, "Swing, in SI", found.tables()[0].write)
-    draw(plot, "plot_sweep", found)
-    _end(study.chosen, found.tables(), *sea_sentences(study.waters), *study.chosen.provenance())
+    swept: Sweep = study.through(swing_over, study.chosen, over, **more)
+    save(out, "Swing, in SI", swept.tables()[0].write)
+    draw(plot, "plot_sweep", swept)
+    _end(study.chosen, swept.tables(), *sea_sentences(study.waters), *study.chosen.provenance())
 
 
 @command(
@@ -469,21 +469,21 @@ def damping(
         )
     within = (begins <= series.time) & (series.time <= ends)
     try:
-        found = swing_damping(series.time[within], series.values[within], rope=rope)
+        free_swing = swing_damping(series.time[within], series.values[within], rope=rope)
     except InputError as error:
         raise InputError(f"{log}, {column}: {error}") from None
     ratio = Column("damping ratio", ".3%")
     interval = [Column(name, ".3%") for name in ("from", "to")]
     table = Table("Free swing, 95 % interval", (ratio, *interval, Column("period", ".2f", "s")))
-    table.add(*found)
+    table.add(*free_swing)
     show(table)
 
 
-def _end(crane: Crane, tables: Iterable[Table], *said: str) -> None:
+def _end(crane: Crane, tables: Iterable[Table], *sentences: str) -> None:
     """Print title, tables and sentences."""
     note(crane.title)
     show(*tables)
-    for sentence in said:
+    for sentence in sentences:
         say(sentence)
 
 
@@ -497,9 +497,9 @@ def _stationary_words(operated: Operated, seaway: Seaway, damping: float) -> str
     names = ("slew_deg", "boom_deg", "rope_m", "swing_damping", "load", "suspension")
     start = {"slew_deg": 0.0, "boom_deg": 45.0, "rope_m": 20.0}
     hung = start | {name: options[name] for name in names if name in options}
-    found = linear_response(operated.chosen, seaway, **hung)
+    response = linear_response(operated.chosen, seaway, **hung)
     return (
-        f"Without control the load swings by {degrees(found.values['swing'].rms):.2f} deg RMS in "
+        f"Without control the load swings by {degrees(response.values['swing'].rms):.2f} deg RMS in "
         f"the long run, by the sea's spectrum and a damping of {100.0 * damping:g} %; a run begins "
         "at rest."
     )

@@ -256,7 +256,7 @@ class Operated(AtSea):
         options = self.pose | _given(
             drag_area=self.drag_area, load=self.load, swing_damping=self.swing_damping
         )
-        names = [each.name for each in fields(Suspension)]
+        names = [field.name for field in fields(Suspension)]
         values = numbers_of("--suspension", self.suspension, "stiffness=6e7", names)
         if values:
             options["suspension"] = Suspension(**values)
@@ -363,8 +363,8 @@ class Studied(Operated):
             if not drawn:
                 raise InputError("--drives drawn needs the folder of a fit: --drive luff=FOLDER.")
             sets["drawn"] = drawn_cranes(self.chosen)
-            kept = [axis for axis in AXES if axis not in drawn]
-            as_given = f"; not drawn, without a fit: {', '.join(kept)}" if kept else ""
+            not_drawn = [axis for axis in AXES if axis not in drawn]
+            as_given = f"; not drawn, without a fit: {', '.join(not_drawn)}" if not_drawn else ""
             side.print(f"Drawn: {', '.join(drawn)}{as_given}")
         crane, changed = self.chosen, []
         for name, text in pairs_of("--scale", self.scale, "luff.orifice=1.5"):
@@ -399,7 +399,7 @@ def control_of(words: str) -> Control | None:
     stages: list[Control] = []
     for word in filter(None, words.split("+")):
         name, _, text = word.partition("=")
-        numbers = [number_of(f"The control '{word}'", each) for each in text.split("/") if text]
+        numbers = [number_of(f"The control '{word}'", part) for part in text.split("/") if text]
         kind, most = kinds.get(name, (None, 0))
         if kind is None or len(numbers) > most:
             raise InputError(
@@ -460,13 +460,13 @@ def _vector(option: str, text: str, example: str) -> tuple[float, ...]:
 
 
 def numbers_of(
-    what: str, given: list[str] | None, example: str, known: Sequence[str] = ()
+    what: str, words: list[str] | None, example: str, allowed: Sequence[str] = ()
 ) -> dict[str, Any]:
-    """Numbers by name of an option's pairs; refuses a name that is not known."""
-    pairs = pairs_of(what, given, example)
-    strange = [name for name, _ in pairs if known and name not in known]
-    if strange:
-        raise InputError(f"{what} has no {strange[0]}; it has {', '.join(known)}.")
+    """Numbers by name of an option's pairs; refuses a name that is not allowed."""
+    pairs = pairs_of(what, words, example)
+    unknown = [name for name, _ in pairs if allowed and name not in allowed]
+    if unknown:
+        raise InputError(f"{what} has no {unknown[0]}; it has {', '.join(allowed)}.")
     return {name: number_of(f"{what} {name}={text}", text) for name, text in pairs}
 
 

@@ -83,11 +83,11 @@ def counted_words(share: ConfidenceInterval, seaways: int) -> str:
 
 
 def more_seaways(share: float, seaways: int, allowed: float) -> str:
-    """How many more seaways than so many tell a share from the one allowed, if the share stays."""
-    for more in ENOUGH:
-        found = share_of(round(share * more), more)
-        if more > seaways and not found.low <= allowed <= found.high:
-            return f"about {more}"
+    """How many seaways, more than there were, tell a share from the one allowed, if it stays."""
+    for number in ENOUGH:
+        interval = share_of(round(share * number), number)
+        if number > seaways and not interval.low <= allowed <= interval.high:
+            return f"about {number}"
     # a share as large as the one allowed: more seaways will first tell whether it stays so
     return f"{10 * seaways} to begin with"
 

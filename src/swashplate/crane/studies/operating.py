@@ -44,7 +44,7 @@ Array = NDArray[np.float64]
 HEADINGS = tuple(range(0, 360, 45))
 """Headings of the waves by default, as likely as each other. [deg]"""
 NEAR = 1.3
-"""Factor within which of a limit the frequency domain is not relied on."""
+"""Factor on a limit, and from it, within which the frequency domain is not relied on."""
 SEEDS = (0, 1)
 """Seaways in which a cell is simulated, ten minutes each."""
 SHORTEST = 300.0
@@ -68,9 +68,10 @@ class SeaCell(NamedTuple):
     limited_by: str
     """A name of `LIMITED`, or drive and its limit, ``"luff orifice"``; empty if workable."""
     ratio: float
-    """Largest ratio of a value to its limit; inf if the run left the model, NaN if it was not asked
-    for, as lower than a sea that is workable."""
+    """Largest ratio of a value to its limit; inf if the run left the model; NaN if it was not
+    computed, as a higher sea is workable."""
     simulated: bool
+    """Whether it was simulated, or follows from a cell that was."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -239,11 +240,12 @@ def operability(
     cells: dict[str, dict[tuple[int, float], SeaCell]] = {name: {} for name in study.cases}
     hoist = (np.inf, np.nan, np.nan)
     runs = (executor or Threads()).run(_of_column, work, columns)
-    for position, (found, too_slow) in counted(
+    for position, (column_cells, too_slow) in counted(
         runs, len(columns), "columns", f"Operability of {crane.name}"
     ):
         column = columns[position]
-        cells[column.variant] |= {(row, column.heading): cell for row, cell in found.items()}
+        for row, cell in column_cells.items():
+            cells[column.variant][row, column.heading] = cell
         if too_slow < hoist[0] and column.variant == NONE:
             hoist = (too_slow, column.period, column.heading)
     ordered = {name: dict(sorted(of_name.items())) for name, of_name in cells.items()}
@@ -251,7 +253,14 @@ def operability(
     simulated = f"A cell is simulated in {seaways} of {study.length / 60.0:g} min."
     case = f"{study.cases[list(study.cases)[-1]].words()} {simulated}"
     return Operability(
-        crane, control, scatter, tuple(map(float, headings)), ordered, base, case, hoist
+        crane=crane,
+        control=control,
+        scatter=scatter,
+        headings=tuple(map(float, headings)),
+        cells=ordered,
+        seaway=base,
+        case=case,
+        hoist_limit=hoist,
     )
 
 
@@ -285,16 +294,17 @@ def _of_column(
         return _by_simulation(study, case, replace(unit, sea=sea), limits)
 
     open_rows = [row for row, cell in cells.items() if cell is None]
-    found = cells | _boundary(open_rows, simulated)
+    complete = cells | _boundary(open_rows, simulated)
     slope = linear.slope["hoist_demand"]
     too_slow = limits.get("hoist_demand", np.inf) / slope if slope > 0.0 else np.inf
-    return {row: cell for row, cell in found.items() if cell is not None}, too_slow
+    return {row: cell for row, cell in complete.items() if cell is not None}, too_slow
 
 
 def _boundary(rows: Sequence[int], simulated: Callable[[int], SeaCell]) -> dict[int, SeaCell]:
-    """Cells of rows, the lowest waves first: half of them are decided by each that is simulated."""
+    """Cells of rows, the lowest waves first: each that is simulated decides half of the others."""
     cells: dict[int, SeaCell] = {}
-    low, high = 0, len(rows)
+    low = 0
+    high = len(rows)
     limiting = SeaCell(LEFT, np.inf, True)
     while low < high:
         middle = (low + high) // 2
@@ -303,7 +313,8 @@ def _boundary(rows: Sequence[int], simulated: Callable[[int], SeaCell]) -> dict[
         if cell.limited_by == WORKABLE:
             low = middle + 1
         else:
-            high, limiting = middle, cell
+            high = middle
+            limiting = cell
     for position, row in enumerate(rows):
         if row not in cells:
             cells[row] = SeaCell(WORKABLE, np.nan, True) if position < low else limiting
@@ -329,8 +340,8 @@ def _linear(case: Case, sea: Seaway, limits: Mapping[str, float]) -> _Linear:
     named = {*limits, "hoist_demand"}
     mean = {name: abs(values[name].mean) for name in named}
     slope = {name: values[name].largest - mean[name] for name in named}
-    asked = [name for name in DEMANDS if name in values and (case.driven or name == "clip")]
-    demand = max((values[name].largest for name in asked), default=0.0)
+    demands = [name for name in DEMANDS if name in values and (case.driven or name == "clip")]
+    demand = max((values[name].largest for name in demands), default=0.0)
     return _Linear(slope, mean, demand if control is not None else 0.0)
 
 
@@ -355,8 +366,8 @@ def _by_simulation(
     study: Study, case: Case, seaway: Seaway, limits: Mapping[str, float]
 ) -> SeaCell:
     """A cell by simulated seaways."""
-    one = replace(study, seaway=seaway, executor=Serial(), progress=None)
-    outcomes = [found for (found,) in one.outcomes([case])]
+    in_sea = replace(study, seaway=seaway, executor=Serial(), progress=None)
+    outcomes = [outcome for (outcome,) in in_sea.outcomes([case])]
     if any(outcome.departure_reason for outcome in outcomes):
         return SeaCell(_drive_limit(outcomes) or LEFT, np.inf, True)
     observed = sum(outcome.counted for outcome in outcomes)
@@ -375,10 +386,12 @@ def _by_simulation(
 def _drive_limit(outcomes: Sequence[RunOutcome]) -> str:
     """Drive and limit that act for the longest time, in words; empty if none acts for long."""
     shares = np.mean([np.nan_to_num(outcome.limits) for outcome in outcomes], axis=0)
-    longest, words = ACTS, ""
+    longest = ACTS
+    words = ""
     for row, axis in zip(shares, AXES, strict=True):
         for limit, name in DRIVES_LIMITS.items():
             share = float(row[PUMPS.index(limit)])
             if share > longest:
-                longest, words = share, f"{axis} {name}"
+                longest = share
+                words = f"{axis} {name}"
     return words

@@ -70,7 +70,7 @@ class LinearResponse(Result):
 
     def tables(self) -> list[Table]:
         """Root mean square, period and largest value of each quantity."""
-        made = []
+        tables = []
         for unit in ("rad", "m", "m/s", "1"):
             names = [name for name in self.values if _unit(name) == unit]
             spec = ".2f" if unit == "rad" else ".3f"
@@ -82,8 +82,8 @@ class LinearResponse(Result):
             for name in names:
                 value = self.values[name]
                 table.add(name.replace("_", " "), value.rms, value.period, value.largest)
-            made.append(table)
-        return made
+            tables.append(table)
+        return tables
 
 
 def _unit(name: str) -> str:
@@ -95,8 +95,8 @@ class Waves(NamedTuple):
 
     frequency: Array
     heading: Array
-    met: Array
-    """As the ship meets them. [rad/s]"""
+    encounter: Array
+    """Frequency at which the ship meets them. [rad/s]"""
     variance: Array
     """Of the surface. [m²]"""
 
@@ -163,13 +163,13 @@ def linear_response(
     arm = np.array(tip_of(home.slew, boom, g))
     motion = seaway.response(waves.frequency, waves.heading)
     tip = tip_motion(motion, arm)
-    moved, load_from_tip = _controlled(tip, waves.encounter, rope_m, damping, settings)
+    tip_under_control, load_from_tip = _controlled(tip, waves.encounter, rope_m, damping, settings)
     c, s = cos(home.slew), sin(home.slew)
-    along, across = np.array([c, -s]), np.array([-s, -c])
+    along = np.array([c, -s])
+    across = np.array([-s, -c])
     # the rope's direction in the ship's axes, which turn by roll and pitch
     direction = load_from_tip / rope_m + np.array([motion[4], -motion[3]])
-    rolled, pitched = radians(seaway.list_deg), radians(seaway.trim_deg)
-    inclined = np.array([pitched, -rolled])
+    inclined = np.array([radians(seaway.trim_deg), -radians(seaway.list_deg)])
     vertical = 1j * waves.encounter * tip[2]
     mass = crane.safe_load if load is None else load
     lifted = -(waves.encounter**2) * tip[2] / GRAVITY
@@ -182,13 +182,13 @@ def linear_response(
         "dynamic_factor": (lifted[None], 1.0),
         "hook_speed": (vertical[None], 0.0),
         "hoist_demand": (vertical[None] / hoist, 0.0),
-        "placement": (moved + load_from_tip, 0.0),
+        "placement": (tip_under_control + load_from_tip, 0.0),
     }
-    asked = moved - tip[:2]  # of the drives, in the ship's axes
+    demanded = tip_under_control - tip[:2]  # of the drives, in the ship's axes
     reach = g.foot + g.boom * boom.cos
     for axis, rate, part in (
-        ("slew", reach, across @ asked),
-        ("luff", float(reach_rate(boom, g)), along @ asked),
+        ("slew", reach, across @ demanded),
+        ("luff", float(reach_rate(boom, g)), along @ demanded),
     ):
         inverse = crane.inverse(axis)
         speed = 1j * waves.encounter * part / (rate * min(np.abs(inverse.limits)))
@@ -208,8 +208,9 @@ def linear_response(
                 for drive, rate in zip(inverses, rates, strict=True)
             ]
         )
-        sizes[1] = settings.clip if settings.clip > 0.0 else sizes[1]
-        responses["clip"] = (np.array([across @ asked, along @ asked]) / sizes[:, None], 0.0)
+        if settings.clip > 0.0:
+            sizes[1] = settings.clip
+        responses["clip"] = (np.array([across @ demanded, along @ demanded]) / sizes[:, None], 0.0)
     values = {
         name: _value(response, mean, waves, duration / (2.0 if name == "dynamic_factor" else 1.0))
         for name, (response, mean) in responses.items()
@@ -242,43 +243,51 @@ def tip_motion(motion: Complex, arm: Array) -> Complex:
     return np.asarray(motion[:3] + np.cross(motion[3:], arm[:, None], axis=0))
 
 
-def swing_response(met: Array, rope: float, damping: float) -> Complex:
+def swing_response(omega: Array, rope: float, damping: float) -> Complex:
     """Load less tip over the tip's horizontal motion, ω²/(ω₀² - ω² + 2 i ζ ω₀ ω)."""
-    own = sqrt(GRAVITY / rope)
-    return np.asarray(met**2 / (own**2 - met**2 + 2j * damping * own * met))
+    natural = sqrt(GRAVITY / rope)
+    return np.asarray(omega**2 / (natural**2 - omega**2 + 2j * damping * natural * omega))
 
 
 def _controlled(
-    tip: Complex, met: Array, rope: float, damping: float, settings: Settings
+    tip: Complex, omega: Array, rope: float, damping: float, settings: Settings
 ) -> tuple[Complex, Complex]:
     """The tip's horizontal motion under control, and load less tip, (2, n) each."""
-    left = (0.0 if settings.ship else 1.0) * tip[:2]
-    own = sqrt(GRAVITY / rope)
-    back = settings.feedback * np.exp(-2j * pi * settings.delay * met / own)
-    load = met**2 * left / (own**2 - met**2 * (1.0 + back) + 2j * damping * own * met)
-    return left + back * load, load
+    uncompensated = (0.0 if settings.ship else 1.0) * tip[:2]
+    natural = sqrt(GRAVITY / rope)
+    feedback = settings.feedback * np.exp(-2j * pi * settings.delay * omega / natural)
+    stiffness = natural**2 - omega**2 * (1.0 + feedback) + 2j * damping * natural * omega
+    load = omega**2 * uncompensated / stiffness
+    return uncompensated + feedback * load, load
 
 
-def _bounce(met: Array, rope: float, mass: float, suspension: Suspension) -> Complex:
+def _bounce(omega: Array, rope: float, mass: float, suspension: Suspension) -> Complex:
     """Transmissibility of an elastic rope; 1 for a rigid one."""
     if suspension.stiffness == inf:
-        return np.ones(met.size, dtype=np.complex128)
-    own = sqrt(suspension.stiffness / (rope * (mass + suspension.hook)))
-    damped = 2j * suspension.bounce_damping * own * met
-    return np.asarray((own**2 + damped) / (own**2 - met**2 + damped))
+        return np.ones(omega.size, dtype=np.complex128)
+    natural = sqrt(suspension.stiffness / (rope * (mass + suspension.hook)))
+    damped = 2j * suspension.bounce_damping * natural * omega
+    return np.asarray((natural**2 + damped) / (natural**2 - omega**2 + damped))
 
 
 def _value(response: Complex, mean: float, waves: Waves, duration: float) -> LinearValue:
     """Moments of a quantity whose components have those amplitudes for each metre of wave."""
-    spread = np.real((response * waves.variance) @ response.conj().T)
-    rates = np.real((response * (waves.variance * waves.encounter**2)) @ response.conj().T)
-    widths, axes = np.linalg.eigh(spread)
-    speeds = np.diagonal(axes.T @ rates @ axes)
-    widths = np.maximum(widths, 0.0)
-    total, speed = float(widths.sum()), float(np.maximum(speeds, 0.0).sum())
-    largest = float(largest_of_gaussian(widths[None], np.maximum(speeds, 0.0)[None], duration)[0])
-    period = 2.0 * pi * sqrt(total / speed) if speed > 0.0 else inf
-    return LinearValue(mean, sqrt(total), period, abs(mean) + largest)
+    covariance = np.real((response * waves.variance) @ response.conj().T)
+    squared_rates = waves.variance * waves.encounter**2
+    rate_covariance = np.real((response * squared_rates) @ response.conj().T)
+    # along the principal axes
+    variances, axes = np.linalg.eigh(covariance)
+    variances = np.maximum(variances, 0.0)
+    rate_variances = np.maximum(np.diagonal(axes.T @ rate_covariance @ axes), 0.0)
+    variance = float(variances.sum())
+    rate_variance = float(rate_variances.sum())
+    largest = float(largest_of_gaussian(variances[None], rate_variances[None], duration)[0])
+    return LinearValue(
+        mean=mean,
+        rms=sqrt(variance),
+        period=2.0 * pi * sqrt(variance / rate_variance) if rate_variance > 0.0 else inf,
+        largest=abs(mean) + largest,
+    )
 
 
 def stationary_start(
@@ -290,5 +299,6 @@ def stationary_start(
     waves = seaway.waves
     tip = tip_motion(seaway.response(waves.frequency, waves.heading), arm)[:2] * waves.amplitude
     load = swing_response(waves.encounter, rope_m, damping) * tip
-    (x, y), (u, v) = load.sum(axis=1).real, (1j * waves.encounter * load).sum(axis=1).real
+    x, y = load.sum(axis=1).real
+    u, v = (1j * waves.encounter * load).sum(axis=1).real
     return (float(x), float(y)), (float(u), float(v))

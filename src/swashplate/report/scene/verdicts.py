@@ -71,7 +71,8 @@ def write_assessment(assessment: Assessment, path: str | Path) -> None:
     from swashplate.report.figures.crane import seaway_words
     from swashplate.report.fit_report.summary import light
 
-    study, crane = assessment.study, assessment.study.crane
+    study = assessment.study
+    crane = study.crane
     tables = assessment.tables()
     swings, worse = tables[:2]
     limited = tables[2:3] if crane.limits else []
@@ -147,7 +148,8 @@ def _fit_verdicts(crane: Crane) -> list[Block]:
     looks: dict[bool | None, Light] = {True: "good", False: "bad"}
     terms: list[tuple[str, Light, list[str]]] = []
     for axis in AXES:
-        source, unreached = crane.sources.get(axis), crane.unreached_sentence(axis)
+        source = crane.sources.get(axis)
+        unreached = crane.unreached_sentence(axis)
         look: Light = "look" if source is None else looks.get(source.fit_usable, "look")
         words = [source.words()] if source is not None else []
         if unreached:
@@ -172,7 +174,8 @@ def _example(assessment: Assessment) -> list[Block]:
     """The runs of a typical seaway; nothing if one of them was stopped."""
     from swashplate.report.figures import plot_crane
 
-    seed, assessed = assessment.typical, assessment.assessed_variant
+    seed = assessment.typical
+    assessed = assessment.assessed_variant
     try:
         runs = {name: assessment.run(name, seed) for name in (NONE, assessed)}
     except (DomainError, InputError):  # a run that was stopped has no signals
@@ -186,7 +189,8 @@ def _example(assessment: Assessment) -> list[Block]:
 
 def _basis(assessment: Assessment) -> list[Block]:
     """Pose, controllers, drives, ship, limits and geometry."""
-    study, crane = assessment.study, assessment.study.crane
+    study = assessment.study
+    crane = study.crane
     pose = study.cases[NONE].pose
     basis = [
         f"Boom at {pose['slew_deg']:g}° from the bow to starboard and {pose['boom_deg']:g}° up, "
@@ -239,7 +243,8 @@ def write_operability(operability: Operability, path: str | Path) -> None:
 
     It replaces an older file; a `FileError` if it cannot be written.
     """
-    crane, seaway = operability.crane, operability.seaway
+    crane = operability.crane
+    seaway = operability.seaway
     (table,) = operability.tables()
     summary = [
         text(_lead(operability), "lead"),
