@@ -127,7 +127,7 @@ ASSESS = [
 
 
 @pytest.mark.slow
-def test_judge_ends_with_the_verdict_as_its_exit_code(tmp_path):
+def test_assess_ends_with_the_verdict_as_its_exit_code(tmp_path):
     page, table = tmp_path / "assessment.html", tmp_path / "assessment.csv"
     fails = said(*ASSESS, "--out", str(table), "--plot", str(tmp_path / "assessment.png"))
     assert fails.exit_code == 1, fails.output

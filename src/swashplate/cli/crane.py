@@ -65,7 +65,9 @@ def show_crane(
     toml: Annotated[
         bool,
         typer.Option(
-            "--toml", metavar=NO_VALUE, help="Print the crane's file, to start your own from."
+            "--toml",
+            metavar=NO_VALUE,
+            help="Print the crane's file, as a template for another crane.",
         ),
     ] = False,
 ) -> None:
@@ -499,7 +501,7 @@ def _stationary_words(operated: Operated, seaway: Seaway, damping: float) -> str
     hung = start | {name: options[name] for name in names if name in options}
     response = linear_response(operated.chosen, seaway, **hung)
     return (
-        f"Without control the load swings by {degrees(response.values['swing'].rms):.2f} deg RMS in "
-        f"the long run, by the sea's spectrum and a damping of {100.0 * damping:g} %; a run begins "
+        f"Without control the load swings by {degrees(response.values['swing'].rms):.2f} deg RMS "
+        f"in the long run, by the sea's spectrum and a damping of {100.0 * damping:g} %; a run begins "
         "at rest."
     )

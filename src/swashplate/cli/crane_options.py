@@ -25,7 +25,7 @@ START, AXES = ("slew_deg", "boom_deg", "rope_m"), ("hoist", "slew", "luff")
 CraneArgument = Annotated[
     str,
     typer.Argument(
-        metavar="CRANE|FILE.toml", help="Packaged crane, tg3637, or the file of your own."
+        metavar="CRANE|FILE.toml", help="Packaged crane, tg3637, or the file of another crane."
     ),
 ]
 
