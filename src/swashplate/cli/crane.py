@@ -19,7 +19,7 @@ from swashplate.cli.crane_options import (
     control_of,
     crane_of,
     number_of,
-    numbers_of,
+    numbers_by_name,
     sea_sentences,
 )
 from swashplate.cli.options import (
@@ -160,7 +160,7 @@ def run(
         from swashplate.crane.axes import RATE
 
         crane, seaway = operated.chosen, operated.seaway(seed=seed, length=length)
-        targets = numbers_of("--until", until, "slew_deg=45")
+        targets = numbers_by_name("--until", until, "slew_deg=45")
         stick = OperatorCommand.trapezoid(
             hoist=hoist, slew=slew, luff=luff, until=targets, duration=duration, length=length
         )
@@ -502,6 +502,6 @@ def _stationary_words(operated: Operated, seaway: Seaway, damping: float) -> str
     response = linear_response(operated.chosen, seaway, **hung)
     return (
         f"Without control the load swings by {degrees(response.values['swing'].rms):.2f} deg RMS "
-        f"in the long run, by the sea's spectrum and a damping of {100.0 * damping:g} %; a run begins "
-        "at rest."
+        f"in the long run, by the sea's spectrum and a damping of {100.0 * damping:g} %; a run "
+        "begins at rest."
     )

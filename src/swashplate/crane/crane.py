@@ -23,8 +23,8 @@ from swashplate.crane.quantities import (
     MAY_LACK,
     CraneQuantity,
     check_sources,
-    in_si,
-    quantity_of,
+    quantities_in_si,
+    user_quantity,
 )
 from swashplate.documents import parse_toml, read_text, validated
 from swashplate.drive import Drive
@@ -183,7 +183,7 @@ class Crane:
         for name, value in changes.items():
             if name not in GEOMETRY:
                 raise ParameterError(f"A crane has no {name}; it has {', '.join(GEOMETRY)}.")
-            quantities[name] = quantity_of(name, value)
+            quantities[name] = user_quantity(name, value)
         return replace(self, quantities=quantities)
 
     def with_limits(self, **limits: float) -> Crane:
@@ -202,7 +202,7 @@ class Crane:
     @cached_property
     def _si(self) -> dict[str, tuple[float, ...]]:
         """Quantities in SI; a `ParameterError` for those that make no crane."""
-        return in_si(self.quantities, self.name)
+        return quantities_in_si(self.quantities, self.name)
 
     @cached_property
     def geometry(self) -> Geometry:
@@ -338,7 +338,7 @@ def _read(text: str, origin: str, folder: Path) -> Crane:
     """A crane of a file's text, its drives beside it."""
     content = validated(parse_toml(text, origin), CraneFile, origin)
     quantities = _geometry_of(content, origin)
-    in_si(quantities, origin)
+    quantities_in_si(quantities, origin)
     limits_of(content.limits, origin)
     drives, sources = drives_of(content.drives, folder)
     return Crane(

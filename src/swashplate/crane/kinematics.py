@@ -82,7 +82,7 @@ def dot(a: Vector, b: Vector) -> float:
 
 
 @equation
-def size(a: Vector) -> float:
+def norm(a: Vector) -> float:
     """Length of a vector."""
     return sqrt(dot(a, a))
 

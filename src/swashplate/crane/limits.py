@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from swashplate.crane.quantities import CraneQuantity, QuantityDefinition, values_of
+from swashplate.crane.quantities import CraneQuantity, QuantityDefinition, values_in_si
 from swashplate.errors import ParameterError
 
 
@@ -82,5 +82,5 @@ def limits_of(limits: Mapping[str, CraneQuantity], origin: str) -> dict[str, flo
         )
     values = {}
     for name, quantity in limits.items():
-        values[name] = values_of(name, quantity, DEFINITIONS[name], origin)[0]
+        values[name] = values_in_si(name, quantity, DEFINITIONS[name], origin)[0]
     return values

@@ -91,7 +91,7 @@ SAME = 1e-9
 """Relative difference up to which two values are the same one."""
 
 
-def quantity_of(name: str, value: Any) -> CraneQuantity:
+def user_quantity(name: str, value: Any) -> CraneQuantity:
     """A value in SI as a quantity whose source is the user.
 
     Parameters
@@ -123,7 +123,7 @@ def _shape(definition: QuantityDefinition) -> str:
     return "one number" if definition.size == 1 else f"a list of {definition.size} numbers"
 
 
-def values_of(
+def values_in_si(
     name: str, quantity: CraneQuantity, definition: QuantityDefinition, origin: str
 ) -> tuple[float, ...]:
     """A quantity in SI; a `ParameterError` if it is out of its plausible range."""
@@ -147,7 +147,9 @@ def values_of(
     return tuple(values)
 
 
-def in_si(quantities: Mapping[str, CraneQuantity], origin: str) -> dict[str, tuple[float, ...]]:
+def quantities_in_si(
+    quantities: Mapping[str, CraneQuantity], origin: str
+) -> dict[str, tuple[float, ...]]:
     """All quantities in SI, angles in rad; `origin`, a file or a crane, names them in errors.
 
     Raises
@@ -159,7 +161,7 @@ def in_si(quantities: Mapping[str, CraneQuantity], origin: str) -> dict[str, tup
     """
     complete = {**DEFAULTS, **quantities}
     si = {
-        name: values_of(name, complete[name], definition, origin)
+        name: values_in_si(name, complete[name], definition, origin)
         for name, definition in GEOMETRY.items()
         if name in complete or name not in MAY_LACK
     }
@@ -214,8 +216,8 @@ def check_sources(
         if quantities[quantity].source
         and quantities[quantity].source == packaged[quantity].source
         and not _same(
-            values_of(quantity, quantities[quantity], definition, origin),
-            values_of(quantity, packaged[quantity], definition, name),
+            values_in_si(quantity, quantities[quantity], definition, origin),
+            values_in_si(quantity, packaged[quantity], definition, name),
         )
     ]
     if changed:

@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swashplate.crane.kinematics import Vector, dot, moved, rotation, size, to_ship
+from swashplate.crane.kinematics import Vector, dot, moved, norm, rotation, to_ship
 from swashplate.equations import equation, kernel
 from swashplate.errors import InputError
 from swashplate.results import Result
@@ -234,7 +234,7 @@ def hook_pulls(
     if u >= 0.0 and w >= 0.0:
         return u, w
     u = multiplier_of(rope, d, length)
-    beyond = size(moved(sling, u, d)) - s.sling
+    beyond = norm(moved(sling, u, d)) - s.sling
     if u < 0.0 or beyond <= 0.0:
         return u, 0.0
     w = multiplier_of(sling, b, s.sling) / (1.0 + s.ratio)
@@ -256,7 +256,7 @@ def rope_step(
     load = coasting(now.load, now.before, square, weight)
     if s.drag > 0.0:
         past = moved(moved(now.load, -1.0, now.before), -h, s.wind)
-        load = moved(load, -square * s.drag * size(past) / (h * h), past)
+        load = moved(load, -square * s.drag * norm(past) / (h * h), past)
     hooked = s.sling > 0.0
     elastic = s.stiffness > 0.0
     hook = coasting(now.hook, now.hook_before, square, weight) if hooked else load
@@ -272,7 +272,7 @@ def rope_step(
         else:
             hook = load
     if elastic:
-        hook = moved(hook, -square * now.pull * (1.0 + s.ratio) / size(d), d)
+        hook = moved(hook, -square * now.pull * (1.0 + s.ratio) / norm(d), d)
     rope = moved(hook, -1.0, following)
     sling = moved(load, -1.0, hook)
     u = 0.0
@@ -286,9 +286,9 @@ def rope_step(
     hook = moved(moved(hook, -u, d), s.ratio * w, b)
     load = moved(load, -w, b) if hooked else hook
     stretch = 0.0
-    pull = u * size(d) / (square * (1.0 + s.ratio))
+    pull = u * norm(d) / (square * (1.0 + s.ratio))
     if elastic:
-        stretch = size(moved(hook, -1.0, following)) - length
+        stretch = norm(moved(hook, -1.0, following)) - length
         pull = elastic_pull(stretch, now.stretch, length, s, h)
     if u < 0.0 or w < 0.0:
         pull = TOO_FAST
@@ -337,8 +337,8 @@ def set_off(
     line = moved(hung.load, -1.0, tip)
     rise = -(velocity_x * line.x + velocity_y * line.y) / line.z
     swing = Vector(velocity_x, velocity_y, rise)
-    led = moved(lead, lowered / size(line), line)
-    hooked = size(moved(hung.hook, -1.0, tip)) / size(line)
+    led = moved(lead, lowered / norm(line), line)
+    hooked = norm(moved(hung.hook, -1.0, tip)) / norm(line)
     before = moved(hung.load, -1.0, moved(led, h, swing))
     hook_before = moved(hung.hook, -1.0, moved(led, h * hooked, swing))
     return Hung(hung.load, before, hung.hook, hook_before, hung.pull, hung.stretch)
@@ -460,7 +460,7 @@ def load_motion(
     out = np.empty((len(path), 7))
     failed = _fill_motion(path, rope, now, s, h, out)
     if failed:
-        raise InputError(too_fast(float(rope[failed]), failed / rate, rate))
+        raise InputError(too_fast_sentence(float(rope[failed]), failed / rate, rate))
     if not s.stiffness > 0.0:
         out[0, 6] = out[1, 6]
     return LoadMotion(out[:, :3], out[:, 6], out[:, 3:6] if s.sling > 0.0 else None)
@@ -541,7 +541,7 @@ def _in_ship_axes(points: Array, ship: Array, out: Array) -> None:
         out[n, 2] = along.z
 
 
-def too_fast(length: float, time: float, rate: float) -> str:
+def too_fast_sentence(length: float, time: float, rate: float) -> str:
     """Sentence for a rope that is too short for the step."""
     return (
         f"At {time:g} s the boom's tip moves within one sample by more than a rope of "

@@ -33,12 +33,12 @@ from swashplate.crane.kinematics import (
     Vector,
     boom_at,
     moved,
+    norm,
     reach_rate,
     rope_length,
     rotation,
     shaft_torques,
     shafts_for,
-    size,
     tip_of,
     to_inertial,
     to_ship,
@@ -427,7 +427,7 @@ def rope_torques(
     """Torques of the rope's tension on the three shafts. [N m]"""
     tension = fixed.mass * hung.pull
     along = moved(hung.hook, -1.0, tip)
-    force = moved(Vector(0.0, 0.0, 0.0), tension / size(along), along)
+    force = moved(Vector(0.0, 0.0, 0.0), tension / norm(along), along)
     return shaft_torques(to_ship(r, force), slew, boom, tension, fixed.geometry)
 
 

@@ -12,7 +12,7 @@ from swashplate.crane.closed_loop.operator_command import Array, OperatorCommand
 from swashplate.crane.closed_loop.result import CraneRun
 from swashplate.crane.closed_loop.stepper import CraneStepper, RunOptions
 from swashplate.crane.crane import Crane
-from swashplate.crane.sea.seaway import Seaway, motion_of
+from swashplate.crane.sea.seaway import Seaway, ship_motion_of
 from swashplate.errors import InputError
 
 
@@ -47,7 +47,7 @@ def simulate(
         If boom or rope meet a limit, or a drive leaves its domain.
     """
     prepared = prepare(crane, stick, options)
-    ship = motion_of(sea, len(prepared.commands), RATE)
+    ship = ship_motion_of(sea, len(prepared.commands), RATE)
     return CraneRun(
         crane=crane,
         stick=prepared.commands,

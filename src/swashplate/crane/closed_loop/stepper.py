@@ -25,7 +25,7 @@ from swashplate.crane.rope import (
     Suspension,
     hanging_load,
     swing_of,
-    too_fast,
+    too_fast_sentence,
 )
 from swashplate.drive import Drive, drive_instance
 from swashplate.equations import CompiledStep, Machine, compiled_step
@@ -288,7 +288,7 @@ class CraneStepper:
         shafts = Shafts(*self._state.axes[loop.ANGLE])
         rope = float(rope_length(shafts, self.fixed.geometry, self.fixed.home))
         if ended == loop.TOO_FAST:
-            return InputError(too_fast(rope, time, RATE))
+            return InputError(too_fast_sentence(rope, time, RATE))
         short, long = crane.rope_limits
         low, high = map(degrees, crane.boom_limits)
         reasons = {

@@ -521,7 +521,7 @@ def _check_sizes(motions: Mapping[str, Array], of: str) -> None:
             )
 
 
-def motion_of(sea: Seaway | ArrayLike | None, count: int, rate: float) -> Array:
+def ship_motion_of(sea: Seaway | ArrayLike | None, count: int, rate: float) -> Array:
     """The ship's motion, (count, 6), one column at rest; refuses another shape or a shorter one."""
     if sea is None:
         return np.zeros((count, 1))
