@@ -79,11 +79,14 @@ def show_crane(
         read = read_text if crane.endswith(".toml") else preset_text
         typer.echo(read(crane), nl=False)
         return
-    chosen = crane_of(crane)
-    show(chosen.table(), *([chosen.limit_table()] if chosen.limits else []))
+    shown = crane_of(crane)
+    tables = [shown.table()]
+    if shown.limits:
+        tables.append(shown.limit_table())
+    show(*tables)
     for axis in AXES:
-        note(f"{axis}: {getattr(chosen, axis).parameters.title}")
-    for sentence in chosen.provenance():
+        note(f"{axis}: {getattr(shown, axis).parameters.title}")
+    for sentence in shown.provenance():
         say(sentence)
 
 
@@ -152,28 +155,30 @@ def run(
     largest one within 25 s, counted from 4 s after the joystick has returned and
     the controller has ended its command.
     """
-    runs, first = {}, ""
+    runs = {}
+    last = ""
     if out is not None and len(variant or ()) > 1:
         raise InputError("--out writes one run's signals: take one --variant.")
     with working("Simulating"):
         from swashplate.crane import OperatorCommand, run_tables, simulate
         from swashplate.crane.axes import RATE
 
-        crane, seaway = operated.chosen, operated.seaway(seed=seed, length=length)
+        crane = operated.chosen
+        seaway = operated.seaway(seed=seed, length=length)
         targets = numbers_by_name("--until", until, "slew_deg=45")
         stick = OperatorCommand.trapezoid(
             hoist=hoist, slew=slew, luff=luff, until=targets, duration=duration, length=length
         )
         ship = seaway or operated.motion(round(stick.length * RATE) + 1)
-        for first in variant or ["inverse"]:
-            drives, _, controller = first.partition(":")
+        for last in variant or ["inverse"]:
+            drives, _, controller = last.partition(":")
             how: dict[str, Any] = {"control": control_of(controller)}
             how["actuation"] = "inverse" if drives == "identified" else drives
-            runs[first] = simulate(
+            runs[last] = simulate(
                 crane, stick, sea=ship, brake=brake, **how, **operated.run_options
             )
         tables = run_tables(runs)
-    save(out, "All signals, in SI", runs[first].write)
+    save(out, "All signals, in SI", runs[last].write)
     draw(plot, "plot_crane", runs)
     if scene is not None:
         from swashplate.report.scene import write_scene
@@ -251,28 +256,30 @@ def assess(
             f"--allowed is in percent, and {allowed:g} % of the seaways would ask for thousands of "
             f"them: did you mean --allowed {100.0 * allowed:g}?"
         )
-    more: dict[str, Any] = {
+    keywords: dict[str, Any] = {
         "allowed_share_worse": allowed / 100.0,
         "remedies": remedies,
         "tipping_points": tipping_points,
     }
     if ask is not None:
-        more["questions"] = [question.strip() for question in ask.split(",")]
+        keywords["questions"] = [question.strip() for question in ask.split(",")]
     if dask is not None:
         from swashplate.executors import Dask
 
-        more["executor"] = Dask(dask)
+        keywords["executor"] = Dask(dask)
     from swashplate.crane import assess as assess_control
     from swashplate.crane.studies.assessing import SEAWAYS, seaways_needed
 
     crane = study.chosen
     side.print(seaways_needed(study.seeds or SEAWAYS, allowed / 100.0))
-    assessment: Assessment = study.through(assess_control, crane, **more)
-    what, write = "Numbers of every seaway, in SI", assessment.write
+    assessment: Assessment = study.through(assess_control, crane, **keywords)
+    what = "Numbers of every seaway, in SI"
+    write = assessment.write
     if out is not None and out.suffix.lower() == ".html":
         from swashplate.report.scene import write_assessment
 
-        what, write = "Verdict", partial(write_assessment, assessment)
+        what = "Verdict"
+        write = partial(write_assessment, assessment)
     save(out, what, write)
     draw(plot, "plot_assessment", assessment)
     _end(study.chosen, assessment.tables(), *assessment.sentences()[1:])
@@ -338,16 +345,18 @@ def operability(
         raise InputError("--heading belongs to one sea: for operability give --headings.")
     if study.sea:
         note("Only the peak factor and the spreading of --sea are used.")
-    more: dict[str, Any] = {}
+    keywords: dict[str, Any] = {}
     if headings is not None:
         words = headings.split(",")
-        more["headings"] = [number_of(f"--headings {headings}", word) for word in words]
-    year: Operability = study.through(operable, study.chosen, scatter=diagram, **more)
-    what, write = "Cells of the year, in SI", year.write
+        keywords["headings"] = [number_of(f"--headings {headings}", word) for word in words]
+    year: Operability = study.through(operable, study.chosen, scatter=diagram, **keywords)
+    what = "Cells of the year, in SI"
+    write = year.write
     if out is not None and out.suffix.lower() == ".html":
         from swashplate.report.scene import write_operability
 
-        what, write = "Operability", partial(write_operability, year)
+        what = "Operability"
+        write = partial(write_operability, year)
     save(out, what, write)
     draw(plot, "plot_operability", year)
     _end(study.chosen, year.tables(), *year.sentences(), *study.chosen.provenance())
@@ -372,10 +381,10 @@ def follow(at_sea: AtSea, *, out: TableFile = None, plot: FigureFile = None) -> 
         from swashplate.crane import follow as largest_sines
 
         seaway = at_sea.seaway(default="ss3")
-        more: dict[str, Any] = {}
+        keywords: dict[str, Any] = {}
         if at_sea.sea and seaway is not None:
-            more["seas"] = (seaway.sea,)
-        followable = largest_sines(at_sea.chosen, seaway=seaway, **more, **at_sea.pose)
+            keywords["seas"] = (seaway.sea,)
+        followable = largest_sines(at_sea.chosen, seaway=seaway, **keywords, **at_sea.pose)
     save(out, "Amplitudes, in SI", followable.tables()[0].write)
     draw(plot, "plot_follow", followable)
     about_sea = sea_sentences(seaway) if at_sea.sea else ()
@@ -410,12 +419,12 @@ def sweep(
     orifice: factors on the luff drive's in-line orifice.
     Each point is simulated in 6 seaways of 10 min.
     """
-    more: dict[str, Any] = {}
+    keywords: dict[str, Any] = {}
     if points is not None:
-        more["points"] = [number_of(f"--points {points}", word) for word in points.split(",")]
+        keywords["points"] = [number_of(f"--points {points}", word) for word in points.split(",")]
     from swashplate.crane import sweep as swing_over
 
-    swept: Sweep = study.through(swing_over, study.chosen, over, **more)
+    swept: Sweep = study.through(swing_over, study.chosen, over, **keywords)
     save(out, "Swing, in SI", swept.tables()[0].write)
     draw(plot, "plot_sweep", swept)
     _end(study.chosen, swept.tables(), *sea_sentences(study.waters), *study.chosen.provenance())
@@ -462,7 +471,8 @@ def damping(
     from swashplate.logs import read_series
 
     series = read_series(log, column, "rad", time_column=time_column)
-    first, last = float(series.time[0]), float(series.time[-1])
+    first = float(series.time[0])
+    last = float(series.time[-1])
     begins = first if start is None else start
     ends = last if stop is None else stop
     if not first <= begins < ends <= last:

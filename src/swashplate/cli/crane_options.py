@@ -19,7 +19,8 @@ if TYPE_CHECKING:
     from swashplate.crane.control import Control
     from swashplate.crane.sea.seaway import Array
 
-START, AXES = ("slew_deg", "boom_deg", "rope_m"), ("hoist", "slew", "luff")
+START = ("slew_deg", "boom_deg", "rope_m")
+AXES = ("hoist", "slew", "luff")
 
 
 CraneArgument = Annotated[
@@ -324,12 +325,12 @@ class Studied(Operated):
         ),
     ] = None
 
-    def through(self, study: Callable[..., Any], *first: Any, **more: Any) -> Any:
+    def through(self, study: Callable[..., Any], *arguments: Any, **keywords: Any) -> Any:
         """A study of the controller, whose progress is shown."""
         controller = control_of(self.control)
         if controller is None:
             raise InputError("--control is empty: there is nothing to assess.")
-        how = self.run_options | _given(length=self.length, run_in=self.run_in) | more
+        how = self.run_options | _given(length=self.length, run_in=self.run_in) | keywords
         if self.waters is not None:
             how["sea"] = self.waters
         if self.seeds is not None:
@@ -338,7 +339,7 @@ class Studied(Operated):
             how["drives"] = self.sets()
         with long_work("Seaways") as shown:
             how["progress"] = lambda done, of: shown(f"{done} of {of} seaways", done / of)
-            return study(*first, controller, **how)
+            return study(*arguments, controller, **how)
 
     @cached_property
     def waters(self) -> Seaway | None:
@@ -366,9 +367,11 @@ class Studied(Operated):
             not_drawn = [axis for axis in AXES if axis not in drawn]
             as_given = f"; not drawn, without a fit: {', '.join(not_drawn)}" if not_drawn else ""
             side.print(f"Drawn: {', '.join(drawn)}{as_given}")
-        crane, changed = self.chosen, []
+        crane = self.chosen
+        changed = []
         for name, text in pairs_of("--scale", self.scale, "luff.orifice=1.5"):
-            (axis, _, variable), words = name.partition("."), f"--scale {name}={text}"
+            axis, _, variable = name.partition(".")
+            words = f"--scale {name}={text}"
             if not variable or axis not in AXES:
                 raise InputError(
                     f"{words}: write the axis first, luff.orifice=1.5; the axes are "
