@@ -214,7 +214,9 @@ def test_a_controller_without_a_number_stops_the_run(crane):
     # the load hangs straight at first: 0/0
     divides = Model("divides", Gains, Filtered, follow, sample=along_the_swing)
     controller = control.Controller(divides, Gains(0.1, 1.0))
-    with pytest.raises(DomainError, match="at 0.00 s the controller gives an offset .* not a finite"):
+    with pytest.raises(
+        DomainError, match="at 0.00 s the controller gives an offset .* not a finite"
+    ):
         simulate(crane, OperatorCommand.rest(0.1), control=controller)
 
 
