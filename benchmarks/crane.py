@@ -1,4 +1,4 @@
-"""Rows of the table for the crane: rope, seaway, runs, a judgment, a year of operability."""
+"""Rows of the table for the crane: rope, seaway, runs, an assessment, a year of operability."""
 
 from collections.abc import Iterator
 from statistics import median
@@ -11,11 +11,11 @@ from timing import Run, alone
 
 from swashplate.crane import (
     Crane,
+    OperatorCommand,
     Scatter,
     Seaway,
-    Stick,
+    assess,
     control,
-    judge,
     load_motion,
     operability,
     simulate,
@@ -24,14 +24,14 @@ from swashplate.crane import (
 ROPE, SEAWAY = 1e-3, 12e-3
 IDEAL, OPEN, CLOSED = 4.0, 9.0, 17.0
 """Targets, times of the rope's march."""
-JUDGED, YEAR = 20.0, 60.0
-"""Targets: processor time of a judgment, and time of a year on two cores. [s]"""
+ASSESSED, YEAR = 20.0, 60.0
+"""Targets: processor time of an assessment, and time of a year on two cores. [s]"""
 CLIPPED = control.DelayedFeedback(0.2, 0.2) | control.ShipCompensation() | control.Clip()
 
 
 def crane_rows() -> Iterator[Row]:
     """60 s at 512 Hz unless said otherwise, in processor time but for what says so."""
-    crane, stick = Crane.preset("tg3637"), Stick.rest(60.0)
+    crane, stick = Crane.preset("tg3637"), OperatorCommand.rest(60.0)
     how = {"slew_deg": 90.0, "rope_m": 27.0}
     ship = Seaway("ss3", seed=1).motion(60 * 512 + 1)
     tip = simulate(crane, stick, sea=ship, **how).tip
@@ -67,9 +67,9 @@ def crane_rows() -> Iterator[Row]:
         lambda: simulate(crane, stick, control=law, **moving),
         CLOSED,
     )
-    short = {"remedies": False, "turns": False}
-    judged = processor_time(lambda: judge(crane, CLIPPED, seeds=range(20), **short), 1)
-    yield row("crane: judgment, 20 seaways of 10 min, 3 variants", judged, JUDGED)
+    short = {"remedies": False, "tipping_points": False}
+    assessed = processor_time(lambda: assess(crane, CLIPPED, seeds=range(20), **short), 1)
+    yield row("crane: assessment, 20 seaways of 10 min, 3 variants", assessed, ASSESSED)
     year = alone(lambda: operability(crane, CLIPPED, Scatter.packaged()), 1)
     yield row(
         "crane: operability, a year, 8 headings, 3 variants, all cores, wall clock", year, YEAR

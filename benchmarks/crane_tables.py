@@ -11,7 +11,7 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.crane import Crane, Stick, control, simulate
+from swashplate.crane import Crane, OperatorCommand, control, simulate
 from swashplate.crane.closed_loop.stepper import Actuation
 from swashplate.crane.control import Control
 from swashplate.crane.sea import extremes
@@ -67,7 +67,7 @@ def slew_tables(crane: Crane) -> Iterator[str]:
     ):
         yield f"\n### {title}\n\n| stick | {heads} |\n|--:|{'--:|' * len(variants)}"
         for part, numbers in others.items():
-            stick = Stick.trapezoid(slew=part, until={"slew_deg": 45.0}, length=160.0)
+            stick = OperatorCommand.trapezoid(slew=part, until={"slew_deg": 45.0}, length=160.0)
             cells = []
             for (actuation, law), other in zip(variants, numbers, strict=True):
                 run = simulate(
@@ -82,7 +82,7 @@ def slew_tables(crane: Crane) -> Iterator[str]:
 RATE, FREQUENCY = 8.0, 0.6
 """Samples a second [Hz], and natural frequency of what is driven by white noise [rad/s]."""
 RUNS, RUN = 80, 600.0
-"""Runs of a judgment, and the time for which each counts. [s]"""
+"""Runs of an assessment, and the time for which each counts. [s]"""
 SETS = 20
 PARTS = (0.499, 0.1)
 """Parts of the peaks that the tail is fitted to; a whole half would have too few below it."""

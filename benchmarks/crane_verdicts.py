@@ -29,14 +29,14 @@ from swashplate.crane import (
     Seaway,
     Spectrum,
     Study,
+    assess,
     control,
-    judge,
     linear_response,
     operability,
     read_ship,
 )
 from swashplate.crane.sea.confidence import rms_of
-from swashplate.crane.studies.judgment import Judgment, largest_of
+from swashplate.crane.studies.crane_assessment import Assessment, largest_of
 
 IDEAL_DESIGN = (
     control.DelayedFeedback(0.2, 0.2) | control.ShipCompensation() | control.PositionLoop(1.5)
@@ -54,15 +54,19 @@ def stability(sets: int, hours: float) -> None:
     for length, seaways in lengths:
         for first in range(sets):
             seeds = range(1000 * first, 1000 * first + seaways)
-            for name, judged in zip(controllers, verdicts(controllers, seeds, length), strict=True):
-                widths = ", ".join(f"{half_width(judged.swing(case)):.1%}" for case in judged.names)
-                answers = f"{judged.harmless}, {judged.sufficient}"
+            for name, assessed in zip(
+                controllers, verdicts(controllers, seeds, length), strict=True
+            ):
+                widths = ", ".join(
+                    f"{half_width(assessed.swing(case)):.1%}" for case in assessed.names
+                )
+                answers = f"{assessed.harmless}, {assessed.sufficient}"
                 print(f"{name}, {length:g} s, {seaways}, {answers}, {widths}", flush=True)
 
 
 def verdicts(
     controllers: dict[str, control.Control], seeds: range, length: float
-) -> list[Judgment]:
+) -> list[Assessment]:
     """The verdict on each controller with the packaged crane's own drives; what is without control
     is simulated once.
     """
@@ -70,14 +74,14 @@ def verdicts(
     study = Study.of(crane, controllers, seeds=seeds, drives=("identified",), length=length)
     names = list(study.cases)
     outcomes = study.outcomes(list(study.cases.values()))
-    judgments = []
+    assessments = []
     for index, name in enumerate(names[1:], start=1):
         cases = {names[0]: study.cases[names[0]], name: study.cases[name]}
         pairs = tuple((of_seed[0], of_seed[index]) for of_seed in outcomes)
-        judgments.append(
-            Judgment(replace(study, cases=cases), pairs, 0.05, ("harm", "sufficiency"), None)
+        assessments.append(
+            Assessment(replace(study, cases=cases), pairs, 0.05, ("harm", "sufficiency"), None)
         )
-    return judgments
+    return assessments
 
 
 def half_width(swing: np.ndarray) -> float:
@@ -108,8 +112,8 @@ def cells(count: int) -> None:
         study = Study.of(crane, CLIPPED, seeds=[77], sea=sea, drives=drives, length=HOURS)
         case = list(study.cases.values())[0 if name == "no control" else 1]
         outcomes = [one for (one,) in study.outcomes([case])]
-        if outcomes[0].left:
-            worst, ratio = outcomes[0].left, np.inf
+        if outcomes[0].departure_reason:
+            worst, ratio = outcomes[0].departure_reason, np.inf
         else:
             ratios = {
                 limited: largest_of(outcomes, limited).value / limit
@@ -172,24 +176,24 @@ CONTROLLERS = (
 def controllers(seaways: int) -> None:
     """Print a row for each controller, as a table of Markdown."""
     laws = {words: control_of(words) for words in CONTROLLERS}
-    judged = judge(
+    assessed = assess(
         Crane.preset("tg3637"),
         laws,
         seeds=range(seaways),
         drives=("identified",),
         remedies=False,
-        turns=False,
+        tipping_points=False,
     )
     print(
         "| `--control` | swing, RMS | worse than none | largest swing in 3 h | place | saturation |"
     )
     print("|---|--:|--:|--:|--:|--:|")
-    for name in judged.names:
+    for name in assessed.names:
         words = name.partition(", ")[0]
-        swing = np.degrees(rms_of(judged.swing(name)))
-        left = sum(judged.left(name).values())
-        worse = "" if name == "no control" else f"{judged.worse(name).value:.0%}"
-        limited = {each.name: each.largest.value for each in judged.limited(name)}
+        swing = np.degrees(rms_of(assessed.swing(name)))
+        left = sum(assessed.departures(name).values())
+        worse = "" if name == "no control" else f"{assessed.share_worse(name).value:.0%}"
+        limited = {each.name: each.largest.value for each in assessed.limited(name)}
         rms = "–" if np.isnan(swing[0]) else f"{swing[0]:.2f}°"
         gone = f" ({left} left)" if left else ""
         print(

@@ -31,9 +31,9 @@ FIGURES = {
         "--variant inverse --variant inverse:zv-tip --variant ideal:zv-tip "
         "--plot crane.png",
     ),
-    "crane-judge.png": (
-        "crane judge tg3637 --scale luff.orifice=2.5 --no-remedies --no-turns "
-        "--plot crane-judge.png",
+    "crane-assess.png": (
+        "crane assess tg3637 --scale luff.orifice=2.5 --no-remedies --no-tipping-points "
+        "--plot crane-assess.png",
     ),
     "crane-operability.png": (
         "crane operability tg3637 --control feedback=0.2/0.2+ship+clip "

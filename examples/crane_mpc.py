@@ -23,8 +23,8 @@ from scipy import signal, sparse
 from swashplate.crane import (
     Crane,
     CraneStepper,
+    OperatorCommand,
     Seaway,
-    Stick,
     control,
     follow,
     linearize,
@@ -42,7 +42,9 @@ H, HORIZON = BLOCK / RATE, 51  # [s], steps: 10 s
 LAG = 0.2  # of the identified drives, delay and lag of the pump together [s]
 START = 40.0  # swing counts from here on [s]
 POSE = {"slew_deg": 75.0, "boom_deg": 45.0, "rope_m": 27.0}
-STICK = Stick.trapezoid(slew=0.5, until={"slew_deg": 105.0}, start=50.0, length=options.length)
+STICK = OperatorCommand.trapezoid(
+    slew=0.5, until={"slew_deg": 105.0}, start=50.0, length=options.length
+)
 crane = Crane.preset("tg3637")
 
 # %% [markdown]

@@ -14,7 +14,7 @@ import sys
 
 import numpy as np
 
-from swashplate.crane import Crane, Stick, simulate
+from swashplate.crane import Crane, OperatorCommand, simulate
 from swashplate.report.figures import plot_crane, save_figure
 
 parser = argparse.ArgumentParser(description="Shape the operator's commands.")
@@ -48,11 +48,11 @@ def shaped(commands: np.ndarray, rope: float) -> np.ndarray:
 # slew misses its target by far. The inverse map of each drive undoes that.
 
 # %%
-operator = Stick.trapezoid(slew=1.0, until={"slew_deg": 45.0}, length=60.0)
+operator = OperatorCommand.trapezoid(slew=1.0, until={"slew_deg": 45.0}, length=60.0)
 plain = simulate(crane, operator, actuation="ideal", rope_m=ROPE, swing_damping=0.0)
 sticks = {
     "as it is": operator,
-    "shaped": Stick.record(shaped(plain.stick, ROPE), RATE),
+    "shaped": OperatorCommand.record(shaped(plain.stick, ROPE), RATE),
 }
 
 # %%

@@ -36,8 +36,8 @@ from swashplate.cli import app
 from swashplate.crane import (
     Crane,
     CraneStepper,
+    OperatorCommand,
     Seaway,
-    Stick,
     TransferFunctions,
     control,
     simulate,
@@ -116,7 +116,7 @@ def analyses(drive: Drive) -> list[Any]:
 def cranes() -> list[object]:
     """A crane, a run of it, and what they are made of."""
     crane = Crane.preset("tg3637")
-    stick = Stick.trapezoid(slew=0.5, duration=2.0, length=10.0)
+    stick = OperatorCommand.trapezoid(slew=0.5, duration=2.0, length=10.0)
     waves = Seaway("ss3", 90.0, seed=1)
     feedback = control.TipShaper("zv") | control.DelayedFeedback(0.2, delay=0.2) | control.Clip()
     run = simulate(crane, stick, sea=waves, control=feedback)

@@ -57,7 +57,7 @@ BRANCHES = (
 TRIPS = {
     "Z16 from the shell": ["simulate", "hoist", "step:9", "--set", "Z16=0.18mm"],
     "a log's column": ["fit", "{campaign}", "--out", "{out}/fit"],
-    "a crane's drive": ["crane", "judge", "tg3637", "--seeds", "2"],
+    "a crane's drive": ["crane", "assess", "tg3637", "--seeds", "2"],
 }
 """Commands whose way through the code is counted."""
 

@@ -8,7 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 from swashplate.cli import app
-from swashplate.crane import Crane, Seaway, Spectrum, Stick, Suspension, simulate
+from swashplate.crane import Crane, OperatorCommand, Seaway, Spectrum, Suspension, simulate
 from swashplate.errors import FileError, InputError, ParameterError
 
 
@@ -76,7 +76,7 @@ def test_run_takes_sea_ship_and_load_as_they_are_given(tmp_path):
     )
     run = simulate(
         Crane.preset("tg3637"),
-        Stick.rest(6.0),
+        OperatorCommand.rest(6.0),
         sea=sea,
         slew_deg=90.0,
         suspension=Suspension(stiffness=6e7, bounce_damping=0.05),
@@ -114,13 +114,22 @@ def test_follow_takes_a_sea_of_numbers():
     assert "ss3" not in rows
 
 
-JUDGE = ["judge", "tg3637", "--seeds", "3", "--length", "60", "--no-remedies", "--no-turns"]
+ASSESS = [
+    "assess",
+    "tg3637",
+    "--seeds",
+    "3",
+    "--length",
+    "60",
+    "--no-remedies",
+    "--no-tipping-points",
+]
 
 
 @pytest.mark.slow
-def test_judge_ends_with_the_verdict_as_its_exit_code(tmp_path):
-    page, table = tmp_path / "judge.html", tmp_path / "judge.csv"
-    fails = said(*JUDGE, "--out", str(table), "--plot", str(tmp_path / "judge.png"))
+def test_assess_ends_with_the_verdict_as_its_exit_code(tmp_path):
+    page, table = tmp_path / "assessment.html", tmp_path / "assessment.csv"
+    fails = said(*ASSESS, "--out", str(table), "--plot", str(tmp_path / "assessment.png"))
     assert fails.exit_code == 1, fails.output
     assert "3 seaways cannot show that control does no harm: 72 are needed" in fails.stderr
     assert "Fails: With the drives 'identified' the controller harms:" in fails.stderr
@@ -133,17 +142,17 @@ def test_judge_ends_with_the_verdict_as_its_exit_code(tmp_path):
         found.filter(pl.col("variant") == "identified")["rms_swing"].to_numpy()
         > found.filter(pl.col("variant") == "no control")["rms_swing"].to_numpy()
     )
-    left = (found.filter(pl.col("variant") == "identified")["left"].fill_null("") != "").sum()
+    left = (found.filter(pl.col("variant") == "identified")["departure"].fill_null("") != "").sum()
     assert f"in {worse.sum() + left} of 3 seaways" in " ".join(fails.stderr.split())
     # 3 of 3 seaways say that less than 71 % are worse, but not that less than 5 % are
     clipped = ["--control", "feedback=0.2/0.2+ship+clip", "--ask", "harm"]
-    passes = said(*JUDGE, *clipped, "--allowed", "75", "--out", str(page))
+    passes = said(*ASSESS, *clipped, "--allowed", "75", "--out", str(page))
     assert passes.exit_code == 0, passes.output
     assert "Passes: With the drives 'identified' the controller does no harm" in " ".join(
         passes.stdout.split()
     )
     assert "does no harm" in page.read_text("utf-8")
-    open_ = said(*JUDGE, *clipped)
+    open_ = said(*ASSESS, *clipped)
     assert open_.exit_code == 1
     assert "Not decided: With the drives 'identified' the controller" in " ".join(
         open_.stderr.split()
@@ -179,16 +188,16 @@ def test_follow_and_a_sweep_print_their_tables(tmp_path):
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
-        ("judge tg3637 --drives fast", "There are no drives 'fast'; there are ideal, identified"),
-        ("judge tg3637 --drives drawn", "needs the folder of a fit: --drive luff=FOLDER"),
-        ("judge tg3637 --scale orifice=2", "write the axis first, luff.orifice=1.5"),
-        ("judge tg3637 --scale luff.bore=2", "bore"),
+        ("assess tg3637 --drives fast", "There are no drives 'fast'; there are ideal, identified"),
+        ("assess tg3637 --drives drawn", "needs the folder of a fit: --drive luff=FOLDER"),
+        ("assess tg3637 --scale orifice=2", "write the axis first, luff.orifice=1.5"),
+        ("assess tg3637 --scale luff.bore=2", "bore"),
         (
-            "judge tg3637 --allowed 0.05",
+            "assess tg3637 --allowed 0.05",
             "0.05 % of the seaways would ask for thousands of them: did",
         ),
-        ("judge tg3637 --allowed 200", "allowed is 2, but is a share of seaways"),
-        ("judge tg3637 --out judge.pdf", "a verdict is written as"),
+        ("assess tg3637 --allowed 200", "allowed_share_worse is 2, but must be a share of seaways"),
+        ("assess tg3637 --out assessment.pdf", "a verdict is written as"),
         ("follow tg3637 --sea ss9", "There is no sea 'ss9'"),
         ("sweep tg3637 orifice --points 1,much", "--points 1,much: 'much' is not a number."),
         ("sweep tg3637 wind", "There is no sweep over 'wind'; there are bearing, height, orifice"),
@@ -196,7 +205,7 @@ def test_follow_and_a_sweep_print_their_tables(tmp_path):
         ("run tg --slew 1", "There is no packaged crane 'tg'; there is tg3637."),
         ("run tg3637 --variant fast", "actuation is 'fast'; it is ideal, volts, inverse."),
         ("run tg3637 --sea ss3,90,1", "no numbers; write --sea ss3 --heading 90 --seed 1."),
-        ("judge tg3637 --sea ss3,90", "no numbers; write --sea ss3 --heading 90."),
+        ("assess tg3637 --sea ss3,90", "no numbers; write --sea ss3 --heading 90."),
         ("run tg3637 --sea 1.5", "--sea 1.5: write a name, --sea ss3, or significant height"),
         ("run tg3637 --sea 1.5,8,1,90", "or significant height in m and peak period in s, --sea"),
         ("run tg3637 --sea 1.5,eight", "--sea 1.5,eight: 'eight' is not a number."),
@@ -214,25 +223,25 @@ def test_follow_and_a_sweep_print_their_tables(tmp_path):
             "--suspension has no rope; it has stiffness,",
         ),
         (
-            "judge tg3637 --ship hull.re1 --roll-period 9",
+            "assess tg3637 --ship hull.re1 --roll-period 9",
             "--ship hull.re1 has its own roll: leave --roll-period and --roll-damping out",
         ),
         ("sweep tg3637 bearing --at slew_deg=3", "A sweep over the bearing sets slew_deg itself"),
-        ("judge tg3637 --ask safety", "no question 'safety'; there are harm, sufficiency"),
-        ("judge tg3637 --length 20", "must count for at least 60 s, eight swings"),
+        ("assess tg3637 --ask safety", "no question 'safety'; there are harm, sufficiency"),
+        ("assess tg3637 --length 20", "must count for at least 60 s, eight swings"),
         ("operability tg3637 --headings 1,x", "--headings 1,x: 'x' is not a number."),
         ("operability tg3637 none.csv", "none.csv"),
         ("operability tg3637 --heading 45", "--heading belongs to one sea: for operability"),
         ("run tg3637 --variant ideal:magic", "There is no control 'magic'; there are zv-tip"),
         ("run tg3637 --variant ideal:sensors=0.1/9", "delay of sensors is 9.0, but must be"),
         ("run tg3637 --variant ideal:sensors=1/2/3/4", "There is no control 'sensors=1/2/3/4'"),
-        ("judge tg3637 --sea ss3 --sea ss2", "--sea ss3 --sea ss2: give one sea"),
+        ("assess tg3637 --sea ss3 --sea ss2", "--sea ss3 --sea ss2: give one sea"),
         ("run tg3637 --variant direct", "With direct actuation commands are voltages"),
         ("run tg3637 --drive luff=none", "or the result or folder of a fit, but there is no such"),
         ("run tg3637 --ship hull.re1", "--ship needs a sea: give --sea, such as --sea ss3."),
         ("run tg3637 --at rope=3", "--at has no rope; it has slew_deg, boom_deg, rope_m."),
         ("run tg3637 --drive boom=hoist", "A crane has no drive 'boom'; it has hoist, slew, luff."),
-        ("judge tg3637 --scale boom.orifice=2", "the axes are hoist, slew, luff."),
+        ("assess tg3637 --scale boom.orifice=2", "the axes are hoist, slew, luff."),
         ("run tg3637 --slew 1 --until 45", "has no equals sign"),
         ("run tg3637 --at rope_m=20 --at rope_m=30", "--at rope_m=... is given twice"),
         ("run tg3637 --variant volts --variant ideal --out a.csv", "--out writes one run's"),
@@ -293,7 +302,14 @@ def test_drives_of_another_axis_and_campaigns_are_refused(tmp_path):
 
 @pytest.mark.slow
 def test_long_names_of_variants_stand_whole_on_a_narrow_terminal():
-    words = [*JUDGE[:2], "--no-remedies", "--scale", "luff.orifice=3", "--scale", "hoist.orifice=2"]
+    words = [
+        *ASSESS[:2],
+        "--no-remedies",
+        "--scale",
+        "luff.orifice=3",
+        "--scale",
+        "hoist.orifice=2",
+    ]
     shown = CliRunner().invoke(app, ["crane", *words, "--seeds", "1"], env={"COLUMNS": "80"})
     # in a row of the swings, three of the differences and three of the limits, and in the verdict
     assert shown.stdout.count("×2") + shown.stderr.count("×2") >= 7

@@ -8,12 +8,12 @@ from typer.testing import CliRunner
 
 from swashplate import Drive
 from swashplate.cli import app
-from swashplate.crane import Crane, Stick, control, judge, simulate, upgraded
+from swashplate.crane import Crane, OperatorCommand, assess, control, simulate, with_design_change
 from swashplate.crane.crane import preset_text
 from swashplate.identification import Verdict, load_setup
 from swashplate.identification.assessment import FitFile, StoredVerdict
 from swashplate.identification.diagnostics.discrepancy import ClassError, PredictionError
-from swashplate.report.scene import write_judgment, write_scene
+from swashplate.report.scene import write_assessment, write_scene
 
 HEADLINES = {
     True: "Usable: predicts shaft_speed within 1.1 % of its range in a new maneuver (large 1.1 %).",
@@ -21,7 +21,7 @@ HEADLINES = {
     "required.",
 }
 NONE_KNOWN = "has none: fit again"
-SHORT = {"length": 60.0, "run_in": 0.0, "remedies": False, "turns": False}
+SHORT = {"length": 60.0, "run_in": 0.0, "remedies": False, "tipping_points": False}
 VALIDITY = "Holds for steps from -9 to 9 V; never reached: the swash plate's stop Z13."
 UNREACHED = (
     "No test of the hoist's drive reached Z13_plus and Z13_minus: beyond what was tested it is "
@@ -81,7 +81,7 @@ def said(*words):
 
 COMMANDS = {
     "run": ("--length", "5"),
-    "judge": ("--seeds", "2"),
+    "assess": ("--seeds", "2"),
     "follow": ("--sea", "ss3"),
     "sweep": ("bearing", "--points", "0", "--seeds", "1"),
     "operability": ("--headings", "0"),
@@ -131,16 +131,16 @@ def test_a_drive_without_a_verdict_says_so(fit, tmp_path):
     words = " ".join(shown.stdout.split())
     assert "no verdict on it is known, as there is no fit beside it" in words
     older = crane.with_drive(hoist=fit(None)).sources["hoist"]
-    assert (older.judged_usable, older.usable) == (None, True)
+    assert (older.fit_usable, older.usable) == (None, True)
     assert "fit again" in older.verdict
     # the verdict is on the drive that was fitted, not on one that was changed by hand
     changed = crane.with_drive(hoist=fit(True, "changed", changed=1.1)).sources["hoist"]
-    assert changed.judged_usable is None
+    assert changed.fit_usable is None
     assert "is not the drive" in changed.verdict
     broken = fit(True, "broken")
     (broken / "fit.json").write_text("{", "utf-8")
     unread = crane.with_drive(hoist=broken).sources["hoist"]
-    assert unread.judged_usable is None
+    assert unread.fit_usable is None
     assert "fit.json is not JSON" in unread.verdict
     assert not crane.with_drive(hoist="hoist", luff=crane.luff).sources
 
@@ -169,14 +169,14 @@ def test_in_python_the_verdict_is_data_of_the_crane(fit):
     bad = crane.with_drive(hoist=result)
     assert not bad.sources["hoist"].usable
     # a moved lever makes another drive of the same fit
-    moved = upgraded(bad, "hoist", {"orifice": 1.5})
-    assert moved.sources["hoist"].judged_usable is False
+    moved = with_design_change(bad, "hoist", {"orifice": 1.5})
+    assert moved.sources["hoist"].fit_usable is False
     assert not bad.with_drive(hoist="hoist").sources
-    unjudged = crane.with_drive(hoist=SimpleNamespace(drive=crane.hoist)).sources["hoist"]
-    assert unjudged.judged_usable is None
+    unassessed = crane.with_drive(hoist=SimpleNamespace(drive=crane.hoist)).sources["hoist"]
+    assert unassessed.fit_usable is None
     # a limit that is given a value is no longer open
     fitted = crane.with_drive(hoist=folder)
-    stopped = upgraded(fitted, "hoist", {"Z13": 1.1})
+    stopped = with_design_change(fitted, "hoist", {"Z13": 1.1})
     assert (fitted.unreached_sentence("hoist"), stopped.unreached_sentence("hoist")) == (
         UNREACHED,
         "",
@@ -191,14 +191,14 @@ def test_in_python_the_verdict_is_data_of_the_crane(fit):
 def test_judgment_and_page_say_the_verdict(fit, tmp_path, usable, look):
     crane = Crane.preset("tg3637").with_drive(hoist=fit(usable))
     verdict = NONE_KNOWN if usable is None else f"{HEADLINES[usable]} {VALIDITY}"
-    found = judge(crane, control.DelayedFeedback(), seeds=[1], **SHORT)
+    found = assess(crane, control.DelayedFeedback(), seeds=[1], **SHORT)
     assert any(verdict in sentence for sentence in found.sentences())
     slow = (
         "The waves' peak is at 0.133 Hz, but the hoist's drive was tested with sines of up to 0.1"
     )
     assert any(slow in sentence for sentence in found.sentences()) == (usable is not None)
-    write_judgment(found, tmp_path / "judge.html")
-    page = tmp_path.joinpath("judge.html").read_text("utf-8")
+    write_assessment(found, tmp_path / "assessment.html")
+    page = tmp_path.joinpath("assessment.html").read_text("utf-8")
     summary, basis = page.partition('<section id="swing">')[0], page.partition('id="basis"')[2]
     for part in (summary, basis):
         for words in (verdict, UNREACHED):
@@ -213,7 +213,7 @@ def test_judgment_and_page_say_the_verdict(fit, tmp_path, usable, look):
 
 def test_a_scene_says_the_verdict(fit, tmp_path):
     crane = Crane.preset("tg3637").with_drive(hoist=fit(False))
-    write_scene(simulate(crane, Stick.rest(2.0)), tmp_path / "scene.html")
+    write_scene(simulate(crane, OperatorCommand.rest(2.0)), tmp_path / "scene.html")
     text = tmp_path.joinpath("scene.html").read_text("utf-8")
     for words in (f"{HEADLINES[False]} {VALIDITY}", UNREACHED):
         assert words.replace("'", "&#39;") in text

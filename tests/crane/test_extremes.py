@@ -45,7 +45,7 @@ def gaussian(duration, damping, components, seed):
 @pytest.mark.parametrize("components", [1, 2])
 @pytest.mark.parametrize("damping", [0.05, 0.2])
 def test_peaks_give_the_extreme_that_is_known(damping, components):
-    """Eighty runs of ten minutes, as of a judgment; the extreme of the process is Rice's."""
+    """Eighty runs of ten minutes, as of an assessment; the extreme of the process is Rice's."""
     signal = gaussian(DURATION * 20, damping, components, seed=1)
     variance, rates = signal.var(axis=1), (8.0 * np.gradient(signal, axis=1)).var(axis=1)
     (known,) = largest_of_gaussian(variance[None], rates[None], DURATION)

@@ -89,7 +89,7 @@ def test_cells_near_a_limit_are_simulated_as_a_study_is(crane, scatter, found):
     study = Study.of(crane, CLIPPED, seeds=(0, 1), sea=sea, drives=("identified",), length=300.0,
                      run_in=60.0)  # fmt: skip
     outcomes = [one for (one,) in study.outcomes([study.cases["identified"]])]
-    assert not any(outcome.left for outcome in outcomes)
+    assert not any(outcome.departure_reason for outcome in outcomes)
     assert (cell.ratio > 1.0) == (cell.limited_by != WORKABLE)
 
 

@@ -12,9 +12,9 @@ from swashplate.crane import (
     SEA_STATES,
     Crane,
     Hull,
+    OperatorCommand,
     Seaway,
     Spectrum,
-    Stick,
     read_ship,
     ship_motion,
     simulate,
@@ -108,7 +108,7 @@ def test_motion_at_the_coarse_rate_is_the_plain_sum(how):
     waves = sea.waves
     motion = sea.motion(32 * 300 + 1, rate=32.0)
     some = np.r_[0, 4, 8, 300, 4800, 9600]
-    turned = np.exp(1j * np.outer(some / 32.0, waves.met)) * waves.amplitude
+    turned = np.exp(1j * np.outer(some / 32.0, waves.encounter)) * waves.amplitude
     plain = (turned @ sea.response(waves.frequency, waves.heading).T).real
     plain[:, 3] += radians(sea.list_deg)
     plain[:, 4] += radians(sea.trim_deg)
@@ -116,14 +116,14 @@ def test_motion_at_the_coarse_rate_is_the_plain_sum(how):
     if not sea.spread:
         omega = waves.frequency
         met = omega - omega**2 / G * sea.speed * np.cos(waves.heading)
-        assert np.abs(waves.met - met).max() <= pi / sea.period * (1.0 + 1e-9)
+        assert np.abs(waves.encounter - met).max() <= pi / sea.period * (1.0 + 1e-9)
 
 
 def test_motion_between_the_coarse_points_is_the_plain_sum():
     sea = Seaway("ss4", heading_deg=130.0, seed=2, speed=3.0)
     waves = sea.waves
     some = np.r_[1, 63, 65, 1000, 12345, 30719]
-    turned = np.exp(1j * np.outer(some / 512.0, waves.met)) * waves.amplitude
+    turned = np.exp(1j * np.outer(some / 512.0, waves.encounter)) * waves.amplitude
     plain = (turned @ sea.response(waves.frequency, waves.heading).T).real
     np.testing.assert_allclose(sea.motion(60 * 512 + 1)[some], plain, atol=2e-7)
 
@@ -167,7 +167,8 @@ def test_a_listed_ship_carries_the_boom_to_the_side_that_is_down():
     crane = Crane.preset("tg3637")
     lists = [Seaway(Spectrum(1e-6, 7.5), list_deg=angle) for angle in (0.0, 5.0)]
     runs = [
-        simulate(crane, Stick.rest(1.0), sea=sea, slew_deg=90.0, actuation="ideal") for sea in lists
+        simulate(crane, OperatorCommand.rest(1.0), sea=sea, slew_deg=90.0, actuation="ideal")
+        for sea in lists
     ]
     upright, listed = (run.tip[0] for run in runs)
     # starboard, where the boom points, goes down by a turn of 5 degrees about the x axis
@@ -379,7 +380,7 @@ def test_measured_motion_comes_from_a_log(tmp_path):
     np.testing.assert_allclose(made[:, 2], 0.5 * np.sin(0.7 * fine), atol=1e-5)
     np.testing.assert_allclose(made[:, 3], np.radians(2.0) * np.sin(0.5 * fine + 1.0), atol=1e-6)
     assert not made[:, [0, 1, 4, 5]].any()
-    run = simulate(Crane.preset("tg3637"), Stick.rest(20.0), sea=made, actuation="ideal")
+    run = simulate(Crane.preset("tg3637"), OperatorCommand.rest(20.0), sea=made, actuation="ideal")
     assert run.swing_deg.max() > 0.05
     with pytest.raises(InputError, match="no column .surge.; it has .*: name the one"):
         ship_motion(path)
@@ -391,7 +392,9 @@ def test_measured_motion_comes_from_a_log(tmp_path):
         ship_motion(path, {"roll": "roll"})
     with pytest.raises(InputError, match="The sea's motion: pitch reaches 3 rad, which no ship"):
         simulate(
-            Crane.preset("tg3637"), Stick.rest(1.0), sea=np.full((600, 6), 3.0) * [0, 0, 0, 0, 1, 0]
+            Crane.preset("tg3637"),
+            OperatorCommand.rest(1.0),
+            sea=np.full((600, 6), 3.0) * [0, 0, 0, 0, 1, 0],
         )
     path.write_text("\n".join(["time [s];heave [m];roll [deg]", *rows[:100], *rows[301:]]), "utf-8")
     with pytest.raises(InputError, match="has no heave from 9.9 to 30.1 s"):
@@ -408,7 +411,7 @@ def test_cut_and_strange_files_are_refused_by_their_line(tmp_path, s175):
     with pytest.raises(FileError, match=r"cut.re1, line 501: .* is missing, .*the file is cut"):
         read_ship(cut)
     cut.write_text("\n".join(["something else", *lines[1:]]), "utf-8")
-    with pytest.raises(FileError, match="is no VERES file"):
+    with pytest.raises(FileError, match="is not a VERES file"):
         read_ship(cut)
 
 

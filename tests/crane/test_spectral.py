@@ -9,9 +9,9 @@ import pytest
 from swashplate.crane import (
     Crane,
     Hull,
+    OperatorCommand,
     Seaway,
     Spectrum,
-    Stick,
     Study,
     control,
     linear_response,
@@ -76,7 +76,7 @@ def test_a_list_is_a_mean_lead(crane):
 
 def test_leads_of_a_run_have_the_signs_of_the_frequency_domain(crane):
     lean = np.tile([0.0, 0.0, 0.0, radians(2.0), radians(1.0), 0.0], (1025, 1))
-    run = simulate(crane, Stick.rest(2.0), sea=lean, slew_deg=90.0, rope_m=27.0)
+    run = simulate(crane, OperatorCommand.rest(2.0), sea=lean, slew_deg=90.0, rope_m=27.0)
     assert run.off_lead_deg[-1] == pytest.approx(2.0, abs=0.05)
     assert run.side_lead_deg[-1] == pytest.approx(-1.0, abs=0.05)
 

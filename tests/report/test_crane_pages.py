@@ -20,26 +20,26 @@ from swashplate.crane import (
     Followable,
     Hull,
     Operability,
+    OperatorCommand,
     Scatter,
     Seaway,
     Spectrum,
-    Stick,
     Sweep,
-    Turn,
+    TippingPoint,
+    assess,
     control,
     follow,
-    judge,
     simulate,
 )
-from swashplate.crane.studies.operating import Cell
+from swashplate.crane.studies.operating import SeaCell
 from swashplate.report import figures
 from swashplate.report.figures.crane import seaway_words
-from swashplate.report.scene import write_judgment, write_operability, write_scene
+from swashplate.report.scene import write_assessment, write_operability, write_scene
 from swashplate.report.scene.pages import COLUMNS
 from swashplate.report.style import BLUE, GREEN, VERMILION
 
 MEANT = control.DelayedFeedback(0.2, 0.2) | control.ShipCompensation()
-SHORT = {"length": 60.0, "run_in": 20.0, "remedies": False, "turns": False}
+SHORT = {"length": 60.0, "run_in": 20.0, "remedies": False, "tipping_points": False}
 
 
 @pytest.fixture(scope="module")
@@ -50,14 +50,20 @@ def crane():
 @pytest.fixture(scope="module")
 def runs(crane):
     return {
-        name: simulate(crane, Stick.rest(20.0), sea=Seaway("ss3", seed=1), control=law, slew_deg=90)
-        for name, law in (("no control", None), ("</script><b>", MEANT))
+        name: simulate(
+            crane,
+            OperatorCommand.rest(20.0),
+            sea=Seaway("ss3", seed=1),
+            control=controller,
+            slew_deg=90,
+        )
+        for name, controller in (("no control", None), ("</script><b>", MEANT))
     }
 
 
 @pytest.fixture(scope="module")
-def judged(crane):
-    return judge(crane, MEANT, seeds=range(3), **SHORT)
+def assessed(crane):
+    return assess(crane, MEANT, seeds=range(3), **SHORT)
 
 
 @pytest.fixture
@@ -97,30 +103,30 @@ BEYOND = "the load swings beyond 30 deg"
 
 
 @pytest.fixture(scope="module")
-def harming(judged):
-    """The same as if the judged variant had left the model twice, and swung more in the third."""
-    left = judged.outcomes[0][-1]._replace(rms_swing=np.nan, left=BEYOND)
-    none = judged.outcomes[2][0]
-    more = judged.outcomes[2][-1]._replace(rms_swing=1.5 * none.rms_swing)
+def harming(assessed):
+    """The same as if the assessed variant had left the model twice, and swung more in the third."""
+    left = assessed.outcomes[0][-1]._replace(rms_swing=np.nan, departure_reason=BEYOND)
+    none = assessed.outcomes[2][0]
+    more = assessed.outcomes[2][-1]._replace(rms_swing=1.5 * none.rms_swing)
     changed = [left, left, more]
     outcomes = tuple(
-        (*seaway[:-1], last) for seaway, last in zip(judged.outcomes, changed, strict=True)
+        (*seaway[:-1], last) for seaway, last in zip(assessed.outcomes, changed, strict=True)
     )
-    return replace(judged, outcomes=outcomes)
+    return replace(assessed, outcomes=outcomes)
 
 
 @pytest.fixture(scope="module")
 def year(crane):
     """Two heights at two periods, one sea missing; headings 0 and 90."""
     scatter = Scatter.of([0.5, 0.5, 1.5], [6.0, 8.0, 8.0], [50.0, 30.0, 20.0], "Made for a test.")
-    good, bad = Cell("", 0.2, False), Cell("side_lead", 2.0, True)
+    good, bad = SeaCell("", 0.2, False), SeaCell("side_lead", 2.0, True)
     none = {(row, heading): bad for row in range(3) for heading in (0.0, 90.0)}
-    own = {**dict.fromkeys(none, good), (1, 90.0): Cell("luff orifice", 1.2, True)}
+    own = {**dict.fromkeys(none, good), (1, 90.0): SeaCell("luff orifice", 1.2, True)}
     own |= {(2, 0.0): bad, (2, 90.0): bad}
     cells = {"no control": none, "identified": own}
     hoist = (0.7, 8.0, 90.0)
-    law, headings = control.Clip(), (0.0, 90.0)
-    return Operability(crane, law, scatter, headings, cells, Seaway(), "The case.", hoist)
+    controller, headings = control.Clip(), (0.0, 90.0)
+    return Operability(crane, controller, scatter, headings, cells, Seaway(), "The case.", hoist)
 
 
 def written(write, result, folder):
@@ -138,13 +144,13 @@ def words_of(figure):
 # --- pages ----------------------------------------------------------------------------------------
 
 
-def test_verdicts_page_has_both_answers_with_a_light_of_their_own(tmp_path, judged, harming):
-    text = written(write_judgment, judged, tmp_path)
+def test_verdicts_page_has_both_answers_with_a_light_of_their_own(tmp_path, assessed, harming):
+    text = written(write_assessment, assessed, tmp_path)
     summary, _, rest = text.partition('<section id="hangs">')
     looks = {"yes": "good", "not decided": "look", "no": "bad"}
     for subject, decision, sentence in (
-        ("Harm", judged.harmless, judged.harm_sentence()),
-        ("Sufficiency", judged.sufficient, judged.sufficiency_sentence()),
+        ("Harm", assessed.harmless, assessed.harm_sentence()),
+        ("Sufficiency", assessed.sufficient, assessed.sufficiency_sentence()),
     ):
         assert f'<dt class="{looks[decision]}">{subject}</dt>' in summary
         assert sentence in summary
@@ -153,21 +159,21 @@ def test_verdicts_page_has_both_answers_with_a_light_of_their_own(tmp_path, judg
     assert "3 seaways of 1 min" in summary
     assert summary.count("<svg") == 1
     assert rest.count("<svg") == 2
-    failed = written(write_judgment, harming, tmp_path)
+    failed = written(write_assessment, harming, tmp_path)
     assert '<div class="headline bad">' in failed
     assert f"'identified' is not an operation in 2 of 3 seaways: {BEYOND}." in failed
 
 
-def test_verdicts_page_says_what_the_answer_hangs_on(tmp_path, judged):
-    turn = Turn("the ship's roll period", "13 s", "10.4 s", True, False)
-    text = written(write_judgment, replace(judged, turns=(turn,)), tmp_path)
+def test_verdicts_page_says_what_the_answer_hangs_on(tmp_path, assessed):
+    point = TippingPoint("the ship's roll period", "13 s", "10.4 s", True, False)
+    text = written(write_assessment, replace(assessed, tipping_points=(point,)), tmp_path)
     hangs = text.partition('<section id="hangs">')[2].partition("</section>")[0]
     for words in (
         "The load's swing has a damping of 0.5 %, assumed.",
         "The ship's roll period is 13 s, assumed.",
         "14 of 15 quantities of the crane are assumed.",
         "Limits that are assumed: swing, off-lead, side-lead",
-        turn.words(),
+        point.words(),
     ):
         assert words in hangs
     # of the limits and of the geometry, every assumed row is marked
@@ -175,14 +181,14 @@ def test_verdicts_page_says_what_the_answer_hangs_on(tmp_path, judged):
     assert "roll period 13 s with a damping of 6 %" in text
 
 
-def test_verdicts_page_of_harm_alone_says_what_was_not_asked(tmp_path, judged):
-    text = written(write_judgment, replace(judged, asked=("harm",)), tmp_path)
+def test_verdicts_page_of_harm_alone_says_what_was_not_asked(tmp_path, assessed):
+    text = written(write_assessment, replace(assessed, questions=("harm",)), tmp_path)
     assert text.count("This was not asked") == 1
     assert "suffice" not in text.partition('<div class="headline')[2].partition("</div>")[0]
 
 
-def test_pages_are_one_file_each_without_an_outside_link(tmp_path, judged, year):
-    for write, result in ((write_judgment, judged), (write_operability, year)):
+def test_pages_are_one_file_each_without_an_outside_link(tmp_path, assessed, year):
+    for write, result in ((write_assessment, assessed), (write_operability, year)):
         text = written(write, result, tmp_path)
         assert not re.search(r"(src|href)\s*=\s*[\"']?(https?:)?//", text)
         assert "min-width: 600px" not in text  # figures are whole on a narrow screen
@@ -204,16 +210,16 @@ def test_operabilitys_page_has_one_figure_the_shares_and_what_is_assumed(tmp_pat
 
 
 @pytest.mark.slow
-def test_verdicts_page_shows_in_a_browser_without_errors(tmp_path, judged, browsed):
-    write_judgment(judged, tmp_path / "judge.html")
-    assert "Limits of the drives" in browsed(tmp_path / "judge.html")
+def test_verdicts_page_shows_in_a_browser_without_errors(tmp_path, assessed, browsed):
+    write_assessment(assessed, tmp_path / "assessment.html")
+    assert "Limits of the drives" in browsed(tmp_path / "assessment.html")
 
 
 @pytest.mark.slow
-def test_nothing_runs_in_a_page_but_its_own_scripts(tmp_path, scene, judged, year, browsed):
+def test_nothing_runs_in_a_page_but_its_own_scripts(tmp_path, scene, assessed, year, browsed):
     assert "data-drawn=" in injected(scene, tmp_path, browsed)
-    write_judgment(judged, tmp_path / "judge.html")
-    assert "Limits of the drives" in injected(tmp_path / "judge.html", tmp_path, browsed)
+    write_assessment(assessed, tmp_path / "assessment.html")
+    assert "Limits of the drives" in injected(tmp_path / "assessment.html", tmp_path, browsed)
     write_operability(year, tmp_path / "year.html")
     assert "What it rests on" in injected(tmp_path / "year.html", tmp_path, browsed)
 
@@ -221,7 +227,7 @@ def test_nothing_runs_in_a_page_but_its_own_scripts(tmp_path, scene, judged, yea
 def test_scenes_that_cannot_be_are_refused(tmp_path, crane, runs):
     with pytest.raises(InputError, match="shows 1 to 4 runs of a crane, not 0"):
         write_scene({}, tmp_path / "scene.html")
-    longer = simulate(crane, Stick.rest(21.0))
+    longer = simulate(crane, OperatorCommand.rest(21.0))
     with pytest.raises(InputError, match="must be of one length"):
         write_scene({**runs, "longer": longer}, tmp_path / "scene.html")
     assert not list(tmp_path.iterdir())
@@ -238,17 +244,17 @@ def test_seaways_in_words_have_height_period_heading_and_roll():
     assert seaway_words(Seaway(heading_deg=-180.0), height=False).startswith("peak at 7.5 s, head")
 
 
-def test_figure_of_a_judgment_tells_seaways_from_the_means_interval(judged, assert_legible):
-    figure = judged.plot()
+def test_figure_of_an_assessment_tells_seaways_from_the_means_interval(assessed, assert_legible):
+    figure = assessed.plot()
     assert_legible(figure)
     title = figure.get_suptitle()
     assert title == "3 seaways of 1 min, ss3 0.88 m, 7.5 s, abeam from starboard, roll 13 s"
     swing = figure.axes[0]
     diamonds = [patch for patch in swing.patches if isinstance(patch, Polygon)]
     for name, points, diamond in zip(
-        reversed(judged.names), swing.collections, diamonds, strict=False
+        reversed(assessed.names), swing.collections, diamonds, strict=False
     ):
-        expected = np.degrees(judged.swing(name))
+        expected = np.degrees(assessed.swing(name))
         np.testing.assert_allclose(np.sort(points.get_offsets()[:, 0]), np.sort(expected))
         # the root of the mean square, and of its interval
         squares = expected**2
@@ -257,10 +263,10 @@ def test_figure_of_a_judgment_tells_seaways_from_the_means_interval(judged, asse
         assert across.max() == pytest.approx(np.sqrt(squares.mean() + half))
         assert across.min() == pytest.approx(np.sqrt(max(squares.mean() - half, 0.0)))
     (line,) = swing.collections[3].get_segments()
-    assert line[0, 0] == pytest.approx(np.degrees(judged.linear.values["swing"].rms))
+    assert line[0, 0] == pytest.approx(np.degrees(assessed.linear.values["swing"].rms))
 
 
-def test_figure_of_a_judgment_counts_runs_that_left_the_model(harming, assert_legible):
+def test_figure_of_an_assessment_counts_runs_that_left_the_model(harming, assert_legible):
     figure = harming.plot()
     assert_legible(figure)
     swing = figure.axes[0]
@@ -276,15 +282,15 @@ def test_figure_of_a_judgment_counts_runs_that_left_the_model(harming, assert_le
     rows = [text.get_text() for text in swing.get_yticklabels()]
     assert rows[0] == "identified\nworse than none: 3 of 3"
     nobody = tuple(
-        tuple(one._replace(rms_swing=np.nan, left=BEYOND) for one in seaway)
+        tuple(one._replace(rms_swing=np.nan, departure_reason=BEYOND) for one in seaway)
         for seaway in harming.outcomes
     )
     assert_legible(replace(harming, outcomes=nobody, linear=None).plot())
 
 
-def test_figure_of_a_judgment_has_shares_of_limits(judged, crane):
-    limits = judged.plot().axes[1]
-    limited = judged.limited(judged.judged)
+def test_figure_of_an_assessment_has_shares_of_limits(assessed, crane):
+    limits = assessed.plot().axes[1]
+    limited = assessed.limited(assessed.assessed_variant)
     labels = [text.get_text().partition("\n")[0] for text in limits.get_yticklabels()]
     assert labels[0] == "saturation"
     assert labels[-1] == "swing"
@@ -293,8 +299,8 @@ def test_figure_of_a_judgment_has_shares_of_limits(judged, crane):
         if one.largest.value == one.largest.value:  # not of too few peaks
             share = one.largest.value / one.limit
             assert shown[row] == pytest.approx(np.clip(share, 0.1, limits.get_xlim()[1]))
-    unlimited = replace(judged, study=replace(judged.study, crane=replace(crane, limits={})))
-    assert len(replace(unlimited, asked=("harm",)).plot().axes) == 1
+    unlimited = replace(assessed, study=replace(assessed.study, crane=replace(crane, limits={})))
+    assert len(replace(unlimited, questions=("harm",)).plot().axes) == 1
 
 
 def swept(crane, over, points, values):
@@ -399,8 +405,8 @@ def entries(figure):
     return zip(legend.get_texts(), legend.get_patches(), strict=True)
 
 
-def test_figures_of_one_panel_draw_in_given_axes(crane, judged):
-    for result in (judged, follow(crane, [5.0, 8.0, 12.0])):
+def test_figures_of_one_panel_draw_in_given_axes(crane, assessed):
+    for result in (assessed, follow(crane, [5.0, 8.0, 12.0])):
         ax = Figure().subplots()
         assert result.plot(ax=ax, title="here") is ax
         assert ax.get_title(loc="left") == "here"
@@ -408,13 +414,13 @@ def test_figures_of_one_panel_draw_in_given_axes(crane, judged):
 
 
 def test_figure_of_runs_shows_them_by_name_what_moves_and_the_sea(crane, runs):
-    calm = {name: simulate(crane, Stick.rest(20.0), slew_deg=90) for name in runs}
+    calm = {name: simulate(crane, OperatorCommand.rest(20.0), slew_deg=90) for name in runs}
     figure = figures.plot_crane(calm, sea=runs)
     labels = [ax.get_ylabel() for ax in figure.axes]
     assert labels == ["swing (deg)", "in sea (deg)", "limits"]
     names = [each.get_text() for each in figure.axes[0].get_legend().get_texts()]
     assert names == list(runs)
-    stick = Stick.trapezoid(slew=0.5, luff=0.5, duration=9.0, length=12.0)
+    stick = OperatorCommand.trapezoid(slew=0.5, luff=0.5, duration=9.0, length=12.0)
     figure = simulate(crane, stick).plot()
     labels = [ax.get_ylabel() for ax in figure.axes]
     assert labels == ["swing (deg)", "slew (deg)", "boom (deg)", "limits"]

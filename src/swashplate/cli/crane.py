@@ -19,7 +19,7 @@ from swashplate.cli.crane_options import (
     control_of,
     crane_of,
     number_of,
-    numbers_of,
+    numbers_by_name,
     sea_sentences,
 )
 from swashplate.cli.options import (
@@ -35,7 +35,7 @@ from swashplate.errors import InputError
 from swashplate.tables import PAGE, Column, Form, Table
 
 if TYPE_CHECKING:
-    from swashplate.crane import Crane, Judgment, Operability, Seaway, Sweep
+    from swashplate.crane import Assessment, Crane, Operability, Seaway, Sweep
 
 VERDICT = Form("a verdict", (".html", ".csv", ".parquet"))
 OPERABILITY = Form("an operability", (".html", ".csv", ".parquet"))
@@ -65,7 +65,9 @@ def show_crane(
     toml: Annotated[
         bool,
         typer.Option(
-            "--toml", metavar=NO_VALUE, help="Print the crane's file, to start your own from."
+            "--toml",
+            metavar=NO_VALUE,
+            help="Print the crane's file, as a template for another crane.",
         ),
     ] = False,
 ) -> None:
@@ -77,11 +79,14 @@ def show_crane(
         read = read_text if crane.endswith(".toml") else preset_text
         typer.echo(read(crane), nl=False)
         return
-    chosen = crane_of(crane)
-    show(chosen.table(), *([chosen.limit_table()] if chosen.limits else []))
+    shown = crane_of(crane)
+    tables = [shown.table()]
+    if shown.limits:
+        tables.append(shown.limit_table())
+    show(*tables)
     for axis in AXES:
-        note(f"{axis}: {getattr(chosen, axis).parameters.title}")
-    for sentence in chosen.provenance():
+        note(f"{axis}: {getattr(shown, axis).parameters.title}")
+    for sentence in shown.provenance():
         say(sentence)
 
 
@@ -150,26 +155,30 @@ def run(
     largest one within 25 s, counted from 4 s after the joystick has returned and
     the controller has ended its command.
     """
-    runs, first = {}, ""
+    runs = {}
+    last = ""
     if out is not None and len(variant or ()) > 1:
         raise InputError("--out writes one run's signals: take one --variant.")
     with working("Simulating"):
-        from swashplate.crane import Stick, run_tables, simulate
+        from swashplate.crane import OperatorCommand, run_tables, simulate
         from swashplate.crane.axes import RATE
 
-        crane, seaway = operated.chosen, operated.seaway(seed=seed, length=length)
-        targets = numbers_of("--until", until, "slew_deg=45")
-        stick = Stick.trapezoid(
+        crane = operated.chosen
+        seaway = operated.seaway(seed=seed, length=length)
+        targets = numbers_by_name("--until", until, "slew_deg=45")
+        stick = OperatorCommand.trapezoid(
             hoist=hoist, slew=slew, luff=luff, until=targets, duration=duration, length=length
         )
         ship = seaway or operated.motion(round(stick.length * RATE) + 1)
-        for first in variant or ["inverse"]:
-            drives, _, law = first.partition(":")
-            how: dict[str, Any] = {"control": control_of(law)}
+        for last in variant or ["inverse"]:
+            drives, _, controller = last.partition(":")
+            how: dict[str, Any] = {"control": control_of(controller)}
             how["actuation"] = "inverse" if drives == "identified" else drives
-            runs[first] = simulate(crane, stick, sea=ship, brake=brake, **how, **operated.setup)
+            runs[last] = simulate(
+                crane, stick, sea=ship, brake=brake, **how, **operated.run_options
+            )
         tables = run_tables(runs)
-    save(out, "All signals, in SI", runs[first].write)
+    save(out, "All signals, in SI", runs[last].write)
     draw(plot, "plot_crane", runs)
     if scene is not None:
         from swashplate.report.scene import write_scene
@@ -184,15 +193,15 @@ def run(
 
 @command(
     cranes,
-    "judge",
+    "assess",
     examples="""
-        swashplate crane judge tg3637 --sea ss3
-        swashplate crane judge tg3637 --control feedback=0.2/0.2+ship+clip --ask harm
-        swashplate crane judge tg3637 --scale luff.orifice=3 --out judge.html
-        swashplate crane judge tg3637 --drive luff=fitted --drives identified,drawn
+        swashplate crane assess tg3637 --sea ss3
+        swashplate crane assess tg3637 --control feedback=0.2/0.2+ship+clip --ask harm
+        swashplate crane assess tg3637 --scale luff.orifice=3 --out assessment.html
+        swashplate crane assess tg3637 --drive luff=fitted --drives identified,drawn
     """,
 )
-def judge(
+def assess(
     study: Studied,
     *,
     allowed: Annotated[
@@ -218,10 +227,10 @@ def judge(
             "--remedies/--no-remedies", metavar=NO_VALUE, help="Search for changes that suffice."
         ),
     ] = True,
-    turns: Annotated[
+    tipping_points: Annotated[
         bool,
         typer.Option(
-            "--turns/--no-turns",
+            "--tipping-points/--no-tipping-points",
             metavar=NO_VALUE,
             help="Search for inputs, such as the ship's roll period, that would change the answer.",
         ),
@@ -247,32 +256,38 @@ def judge(
             f"--allowed is in percent, and {allowed:g} % of the seaways would ask for thousands of "
             f"them: did you mean --allowed {100.0 * allowed:g}?"
         )
-    more: dict[str, Any] = {"allowed": allowed / 100.0, "remedies": remedies, "turns": turns}
+    keywords: dict[str, Any] = {
+        "allowed_share_worse": allowed / 100.0,
+        "remedies": remedies,
+        "tipping_points": tipping_points,
+    }
     if ask is not None:
-        more["asked"] = [question.strip() for question in ask.split(",")]
+        keywords["questions"] = [question.strip() for question in ask.split(",")]
     if dask is not None:
         from swashplate.executors import Dask
 
-        more["executor"] = Dask(dask)
-    from swashplate.crane import judge as judge_control
-    from swashplate.crane.studies.judging import SEAWAYS, seaways_needed
+        keywords["executor"] = Dask(dask)
+    from swashplate.crane import assess as assess_control
+    from swashplate.crane.studies.assessing import SEAWAYS, seaways_needed
 
     crane = study.chosen
     side.print(seaways_needed(study.seeds or SEAWAYS, allowed / 100.0))
-    found: Judgment = study.through(judge_control, crane, **more)
-    what, write = "Numbers of every seaway, in SI", found.write
+    assessment: Assessment = study.through(assess_control, crane, **keywords)
+    what = "Numbers of every seaway, in SI"
+    write = assessment.write
     if out is not None and out.suffix.lower() == ".html":
-        from swashplate.report.scene import write_judgment
+        from swashplate.report.scene import write_assessment
 
-        what, write = "Verdict", partial(write_judgment, found)
+        what = "Verdict"
+        write = partial(write_assessment, assessment)
     save(out, what, write)
-    draw(plot, "plot_judgment", found)
-    _end(study.chosen, found.tables(), *found.sentences()[1:])
+    draw(plot, "plot_assessment", assessment)
+    _end(study.chosen, assessment.tables(), *assessment.sentences()[1:])
     say_saved()
-    if not found.passed:
-        side.print(found.headline)
+    if not assessment.passed:
+        side.print(assessment.headline)
         raise typer.Exit(1)
-    say(found.headline)
+    say(assessment.headline)
 
 
 @command(
@@ -330,19 +345,21 @@ def operability(
         raise InputError("--heading belongs to one sea: for operability give --headings.")
     if study.sea:
         note("Only the peak factor and the spreading of --sea are used.")
-    more: dict[str, Any] = {}
+    keywords: dict[str, Any] = {}
     if headings is not None:
         words = headings.split(",")
-        more["headings"] = [number_of(f"--headings {headings}", word) for word in words]
-    found: Operability = study.through(operable, study.chosen, scatter=diagram, **more)
-    what, write = "Cells of the year, in SI", found.write
+        keywords["headings"] = [number_of(f"--headings {headings}", word) for word in words]
+    year: Operability = study.through(operable, study.chosen, scatter=diagram, **keywords)
+    what = "Cells of the year, in SI"
+    write = year.write
     if out is not None and out.suffix.lower() == ".html":
         from swashplate.report.scene import write_operability
 
-        what, write = "Operability", partial(write_operability, found)
+        what = "Operability"
+        write = partial(write_operability, year)
     save(out, what, write)
-    draw(plot, "plot_operability", found)
-    _end(study.chosen, found.tables(), *found.sentences(), *study.chosen.provenance())
+    draw(plot, "plot_operability", year)
+    _end(study.chosen, year.tables(), *year.sentences(), *study.chosen.provenance())
 
 
 @command(
@@ -364,14 +381,14 @@ def follow(at_sea: AtSea, *, out: TableFile = None, plot: FigureFile = None) -> 
         from swashplate.crane import follow as largest_sines
 
         seaway = at_sea.seaway(default="ss3")
-        more: dict[str, Any] = {}
+        keywords: dict[str, Any] = {}
         if at_sea.sea and seaway is not None:
-            more["seas"] = (seaway.sea,)
-        found = largest_sines(at_sea.chosen, seaway=seaway, **more, **at_sea.pose)
-    save(out, "Amplitudes, in SI", found.tables()[0].write)
-    draw(plot, "plot_follow", found)
+            keywords["seas"] = (seaway.sea,)
+        followable = largest_sines(at_sea.chosen, seaway=seaway, **keywords, **at_sea.pose)
+    save(out, "Amplitudes, in SI", followable.tables()[0].write)
+    draw(plot, "plot_follow", followable)
     about_sea = sea_sentences(seaway) if at_sea.sea else ()
-    _end(at_sea.chosen, found.tables(), *about_sea, *at_sea.chosen.provenance())
+    _end(at_sea.chosen, followable.tables(), *about_sea, *at_sea.chosen.provenance())
 
 
 @command(
@@ -402,15 +419,15 @@ def sweep(
     orifice: factors on the luff drive's in-line orifice.
     Each point is simulated in 6 seaways of 10 min.
     """
-    more: dict[str, Any] = {}
+    keywords: dict[str, Any] = {}
     if points is not None:
-        more["points"] = [number_of(f"--points {points}", each) for each in points.split(",")]
+        keywords["points"] = [number_of(f"--points {points}", word) for word in points.split(",")]
     from swashplate.crane import sweep as swing_over
 
-    found: Sweep = study.through(swing_over, study.chosen, over, **more)
-    save(out, "Swing, in SI", found.tables()[0].write)
-    draw(plot, "plot_sweep", found)
-    _end(study.chosen, found.tables(), *sea_sentences(study.waters), *study.chosen.provenance())
+    swept: Sweep = study.through(swing_over, study.chosen, over, **keywords)
+    save(out, "Swing, in SI", swept.tables()[0].write)
+    draw(plot, "plot_sweep", swept)
+    _end(study.chosen, swept.tables(), *sea_sentences(study.waters), *study.chosen.provenance())
 
 
 @command(
@@ -454,7 +471,8 @@ def damping(
     from swashplate.logs import read_series
 
     series = read_series(log, column, "rad", time_column=time_column)
-    first, last = float(series.time[0]), float(series.time[-1])
+    first = float(series.time[0])
+    last = float(series.time[-1])
     begins = first if start is None else start
     ends = last if stop is None else stop
     if not first <= begins < ends <= last:
@@ -463,21 +481,21 @@ def damping(
         )
     within = (begins <= series.time) & (series.time <= ends)
     try:
-        found = swing_damping(series.time[within], series.values[within], rope=rope)
+        free_swing = swing_damping(series.time[within], series.values[within], rope=rope)
     except InputError as error:
         raise InputError(f"{log}, {column}: {error}") from None
     ratio = Column("damping ratio", ".3%")
     interval = [Column(name, ".3%") for name in ("from", "to")]
     table = Table("Free swing, 95 % interval", (ratio, *interval, Column("period", ".2f", "s")))
-    table.add(*found)
+    table.add(*free_swing)
     show(table)
 
 
-def _end(crane: Crane, tables: Iterable[Table], *said: str) -> None:
+def _end(crane: Crane, tables: Iterable[Table], *sentences: str) -> None:
     """Print title, tables and sentences."""
     note(crane.title)
     show(*tables)
-    for sentence in said:
+    for sentence in sentences:
         say(sentence)
 
 
@@ -487,13 +505,13 @@ def _stationary_words(operated: Operated, seaway: Seaway, damping: float) -> str
 
     from swashplate.crane import linear_response
 
-    setup = operated.setup
+    options = operated.run_options
     names = ("slew_deg", "boom_deg", "rope_m", "swing_damping", "load", "suspension")
     start = {"slew_deg": 0.0, "boom_deg": 45.0, "rope_m": 20.0}
-    hung = start | {name: setup[name] for name in names if name in setup}
-    found = linear_response(operated.chosen, seaway, **hung)
+    hung = start | {name: options[name] for name in names if name in options}
+    response = linear_response(operated.chosen, seaway, **hung)
     return (
-        f"Without control the load swings by {degrees(found.values['swing'].rms):.2f} deg RMS in "
-        f"the long run, by the sea's spectrum and a damping of {100.0 * damping:g} %; a run begins "
-        "at rest."
+        f"Without control the load swings by {degrees(response.values['swing'].rms):.2f} deg RMS "
+        f"in the long run, by the sea's spectrum and a damping of {100.0 * damping:g} %; a run "
+        "begins at rest."
     )

@@ -19,13 +19,14 @@ if TYPE_CHECKING:
     from swashplate.crane.control import Control
     from swashplate.crane.sea.seaway import Array
 
-START, AXES = ("slew_deg", "boom_deg", "rope_m"), ("hoist", "slew", "luff")
+START = ("slew_deg", "boom_deg", "rope_m")
+AXES = ("hoist", "slew", "luff")
 
 
 CraneArgument = Annotated[
     str,
     typer.Argument(
-        metavar="CRANE|FILE.toml", help="Packaged crane, tg3637, or the file of your own."
+        metavar="CRANE|FILE.toml", help="Packaged crane, tg3637, or the file of another crane."
     ),
 ]
 
@@ -60,7 +61,7 @@ class Placed:
     def chosen(self) -> Crane:
         """The crane, with its drives; one whose fit is not usable is refused without --force."""
         drives = dict(pairs_of("--drive", self.drive, "luff=mine.toml"))
-        crane = crane_of(self.crane).with_drive(known=True, **drives)
+        crane = crane_of(self.crane).with_drive(known_to_controller=True, **drives)
         if not self.force:
             _refuse_unusable(crane)
         return crane
@@ -68,7 +69,7 @@ class Placed:
     @property
     def pose(self) -> dict[str, Any]:
         """The initial position, as far as it is given."""
-        return numbers_of("--at", self.at, "rope_m=25", START)
+        return numbers_by_name("--at", self.at, "rope_m=25", START)
 
 
 @dataclass(frozen=True)
@@ -249,24 +250,24 @@ class Operated(AtSea):
     ] = None
 
     @property
-    def setup(self) -> dict[str, Any]:
+    def run_options(self) -> dict[str, Any]:
         """Where a run begins, and what hangs on the crane, as far as it is given."""
         from swashplate.crane import Suspension
 
-        setup = self.pose | _given(
+        options = self.pose | _given(
             drag_area=self.drag_area, load=self.load, swing_damping=self.swing_damping
         )
-        names = [each.name for each in fields(Suspension)]
-        values = numbers_of("--suspension", self.suspension, "stiffness=6e7", names)
+        names = [field.name for field in fields(Suspension)]
+        values = numbers_by_name("--suspension", self.suspension, "stiffness=6e7", names)
         if values:
-            setup["suspension"] = Suspension(**values)
+            options["suspension"] = Suspension(**values)
         if self.wind is not None:
             if self.drag_area is None:
                 raise InputError(
                     f"--wind {self.wind} needs the load's drag area: give --drag-area, such as 12."
                 )
-            setup["wind"] = _vector("--wind", self.wind, "10,-5")
-        return setup
+            options["wind"] = _vector("--wind", self.wind, "10,-5")
+        return options
 
 
 @dataclass(frozen=True)
@@ -285,7 +286,7 @@ class Studied(Operated):
     ] = "feedback=0.2/0.2+ship+loop=1.5"
     seeds: Annotated[
         int | None,
-        typer.Option(metavar="N", help="Number of seaways (judge: 120 by default)."),
+        typer.Option(metavar="N", help="Number of seaways (assess: 120 by default)."),
     ] = None
     length: Annotated[
         float | None,
@@ -324,12 +325,12 @@ class Studied(Operated):
         ),
     ] = None
 
-    def through(self, study: Callable[..., Any], *first: Any, **more: Any) -> Any:
+    def through(self, study: Callable[..., Any], *arguments: Any, **keywords: Any) -> Any:
         """A study of the controller, whose progress is shown."""
-        law = control_of(self.control)
-        if law is None:
+        controller = control_of(self.control)
+        if controller is None:
             raise InputError("--control is empty: there is nothing to assess.")
-        how = self.setup | _given(length=self.length, run_in=self.run_in) | more
+        how = self.run_options | _given(length=self.length, run_in=self.run_in) | keywords
         if self.waters is not None:
             how["sea"] = self.waters
         if self.seeds is not None:
@@ -338,7 +339,7 @@ class Studied(Operated):
             how["drives"] = self.sets()
         with long_work("Seaways") as shown:
             how["progress"] = lambda done, of: shown(f"{done} of {of} seaways", done / of)
-            return study(*first, law, **how)
+            return study(*arguments, controller, **how)
 
     @cached_property
     def waters(self) -> Seaway | None:
@@ -353,7 +354,7 @@ class Studied(Operated):
     def sets(self) -> dict[str, Any]:
         """Sets of drives by name."""
         from swashplate.analysis.design_variables import powers_of
-        from swashplate.crane import drawn_cranes, upgraded
+        from swashplate.crane import drawn_cranes, with_design_change
 
         names = filter(None, map(str.strip, (self.drives or "ideal,identified").split(",")))
         sets: dict[str, Any] = {name: name for name in names}
@@ -363,12 +364,14 @@ class Studied(Operated):
             if not drawn:
                 raise InputError("--drives drawn needs the folder of a fit: --drive luff=FOLDER.")
             sets["drawn"] = drawn_cranes(self.chosen)
-            kept = [axis for axis in AXES if axis not in drawn]
-            as_given = f"; not drawn, without a fit: {', '.join(kept)}" if kept else ""
+            not_drawn = [axis for axis in AXES if axis not in drawn]
+            as_given = f"; not drawn, without a fit: {', '.join(not_drawn)}" if not_drawn else ""
             side.print(f"Drawn: {', '.join(drawn)}{as_given}")
-        crane, changed = self.chosen, []
+        crane = self.chosen
+        changed = []
         for name, text in pairs_of("--scale", self.scale, "luff.orifice=1.5"):
-            (axis, _, variable), words = name.partition("."), f"--scale {name}={text}"
+            axis, _, variable = name.partition(".")
+            words = f"--scale {name}={text}"
             if not variable or axis not in AXES:
                 raise InputError(
                     f"{words}: write the axis first, luff.orifice=1.5; the axes are "
@@ -376,7 +379,7 @@ class Studied(Operated):
                 )
             powers_of(variable)
             factor = number_of(words, text)
-            crane = upgraded(crane, axis, {variable: factor})
+            crane = with_design_change(crane, axis, {variable: factor})
             changed.append(f"{axis} {variable} ×{factor:g}")
         if changed:
             sets[", ".join(changed)] = crane
@@ -399,7 +402,7 @@ def control_of(words: str) -> Control | None:
     stages: list[Control] = []
     for word in filter(None, words.split("+")):
         name, _, text = word.partition("=")
-        numbers = [number_of(f"The control '{word}'", each) for each in text.split("/") if text]
+        numbers = [number_of(f"The control '{word}'", part) for part in text.split("/") if text]
         kind, most = kinds.get(name, (None, 0))
         if kind is None or len(numbers) > most:
             raise InputError(
@@ -459,14 +462,14 @@ def _vector(option: str, text: str, example: str) -> tuple[float, ...]:
     return numbers
 
 
-def numbers_of(
-    what: str, given: list[str] | None, example: str, known: Sequence[str] = ()
+def numbers_by_name(
+    what: str, words: list[str] | None, example: str, allowed: Sequence[str] = ()
 ) -> dict[str, Any]:
-    """Numbers by name of an option's pairs; refuses a name that is not known."""
-    pairs = pairs_of(what, given, example)
-    strange = [name for name, _ in pairs if known and name not in known]
-    if strange:
-        raise InputError(f"{what} has no {strange[0]}; it has {', '.join(known)}.")
+    """Numbers by name of an option's pairs; refuses a name that is not allowed."""
+    pairs = pairs_of(what, words, example)
+    unknown = [name for name, _ in pairs if allowed and name not in allowed]
+    if unknown:
+        raise InputError(f"{what} has no {unknown[0]}; it has {', '.join(allowed)}.")
     return {name: number_of(f"{what} {name}={text}", text) for name, text in pairs}
 
 
@@ -490,7 +493,7 @@ def _refuse_unusable(crane: Crane) -> None:
     for axis, source in crane.sources.items():
         if not source.usable:
             raise InputError(
-                f"{axis}={source.place}: the verdict on the fit of this drive is "
+                f"{axis}={source.origin}: the verdict on the fit of this drive is "
                 f"'{source.verdict.rstrip('.')}'; fit again until it is usable, as its report "
                 f"advises, give another drive, or accept this one with --force."
             )

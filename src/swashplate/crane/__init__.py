@@ -1,6 +1,6 @@
 """Cranes: three identified drives, a boom on a moving ship, a load on its rope, and control.
 
-The crane itself stands here; `sea` moves its ship, `closed_loop` runs it, `studies` judge it.
+The crane itself stands here; `sea` moves its ship, `closed_loop` runs it, `studies` assess control.
 """
 
 import lazy_loader

@@ -8,13 +8,13 @@ from swashplate.errors import InputError
 
 AXES = ("hoist", "slew", "luff")
 RATE = 512.0
-"""Samples a second of the loop: the packaged drives' own. [Hz]"""
+"""Samples a second of the loop: that of the packaged drives. [Hz]"""
 
 
 def check_names(
-    said: str, given: Iterable[str], known: Iterable[str], has: str = "there are"
+    beginning: str, names: Iterable[str], allowed: Iterable[str], has: str = "there are"
 ) -> None:
-    """Refuse names that are not known, in a sentence that begins as said."""
-    strange = [each for each in given if each not in known]
-    if strange:
-        raise InputError(f"{said} '{strange[0]}'; {has} {', '.join(known)}.")
+    """Refuse names that are not allowed, in a sentence that starts with `beginning`."""
+    unknown = [name for name in names if name not in allowed]
+    if unknown:
+        raise InputError(f"{beginning} '{unknown[0]}'; {has} {', '.join(allowed)}.")

@@ -1,11 +1,12 @@
-"""Control of a crane: shaper, delayed feedback, ship compensation, limits, user-defined laws.
+"""Control of a crane: shaper, delayed feedback, ship compensation, limits, user-defined stages.
 
 Each is a value; `|` combines them: ``TipShaper("zv") | DelayedFeedback(0.2) | Clip()``. In the
 loop they act in one order, whatever order they are written in: path of the tip, tip shaper, offsets
-of the tip (feedback, ship, law), clip, inverse kinematics, position loop. Every stage works on the
-path of the tip, and brings the position loop of 0.7 /s with it, by which the shafts follow that
-path; `PositionLoop` sets another gain. `Sensors` says how well control sees the crane; without them
-it sees what is so. The linear crane is for controllers that are designed outside the package.
+of the tip (feedback, ship, user-defined), clip, inverse kinematics, position loop. Every stage
+works on the path of the tip. It brings a position loop of 0.7 /s with it, by which the shafts
+follow that path; `PositionLoop` sets another gain. `Sensors` says how well control sees the crane;
+without sensors it sees the true signals. The linear crane, `linearize`, is for controllers that are
+designed outside the package.
 """
 
 from __future__ import annotations
@@ -37,11 +38,11 @@ stays below that over the widest range of ropes (Singhose, Seering and Singer 19
 SEEN = (
     *("swing_x", "swing_y"),
     *("rope", "slew", "boom"),
-    *("wanted_x", "wanted_y"),
+    *("reference_x", "reference_y"),
     *("surge", "sway", "heave", "roll", "pitch", "yaw"),
 )
-"""What a law of one's own may take as inputs: load less tip, horizontal, inertial [m]; rope [m];
-slew and boom [rad]; the operator's tip in the ship's frame, shaped [m]; the ship's motion [m],
+"""What a user-defined controller may take as inputs: load less tip, horizontal, inertial [m]; rope
+[m]; slew and boom [rad]; the operator's tip in the ship's frame, shaped [m]; the ship's motion [m],
 [rad]."""
 SENSED = (
     ("rope_angle_noise_deg", 0.0, 10.0),
@@ -51,7 +52,7 @@ SENSED = (
 )
 """Plausible ranges of the numbers of sensors."""
 GIVES = ("tip_x", "tip_y")
-"""Signals of a law of one's own: what is added to the wanted tip in the ship's frame. [m]"""
+"""Signals of a user-defined controller: what it adds to the reference tip, ship's frame. [m]"""
 
 
 class Sensing(NamedTuple):
@@ -121,10 +122,10 @@ class Chain(Control):
     parts: tuple[Control, ...]
 
     def __post_init__(self) -> None:
-        kinds = [each.kind for each in self.parts]
-        twice = [each for each in kinds if kinds.count(each) > 1]
-        if twice:
-            raise InputError(f"A controller has one {twice[0]}, not {kinds.count(twice[0])}.")
+        kinds = [stage.kind for stage in self.parts]
+        repeated = [kind for kind in kinds if kinds.count(kind) > 1]
+        if repeated:
+            raise InputError(f"A controller has one {repeated[0]}, not {kinds.count(repeated[0])}.")
 
     def __repr__(self) -> str:
         return " | ".join(map(repr, self.parts))
@@ -168,7 +169,7 @@ class DelayedFeedback(Control):
     """
 
     gain: float = 0.2
-    """k, part of the load's horizontal distance from the tip that is added to the wanted tip; at
+    """k, part of the load's horizontal distance from the tip that is added to the reference tip; at
     most 2, and unstable from 1 on."""
     delay: float = 0.25
     """τ in periods of the present rope, at most 1. The damping ratio is about k/2 at 0.25."""
@@ -182,7 +183,7 @@ class DelayedFeedback(Control):
 
 @dataclass(frozen=True)
 class ShipCompensation(Control):
-    """Compensation of the ship's motion: the wanted tip keeps its place over the sea."""
+    """Compensation of the ship's motion: the reference tip keeps its place over the sea."""
 
     kind = "ship compensation"
 
@@ -213,7 +214,7 @@ class Clip(Control):
 
 @dataclass(frozen=True)
 class PositionLoop(Control):
-    """Loop that brings slew and luff back to the wanted path.
+    """Loop that brings slew and luff back to the reference path.
 
     It belongs to every control of the tip; without this stage its gain is 0.7 /s.
     """
@@ -232,10 +233,11 @@ class PositionLoop(Control):
 class Sensors(Control):
     """Sensors through which control sees the crane: noise, delay and samples of the signals.
 
-    Delayed feedback, ship compensation and laws take the rope's direction, rope, slew, boom and the
-    ship's motion from them. A measurement holds until the next one; the one of the start has been
-    there before. Noise is white, drawn again for each measurement. The run itself keeps the true
-    signals. The default values are assumed, not those of a certain product.
+    Delayed feedback, ship compensation and a user-defined controller take the rope's direction, the
+    rope's length, slew, boom and the ship's motion from them. A measurement holds until the next
+    one; before the start it is that of the start. Noise is white, drawn again for each measurement.
+    The run itself keeps the true signals. The default values are assumed, not those of a certain
+    product.
     """
 
     rope_angle_noise_deg: float = 0.1
@@ -244,7 +246,7 @@ class Sensors(Control):
     motion_noise_deg: float = 0.05
     """Root mean square noise of roll and of pitch, at most 10; assumed. [deg]"""
     delay: float = 0.05
-    """From the measurement to where control has it, at most 5; assumed. [s]"""
+    """Time from a measurement until control has it, at most 5; assumed. [s]"""
     rate: float = 50.0
     """Measurements a second, 1 to 512; assumed. [Hz]"""
     seed: int = 0
@@ -282,8 +284,8 @@ class Sensors(Control):
 
 
 @dataclass(frozen=True)
-class Law(Control):
-    """A law of one's own: an offset of the wanted tip, as a model of the engine with its state.
+class Controller(Control):
+    """User-defined controller: a model of the engine whose outputs offset the reference tip.
 
     The position loop acts beside it, at 0.7 /s unless a `PositionLoop` says otherwise.
     """
@@ -292,24 +294,24 @@ class Law(Control):
     """Its inputs are of `SEEN`, its signals or states among others `GIVES`."""
     values: Any = ()
     """Named tuple of its parameters."""
-    kind = "law"
+    kind = "user-defined controller"
 
     def words(self) -> str:
         """Its model's name."""
         return f"{self.kind} {self.model.name}"
 
     def __post_init__(self) -> None:
-        strange = [each for each in self.model.external if each not in SEEN]
-        if strange:
+        unknown = [name for name in self.model.external if name not in SEEN]
+        if unknown:
             raise InputError(
-                f"The law {self.model.name} asks for '{strange[0]}', but a crane's controller sees "
-                f"{', '.join(SEEN)}."
+                f"The controller {self.model.name} asks for '{unknown[0]}', but a crane's "
+                f"controller sees {', '.join(SEEN)}."
             )
-        lacks = [each for each in GIVES if each not in self.model.signal_names]
-        if lacks:
+        missing = [name for name in GIVES if name not in self.model.signal_names]
+        if missing:
             raise InputError(
-                f"The law {self.model.name} must have the signals {' and '.join(GIVES)}, what is "
-                f"added to the wanted tip; {lacks[0]} is missing."
+                f"The controller {self.model.name} must have the signals {' and '.join(GIVES)}, "
+                f"which are added to the reference tip; {missing[0]} is missing."
             )
 
 
@@ -317,35 +319,41 @@ class Stages(NamedTuple):
     """What a controller is made of, as a run takes it."""
 
     settings: Settings
-    law: Law | None
+    controller: Controller | None
     sensors: Sensors | None
 
 
 def stages_of(control: Control | None) -> Stages:
-    """Numbers of a controller, the law and the sensors in it."""
+    """Numbers of the stages of control, the user-defined controller and the sensors among them."""
     if control is None:
         return Stages(Settings(), None, None)
     if not isinstance(control, Control):
-        raise InputError(f"{control!r} is no control of a crane; see swashplate.crane.control.")
-    made: dict[str, Any] = {"path": any(not isinstance(stage, Sensors) for stage in control.stages)}
-    law, sensors = None, None
+        raise InputError(f"{control!r} is not a control of a crane; see swashplate.crane.control.")
+    settings: dict[str, Any] = {
+        "path": any(not isinstance(stage, Sensors) for stage in control.stages)
+    }
+    controller: Controller | None = None
+    sensors: Sensors | None = None
     for stage in control.stages:
         match stage:
             case TipShaper():
-                made["tip"] = IMPULSES[stage.shape]
+                settings["tip"] = IMPULSES[stage.shape]
             case DelayedFeedback():
-                made |= {"feedback": stage.gain, "delay": stage.delay}
+                settings["feedback"] = stage.gain
+                settings["delay"] = stage.delay
             case ShipCompensation():
-                made["ship"] = True
+                settings["ship"] = True
             case Clip(size):
-                made |= {"clip": 0.0 if size == "auto" else float(size), "share": stage.share}
+                settings["clip"] = 0.0 if size == "auto" else float(size)
+                settings["share"] = stage.share
             case PositionLoop():
-                made["gain"] = stage.gain
+                settings["gain"] = stage.gain
             case Sensors():
-                made["sensing"], sensors = stage.sensing(), stage
-            case Law():
-                law = stage
-    return Stages(Settings(**made), law, sensors)
+                settings["sensing"] = stage.sensing()
+                sensors = stage
+            case Controller():
+                controller = stage
+    return Stages(Settings(**settings), controller, sensors)
 
 
 def feedback_damping(gain: ArrayLike, delay: ArrayLike) -> Array:
@@ -365,14 +373,16 @@ def feedback_damping(gain: ArrayLike, delay: ArrayLike) -> Array:
         raise InputError("The gain of delayed feedback must be above 0 and below 1.")
     if not ((tau > 0.0) & (tau <= 2.0 * np.pi)).all():
         raise InputError("Delayed feedback waits for more than 0 and at most 1 period.")
-    k, tau = k[..., None], tau[..., None]
+    k = k[..., None]
+    tau = tau[..., None]
     real, imaginary = np.meshgrid(np.linspace(-1.5, 0.5, 9), np.linspace(0.2, 4.0, 20))
     s = np.broadcast_to((real + 1j * imaginary).ravel(), (*k.shape[:-1], real.size))
     with np.errstate(all="ignore"):
         for _ in range(30):
             late = k * np.exp(-s * tau)
             s = s - (s * s * (1.0 + late) + 1.0) / (2.0 * s * (1.0 + late) - s * s * tau * late)
-        left = np.abs(s * s * (1.0 + k * np.exp(-s * tau)) + 1.0)
-    right = np.where((left < 1e-9) & (s.imag > 1e-6) & (np.abs(s) < 2.0), s, -np.inf)
-    first = np.take_along_axis(right, np.argmax(right.real, axis=-1)[..., None], axis=-1)[..., 0]
-    return np.asarray(-first.real / np.abs(first))
+        residual = np.abs(s * s * (1.0 + k * np.exp(-s * tau)) + 1.0)
+    roots = np.where((residual < 1e-9) & (s.imag > 1e-6) & (np.abs(s) < 2.0), s, -np.inf)
+    index = np.argmax(roots.real, axis=-1)[..., None]
+    rightmost = np.take_along_axis(roots, index, axis=-1)[..., 0]
+    return np.asarray(-rightmost.real / np.abs(rightmost))

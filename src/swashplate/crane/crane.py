@@ -21,10 +21,10 @@ from swashplate.crane.quantities import (
     DEFAULTS,
     GEOMETRY,
     MAY_LACK,
-    Quantity,
+    CraneQuantity,
     check_sources,
-    in_si,
-    quantity_of,
+    quantities_in_si,
+    user_quantity,
 )
 from swashplate.documents import parse_toml, read_text, validated
 from swashplate.drive import Drive
@@ -50,8 +50,8 @@ class CraneFile(BaseModel):
     name: str
     title: str = ""
     drives: Annotated[dict[Literal["hoist", "slew", "luff"], str], Field(min_length=3)]
-    geometry: dict[str, Quantity]
-    limits: dict[str, Quantity] = Field(default_factory=dict)
+    geometry: dict[str, CraneQuantity]
+    limits: dict[str, CraneQuantity] = Field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,13 +61,13 @@ class Crane:
     Examples
     --------
     >>> crane = Crane.preset("tg3637")
-    >>> run = simulate(crane, Stick.trapezoid(slew=1.0, until={"slew_deg": 45}))
+    >>> run = simulate(crane, OperatorCommand.trapezoid(slew=1.0, until={"slew_deg": 45}))
     >>> run.residual_deg
     """
 
     name: str
     title: str
-    quantities: Mapping[str, Quantity]
+    quantities: Mapping[str, CraneQuantity]
     """Geometry by name."""
     hoist: Drive
     slew: Drive
@@ -76,7 +76,7 @@ class Crane:
     """Drives that the controller counts on, by axis, if they are not those that move the crane."""
     sources: Mapping[str, DriveSource] = field(default_factory=dict)
     """Where drives come from that are neither packaged nor made in Python, by axis."""
-    limits: Mapping[str, Quantity] = field(default_factory=dict)
+    limits: Mapping[str, CraneQuantity] = field(default_factory=dict)
     """What an operation may reach, by names of `swashplate.crane.LIMITED`."""
 
     def __post_init__(self) -> None:
@@ -97,8 +97,8 @@ class Crane:
                 (crane.quantities, packaged.quantities, GEOMETRY),
                 (crane.limits, packaged.limits, DEFINITIONS),
             )
-            for own, of_packaged, definitions in checked:
-                check_sources(own, of_packaged, definitions, str(path), name)
+            for quantities, packaged_quantities, definitions in checked:
+                check_sources(quantities, packaged_quantities, definitions, str(path), name)
         return crane
 
     def __repr__(self) -> str:
@@ -108,7 +108,7 @@ class Crane:
     @property
     def assumed(self) -> str:
         """How much of the geometry is assumed: ``"12 of 13 quantities"``, empty if nothing is."""
-        count = sum(each.status == "assumed" for each in self.quantities.values())
+        count = sum(quantity.status == "assumed" for quantity in self.quantities.values())
         return f"{count} of {len(self.quantities)} quantities" if count else ""
 
     def provenance(self) -> tuple[str, ...]:
@@ -127,43 +127,43 @@ class Crane:
     def unreached_sentence(self, axis: str) -> str:
         """The limits that no test of an axis's drive reached, in a sentence; empty if it has none.
 
-        Limits that were given another value since are none of them.
+        Limits that were given another value since then are left out.
         """
         drive: Drive = getattr(self, axis)
         return drive.parameters.unreached_sentence(f"the {axis}'s drive")
 
-    def with_drive(self, *, known: bool = True, **drives: DriveLike) -> Crane:
+    def with_drive(self, *, known_to_controller: bool = True, **drives: DriveLike) -> Crane:
         """The crane with other drives by axis.
 
         Parameters
         ----------
-        known : bool
+        known_to_controller : bool
             Whether the controller knows the new drives, as after a redesign. If not, it counts on
-            those before, as if a drive has worn: inverse maps, the stick's full speed and the clip
-            are theirs.
+            the drives before, as if a drive has worn: inverse maps, the stick's full speed and the
+            clip are theirs.
         **drives
-            Each is a drive, ``luff=crane.luff.scale(Z16=1.5)``; the result of a fit; or a place: a
-            packaged name, a parameter file, or the folder that a fit wrote. The verdict on a fit
-            stands in `sources`; a drive that is not usable is taken, and judgments say so.
+            Each is a drive, ``luff=crane.luff.scale(Z16=1.5)``; the result of a fit; a packaged
+            name; a parameter file; or the folder that a fit wrote. The verdict on a fit stands in
+            `sources`; a drive that is not usable is taken, and assessments say so.
         """
         check_names("A crane has no drive", drives, AXES, "it has")
         replacements, new_sources = drives_of(drives, Path())
-        known_to_controller = {
+        counted_on = {
             axis: drive
             for axis, drive in self.known_to_controller.items()
             if axis not in replacements
         }
-        if not known:
+        if not known_to_controller:
             for axis, drive in replacements.items():
                 before = self.controller_drive(axis)
                 if before != drive:
-                    known_to_controller[axis] = before
+                    counted_on[axis] = before
         sources = {
             axis: source for axis, source in self.sources.items() if axis not in replacements
         }
         return replace(
             self,
-            known_to_controller=known_to_controller,
+            known_to_controller=counted_on,
             sources=sources | new_sources,
             **replacements,
         )
@@ -183,7 +183,7 @@ class Crane:
         for name, value in changes.items():
             if name not in GEOMETRY:
                 raise ParameterError(f"A crane has no {name}; it has {', '.join(GEOMETRY)}.")
-            quantities[name] = quantity_of(name, value)
+            quantities[name] = user_quantity(name, value)
         return replace(self, quantities=quantities)
 
     def with_limits(self, **limits: float) -> Crane:
@@ -192,7 +192,9 @@ class Crane:
         A `ParameterError` for an unknown name, or a value out of its plausible range.
         """
         quantities = {
-            name: Quantity(value=float(value), unit=LIMITED[name].unit if name in LIMITED else "1")
+            name: CraneQuantity(
+                value=float(value), unit=LIMITED[name].unit if name in LIMITED else "1"
+            )
             for name, value in limits.items()
         }
         return replace(self, limits={**self.limits, **quantities})
@@ -200,22 +202,22 @@ class Crane:
     @cached_property
     def _si(self) -> dict[str, tuple[float, ...]]:
         """Quantities in SI; a `ParameterError` for those that make no crane."""
-        return in_si(self.quantities, self.name)
+        return quantities_in_si(self.quantities, self.name)
 
     @cached_property
     def geometry(self) -> Geometry:
         """Lengths as the equations take them, in SI."""
         si = {name: values[0] for name, values in self._si.items()}
         return Geometry(
-            si["boom_length"],
-            si["foot_offset"],
-            Vector(*self._si["slew_axis"]),
-            si["tower_sheave_distance"],
-            cos(si["tower_sheave_angle"]),
-            sin(si["tower_sheave_angle"]),
-            si["hoist_drum_radius"] / si["hoist_falls"],
-            si["luff_drum_radius"] / si["luff_falls"],
-            si["rope_coupling"],
+            boom=si["boom_length"],
+            foot=si["foot_offset"],
+            axis=Vector(*self._si["slew_axis"]),
+            sheave=si["tower_sheave_distance"],
+            sheave_cos=cos(si["tower_sheave_angle"]),
+            sheave_sin=sin(si["tower_sheave_angle"]),
+            hoist=si["hoist_drum_radius"] / si["hoist_falls"],
+            luff=si["luff_drum_radius"] / si["luff_falls"],
+            coupling=si["rope_coupling"],
         )
 
     @cached_property
@@ -286,7 +288,7 @@ class Crane:
         return _table("Limits of an operation", self.limits, names)
 
 
-def _table(title: str, quantities: Mapping[str, Quantity], names: Mapping[str, str]) -> Table:
+def _table(title: str, quantities: Mapping[str, CraneQuantity], names: Mapping[str, str]) -> Table:
     """Quantities with unit, status and source, by what they are called."""
     heads = ("quantity", "value", "unit", "status")
     table = Table(title, (*map(Column, heads), Column("source", wrap=True)))
@@ -320,29 +322,29 @@ def preset_text(name: str) -> str:
     return (SETS / f"{name}.toml").read_text("utf-8")
 
 
-def _geometry_of(content: CraneFile, origin: str) -> dict[str, Quantity]:
+def _geometry_of(content: CraneFile, origin: str) -> dict[str, CraneQuantity]:
     """All quantities of a crane's file; refuses a name that is missing or unknown."""
-    given = {**DEFAULTS, **content.geometry}
-    lacks = [name for name in GEOMETRY if name not in given and name not in MAY_LACK]
-    strange = [name for name in content.geometry if name not in GEOMETRY]
-    if lacks or strange:
-        extra = f", and knows no '{strange[0]}'" if strange else ""
-        need = f"needs an entry '{lacks[0]}'" if lacks else f"has {len(GEOMETRY)} quantities"
+    quantities = {**DEFAULTS, **content.geometry}
+    missing = [name for name in GEOMETRY if name not in quantities and name not in MAY_LACK]
+    unknown = [name for name in content.geometry if name not in GEOMETRY]
+    if missing or unknown:
+        extra = f", and knows no '{unknown[0]}'" if unknown else ""
+        need = f"needs an entry '{missing[0]}'" if missing else f"has {len(GEOMETRY)} quantities"
         raise ParameterError(f"{origin}: geometry {need}{extra}.")
-    return {name: given[name] for name in GEOMETRY if name in given}
+    return {name: quantities[name] for name in GEOMETRY if name in quantities}
 
 
 def _read(text: str, origin: str, folder: Path) -> Crane:
     """A crane of a file's text, its drives beside it."""
     content = validated(parse_toml(text, origin), CraneFile, origin)
     quantities = _geometry_of(content, origin)
-    in_si(quantities, origin)
+    quantities_in_si(quantities, origin)
     limits_of(content.limits, origin)
     drives, sources = drives_of(content.drives, folder)
     return Crane(
-        content.name,
-        content.title,
-        quantities,
+        name=content.name,
+        title=content.title,
+        quantities=quantities,
         **drives,
         sources=sources,
         limits=content.limits,

@@ -1,4 +1,4 @@
-"""Drives of a crane: what they are given as, where they come from, verdicts on their fits."""
+"""Drives of a crane: in what form they are given, where they come from, verdicts on their fits."""
 
 from __future__ import annotations
 
@@ -36,12 +36,12 @@ DriveLike = Drive | Fitted | str | Path
 class DriveSource(NamedTuple):
     """Where the drive of an axis comes from, and the verdict on its fit."""
 
-    place: str
+    origin: str
     """Its file, or how it was given."""
     fit: Path | None
     """Folder of the fit that found it; None if there is none, or it was changed since."""
-    judged_usable: bool | None
-    """Whether that fit's verdict calls it usable; None if no verdict is known."""
+    fit_usable: bool | None
+    """Whether the verdict on that fit calls it usable; None if no verdict is known."""
     verdict: str
     """Headline of the verdict, or the clause why none is known."""
     validity: str = ""
@@ -52,16 +52,16 @@ class DriveSource(NamedTuple):
     @property
     def usable(self) -> bool:
         """Whether no verdict says that it is not."""
-        return self.judged_usable is not False
+        return self.fit_usable is not False
 
     def words(self) -> str:
         """Where the drive comes from, what the verdict was and what it holds for.
 
         It ends a sentence, and may go on with another one.
         """
-        if self.judged_usable is None:
-            return f"{self.place}; no verdict on it is known, as {self.verdict}."
-        return f"{self.place}; the verdict on its fit is: {self.verdict} {self.validity}".rstrip()
+        if self.fit_usable is None:
+            return f"{self.origin}; no verdict on it is known, as {self.verdict}."
+        return f"{self.origin}; the verdict on its fit is: {self.verdict} {self.validity}".rstrip()
 
     def sentence(self, axis: str) -> str:
         """The same of the drive of an axis."""
@@ -69,13 +69,13 @@ class DriveSource(NamedTuple):
 
 
 def drives_of(
-    given: Mapping[Any, DriveLike], folder: Path
+    drive_likes: Mapping[Any, DriveLike], folder: Path
 ) -> tuple[dict[str, Any], dict[str, DriveSource]]:
     """Drives by axis, and the sources of those that come from a file or a fit.
 
     Parameters
     ----------
-    given : mapping of str to drive, fit, str or path
+    drive_likes : mapping of str to drive, fit, str or path
         As `Crane.with_drive` takes them.
     folder : path
         Where files and folders of fits are looked for; packaged names go first.
@@ -85,12 +85,13 @@ def drives_of(
     ParameterError, FileError
         For a file that is not there or not a drive's, and a drive of another axis.
     """
-    drives, sources = {}, {}
-    for axis, drive_like in given.items():
+    drives: dict[str, Any] = {}
+    sources: dict[str, DriveSource] = {}
+    for axis, drive_like in drive_likes.items():
         drive, path = _drive(drive_like, folder, axis)
         # a packaged drive or a Drive is put onto another axis knowingly, a fit or file hardly
-        chosen = isinstance(drive_like, Drive) or str(drive_like) in preset_names()
-        if not chosen and drive.name in AXES and drive.name != axis:
+        deliberate = isinstance(drive_like, Drive) or str(drive_like) in preset_names()
+        if not deliberate and drive.name in AXES and drive.name != axis:
             raise ParameterError(
                 f"{axis}: {path or 'the fit'} has a drive of the {drive.name}. If it moves the "
                 f"{axis} as well, give it another name."
@@ -102,15 +103,15 @@ def drives_of(
     return drives, sources
 
 
-def _drive(given: DriveLike, folder: Path, axis: str) -> tuple[Drive, Path | None]:
+def _drive(drive_like: DriveLike, folder: Path, axis: str) -> tuple[Drive, Path | None]:
     """The drive of an axis as it is given, and its file, if it has one."""
-    if not isinstance(given, str | Path):
-        drive = getattr(given, "drive", given)
+    if not isinstance(drive_like, str | Path):
+        drive = getattr(drive_like, "drive", drive_like)
         if isinstance(drive, Drive):
             return drive, None
-    elif str(given) in preset_names():
-        return Drive.preset(str(given)), None
-    elif (path := folder / given).is_dir() or path.suffix == ".toml":
+    elif str(drive_like) in preset_names():
+        return Drive.preset(str(drive_like)), None
+    elif (path := folder / drive_like).is_dir() or path.suffix == ".toml":
         path = path / DRIVE_FILE if path.is_dir() else path
         if path.is_file() and "runs" in parse_toml(read_text(path), str(path)):
             raise ParameterError(
@@ -119,53 +120,58 @@ def _drive(given: DriveLike, folder: Path, axis: str) -> tuple[Drive, Path | Non
         return Drive.from_toml(path), path
     raise ParameterError(
         f"{axis}: a crane's drive is a packaged one, {', '.join(preset_names())}, a .toml file, or "
-        f"the result or folder of a fit, but there is no such '{given}'."
+        f"the result or folder of a fit, but there is no such '{drive_like}'."
     )
 
 
 # --- verdicts -------------------------------------------------------------------------------------
 
 
-def _source(given: DriveLike, drive: Drive, path: Path | None) -> DriveSource | None:
+def _source(drive_like: DriveLike, drive: Drive, path: Path | None) -> DriveSource | None:
     """Where a drive comes from; None for a packaged one, and a `Drive` that says nothing of it."""
     if path is not None:
         return _source_of_file(path, drive)
-    if isinstance(given, str | Path):
+    if isinstance(drive_like, str | Path):
         return None
     stated = _stated_in_title(drive)
-    if isinstance(given, Drive):
-        return DriveSource(f"'{drive.name}'", None, False, stated) if stated else None
-    verdict = getattr(given, "verdict", None)
+    if isinstance(drive_like, Drive):
+        if not stated:
+            return None
+        return DriveSource(f"'{drive.name}'", fit=None, fit_usable=False, verdict=stated)
+    verdict = getattr(drive_like, "verdict", None)
     if verdict is None:
-        return DriveSource("that of a fit", None, None, "the fit was not judged")
-    return _judged_source("that of a fit", None, verdict)
+        return DriveSource(
+            "that of a fit", fit=None, fit_usable=None, verdict="the fit was not assessed"
+        )
+    return _assessed_source("that of a fit", None, verdict)
 
 
-def _judged_source(place: str, fit: Path | None, verdict: Verdict) -> DriveSource:
-    """The source of a drive whose fit was judged."""
+def _assessed_source(origin: str, fit: Path | None, verdict: Verdict) -> DriveSource:
+    """The source of a drive whose fit was assessed."""
     return DriveSource(
-        place,
-        fit,
-        verdict.usable,
-        verdict.headline,
-        verdict.validity,
-        verdict.fastest_sine,
+        origin=origin,
+        fit=fit,
+        fit_usable=verdict.usable,
+        verdict=verdict.headline,
+        validity=verdict.validity,
+        fastest_sine=verdict.fastest_sine,
     )
 
 
 def _source_of_file(path: Path, drive: Drive) -> DriveSource:
     """The source of a drive's file, with the verdict of the fit beside it."""
     stored = path.with_name(FIT_FILE)
-    fit, why = None, "there is no fit beside it"
+    fit = None
+    unknown_because = "there is no fit beside it"
     if path.name == DRIVE_FILE and stored.is_file():
         fit = path.parent
-        verdict, why = _stored_verdict(stored, drive)
+        verdict, unknown_because = _stored_verdict(stored, drive)
         if verdict is not None:
-            return _judged_source(str(path), fit, verdict)
+            return _assessed_source(str(path), fit, verdict)
     stated = _stated_in_title(drive)
     if stated:
-        return DriveSource(str(path), fit, False, stated)
-    return DriveSource(str(path), fit, None, why)
+        return DriveSource(str(path), fit=fit, fit_usable=False, verdict=stated)
+    return DriveSource(str(path), fit=fit, fit_usable=None, verdict=unknown_because)
 
 
 def _stored_verdict(path: Path, drive: Drive) -> tuple[Verdict | None, str]:

@@ -55,22 +55,23 @@ def swing_damping(time: ArrayLike, angle: ArrayLike, *, rope: float | None = Non
     Raises
     ------
     InputError
-        For fewer than five swings, an angle that is never negative or beyond 1 rad, a log that is
-        no decaying sine for the most part, whose swing does not surely fall, or whose period is
-        not that of the rope.
+        For fewer than five swings, an angle that is never negative or beyond 1 rad, and a log that
+        is not a decaying sine for the most part, whose swing does not surely fall, or whose period
+        is not that of the rope.
 
     Notes
     -----
     The fit is by least squares; it starts at the largest line of the spectrum and the logarithmic
-    decrement. The interval takes what is left for correlated: the samples count as many as they
-    are over one plus twice the sum of its autocorrelation up to the first that is not positive.
+    decrement. The interval takes the residuals as correlated: their effective number is that of the
+    samples over one plus twice the sum of their autocorrelation up to the first value that is not
+    positive.
     """
     from scipy.optimize import least_squares
     from scipy.special import stdtrit
 
     stamps, swing = _checked(time, angle)
     start = _start(stamps, swing)
-    found = least_squares(
+    fit = least_squares(
         _residual,
         start,
         jac=_jacobian,
@@ -78,13 +79,13 @@ def swing_damping(time: ArrayLike, angle: ArrayLike, *, rope: float | None = Non
         x_scale="jac",
         args=(stamps, swing),
     )
-    frequency, ratio = found.x[3:].tolist()
-    left = found.fun
-    explained = 1.0 - float(np.var(left) / np.var(swing))
+    frequency, ratio = fit.x[3:].tolist()
+    residuals = fit.fun
+    explained = 1.0 - float(np.var(residuals) / np.var(swing))
     if explained < EXPLAINED:
         raise InputError(
             f"A decaying sine explains {100.0 * max(explained, 0.0):.0f} % of what the log holds, "
-            "which is no free swing: cut the log to where the crane is at rest."
+            "which is not a free swing: cut the log to where the crane is at rest."
         )
     period = 2.0 * pi / frequency
     if rope is not None:
@@ -96,15 +97,15 @@ def swing_damping(time: ArrayLike, angle: ArrayLike, *, rope: float | None = Non
                 f"The log swings once in {period:.3g} s, but a load on {rope:g} m of rope in "
                 f"{expected:.3g} s: look at the column and at the unit of the time."
             )
-    correlation = _correlation_time(left)
-    freedom = left.size / correlation - UNKNOWNS
+    correlation = _correlation_time(residuals)
+    freedom = residuals.size / correlation - UNKNOWNS
     if freedom < 1.0:
         raise InputError(
             "What the log holds beside the swing changes too slowly to tell the swing's damping: "
             "take a drift off, or a longer log."
         )
-    variance = float(left @ left) / freedom
-    covariance = np.linalg.inv(found.jac.T @ found.jac)
+    variance = float(residuals @ residuals) / freedom
+    covariance = np.linalg.inv(fit.jac.T @ fit.jac)
     half = float(stdtrit(freedom, 0.975)) * sqrt(variance * covariance[4, 4])
     if ratio - half <= 0.0:
         raise InputError(
@@ -160,13 +161,14 @@ def _start(time: Array, swing: Array) -> Array:
         [np.ones(time.size), np.cos(frequency * time), np.sin(frequency * time)], axis=1
     )
     number = np.minimum((time / time[-1] * int(swings)).astype(np.int64), int(swings) - 1)
-    amplitudes, middles = [], []
+    amplitudes = []
+    middles = []
     for k in range(int(swings)):
-        one = number == k
-        if one.sum() > basis.shape[1]:
-            waves = np.linalg.lstsq(basis[one], swing[one], rcond=None)[0]
-            amplitudes.append(np.hypot(*waves[1:]))
-            middles.append(time[one].mean())
+        within = number == k
+        if within.sum() > basis.shape[1]:
+            coefficients = np.linalg.lstsq(basis[within], swing[within], rcond=None)[0]
+            amplitudes.append(np.hypot(*coefficients[1:]))
+            middles.append(time[within].mean())
     decay = 0.0
     if len(middles) > 1:
         decay = -float(np.polyfit(middles, np.log(np.maximum(amplitudes, 1e-12)), 1)[0])
@@ -197,16 +199,18 @@ def _jacobian(x: Array, time: Array, swing: Array) -> Array:
     _, cosine, sine, frequency, ratio = x
     _, c, s = _parts(x, time)
     root = np.sqrt(1.0 - ratio * ratio)
-    value, turned = cosine * c + sine * s, sine * c - cosine * s
+    value = cosine * c + sine * s
+    turned = sine * c - cosine * s
     by_frequency = time * (-ratio * value + root * turned)
     by_ratio = frequency * time * (-value - ratio / root * turned)
     return np.stack([np.ones(swing.size), c, s, by_frequency, by_ratio], axis=1)
 
 
-def _correlation_time(left: Array) -> float:
+def _correlation_time(residuals: Array) -> float:
     """One plus twice the sum of the autocorrelation up to the first that is not positive."""
-    power = np.abs(np.fft.rfft(left - left.mean(), 2 * left.size)) ** 2
-    covariance = np.fft.irfft(power)[: left.size]
+    count = residuals.size
+    power = np.abs(np.fft.rfft(residuals - residuals.mean(), 2 * count)) ** 2
+    covariance = np.fft.irfft(power)[:count]
     if not covariance[0] > 0.0:
         return 1.0
     correlation = covariance / covariance[0]

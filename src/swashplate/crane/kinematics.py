@@ -82,7 +82,7 @@ def dot(a: Vector, b: Vector) -> float:
 
 
 @equation
-def size(a: Vector) -> float:
+def norm(a: Vector) -> float:
     """Length of a vector."""
     return sqrt(dot(a, a))
 
@@ -96,7 +96,9 @@ def moved(a: Vector, share: float, b: Vector) -> Vector:
 @equation
 def rotation(roll: float, pitch: float, yaw: float) -> Rotation:
     """R = Rz(yaw) Ry(pitch) Rx(roll); roll lifts port, pitch lowers the bow, yaw turns to port."""
-    cf, sf, ct, st, cy, sy = cos(roll), sin(roll), cos(pitch), sin(pitch), cos(yaw), sin(yaw)
+    cf, sf = cos(roll), sin(roll)
+    ct, st = cos(pitch), sin(pitch)
+    cy, sy = cos(yaw), sin(yaw)
     return Rotation(
         Vector(cy * ct, sy * ct, -st),
         Vector(cy * st * sf - sy * cf, sy * st * sf + cy * cf, ct * sf),
@@ -192,7 +194,8 @@ def shaft_torques(force: Vector, slew: float, boom: Boom, tension: float, g: Geo
     by κ r_l/n_l with the luff's.
     """
     rise = boom_rate(boom, g)
-    reach, along = g.foot + g.boom * boom.cos, -g.boom * boom.sin * rise
+    reach = g.foot + g.boom * boom.cos
+    along = -g.boom * boom.sin * rise
     c, s = cos(slew), sin(slew)
     return Shafts(
         tension * g.hoist,

@@ -1,7 +1,7 @@
 """What an operation may reach: swing, off-lead, side-lead, hook load, hook speed, place, drives.
 
 A crane's file gives limits in its table ``[limits]``, each with unit, status and source as its
-geometry; what it does not give is not judged.
+geometry; what it does not give is not assessed.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from swashplate.crane.quantities import Definition, Quantity, values_of
+from swashplate.crane.quantities import CraneQuantity, QuantityDefinition, values_in_si
 from swashplate.errors import ParameterError
 
 
@@ -49,23 +49,23 @@ LIMITED: Mapping[str, Limited] = {
         "saturation", "1", "share of time for which a drive is at a limit of its own", 0.0, 1.0
     ),
 }
-"""Quantities that have a limit, by name. All but `saturation` are judged by their most probable
+"""Quantities that have a limit, by name. All but `saturation` are assessed by their most probable
 largest value in three hours."""
 
 
-DEFINITIONS: Mapping[str, Definition] = {
-    name: Definition(limited.unit, 1, limited.low, limited.high)
+DEFINITIONS: Mapping[str, QuantityDefinition] = {
+    name: QuantityDefinition(limited.unit, 1, limited.low, limited.high)
     for name, limited in LIMITED.items()
 }
 """The same as quantities of a crane's file."""
 
 
-def limits_of(limits: Mapping[str, Quantity], origin: str) -> dict[str, float]:
+def limits_of(limits: Mapping[str, CraneQuantity], origin: str) -> dict[str, float]:
     """Limits in SI by name.
 
     Parameters
     ----------
-    limits : mapping of str to Quantity
+    limits : mapping of str to CraneQuantity
         The table ``[limits]`` of a crane's file.
     origin : str
         File or crane, as errors name it.
@@ -82,5 +82,5 @@ def limits_of(limits: Mapping[str, Quantity], origin: str) -> dict[str, float]:
         )
     values = {}
     for name, quantity in limits.items():
-        values[name] = values_of(name, quantity, DEFINITIONS[name], origin)[0]
+        values[name] = values_in_si(name, quantity, DEFINITIONS[name], origin)[0]
     return values

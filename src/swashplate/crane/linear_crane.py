@@ -31,12 +31,22 @@ def linearize(crane: Crane, boom_deg: float = 45.0, rope_m: float = 20.0) -> Lin
     the speed of the tip, -∂ρ/∂θ of the luff and ρ of the slew.
     """
     crane.home(0.0, boom_deg, rope_m)
-    g, boom = crane.geometry, Boom(cos(radians(boom_deg)), sin(radians(boom_deg)))
-    A, B, C = np.zeros((7, 7)), np.zeros((7, 3)), np.zeros((5, 7))
+    g = crane.geometry
+    boom = Boom(cos(radians(boom_deg)), sin(radians(boom_deg)))
+    A = np.zeros((7, 7))
+    B = np.zeros((7, 3))
+    C = np.zeros((5, 7))
+    # the two pendulums
     for i in (0, 2):
-        A[i, i + 1], A[i + 1, i], C[i // 2, i] = 1.0, -GRAVITY / rope_m, 1.0 / rope_m
-    B[0, 2], B[2, 1] = reach_rate(boom, g), -(g.foot + g.boom * boom.cos)
-    B[4], B[5, 1], B[6, 2] = (-g.hoist, 0.0, g.coupling * g.luff), 1.0, boom_rate(boom, g)
+        A[i, i + 1] = 1.0
+        A[i + 1, i] = -GRAVITY / rope_m
+        C[i // 2, i] = 1.0 / rope_m
+    B[0, 2] = reach_rate(boom, g)
+    B[2, 1] = -(g.foot + g.boom * boom.cos)
+    # rope, slew, boom
+    B[4] = (-g.hoist, 0.0, g.coupling * g.luff)
+    B[5, 1] = 1.0
+    B[6, 2] = boom_rate(boom, g)
     C[2:, 4:] = np.eye(3)
     name = f"{crane.name}_{boom_deg:g}_{rope_m:g}"
     return LinearModel(

@@ -13,7 +13,7 @@ from swashplate.tables import listed
 from swashplate.units import to_si
 
 
-class Quantity(BaseModel):
+class CraneQuantity(BaseModel):
     """A length, angle or number of a crane, with where it comes from."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
@@ -24,7 +24,7 @@ class Quantity(BaseModel):
     source: str = ""
 
     @model_validator(mode="after")
-    def _published_somewhere(self) -> Quantity:
+    def _published_somewhere(self) -> CraneQuantity:
         if self.status == "published" and not self.source.strip():
             raise ValueError("a published value needs its source, or another status")
         return self
@@ -35,7 +35,7 @@ class Quantity(BaseModel):
         return self.value if isinstance(self.value, list) else [self.value]
 
 
-class Definition(NamedTuple):
+class QuantityDefinition(NamedTuple):
     """What a quantity may be: SI unit, how many numbers it has, and their plausible range."""
 
     unit: str
@@ -45,53 +45,53 @@ class Definition(NamedTuple):
     """In SI, as `low`; an angle's are in degrees."""
 
 
-GEOMETRY: Mapping[str, Definition] = {
+GEOMETRY: Mapping[str, QuantityDefinition] = {
     # from a knuckle boom on a small lorry to the longest booms of crawler cranes, about 200 m
-    "boom_length": Definition("m", 1, 1.0, 300.0),
+    "boom_length": QuantityDefinition("m", 1, 1.0, 300.0),
     # boom foot from the slew axis: 10 to 20 m on cranes of 5000 t
-    "foot_offset": Definition("m", 1, 0.0, 50.0),
+    "foot_offset": QuantityDefinition("m", 1, 0.0, 50.0),
     # forward, port and up from the ship's origin, which may stand at its stern: ships reach 400 m
-    "slew_axis": Definition("m", 3, -450.0, 450.0),
+    "slew_axis": QuantityDefinition("m", 3, -450.0, 450.0),
     # a mast beside the boom's foot; A-frames of heavy-lift cranes are about 60 m high
-    "tower_sheave_distance": Definition("m", 1, 0.1, 150.0),
-    "tower_sheave_angle": Definition("rad", 1, 0.0, 180.0),
+    "tower_sheave_distance": QuantityDefinition("m", 1, 0.1, 150.0),
+    "tower_sheave_angle": QuantityDefinition("rad", 1, 0.0, 180.0),
     # a hand winch's drum has 30 mm, those of deep-water winches 1 to 3 m
-    "hoist_drum_radius": Definition("m", 1, 0.01, 5.0),
+    "hoist_drum_radius": QuantityDefinition("m", 1, 0.01, 5.0),
     # hooks of 5000 t hang on about 50 to 100 parts of rope
-    "hoist_falls": Definition("1", 1, 1.0, 250.0),
-    "luff_drum_radius": Definition("m", 1, 0.01, 5.0),
-    "luff_falls": Definition("1", 1, 1.0, 250.0),
+    "hoist_falls": QuantityDefinition("1", 1, 1.0, 250.0),
+    "luff_drum_radius": QuantityDefinition("m", 1, 0.01, 5.0),
+    "luff_falls": QuantityDefinition("1", 1, 1.0, 250.0),
     # parts of rope from tower to tip over the falls: 1 with one of each
-    "rope_coupling": Definition("1", 1, 0.0, 4.0),
+    "rope_coupling": QuantityDefinition("1", 1, 0.0, 4.0),
     # the heaviest cranes at sea lift 10 000 t with one hook, gantries on land 20 000 t
-    "safe_load": Definition("kg", 1, 1.0, 3e7),
-    "boom_limits": Definition("rad", 2, 0.0, 90.0),
+    "safe_load": QuantityDefinition("kg", 1, 1.0, 3e7),
+    "boom_limits": QuantityDefinition("rad", 2, 0.0, 90.0),
     # cranes that lower to the sea bed have 3000 to 4000 m
-    "rope_limits": Definition("m", 2, 0.05, 6000.0),
+    "rope_limits": QuantityDefinition("m", 2, 0.05, 6000.0),
     # 0.2 to 1 % by air, sheaves and rope; an anti-sway device in the rope may have more
-    "swing_damping": Definition("1", 1, 0.0, 0.2),
+    "swing_damping": QuantityDefinition("1", 1, 0.0, 0.2),
     # height above the ship's origin, and half of its breadth: the widest ships have 124 m
-    "deck": Definition("m", 2, 0.0, 100.0),
+    "deck": QuantityDefinition("m", 2, 0.0, 100.0),
 }
 """Quantities of a crane by name, with ranges that every crane lies well within."""
 MAY_LACK = ("deck",)
-"""Quantities that a crane may be without: what they decide is then not looked at."""
-DEFAULTS: Mapping[str, Quantity] = {
-    "swing_damping": Quantity(
+"""Quantities that a crane may be without; what depends on them is then left out."""
+DEFAULTS: Mapping[str, CraneQuantity] = {
+    "swing_damping": CraneQuantity(
         value=0.005,
         unit="1",
         status="assumed",
         source="not given; loads on ropes have a damping ratio of 0.2 to 1 % (air, sheaves, rope)",
     )
 }
-"""Quantities that a file may leave out, as they then are."""
+"""Quantities that a file may leave out, with the values that then count."""
 ROUNDING = 1e-9
 """By which a number may lie beyond its range."""
 SAME = 1e-9
 """Relative difference up to which two values are the same one."""
 
 
-def quantity_of(name: str, value: Any) -> Quantity:
+def user_quantity(name: str, value: Any) -> CraneQuantity:
     """A value in SI as a quantity whose source is the user.
 
     Parameters
@@ -115,26 +115,27 @@ def quantity_of(name: str, value: Any) -> Quantity:
         ) from None
     if not all(map(isfinite, floats)):
         raise ParameterError(f"{name} is {value!r:.60}, but must be finite.")
-    return Quantity(value=floats if len(floats) > 1 else floats[0], unit=GEOMETRY[name].unit)
+    return CraneQuantity(value=floats if len(floats) > 1 else floats[0], unit=GEOMETRY[name].unit)
 
 
-def _shape(definition: Definition) -> str:
+def _shape(definition: QuantityDefinition) -> str:
     """How many numbers a quantity has, in words."""
     return "one number" if definition.size == 1 else f"a list of {definition.size} numbers"
 
 
-def values_of(
-    name: str, quantity: Quantity, definition: Definition, origin: str
+def values_in_si(
+    name: str, quantity: CraneQuantity, definition: QuantityDefinition, origin: str
 ) -> tuple[float, ...]:
     """A quantity in SI; a `ParameterError` if it is out of its plausible range."""
-    given = quantity.values
-    if len(given) != definition.size:
-        raise ParameterError(f"{origin}: {name} must be {_shape(definition)}, not {len(given)}.")
-    values = [to_si(each, quantity.unit, definition.unit, f"{origin}: {name}") for each in given]
+    numbers = quantity.values
+    if len(numbers) != definition.size:
+        raise ParameterError(f"{origin}: {name} must be {_shape(definition)}, not {len(numbers)}.")
+    subject = f"{origin}: {name}"
+    values = [to_si(number, quantity.unit, definition.unit, subject) for number in numbers]
     in_degrees = definition.unit == "rad"
-    for number, value in zip(given, values, strict=True):
+    for number, value in zip(numbers, values, strict=True):
         shown = degrees(value) if in_degrees else value
-        # as an angle in degrees may come back a rounding beyond its end
+        # an angle in degrees may come back a rounding beyond its end
         if not definition.low - ROUNDING <= shown <= definition.high + ROUNDING:
             unit = "deg" if in_degrees else definition.unit.replace("1", "")
             written = f"{number:g} {quantity.unit}".removesuffix(" 1")
@@ -146,7 +147,9 @@ def values_of(
     return tuple(values)
 
 
-def in_si(quantities: Mapping[str, Quantity], origin: str) -> dict[str, tuple[float, ...]]:
+def quantities_in_si(
+    quantities: Mapping[str, CraneQuantity], origin: str
+) -> dict[str, tuple[float, ...]]:
     """All quantities in SI, angles in rad; `origin`, a file or a crane, names them in errors.
 
     Raises
@@ -156,11 +159,11 @@ def in_si(quantities: Mapping[str, Quantity], origin: str) -> dict[str, tuple[fl
     InputError
         For a unit that does not measure the quantity.
     """
-    known = {**DEFAULTS, **quantities}
+    complete = {**DEFAULTS, **quantities}
     si = {
-        name: values_of(name, known[name], definition, origin)
+        name: values_in_si(name, complete[name], definition, origin)
         for name, definition in GEOMETRY.items()
-        if name in known or name not in MAY_LACK
+        if name in complete or name not in MAY_LACK
     }
     low, high = map(degrees, si["boom_limits"])
     if not 0.0 <= low < high < 90.0:
@@ -182,9 +185,9 @@ def in_si(quantities: Mapping[str, Quantity], origin: str) -> dict[str, tuple[fl
 
 
 def check_sources(
-    quantities: Mapping[str, Quantity],
-    packaged: Mapping[str, Quantity],
-    definitions: Mapping[str, Definition],
+    quantities: Mapping[str, CraneQuantity],
+    packaged: Mapping[str, CraneQuantity],
+    definitions: Mapping[str, QuantityDefinition],
     origin: str,
     name: str,
 ) -> None:
@@ -192,11 +195,11 @@ def check_sources(
 
     Parameters
     ----------
-    quantities : mapping of str to Quantity
+    quantities : mapping of str to CraneQuantity
         Of a crane whose file began as a copy of a packaged one.
-    packaged : mapping of str to Quantity
+    packaged : mapping of str to CraneQuantity
         The packaged crane's.
-    definitions : mapping of str to Definition
+    definitions : mapping of str to QuantityDefinition
         `GEOMETRY`, or those of limits.
     origin, name : str
         The file, and the packaged crane, as errors name them.
@@ -213,8 +216,8 @@ def check_sources(
         if quantities[quantity].source
         and quantities[quantity].source == packaged[quantity].source
         and not _same(
-            values_of(quantity, quantities[quantity], definition, origin),
-            values_of(quantity, packaged[quantity], definition, name),
+            values_in_si(quantity, quantities[quantity], definition, origin),
+            values_in_si(quantity, packaged[quantity], definition, name),
         )
     ]
     if changed:

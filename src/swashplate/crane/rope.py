@@ -3,7 +3,7 @@
 The step needs nothing but positions of the boom's tip: no angles, which are singular where the rope
 lies level, and no accelerations of the tip, which drives with jumps do not have. The rope's pull is
 the multiplier that puts the load back on the sphere around the new tip; it follows from a quadratic
-in closed form, is zero where the rope is slack, and there is no drift.
+in closed form, is zero if the rope is slack, and there is no drift.
 
 Two options (`Suspension`) leave the single multiplier: an elastic rope, whose pull follows from its
 stretch, and a hook with the load on slings below it, a double pendulum with a multiplier for each
@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swashplate.crane.kinematics import Vector, dot, moved, rotation, size, to_ship
+from swashplate.crane.kinematics import Vector, dot, moved, norm, rotation, to_ship
 from swashplate.equations import equation, kernel
 from swashplate.errors import InputError
 from swashplate.results import Result
@@ -50,11 +50,13 @@ def multiplier_of(free: Vector, along: Vector, length: float) -> float:
     μ = o/(e·d + √((e·d)² - d·d o)) with o = e·e - L².
     """
     o = dot(free, free) - length * length
+    if not o > 0.0:
+        return 0.0
     ed = dot(free, along)
     root = ed * ed - dot(along, along) * o
-    bad = o > 0.0 and (root < 0.0 or ed <= 0.0)
-    taut = o > 0.0 and not bad
-    return TOO_FAST if bad else o / (ed + sqrt(root)) if taut else 0.0
+    if root < 0.0 or ed <= 0.0:
+        return TOO_FAST
+    return o / (ed + sqrt(root))
 
 
 # --- elastic rope, hook and slings ----------------------------------------------------------------
@@ -161,10 +163,11 @@ class Hung(NamedTuple):
 
     load: Vector
     before: Vector
-    """Load, and one step earlier. [m]"""
+    """The load one step earlier. [m]"""
     hook: Vector
+    """Where the rope ends: the hook, or the load without one. [m]"""
     hook_before: Vector
-    """Where the rope ends, the hook or the load without one, and one step earlier. [m]"""
+    """The same one step earlier. [m]"""
     pull: float
     """Tension of the rope for each kilogram of load and hook. [N/kg]"""
     stretch: float
@@ -200,20 +203,25 @@ def elastic_pull(stretch: float, before: float, length: float, s: Hanging, h: fl
 def both_taut(
     rope: Vector, sling: Vector, d: Vector, b: Vector, length: float, s: Hanging
 ) -> tuple[float, float]:
-    """Multipliers u of the rope and w of the slings where both are taut, by Newton's method.
+    """Multipliers u of the rope and w of the slings if both are taut, by Newton's method.
 
     |rope - u d + q w b| = L and |sling + u d - (1 + q) w b| = l, with q the ratio of masses; rope
     and sling are without pulls, d and b those at the step's beginning, along which they pull. [m]
     """
-    u, w = 0.0, 0.0
+    u = 0.0
+    w = 0.0
     for _ in range(4):
-        one = moved(moved(rope, -u, d), s.ratio * w, b)
-        two = moved(moved(sling, u, d), -(1.0 + s.ratio) * w, b)
-        f, g = dot(one, one) - length * length, dot(two, two) - s.sling * s.sling
-        f_u, f_w = -2.0 * dot(one, d), 2.0 * s.ratio * dot(one, b)
-        g_u, g_w = 2.0 * dot(two, d), -2.0 * (1.0 + s.ratio) * dot(two, b)
-        area = f_u * g_w - f_w * g_u
-        u, w = u - (f * g_w - f_w * g) / area, w - (f_u * g - f * g_u) / area
+        rope_line = moved(moved(rope, -u, d), s.ratio * w, b)
+        sling_line = moved(moved(sling, u, d), -(1.0 + s.ratio) * w, b)
+        f = dot(rope_line, rope_line) - length * length
+        g = dot(sling_line, sling_line) - s.sling * s.sling
+        f_u = -2.0 * dot(rope_line, d)
+        f_w = 2.0 * s.ratio * dot(rope_line, b)
+        g_u = 2.0 * dot(sling_line, d)
+        g_w = -2.0 * (1.0 + s.ratio) * dot(sling_line, b)
+        determinant = f_u * g_w - f_w * g_u
+        u = u - (f * g_w - f_w * g) / determinant
+        w = w - (f_u * g - f * g_u) / determinant
     return u, w
 
 
@@ -221,12 +229,12 @@ def both_taut(
 def hook_pulls(
     rope: Vector, sling: Vector, d: Vector, b: Vector, length: float, s: Hanging
 ) -> tuple[float, float]:
-    """Multipliers as of `both_taut`, each 0 where rope or slings are slack; below 0 if none fit."""
+    """Multipliers as of `both_taut`, 0 for what is slack; below 0 if none fit."""
     u, w = both_taut(rope, sling, d, b, length, s)
     if u >= 0.0 and w >= 0.0:
         return u, w
     u = multiplier_of(rope, d, length)
-    beyond = size(moved(sling, u, d)) - s.sling
+    beyond = norm(moved(sling, u, d)) - s.sling
     if u < 0.0 or beyond <= 0.0:
         return u, 0.0
     w = multiplier_of(sling, b, s.sling) / (1.0 + s.ratio)
@@ -248,10 +256,12 @@ def rope_step(
     load = coasting(now.load, now.before, square, weight)
     if s.drag > 0.0:
         past = moved(moved(now.load, -1.0, now.before), -h, s.wind)
-        load = moved(load, -square * s.drag * size(past) / (h * h), past)
-    hooked, elastic = s.sling > 0.0, s.stiffness > 0.0
+        load = moved(load, -square * s.drag * norm(past) / (h * h), past)
+    hooked = s.sling > 0.0
+    elastic = s.stiffness > 0.0
     hook = coasting(now.hook, now.hook_before, square, weight) if hooked else load
-    d, b = moved(now.hook, -1.0, tip), moved(now.load, -1.0, now.hook)
+    d = moved(now.hook, -1.0, tip)
+    b = moved(now.load, -1.0, now.hook)
     if s.swing_damping > 0.0:
         rate = 1.0 / h
         share = 2.0 * s.swing_damping * sqrt(GRAVITY / (length + s.sling)) * (square * rate)
@@ -262,9 +272,11 @@ def rope_step(
         else:
             hook = load
     if elastic:
-        hook = moved(hook, -square * now.pull * (1.0 + s.ratio) / size(d), d)
-    rope, sling = moved(hook, -1.0, following), moved(load, -1.0, hook)
-    u, w = 0.0, 0.0
+        hook = moved(hook, -square * now.pull * (1.0 + s.ratio) / norm(d), d)
+    rope = moved(hook, -1.0, following)
+    sling = moved(load, -1.0, hook)
+    u = 0.0
+    w = 0.0
     if hooked and elastic:
         w = multiplier_of(sling, b, s.sling) / (1.0 + s.ratio)
     elif hooked:
@@ -273,11 +285,14 @@ def rope_step(
         u = multiplier_of(rope, d, length)
     hook = moved(moved(hook, -u, d), s.ratio * w, b)
     load = moved(load, -w, b) if hooked else hook
-    stretch, pull = 0.0, u * size(d) / (square * (1.0 + s.ratio))
+    stretch = 0.0
+    pull = u * norm(d) / (square * (1.0 + s.ratio))
     if elastic:
-        stretch = size(moved(hook, -1.0, following)) - length
+        stretch = norm(moved(hook, -1.0, following)) - length
         pull = elastic_pull(stretch, now.stretch, length, s, h)
-    return Hung(load, now.load, hook, now.hook, TOO_FAST if u < 0.0 or w < 0.0 else pull, stretch)
+    if u < 0.0 or w < 0.0:
+        pull = TOO_FAST
+    return Hung(load, now.load, hook, now.hook, pull, stretch)
 
 
 class Start(NamedTuple):
@@ -296,10 +311,10 @@ def hanging_load(tip: Vector, offset_x: float, offset_y: float, length: float, s
     straight = length + s.sling
     pull = GRAVITY * sqrt(1.0 - horizontal / (straight * straight))
     stretch = pull * length / s.stiffness if s.stiffness > 0.0 else 0.0
-    whole = straight + stretch
-    line = Vector(offset_x, offset_y, -sqrt(whole * whole - horizontal))
+    stretched = straight + stretch
+    line = Vector(offset_x, offset_y, -sqrt(stretched * stretched - horizontal))
     load = moved(tip, 1.0, line)
-    hook = moved(tip, (length + stretch) / whole, line) if s.sling > 0.0 else load
+    hook = moved(tip, (length + stretch) / stretched, line) if s.sling > 0.0 else load
     return Hung(load, load, hook, hook, pull, stretch)
 
 
@@ -313,7 +328,7 @@ def set_off(
     velocity_y: float,
     h: float,
 ) -> Hung:
-    """A load at rest, with the places one step earlier that give it its first velocity.
+    """A load at rest, with the positions one step earlier that give it its first velocity.
 
     It moves with the tip, by `lead` within the step, and away from it along the rope by `lowered`
     [m]. Its velocity relative to the tip has the given horizontal part [m/s]; the vertical one
@@ -322,20 +337,21 @@ def set_off(
     line = moved(hung.load, -1.0, tip)
     rise = -(velocity_x * line.x + velocity_y * line.y) / line.z
     swing = Vector(velocity_x, velocity_y, rise)
-    led = moved(lead, lowered / size(line), line)
-    hooked = size(moved(hung.hook, -1.0, tip)) / size(line)
+    led = moved(lead, lowered / norm(line), line)
+    hooked = norm(moved(hung.hook, -1.0, tip)) / norm(line)
     before = moved(hung.load, -1.0, moved(led, h, swing))
     hook_before = moved(hung.hook, -1.0, moved(led, h * hooked, swing))
     return Hung(hung.load, before, hung.hook, hook_before, hung.pull, hung.stretch)
 
 
-# --- march ----------------------------------------------------------------------------------------
+# --- path of a load -------------------------------------------------------------------------------
 
 
 @kernel
-def _march(tip: Array, length: Array, start: Hung, s: Hanging, h: float, out: Array) -> int:
+def _fill_motion(tip: Array, length: Array, start: Hung, s: Hanging, h: float, out: Array) -> int:
     """Fill load, hook and pull after the first sample; the sample that failed, or 0."""
-    now, at = start, Vector(tip[0, 0], tip[0, 1], tip[0, 2])
+    now = start
+    at = Vector(tip[0, 0], tip[0, 1], tip[0, 2])
     for n in range(tip.shape[0]):
         if n > 0:
             following = Vector(tip[n, 0], tip[n, 1], tip[n, 2])
@@ -398,8 +414,8 @@ def load_motion(
     Raises
     ------
     InputError
-        For paths that do not fit together, a damping ratio beyond its range, and where the tip
-        moves, within a step, by the order of the rope's length.
+        For paths that do not fit together, a damping ratio beyond its range, and if the tip moves
+        by the order of the rope's length within a step.
     """
     path = np.ascontiguousarray(tip, dtype=np.float64)
     if path.ndim != 2 or path.shape[1] != 3 or len(path) < 2:
@@ -410,8 +426,8 @@ def load_motion(
     # second-order difference of the first samples
     slope = (4.0 * path[1] - 3.0 * path[0] - path[min(2, len(path) - 1)]) * rate / 2.0
     v = slope if velocity is None else np.asarray(velocity, dtype=np.float64)
-    h, hangs = 1.0 / rate, suspension or Suspension()
-    s = hangs.hanging(
+    h = 1.0 / rate
+    s = (suspension or Suspension()).hanging(
         mass,
         shortest=float(rope.min()),
         rate=rate,
@@ -425,21 +441,26 @@ def load_motion(
     if start is not None:
         load = np.asarray(start, dtype=np.float64)
         line = load - path[0]
-        far = float(np.linalg.norm(line))
-        if not far > s.sling:
+        distance = float(np.linalg.norm(line))
+        if not distance > s.sling:
             raise InputError(
-                f"The load starts {far:g} m from the tip, but hangs on slings of {s.sling:g} m."
+                f"The load starts {distance:g} m from the tip, but hangs on slings of "
+                f"{s.sling:g} m."
             )
-        hook = load - s.sling / far * line
-        places = (load, load - v * h, hook, hook - v * h)
-        stretch = far - s.sling - float(rope[0])
-        pull = float(elastic_pull(stretch, stretch, float(rope[0]), s, h))
-        a, b, c, d = (Vector(*each.tolist()) for each in places)
-        now = Hung(a, b, c, d, pull, stretch)
+        hook = load - s.sling / distance * line
+        stretch = distance - s.sling - float(rope[0])
+        now = Hung(
+            load=Vector(*load.tolist()),
+            before=Vector(*(load - v * h).tolist()),
+            hook=Vector(*hook.tolist()),
+            hook_before=Vector(*(hook - v * h).tolist()),
+            pull=float(elastic_pull(stretch, stretch, float(rope[0]), s, h)),
+            stretch=stretch,
+        )
     out = np.empty((len(path), 7))
-    failed = _march(path, rope, now, s, h, out)
+    failed = _fill_motion(path, rope, now, s, h, out)
     if failed:
-        raise InputError(too_fast(float(rope[failed]), failed / rate, rate))
+        raise InputError(too_fast_sentence(float(rope[failed]), failed / rate, rate))
     if not s.stiffness > 0.0:
         out[0, 6] = out[1, 6]
     return LoadMotion(out[:, :3], out[:, 6], out[:, 3:6] if s.sling > 0.0 else None)
@@ -467,9 +488,9 @@ def rope_leads(line: Array, slew: Array, ship: Array) -> Array:
     -------
     (n, 2) array
     """
-    made = np.empty((len(line), 2))
-    _leads(np.ascontiguousarray(line), np.ascontiguousarray(slew), ship, made)
-    return made
+    angles = np.empty((len(line), 2))
+    _leads(np.ascontiguousarray(line), np.ascontiguousarray(slew), ship, angles)
+    return angles
 
 
 @kernel
@@ -520,7 +541,7 @@ def _in_ship_axes(points: Array, ship: Array, out: Array) -> None:
         out[n, 2] = along.z
 
 
-def too_fast(length: float, time: float, rate: float) -> str:
+def too_fast_sentence(length: float, time: float, rate: float) -> str:
     """Sentence for a rope that is too short for the step."""
     return (
         f"At {time:g} s the boom's tip moves within one sample by more than a rope of "

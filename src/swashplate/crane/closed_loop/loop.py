@@ -3,10 +3,10 @@
 One sample after the other, at the drives' own rate:
 
 1. what control sees is the last sample, as a controller's computer has it, or what sensors say;
-2. the stick's commands become wanted speeds of the shafts, through the path of the tip, the
-   offsets and the clip if control asks for it;
-3. wanted speeds become speeds: at once (ideal drives), or by voltages, which each drive takes by
-   the engine's compiled step;
+2. the stick's commands become reference speeds of the shafts; if the tip is controlled, through its
+   path, the offsets and the clip;
+3. reference speeds become speeds: instantaneously (ideal drives), or by voltages, which each drive
+   takes by the engine's compiled step;
 4. shafts move the tip, the ship moves the crane, the tip leads the load.
 
 A stepper is the same kernel over one sample. In open loop nothing of a sample acts on the drives:
@@ -33,12 +33,12 @@ from swashplate.crane.kinematics import (
     Vector,
     boom_at,
     moved,
+    norm,
     reach_rate,
     rope_length,
     rotation,
     shaft_torques,
     shafts_for,
-    size,
     tip_of,
     to_inertial,
     to_ship,
@@ -59,13 +59,13 @@ from swashplate.parameters.rules import FULL_VOLTAGE
 Array = NDArray[np.float64]
 
 IDEAL, VOLTS, INVERSE, DIRECT, MARCHED = range(5)
-"""Actuation: speeds at once; 10 V for full speed; the inverse map's voltage; voltages as given;
-drives that were marched before."""
+"""Actuation: instantaneous speeds; 10 V for full speed; the inverse map's voltage; voltages as
+given; drives that were simulated before."""
 FINE, TOO_FAST, BOOM_OUT, ROPE_OUT, NO_NUMBER = range(5)
 """How a pass ended."""
-ANGLE, SHAFT_SPEED, OPERATOR, WISH, AIM, TORQUE = range(6)
+ANGLE, SHAFT_SPEED, OPERATOR_ANGLE, OPERATOR_SPEED, REFERENCE_ANGLE, TORQUE = range(6)
 """Shafts' angles and speeds; angles to which the stick alone would have brought them, and its
-wanted speeds; angles that control wants; torques of the rope. [rad], [rad/s], [N m]"""
+speeds; reference angles of control; torques of the rope. [rad], [rad/s], [N m]"""
 BRAKE_WAITS, BRAKE_TAKES = 0.3, 0.2
 """Time at rest before the hoist's brake falls in, and time in which it stops the drum. [s]"""
 PATH, SWING = 0, 2
@@ -79,7 +79,7 @@ class Inverse(NamedTuple):
 
     speed: Array
     voltage: Array
-    """Points of both branches, rising. [rad/s], [V]"""
+    """Points of both branches, both rising. [rad/s], [V]"""
     gap: int
     """Last point of the lower branch; to the next it is the dead zone, with only the creep."""
     creep: float
@@ -111,13 +111,13 @@ class Fixed(NamedTuple):
     columns: Columns
 
 
-class Plant(NamedTuple):
-    """What the loop drives, and what is remembered of it in arrays."""
+class LoopArrays(NamedTuple):
+    """Arrays that the loop changes: states of drives and controller, memories, margins."""
 
     drives: tuple[StepContext, StepContext, StepContext]
-    law: StepContext
+    controller: StepContext
     picks: NDArray[np.int64]
-    """Which of `SEEN` the law takes."""
+    """Which of `SEEN` the controller takes."""
     memory: Array
     """Delayed signals, a row each: the operator's tip x and y, swing x and y."""
     readings: Array
@@ -125,9 +125,9 @@ class Plant(NamedTuple):
     noise: Array
     """(n, 4) of each measurement to come, of root mean square 1: rope x and y, roll, pitch."""
     margins: Array
-    """Worst margins of the domains of the drives and the law."""
+    """Worst margins of the domains of the drives and the controller."""
     marched: tuple[Array, ...]
-    """Three voltages, three speeds, three limits of drives that were marched before."""
+    """Three voltages, three speeds, three limits of drives that were simulated before."""
 
 
 class State(NamedTuple):
@@ -171,7 +171,7 @@ READINGS, NOISY = 13, 4
 
 @inlined
 def measurement_at(sample: float, rate: float) -> int:
-    """Number of the last measurement at a sample of the loop; the start's, 0, has been before."""
+    """Number of the last measurement at a sample of the loop; 0, the start's, also before it."""
     return max(int(floor(sample * rate + ROUNDING)), 0)  # noqa: RUF046  # a float if compiled
 
 
@@ -183,11 +183,15 @@ def measured(
     last = len(readings) - 1  # lengths are powers of two
     number = measurement_at(sample, sensing.rate)
     if sample == 0 or number > measurement_at(sample - 1, sensing.rate):
-        row, error = readings[number & last], noise[number - first]
+        row = readings[number & last]
+        error = noise[number - first]
         row[0] = true.swing_x + sensing.rope_angle * true.rope * error[0]
         row[1] = true.swing_y + sensing.rope_angle * true.rope * error[1]
-        row[2], row[3] = true.rope, true.slew
-        row[4], row[5], row[6] = true.boom.cos, true.boom.sin, true.height
+        row[2] = true.rope
+        row[3] = true.slew
+        row[4] = true.boom.cos
+        row[5] = true.boom.sin
+        row[6] = true.height
         row[7], row[8], row[9] = true.shift
         row[10] = true.angles.x + sensing.motion * error[2]
         row[11] = true.angles.y + sensing.motion * error[3]
@@ -210,13 +214,13 @@ def measured(
 
 @inlined
 def delayed(memory: Array, row: int, sample: int, delay: float) -> float:
-    """A remembered signal so many samples ago, straight between samples."""
-    whole = int(delay)
-    part = delay - whole
+    """A remembered signal a delay [samples] ago, straight between samples."""
+    delay_samples = int(delay)
+    delay_fraction = delay - delay_samples
     last = memory.shape[1] - 1  # lengths are powers of two
-    newer: float = memory[row, (sample - whole) & last]
-    older: float = memory[row, (sample - whole - 1) & last]
-    return newer + part * (older - newer)
+    newer: float = memory[row, (sample - delay_samples) & last]
+    older: float = memory[row, (sample - delay_samples - 1) & last]
+    return newer + delay_fraction * (older - newer)
 
 
 @inlined
@@ -224,25 +228,25 @@ def shaped(
     memory: Array, row: int, sample: int, half: float, impulses: tuple[float, float, float]
 ) -> float:
     """A remembered signal through a shaper whose impulses are `half` samples apart."""
-    made = 0.0
+    total = 0.0
     for k in range(3):
         if impulses[k] > 0.0:
-            made += impulses[k] * delayed(memory, row, sample, k * half)
-    return made
+            total += impulses[k] * delayed(memory, row, sample, k * half)
+    return total
 
 
 @inlined
 def operator_path(
-    wanted: Array, axes: Array, memory: Array, sample: int, half: float, h: float, fixed: Fixed
+    reference: Array, axes: Array, memory: Array, sample: int, half: float, h: float, fixed: Fixed
 ) -> tuple[float, float]:
     """Where the operator's speeds alone would have brought the tip in the ship's frame, shaped. [m]
 
     `half` is half a period of the load. [samples]
     """
     last = memory.shape[1] - 1
-    advance(axes, OPERATOR, WISH, wanted, h, sample > 0)
-    boom = boom_at(axes[OPERATOR, 2], fixed.geometry, fixed.home)
-    ahead = tip_of(fixed.home.slew + axes[OPERATOR, 1], boom, fixed.geometry)
+    advance(axes, OPERATOR_ANGLE, OPERATOR_SPEED, reference, h, sample > 0)
+    boom = boom_at(axes[OPERATOR_ANGLE, 2], fixed.geometry, fixed.home)
+    ahead = tip_of(fixed.home.slew + axes[OPERATOR_ANGLE, 1], boom, fixed.geometry)
     memory[PATH, sample & last] = ahead.x
     memory[PATH + 1, sample & last] = ahead.y
     impulses = fixed.settings.tip
@@ -265,19 +269,21 @@ def tip_offset(
     last = memory.shape[1] - 1
     memory[SWING, sample & last] = seen.swing_x
     memory[SWING + 1, sample & last] = seen.swing_y
-    x, y = 0.0, 0.0
+    x = 0.0
+    y = 0.0
     if settings.feedback > 0.0:
         back = 2.0 * half * settings.delay
         x = settings.feedback * delayed(memory, SWING, sample, back)
         y = settings.feedback * delayed(memory, SWING + 1, sample, back)
         turned = to_ship(r, Vector(x, y, 0.0))
-        x, y = turned.x, turned.y
+        x = turned.x
+        y = turned.y
     if settings.ship:
-        # the path's place on the sea, at the tip's own height
-        over = Vector(path[0] - seen.shift.x, path[1] - seen.shift.y, seen.height)
-        place = to_ship(r, over)
-        x += place.x - path[0]
-        y += place.y - path[1]
+        # the point of the path over the sea, at the tip's own height
+        over_sea = Vector(path[0] - seen.shift.x, path[1] - seen.shift.y, seen.height)
+        compensated = to_ship(r, over_sea)
+        x += compensated.x - path[0]
+        y += compensated.y - path[1]
     return x, y
 
 
@@ -293,57 +299,67 @@ def clipped_offset(
 ) -> tuple[float, float]:
     """Offset of the tip, limited along the boom and across it to what the drives can follow."""
     omega = sqrt(GRAVITY / rope)
-    g, settings = fixed.geometry, fixed.settings
-    e_x, e_y = path[0] - g.axis.x, path[1] - g.axis.y
+    g = fixed.geometry
+    settings = fixed.settings
+    _, slew, luff = fixed.inverses
+    x, y = offset
+    e_x = path[0] - g.axis.x
+    e_y = path[1] - g.axis.y
     reach = sqrt(e_x * e_x + e_y * e_y)
-    e_x, e_y = e_x / reach, e_y / reach
-    rate, (_, slew, luff), (x, y) = reach_rate(boom, g), fixed.inverses, offset
-    speed, turning = rate * min(luff.high, -luff.low), reach * min(slew.high, -slew.low)
-    along = settings.share * largest_sine(speed, rate * luff.acceleration, omega)
-    along = settings.clip if settings.clip > 0.0 else along
-    across = settings.share * largest_sine(turning, reach * slew.acceleration, omega)
-    out = min(max(x * e_x + y * e_y, -along), along)
-    turn = min(max(y * e_x - x * e_y, -across), across)
-    return out * e_x - turn * e_y, out * e_y + turn * e_x
+    e_x = e_x / reach
+    e_y = e_y / reach
+    rate = reach_rate(boom, g)
+    speed_along = rate * min(luff.high, -luff.low)
+    speed_across = reach * min(slew.high, -slew.low)
+    most_along = settings.share * largest_sine(speed_along, rate * luff.acceleration, omega)
+    if settings.clip > 0.0:
+        most_along = settings.clip
+    most_across = settings.share * largest_sine(speed_across, reach * slew.acceleration, omega)
+    along = min(max(x * e_x + y * e_y, -most_along), most_along)
+    across = min(max(y * e_x - x * e_y, -most_across), most_across)
+    return along * e_x - across * e_y, along * e_y + across * e_x
 
 
 @inlined
 def follow_path(
-    x: float, y: float, axes: Array, wanted: Array, sample: int, h: float, fixed: Fixed
+    x: float, y: float, axes: Array, reference: Array, sample: int, h: float, fixed: Fixed
 ) -> None:
-    """Wanted speeds of slew and luff for a wanted tip in the ship's frame, and the position loop's.
+    """Reference speeds of slew and luff that bring the tip to (x, y) in the ship's frame.
 
-    [m], [rad/s]
+    Their sum with the position loop's correction. [m], [rad/s]
     """
-    target = shafts_for(x, y, shafts_of(axes, AIM), fixed.geometry, fixed.home)
-    for i, aim in ((1, target.slew), (2, target.luff)):
-        correction = fixed.settings.gain * (aim - axes[ANGLE, i])
-        wanted[i] = (aim - axes[AIM, i]) / h * (sample > 0) + correction
-        axes[AIM, i] = aim
+    target = shafts_for(x, y, shafts_of(axes, REFERENCE_ANGLE), fixed.geometry, fixed.home)
+    for i, angle in ((1, target.slew), (2, target.luff)):
+        correction = fixed.settings.gain * (angle - axes[ANGLE, i])
+        reference[i] = (angle - axes[REFERENCE_ANGLE, i]) / h * (sample > 0) + correction
+        axes[REFERENCE_ANGLE, i] = angle
 
 
 # --- actuation and motion -------------------------------------------------------------------------
 
 
 @inlined
-def voltage_for(wanted: float, inverse: Inverse, actuation: int) -> float:
-    """Command of a drive for a wanted speed of its shaft, by `InverseMap.voltage`, clipped. [V]"""
+def voltage_for(reference: float, inverse: Inverse, actuation: int) -> float:
+    """Command of a drive for a speed of its shaft, by `InverseMap.voltage`, clipped. [V]"""
     if actuation == VOLTS:
-        full = inverse.high if wanted > 0.0 else -inverse.low
-        return min(max(FULL_VOLTAGE * wanted / full, -FULL_VOLTAGE), FULL_VOLTAGE)
-    speed, voltage, gap = inverse.speed, inverse.voltage, inverse.gap
-    below, above = wanted - speed[gap], speed[gap + 1] - wanted
+        full = inverse.high if reference > 0.0 else -inverse.low
+        return min(max(FULL_VOLTAGE * reference / full, -FULL_VOLTAGE), FULL_VOLTAGE)
+    speed = inverse.speed
+    voltage = inverse.voltage
+    gap = inverse.gap
+    below = reference - speed[gap]
+    above = speed[gap + 1] - reference
     if below >= 0.0 and above >= 0.0:
-        at_rest = abs(wanted - inverse.creep)
+        at_rest = abs(reference - inverse.creep)
         if at_rest <= below and at_rest <= above:
             return 0.0
         edge: float = voltage[gap] if below <= above else voltage[gap + 1]
         return edge
-    inside = min(max(wanted, inverse.low), inverse.high)
+    inside = min(max(reference, inverse.low), inverse.high)
     n = min(int(np.searchsorted(speed, inside, side="right")), speed.size - 1)
     share = (inside - speed[n - 1]) / (speed[n] - speed[n - 1])
-    made: float = voltage[n - 1] + share * (voltage[n] - voltage[n - 1])
-    return made
+    between: float = voltage[n - 1] + share * (voltage[n] - voltage[n - 1])
+    return between
 
 
 @inlined
@@ -363,7 +379,7 @@ def shafts_of(axes: Array, row: int) -> Shafts:
 
 @inlined
 def limited(u: float, inverse: Inverse) -> float:
-    """Wanted speed for a stick's fraction of the full speed that way. [rad/s]"""
+    """Speed for a stick's fraction of the full speed in its direction. [rad/s]"""
     return u * inverse.high if u > 0.0 else -u * inverse.low
 
 
@@ -381,11 +397,18 @@ def braked(
 
 @inlined
 def led_load(
-    hung: Hung, tip: Vector, following: Vector, rope: float, before: float, sample: int, h: float,
+    hung: Hung,
+    tip: Vector,
+    following: Vector,
+    rope: float,
+    rope_before: float,
+    sample: int,
+    h: float,
     fixed: Fixed,
-) -> Hung:  # fmt: skip
-    """Load and hook after the tip has moved and the rope has changed from a length before. [m]"""
-    s, start = fixed.hanging, fixed.start
+) -> Hung:
+    """Load and hook after the tip has moved and the rope has changed its length. [m]"""
+    s = fixed.hanging
+    start = fixed.start
     if sample == 0:
         return hanging_load(following, start.offset[0], start.offset[1], rope, s)
     square = h * h
@@ -393,7 +416,7 @@ def led_load(
         square = 0.5 * square
         lead = moved(following, -1.0, tip)
         v = start.velocity
-        hung = set_off(hung, tip, lead, rope - before, v[0], v[1], h)
+        hung = set_off(hung, tip, lead, rope - rope_before, v[0], v[1], h)
     return rope_step(hung, tip, following, rope, s, h, square)
 
 
@@ -404,12 +427,12 @@ def rope_torques(
     """Torques of the rope's tension on the three shafts. [N m]"""
     tension = fixed.mass * hung.pull
     along = moved(hung.hook, -1.0, tip)
-    pulled = moved(Vector(0.0, 0.0, 0.0), tension / size(along), along)
-    return shaft_torques(to_ship(r, pulled), slew, boom, tension, fixed.geometry)
+    force = moved(Vector(0.0, 0.0, 0.0), tension / norm(along), along)
+    return shaft_torques(to_ship(r, force), slew, boom, tension, fixed.geometry)
 
 
 @inlined
-def leave(
+def store(
     row: Array,
     volts: Array,
     omega: Array,
@@ -419,59 +442,84 @@ def leave(
     hung: Hung,
     columns: Columns,
 ) -> None:
-    """Leave a sample's signals, by `Columns`."""
-    voltage, bits, torque, hook = columns.voltage, columns.limits, columns.torque, columns.hook
+    """Store a sample's signals in a row, by `Columns`."""
     for i in range(3):
-        row[SPEED + i], row[SHAFT + i] = omega[i], axes[ANGLE, i]
-        if voltage != ABSENT:
-            row[voltage + i], row[bits + i] = volts[i], limits[i]
-        if torque != ABSENT:
-            row[torque + i] = axes[TORQUE, i]
+        row[SPEED + i] = omega[i]
+        row[SHAFT + i] = axes[ANGLE, i]
+        if columns.voltage != ABSENT:
+            row[columns.voltage + i] = volts[i]
+            row[columns.limits + i] = limits[i]
+        if columns.torque != ABSENT:
+            row[columns.torque + i] = axes[TORQUE, i]
     row[TIP], row[TIP + 1], row[TIP + 2] = tip
     row[LOAD], row[LOAD + 1], row[LOAD + 2] = hung.load
     row[PULL] = hung.pull
-    if hook != ABSENT:
+    if columns.hook != ABSENT:
+        hook = columns.hook
         row[hook], row[hook + 1], row[hook + 2] = hung.hook
 
 
 @kernel
 def open_voltages(stick: Array, inverse: Inverse, actuation: int) -> Array:
     """Voltages of a drive under the stick alone. [V]"""
-    made = np.empty(stick.size)
+    voltages = np.empty(stick.size)
     for m in range(stick.size):
-        made[m] = voltage_for(limited(stick[m], inverse), inverse, actuation)
-    return made
+        voltages[m] = voltage_for(limited(stick[m], inverse), inverse, actuation)
+    return voltages
 
 
 # --- the loop -------------------------------------------------------------------------------------
 
 
-def _no_law(*_: Any) -> float:
+def _no_controller(*_: Any) -> float:
     return inf
 
 
 @generating
-def loop_of(hoist: Any, slew_drive: Any, luff: Any, law: Any) -> Callable[..., tuple[State, int]]:
-    """The compiled loop over given steps of three drives and of a law, None for no law."""
-    own = law is not None
-    advance_law = law if own else inlined(_no_law)
+def loop_of(
+    hoist: Any, slew_drive: Any, luff: Any, controller: Any
+) -> Callable[..., tuple[State, int]]:
+    """The compiled loop over steps of three drives and of a user-defined controller, or None."""
+    controlled = controller is not None
+    advance_controller = controller if controlled else inlined(_no_controller)
 
     @kernel
     def loop(
-        h: float, fixed: Fixed, state: State, plant: Plant, stick: Array, ship: Array, out: Array
+        h: float,
+        fixed: Fixed,
+        state: State,
+        arrays: LoopArrays,
+        stick: Array,
+        ship: Array,
+        out: Array,
     ) -> tuple[State, int]:
         """Take the stick's samples; the state after the last, and how the pass ended."""
-        inverses, settings, actuation = fixed.inverses, fixed.settings, fixed.actuation
-        laws, picks, memory, margins = plant.law, plant.picks, plant.memory, plant.margins
-        a, b, c = plant.drives
-        g, home, columns, sensing = fixed.geometry, fixed.home, fixed.columns, settings.sensing
-        marched, moving, loaded = plant.marched, ship.shape[1] > 1, fixed.loaded
+        inverses = fixed.inverses
+        settings = fixed.settings
+        sensing = settings.sensing
+        actuation = fixed.actuation
+        loaded = fixed.loaded
+        columns = fixed.columns
+        g = fixed.geometry
+        home = fixed.home
+        a, b, c = arrays.drives
+        user = arrays.controller
+        picks = arrays.picks
+        memory = arrays.memory
+        margins = arrays.margins
+        marched = arrays.marched
+        moving = ship.shape[1] > 1
         sample, axes, tip, hung, still, brake = state
         shafts = shafts_of(axes, ANGLE)
-        boom, rope = boom_at(shafts.luff, g, home), rope_length(shafts, g, home)
-        wanted, volts, omega, limits = np.zeros(3), np.zeros(3), np.zeros(3), np.zeros(3)
-        known = np.zeros(len(SEEN))
-        r, shift = rotation(0.0, 0.0, 0.0), Vector(0.0, 0.0, 0.0)
+        boom = boom_at(shafts.luff, g, home)
+        rope = rope_length(shafts, g, home)
+        reference = np.zeros(3)
+        volts = np.zeros(3)
+        omega = np.zeros(3)
+        limits = np.zeros(3)
+        inputs = np.zeros(len(SEEN))
+        r = rotation(0.0, 0.0, 0.0)
+        shift = Vector(0.0, 0.0, 0.0)
         angles = Vector(0.0, 0.0, 0.0)
         first = measurement_at(sample - 1, sensing.rate) + 1 if sample > 0 else 0
         ended = FINE
@@ -481,7 +529,7 @@ def loop_of(hoist: Any, slew_drive: Any, luff: Any, law: Any) -> Callable[..., t
                 angles = Vector(ship[m, 3], ship[m, 4], ship[m, 5])
                 r = rotation(angles.x, angles.y, angles.z)
             for i in range(3):
-                wanted[i] = limited(stick[m, i], inverses[i])
+                reference[i] = limited(stick[m, i], inverses[i])
             if settings.path:
                 # 1. what control sees
                 swing = moved(hung.hook, -1.0, tip)
@@ -489,35 +537,38 @@ def loop_of(hoist: Any, slew_drive: Any, luff: Any, law: Any) -> Callable[..., t
                 seen = Seen(swing.x, swing.y, rope, slew, boom, tip.z - shift.z, shift, angles)
                 seen_r = r
                 if sensing.rate > 0.0:
-                    seen = measured(seen, sample, first, sensing, plant.readings, plant.noise)
+                    seen = measured(seen, sample, first, sensing, arrays.readings, arrays.noise)
                     seen_r = rotation(seen.angles.x, seen.angles.y, seen.angles.z)
-                # 2. path, offsets, clip, wanted speeds
+                # 2. path, offsets, clip, reference speeds
                 half = pi * sqrt(rope / GRAVITY) / h
-                path = operator_path(wanted, axes, memory, sample, half, h, fixed)
+                path = operator_path(reference, axes, memory, sample, half, h, fixed)
                 x, y = tip_offset(path, seen, seen_r, memory, sample, half, settings)
-                if own:
-                    known[0], known[1], known[2] = seen.swing_x, seen.swing_y, seen.rope
-                    known[3], known[4] = seen.slew, atan2(seen.boom.sin, seen.boom.cos)
-                    known[5], known[6] = path
-                    known[7], known[8], known[9] = seen.shift
-                    known[10], known[11], known[12] = seen.angles
+                if controlled:
+                    inputs[0] = seen.swing_x
+                    inputs[1] = seen.swing_y
+                    inputs[2] = seen.rope
+                    inputs[3] = seen.slew
+                    inputs[4] = atan2(seen.boom.sin, seen.boom.cos)
+                    inputs[5], inputs[6] = path
+                    inputs[7], inputs[8], inputs[9] = seen.shift
+                    inputs[10], inputs[11], inputs[12] = seen.angles
                     for i in range(picks.size):
-                        laws.inputs[i] = known[picks[i]]
-                    margin = advance_law(laws)
+                        user.inputs[i] = inputs[picks[i]]
+                    margin = advance_controller(user)
                     # what is not a number would pass through every limit as one
-                    if not abs(laws.outputs[0]) + abs(laws.outputs[1]) < inf:
+                    if not abs(user.outputs[0]) + abs(user.outputs[1]) < inf:
                         ended = NO_NUMBER
                         break
                     margins[3] = min(margins[3], margin)
-                    x += laws.outputs[0]
-                    y += laws.outputs[1]
+                    x += user.outputs[0]
+                    y += user.outputs[1]
                 if settings.clip > 0.0 or settings.share > 0.0:
                     x, y = clipped_offset((x, y), path, boom, rope, fixed)
-                follow_path(path[0] + x, path[1] + y, axes, wanted, sample, h, fixed)
+                follow_path(path[0] + x, path[1] + y, axes, reference, sample, h, fixed)
             # 3. speeds
             if actuation == IDEAL:
                 for i in range(3):
-                    omega[i] = min(max(wanted[i], inverses[i].low), inverses[i].high)
+                    omega[i] = min(max(reference[i], inverses[i].low), inverses[i].high)
             elif actuation == MARCHED:
                 volts[0], volts[1], volts[2] = marched[0][m], marched[1][m], marched[2][m]
                 omega[0], omega[1], omega[2] = marched[3][m], marched[4][m], marched[5][m]
@@ -526,7 +577,7 @@ def loop_of(hoist: Any, slew_drive: Any, luff: Any, law: Any) -> Callable[..., t
                 for i in range(3):
                     volts[i] = stick[m, i]
                     if actuation != DIRECT:
-                        volts[i] = voltage_for(wanted[i], inverses[i], actuation)
+                        volts[i] = voltage_for(reference[i], inverses[i], actuation)
                 a.inputs[0], b.inputs[0], c.inputs[0] = volts[0], volts[1], volts[2]
                 if loaded:
                     a.inputs[1], b.inputs[1] = axes[TORQUE, 0], axes[TORQUE, 1]
@@ -541,8 +592,10 @@ def loop_of(hoist: Any, slew_drive: Any, luff: Any, law: Any) -> Callable[..., t
                 omega[0] = omega[0] * (1.0 - brake)
             # 4. kinematics and rope
             advance(axes, ANGLE, SHAFT_SPEED, omega, h, sample > 0)
-            shafts, before = shafts_of(axes, ANGLE), rope
-            boom, rope = boom_at(shafts.luff, g, home), rope_length(shafts, g, home)
+            shafts = shafts_of(axes, ANGLE)
+            rope_before = rope
+            boom = boom_at(shafts.luff, g, home)
+            rope = rope_length(shafts, g, home)
             following = to_inertial(r, tip_of(home.slew + shafts.slew, boom, g), shift)
             if not (fixed.ropes[0] <= rope <= fixed.ropes[1]):
                 ended = ROPE_OUT
@@ -550,15 +603,15 @@ def loop_of(hoist: Any, slew_drive: Any, luff: Any, law: Any) -> Callable[..., t
             if not (fixed.boom[0] <= boom.sin <= fixed.boom[1] and boom.cos > 0.0):
                 ended = BOOM_OUT
                 break
-            hung = led_load(hung, tip, following, rope, before, sample, h, fixed)
+            hung = led_load(hung, tip, following, rope, rope_before, sample, h, fixed)
             if hung.pull < 0.0:
                 ended = TOO_FAST
                 break
             tip = following
-            leave(out[m], volts, omega, limits, axes, tip, hung, columns)
+            store(out[m], volts, omega, limits, axes, tip, hung, columns)
             if loaded:
-                felt = rope_torques(hung, tip, r, home.slew + shafts.slew, boom, fixed)
-                axes[TORQUE, 0], axes[TORQUE, 1], axes[TORQUE, 2] = felt
+                torques = rope_torques(hung, tip, r, home.slew + shafts.slew, boom, fixed)
+                axes[TORQUE, 0], axes[TORQUE, 1], axes[TORQUE, 2] = torques
             sample += 1
         return State(sample, axes, tip, hung, still, brake), ended
 

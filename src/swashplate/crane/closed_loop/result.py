@@ -30,29 +30,35 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-CALMS, WATCHED = 4.0, 25.0
-"""Residual swing counts from so long after the shaper's last impulse, for so long. [s]"""
+CALMS = 4.0
+"""Time after the shaper's last impulse from which residual swing counts. [s]"""
+WATCHED = 25.0
+"""Time for which residual swing counts. [s]"""
 FARTHEST_SWING = 30.0
 """Swing beyond which a run is not an operation any more: the model is a mass on a free rope, and
 nobody goes on with a load that swings beyond it. [deg]"""
 IN_WATER = "the load is in the water"
 IN_DECK = "the load is in the deck"
 LOOK = 32
-"""Samples from one at which swing and place of the load are looked at to the next: 16 a second."""
+"""Every so many samples the swing and the position of the load are looked at: 16 a second."""
 SETTLED = 1.0
 """Swing below which a load counts as settled. [deg]"""
 PUMPS = (Limit.DEAD_ZONE, Limit.ORIFICE, Limit.SPOOL, Limit.SWASH_STOP, Limit.RELIEF)
-"""Limits that the loop leaves of each drive, in the order of its bits."""
+"""Limits that the loop stores of each drive, in the order of its bits."""
 
 THREES = {
-    **{"tip": "tip", "load": "load", "hook": "hook", "voltage": "voltage"},
-    **{"shaft_speed": "speed", "load_torque": "torque"},
+    "tip": "tip",
+    "load": "load",
+    "hook": "hook",
+    "voltage": "voltage",
+    "shaft_speed": "speed",
+    "load_torque": "torque",
 }
 """Signals of three columns, and how their names in `ROWS` begin."""
 
 
-class Left(NamedTuple):
-    """When and why a run has left the model."""
+class Departure(NamedTuple):
+    """When and why a run left what the model holds for."""
 
     time: float
     """[s]"""
@@ -72,7 +78,7 @@ class CraneRun(Tabular):
     ship: Array
     """(n, 6) surge, sway, heave [m], roll, pitch, yaw [rad]; (n, 1) zeros for a ship at rest."""
     stored: Array = field(repr=False)
-    """What the loop has left of each sample, by `fixed.columns`, SI."""
+    """What the loop stores of each sample, by `fixed.columns`, SI."""
     fixed: Fixed = field(repr=False)
     """What stayed as it was: home, mass of load and hook, settings of the controller."""
     stick_end: float
@@ -103,16 +109,16 @@ class CraneRun(Tabular):
     @cached_property
     def out(self) -> Array:
         """(n, 28) all signals, a column for each name in `rows`, SI."""
-        made = self._signals.table()
-        made.flags.writeable = False
-        return made
+        table = self._signals.table()
+        table.flags.writeable = False
+        return table
 
     tip = Named()
     """(n, 3) tip of the boom. [m]"""
     load = Named()
     """(n, 3) load. [m]"""
     hook = Named()
-    """(n, 3) hook, or the load where there is none. [m]"""
+    """(n, 3) hook, or the load if there is none. [m]"""
     voltage = Named()
     """(n, 3) commands of the drives, zero with ideal ones. [V]"""
     shaft_speed = Named()
@@ -133,7 +139,7 @@ class CraneRun(Tabular):
 
     @property
     def actuation(self) -> str:
-        """What made speeds of wanted speeds, as of `Setup`."""
+        """What turned reference speeds into speeds, as of `RunOptions`."""
         return ACTUATIONS[self.fixed.actuation]
 
     @cached_property
@@ -153,7 +159,7 @@ class CraneRun(Tabular):
 
     @property
     def tension(self) -> Array:
-        """(n,) tension of the rope, 0 where it is slack. [N]"""
+        """(n,) tension of the rope, 0 while it is slack. [N]"""
         return self.fixed.mass * self["pull"]
 
     @property
@@ -180,8 +186,8 @@ class CraneRun(Tabular):
     def snap(self) -> float | None:
         """Largest tension from the first moment on at which a slack rope snaps taut. [N]
 
-        0 if it never does. None if it does so with a rigid rope: that tension would depend on the
-        time step, so it is not computed; an elastic rope has it, `Suspension.stiffness`.
+        0 if it never snaps. None if a rigid rope snaps: that tension would depend on the time step,
+        so it is not computed; give the rope a `Suspension.stiffness`.
         """
         if not self._snaps.size:
             return 0.0
@@ -191,7 +197,7 @@ class CraneRun(Tabular):
 
     @property
     def stretch(self) -> Array:
-        """(n,) what the tension has added to the rope's length. [m]"""
+        """(n,) elongation of the rope by its tension. [m]"""
         return np.asarray(np.linalg.norm(self.hook - self.tip, axis=1) - self.rope)
 
     @property
@@ -228,19 +234,22 @@ class CraneRun(Tabular):
         return np.asarray(np.gradient(self.hook[:, 2], 1.0 / RATE))
 
     @cached_property
-    def left_model(self) -> Left | None:
+    def departure(self) -> Departure | None:
         """When and why a run is not an operation any more; None if it stays one.
 
         The first time at which the load swings beyond 30 degrees, the rope is slack or lies on the
         boom, or the load is in the water, or in the deck if the crane's file has one. The load is a
         point, and nothing that stands on the deck is known. Control changes the speed of ideal
-        drives at once, which slackens any rope for a moment: that is not looked at.
+        drives instantaneously, which slackens any rope for a moment: that is not looked at.
         """
-        some = slice(None, None, LOOK)
-        tip, hook, load = self.tip[some], self.hook[some], self.load[some]
-        slew = self.fixed.home.slew + self["shaft_slew"][some]
-        inboard = -rope_leads(hook - tip, slew, self.ship[some])[:, 0]
-        boom = np.arctan2(self["boom_sin"][some], self["boom_cos"][some])
+        looked_at = slice(None, None, LOOK)
+        tip = self.tip[looked_at]
+        hook = self.hook[looked_at]
+        load = self.load[looked_at]
+        ship = self.ship[looked_at]
+        slew = self.fixed.home.slew + self["shaft_slew"][looked_at]
+        inboard = -rope_leads(hook - tip, slew, ship)[:, 0]
+        boom = np.arctan2(self["boom_sin"][looked_at], self["boom_cos"][looked_at])
         beyond = np.degrees(swing_of(load, tip)) > FARTHEST_SWING
         times = {
             f"the load swings beyond {FARTHEST_SWING:g} deg": _first(beyond, LOOK),
@@ -249,13 +258,13 @@ class CraneRun(Tabular):
         }
         deck = self.crane.deck
         if deck is not None:
-            aboard = in_ship_axes(load, self.ship[some])
+            aboard = in_ship_axes(load, ship)
             below = (aboard[:, 2] < deck.height) & (np.abs(aboard[:, 1]) < deck.half_breadth)
             times[IN_DECK] = _first(below, LOOK)
         if not (self.actuation == "ideal" and self.fixed.settings.path):
             times["the rope is slack"] = _first(self.slack, 1)
         reason = min(times, key=times.__getitem__)
-        return Left(times[reason], reason) if np.isfinite(times[reason]) else None
+        return Departure(times[reason], reason) if np.isfinite(times[reason]) else None
 
     @property
     def settling(self) -> slice:
@@ -276,7 +285,7 @@ class CraneRun(Tabular):
 
     @property
     def residual_deg(self) -> float:
-        """Largest swing in `settling`, refused as that. [deg]"""
+        """Largest swing in `settling`; refused if the run is too short for it. [deg]"""
         return float(self.swing_deg[self.settling].max())
 
     def rms_deg(self, start: float = 0.0) -> float:
@@ -297,16 +306,16 @@ class CraneRun(Tabular):
 
     def limits(self, axis: str) -> dict[str, float]:
         """Share of time for which each limit of a drive acts, by name, 0 to 1."""
-        return {str(each.name).lower(): float(self.active(axis, each).mean()) for each in PUMPS}
+        return {str(limit.name).lower(): float(self.active(axis, limit).mean()) for limit in PUMPS}
 
     def drive(self, axis: str) -> Simulation:
-        """The simulation of one drive under its voltages, with all signals; not of ideal ones."""
+        """The simulation of one drive, not an ideal one, under its voltages, with all signals."""
         if self.actuation == "ideal":
             raise InputError("Ideal drives have neither voltages nor limits other than of speed.")
         torque = self[f"torque_{axis}"] if self.fixed.loaded else None
         drive = getattr(self.crane, axis)
-        made: Simulation = drive.simulate(self[f"voltage_{axis}"], RATE, load_torque=torque)
-        return made
+        simulation: Simulation = drive.simulate(self[f"voltage_{axis}"], RATE, load_torque=torque)
+        return simulation
 
     def tables(self) -> list[Table]:
         """What the run amounts to, and what limits its drives."""
@@ -314,24 +323,27 @@ class CraneRun(Tabular):
 
     def sentences(self) -> tuple[str, ...]:
         """Why the run is not an operation any more, and what of it is not computed."""
-        said = []
+        sentences = []
         lowest = float(self.load[:, 2].min())
         if lowest < 0.0:
-            said.append(
+            sentences.append(
                 f"The load is down to z = {lowest:.1f} m, below the point of the ship that its "
                 "motion is given for, near the waterline. Water is not in the model."
             )
-        if self.left_model is not None and self.left_model[1] != IN_WATER:
-            time, why = self.left_model
-            said.append(f"From {time:.2f} s on the run is not an operation any more: {why}.")
+        departure = self.departure
+        if departure is not None and departure.reason != IN_WATER:
+            sentences.append(
+                f"From {departure.time:.2f} s on the run is not an operation any more: "
+                f"{departure.reason}."
+            )
         jumps = self.actuation == "ideal" and self.fixed.settings.path
         if self.snap is None and not jumps:
-            said.append(
+            sentences.append(
                 f"The slack rope snaps taut at {self.time[self._snaps[0]]:.2f} s. With a rigid "
                 "rope the tension of that is not computed: take an elastic rope, "
                 "suspension=Suspension(stiffness=6e7)."
             )
-        return tuple(said)
+        return tuple(sentences)
 
     def to_polars(self) -> polars.DataFrame:
         """All signals and the ship's motion, a row for each sample, in SI."""
@@ -355,7 +367,15 @@ def _first(happens: NDArray[np.bool_], every: int) -> float:
 def named_runs(
     runs: CraneRun | Mapping[str, CraneRun], most: int, shown: str
 ) -> dict[str, CraneRun]:
-    """Runs by their names, of which something shows so many at most; one alone by its actuation.
+    """Runs by their names; a single one is named by its actuation.
+
+    Parameters
+    ----------
+    runs : CraneRun or mapping of str to CraneRun
+    most : int
+        How many can be shown.
+    shown : str
+        What shows them, as the error names it.
 
     Raises
     ------
@@ -371,7 +391,7 @@ def named_runs(
 def run_tables(runs: Mapping[str, CraneRun]) -> list[Table]:
     """Swing and end of runs, a row for each by its name; what limits their drives.
 
-    The residual swing is empty where a run is too short for it; ideal drives have no limits.
+    The residual swing is empty if a run is too short for it; ideal drives have no limits.
     """
     columns = (
         Column("run", wrap=True),
@@ -383,7 +403,8 @@ def run_tables(runs: Mapping[str, CraneRun]) -> list[Table]:
         Column("rope", ".2f", "m"),
         Column("slack", ".1%", of="pf"),
     )
-    made, shares = Table("", columns, "Swing, and where slew, boom and rope end"), []
+    table = Table("", columns, "Swing, and where slew, boom and rope end")
+    shares = []
     for name, run in runs.items():
         try:
             residual = run.residual_deg
@@ -391,19 +412,19 @@ def run_tables(runs: Mapping[str, CraneRun]) -> list[Table]:
             residual = np.nan
         swing = (residual, run.rms_deg(), run.swing_deg.max())
         angles = np.radians([*swing, run.slew_deg[-1], run.boom_deg[-1]])
-        made.add(name, *angles.tolist(), float(run.rope[-1]), float(run.slack.mean()))
+        table.add(name, *angles.tolist(), float(run.rope[-1]), float(run.slack.mean()))
         if run.actuation != "ideal":
             shares += [(name, axis, run.limits(axis).values()) for axis in AXES]
-    return [made, limit_table(shares)] if shares else [made]
+    return [table, limit_table(shares)] if shares else [table]
 
 
 def limit_table(rows: Iterable[tuple[str, str, Iterable[float]]]) -> Table:
     """Share of time for which limits act: of a name and an axis, in the order of `PUMPS`."""
-    heads = [str(each.name).lower().replace("_", " ") for each in PUMPS]
-    numbers = [Column(each, ".1%", none="–") for each in heads]
+    heads = [str(limit.name).lower().replace("_", " ") for limit in PUMPS]
+    numbers = [Column(head, ".1%", none="–") for head in heads]
     columns = (Column("variant", wrap=True), Column("axis"), *numbers)
-    said = "dead zone: the current is within that of the solenoids"
-    made = Table("Share of time for which limits act", columns, said)
+    note = "dead zone: the current is within that of the solenoids"
+    table = Table("Share of time for which limits act", columns, note)
     for name, axis, shares in rows:
-        made.add(name, axis, *shares)
-    return made
+        table.add(name, axis, *shares)
+    return table

@@ -1,4 +1,4 @@
-"""Signals of a crane's run: what the loop leaves of each sample, and what follows from that."""
+"""Signals of a crane's run: what the loop stores of each sample, and what follows from that."""
 
 from __future__ import annotations
 
@@ -27,41 +27,42 @@ ROWS = (
 """Signals of a run by name, SI; the torques are those that the drives have taken."""
 
 SPEED, SHAFT, TIP, LOAD, PULL = 0, 3, 6, 9, 12
-"""Columns that the loop leaves of every run."""
+"""First columns of what the loop stores of every run: four groups of three, and the pull."""
 ABSENT = -1
 BOOM_AND_ROPE = ("rope", "boom_cos", "boom_sin")
 """What follows from the angles of the shafts."""
 PARTS = {"hoist": 0, "slew": 1, "luff": 2, "x": 0, "y": 1, "z": 2}
-"""Place of an axis in its group."""
+"""Position of an axis in its group."""
 
 
 class Columns(NamedTuple):
-    """Columns that the loop leaves only of some runs, `ABSENT` if it does not."""
+    """Columns that the loop stores only of some runs, `ABSENT` if it does not."""
 
     voltage: int
+    """First of the three voltages; ideal drives have none."""
     limits: int
-    """Of voltages and limits of the drives, the first of three each; not of ideal ones."""
+    """First of the limits of the three drives; ideal ones have none."""
     hook: int
-    """Of a hook with slings; without one it is where the load is."""
+    """First of the hook with slings; without one it is where the load is."""
     torque: int
-    """Of drives that the rope loads."""
+    """First of the torques, if the rope loads the drives."""
     width: int
-    """All columns, with those of every run."""
+    """Number of columns, with those of every run."""
 
 
 def columns_of(*, ideal: bool, hooked: bool, loaded: bool) -> Columns:
-    """Columns that the loop leaves of a run."""
+    """Columns that the loop stores of a run."""
     width = PULL + 1
-    places = {}
+    first_columns = {}
     for group, present in (
         ("voltage", not ideal),
         ("limits", not ideal),
         ("hook", hooked),
         ("torque", loaded),
     ):
-        places[group] = width if present else ABSENT
+        first_columns[group] = width if present else ABSENT
         width += 3 if present else 0
-    return Columns(**places, width=width)
+    return Columns(**first_columns, width=width)
 
 
 @kernel
@@ -71,7 +72,8 @@ def _boom_and_rope(shafts: Array, g: Geometry, home: Home, out: Array) -> None:
         now = Shafts(shafts[n, 0], shafts[n, 1], shafts[n, 2])
         boom = boom_at(now.luff, g, home)
         out[n, 0] = rope_length(now, g, home)
-        out[n, 1], out[n, 2] = boom.cos, boom.sin
+        out[n, 1] = boom.cos
+        out[n, 2] = boom.sin
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,23 +81,23 @@ class Signals(Result):
     """Signals by their names of `ROWS`, each computed when it is asked for."""
 
     stored: Array
-    """(n, `columns.width`) what the loop has left."""
+    """(n, `columns.width`) what the loop has stored."""
     columns: Columns
     geometry: Geometry
     home: Home
 
     @cached_property
     def _boom_and_rope(self) -> Array:
-        made = np.empty((len(self.stored), 3))
-        _boom_and_rope(self.stored[:, SHAFT : SHAFT + 3], self.geometry, self.home, made)
-        made.flags.writeable = False
-        return made
+        columns = np.empty((len(self.stored), 3))
+        _boom_and_rope(self.stored[:, SHAFT : SHAFT + 3], self.geometry, self.home, columns)
+        columns.flags.writeable = False
+        return columns
 
     @cached_property
     def _zeros(self) -> Array:
-        made = np.zeros((len(self.stored), 3))
-        made.flags.writeable = False
-        return made
+        zeros = np.zeros((len(self.stored), 3))
+        zeros.flags.writeable = False
+        return zeros
 
     def three(self, group: str) -> Array:
         """(n, 3) the signals of a group: ``"speed"`` of hoist, slew and luff, ``"tip"``."""

@@ -2,26 +2,26 @@
 
 from __future__ import annotations
 
-from typing import Unpack
+from typing import NamedTuple, Unpack
 
 from numpy.typing import ArrayLike
 
 from swashplate.crane.axes import RATE
 from swashplate.crane.closed_loop.loop import DIRECT, IDEAL
+from swashplate.crane.closed_loop.operator_command import Array, OperatorCommand
 from swashplate.crane.closed_loop.result import CraneRun
-from swashplate.crane.closed_loop.stepper import CraneStepper, Setup
-from swashplate.crane.closed_loop.stick import Array, Stick
+from swashplate.crane.closed_loop.stepper import CraneStepper, RunOptions
 from swashplate.crane.crane import Crane
-from swashplate.crane.sea.seaway import Seaway, motion_of
+from swashplate.crane.sea.seaway import Seaway, ship_motion_of
 from swashplate.errors import InputError
 
 
 def simulate(
     crane: Crane,
-    stick: Stick,
+    stick: OperatorCommand,
     *,
     sea: Seaway | ArrayLike | None = None,
-    **setup: Unpack[Setup],
+    **options: Unpack[RunOptions],
 ) -> CraneRun:
     """Simulate a whole crane.
 
@@ -29,13 +29,13 @@ def simulate(
     ----------
     crane : Crane
         The crane with its drives.
-    stick : Stick
+    stick : OperatorCommand
         What the operator asks for; its length is that of the run.
     sea : Seaway or (n, 6) array_like, optional
         A seaway, or the ship's motion at 512 Hz: surge, sway, heave [m], roll, pitch, yaw [rad], as
         `ship_motion` reads it from a log; by default the ship is at rest.
-    **setup
-        Where it begins, what controls it, what hangs on it: see `Setup`.
+    **options
+        Where it begins, what controls it, what hangs on it: see `RunOptions`.
 
     Raises
     ------
@@ -46,26 +46,44 @@ def simulate(
     DomainError
         If boom or rope meet a limit, or a drive leaves its domain.
     """
-    stepper, commands, end = begun(crane, stick, setup)
-    ship = motion_of(sea, len(commands), RATE)
-    signals = stepper.run(commands, ship)
-    return CraneRun(crane, commands, ship, signals, stepper.fixed, end)
+    prepared = prepare(crane, stick, options)
+    ship = ship_motion_of(sea, len(prepared.commands), RATE)
+    return CraneRun(
+        crane=crane,
+        stick=prepared.commands,
+        ship=ship,
+        stored=prepared.stepper.run(prepared.commands, ship),
+        fixed=prepared.stepper.fixed,
+        stick_end=prepared.end,
+    )
 
 
-def begun(crane: Crane, stick: Stick, setup: Setup) -> tuple[CraneStepper, Array, float]:
-    """A run at its start: stepper, commands, and when the last one ends; as `simulate` refuses."""
-    stepper = CraneStepper(crane, **setup)
+class PreparedRun(NamedTuple):
+    """A run before its first sample."""
+
+    stepper: CraneStepper
+    commands: Array
+    """(n, 3) of hoist, slew and luff, -1 to 1."""
+    end: float
+    """When the last command has returned to zero. [s]"""
+
+
+def prepare(crane: Crane, stick: OperatorCommand, options: RunOptions) -> PreparedRun:
+    """A run before its first sample; it refuses what `simulate` refuses of crane and stick."""
+    stepper = CraneStepper(crane, **options)
     if stepper.fixed.actuation == DIRECT:
         raise InputError(
             "With direct actuation commands are voltages, but a stick gives parts of the full "
             "speed: take a CraneStepper, or actuation='volts'."
         )
-    if not isinstance(stick, Stick):
-        raise InputError(f"The stick is {stick!r}, but must be a Stick, as Stick.rest(60).")
+    if not isinstance(stick, OperatorCommand):
+        raise InputError(
+            f"The stick is {stick!r}, but must be an OperatorCommand, as OperatorCommand.rest(60)."
+        )
     commands, end = stick.sample(crane, stepper.fixed.home, RATE)
     if stepper.fixed.actuation == IDEAL and commands[0].any():
         raise InputError(
-            "Ideal drives follow at once, and the crane starts at rest: a recorded stick must "
-            "begin at zero, so put a row of zeros before it."
+            "Ideal drives follow instantaneously, and the crane starts at rest: a recorded stick "
+            "must begin at zero, so put a row of zeros before it."
         )
-    return stepper, commands, end
+    return PreparedRun(stepper, commands, end)

@@ -1,4 +1,4 @@
-"""Steppers: a crane with its setup, one sample after the other or a whole run at once."""
+"""Steppers: a crane with its options, sample by sample or for a whole run."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from swashplate.analysis.compensation import InverseMap
 from swashplate.crane.axes import AXES, RATE, check_names
 from swashplate.crane.closed_loop import loop
-from swashplate.crane.closed_loop.loop import Fixed, Inverse, Plant, State
+from swashplate.crane.closed_loop.loop import Fixed, Inverse, LoopArrays, State
 from swashplate.crane.closed_loop.signals import ROWS, Signals, columns_of
 from swashplate.crane.control import GIVES, SEEN, Control, stages_of
 from swashplate.crane.crane import Crane
@@ -25,7 +25,7 @@ from swashplate.crane.rope import (
     Suspension,
     hanging_load,
     swing_of,
-    too_fast,
+    too_fast_sentence,
 )
 from swashplate.drive import Drive, drive_instance
 from swashplate.equations import CompiledStep, StepContext, compiled_step
@@ -53,7 +53,7 @@ QUICKEST = 0.4
 would swing against each other from sample to sample."""
 
 
-class Setup(TypedDict, total=False):
+class RunOptions(TypedDict, total=False):
     """How a run is set up: keywords of `simulate` and `CraneStepper`, each optional.
 
     Parameters
@@ -61,9 +61,9 @@ class Setup(TypedDict, total=False):
     control : Control, default None
         Of `swashplate.crane.control`; by default the stick's commands as they are.
     actuation : {"inverse", "volts", "ideal", "direct"}, default "inverse"
-        What makes speeds of wanted speeds: the real drives behind their inverse maps, or behind
-        10 V for full speed (``"volts"``); or drives that follow at once within their limits of
-        speed (``"ideal"``). A stepper also takes voltages (``"direct"``).
+        What turns reference speeds into speeds: the real drives behind their inverse maps, or
+        behind 10 V for full speed (``"volts"``); or drives that follow instantaneously within their
+        limits of speed (``"ideal"``). A stepper also takes voltages (``"direct"``).
     slew_deg : float, default 0, in studies 90
         From forward to starboard.
     boom_deg : float, default 45
@@ -118,37 +118,45 @@ class CraneStepper:
     ----------
     crane : Crane
         The crane with its drives.
-    **setup
-        Where it begins, what controls it, what hangs on it: see `Setup`.
+    **options
+        Where it begins, what controls it, what hangs on it: see `RunOptions`.
     """
 
-    def __init__(self, crane: Crane, **setup: Unpack[Setup]) -> None:
-        how: dict[str, Any] = dict(setup)
-        check_names("A crane's run has no", how, Setup.__annotations__, "it has")
-        control = how.pop("control", None)
-        settings, law, self._sensors = stages_of(control)
-        self._crane, self.fixed = crane, _fixed(crane, settings, **how)
-        fixed = self.fixed
+    def __init__(self, crane: Crane, **options: Unpack[RunOptions]) -> None:
+        keywords: dict[str, Any] = dict(options)
+        check_names("A crane's run has no", keywords, RunOptions.__annotations__, "it has")
+        control = keywords.pop("control", None)
+        settings, controller, sensors = stages_of(control)
+        fixed = _fixed(crane, settings, **keywords)
+        self._crane = crane
+        self.fixed = fixed
         if fixed.actuation == loop.DIRECT and control is not None:
             raise InputError("With direct actuation the voltages are given: leave control out.")
-        given = ("voltage", "load_torque") if fixed.loaded else ("voltage",)
-        compiled = [_compiled(getattr(crane, axis), given) for axis in AXES]
+        inputs = ("voltage", "load_torque") if fixed.loaded else ("voltage",)
+        compiled = [_compiled(getattr(crane, axis), inputs) for axis in AXES]
         self._steps = [step for step, _ in compiled]
         hoist, slew, luff = (context.copied() for _, context in compiled)
-        own, picks = hoist, np.zeros(0, dtype=np.int64)
-        if law is not None:
-            seen = law.model.external
-            self._steps.append(compiled_step(law.model, law.values, seen, GIVES, RATE))
-            own = self._steps[3].context()
-            picks = np.array([SEEN.index(each) for each in seen], dtype=np.int64)
+        # without a user-defined controller its arrays are not used
+        user = hoist
+        controller_step = None
+        picks = np.zeros(0, dtype=np.int64)
+        if controller is not None:
+            names = controller.model.external
+            step = compiled_step(controller.model, controller.values, names, GIVES, RATE)
+            self._steps.append(step)
+            user = step.context()
+            controller_step = step.step
+            picks = np.array([SEEN.index(name) for name in names], dtype=np.int64)
         # in open loop nothing acts back on the drives
         self._open = (
             not settings.path and not fixed.loaded and fixed.actuation in (loop.VOLTS, loop.INVERSE)
         )
-        one, two, three, *last = (each.step for each in self._steps)
-        self._loop = loop.loop_of(one, two, three, last[0] if last else None)
-        g, home = fixed.geometry, fixed.home
-        axes, boom = np.zeros((6, 3)), boom_at(0.0, g, home)
+        hoist_step, slew_step, luff_step = (step.step for step, _ in compiled)
+        self._loop = loop.loop_of(hoist_step, slew_step, luff_step, controller_step)
+        g = fixed.geometry
+        home = fixed.home
+        axes = np.zeros((6, 3))
+        boom = boom_at(0.0, g, home)
         tip = tip_of(home.slew, boom, g)
         if fixed.loaded:
             weight = fixed.mass * GRAVITY
@@ -163,10 +171,10 @@ class CraneStepper:
         memory[loop.SWING : loop.SWING + 2] = [[hung.hook.x - tip.x], [hung.hook.y - tip.y]]
         sensing = settings.sensing
         on_their_way = int(sensing.delay * sensing.rate) + 2
-        self._noise = np.random.default_rng(self._sensors.seed if self._sensors else 0)
-        self._plant = Plant(
+        self._noise = np.random.default_rng(0 if sensors is None else sensors.seed)
+        self._arrays = LoopArrays(
             drives=(hoist, slew, luff),
-            law=own,
+            controller=user,
             picks=picks,
             memory=memory,
             readings=np.zeros((1 << on_their_way.bit_length(), loop.READINGS)),
@@ -204,16 +212,17 @@ class CraneStepper:
 
     def named(self, row: Array) -> dict[str, float]:
         """Signals of a row that `take` returns, by name, and the swing."""
-        made = dict(zip(ROWS, row.tolist(), strict=True))
-        load, tip = (np.array([made[f"{end}_{axis}"] for axis in "xyz"]) for end in ("load", "tip"))
-        return made | {"swing": float(swing_of(load, tip))}
+        signals = dict(zip(ROWS, row.tolist(), strict=True))
+        load = np.array([signals[f"load_{axis}"] for axis in "xyz"])
+        tip = np.array([signals[f"tip_{axis}"] for axis in "xyz"])
+        return signals | {"swing": float(swing_of(load, tip))}
 
     def signals(self, stored: Array) -> Signals:
-        """Signals of what the loop has left."""
+        """Signals by name, of rows that the loop has stored."""
         return Signals(stored, self.fixed.columns, self.fixed.geometry, self.fixed.home)
 
     def take(self, commands: Array, ship: Array) -> Array:
-        """Advance by many samples at once: a row for each, a column for each of `step`'s signals.
+        """Advance by many samples: a row for each, a column for each of `step`'s signals.
 
         Commands are (n, 3), the ship's motion (n, 6), or (n, 1) if it does not move.
         """
@@ -221,65 +230,76 @@ class CraneStepper:
         return self.signals(self._advanced(self.fixed, commands, ship, out)).table()
 
     def run(self, commands: Array, ship: Array) -> Array:
-        """What the loop leaves of a whole run, by `Fixed.columns`.
+        """What the loop stores of a whole run, by `Fixed.columns`.
 
-        As `take`; the stepper itself is then of no more use.
+        As `take`; the stepper cannot be used after it.
         """
-        fixed, h = self.fixed, 1.0 / RATE
+        fixed = self.fixed
         out = np.empty((len(commands), fixed.columns.width))
         if self._open:  # the drives by themselves, which is quicker
-            voltages, speeds, limits = [], [], []
-            for i, axis in enumerate(AXES):
-                stick = np.ascontiguousarray(commands[:, i])
-                volts = loop.open_voltages(stick, fixed.inverses[i], fixed.actuation)
-                instance = drive_instance(getattr(self._crane, axis).parameters, by_voltage=True)
-                begun = instance.start({"voltage": 0.0}, h, "rest")
-                wanted = stored_of(instance.model, OUTPUTS)
-                made = marched(instance, {"voltage": volts}, h, begun, wanted, "command")
-                voltages.append(volts)
-                speeds.append(np.ascontiguousarray(made[0]))
-                limits.append(np.ascontiguousarray(made[1]))
-            self._plant = self._plant._replace(marched=(*voltages, *speeds, *limits))
+            self._arrays = self._arrays._replace(marched=self._marched_drives(commands))
             fixed = fixed._replace(actuation=loop.MARCHED)
         return self._advanced(fixed, commands, ship, out)
 
+    def _marched_drives(self, commands: Array) -> tuple[Array, ...]:
+        """Voltages, speeds and limits of the three drives, which nothing acts back on."""
+        h = 1.0 / RATE
+        voltages = []
+        speeds = []
+        limits = []
+        for i, axis in enumerate(AXES):
+            stick = np.ascontiguousarray(commands[:, i])
+            volts = loop.open_voltages(stick, self.fixed.inverses[i], self.fixed.actuation)
+            instance = drive_instance(getattr(self._crane, axis).parameters, by_voltage=True)
+            start = instance.start({"voltage": 0.0}, h, "rest")
+            outputs = stored_of(instance.model, OUTPUTS)
+            rows = marched(instance, {"voltage": volts}, h, start, outputs, "command")
+            voltages.append(volts)
+            speeds.append(np.ascontiguousarray(rows[0]))
+            limits.append(np.ascontiguousarray(rows[1]))
+        return (*voltages, *speeds, *limits)
+
     def _advanced(self, fixed: Fixed, commands: Array, ship: Array, out: Array) -> Array:
         """The rows, filled by the loop; refuses what has stopped it."""
-        plant = self._plant._replace(noise=self._next_noise(len(commands)))
-        self._state, ended = self._loop(1.0 / RATE, fixed, self._state, plant, commands, ship, out)
+        arrays = self._arrays._replace(noise=self._next_noise(len(commands)))
+        self._state, ended = self._loop(1.0 / RATE, fixed, self._state, arrays, commands, ship, out)
         if ended != loop.FINE:
             raise self._stopped(ended)
-        machines, margins = (*self._plant.drives, self._plant.law), self._plant.margins.tolist()
-        for step, context, worst in zip(self._steps, machines, margins, strict=False):
+        contexts = (*self._arrays.drives, self._arrays.controller)
+        margins = self._arrays.margins.tolist()
+        for step, context, worst in zip(self._steps, contexts, margins, strict=False):
             step.check(context, worst, "command")
         return out
 
     def _next_noise(self, samples: int) -> Array:
         """Noise of the measurements within the next samples, from one stream for the whole run."""
-        sample, rate = self._state.sample, self.fixed.settings.sensing.rate
+        sample = self._state.sample
+        rate = self.fixed.settings.sensing.rate
         if rate == 0.0 or samples == 0:
-            return self._plant.noise
+            return self._arrays.noise
         taken = loop.measurement_at(sample - 1, rate) + 1 if sample > 0 else 0
         due = loop.measurement_at(sample + samples - 1, rate) + 1
         return self._noise.standard_normal((due - taken, loop.NOISY))
 
     def _stopped(self, ended: int) -> Exception:
         """What has stopped the loop, as the error to raise."""
-        crane, time = self._crane, self._state.sample / RATE
+        crane = self._crane
+        time = self._state.sample / RATE
         shafts = Shafts(*self._state.axes[loop.ANGLE])
         rope = float(rope_length(shafts, self.fixed.geometry, self.fixed.home))
         if ended == loop.TOO_FAST:
-            return InputError(too_fast(rope, time, RATE))
-        (short, long), (low, high) = crane.rope_limits, map(degrees, crane.boom_limits)
-        said = {
-            loop.NO_NUMBER: "the control law gives an offset of the tip that is no finite number; "
-            "look for a division by zero or a root of what is negative in it",
+            return InputError(too_fast_sentence(rope, time, RATE))
+        short, long = crane.rope_limits
+        low, high = map(degrees, crane.boom_limits)
+        reasons = {
+            loop.NO_NUMBER: "the controller gives an offset of the tip that is not a finite "
+            "number; look for a division by zero or a root of a negative number in it",
             loop.ROPE_OUT: f"the rope is {rope:.2f} m long, but can be {short:g} to {long:g} m; "
             "hoist or lower less, or start elsewhere",
             loop.BOOM_OUT: f"the boom meets the limits of its travel, {low:g} to {high:g} deg; "
             "luff less, or start elsewhere",
         }
-        return DomainError(f"{crane.name}: at {time:.2f} s {said[ended]}.")
+        return DomainError(f"{crane.name}: at {time:.2f} s {reasons[ended]}.")
 
 
 def _fixed(
@@ -300,7 +320,7 @@ def _fixed(
     wind: tuple[float, float] = (0.0, 0.0),
     brake: bool = True,
 ) -> Fixed:
-    """What stays as it is during a run, of a `Setup`; refuses one that cannot be."""
+    """What stays as it is during a run, of `RunOptions`; refuses one that cannot be."""
     if actuation not in ACTUATIONS:
         raise InputError(f"actuation is '{actuation}'; it is {', '.join(ACTUATIONS[:-1])}.")
     load = crane.safe_load if load is None else load
@@ -341,7 +361,8 @@ def _fixed(
             f"The load is {load:g} kg, but {crane.name} lifts {crane.safe_load:g} kg: take less, "
             "or a crane with another safe_load."
         )
-    drag = AIR * drag_area / (2.0 * load) if load > 0.0 else 0.0  # which the suspension refuses
+    # the suspension refuses a load of 0
+    drag = AIR * drag_area / (2.0 * load) if load > 0.0 else 0.0
     if loaded is None:
         loaded = actuation != "ideal" and feels_load(crane)
     if loaded:
@@ -379,16 +400,17 @@ def _fixed(
 def _pair(name: str, value: Any, what: str) -> tuple[float, float]:
     """Two finite numbers; an `InputError` that says what they are."""
     pair = np.array(value, dtype=object)
-    if pair.shape != (2,) or not all(isinstance(each, Real) and isfinite(each) for each in pair):
+    if pair.shape != (2,) or not all(isinstance(part, Real) and isfinite(part) for part in pair):
         raise InputError(f"{name} is {value!r}, but must be {what}.")
-    one, two = map(float, pair)
-    return one, two
+    return float(pair[0]), float(pair[1])
 
 
 def _check_loaded(crane: Crane, actuation: str, mass: float, suspension: Suspension) -> None:
     """Refuse loads on drives that feel none, or that answer them faster than a sample."""
     if actuation == "ideal":
-        raise InputError("Ideal drives follow at once, whatever the load: leave out 'loaded'.")
+        raise InputError(
+            "Ideal drives follow instantaneously, whatever the load: leave out 'loaded'."
+        )
     lost = {axis: _speed_lost(getattr(crane, axis)) for axis in AXES}
     if not feels_load(crane):
         raise InputError(
@@ -407,9 +429,9 @@ def _check_loaded(crane: Crane, actuation: str, mass: float, suspension: Suspens
 
 @lru_cache(maxsize=64)
 def _compiled(drive: Drive, inputs: tuple[str, ...]) -> tuple[CompiledStep, StepContext]:
-    """A drive's step, and its context at its start to copy."""
-    made = drive.compiled_step(OUTPUTS, inputs=inputs, rate=RATE)
-    return made, made.context()
+    """A drive's step, and its context at the start to copy."""
+    step = drive.compiled_step(OUTPUTS, inputs=inputs, rate=RATE)
+    return step, step.context()
 
 
 def feels_load(crane: Crane) -> bool:
@@ -420,13 +442,23 @@ def feels_load(crane: Crane) -> bool:
 
 @lru_cache(maxsize=64)
 def _speed_lost(drive: Drive) -> float:
-    """Speed that a drive loses at once for each N m of load. [rad/s/(N m)]"""
-    still, pulled = (drive.simulate([0.0], load_torque=torque) for torque in (0.0, 1e5))
-    return float(still.shaft_speed[0] - pulled.shaft_speed[0]) / 1e5
+    """Speed that a drive loses instantaneously for each N m of load. [rad/s/(N m)]"""
+    torque = 1e5
+    unloaded = drive.simulate([0.0], load_torque=0.0)
+    loaded = drive.simulate([0.0], load_torque=torque)
+    return float(unloaded.shaft_speed[0] - loaded.shaft_speed[0]) / torque
 
 
 def _inverse(inverse: InverseMap) -> Inverse:
     """An inverse map as the loop takes it."""
     speed, voltage = np.hstack([inverse.minus, inverse.plus])
-    gap, (low, high) = inverse.minus.speed.size - 1, inverse.limits
-    return Inverse(speed, voltage, gap, inverse.creep, low, high, min(inverse.acceleration))
+    low, high = inverse.limits
+    return Inverse(
+        speed=speed,
+        voltage=voltage,
+        gap=inverse.minus.speed.size - 1,
+        creep=inverse.creep,
+        low=low,
+        high=high,
+        acceleration=min(inverse.acceleration),
+    )

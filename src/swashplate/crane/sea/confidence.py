@@ -13,10 +13,10 @@ from swashplate.tables import count
 Array = NDArray[np.float64]
 
 ENOUGH = (10, 20, 30, 50, 75, 100, 150, 200, 300, 500, 700, 1000, 1500, 2000, 3000, 5000, 10_000)
-"""Numbers of seaways that are advised where fewer do not decide."""
+"""Numbers of seaways that are advised if fewer do not decide."""
 
 
-class Estimate(NamedTuple):
+class ConfidenceInterval(NamedTuple):
     """A number with its 95 % confidence interval."""
 
     value: float
@@ -24,11 +24,10 @@ class Estimate(NamedTuple):
     high: float
 
 
-def mean_of(values: Array, least: float = -inf) -> Estimate:
+def mean_of(values: Array, least: float = -inf) -> ConfidenceInterval:
     """Mean of independent values with Student's interval; NaN are left out.
 
-    Values that cannot be below `least`, as a swing not below 0, have no interval that reaches
-    below it.
+    The interval is cut off at `least`, below which the values cannot be.
 
     Notes
     -----
@@ -38,26 +37,26 @@ def mean_of(values: Array, least: float = -inf) -> Estimate:
     """
     from scipy.special import stdtrit
 
-    known = values[np.isfinite(values)]
-    mean = float(known.mean()) if known.size else np.nan
-    if known.size < 2:
-        return Estimate(mean, np.nan, np.nan)
-    t = float(stdtrit(known.size - 1, 0.975))
-    half = t * float(known.std(ddof=1)) / sqrt(known.size)
-    return Estimate(mean, max(mean - half, least), mean + half)
+    finite = values[np.isfinite(values)]
+    mean = float(finite.mean()) if finite.size else np.nan
+    if finite.size < 2:
+        return ConfidenceInterval(mean, np.nan, np.nan)
+    t = float(stdtrit(finite.size - 1, 0.975))
+    half = t * float(finite.std(ddof=1)) / sqrt(finite.size)
+    return ConfidenceInterval(mean, max(mean - half, least), mean + half)
 
 
-def rms_of(values: Array) -> Estimate:
+def rms_of(values: Array) -> ConfidenceInterval:
     """Root mean square over independent seaways of a root mean square in each; NaN are left out.
 
     Its square is what a spectrum gives: the mean of the roots is smaller. The interval is the root
     of Student's for the mean of the squares.
     """
     squares = mean_of(values**2, 0.0)
-    return Estimate(*np.sqrt(np.array(squares)).tolist())
+    return ConfidenceInterval(*np.sqrt(np.array(squares)).tolist())
 
 
-def share_of(hits: int, of: int, unknown: int = 0) -> Estimate:
+def share_of(hits: int, of: int, unknown: int = 0) -> ConfidenceInterval:
     """Share of independent seaways with its exact interval (Clopper and Pearson 1934).
 
     Parameters
@@ -73,10 +72,10 @@ def share_of(hits: int, of: int, unknown: int = 0) -> Estimate:
     most = hits + unknown
     low = float(betaincinv(hits, of - hits + 1, 0.025)) if hits > 0 else 0.0
     high = float(betaincinv(most + 1, of - most, 0.975)) if most < of else 1.0
-    return Estimate(hits / of, low, high)
+    return ConfidenceInterval(hits / of, low, high)
 
 
-def counted_words(share: Estimate, seaways: int) -> str:
+def counted_words(share: ConfidenceInterval, seaways: int) -> str:
     """A share of seaways in words: ``"2 of 37 seaways (95 % interval 0.7 to 18.2 %)"``."""
     low, high = 100.0 * share.low, 100.0 * share.high
     of = f"{round(share.value * seaways)} of {count(seaways, 'seaway')}"
@@ -84,11 +83,11 @@ def counted_words(share: Estimate, seaways: int) -> str:
 
 
 def more_seaways(share: float, seaways: int, allowed: float) -> str:
-    """How many more seaways than so many tell a share from the one allowed, if the share stays."""
-    for more in ENOUGH:
-        found = share_of(round(share * more), more)
-        if more > seaways and not found.low <= allowed <= found.high:
-            return f"about {more}"
+    """How many seaways, more than there were, tell a share from the one allowed, if it stays."""
+    for number in ENOUGH:
+        interval = share_of(round(share * number), number)
+        if number > seaways and not interval.low <= allowed <= interval.high:
+            return f"about {number}"
     # a share as large as the one allowed: more seaways will first tell whether it stays so
     return f"{10 * seaways} to begin with"
 

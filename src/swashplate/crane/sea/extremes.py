@@ -13,14 +13,14 @@ from math import pi
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swashplate.crane.sea.confidence import Estimate
+from swashplate.crane.sea.confidence import ConfidenceInterval
 
 Array = NDArray[np.float64]
 
 THREE_HOURS = 10_800.0
 """Duration for which an extreme is stated, as a sea state is taken to last. [s]"""
 GROUPS = 10
-"""Groups of runs, one of which at a time is left out for the interval of an extreme."""
+"""Groups of runs; for the interval of an extreme each is left out in turn."""
 UPPER, FEWEST_UPPER = 0.1, 20
 """Part of the peaks that the tail is fitted to, and their least number. On Gaussian signals whose
 extreme is known, narrow and wide, of one and two components, the upper tenth errs by 2.5 % at most,
@@ -62,36 +62,41 @@ def largest_of_gaussian(
     with the density f and the standard deviation σ'(u) of the velocity along u (Belyaev 1968),
     taken as independent of the place.
     """
-    spread, rates = np.broadcast_arrays(
+    variances, rate_variances = np.broadcast_arrays(
         np.asarray(variance, dtype=np.float64), np.asarray(rate_variance, dtype=np.float64)
     )
-    widest = np.sqrt(spread.max(axis=-1))
-    low, high = widest, 12.0 * widest
+    deviation = np.sqrt(variances.max(axis=-1))
+    low = deviation
+    high = 12.0 * deviation
     for _ in range(BISECTIONS):
         middle = 0.5 * (low + high)
-        more = _crossings(middle, spread, rates) * duration > 1.0
-        low, high = np.where(more, middle, low), np.where(more, high, middle)
+        crossed_more = _crossings(middle, variances, rate_variances) * duration > 1.0
+        low = np.where(crossed_more, middle, low)
+        high = np.where(crossed_more, high, middle)
     return np.asarray(low)
 
 
-def _crossings(radius: Array, variance: Array, rates: Array) -> Array:
+def _crossings(radius: Array, variance: Array, rate_variance: Array) -> Array:
     """Crossings of a radius outwards in a second; 0 for a vector that stands still. [1/s]"""
     order = np.argsort(-variance, axis=-1)
-    spread = np.take_along_axis(variance, order, axis=-1)
-    rates = np.take_along_axis(rates, order, axis=-1)
-    widest = np.where(spread[..., 0] > 0.0, spread[..., 0], 1.0)
-    if spread.shape[-1] == 1:
-        made = np.sqrt(rates[..., 0] / widest) / pi * np.exp(-0.5 * radius**2 / widest)
+    variance = np.take_along_axis(variance, order, axis=-1)
+    rate_variance = np.take_along_axis(rate_variance, order, axis=-1)
+    largest = np.where(variance[..., 0] > 0.0, variance[..., 0], 1.0)
+    if variance.shape[-1] == 1:
+        rate = np.sqrt(rate_variance[..., 0] / largest) / pi
+        crossings = rate * np.exp(-0.5 * radius**2 / largest)
     else:
-        thin = np.maximum(spread[..., 1], THINNEST * widest)
+        smallest = np.maximum(variance[..., 1], THINNEST * largest)
         angle = (np.arange(DIRECTIONS) + 0.5) * pi / DIRECTIONS
-        along, across = np.cos(angle) ** 2, np.sin(angle) ** 2
-        squares = along / widest[..., None] + across / thin[..., None]
+        along = np.cos(angle) ** 2
+        across = np.sin(angle) ** 2
+        squares = along / largest[..., None] + across / smallest[..., None]
         density = np.exp(-0.5 * radius[..., None] ** 2 * squares)
-        density /= 2.0 * pi * np.sqrt(widest * thin)[..., None]
-        speed = np.sqrt((rates[..., :1] * along + rates[..., 1:] * across) / (2.0 * pi))
-        made = 2.0 * radius * (density * speed).sum(axis=-1) * pi / DIRECTIONS
-    return np.where(spread[..., 0] > 0.0, made, 0.0)
+        density /= 2.0 * pi * np.sqrt(largest * smallest)[..., None]
+        speed_variance = rate_variance[..., :1] * along + rate_variance[..., 1:] * across
+        speed = np.sqrt(speed_variance / (2.0 * pi))
+        crossings = 2.0 * radius * (density * speed).sum(axis=-1) * pi / DIRECTIONS
+    return np.where(variance[..., 0] > 0.0, crossings, 0.0)
 
 
 # --- peaks ----------------------------------------------------------------------------------------
@@ -106,7 +111,7 @@ def peaks_of(signal: Array) -> Array:
 
 def largest_of_peaks(
     runs: Sequence[Array], observed: float, duration: float = THREE_HOURS
-) -> Estimate:
+) -> ConfidenceInterval:
     """Most probable largest value in a duration, from the peaks of independent runs.
 
     Parameters
@@ -120,7 +125,7 @@ def largest_of_peaks(
 
     Returns
     -------
-    Estimate
+    ConfidenceInterval
         With a 95 % interval by the jackknife over groups of runs; the interval is NaN for fewer
         than two groups, and all is NaN for fewer than 40 peaks.
 
@@ -134,7 +139,7 @@ def largest_of_peaks(
     value = _weibull_level(np.concatenate([np.zeros(0), *runs]), observed, duration)
     groups = min(GROUPS, len(runs))
     if groups < 2 or not np.isfinite(value):
-        return Estimate(value, np.nan, np.nan)
+        return ConfidenceInterval(value, np.nan, np.nan)
     numbers = np.arange(len(runs)) % groups
     left_out = np.empty(groups)
     for group in range(groups):
@@ -143,12 +148,13 @@ def largest_of_peaks(
         left_out[group] = _weibull_level(np.concatenate(rest), share * observed, duration)
     variance = (groups - 1) / groups * float(np.sum((left_out - left_out.mean()) ** 2))
     half = float(stdtrit(groups - 1, 0.975)) * variance**0.5
-    return Estimate(value, max(value - half, 0.0), value + half)
+    return ConfidenceInterval(value, max(value - half, 0.0), value + half)
 
 
 def _weibull_level(peaks: Array, observed: float, duration: float) -> float:
     """Level that peaks exceed once in a duration on average; NaN for too few of them."""
-    n, upper = peaks.size, max(round(UPPER * peaks.size), FEWEST_UPPER)
+    n = peaks.size
+    upper = max(round(UPPER * n), FEWEST_UPPER)
     if n < 2 * upper:
         return float("nan")
     first = n - upper
@@ -156,7 +162,8 @@ def _weibull_level(peaks: Array, observed: float, duration: float) -> float:
     if highest[-1] - highest[0] <= 1e-9 * highest[-1]:  # a signal that repeats itself
         return float(highest[-1])
     exceeded = 1.0 - (np.arange(first, n) + 0.65) / (n + 0.3)
-    x, y = np.log(highest), np.log(-np.log(exceeded))
+    x = np.log(highest)
+    y = np.log(-np.log(exceeded))
     shape = float(np.sum((x - x.mean()) * (y - y.mean())) / np.sum((x - x.mean()) ** 2))
-    wanted = np.log(np.log(max(n * duration / observed, 2.0)))
-    return float(np.exp(x.mean() + (wanted - y.mean()) / shape))
+    y_of_level = np.log(np.log(max(n * duration / observed, 2.0)))
+    return float(np.exp(x.mean() + (y_of_level - y.mean()) / shape))

@@ -34,7 +34,7 @@ RECORDS = (4096.0, 131_072.0)
 DIRECTIONS = 8
 """Components of each frequency in a spread sea."""
 LONGEST_HOLE = 1.0
-"""Time without a sample in a log of motions that is a hole, where samples are closer. [s]"""
+"""Time without a sample that is a hole in a log of motions whose samples are closer. [s]"""
 SPARSEST = 5.0
 """Median time between samples from which a ship's motion cannot be drawn through them. [s]"""
 ALIKE = 1e-3
@@ -43,8 +43,8 @@ STEEPEST, FARTHEST = 1.0, 1000.0
 """Roll, pitch or yaw beyond which a measured motion is probably in degrees [rad]; distance from its
 mean place that no ship comes to while a crane works [m]."""
 OVERSHOOT = 1.0
-"""How far a curve through samples may swing beyond them, over their range; where a motion is
-sampled well it is a few percent."""
+"""How far a curve through samples may swing beyond them, over their range; it is a few percent if a
+motion is sampled well."""
 RATES = (10.0, 1e5)
 """Samples a second that a measured motion is given at. [Hz]"""
 LARGEST = 100_000_000
@@ -144,11 +144,11 @@ class Components(NamedTuple):
 
     frequency: Array
     """[rad/s]"""
-    met: Array
+    encounter: Array
     """Frequency at which the ship meets them, on a bin of the record; below 0 if the ship overtakes
     them. [rad/s]"""
     amplitude: Complex
-    """A, of a surface Re A e^{i met t} at the ship's mean place. [m]"""
+    """A, of a surface Re A e^{i encounter t} at the ship's mean place. [m]"""
     heading: Array
     """Where they run, from the bow to port; 0 following, 90° abeam. [rad]"""
 
@@ -259,8 +259,9 @@ class Seaway(Result):
         return 1.0 - self.spectrum.share(low, high) / self.spectrum.share(*BAND)
 
     def sentences(self) -> tuple[str, ...]:
-        """What of the sea is not simulated as it is asked for, if that is more than a little."""
-        outside, lost = 1.0 - self.spectrum.share(*BAND), self._lost
+        """What of the sea is not simulated as it is given, if that is more than a little."""
+        outside = 1.0 - self.spectrum.share(*BAND)
+        lost = self._lost
         sentences = []
         if outside > OUTSIDE:
             shortest, longest = (2.0 * np.pi / omega for omega in BAND[::-1])
@@ -296,7 +297,8 @@ class Seaway(Result):
         surface's variance.
         """
         width = 2.0 * pi / self.period
-        first, last = ceil(BAND[0] / width), floor(BAND[1] / width)
+        first = ceil(BAND[0] / width)
+        last = floor(BAND[1] / width)
         frequency = width * np.arange(first, last + 1, dtype=np.float64)
         density = self.spectrum.density(frequency)
         variance = density * (self.spectrum.height**2 / 16.0 / density.sum())
@@ -304,21 +306,25 @@ class Seaway(Result):
 
     @cached_property
     def waves(self) -> Components:
-        """Regular waves: one on each bin, or several directions of each if the sea is spread."""
+        """Regular waves: one on each bin, or several directions of each if the sea is spread.
+
+        They are drawn when they are first asked for, always the same for a seed.
+        """
         rng = np.random.default_rng(self.seed)
-        each = DIRECTIONS if self.spread else 1
-        omega, variance = (np.repeat(values, each) for values in self.bins)
+        directions = DIRECTIONS if self.spread else 1
+        omega, variance = (np.repeat(values, directions) for values in self.bins)
         real, imaginary = rng.standard_normal((2, omega.size))
-        amplitude = np.sqrt(variance / each) * (real + 1j * imaginary)
+        amplitude = np.sqrt(variance / directions) * (real + 1j * imaginary)
         heading = np.full(omega.size, radians(self.heading_deg))
         if self.spread:
             # one direction in each of equally probable sectors
-            probability = (np.arange(omega.size) % each + rng.random(omega.size)) / each
+            sector = np.arange(omega.size) % directions
+            probability = (sector + rng.random(omega.size)) / directions
             grid = np.linspace(-0.5 * pi, 0.5 * pi, 1001)
             heading += np.interp(probability, 0.5 + (grid + 0.5 * np.sin(2.0 * grid)) / pi, grid)
         width = 2.0 * pi / self.period
-        met = width * np.rint(self.encounter(omega, heading) / width)
-        return Components(omega, met, amplitude, heading)
+        encounter = width * np.rint(self.encounter(omega, heading) / width)
+        return Components(omega, encounter, amplitude, heading)
 
     def encounter(self, omega: Array, heading: Array) -> Array:
         """Frequencies at which the ship meets waves, by their frequency and heading. [rad/s]"""
@@ -366,12 +372,13 @@ class Seaway(Result):
 
     def _points(self, count: int) -> Array:
         """Value, slope and curvature of the six motions at `COARSE`, (count, 18), without lean."""
-        waves, size = self.waves, self._samples
+        waves = self.waves
+        size = self._samples
         motions = (self.response(waves.frequency, waves.heading) * waves.amplitude).T
-        w = waves.met[:, None]
+        w = waves.encounter[:, None]
         sums = np.hstack([motions, 1j * w * motions, -w * w * motions])
         # a wave met too fast for the rate is one of its aliases, which has the same samples
-        index = np.rint(waves.met * self.period / (2.0 * pi)).astype(np.int64) % size
+        index = np.rint(waves.encounter * self.period / (2.0 * pi)).astype(np.int64) % size
         mirrored = index > size // 2
         index[mirrored] = size - index[mirrored]
         sums[mirrored] = sums[mirrored].conj()
@@ -409,7 +416,7 @@ def ship_motion(
     rate : float
         Of the motion returned, 10 Hz to 100 kHz; a crane takes 512 Hz.
     options : TextOptions, optional
-        How a text file is written, where that cannot be recognised from it.
+        How a text file is written, if that cannot be recognised from it.
 
     Raises
     ------
@@ -420,11 +427,12 @@ def ship_motion(
         samples more than 5 s apart, two stamps that are nearly alike, a spike, a rotation beyond 1
         rad or a distance beyond 1 km, and a motion of more than 100 million numbers.
     """
-    wanted = dict(zip(MOTIONS, MOTIONS, strict=True)) if columns is None else dict(columns)
-    strange = [each for each in wanted if each not in MOTIONS]
-    if strange or not wanted:
+    if columns is None:
+        columns = dict(zip(MOTIONS, MOTIONS, strict=True))
+    unknown = [motion for motion in columns if motion not in MOTIONS]
+    if unknown or not columns:
         raise InputError(
-            f"A ship's motions are {', '.join(MOTIONS)}, not {', '.join(strange) or 'none'}."
+            f"A ship's motions are {', '.join(MOTIONS)}, not {', '.join(unknown) or 'none'}."
         )
     low, high = RATES
     if not (isinstance(rate, Real) and low <= rate <= high):
@@ -432,46 +440,47 @@ def ship_motion(
             f"The rate of a ship's motion is {rate!r} Hz, but must be {low:g} to {high:g} Hz; a "
             "crane takes 512 Hz."
         )
-    made: Array = np.zeros((0, 6))
-    for motion, column in wanted.items():
+    motions: Array = np.zeros((0, 6))
+    for motion, column in columns.items():
         unit = "m" if motion in MOTIONS[:3] else "rad"
         series = read_series(path, column, unit, time_column=time_column, options=options)
         _check_sampling(series.time, column, str(path))
         _check_sizes({motion: series.values}, str(path))
-        if not len(made):
+        if not len(motions):
             seconds = float(series.time[-1] - series.time[0])
             if 6.0 * seconds * rate > LARGEST:
                 raise InputError(
                     f"{path} lasts {seconds:g} s: at {rate:g} Hz that are more than the "
-                    f"{LARGEST} numbers that are taken at once; cut the log, or take a lower rate."
+                    f"{LARGEST} numbers that are taken together; cut the log, or take a lower rate."
                 )
-            made = np.zeros((int(seconds * rate + 1e-6) + 1, 6))
-        grid = series.time[0] + np.arange(len(made)) / rate
-        made[:, MOTIONS.index(motion)] = _curve(series, grid, column, str(path))
-    _check_sizes(dict(zip(MOTIONS, made.T, strict=True)), str(path))
-    return made
+            motions = np.zeros((int(seconds * rate + 1e-6) + 1, 6))
+        grid = series.time[0] + np.arange(len(motions)) / rate
+        motions[:, MOTIONS.index(motion)] = _curve(series, grid, column, str(path))
+    _check_sizes(dict(zip(MOTIONS, motions.T, strict=True)), str(path))
+    return motions
 
 
 def _check_sampling(time: Array, column: str, of: str) -> None:
     """Refuse stamps that no curve of a ship's motion can be drawn through."""
     if time.size < 4:
         raise InputError(f"{of} has {time.size} samples of {column}, but needs four.")
-    apart = np.diff(time)
-    median = float(np.median(apart))
+    steps = np.diff(time)
+    median = float(np.median(steps))
     if median > SPARSEST:
         raise InputError(
             f"{of}: samples of {column} are {median:g} s apart, but a ship's motion needs one "
             f"every {SPARSEST:g} s at least; look at the unit of the time."
         )
-    hole, narrow = int(np.argmax(apart)), int(np.argmin(apart))
-    if apart[hole] > max(LONGEST_HOLE, 5.0 * median):
+    hole = int(np.argmax(steps))
+    narrow = int(np.argmin(steps))
+    if steps[hole] > max(LONGEST_HOLE, 5.0 * median):
         raise InputError(
             f"{of} has no {column} from {time[hole]:g} to {time[hole + 1]:g} s: cut the log to a "
             "part without holes."
         )
-    if apart[narrow] < ALIKE * median:
+    if steps[narrow] < ALIKE * median:
         raise InputError(
-            f"{of}: data rows {narrow + 1} and {narrow + 2} are only {apart[narrow]:.2g} s apart, "
+            f"{of}: data rows {narrow + 1} and {narrow + 2} are only {steps[narrow]:.2g} s apart, "
             f"others {median:.2g} s: take one of them out, or mend its stamp."
         )
 
@@ -482,7 +491,8 @@ def _curve(series: Series, grid: Array, column: str, of: str) -> Array:
 
     time, values = series
     curve = np.asarray(CubicSpline(time, values)(grid))
-    low, high = float(values.min()), float(values.max())
+    low = float(values.min())
+    high = float(values.max())
     off = np.maximum(curve - high, low - curve)
     worst = int(np.argmax(off))
     if off[worst] > OVERSHOOT * (high - low) + 1e-9:  # of a motion that stands, its rounding
@@ -511,28 +521,28 @@ def _check_sizes(motions: Mapping[str, Array], of: str) -> None:
             )
 
 
-def motion_of(sea: Seaway | ArrayLike | None, count: int, rate: float) -> Array:
+def ship_motion_of(sea: Seaway | ArrayLike | None, count: int, rate: float) -> Array:
     """The ship's motion, (count, 6), one column at rest; refuses another shape or a shorter one."""
     if sea is None:
         return np.zeros((count, 1))
     if isinstance(sea, Seaway):
         return sea.motion(count, rate)
     try:
-        made = np.ascontiguousarray(sea, dtype=np.float64)
+        motion = np.ascontiguousarray(sea, dtype=np.float64)
     except (TypeError, ValueError):
-        made = np.zeros(0)
-    if made.ndim != 2 or made.shape[1] != 6 or not np.isfinite(made).all():
+        motion = np.zeros(0)
+    if motion.ndim != 2 or motion.shape[1] != 6 or not np.isfinite(motion).all():
         raise InputError(
             "A sea is a Seaway, as Seaway('ss3'), or the ship's motion in rows of six finite "
             "numbers: surge, sway, heave [m], roll, pitch, yaw [rad]."
         )
-    if len(made) < count:
+    if len(motion) < count:
         raise InputError(
             f"The stick is {(count - 1) / rate:g} s long, but the ship's motion only "
-            f"{(len(made) - 1) / rate:g} s at {rate:g} Hz."
+            f"{(len(motion) - 1) / rate:g} s at {rate:g} Hz."
         )
-    _check_sizes(dict(zip(MOTIONS, made.T, strict=True)), "The sea's motion")
-    return made[:count]
+    _check_sizes(dict(zip(MOTIONS, motion.T, strict=True)), "The sea's motion")
+    return motion[:count]
 
 
 def _basis(inner: int) -> Array:
@@ -556,9 +566,11 @@ def _basis(inner: int) -> Array:
 @kernel
 def _join(points: Array, basis: Array, out: Array) -> None:
     """Fill motions between points on the coarse grid, rows of values, slopes and curvatures."""
-    inner, motions = basis.shape[0], out.shape[1]
+    inner = basis.shape[0]
+    motions = out.shape[1]
     for n in range(points.shape[0] - 1):
-        before, after = points[n], points[n + 1]
+        before = points[n]
+        after = points[n + 1]
         for i in range(inner):
             for q in range(motions):
                 value = 0.0

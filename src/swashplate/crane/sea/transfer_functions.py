@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from itertools import count
 from math import inf, isfinite, pi, prod
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,16 +30,32 @@ Complex = NDArray[np.complex128]
 
 MOTIONS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 MIRRORED = np.array([1.0, -1.0, 1.0, -1.0, 1.0, -1.0])
-"""Signs of the motions where waves come from the other side."""
+"""Signs of the motions in waves from the other side."""
 LONGEST, ROLLS = 0.4, 0.2
 """A file whose lowest frequency is above the first has no long wave; above the second a ship may be
 beyond its roll period, where it rolls against the slope. [rad/s]"""
+
+
+class LongWave(NamedTuple):
+    """A motion that goes with the water in the longest wave of a file."""
+
+    motion: str
+    """A name of `MOTIONS`."""
+    heading_deg: float
+    water: complex
+    """Phase of the water's motion."""
+    seen_above: float
+    """Size of the motion above which its phase counts. [m/m], [rad/m]"""
+    below: float
+    """Frequency below which the wave is long. [rad/s]"""
+
+
 LONG_WAVES = (
-    *((0, 0.0, -1j, 0.2, LONGEST), (1, 90.0, -1j, 0.2, LONGEST)),
-    *((3, 90.0, -1j, 0.0, ROLLS), (4, 0.0, 1j, 0.0, LONGEST)),
+    LongWave("surge", 0.0, -1j, 0.2, LONGEST),
+    LongWave("sway", 90.0, -1j, 0.2, LONGEST),
+    LongWave("roll", 90.0, -1j, 0.0, ROLLS),
+    LongWave("pitch", 0.0, 1j, 0.0, LONGEST),
 )
-"""Motions that go with the water in the longest wave of a file: which, heading [deg], the water's
-phase, what it must exceed to be seen, and the frequency below which the wave is long. [rad/s]"""
 HEAVES = 0.3
 """Largest distance of heave from 1 in the longest wave of a file, which the wave's crest lifts."""
 STEEPEST = 2.0
@@ -89,24 +106,29 @@ class Hull:
     def response(self, omega: Array, heading: Array, speed: float = 0.0) -> Complex:
         """Complex amplitudes of six motions, (6, n); as `TransferFunctions.response`."""
         L, B, T = self.length, self.beam, self.draught
-        k, c = omega**2 / GRAVITY, np.cos(heading)
-        met = omega - k * speed * c
-        alpha = met / omega
+        k = omega**2 / GRAVITY
+        c = np.cos(heading)
+        encounter = omega - k * speed * c
+        alpha = encounter / omega
         along = np.maximum(np.abs(k * c), 1e-9)
         sigma = 0.5 * along * L
         A = 2.0 * np.sin(0.5 * k * B * alpha**2) * np.exp(-k * T * alpha**2)
         f = np.sqrt((1.0 - k * T) ** 2 + (A**2 / (k * B * alpha**3)) ** 2)
         resonance = np.sqrt((1.0 - 2.0 * k * T * alpha**2) ** 2 + (A**2 / (k * B * alpha**2)) ** 2)
-        force, ratio = np.exp(-along * T) * f / resonance, np.sinc(sigma / pi)
-        # (sin σ/σ - cos σ)/σ loses its digits where σ is small
+        force = np.exp(-along * T) * f / resonance
+        ratio = np.sinc(sigma / pi)
+        # (sin σ/σ - cos σ)/σ loses its digits if σ is small
         slope = np.where(sigma < 1e-3, sigma / 3.0, (ratio - np.cos(sigma)) / sigma)
         pitch = force * 6.0 / L * slope
         carried = np.exp(-0.5 * k * T) * np.sinc(0.5 * k * np.abs(c) * L / pi)
-        own = 2.0 * pi / self.roll_period
-        resonant = own**2 / (own**2 - met**2 + 2j * self.roll_damping * own * met)
+        natural = 2.0 * pi / self.roll_period
+        damped = 2j * self.roll_damping * natural * encounter
+        roll_resonance = natural**2 / (natural**2 - encounter**2 + damped)
+        surge = -1j * c * carried
         sway = -1j * np.sin(heading) * carried
-        surge, turn = -1j * c * carried, 1j * np.sign(c) * pitch
-        return np.stack([surge, sway, force * ratio + 0j, k * sway * resonant, turn, 0j * k])
+        heave = force * ratio + 0j
+        roll = k * sway * roll_resonance
+        return np.stack([surge, sway, heave, roll, 1j * np.sign(c) * pitch, 0j * k])
 
 
 CRANE_SHIP = Hull(203.8, 23.2, 9.75)
@@ -141,23 +163,16 @@ class TransferFunctions(Result):
     def __post_init__(self) -> None:
         if self.frequencies[0] >= LONGEST:
             return
-        longest, wrong = self.values[0, :, 0], "convert the file."
+        longest = self.values[0, :, 0]
         heave = longest[:, 2]
         if np.abs(heave - 1.0).max() > HEAVES:
             raise InputError(
                 f"{self.name}: in the longest wave heave is {complex(heave[0]):.2f} for each "
-                f"metre, but must be near 1 + 0i, as with the phase to the crest and z up: {wrong}"
+                f"metre, but must be near 1 + 0i, as with the phase to the crest and z up: "
+                "convert the file."
             )
-        for motion, angle, water, seen, below in LONG_WAVES:
-            there = np.abs(np.degrees(self.headings) - angle) < 1e-4
-            for found in longest[there & (self.frequencies[0] < below), motion].tolist():
-                if (found * np.conj(water)).real < 0.0 and abs(found) > seen:
-                    raise InputError(
-                        f"{self.name}: in the longest wave of {angle:g} deg {MOTIONS[motion]} is "
-                        f"{found:.3g} for each metre, but must go with the water, {water:g} times "
-                        f"what it is: axes, headings or phases are counted otherwise; {wrong}"
-                    )
-
+        for wave in LONG_WAVES:
+            self._check_long_wave(wave)
         slope = self.frequencies[0] ** 2 / GRAVITY
         pitch = float(np.abs(longest[self.headings < 1e-4, 4]).max(initial=0.0))
         if pitch > STEEPEST * slope:
@@ -166,6 +181,22 @@ class TransferFunctions(Result):
                 f"{pitch:.3g} for each metre, but the wave's slope is {slope:.3g} rad: rotations "
                 "must be in rad for each metre of wave, frequencies in rad/s."
             )
+
+    def _check_long_wave(self, wave: LongWave) -> None:
+        """Refuse a motion that does not go with the water."""
+        if not self.frequencies[0] < wave.below:
+            return
+        at_heading = np.abs(np.degrees(self.headings) - wave.heading_deg) < 1e-4
+        amplitudes = self.values[0, at_heading, 0, MOTIONS.index(wave.motion)]
+        for amplitude in amplitudes.tolist():
+            against = (amplitude * np.conj(wave.water)).real < 0.0
+            if against and abs(amplitude) > wave.seen_above:
+                raise InputError(
+                    f"{self.name}: in the longest wave of {wave.heading_deg:g} deg {wave.motion} "
+                    f"is {amplitude:.3g} for each metre, but must go with the water, "
+                    f"{wave.water:g} times what it is: axes, headings or phases are counted "
+                    "otherwise; convert the file."
+                )
 
     def response(self, omega: Array, heading: Array, speed: float = 0.0) -> Complex:
         """Complex amplitudes of the six motions for each metre of wave, (6, n).
@@ -180,7 +211,7 @@ class TransferFunctions(Result):
                 f"{self.name} has speeds from {low:g} to {high:g} m/s, but {speed:g} m/s is asked "
                 "for."
             )
-        made = np.zeros((6, omega.size), dtype=np.complex128)
+        response = np.zeros((6, omega.size), dtype=np.complex128)
         folded = np.arccos(np.clip(np.cos(heading), -1.0, 1.0))
         aside = np.degrees(np.abs(folded - self.headings[0]).max(initial=0.0))
         if self.headings.size == 1 and aside > ASIDE:
@@ -191,16 +222,16 @@ class TransferFunctions(Result):
         for v, weight_v in _weights(self.speeds, np.array([speed])):
             for m, weight_m in _weights(self.headings, folded):
                 for f, weight_f in _weights(self.frequencies, omega):
-                    made += self.values[v, m, f].T * (weight_v * weight_m * weight_f)
-        return made * np.where(np.sin(heading) < 0.0, MIRRORED[:, None], 1.0)
+                    response += self.values[v, m, f].T * (weight_v * weight_m * weight_f)
+        return response * np.where(np.sin(heading) < 0.0, MIRRORED[:, None], 1.0)
 
 
 def _weights(grid: Array, at: Array) -> Iterator[tuple[NDArray[np.int64], Array]]:
     """Indices and weights of the two neighbours of each value, held at the grid's ends."""
-    place = np.interp(at, grid, np.arange(grid.size))
-    below = np.minimum(place.astype(np.int64), max(grid.size - 2, 0))
-    yield below, 1.0 - (place - below)
-    yield np.minimum(below + 1, grid.size - 1), place - below
+    position = np.interp(at, grid, np.arange(grid.size))
+    below = np.minimum(position.astype(np.int64), max(grid.size - 2, 0))
+    yield below, 1.0 - (position - below)
+    yield np.minimum(below + 1, grid.size - 1), position - below
 
 
 # --- files ----------------------------------------------------------------------------------------
@@ -261,7 +292,7 @@ def read_ship(path: str | Path, length: float | None = None) -> TransferFunction
         ``.re1`` of VERES; ``.4`` of WAMIT, displacements; ``.nc`` of Capytaine, in netCDF 4: the
         array ``RAO`` that ``capytaine.post_pro.rao`` gives, stored by ``separate_complex_values``;
         or ``.csv``, a table in this module's convention with columns ``heading_deg``, ``omega``
-        [rad/s], ``surge_re``, ``surge_im`` and so on [m/m], [rad/m], and where it likes ``speed``
+        [rad/s], ``surge_re``, ``surge_im`` and so on [m/m], [rad/m], and optionally ``speed``
         [m/s]. Waves from beyond 180 deg are taken as those from the other side, by symmetry.
     length : float, optional
         WAMIT's ULEN, by which rotations of a ``.4`` are made dimensionless, 0.01 to 10 000. [m]
@@ -269,9 +300,9 @@ def read_ship(path: str | Path, length: float | None = None) -> TransferFunction
     Raises
     ------
     FileError
-        If a line is none of such a file, a number is not plausible (`RANGES`), or a motion is
-        missing; the sentence says where. A ``.nc`` is read in a process of its own, which a damaged
-        file cannot hang.
+        If a line does not belong to such a file, a number is not plausible (`RANGES`), or a motion
+        is missing; the sentence says where. A ``.nc`` is read in a process of its own, which a
+        damaged file cannot hang.
     InputError
         For another ending, a length that is missing or that no other file takes, and another
         convention of axes, headings or phases.
@@ -316,9 +347,12 @@ def _is_plausible(name: str, value: float) -> bool:
     return isfinite(value) and low <= value <= high and (kind not in WHOLE or value.is_integer())
 
 
-def _numbers(path: str | Path, line: int, words: Sequence[str | None], wanted: str) -> list[float]:
-    """Plausible numbers of a line, as many as are wanted, joined by commas."""
-    names, numbers = wanted.split(", "), list[float]()
+def _numbers(
+    path: str | Path, line: int, words: Sequence[str | None], required: str
+) -> list[float]:
+    """Plausible numbers of a line, by their names, which are joined by commas."""
+    names = required.split(", ")
+    numbers = list[float]()
     for name, word in zip(names, [*words, *([None] * len(names))], strict=False):
         try:
             # Python reads 1_000 as a number, no other program does
@@ -328,7 +362,7 @@ def _numbers(path: str | Path, line: int, words: Sequence[str | None], wanted: s
         if not _is_plausible(name, number):
             raise FileError(
                 f"{path}, line {line}: {name} is {'missing' if word is None else repr(word)}, but "
-                f"must be {_expected(name)}; needed are {wanted}: the file is cut or another one."
+                f"must be {_expected(name)}; needed are {required}: the file is cut or another one."
             )
         numbers.append(number)
     return numbers
@@ -342,14 +376,14 @@ def _veres_rows(path: str | Path) -> Iterator[Amplitude]:
     lines = read_text(path).splitlines()
     if len(lines) < 11 or "VERES" not in lines[0]:
         raise FileError(
-            f"{path} is no VERES file of motion transfer functions: its first line differs."
+            f"{path} is not a VERES file of motion transfer functions: its first line differs."
         )
     rows = count(10)
 
-    def following(wanted: str) -> list[float]:
+    def following(required: str) -> list[float]:
         row = next(rows)
         words = lines[row - 1].split() if row <= len(lines) else []
-        return _numbers(path, row, words, wanted)
+        return _numbers(path, row, words, required)
 
     speeds, headings, frequencies, _ = map(int, following("speeds, headings, frequencies, motions"))
     for _ in range(speeds):
@@ -368,12 +402,12 @@ def _wamit(path: str | Path) -> Amplitudes:
 
 
 def _wamit_rows(path: str | Path) -> Iterator[Amplitude]:
-    wanted = "period, heading, motion, modulus, phase, real part, imaginary part"
+    required = "period, heading, motion, modulus, phase, real part, imaginary part"
     for row, line in enumerate(read_text(path).splitlines(), 1):
         words = line.split()
         if row == 1 and words and not words[0][-1].isdigit():
             continue  # names of columns
-        period, heading, motion, _, _, real, imaginary = _numbers(path, row, words, wanted)
+        period, heading, motion, _, _, real, imaginary = _numbers(path, row, words, required)
         yield 0.0, heading, 2.0 * pi / period, int(motion), complex(real, imaginary)
 
 
@@ -383,12 +417,12 @@ def _csv(path: str | Path) -> Amplitudes:
 
 def _csv_rows(path: str | Path) -> Iterator[Amplitude]:
     parts = ", ".join(f"{motion}_{part}" for motion in MOTIONS for part in ("re", "im"))
-    wanted = f"speed, heading_deg, omega, {parts}"
+    required = f"speed, heading_deg, omega, {parts}"
     table = csv.DictReader(read_text(path).splitlines())
     try:
         for cells in table:
-            words = [{"speed": "0", **cells}.get(name) for name in wanted.split(", ")]
-            speed, heading, omega, *values = _numbers(path, table.line_num, words, wanted)
+            words = [{"speed": "0", **cells}.get(name) for name in required.split(", ")]
+            speed, heading, omega, *values = _numbers(path, table.line_num, words, required)
             pairs = zip(values[::2], values[1::2], strict=True)
             for motion, (real, imaginary) in enumerate(pairs, 1):
                 yield speed, heading, omega, motion, complex(real, imaginary)
@@ -434,28 +468,32 @@ def _gathered(path: str | Path, rows: Amplitudes, length: float) -> TransferFunc
     speeds, v = np.unique(rows["speed"], return_inverse=True)
     headings, m = np.unique(np.minimum(angle, 360.0 - angle), return_inverse=True)
     omega, f = np.unique(rows["frequency"], return_inverse=True)
-    motion, amplitude = rows["motion"] - 1, rows["value"]
+    motion = rows["motion"] - 1
+    amplitude = rows["value"]
     at = np.stack([v, m, f, motion])
     shape = (speeds.size, headings.size, omega.size, len(MOTIONS))
     # a table of all of them could be far larger than the file
     present = np.unique(np.ravel_multi_index(tuple(at), shape))
     if present.size < prod(shape):
         off = np.flatnonzero(present != np.arange(present.size))
-        _, i, j, lacks = np.unravel_index(off[0] if off.size else present.size, shape)
+        first = off[0] if off.size else present.size
+        _, i, j, missing = np.unravel_index(first, shape)
         raise FileError(
-            f"{path}: there is no {MOTIONS[lacks]} for {omega[j]:g} rad/s and {headings[i]:g} deg; "
-            f"the file is cut, or its waves are on no grid: it has {present.size} of the "
+            f"{path}: there is no {MOTIONS[missing]} for {omega[j]:g} rad/s and {headings[i]:g} "
+            f"deg; the file is cut, or its waves are on no grid: it has {present.size} of the "
             f"{prod(shape)} amplitudes of {headings.size} headings and {omega.size} frequencies."
         )
     values = np.full(shape, np.nan, dtype=np.complex128)
-    # the other side, which follows by symmetry, where this one lacks it
-    other = angle > 180.0
-    values[*at[:, other]] = MIRRORED[motion[other]] * amplitude[other]
-    own, given = at[:, ~other], amplitude[~other]
-    values[*own] = given
-    twice = np.abs(values[*own] - given) > 1e-3 * np.maximum(np.abs(given), 1e-3)
+    # waves from the other side count, by symmetry, if this side lacks them
+    other_side = angle > 180.0
+    values[*at[:, other_side]] = MIRRORED[motion[other_side]] * amplitude[other_side]
+    at_this_side = at[:, ~other_side]
+    this_side = amplitude[~other_side]
+    values[*at_this_side] = this_side
+    difference = np.abs(values[*at_this_side] - this_side)
+    twice = difference > 1e-3 * np.maximum(np.abs(this_side), 1e-3)
     if twice.any():
-        _, i, j, which = own[:, twice][:, 0]
+        _, i, j, which = at_this_side[:, twice][:, 0]
         raise FileError(
             f"{path}: motion {which + 1} in waves of {omega[j]:g} rad/s and {headings[i]:g} deg is "
             "there twice, with other values."

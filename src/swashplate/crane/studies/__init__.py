@@ -1,1 +1,1 @@
-"""Studies of a crane: many runs or a spectrum, and the judgment that follows from them."""
+"""Studies of a crane: many runs or a spectrum, and the assessment that follows from them."""

@@ -1,8 +1,9 @@
-"""What the answer on a crane hangs on: the number that, if it were another, would turn it.
+"""What the answer on a crane rests on: numbers that would turn it, if they had another value.
 
 Roll period, damping of the load, height, period and peak of the sea, its heading, the luff's drum:
-each is moved alone to both ends of what is plausible, and the answer asked again, shortly. Swing
-without control comes from the frequency domain, with control from a few simulated seaways.
+each alone is set to both ends of what is plausible, and the answer is computed again from short
+runs. Swing without control comes from the frequency domain, with control from a few simulated
+seaways.
 """
 
 from __future__ import annotations
@@ -13,40 +14,42 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swashplate.crane.closed_loop.stick import Stick
+from swashplate.crane.closed_loop.operator_command import OperatorCommand
 from swashplate.crane.crane import Crane
 from swashplate.crane.sea.extremes import largest_of_peaks
 from swashplate.crane.sea.seaway import Seaway
 from swashplate.crane.sea.transfer_functions import Hull
-from swashplate.crane.studies.outcome import Outcome
+from swashplate.crane.studies.run_outcome import RunOutcome
 from swashplate.crane.studies.spectral import linear_response
 from swashplate.crane.studies.study import Case, Study
 from swashplate.errors import SwashplateError
 
-SEAWAYS, LENGTH = 6, 300.0
-"""Seaways of a short answer, and the time for which each counts: half an hour together. [s]"""
+SEAWAYS = 6
+"""Seaways of a short answer."""
+LENGTH = 300.0
+"""Time for which each of them counts: half an hour together. [s]"""
 TIGHT = 0.9
 """Part of a limit, or of the swing without control, from which on a short answer is not sure."""
 DAMPINGS = (0.002, 0.01)
 """Least and largest damping ratio of loads on ropes."""
 PERIOD, ROLL, HEIGHT, DRUM = 0.15, 0.2, 0.25, 0.2
-"""Parts by which the sea's period, the ship's roll period, the height of the waves and the radius
-of a drum are moved: what forecasts, trials without ballast records and type plates leave open."""
+"""Relative changes of the sea's period, the ship's roll period, the height of the waves and the
+radius of a drum: what forecasts, trials without ballast records and type plates leave open."""
 TURNED = 30.0
-"""By which the heading is moved. [deg]"""
+"""Change of the heading. [deg]"""
 PEAKS = (1.0, 3.3)
 """Peak factors of a fully developed and of a young sea."""
 
 
-class Turn(NamedTuple):
+class TippingPoint(NamedTuple):
     """A number that would turn the answer."""
 
     what: str
     """In words: ``"the roll period"``."""
     used: str
-    """What it is, with unit."""
+    """The value that the answer was computed with, with unit."""
     other: str
-    """With what the answer is another one."""
+    """The value with which the answer is another one."""
     assumed: bool
     """Whether it is assumed, not given."""
     passes: bool
@@ -62,7 +65,9 @@ class Turn(NamedTuple):
         )
 
 
-class _Trial(NamedTuple):
+class _ChangedNumber(NamedTuple):
+    """A number with another value, and seaway and variant with that value."""
+
     what: str
     used: str
     other: str
@@ -71,73 +76,138 @@ class _Trial(NamedTuple):
     case: Case
 
 
-def turns_of(study: Study, judged: str, limits: Mapping[str, float]) -> tuple[Turn, ...]:
+def tipping_points_of(
+    study: Study, variant: str, limits: Mapping[str, float]
+) -> tuple[TippingPoint, ...]:
     """Numbers that would turn the answer on a variant; none if short runs do not agree with it.
 
     Parameters
     ----------
     study : Study
-    judged : str
-        The variant.
+    variant : str
+        A name of the study's cases.
     limits : mapping of str to float
         In SI, by name; without them only harm counts.
     """
-    case = study.cases[judged]
+    case = study.cases[variant]
     if case.stick.samples is not None or case.stick.parts:
         return ()  # what the operator does takes as long as it takes
-    case = case._replace(stick=Stick.rest(study.run_in + LENGTH))
+    case = case._replace(stick=OperatorCommand.rest(study.run_in + LENGTH))
     short = replace(study, seeds=study.seeds[:SEAWAYS], progress=None)
     base = _passes(short, study.seaway, case, limits)
-    turns = []
-    for trial in _trials(study, case):
+    tipping_points = []
+    for changed in _changed_numbers(study, case):
         try:
-            passes = _passes(short, trial.seaway, trial.case, limits)
-        except SwashplateError:  # a number that this sea, ship or crane cannot have
+            passes = _passes(short, changed.seaway, changed.case, limits)
+        except SwashplateError:  # a value that this sea, ship or crane cannot have
             continue
         if passes is not base and passes is not None and base is not None:
-            turns.append(Turn(trial.what, trial.used, trial.other, trial.assumed, passes))
-    return tuple(turns)
+            point = TippingPoint(
+                what=changed.what,
+                used=changed.used,
+                other=changed.other,
+                assumed=changed.assumed,
+                passes=passes,
+            )
+            tipping_points.append(point)
+    return tuple(tipping_points)
 
 
-def _trials(study: Study, case: Case) -> Iterator[_Trial]:
-    seaway, crane = study.seaway, study.crane
-    spectrum, ship = seaway.spectrum, seaway.ship
-    if isinstance(ship, Hull):
-        used = f"{ship.roll_period:.3g} s"
-        for factor in (1.0 - ROLL, 1.0 + ROLL):
-            other = replace(ship, roll_period=factor * ship.roll_period)
-            moved = replace(seaway, ship=other)
-            text = f"{other.roll_period:.3g} s"
-            yield _Trial("the ship's roll period", used, text, True, moved, case)
-    used = f"{100.0 * case.swing_damping:.3g} %"
-    assumed = "swing_damping" not in case.hangs and _assumed(crane, "swing_damping")
+def _changed_numbers(study: Study, case: Case) -> Iterator[_ChangedNumber]:
+    yield from _other_ships(study, case)
+    yield from _other_dampings(study, case)
+    yield from _other_seas(study, case)
+    yield from _other_drums(study, case)
+
+
+def _other_ships(study: Study, case: Case) -> Iterator[_ChangedNumber]:
+    ship = study.seaway.ship
+    if not isinstance(ship, Hull):
+        return
+    for factor in (1.0 - ROLL, 1.0 + ROLL):
+        other = replace(ship, roll_period=factor * ship.roll_period)
+        yield _ChangedNumber(
+            what="the ship's roll period",
+            used=f"{ship.roll_period:.3g} s",
+            other=f"{other.roll_period:.3g} s",
+            assumed=True,
+            seaway=replace(study.seaway, ship=other),
+            case=case,
+        )
+
+
+def _other_dampings(study: Study, case: Case) -> Iterator[_ChangedNumber]:
     for ratio in DAMPINGS:
-        words = "a damping of the swing", used, f"{100.0 * ratio:.3g} %"
-        yield _Trial(*words, assumed, seaway, case.changed(swing_damping=ratio))
+        yield _ChangedNumber(
+            what="a damping of the swing",
+            used=f"{100.0 * case.swing_damping:.3g} %",
+            other=f"{100.0 * ratio:.3g} %",
+            assumed="swing_damping" not in case.hangs and _assumed(study.crane, "swing_damping"),
+            seaway=study.seaway,
+            case=case.changed(swing_damping=ratio),
+        )
+
+
+def _other_seas(study: Study, case: Case) -> Iterator[_ChangedNumber]:
+    seaway = study.seaway
+    spectrum = seaway.spectrum
     for factor in (1.0 - HEIGHT, 1.0 + HEIGHT):
-        other_sea = replace(spectrum, height=factor * spectrum.height)
-        words = "waves", f"{spectrum.height:.3g} m", f"{other_sea.height:.3g} m"
-        yield _Trial(*words, False, replace(seaway, sea=other_sea), case)
+        sea = replace(spectrum, height=factor * spectrum.height)
+        yield _ChangedNumber(
+            what="waves",
+            used=f"{spectrum.height:.3g} m",
+            other=f"{sea.height:.3g} m",
+            assumed=False,
+            seaway=replace(seaway, sea=sea),
+            case=case,
+        )
     for factor in (1.0 - PERIOD, 1.0 + PERIOD):
-        other_sea = replace(spectrum, period=factor * spectrum.period)
-        words = "a peak period", f"{spectrum.period:.3g} s", f"{other_sea.period:.3g} s"
-        yield _Trial(*words, False, replace(seaway, sea=other_sea), case)
+        sea = replace(spectrum, period=factor * spectrum.period)
+        yield _ChangedNumber(
+            what="a peak period",
+            used=f"{spectrum.period:.3g} s",
+            other=f"{sea.period:.3g} s",
+            assumed=False,
+            seaway=replace(seaway, sea=sea),
+            case=case,
+        )
     for peak in PEAKS:
         if peak != spectrum.peak_factor:
-            other_sea = replace(spectrum, peak_factor=peak)
-            words = "a peak factor", f"{spectrum.peak_factor:g}", f"{peak:g}"
-            yield _Trial(*words, True, replace(seaway, sea=other_sea), case)
+            yield _ChangedNumber(
+                what="a peak factor",
+                used=f"{spectrum.peak_factor:g}",
+                other=f"{peak:g}",
+                assumed=True,
+                seaway=replace(seaway, sea=replace(spectrum, peak_factor=peak)),
+                case=case,
+            )
     for turn in (-TURNED, TURNED):
-        moved = replace(seaway, heading_deg=seaway.heading_deg + turn)
-        words = "a heading", f"{seaway.heading_deg:g} deg", f"{moved.heading_deg:g} deg"
-        yield _Trial(*words, False, moved, case)
-    drum = crane.quantities["luff_drum_radius"]
-    if _assumed(crane, "luff_drum_radius"):
-        for factor in (1.0 - DRUM, 1.0 + DRUM):
-            radius = factor * drum.values[0]
-            cranes = tuple(each.with_geometry(luff_drum_radius=radius) for each in case.cranes)
-            words = "a luff drum's radius", f"{drum.values[0]:.3g} m", f"{radius:.3g} m"
-            yield _Trial(*words, True, seaway, case._replace(cranes=cranes))
+        turned = replace(seaway, heading_deg=seaway.heading_deg + turn)
+        yield _ChangedNumber(
+            what="a heading",
+            used=f"{seaway.heading_deg:g} deg",
+            other=f"{turned.heading_deg:g} deg",
+            assumed=False,
+            seaway=turned,
+            case=case,
+        )
+
+
+def _other_drums(study: Study, case: Case) -> Iterator[_ChangedNumber]:
+    if not _assumed(study.crane, "luff_drum_radius"):
+        return
+    used = study.crane.quantities["luff_drum_radius"].values[0]
+    for factor in (1.0 - DRUM, 1.0 + DRUM):
+        radius = factor * used
+        cranes = tuple(crane.with_geometry(luff_drum_radius=radius) for crane in case.cranes)
+        yield _ChangedNumber(
+            what="a luff drum's radius",
+            used=f"{used:.3g} m",
+            other=f"{radius:.3g} m",
+            assumed=True,
+            seaway=study.seaway,
+            case=case._replace(cranes=cranes),
+        )
 
 
 def _assumed(crane: Crane, name: str) -> bool:
@@ -145,26 +215,26 @@ def _assumed(crane: Crane, name: str) -> bool:
 
 
 def _passes(study: Study, seaway: Seaway, case: Case, limits: Mapping[str, float]) -> bool | None:
-    """Whether control passes, shortly; None if it is too close to say."""
-    found = [outcome for (outcome,) in replace(study, seaway=seaway).outcomes([case])]
-    if any(outcome.left for outcome in found):
+    """Whether control passes in short runs; None if it is too close to say."""
+    outcomes = [outcome for (outcome,) in replace(study, seaway=seaway).outcomes([case])]
+    if any(outcome.departure_reason for outcome in outcomes):
         return False
-    ratios = [_over_none(seaway, case, found)]
-    observed = sum(outcome.counted for outcome in found)
+    ratios = [_over_none(seaway, case, outcomes)]
+    observed = sum(outcome.counted for outcome in outcomes)
     for name, limit in limits.items():
         if name == "saturation":
-            ratios.append(float(np.mean([outcome.saturation for outcome in found])) / limit)
-        elif all(name in outcome.peaks for outcome in found):
-            runs = [outcome.peaks[name] for outcome in found]
-            ratios.append(largest_of_peaks(runs, observed).value / limit)
+            ratios.append(float(np.mean([outcome.saturation for outcome in outcomes])) / limit)
+        elif all(name in outcome.peaks for outcome in outcomes):
+            peaks = [outcome.peaks[name] for outcome in outcomes]
+            ratios.append(largest_of_peaks(peaks, observed).value / limit)
     worst = max(ratios)
     if TIGHT < worst < 1.0 / TIGHT:
         return None
     return worst <= 1.0
 
 
-def _over_none(seaway: Seaway, case: Case, found: list[Outcome]) -> float:
+def _over_none(seaway: Seaway, case: Case, outcomes: list[RunOutcome]) -> float:
     """Root mean square swing over that without control."""
     linear = linear_response(case.cranes[0], seaway, **case.pose, **case.hangs)
-    own = np.sqrt(np.mean([outcome.rms_swing**2 for outcome in found]))
-    return float(own / linear.values["swing"].rms)
+    controlled = np.sqrt(np.mean([outcome.rms_swing**2 for outcome in outcomes]))
+    return float(controlled / linear.values["swing"].rms)

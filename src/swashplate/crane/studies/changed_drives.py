@@ -18,24 +18,24 @@ if TYPE_CHECKING:
     from swashplate.analysis.monte_carlo import Draws
 
 
-def upgraded(crane: Crane, axis: str, levers: Mapping[str, float]) -> Crane:
-    """The crane with levers moved on the drive of an axis, which the controller knows.
+def with_design_change(crane: Crane, axis: str, factors: Mapping[str, float]) -> Crane:
+    """The crane with a redesigned drive of an axis, which the controller knows.
 
     Parameters
     ----------
     crane : Crane
-        If its controller counts on another drive of that axis, they are moved on that, too.
+        If its controller counts on another drive of that axis, that one is redesigned, too.
     axis : {"hoist", "slew", "luff"}
         The axis.
-    levers : mapping of str to float
-        Factors by lever or parameter, as of `swashplate.analysis.whatif`.
+    factors : mapping of str to float
+        Factors by design variable or parameter, as of `swashplate.analysis.whatif`.
     """
     known_to_controller = dict(crane.known_to_controller)
     if axis in known_to_controller:
-        known_to_controller[axis] = with_factors(known_to_controller[axis], levers)
-    # the verdict stays that of what was changed, draws do not
+        known_to_controller[axis] = with_factors(known_to_controller[axis], factors)
+    # the verdict stays that of the drive that was redesigned; draws do not
     sources = _without_draws(crane.sources, (axis,))
-    drive: dict[str, Any] = {axis: with_factors(getattr(crane, axis), levers)}
+    drive: dict[str, Any] = {axis: with_factors(getattr(crane, axis), factors)}
     return replace(crane, known_to_controller=known_to_controller, sources=sources, **drive)
 
 
@@ -81,7 +81,8 @@ def drawn_cranes(crane: Crane, **draws: Draws) -> tuple[Crane, ...]:
     cranes = list[Crane]()
     for combination in zip(*shuffled.values(), strict=False):
         drives = dict(zip(shuffled, combination, strict=True))
-        cranes.append(replace(crane.with_drive(known=False, **drives), sources=sources))
+        drawn = crane.with_drive(known_to_controller=False, **drives)
+        cranes.append(replace(drawn, sources=sources))
     return tuple(cranes)
 
 

@@ -52,14 +52,14 @@ class Followable(Drawn):
 
     def tables(self) -> list[Table]:
         """Amplitudes over the period, and what seas ask for."""
-        heads = [Column("period", ".1f", "s"), *(Column(each, ".3f", "m") for each in AXES)]
-        made = Table("Largest sine an axis can follow", heads)
+        heads = [Column("period", ".1f", "s"), *(Column(axis, ".3f", "m") for axis in AXES)]
+        largest = Table("Largest sine an axis can follow", heads)
         for period, amplitudes in zip(self.periods.tolist(), self.amplitude.tolist(), strict=True):
-            made.add(period, *amplitudes)
-        asked = Table("What seas ask, significant amplitudes", [Column("sea"), *heads])
-        for name, each in self.seas.items():
-            asked.add(name, each.period, *each.amplitude)
-        return [made, asked]
+            largest.add(period, *amplitudes)
+        demands = Table("What seas ask, significant amplitudes", [Column("sea"), *heads])
+        for name, demand in self.seas.items():
+            demands.add(name, demand.period, *demand.amplitude)
+        return [largest, demands]
 
 
 def follow(
@@ -82,7 +82,8 @@ def follow(
     times = np.atleast_1d(np.asarray(periods, dtype=np.float64))
     if not (((times > 0.0) & (times <= SLOWEST)).all() and times.size):
         raise InputError(f"Periods to follow must be above 0 s and at most {SLOWEST:g} s.")
-    g, home = crane.geometry, crane.home(slew_deg, boom_deg, rope_m)
+    g = crane.geometry
+    home = crane.home(slew_deg, boom_deg, rope_m)
     boom = boom_at(0.0, g, home)
     rates = (g.hoist, g.foot + g.boom * boom.cos, float(reach_rate(boom, g)))
     amplitude = np.zeros((times.size, 3))
@@ -98,7 +99,7 @@ def follow(
     forward, port, up = tip_motion(base.response(omega, heading), arm)
     c, s = cos(home.slew), sin(home.slew)
     powers = np.abs([up, s * forward + c * port, c * forward - s * port]) ** 2
-    asked = {}
+    demands = {}
     for sea in seas:
         of_sea = replace(base, sea=sea)
         variances = powers * of_sea.bins.variance
@@ -106,5 +107,5 @@ def follow(
         second = float((variances[2] * base.encounter(omega, heading) ** 2).sum())
         height, across, along = (2.0 * np.sqrt(zeroth)).tolist()
         period = 2.0 * pi * float(np.sqrt(zeroth[2] / second))
-        asked[of_sea.title] = Demand(period, (height, across, along))
-    return Followable(times, amplitude, asked, crane, boom_deg)
+        demands[of_sea.title] = Demand(period, (height, across, along))
+    return Followable(times, amplitude, demands, crane, boom_deg)

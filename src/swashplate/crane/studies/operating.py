@@ -1,10 +1,10 @@
 """Operability: the share of a year that can be worked, and what limits it, sea by sea.
 
-A scatter diagram says how often each significant height comes with each peak period. Of each of its
-cells and each heading the frequency domain says at once what is linear: the crane without control,
-and with control as long as no drive is at a limit. Where that is near a limit, or asks of a drive
-what it cannot do, the cell is simulated. At one period and heading what is beyond a limit stays so
-in higher waves, so that only the boundary is looked for.
+A scatter diagram says how often each significant height comes with each peak period. For each of
+its cells and each heading the frequency domain gives what is linear: the crane without control, and
+with control as long as no drive is at a limit. A cell is simulated if that is near a limit, or asks
+of a drive what it cannot do. At one period and heading, what is beyond a limit stays beyond it in
+higher waves, so that only the boundary is looked for.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from swashplate.crane.limits import LIMITED
 from swashplate.crane.sea.extremes import largest_of_peaks
 from swashplate.crane.sea.scatter import Scatter
 from swashplate.crane.sea.seaway import Seaway, Spectrum
-from swashplate.crane.studies.outcome import Outcome
+from swashplate.crane.studies.run_outcome import RunOutcome
 from swashplate.crane.studies.spectral import DEMANDS, linear_response
 from swashplate.crane.studies.study import BUILT, IDEAL, NONE, Case, Drives, Study, assumed_words
 from swashplate.drive import Limit
@@ -44,7 +44,7 @@ Array = NDArray[np.float64]
 HEADINGS = tuple(range(0, 360, 45))
 """Headings of the waves by default, as likely as each other. [deg]"""
 NEAR = 1.3
-"""Factor within which of a limit the frequency domain is not relied on."""
+"""Factor on a limit, and from it, within which the frequency domain is not relied on."""
 SEEDS = (0, 1)
 """Seaways in which a cell is simulated, ten minutes each."""
 SHORTEST = 300.0
@@ -62,15 +62,16 @@ DRIVES_LIMITS: Mapping[Limit, str] = {
 }
 
 
-class Cell(NamedTuple):
+class SeaCell(NamedTuple):
     """A sea of one height, period and heading, for one variant."""
 
     limited_by: str
-    """Quantity of `LIMITED`, or drive and its limit, ``"luff orifice"``; empty if workable."""
+    """A name of `LIMITED`, or drive and its limit, ``"luff orifice"``; empty if workable."""
     ratio: float
-    """Largest ratio of a value to its limit; inf if the run left the model, NaN if it was not asked
-    for, as lower than a sea that is workable."""
+    """Largest ratio of a value to its limit; inf if the run left the model; NaN if it was not
+    computed, as a higher sea is workable."""
     simulated: bool
+    """Whether it was simulated, or follows from a cell that was."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +83,7 @@ class Operability(Tabular):
     scatter: Scatter
     headings: tuple[float, ...]
     """[deg]"""
-    cells: Mapping[str, Mapping[tuple[int, float], Cell]] = field(repr=False)
+    cells: Mapping[str, Mapping[tuple[int, float], SeaCell]] = field(repr=False)
     """By variant, and by row of the scatter diagram and heading."""
     seaway: Seaway
     """Ship, peak factor, spreading."""
@@ -184,7 +185,7 @@ def operability(
     drives: Drives = (IDEAL, BUILT),
     sea: Seaway | None = None,
     executor: Executor | None = None,
-    **setup: Any,
+    **options: Any,
 ) -> Operability:
     """Share of a year that a crane can work with control, by its limits.
 
@@ -199,12 +200,12 @@ def operability(
     headings : sequence of float
         Of the waves, as likely as each other. [deg]
     drives
-        As of `judge`.
+        As of `assess`.
     sea : Seaway, optional
         Ship, peak factor, spreading, speed; its height, period and heading do not count.
     executor : Executor, optional
         Threads by default; the numbers do not depend on it.
-    **setup
+    **options
         As of `Study.of`, without a stick.
 
     Raises
@@ -221,7 +222,7 @@ def operability(
     if not headings:
         raise InputError("Operability needs one heading of the waves at least.")
     base = Seaway() if sea is None else sea
-    study = Study.of(crane, control, sea=base, drives=drives, **{"seeds": SEEDS, **setup})
+    study = Study.of(crane, control, sea=base, drives=drives, **{"seeds": SEEDS, **options})
     if study.length < SHORTEST:
         raise InputError(
             f"A sea is simulated for {study.length:g} s, but its largest values in three hours "
@@ -236,14 +237,15 @@ def operability(
         for period in dict.fromkeys(scatter.period.tolist())
     ]
     work = (study, scatter, limits)
-    cells: dict[str, dict[tuple[int, float], Cell]] = {name: {} for name in study.cases}
+    cells: dict[str, dict[tuple[int, float], SeaCell]] = {name: {} for name in study.cases}
     hoist = (np.inf, np.nan, np.nan)
     runs = (executor or Threads()).run(_of_column, work, columns)
-    for position, (found, too_slow) in counted(
+    for position, (column_cells, too_slow) in counted(
         runs, len(columns), "columns", f"Operability of {crane.name}"
     ):
         column = columns[position]
-        cells[column.variant] |= {(row, column.heading): cell for row, cell in found.items()}
+        for row, cell in column_cells.items():
+            cells[column.variant][row, column.heading] = cell
         if too_slow < hoist[0] and column.variant == NONE:
             hoist = (too_slow, column.period, column.heading)
     ordered = {name: dict(sorted(of_name.items())) for name, of_name in cells.items()}
@@ -251,7 +253,14 @@ def operability(
     simulated = f"A cell is simulated in {seaways} of {study.length / 60.0:g} min."
     case = f"{study.cases[list(study.cases)[-1]].words()} {simulated}"
     return Operability(
-        crane, control, scatter, tuple(map(float, headings)), ordered, base, case, hoist
+        crane=crane,
+        control=control,
+        scatter=scatter,
+        headings=tuple(map(float, headings)),
+        cells=ordered,
+        seaway=base,
+        case=case,
+        hoist_limit=hoist,
     )
 
 
@@ -265,7 +274,7 @@ class _Column(NamedTuple):
 
 def _of_column(
     work: tuple[Study, Scatter, Mapping[str, float]], column: _Column
-) -> tuple[dict[int, Cell], float]:
+) -> tuple[dict[int, SeaCell], float]:
     """Cells of a column by their row, and the height from which on the hoist is too slow. [m]"""
     study, scatter, limits = work
     case = study.cases[column.variant]
@@ -280,22 +289,23 @@ def _of_column(
     rows = rows[np.argsort(scatter.height[rows])]
     cells = {int(row): _by_spectrum(float(scatter.height[row]), linear, limits) for row in rows}
 
-    def simulated(row: int) -> Cell:
+    def simulated(row: int) -> SeaCell:
         sea = Spectrum(float(scatter.height[row]), column.period, factor)
         return _by_simulation(study, case, replace(unit, sea=sea), limits)
 
     open_rows = [row for row, cell in cells.items() if cell is None]
-    found = cells | _boundary(open_rows, simulated)
+    complete = cells | _boundary(open_rows, simulated)
     slope = linear.slope["hoist_demand"]
     too_slow = limits.get("hoist_demand", np.inf) / slope if slope > 0.0 else np.inf
-    return {row: cell for row, cell in found.items() if cell is not None}, too_slow
+    return {row: cell for row, cell in complete.items() if cell is not None}, too_slow
 
 
-def _boundary(rows: Sequence[int], simulated: Callable[[int], Cell]) -> dict[int, Cell]:
-    """Cells of rows, the lowest waves first: half of them are decided by each that is simulated."""
-    cells: dict[int, Cell] = {}
-    low, high = 0, len(rows)
-    limiting = Cell(LEFT, np.inf, True)
+def _boundary(rows: Sequence[int], simulated: Callable[[int], SeaCell]) -> dict[int, SeaCell]:
+    """Cells of rows, the lowest waves first: each that is simulated decides half of the others."""
+    cells: dict[int, SeaCell] = {}
+    low = 0
+    high = len(rows)
+    limiting = SeaCell(LEFT, np.inf, True)
     while low < high:
         middle = (low + high) // 2
         cell = simulated(rows[middle])
@@ -303,10 +313,11 @@ def _boundary(rows: Sequence[int], simulated: Callable[[int], Cell]) -> dict[int
         if cell.limited_by == WORKABLE:
             low = middle + 1
         else:
-            high, limiting = middle, cell
+            high = middle
+            limiting = cell
     for position, row in enumerate(rows):
         if row not in cells:
-            cells[row] = Cell(WORKABLE, np.nan, True) if position < low else limiting
+            cells[row] = SeaCell(WORKABLE, np.nan, True) if position < low else limiting
     return cells
 
 
@@ -323,18 +334,18 @@ class _Linear(NamedTuple):
 
 def _linear(case: Case, sea: Seaway, limits: Mapping[str, float]) -> _Linear:
     """The first of a case's cranes in a sea of 1 m, in the frequency domain."""
-    control = case.setup["control"]
+    control = case.options["control"]
     response = linear_response(case.cranes[0], sea, control, **case.pose, **case.hangs)
     values = response.values
     named = {*limits, "hoist_demand"}
     mean = {name: abs(values[name].mean) for name in named}
     slope = {name: values[name].largest - mean[name] for name in named}
-    asked = [name for name in DEMANDS if name in values and (case.driven or name == "clip")]
-    demand = max((values[name].largest for name in asked), default=0.0)
+    demands = [name for name in DEMANDS if name in values and (case.driven or name == "clip")]
+    demand = max((values[name].largest for name in demands), default=0.0)
     return _Linear(slope, mean, demand if control is not None else 0.0)
 
 
-def _by_spectrum(height: float, linear: _Linear, limits: Mapping[str, float]) -> Cell | None:
+def _by_spectrum(height: float, linear: _Linear, limits: Mapping[str, float]) -> SeaCell | None:
     """A cell by the frequency domain; None if it is too near a limit, of a drive as well."""
     ratios = {
         name: (linear.mean[name] + height * linear.slope[name]) / limit
@@ -343,20 +354,22 @@ def _by_spectrum(height: float, linear: _Linear, limits: Mapping[str, float]) ->
     worst = max(ratios, key=lambda name: ratios[name])
     ratio = ratios[worst]
     if linear.demand == 0.0:  # no drive moves
-        return Cell(worst if ratio > 1.0 else WORKABLE, ratio, False)
+        return SeaCell(worst if ratio > 1.0 else WORKABLE, ratio, False)
     if ratio > NEAR:  # drives that are at their limits do not make it better
-        return Cell(worst, ratio, False)
+        return SeaCell(worst, ratio, False)
     if ratio < 1.0 / NEAR and linear.demand * height < 1.0 / NEAR:
-        return Cell(WORKABLE, ratio, False)
+        return SeaCell(WORKABLE, ratio, False)
     return None
 
 
-def _by_simulation(study: Study, case: Case, seaway: Seaway, limits: Mapping[str, float]) -> Cell:
+def _by_simulation(
+    study: Study, case: Case, seaway: Seaway, limits: Mapping[str, float]
+) -> SeaCell:
     """A cell by simulated seaways."""
-    one = replace(study, seaway=seaway, executor=Serial(), progress=None)
-    outcomes = [found for (found,) in one.outcomes([case])]
-    if any(outcome.left for outcome in outcomes):
-        return Cell(_drive_limit(outcomes) or LEFT, np.inf, True)
+    in_sea = replace(study, seaway=seaway, executor=Serial(), progress=None)
+    outcomes = [outcome for (outcome,) in in_sea.outcomes([case])]
+    if any(outcome.departure_reason for outcome in outcomes):
+        return SeaCell(_drive_limit(outcomes) or LEFT, np.inf, True)
     observed = sum(outcome.counted for outcome in outcomes)
     ratios = {
         name: largest_of_peaks([outcome.peaks[name] for outcome in outcomes], observed).value
@@ -366,17 +379,19 @@ def _by_simulation(study: Study, case: Case, seaway: Seaway, limits: Mapping[str
     }
     worst = max(ratios, key=lambda name: ratios[name])
     if ratios[worst] <= 1.0:
-        return Cell(WORKABLE, ratios[worst], True)
-    return Cell(_drive_limit(outcomes) or worst, ratios[worst], True)
+        return SeaCell(WORKABLE, ratios[worst], True)
+    return SeaCell(_drive_limit(outcomes) or worst, ratios[worst], True)
 
 
-def _drive_limit(outcomes: Sequence[Outcome]) -> str:
+def _drive_limit(outcomes: Sequence[RunOutcome]) -> str:
     """Drive and limit that act for the longest time, in words; empty if none acts for long."""
     shares = np.mean([np.nan_to_num(outcome.limits) for outcome in outcomes], axis=0)
-    longest, words = ACTS, ""
+    longest = ACTS
+    words = ""
     for row, axis in zip(shares, AXES, strict=True):
         for limit, name in DRIVES_LIMITS.items():
             share = float(row[PUMPS.index(limit)])
             if share > longest:
-                longest, words = share, f"{axis} {name}"
+                longest = share
+                words = f"{axis} {name}"
     return words

@@ -1,9 +1,9 @@
 """The crane in waves in the frequency domain: exact for small motion, without a simulation.
 
-The ship's transfer functions move the tip, the tip moves the load, a pendulum with its damping; a
-spectrum of waves gives variances of all that is linear in them. Control is linear as long as its
-drives follow at once: delayed feedback and ship compensation. It is the check of every simulated
-crane without control, and the first answer on every sea of a year.
+The ship's transfer functions move the tip; the tip moves the load, a damped pendulum; a spectrum of
+waves gives the variances of all that is linear in them. Control by delayed feedback and ship
+compensation is linear as long as the drives follow instantaneously. The result checks every
+simulated crane without control, and is the first answer on every sea of a year.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ class LinearValue(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class LinearResponse(Result):
-    """What a sea does to a crane whose drives follow at once, and what it asks of them."""
+    """What a sea does to a crane whose drives follow instantaneously, and what it asks of them."""
 
     values: Mapping[str, LinearValue]
     """By names of `limits.LIMITED`, saturation apart, and of `DEMANDS`."""
@@ -70,7 +70,7 @@ class LinearResponse(Result):
 
     def tables(self) -> list[Table]:
         """Root mean square, period and largest value of each quantity."""
-        made = []
+        tables = []
         for unit in ("rad", "m", "m/s", "1"):
             names = [name for name in self.values if _unit(name) == unit]
             spec = ".2f" if unit == "rad" else ".3f"
@@ -82,8 +82,8 @@ class LinearResponse(Result):
             for name in names:
                 value = self.values[name]
                 table.add(name.replace("_", " "), value.rms, value.period, value.largest)
-            made.append(table)
-        return made
+            tables.append(table)
+        return tables
 
 
 def _unit(name: str) -> str:
@@ -95,8 +95,8 @@ class Waves(NamedTuple):
 
     frequency: Array
     heading: Array
-    met: Array
-    """As the ship meets them. [rad/s]"""
+    encounter: Array
+    """Frequency at which the ship meets them. [rad/s]"""
     variance: Array
     """Of the surface. [m²]"""
 
@@ -122,9 +122,9 @@ def linear_response(
     sea : Seaway
         By default sea state 3 abeam on the packaged hull.
     control : Control, optional
-        Delayed feedback and ship compensation of drives that follow at once; a shaper, a position
-        loop and a clip change nothing as long as the operator's stick rests and the clip does not
-        act.
+        Delayed feedback and ship compensation of drives that follow instantaneously; a shaper, a
+        position loop and a clip change nothing as long as the operator's stick rests and the clip
+        does not act.
     slew_deg, boom_deg, rope_m, swing_damping, load, suspension
         As of `simulate`.
     duration : float
@@ -133,8 +133,8 @@ def linear_response(
     Raises
     ------
     InputError
-        For a user's own law, whose transfer function is not known, a damping of 0 without control,
-        for which the swing has no stationary state, and what `Crane.home` refuses.
+        For a user-defined controller, whose transfer function is not known, for a damping of 0
+        without control, with which the swing has no stationary state, and as of `Crane.home`.
 
     Notes
     -----
@@ -144,11 +144,11 @@ def linear_response(
     the waves.
     """
     seaway = Seaway() if sea is None else sea
-    settings, law, _ = stages_of(control)
-    if law is not None:
+    settings, controller, _ = stages_of(control)
+    if controller is not None:
         raise InputError(
-            "The frequency domain knows delayed feedback and ship compensation, not the user's own "
-            f"law {law.model.name}: simulate it."
+            "The frequency domain knows delayed feedback and ship compensation, not the "
+            f"user-defined controller {controller.model.name}: simulate it."
         )
     damping = crane.swing_damping if swing_damping is None else swing_damping
     if damping <= 0.0 and settings.feedback <= 0.0 and not settings.ship:
@@ -163,17 +163,17 @@ def linear_response(
     arm = np.array(tip_of(home.slew, boom, g))
     motion = seaway.response(waves.frequency, waves.heading)
     tip = tip_motion(motion, arm)
-    moved, load_from_tip = _controlled(tip, waves.met, rope_m, damping, settings)
+    tip_under_control, load_from_tip = _controlled(tip, waves.encounter, rope_m, damping, settings)
     c, s = cos(home.slew), sin(home.slew)
-    along, across = np.array([c, -s]), np.array([-s, -c])
+    along = np.array([c, -s])
+    across = np.array([-s, -c])
     # the rope's direction in the ship's axes, which turn by roll and pitch
     direction = load_from_tip / rope_m + np.array([motion[4], -motion[3]])
-    rolled, pitched = radians(seaway.list_deg), radians(seaway.trim_deg)
-    inclined = np.array([pitched, -rolled])
-    vertical = 1j * waves.met * tip[2]
+    inclined = np.array([radians(seaway.trim_deg), -radians(seaway.list_deg)])
+    vertical = 1j * waves.encounter * tip[2]
     mass = crane.safe_load if load is None else load
-    lifted = -(waves.met**2) * tip[2] / GRAVITY
-    lifted = lifted * _bounce(waves.met, rope_m, mass, suspension or Suspension())
+    lifted = -(waves.encounter**2) * tip[2] / GRAVITY
+    lifted = lifted * _bounce(waves.encounter, rope_m, mass, suspension or Suspension())
     hoist = crane.geometry.hoist * min(np.abs(crane.inverse("hoist").limits))
     responses: dict[str, tuple[Complex, float]] = {
         "swing": (load_from_tip / rope_m, 0.0),
@@ -182,17 +182,17 @@ def linear_response(
         "dynamic_factor": (lifted[None], 1.0),
         "hook_speed": (vertical[None], 0.0),
         "hoist_demand": (vertical[None] / hoist, 0.0),
-        "placement": (moved + load_from_tip, 0.0),
+        "placement": (tip_under_control + load_from_tip, 0.0),
     }
-    asked = moved - tip[:2]  # of the drives, in the ship's axes
+    demanded = tip_under_control - tip[:2]  # of the drives, in the ship's axes
     reach = g.foot + g.boom * boom.cos
     for axis, rate, part in (
-        ("slew", reach, across @ asked),
-        ("luff", float(reach_rate(boom, g)), along @ asked),
+        ("slew", reach, across @ demanded),
+        ("luff", float(reach_rate(boom, g)), along @ demanded),
     ):
         inverse = crane.inverse(axis)
-        speed = 1j * waves.met * part / (rate * min(np.abs(inverse.limits)))
-        rise = -(waves.met**2) * part / (rate * min(inverse.acceleration))
+        speed = 1j * waves.encounter * part / (rate * min(np.abs(inverse.limits)))
+        rise = -(waves.encounter**2) * part / (rate * min(inverse.acceleration))
         responses[f"{axis}_speed"] = (speed[None], 0.0)
         responses[f"{axis}_acceleration"] = (rise[None], 0.0)
     if settings.clip > 0.0 or settings.share > 0.0:
@@ -208,8 +208,9 @@ def linear_response(
                 for drive, rate in zip(inverses, rates, strict=True)
             ]
         )
-        sizes[1] = settings.clip if settings.clip > 0.0 else sizes[1]
-        responses["clip"] = (np.array([across @ asked, along @ asked]) / sizes[:, None], 0.0)
+        if settings.clip > 0.0:
+            sizes[1] = settings.clip
+        responses["clip"] = (np.array([across @ demanded, along @ demanded]) / sizes[:, None], 0.0)
     values = {
         name: _value(response, mean, waves, duration / (2.0 if name == "dynamic_factor" else 1.0))
         for name, (response, mean) in responses.items()
@@ -218,7 +219,10 @@ def linear_response(
 
 
 def waves_of(seaway: Seaway, width: float) -> Waves:
-    """Waves of a seaway, fine enough for a resonance of half that width. [rad/s]"""
+    """Waves of a seaway, fine enough for a resonance.
+
+    `width` is the half-width ζω₀ of the resonance that they must resolve. [rad/s]
+    """
     step = min(max(2.0 * width / PER_RESONANCE, FINEST), WIDEST)
     omega = np.arange(BAND[0], BAND[1], step) + 0.5 * step
     density = seaway.spectrum.density(omega)
@@ -239,43 +243,51 @@ def tip_motion(motion: Complex, arm: Array) -> Complex:
     return np.asarray(motion[:3] + np.cross(motion[3:], arm[:, None], axis=0))
 
 
-def swing_response(met: Array, rope: float, damping: float) -> Complex:
+def swing_response(omega: Array, rope: float, damping: float) -> Complex:
     """Load less tip over the tip's horizontal motion, ω²/(ω₀² - ω² + 2 i ζ ω₀ ω)."""
-    own = sqrt(GRAVITY / rope)
-    return np.asarray(met**2 / (own**2 - met**2 + 2j * damping * own * met))
+    natural = sqrt(GRAVITY / rope)
+    return np.asarray(omega**2 / (natural**2 - omega**2 + 2j * damping * natural * omega))
 
 
 def _controlled(
-    tip: Complex, met: Array, rope: float, damping: float, settings: Settings
+    tip: Complex, omega: Array, rope: float, damping: float, settings: Settings
 ) -> tuple[Complex, Complex]:
     """The tip's horizontal motion under control, and load less tip, (2, n) each."""
-    left = (0.0 if settings.ship else 1.0) * tip[:2]
-    own = sqrt(GRAVITY / rope)
-    back = settings.feedback * np.exp(-2j * pi * settings.delay * met / own)
-    load = met**2 * left / (own**2 - met**2 * (1.0 + back) + 2j * damping * own * met)
-    return left + back * load, load
+    uncompensated = (0.0 if settings.ship else 1.0) * tip[:2]
+    natural = sqrt(GRAVITY / rope)
+    feedback = settings.feedback * np.exp(-2j * pi * settings.delay * omega / natural)
+    stiffness = natural**2 - omega**2 * (1.0 + feedback) + 2j * damping * natural * omega
+    load = omega**2 * uncompensated / stiffness
+    return uncompensated + feedback * load, load
 
 
-def _bounce(met: Array, rope: float, mass: float, suspension: Suspension) -> Complex:
+def _bounce(omega: Array, rope: float, mass: float, suspension: Suspension) -> Complex:
     """Transmissibility of an elastic rope; 1 for a rigid one."""
     if suspension.stiffness == inf:
-        return np.ones(met.size, dtype=np.complex128)
-    own = sqrt(suspension.stiffness / (rope * (mass + suspension.hook)))
-    damped = 2j * suspension.bounce_damping * own * met
-    return np.asarray((own**2 + damped) / (own**2 - met**2 + damped))
+        return np.ones(omega.size, dtype=np.complex128)
+    natural = sqrt(suspension.stiffness / (rope * (mass + suspension.hook)))
+    damped = 2j * suspension.bounce_damping * natural * omega
+    return np.asarray((natural**2 + damped) / (natural**2 - omega**2 + damped))
 
 
 def _value(response: Complex, mean: float, waves: Waves, duration: float) -> LinearValue:
     """Moments of a quantity whose components have those amplitudes for each metre of wave."""
-    spread = np.real((response * waves.variance) @ response.conj().T)
-    rates = np.real((response * (waves.variance * waves.met**2)) @ response.conj().T)
-    widths, axes = np.linalg.eigh(spread)
-    speeds = np.diagonal(axes.T @ rates @ axes)
-    widths = np.maximum(widths, 0.0)
-    total, speed = float(widths.sum()), float(np.maximum(speeds, 0.0).sum())
-    largest = float(largest_of_gaussian(widths[None], np.maximum(speeds, 0.0)[None], duration)[0])
-    period = 2.0 * pi * sqrt(total / speed) if speed > 0.0 else inf
-    return LinearValue(mean, sqrt(total), period, abs(mean) + largest)
+    covariance = np.real((response * waves.variance) @ response.conj().T)
+    squared_rates = waves.variance * waves.encounter**2
+    rate_covariance = np.real((response * squared_rates) @ response.conj().T)
+    # along the principal axes
+    variances, axes = np.linalg.eigh(covariance)
+    variances = np.maximum(variances, 0.0)
+    rate_variances = np.maximum(np.diagonal(axes.T @ rate_covariance @ axes), 0.0)
+    variance = float(variances.sum())
+    rate_variance = float(rate_variances.sum())
+    largest = float(largest_of_gaussian(variances[None], rate_variances[None], duration)[0])
+    return LinearValue(
+        mean=mean,
+        rms=sqrt(variance),
+        period=2.0 * pi * sqrt(variance / rate_variance) if rate_variance > 0.0 else inf,
+        largest=abs(mean) + largest,
+    )
 
 
 def stationary_start(
@@ -286,6 +298,7 @@ def stationary_start(
     arm = np.array(tip_of(home.slew, boom_at(0.0, crane.geometry, home), crane.geometry))
     waves = seaway.waves
     tip = tip_motion(seaway.response(waves.frequency, waves.heading), arm)[:2] * waves.amplitude
-    load = swing_response(waves.met, rope_m, damping) * tip
-    (x, y), (u, v) = load.sum(axis=1).real, (1j * waves.met * load).sum(axis=1).real
+    load = swing_response(waves.encounter, rope_m, damping) * tip
+    x, y = load.sum(axis=1).real
+    u, v = (1j * waves.encounter * load).sum(axis=1).real
     return (float(x), float(y)), (float(u), float(v))

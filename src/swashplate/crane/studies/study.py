@@ -2,7 +2,7 @@
 
 Differences between variants are within each seaway. Every run begins in the stationary swing
 without control of its seaway, has a run-in in which control does what it can, and counts after it.
-Of a run only its `Outcome` is kept.
+Of a run only its `RunOutcome` is kept.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.crane.axes import RATE, check_names
+from swashplate.crane.closed_loop.operator_command import OperatorCommand
 from swashplate.crane.closed_loop.result import FARTHEST_SWING, CraneRun
-from swashplate.crane.closed_loop.simulating import begun, simulate
-from swashplate.crane.closed_loop.stepper import Actuation, Setup, feels_load
-from swashplate.crane.closed_loop.stick import Stick
+from swashplate.crane.closed_loop.simulating import prepare, simulate
+from swashplate.crane.closed_loop.stepper import Actuation, RunOptions, feels_load
 from swashplate.crane.control import Clip, Control
 from swashplate.crane.crane import Crane
 from swashplate.crane.kinematics import Vector, boom_at, rotation, tip_of, to_inertial
@@ -27,7 +27,7 @@ from swashplate.crane.limits import LIMITED
 from swashplate.crane.rope import GRAVITY
 from swashplate.crane.sea.seaway import Seaway, Spectrum
 from swashplate.crane.studies.following import follow
-from swashplate.crane.studies.outcome import STOPPED, Outcome, outcome_of
+from swashplate.crane.studies.run_outcome import STOPPED, RunOutcome, outcome_of
 from swashplate.crane.studies.spectral import stationary_start
 from swashplate.errors import DomainError, InputError
 from swashplate.executors import Executor, Threads
@@ -42,8 +42,8 @@ Drives = Sequence[str] | Mapping[str, str | Crane | Sequence[Crane]]
 
 IDEAL, BUILT = "ideal", "identified"
 ACTUATED: Mapping[str, Actuation] = {IDEAL: "ideal", BUILT: "inverse", "volts": "volts"}
-"""Drives that follow at once; the crane's own after their inverse maps; the same, 10 V for full
-speed."""
+"""Drives that follow instantaneously; the crane's own after their inverse maps; the same, 10 V for
+full speed."""
 NONE = "no control"
 """The crane as it is built, under the operator's stick alone."""
 LENGTH, RUN_IN = 600.0, 120.0
@@ -61,55 +61,55 @@ class Case(NamedTuple):
 
     cranes: tuple[Crane, ...]
     """One, or cranes of which each seaway takes the next."""
-    setup: Setup
-    stick: Stick
+    options: RunOptions
+    stick: OperatorCommand
 
     @property
     def driven(self) -> bool:
-        """Whether it has drives that have limits, not ideal ones."""
-        return self.setup["actuation"] != IDEAL
+        """Whether its drives have limits, as ideal ones have not."""
+        return self.options["actuation"] != IDEAL
 
     @property
     def pose(self) -> dict[str, Any]:
         """Where it begins: keywords of `Crane.home`."""
-        return {name: self._setup[name] for name in ("slew_deg", "boom_deg", "rope_m")}
+        return {name: self._options[name] for name in ("slew_deg", "boom_deg", "rope_m")}
 
     @property
     def hangs(self) -> dict[str, Any]:
         """What hangs on it, as far as it is given: keywords of `linear_response`."""
         names = ("swing_damping", "load", "suspension")
-        return {name: self._setup[name] for name in names if name in self._setup}
+        return {name: self._options[name] for name in names if name in self._options}
 
     @property
     def swing_damping(self) -> float:
         """Damping ratio of the load's swing."""
-        given = self.setup.get("swing_damping")
-        return self.cranes[0].swing_damping if given is None else given
+        damping = self.options.get("swing_damping")
+        return self.cranes[0].swing_damping if damping is None else damping
 
     @property
-    def _setup(self) -> dict[str, Any]:
-        return dict(self.setup)
+    def _options(self) -> dict[str, Any]:
+        return dict(self.options)
 
-    def changed(self, **setup: Unpack[Setup]) -> Case:
-        """The case set up in another way."""
-        return self._replace(setup=self.setup | setup)
+    def changed(self, **options: Unpack[RunOptions]) -> Case:
+        """The case with other options."""
+        return self._replace(options=self.options | options)
 
     def run(self, number: int, seaway: Seaway, motion: Array | None = None) -> CraneRun:
         """Its run in a seaway by the seaway's number; the ship's motion, if it is known already."""
         crane = self.cranes[number % len(self.cranes)]
         if motion is None:
             motion = seaway.motion(round(self.stick.length * RATE) + 1, RATE)
-        setup = self.setup | self._start(seaway)
-        return simulate(crane, self.stick, sea=motion, **setup)
+        options = self.options | self._start(seaway)
+        return simulate(crane, self.stick, sea=motion, **options)
 
-    def _start(self, seaway: Seaway) -> Setup:
+    def _start(self, seaway: Seaway) -> RunOptions:
         """The stationary swing without control at time 0, at most a part of the model's edge."""
         if self.swing_damping <= 0.0:
             return {}
         offset, velocity = stationary_start(
             self.cranes[0], seaway, damping=self.swing_damping, **self.pose
         )
-        largest = LARGEST_START * self.setup["rope_m"] * sin(radians(FARTHEST_SWING))
+        largest = LARGEST_START * self.options["rope_m"] * sin(radians(FARTHEST_SWING))
         share = min(largest / max(float(np.hypot(*offset)), 1e-9), 1.0)
         return {
             "load_offset": (share * offset[0], share * offset[1]),
@@ -118,7 +118,9 @@ class Case(NamedTuple):
 
     def words(self) -> str:
         """Where the crane stands, what hangs on it and what controls it, in a sentence."""
-        crane, pose, control = self.cranes[0], self.pose, self.setup["control"]
+        crane = self.cranes[0]
+        pose = self.pose
+        control = self.options["control"]
         load = self.hangs.get("load")
         mass = crane.safe_load if load is None else load
         stands = (
@@ -134,7 +136,7 @@ class Case(NamedTuple):
             clip = f"; the clip is {size:.2g} m along the boom, sized for the crane's own drives"
         return f"Control by {control.words()}: {stands}{clip}."
 
-    def wanted(self, seaway: Seaway) -> tuple[float, float] | None:
+    def target(self, seaway: Seaway) -> tuple[float, float] | None:
         """Where the load shall be, horizontal and inertial [m]; None if the operator moves it."""
         if self.stick.samples is not None or self.stick.parts:
             return None
@@ -142,8 +144,8 @@ class Case(NamedTuple):
         home = crane.home(**self.pose)
         tip = tip_of(home.slew, boom_at(0.0, crane.geometry, home), crane.geometry)
         attitude = rotation(radians(seaway.list_deg), radians(seaway.trim_deg), 0.0)
-        place = to_inertial(attitude, tip, Vector(0.0, 0.0, 0.0))
-        return place.x, place.y
+        position = to_inertial(attitude, tip, Vector(0.0, 0.0, 0.0))
+        return position.x, position.y
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,14 +174,14 @@ class Study(Result):
         seeds: Sequence[int],
         sea: str | Spectrum | Seaway = "ss3",
         drives: Drives = (IDEAL, BUILT),
-        stick: Stick | None = None,
+        stick: OperatorCommand | None = None,
         length: float = LENGTH,
         run_in: float = RUN_IN,
         executor: Executor | None = None,
         progress: Callable[[int, int], None] | None = None,
-        **setup: Any,
+        **options: Any,
     ) -> Study:
-        """A study; these are the keywords of `judge` and `sweep`.
+        """A study; these are the keywords of `assess` and `sweep`.
 
         Parameters
         ----------
@@ -190,10 +192,11 @@ class Study(Result):
         sea : str, Spectrum or Seaway
             Sea state; a seaway gives heading, ship and spreading as well.
         drives : sequence of str, or mapping of str to str, Crane or sequence of Crane
-            ``"ideal"``, which follow at once within their limits of speed; ``"identified"``, the
-            crane's own; ``"volts"``, these without their inverse maps; by name also other cranes,
-            or several of which each seaway takes the next, see `drawn_cranes`.
-        stick : Stick, optional
+            ``"ideal"``, which follow instantaneously within their limits of speed;
+            ``"identified"``, the crane's own; ``"volts"``, these without their inverse maps. By
+            name also other cranes, or several of which each seaway takes the next, see
+            `drawn_cranes`.
+        stick : OperatorCommand, optional
             What the operator does; by default nothing, the crane keeps its load in place. Its
             length is then that of each run.
         length : float
@@ -204,53 +207,56 @@ class Study(Result):
             Of `swashplate.executors`; threads by default. The numbers do not depend on it.
         progress : callable, optional
             Called with seaways done and their number.
-        **setup
-            Where each run begins, what hangs on it: see `Setup`, whose control and actuation follow
-            from controllers and drives. By default the load hangs abeam on 27 m of rope.
+        **options
+            Where each run begins, what hangs on it: see `RunOptions`, whose control and actuation
+            follow from controllers and drives. By default the load hangs abeam on 27 m of rope.
         """
         controllers = control if isinstance(control, Mapping) else {"": control}
-        named = [drives] if isinstance(drives, str) else drives
-        if not isinstance(named, Iterable):
+        names_or_sets = [drives] if isinstance(drives, str) else drives
+        if not isinstance(names_or_sets, Iterable):
             raise InputError(f"drives is {drives!r}, but must be a list of names, or a mapping.")
-        sets = named if isinstance(named, Mapping) else {name: name for name in named}
+        if isinstance(names_or_sets, Mapping):
+            sets = names_or_sets
+        else:
+            sets = {name: name for name in names_or_sets}
         if isinstance(seeds, int):
             raise InputError(f"seeds is {seeds}, but must be a sequence, as range({seeds}).")
         if not (controllers and sets and seeds):
             raise InputError("A study needs a controller, a set of drives and a seed at least.")
-        apart = ("control", "actuation", "load_offset", "load_velocity")
-        poses = [name for name in Setup.__annotations__ if name not in apart]
-        words = ("seeds", "sea", "drives", "stick", "length", "run_in", *poses)
-        check_names("A study has no", setup, words, "it has")
+        set_here = ("control", "actuation", "load_offset", "load_velocity")
+        run_options = [name for name in RunOptions.__annotations__ if name not in set_here]
+        keywords = ("seeds", "sea", "drives", "stick", "length", "run_in", *run_options)
+        check_names("A study has no", options, keywords, "it has")
         if not (length >= SHORTEST and run_in >= 0.0):
             raise InputError(
                 f"A run counts for {length:g} s after a run-in of {run_in:g} s, but must count for "
                 f"at least {SHORTEST:g} s, eight swings, after a run-in of 0 s or more."
             )
         if stick is None:
-            stick = Stick.rest(run_in + length)
+            stick = OperatorCommand.rest(run_in + length)
         elif stick.length < run_in + SHORTEST:
             raise InputError(
                 f"The stick is {stick.length:g} s long, but a run counts from {run_in:g} s on for "
                 f"at least {SHORTEST:g} s: take a longer stick, or a shorter run_in."
             )
-        pose: Any = {"slew_deg": 90.0, "boom_deg": 45.0, "rope_m": 27.0, **setup}
+        pose: Any = {"slew_deg": 90.0, "boom_deg": 45.0, "rope_m": 27.0, **options}
         none = Case((crane,), pose | {"control": None, "actuation": "inverse"}, stick)
         cases = {NONE: none}
         for controller, stages in controllers.items():
-            for name, given in sets.items():
-                case = _driven(none.changed(control=stages), name, given)
+            for name, drives_of_set in sets.items():
+                case = _driven(none.changed(control=stages), name, drives_of_set)
                 cases[f"{controller}, {name}" if controller else name] = case
         seaway = sea if isinstance(sea, Seaway) else Seaway(sea)
-        needed = max(seaway.record, stick.length)
+        record = max(seaway.record, stick.length)
         return cls(
-            crane,
-            cases,
-            replace(seaway, record=needed),
-            tuple(seeds),
-            stick.length - run_in,
-            run_in,
-            executor or Threads(),
-            progress,
+            crane=crane,
+            cases=cases,
+            seaway=replace(seaway, record=record),
+            seeds=tuple(seeds),
+            length=stick.length - run_in,
+            run_in=run_in,
+            executor=executor or Threads(),
+            progress=progress,
         )
 
     def provenance(self) -> tuple[str, ...]:
@@ -269,22 +275,22 @@ class Study(Result):
 
     def outcomes(
         self, cases: Sequence[Case], numbers: range | None = None
-    ) -> list[tuple[Outcome, ...]]:
+    ) -> list[tuple[RunOutcome, ...]]:
         """Outcomes of all cases, a tuple for each seaway, or for some by their numbers.
 
         An `InputError` or `ParameterError` if a case cannot begin as it is asked to.
         """
-        for case in cases:  # said here, once, and not by a worker
-            begun(case.cranes[0], case.stick, case.setup)
-        chosen = range(len(self.seeds)) if numbers is None else numbers
-        outcomes: list[tuple[Outcome, ...]] = [()] * len(chosen)
-        items = [(number, self.seeds[number]) for number in chosen]
+        for case in cases:  # refused here, once, and not by a worker
+            prepare(case.cranes[0], case.stick, case.options)
+        seaway_numbers = range(len(self.seeds)) if numbers is None else numbers
+        outcomes: list[tuple[RunOutcome, ...]] = [()] * len(seaway_numbers)
+        items = [(number, self.seeds[number]) for number in seaway_numbers]
         runs = self.executor.run(_of_seaway, (tuple(cases), self.seaway, self.run_in), items)
-        seaways = counted(runs, len(chosen), "seaways", f"Simulating {self.crane.name}")
-        for done, (position, found) in enumerate(seaways, 1):
-            outcomes[position] = found
+        seaways = counted(runs, len(seaway_numbers), "seaways", f"Simulating {self.crane.name}")
+        for done, (position, of_seaway) in enumerate(seaways, 1):
+            outcomes[position] = of_seaway
             if self.progress is not None and numbers is None:
-                self.progress(done, len(chosen))
+                self.progress(done, len(seaway_numbers))
         return outcomes
 
 
@@ -312,25 +318,26 @@ def clip_size(clip: Clip, crane: Crane, pose: Mapping[str, Any]) -> float:
     return clip.share * float(reach)
 
 
-def _driven(case: Case, name: str, given: str | Crane | Sequence[Crane]) -> Case:
+def _driven(case: Case, name: str, drives: str | Crane | Sequence[Crane]) -> Case:
     """A case on a set of drives: a name of `ACTUATED`, a crane, or several."""
-    if isinstance(given, str):
-        check_names("There are no drives", [given], ACTUATED)
-        return case.changed(actuation=ACTUATED[given])
-    cranes: tuple[Any, ...] = tuple(given) if isinstance(given, Sequence) else (given,)
+    if isinstance(drives, str):
+        check_names("There are no drives", [drives], ACTUATED)
+        return case.changed(actuation=ACTUATED[drives])
+    cranes: tuple[Any, ...] = tuple(drives) if isinstance(drives, Sequence) else (drives,)
     if not cranes or not all(isinstance(crane, Crane) for crane in cranes):
         raise InputError(
-            f"The drives '{name}' are {given!r}, but must be a name, a crane or a list of cranes."
+            f"The drives '{name}' are {drives!r}, but must be a name, a crane or a list of cranes."
         )
     return case._replace(cranes=cranes)
 
 
 def _of_seaway(
     work: tuple[tuple[Case, ...], Seaway, float], item: tuple[int, int]
-) -> tuple[Outcome, ...]:
+) -> tuple[RunOutcome, ...]:
     """Outcomes of all cases in one seaway."""
-    (cases, of, run_in), (number, seed) = work, item
-    seaway = replace(of, seed=seed)
+    cases, unseeded, run_in = work
+    number, seed = item
+    seaway = replace(unseeded, seed=seed)
     longest = max(case.stick.length for case in cases)
     motion = seaway.motion(round(longest * RATE) + 1, RATE)
     outcomes = []
@@ -340,5 +347,5 @@ def _of_seaway(
         except (DomainError, InputError):  # the travel's limits, or a tip too fast for the rope
             outcomes.append(STOPPED)
         else:
-            outcomes.append(outcome_of(run, run_in, case.wanted(seaway)))
+            outcomes.append(outcome_of(run, run_in, case.target(seaway)))
     return tuple(outcomes)

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from swashplate.crane.axes import check_names
 from swashplate.crane.crane import Crane
 from swashplate.crane.sea.seaway import HIGHEST, Seaway
-from swashplate.crane.studies.changed_drives import upgraded
+from swashplate.crane.studies.changed_drives import with_design_change
 from swashplate.crane.studies.spectral import linear_response
 from swashplate.crane.studies.study import NONE, Case, Controllers, Study
 from swashplate.errors import InputError
@@ -46,9 +46,9 @@ def _at_height(seaway: Seaway, case: Case, point: float) -> tuple[Seaway, Case]:
 
 
 def _at_orifice(seaway: Seaway, case: Case, point: float) -> tuple[Seaway, Case]:
-    if case.setup["control"] is None or not case.driven:
+    if case.options["control"] is None or not case.driven:
         return seaway, case  # no control and ideal drives do not know the orifice
-    cranes = tuple(upgraded(crane, "luff", {"orifice": point}) for crane in case.cranes)
+    cranes = tuple(with_design_change(crane, "luff", {"orifice": point}) for crane in case.cranes)
     return seaway, case._replace(cranes=cranes)
 
 
@@ -136,19 +136,30 @@ def sweep(
             f"{swept.high:g} {swept.unit}".rstrip()
             + "."
         )
-    asked = Study.of(crane, control, **{"seeds": SEEDS, **study})
-    none = asked.cases[NONE]
-    variants = {name: case for name, case in asked.cases.items() if name == NONE or case != none}
-    values = np.empty((len(asked.seeds), grid.size, len(variants)))
+    swept_study = Study.of(crane, control, **{"seeds": SEEDS, **study})
+    none = swept_study.cases[NONE]
+    variants = {
+        name: case for name, case in swept_study.cases.items() if name == NONE or case != none
+    }
+    values = np.empty((len(swept_study.seeds), grid.size, len(variants)))
     spectrum = np.full(grid.size, np.nan)
     for index, point in enumerate(grid.tolist()):
-        places = [swept.at(asked.seaway, case, point) for case in variants.values()]
-        seaway, cases = places[0][0], tuple(case for _, case in places)
-        outcomes = replace(asked, seaway=seaway).outcomes(cases)
+        at_point = [swept.at(swept_study.seaway, case, point) for case in variants.values()]
+        seaway, _ = at_point[0]  # the same for all variants
+        cases = tuple(case for _, case in at_point)
+        outcomes = replace(swept_study, seaway=seaway).outcomes(cases)
         values[:, index] = [[outcome.rms_swing for outcome in of] for of in outcomes]
         if cases[0].swing_damping > 0.0:
             linear = linear_response(crane, seaway, **cases[0].pose, **cases[0].hangs)
             spectrum[index] = linear.values["swing"].rms
     if over == "bearing":
         grid = np.radians(grid)
-    return Sweep(over, grid, tuple(variants), values, spectrum, crane, asked.seaway)
+    return Sweep(
+        over=over,
+        points=grid,
+        names=tuple(variants),
+        values=values,
+        spectrum=spectrum,
+        crane=crane,
+        seaway=swept_study.seaway,
+    )

@@ -12,7 +12,7 @@ from .campaign import plot_prediction as plot_prediction
 from .crane import plot_crane as plot_crane
 from .crane import plot_follow as plot_follow
 from .crane import plot_sweep as plot_sweep
-from .crane_verdicts import plot_judgment as plot_judgment
+from .crane_verdicts import plot_assessment as plot_assessment
 from .crane_verdicts import plot_operability as plot_operability
 from .linear import plot_bode as plot_bode
 from .simulation import plot_comparison as plot_comparison

@@ -28,7 +28,7 @@ MOST_RUNS = 6
 MOVED = 2.0
 """Travel of slew and boom that gets a panel of its own. [deg]"""
 ACTING = (Limit.ORIFICE, Limit.SWASH_STOP)
-"""Limits that a crane's drives are judged by: of acceleration and of speed."""
+"""Limits that a crane's drives are assessed by: of acceleration and of speed."""
 LEAST = 0.01
 """Least swing on a logarithmic scale. [deg]"""
 LETTERS = 118
@@ -69,9 +69,9 @@ def seaway_words(sea: Seaway, height: bool = True) -> str:
     return ", ".join(words)
 
 
-def remarks(*said: str) -> str:
+def remarks(*texts: str) -> str:
     """Remarks joined, in lines that fit above a panel."""
-    return "\n".join(wrap("; ".join(filter(None, said)), LETTERS))
+    return "\n".join(wrap("; ".join(filter(None, texts)), LETTERS))
 
 
 def remark(ax: Axes, words: str, rows: int = 0) -> None:
@@ -85,11 +85,13 @@ def _panels(
     below: str,
     title: str,
     looks: Mapping[str, style.Stroke],
-    *said: str,
+    *texts: str,
 ) -> tuple[Figure, list[Axes]]:
-    """Panels with a legend of lines, where there are several, and a remark."""
-    legend = [style.handle(name, *look) for name, look in looks.items()] if len(looks) > 1 else []
-    words = remarks(*said)
+    """Panels with a legend of lines, if there are several, and a remark."""
+    legend = []
+    if len(looks) > 1:
+        legend = [style.handle(name, *look) for name, look in looks.items()]
+    words = remarks(*texts)
     lines = 1 + words.count("\n")
     figure, axes = style.sheet(heights, title, labels, below, legend=legend, lines=lines)
     remark(axes[0], words, style.legend_rows(legend) if legend else 0)
@@ -114,7 +116,7 @@ def plot_crane(
     sea: Mapping[str, CraneRun] | None = None,
     title: str | None = None,
 ) -> Figure:
-    """Figure of a run or of several: swing, slew and boom where they move, and when limits act.
+    """Figure of a run or of several: swing, slew and boom if they move, and when limits act.
 
     Parameters
     ----------
@@ -124,19 +126,30 @@ def plot_crane(
         The same in a seaway, whose swing gets a panel of its own.
     """
     named = named_runs(runs, MOST_RUNS, "A figure")
-    first, looks = next(iter(named.values())), style.strokes(named)
+    first = next(iter(named.values()))
+    looks = style.strokes(named)
     driven = {name: run for name, run in named.items() if run.actuation != "ideal"}
     shown = [("swing_deg", "swing (deg)", 2.1, named)]
     for signal, label, height in (("slew_deg", "slew (deg)", 1.5), ("boom_deg", "boom (deg)", 1.2)):
         if any(np.ptp(getattr(run, signal)) > MOVED for run in named.values()):
             shown.append((signal, label, height, named))
-    shown += [("swing_deg", "in sea (deg)", 1.5, dict(sea))] if sea else []
+    if sea:
+        shown.append(("swing_deg", "in sea (deg)", 1.5, dict(sea)))
     heights = [height for _, _, height, _ in shown]
-    heights += [0.17 * 2 * len(driven) + 0.25] if driven else []
-    labels = [label for _, label, _, _ in shown] + ["limits"] * bool(driven)
+    labels = [label for _, label, _, _ in shown]
+    if driven:
+        heights.append(0.17 * 2 * len(driven) + 0.25)
+        labels.append("limits")
     back = "grey line: the stick is back at zero" if first.stick_end > 0.0 else ""
-    said, title = (back, assumed(first.crane)), title or first.crane.title
-    figure, axes = _panels(heights, labels, "time (s)", title, looks, *said)
+    figure, axes = _panels(
+        heights,
+        labels,
+        "time (s)",
+        title or first.crane.title,
+        looks,
+        back,
+        assumed(first.crane),
+    )
     for ax, (signal, _, _, lines) in zip(axes, shown, strict=False):
         for name, run in lines.items():
             draw(ax, run.time, getattr(run, signal), looks[name].color, dashes=looks[name].dashes)
@@ -152,7 +165,7 @@ def plot_crane(
 
 
 def _acting(ax: Axes, runs: Mapping[str, CraneRun], looks: Mapping[str, style.Stroke]) -> None:
-    """Bars where limits of slew and luff act, a row for each run and axis."""
+    """Bars while limits of slew and luff act, a row for each run and axis."""
     rows = [(name, axis) for name in runs for axis in ("slew", "luff")]
     ax.set_ylim(len(rows) - 0.4, -0.6)
     for row, (name, axis) in enumerate(rows):
@@ -175,8 +188,8 @@ LOOKS = {
     "bearing": ("Swing over the bearing of the boom", ""),
     "height": ("Swing over the height of the waves", "significant height of the waves (m)"),
     "orifice": (
-        *("Swing over the size of the luff drive's orifice",),
-        *("orifice of the luff drive, to the identified one",),
+        "Swing over the size of the luff drive's orifice",
+        "orifice of the luff drive, to the identified one",
     ),
 }
 """Title of a sweep over a quantity, and its abscissa."""
@@ -200,19 +213,20 @@ def plot_sweep(result: Sweep, *, title: str | None = None) -> Figure:
     means = "over {} with its 95 % interval"
     if result.over == "bearing":
         means = "RMS over {}"
-    left = bool(np.isnan(result.rms()).any())
-    said = (
+    some_left = bool(np.isnan(result.rms()).any())
+    texts = (
         seaway_words(result.seaway, result.over != "height"),
         means.format(count(len(result.values), "seaway")),
         "" if result.over == "bearing" else "thin line: no control, by its spectrum",
-        "×: a run left the model" if left else "",
+        "×: a run left the model" if some_left else "",
         assumed(result.crane),
     )
     if result.over == "bearing":
-        return _polar(result, title or usual, looks, *said)
+        return _polar(result, title or usual, looks, *texts)
     labels = ("swing, RMS (deg)",)
-    figure, (ax,) = _panels([3.0], labels, below, title or usual, looks, *said)
-    values, points = np.degrees(result.values), result.points
+    figure, (ax,) = _panels([3.0], labels, below, title or usual, looks, *texts)
+    values = np.degrees(result.values)
+    points = result.points
     highest = LEAST
     for variant, (color, dashes) in enumerate(looks.values()):
         of_variant = values[:, :, variant].T
@@ -240,7 +254,7 @@ def plot_sweep(result: Sweep, *, title: str | None = None) -> Figure:
     return figure
 
 
-def _half(bearings: Array) -> tuple[str, float]:
+def _side_of(bearings: Array) -> tuple[str, float]:
     """Side of the ship that bearings [rad] lie on, empty if they are on both; its first bearing."""
     if bearings.size and (bearings >= 0.0).all() and (bearings <= np.pi).all():
         return "starboard", 0.0
@@ -249,24 +263,25 @@ def _half(bearings: Array) -> tuple[str, float]:
     return "", 0.0
 
 
-def _polar(result: Sweep, title: str, looks: dict[str, style.Stroke], *said: str) -> Figure:
+def _polar(result: Sweep, title: str, looks: dict[str, style.Stroke], *texts: str) -> Figure:
     """Swing over the bearing around the ship, or over the half of it that the bearings are on."""
     legend = [style.handle(name, *look) for name, look in looks.items()]
     rows = style.legend_rows(legend)
-    words = remarks(*said)
+    words = remarks(*texts)
     above = style.HEAD + style.ROW * (rows + 1 + words.count("\n"))
-    half, first = _half(result.points)
-    tall = 0.5 * ACROSS if half else ACROSS
+    side, first = _side_of(result.points)
+    tall = 0.5 * ACROSS if side else ACROSS
     height = above + tall + 2.0 * AROUND
     figure = style.new_figure(style.WIDTH, height, layout="none")
     style.write_title(figure, title)
     # the axes are a square, of which half a circle takes the middle
-    left, bottom = 0.5 * (style.WIDTH - ACROSS), AROUND + 0.5 * (tall - ACROSS)
+    left = 0.5 * (style.WIDTH - ACROSS)
+    bottom = AROUND + 0.5 * (tall - ACROSS)
     square = left / style.WIDTH, bottom / height, ACROSS / style.WIDTH, ACROSS / height
     ax: Any = figure.add_axes(square, projection="polar")
-    ax.set_theta_offset(first + np.pi if half else 0.5 * np.pi)  # half a circle lies flat
+    ax.set_theta_offset(first + np.pi if side else 0.5 * np.pi)  # half a circle lies flat
     ax.set_theta_direction(-1)
-    if half:
+    if side:
         ax.set_thetamin(np.degrees(first))
         ax.set_thetamax(np.degrees(first) + 180.0)
         ax.spines["start"].set_color(style.FAINT)
@@ -287,20 +302,20 @@ def _polar(result: Sweep, title: str, looks: dict[str, style.Stroke], *said: str
     shown = [radius for radius in RADII if radius <= 1.3 * largest]
     ax.set_ylim(0.0, edge)
     ax.set_yticks(np.log10(np.array(shown) / CENTRE), [f"{radius:g}°" for radius in shown])
-    if not half:
+    if not side:
         ax.set_rlabel_position(52.5)  # lines cross it straight on
     names = {0: "bow", 90: "starboard", 180: "stern", 270: "port"}
     angles = range(0, 360, 30)
-    if half:
+    if side:
         angles = range(round(np.degrees(first)), round(np.degrees(first)) + 181, 30)
     labels = [names.get(angle % 360, f"{angle}°") for angle in angles]
     ax.set_xticks(np.radians(angles), labels)
     ax.tick_params(labelsize=style.SMALL, labelcolor=style.INK)
     ax.tick_params(axis="x", pad=8.0)
-    if not half:
+    if not side:
         for angle, text in zip(angles, ax.get_xticklabels(), strict=True):
-            side = "left" if angle < 180 else "right"
-            text.set_horizontalalignment("center" if angle % 180 == 0 else side)
+            alignment = "left" if angle < 180 else "right"
+            text.set_horizontalalignment("center" if angle % 180 == 0 else alignment)
     ax.grid(True, color=style.GRID, linewidth=0.6)
     ax.spines["polar"].set_color(style.FAINT)
     head = figure.add_axes((0.012, 1.0 - (above + 0.02) / height, 0.9, 0.001))
@@ -344,29 +359,42 @@ def plot_follow(
     words = title or "What the axes can follow"
     labels = ("amplitude (m)",), "period (s)"
     if ax is None:
-        said = f"boom at {result.boom_deg:.0f}°", DEMANDED, assumed(result.crane)
-        figure, (panel,) = _panels([3.6], *labels, words, looks, *said)
+        figure, (panel,) = _panels(
+            [3.6],
+            *labels,
+            words,
+            looks,
+            f"boom at {result.boom_deg:.0f}°",
+            DEMANDED,
+            assumed(result.crane),
+        )
     else:
         legend = [style.handle(name, *look) for name, look in looks.items()]
         (panel,) = style.dress_given(ax, title, *labels, what="panel", legend=legend)
     lines = list(zip(looks.values(), result.amplitude.T, strict=True))
     for (color, dashes), amplitudes in lines:
         panel.plot(result.periods, amplitudes, color=color, linestyle=dashes, linewidth=1.4)
-    first, last = float(result.periods[0]), float(result.periods[-1])
+    first = float(result.periods[0])
+    last = float(result.periods[-1])
     seas = {name: sea for name, sea in result.seas.items() if first <= sea.period <= last}
-    asked = [demand for sea in seas.values() for demand in sea.amplitude]
+    demands = [demand for sea in seas.values() for demand in sea.amplitude]
     low = LOWEST_DEMAND * float(result.amplitude.min())
-    _logarithmic(panel, low, 1.8 * max([float(result.amplitude.max()), *asked]))
+    _logarithmic(panel, low, 1.8 * max([float(result.amplitude.max()), *demands]))
     panel.set_xlim(first, last)
     for sea in seas.values():
         for axis, demand in enumerate(sea.amplitude):
             (color, _), amplitudes = lines[axis]
             beyond = demand > np.interp(sea.period, result.periods, amplitudes)
-            place = sea.period + (axis - 1) * APART * (last - first), max(demand, low)
-            marker = "D" if demand > low else "v"
-            face = color if beyond else "white"
-            how: dict[str, Any] = {"color": color, "mfc": face, "ms": 5.0}
-            panel.plot(*place, marker, zorder=3.0, clip_on=False, **how)
+            panel.plot(
+                sea.period + (axis - 1) * APART * (last - first),
+                max(demand, low),
+                "D" if demand > low else "v",
+                color=color,
+                mfc=color if beyond else "white",
+                ms=5.0,
+                zorder=3.0,
+                clip_on=False,
+            )
     _name_seas(panel, {name: (sea.period, max(sea.amplitude)) for name, sea in seas.items()})
     return figure if ax is None else ax
 
@@ -379,11 +407,12 @@ def _name_seas(ax: Axes, tops: Mapping[str, tuple[float, float]]) -> None:
     names: list[tuple[float, float, float]] = []
     for name, (period, top) in sorted(tops.items(), key=lambda entry: entry[1]):
         across = (period - first) / (last - first)
-        up, wide = (np.log(top) - low) / (high - low), 0.012 * len(name)
+        up = (np.log(top) - low) / (high - low)
+        width = 0.012 * len(name)
         while any(
-            abs(across - other) < 0.5 * (wide + width) and abs(up - height) < 0.06
-            for other, height, width in names
+            abs(across - named_across) < 0.5 * (width + named_width) and abs(up - named_up) < 0.06
+            for named_across, named_up, named_width in names
         ):
             up += 0.01
-        names.append((across, up, wide))
+        names.append((across, up, width))
         style.write(ax, name, (across, up), (0.0, 6.0), ha="center", bbox=box)

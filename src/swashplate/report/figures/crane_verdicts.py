@@ -1,4 +1,4 @@
-"""Figures of what is decided on a crane: judgment of its control, operability over a year."""
+"""Figures of what is decided on a crane: assessment of its control, operability over a year."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from matplotlib.patches import Patch, Polygon, Rectangle
 from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, NullLocator
 from numpy.typing import NDArray
 
-from swashplate.crane import LIMITED, Hull, Judged, Judgment, Operability
+from swashplate.crane import LIMITED, AssessedQuantity, Assessment, Hull, Operability
 from swashplate.crane.sea.confidence import rms_of
 from swashplate.crane.studies.operating import WORKABLE, label_of
 from swashplate.crane.studies.study import NONE
@@ -27,7 +27,7 @@ from swashplate.tables import count
 
 Array = NDArray[np.float64]
 
-# --- judgment -------------------------------------------------------------------------------------
+# --- assessment -----------------------------------------------------------------------------------
 
 SWING = "swing, RMS of a seaway (deg)"
 NAME, ROOM = 30, style.WIDTH - 2.4
@@ -47,17 +47,19 @@ FACES = {"yes": style.BLUE, "no": style.VERMILION, "not decided": "white"}
 
 
 @overload
-def plot_judgment(result: Judgment, *, ax: None = None, title: str | None = None) -> Figure: ...
+def plot_assessment(result: Assessment, *, ax: None = None, title: str | None = None) -> Figure: ...
 
 
 @overload
-def plot_judgment(result: Judgment, *, ax: GivenAxes, title: str | None = None) -> GivenAxes: ...
+def plot_assessment(
+    result: Assessment, *, ax: GivenAxes, title: str | None = None
+) -> GivenAxes: ...
 
 
-def plot_judgment(
-    result: Judgment, *, ax: Axes | Sequence[Axes] | None = None, title: str | None = None
+def plot_assessment(
+    result: Assessment, *, ax: Axes | Sequence[Axes] | None = None, title: str | None = None
 ) -> Figure | Axes | Sequence[Axes]:
-    """Figure of a judgment: swing of each variant in each seaway, and what has a limit.
+    """Figure of an assessment: swing of each variant in each seaway, and what has a limit.
 
     The first panel has a point for each seaway and a diamond as wide as the 95 % interval of their
     root mean square; runs that left the model are counted beyond a break of the axis. The second
@@ -70,7 +72,8 @@ def plot_judgment(
         (panel,) = style.dress_given(ax, title, [""], SWING, what="panel")
         _swings(panel, result)
         return ax
-    study, limited = result.study, result.limited(result.judged)
+    study = result.study
+    limited = result.limited(result.assessed_variant)
     legends = [_swing_legend(result)]
     heights = [0.46 * len(result.names) + 0.2]
     if limited:
@@ -85,7 +88,7 @@ def plot_judgment(
     style.write_title(figure, title or f"{seaways}, {seaway_words(study.seaway)}")
     above = [
         assumed(study.crane),
-        f"'{result.judged}' and its limits; bars: 95 % intervals",
+        f"'{result.assessed_variant}' and its limits; bars: 95 % intervals",
     ]
     for panel, legend, words in zip(panels, legends, above, strict=False):
         style.dress(panel)
@@ -112,7 +115,7 @@ def _mark(name: str, marker: str, color: str, *, face: str = "", size: float = 5
     )
 
 
-def _swing_legend(result: Judgment) -> list[Line2D]:
+def _swing_legend(result: Assessment) -> list[Line2D]:
     handles = [
         _mark("a seaway", "o", style.BLUE, size=4.0),
         _mark("more swing than without control", "o", style.VERMILION, size=4.0),
@@ -120,12 +123,12 @@ def _swing_legend(result: Judgment) -> list[Line2D]:
     ]
     if result.linear is not None:
         handles.append(style.handle("by its spectrum alone", style.INK, width=1.0))
-    if any(result.left(name) for name in result.names):
+    if any(result.departures(name) for name in result.names):
         handles.append(_mark("left the model, not in the RMS", "x", style.INK))
     return handles
 
 
-def _swings(ax: Axes, result: Judgment) -> None:
+def _swings(ax: Axes, result: Assessment) -> None:
     """A row for each variant: its seaways, their mean, how many left the model."""
     names = list(reversed(result.names))
     swings = {name: np.degrees(result.swing(name)) for name in names}
@@ -137,26 +140,26 @@ def _swings(ax: Axes, result: Judgment) -> None:
         colors = np.where(swing > swings[NONE], style.VERMILION, style.BLUE)
         ax.scatter(swing, rows, s=10.0, c=colors, alpha=0.55, linewidths=0.0, zorder=2.0)
         _diamond(ax, row - 0.16, swing)
-        left = sum(result.left(name).values())
-        if left:
+        departures = sum(result.departures(name).values())
+        if departures:
             ax.plot(LEFT * edge, row, "x", color=style.INK, ms=6.0)
-            style.write(ax, f"{left}", (LEFT * edge, row), (7.0, -3.0), coords="data")
+            style.write(ax, f"{departures}", (LEFT * edge, row), (7.0, -3.0), coords="data")
         label = style.in_lines(name, NAME)
         if name != NONE:
-            worse = round(result.worse(name).value * swing.size)
+            worse = round(result.share_worse(name).value * swing.size)
             label += f"\nworse than none: {worse} of {swing.size}"
         labels.append(label)
     if result.linear is not None:
         by_spectrum = np.degrees(result.linear.values["swing"].rms)
         ends = names.index(NONE) - 0.4, names.index(NONE) + 0.4
         ax.vlines(by_spectrum, *ends, color=style.INK, linewidth=1.0, zorder=4.0)
-    _swing_axis(ax, edge, broken=any(result.left(name) for name in names))
+    _swing_axis(ax, edge, broken=any(result.departures(name) for name in names))
     ax.grid(False, axis="y")
     ax.set_yticks(range(len(names)), labels, fontsize=style.SMALL)
     ax.set_ylim(-0.5, len(names) - 0.5)
 
 
-def _largest_swing(result: Judgment, swings: Sequence[Array]) -> float:
+def _largest_swing(result: Assessment, swings: Sequence[Array]) -> float:
     """Largest number of a panel of swings [deg]; 1 if all runs left the model."""
     largest = max(float(np.nanmax(np.append(swing, 0.0))) for swing in swings)
     ends = [rms_of(swing).high for swing in swings]
@@ -192,8 +195,10 @@ def _diamond(ax: Axes, row: float, swing: Array) -> None:
     ax.add_patch(Polygon(corners, facecolor=style.INK, edgecolor=style.INK, lw=0.8, zorder=3.0))
 
 
-def _limit_legend(result: Judgment, limited: Sequence[Judged]) -> list[Line2D]:
-    decisions = [decision for decision in WITHIN if decision in {one.within for one in limited}]
+def _limit_legend(result: Assessment, limited: Sequence[AssessedQuantity]) -> list[Line2D]:
+    decisions = [
+        decision for decision in WITHIN if decision in {quantity.within for quantity in limited}
+    ]
     handles = []
     for decision in decisions:
         color = FACES[decision] if decision != "not decided" else style.INK
@@ -206,37 +211,39 @@ def _limit_legend(result: Judgment, limited: Sequence[Judged]) -> list[Line2D]:
     return handles
 
 
-def _limits(ax: Axes, result: Judgment, limited: Sequence[Judged]) -> None:
+def _limits(ax: Axes, result: Assessment, limited: Sequence[AssessedQuantity]) -> None:
     """A row for each quantity that has a limit: its largest value as a share of that."""
     others = {name: result.limited(name) for name in result.names[:-1]}
-    shares = [_share(one.largest.high, one.limit) for one in limited]
-    shares += [_share(one.largest.value, one.limit) for found in others.values() for one in found]
+    shares = [_share(quantity.largest.high, quantity.limit) for quantity in limited]
+    for quantities in others.values():
+        shares += [_share(quantity.largest.value, quantity.limit) for quantity in quantities]
     top = max([2.0, *(1.25 * share for share in shares if isfinite(share))])
     end = min(top, MOST_SHARE)
-    quantities = [one.name for one in reversed(limited)]
+    names = [quantity.name for quantity in reversed(limited)]
     ax.axvspan(1.0, end, color=style.VERMILION, alpha=0.07, linewidth=0.0, zorder=0.5)
     ax.axvline(1.0, color=style.VERMILION, linewidth=1.0, zorder=1.5)
-    for name, found in others.items():
-        marker = "s" if name == NONE else "o"
-        for one in found:
-            if one.name in quantities:
-                row = quantities.index(one.name) + 0.18
-                share = _share(one.largest.value, one.limit)
+    for variant, quantities in others.items():
+        marker = "s" if variant == NONE else "o"
+        for quantity in quantities:
+            if quantity.name in names:
+                row = names.index(quantity.name) + 0.18
+                share = _share(quantity.largest.value, quantity.limit)
                 _point(ax, share, row, end, marker, style.FAINT, face="white", ms=4.5)
     labels = []
-    for row, one in enumerate(reversed(limited)):
-        color = FACES[one.within] if one.within != "not decided" else style.INK
-        low, high = (_share(value, one.limit) for value in one.largest[1:])
+    for row, quantity in enumerate(reversed(limited)):
+        color = FACES[quantity.within] if quantity.within != "not decided" else style.INK
+        low = _share(quantity.largest.low, quantity.limit)
+        high = _share(quantity.largest.high, quantity.limit)
         if isfinite(low) and isfinite(high):
             low, high = (min(max(share, LEAST_SHARE), end) for share in (low, high))
             ax.hlines(row, low, high, color=color, linewidth=2.0, zorder=2.5)
-        share = _share(one.largest.value, one.limit)
-        _point(ax, share, row, end, "o", color, face=FACES[one.within], ms=6.5)
-        unit, factor = one.shown
+        share = _share(quantity.largest.value, quantity.limit)
+        _point(ax, share, row, end, "o", color, face=FACES[quantity.within], ms=6.5)
+        unit, factor = quantity.shown
         # what has no more than three decimals is 0: a side-lead without waves across the boom
-        value = f"{round(factor * one.largest.value, 3):.3g}" if isfinite(share) else "–"
-        shown = f"{value} of {factor * one.limit:.3g} {unit}".rstrip()
-        labels.append(f"{LIMITED[one.name].label}\n{shown}")
+        value = f"{round(factor * quantity.largest.value, 3):.3g}" if isfinite(share) else "–"
+        shown = f"{value} of {factor * quantity.limit:.3g} {unit}".rstrip()
+        labels.append(f"{LIMITED[quantity.name].label}\n{shown}")
     ax.set_xscale("log")
     ax.set_xlim(LEAST_SHARE, end)
     ax.xaxis.set_major_locator(FixedLocator([0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0]))
@@ -266,17 +273,22 @@ def _point(
     elif share > end:
         marker = ">"
     face = how.pop("face")
-    place = min(max(share, LEAST_SHARE), end)
-    ax.plot(place, row, marker, color=color, mfc=face, zorder=3.0, clip_on=False, **how)
+    shown = min(max(share, LEAST_SHARE), end)
+    ax.plot(shown, row, marker, color=color, mfc=face, zorder=3.0, clip_on=False, **how)
 
 
 # --- operability ----------------------------------------------------------------------------------
 
 LIMIT_COLORS = (
-    *(style.BLUE, style.VERMILION, style.GREEN, style.PURPLE, style.ORANGE),
-    *(style.INK, style.SKY),
+    style.BLUE,
+    style.VERMILION,
+    style.GREEN,
+    style.PURPLE,
+    style.ORANGE,
+    style.INK,
+    style.SKY,
 )
-"""Colours of limits, the most frequent first; pale ones of the first five are told apart, too."""
+"""Colours of limits, the most frequent first; the first five can be distinguished if pale."""
 PALEST = 0.3
 """Strength of the colour of a cell that one heading alone spoils."""
 ABREAST = 3
@@ -324,14 +336,14 @@ def plot_operability(result: Operability, *, title: str | None = None) -> Figure
     ship = f"roll {seaway.ship.roll_period:g} s" if isinstance(seaway.ship, Hull) else ""
     headings = count(len(result.headings), "heading")
     note = result.scatter.note.removesuffix(".")
-    said = [
+    texts = [
         f"the stronger a colour, the more of {headings} cannot be worked",
         ship,
         note[:1].lower() + note[1:],
         assumed(result.crane),
     ]
-    made = figure.legend(
-        title=remarks(*said),
+    drawn_legend = figure.legend(
+        title=remarks(*texts),
         title_fontproperties={"size": style.SMALL},
         alignment="left",
         handles=legend,
@@ -341,7 +353,7 @@ def plot_operability(result: Operability, *, title: str | None = None) -> Figure
         fontsize=style.SMALL,
         labelcolor=style.INK,
     )
-    made.get_title().set_color(style.GREY)
+    drawn_legend.get_title().set_color(style.GREY)
     return figure
 
 
@@ -356,8 +368,10 @@ def _weights(result: Operability) -> dict[str, float]:
 
 def _cells(ax: Axes, result: Operability, name: str, colors: Mapping[str, str]) -> None:
     """The cells of the scatter diagram, each in its colour."""
-    scatter, cells = result.scatter, result.cells[name]
-    periods, heights = _edges(scatter.period), _edges(scatter.height)
+    scatter = result.scatter
+    cells = result.cells[name]
+    periods = _edges(scatter.period)
+    heights = _edges(scatter.height)
     for row, (period, height) in enumerate(
         zip(scatter.period.tolist(), scatter.height.tolist(), strict=True)
     ):
@@ -369,9 +383,17 @@ def _cells(ax: Axes, result: Operability, name: str, colors: Mapping[str, str]) 
             strength = PALEST + (1.0 - PALEST) * len(spoiled) / len(limits)
             full = np.array(to_rgb(colors.get(most, style.FAINT)))
             color = tuple(1.0 - strength * (1.0 - full))
-        (left, right), (low, high) = periods[period], heights[height]
-        box = (left, low), right - left, high - low
-        ax.add_patch(Rectangle(*box, facecolor=color, edgecolor=style.FAINT, linewidth=0.6))
+        left, right = periods[period]
+        low, high = heights[height]
+        cell = Rectangle(
+            (left, low),
+            right - left,
+            high - low,
+            facecolor=color,
+            edgecolor=style.FAINT,
+            linewidth=0.6,
+        )
+        ax.add_patch(cell)
     ax.set_xlim(min(low for low, _ in periods.values()), max(high for _, high in periods.values()))
     ax.set_ylim(0.0, max(high for _, high in heights.values()))
     ax.grid(False)

@@ -1,4 +1,4 @@
-"""Pages of cranes: a scene that moves, the verdict of a judgment, operability."""
+"""Pages of cranes: a scene that moves, the verdict of an assessment, operability."""
 
 import lazy_loader
 

@@ -19,8 +19,18 @@ STEP = round(RATE / 30.0)
 """Samples between two pictures of the page."""
 MOST_RUNS = 4
 COLUMNS = (
-    *("tip_x", "tip_y", "tip_z", "load_x", "load_y", "load_z", "shaft_slew", "pull", "rope"),
-    *("limits_hoist", "limits_slew", "limits_luff"),
+    "tip_x",
+    "tip_y",
+    "tip_z",
+    "load_x",
+    "load_y",
+    "load_z",
+    "shaft_slew",
+    "pull",
+    "rope",
+    "limits_hoist",
+    "limits_slew",
+    "limits_luff",
 )
 """What the page keeps of each picture, beside the ship's six motions."""
 
@@ -36,7 +46,7 @@ def write_scene(runs: CraneRun | Mapping[str, CraneRun], path: str | Path) -> No
         For none, more than four, or runs that differ in length; if the file cannot be written.
     """
     named = named_runs(runs, MOST_RUNS, "A scene")
-    if len({len(each.out) for each in named.values()}) > 1:
+    if len({len(run.out) for run in named.values()}) > 1:
         raise InputError("The runs of a scene must be of one length.")
     first = next(iter(named.values()))
     g = first.crane.geometry
@@ -52,7 +62,7 @@ def write_scene(runs: CraneRun | Mapping[str, CraneRun], path: str | Path) -> No
             for name, run in named.items()
         ],
     }
-    made = rendered(
+    page = rendered(
         "scene/scene.html",
         ("scene.js",),
         ("scene.css",),
@@ -62,11 +72,11 @@ def write_scene(runs: CraneRun | Mapping[str, CraneRun], path: str | Path) -> No
         provenance=first.crane.provenance(),
         data=script_json(content),
     )
-    write_text(made, path)
+    write_text(page, path)
 
 
 def _pictures(run: CraneRun) -> str:
     """Rows of `COLUMNS` and of the ship's motion, as 4-byte numbers in base64."""
-    kept = np.stack([run[name][::STEP] for name in COLUMNS], axis=1)
-    ship = run.ship[::STEP] if run.ship.shape[1] == 6 else np.zeros((len(kept), 6))
-    return b64encode(np.hstack([kept, ship]).astype("<f4").tobytes()).decode("ascii")
+    signals = np.stack([run[name][::STEP] for name in COLUMNS], axis=1)
+    ship = run.ship[::STEP] if run.ship.shape[1] == 6 else np.zeros((len(signals), 6))
+    return b64encode(np.hstack([signals, ship]).astype("<f4").tobytes()).decode("ascii")

@@ -1,4 +1,4 @@
-"""Pages of what is decided on a crane: judgment of its control, operability; each is one file."""
+"""Pages of what is decided on a crane: assessment of its control, operability; each is one file."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from markupsafe import Markup
 
-from swashplate.crane import Crane, Hull, Judgment, Operability, Seaway, follow
+from swashplate.crane import Assessment, Crane, Hull, Operability, Seaway, follow
 from swashplate.crane.axes import AXES
 from swashplate.crane.drives import UNUSABLE
-from swashplate.crane.studies.judgment import Decision
+from swashplate.crane.studies.crane_assessment import Decision
 from swashplate.crane.studies.operating import WORKABLE, label_of
 from swashplate.crane.studies.study import NONE
 from swashplate.errors import DomainError, InputError
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
     from swashplate.report.fit_report.summary import Light
 
-# --- judgment -------------------------------------------------------------------------------------
+# --- assessment -----------------------------------------------------------------------------------
 
 LIGHTS: dict[Decision, Light] = {"yes": "good", "not decided": "look", "no": "bad"}
 OUTCOMES: dict[str, Light] = {"passes": "good", "not decided": "look", "fails": "bad"}
@@ -61,82 +61,85 @@ PERIODS = np.linspace(4.0, 16.0, 25)
 """Of the sines that axes are asked to follow. [s]"""
 
 
-def write_judgment(judgment: Judgment, path: str | Path) -> None:
-    """Write a judgment's page: one HTML file, whole or not at all, that needs no network.
+def write_assessment(assessment: Assessment, path: str | Path) -> None:
+    """Write an assessment's page: one HTML file, whole or not at all, that needs no network.
 
     It replaces an older file; a `FileError` if it cannot be written.
     """
     # a scene alone needs no figures
-    from swashplate.report.figures import plot_judgment
+    from swashplate.report.figures import plot_assessment
     from swashplate.report.figures.crane import seaway_words
     from swashplate.report.fit_report.summary import light
 
-    study, crane = judgment.study, judgment.study.crane
-    tables = judgment.tables()
+    study = assessment.study
+    crane = study.crane
+    tables = assessment.tables()
     swings, worse = tables[:2]
     limited = tables[2:3] if crane.limits else []
     differences, acting, *remedies = tables[2 + len(limited) :]
-    look = OUTCOMES[judgment.outcome]
+    look = OUTCOMES[assessment.outcome]
     summary = [
-        Block("verdict", (light(look, judgment.outcome), _headline(judgment)), look),
-        *_answers(judgment),
+        Block("verdict", (light(look, assessment.outcome), _headline(assessment)), look),
+        *_answers(assessment),
         *_fit_verdicts(crane),
         *(block for table in limited for block in titled(table, "limits")),
-        _drawn(plot_judgment(judgment), "Swing of each variant in each seaway, and its limits"),
-        *_remedies(judgment, remedies),
+        _drawn(plot_assessment(assessment), "Swing of each variant in each seaway, and its limits"),
+        *_remedies(assessment, remedies),
     ]
     provenance = study.provenance()
-    hangs = [words for words in judgment.sentences()[1:] if words not in provenance]
+    hangs = [words for words in assessment.sentences()[1:] if words not in provenance]
     swing_tables = [block for table in (swings, worse, differences) for block in titled(table)]
     sections = [
         Section("summary", "Summary", summary),
         Section("hangs", "What the answer hangs on", listed_block(hangs)),
         Section("swing", "Swing", [text(IN_WORDS), *swing_tables]),
-        Section("limits", "Limits of the drives", _drives_limits(judgment, acting)),
-        Section("example", "One of the seaways", _example(judgment)),
-        Section("basis", "What it rests on", _basis(judgment)),
+        Section("limits", "Limits of the drives", _drives_limits(assessment, acting)),
+        Section("example", "One of the seaways", _example(assessment)),
+        Section("basis", "What it rests on", _basis(assessment)),
     ]
     facts = [
         seaway_words(study.seaway),
         f"{count(len(study.seeds), 'seaway')} of {study.length / 60.0:g} min",
-        f"{count(len(judgment.names) - 1, 'variant')} beside no control",
+        f"{count(len(assessment.names) - 1, 'variant')} beside no control",
     ]
     title = crane.title or crane.name
     write_text(page(sections, what="Crane", title=title, facts=" · ".join(facts)), path)
 
 
-def _headline(judgment: Judgment) -> str:
+def _headline(assessment: Assessment) -> str:
     """The outcome and the answers to what was asked, in one short sentence."""
-    answers = [HARM[judgment.harmless]] if "harm" in judgment.asked else []
+    answers = [HARM[assessment.harmless]] if "harm" in assessment.questions else []
     joint = "and"
-    if "sufficiency" in judgment.asked and judgment.sufficient is not None:
-        if answers and (judgment.harmless == "yes") != (judgment.sufficient == "yes"):
+    if "sufficiency" in assessment.questions and assessment.sufficient is not None:
+        if answers and (assessment.harmless == "yes") != (assessment.sufficient == "yes"):
             joint = "but"
-        answers.append(SUFFICES[judgment.sufficient])
-    words = "changes nothing" if judgment.idle else f" {joint} ".join(answers)
-    sentence = f"{judgment.outcome.capitalize()}: control ('{judgment.judged}') {words}."
-    return f"{sentence} {judgment.unusable_sentence()}".rstrip()
+        answers.append(SUFFICES[assessment.sufficient])
+    words = "changes nothing" if assessment.idle else f" {joint} ".join(answers)
+    sentence = (
+        f"{assessment.outcome.capitalize()}: control ('{assessment.assessed_variant}') {words}."
+    )
+    return f"{sentence} {assessment.unusable_sentence()}".rstrip()
 
 
-def _answers(judgment: Judgment) -> list[Block]:
+def _answers(assessment: Assessment) -> list[Block]:
     """Both answers with a light of their own, asked or not."""
-    harmless: Decision = "no" if judgment.idle else judgment.harmless
-    terms = [("Harm", LIGHTS[harmless], [judgment.harm_sentence()])]
-    if judgment.sufficient is not None:
-        sentence = judgment.sufficiency_sentence()
-        terms.append(("Sufficiency", LIGHTS[judgment.sufficient], [sentence]))
+    harmless: Decision = "no" if assessment.idle else assessment.harmless
+    terms = [("Harm", LIGHTS[harmless], [assessment.harm_sentence()])]
+    if assessment.sufficient is not None:
+        sentence = assessment.sufficiency_sentence()
+        terms.append(("Sufficiency", LIGHTS[assessment.sufficient], [sentence]))
     for subject, _, sentences in terms:
-        if subject.lower() not in judgment.asked:
+        if subject.lower() not in assessment.questions:
             sentences.append("This was not asked: it does not count for the outcome.")
     return [Block("terms", terms, "verdict")]
 
 
-def _remedies(judgment: Judgment, tables: Sequence[Table]) -> list[Block]:
+def _remedies(assessment: Assessment, tables: Sequence[Table]) -> list[Block]:
     """What would do, and what was tried in vain."""
-    blocks = [text(words) for words in judgment.remedy_sentences()]
+    blocks = [text(words) for words in assessment.remedy_sentences()]
     blocks += [block for table in tables for block in titled(table)]
-    if judgment.tried and judgment.remedies:  # else the sentence says so
-        blocks.append(text(f"Tried as well, and not better: {listed(judgment.tried)}.", "remark"))
+    if assessment.tried and assessment.remedies:  # else the sentence says so
+        blocks.append(text(f"Tried as well, and not better: {listed(assessment.tried)}.", "remark"))
     return blocks
 
 
@@ -145,8 +148,9 @@ def _fit_verdicts(crane: Crane) -> list[Block]:
     looks: dict[bool | None, Light] = {True: "good", False: "bad"}
     terms: list[tuple[str, Light, list[str]]] = []
     for axis in AXES:
-        source, unreached = crane.sources.get(axis), crane.unreached_sentence(axis)
-        look: Light = "look" if source is None else looks.get(source.judged_usable, "look")
+        source = crane.sources.get(axis)
+        unreached = crane.unreached_sentence(axis)
+        look: Light = "look" if source is None else looks.get(source.fit_usable, "look")
         words = [source.words()] if source is not None else []
         if unreached:
             words.append(unreached)
@@ -155,36 +159,38 @@ def _fit_verdicts(crane: Crane) -> list[Block]:
     return [Block("terms", terms, "verdict")] if terms else []
 
 
-def _drives_limits(judgment: Judgment, acting: Table) -> list[Block]:
+def _drives_limits(assessment: Assessment, acting: Table) -> list[Block]:
     """What the axes can follow, and for how long limits act; nothing for ideal drives alone."""
     if not acting.rows:
         return []
-    study = judgment.study
+    study = assessment.study
     pose = study.cases[NONE].pose
     seas = [study.seaway.sea]
     followable = follow(study.crane, PERIODS, seas=seas, seaway=study.seaway, **pose)
     return [text(LIMITS_IN_WORDS), _drawn(followable.plot(), FOLLOWED), *titled(acting)]
 
 
-def _example(judgment: Judgment) -> list[Block]:
+def _example(assessment: Assessment) -> list[Block]:
     """The runs of a typical seaway; nothing if one of them was stopped."""
     from swashplate.report.figures import plot_crane
 
-    seed, judged = judgment.typical, judgment.judged
+    seed = assessment.typical
+    assessed = assessment.assessed_variant
     try:
-        runs = {name: judgment.run(name, seed) for name in (NONE, judged)}
+        runs = {name: assessment.run(name, seed) for name in (NONE, assessed)}
     except (DomainError, InputError):  # a run that was stopped has no signals
         return []
     caption = (
-        f"Seaway {seed}, in which '{judged}' swings as in half of all seaways; it counts from "
-        f"{judgment.study.run_in:g} s on"
+        f"Seaway {seed}, in which '{assessed}' swings as in half of all seaways; it counts from "
+        f"{assessment.study.run_in:g} s on"
     )
     return [_drawn(plot_crane(runs, title=f"Swing in seaway {seed}"), caption)]
 
 
-def _basis(judgment: Judgment) -> list[Block]:
+def _basis(assessment: Assessment) -> list[Block]:
     """Pose, controllers, drives, ship, limits and geometry."""
-    study, crane = judgment.study, judgment.study.crane
+    study = assessment.study
+    crane = study.crane
     pose = study.cases[NONE].pose
     basis = [
         f"Boom at {pose['slew_deg']:g}° from the bow to starboard and {pose['boom_deg']:g}° up, "
@@ -192,7 +198,7 @@ def _basis(judgment: Judgment) -> list[Block]:
         _ship_sentence(study.seaway),
     ]
     for name, case in study.cases.items():
-        control = case.setup["control"]
+        control = case.options["control"]
         if name != NONE:
             drives = count(len(case.cranes), "crane") if case.driven else "ideal drives"
             words = control.words() if control is not None else "no control"
@@ -237,7 +243,8 @@ def write_operability(operability: Operability, path: str | Path) -> None:
 
     It replaces an older file; a `FileError` if it cannot be written.
     """
-    crane, seaway = operability.crane, operability.seaway
+    crane = operability.crane
+    seaway = operability.seaway
     (table,) = operability.tables()
     summary = [
         text(_lead(operability), "lead"),

@@ -1,4 +1,4 @@
-"""Judgment of control over many seaways: does it harm, does it suffice, and what would?
+"""Assessment of control over many seaways: does it harm, does it suffice, and what would?
 
 Two questions have two answers. *Harm*: in which share of seaways is the swing larger than without
 control? *Sufficiency*: does all that has a limit stay within it in a sea of three hours?
@@ -19,7 +19,7 @@ from swashplate.crane.closed_loop.result import PUMPS, CraneRun, limit_table
 from swashplate.crane.control import PositionLoop
 from swashplate.crane.limits import LIMITED
 from swashplate.crane.sea.confidence import (
-    Estimate,
+    ConfidenceInterval,
     counted_words,
     mean_of,
     more_seaways,
@@ -28,8 +28,8 @@ from swashplate.crane.sea.confidence import (
 )
 from swashplate.crane.sea.extremes import THREE_HOURS, largest_of_peaks
 from swashplate.crane.sea.transfer_functions import CRANE_SHIP, Hull
-from swashplate.crane.studies.assumptions import Turn
-from swashplate.crane.studies.outcome import Outcome
+from swashplate.crane.studies.assumptions import TippingPoint
+from swashplate.crane.studies.run_outcome import RunOutcome
 from swashplate.crane.studies.spectral import LinearResponse
 from swashplate.crane.studies.study import NONE, Study, assumed_words
 from swashplate.drive import Limit
@@ -46,7 +46,7 @@ Decision = Literal["yes", "no", "not decided"]
 
 LOOP = PositionLoop()
 """What a clip is tried with: a stiffer loop brings back what the clip takes."""
-NOTHING_TURNS = (
+NO_TIPPING_POINT = (
     "No other damping, roll period, height, period, peak factor, heading or drum that was tried, "
     "each alone, surely turns the answer, by short runs."
 )
@@ -54,12 +54,12 @@ IDLE = 1e-3
 """Relative difference of the swing below which control changes nothing."""
 
 
-class Judged(NamedTuple):
+class AssessedQuantity(NamedTuple):
     """A quantity with a limit, of one variant."""
 
     name: str
     limit: float
-    largest: Estimate
+    largest: ConfidenceInterval
     """Most probable largest value in three hours; of the saturation its mean."""
 
     @property
@@ -98,9 +98,9 @@ class Remedy(NamedTuple):
     """Whether control is worse than none as seldom as allowed then."""
     sufficient: Decision | None
     """Whether all stays within its limits then; None if that was not asked."""
-    worse: Estimate
+    share_worse: ConfidenceInterval
     """Share of seaways in which control is then worse than none."""
-    swing: Estimate
+    swing: ConfidenceInterval
     """Root mean square swing then. [rad]"""
     beyond: tuple[str, ...]
     """What is beyond its limit then, in words."""
@@ -112,30 +112,30 @@ class Remedy(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Judgment(Tabular, Drawn):
+class Assessment(Tabular, Drawn):
     """Variants of control and drives in the same seaways, and what follows."""
 
-    drawn_by: ClassVar[str] = "plot_judgment"
+    drawn_by: ClassVar[str] = "plot_assessment"
 
     study: Study
     """Crane, variants, seaways, and for how long each counts."""
-    outcomes: tuple[tuple[Outcome, ...], ...]
+    outcomes: tuple[tuple[RunOutcome, ...], ...]
     """Of every seaway, in the order of the variants."""
-    allowed: float
+    allowed_share_worse: float
     """Share of seaways in which control may be worse than none."""
-    asked: tuple[Question, ...]
+    questions: tuple[Question, ...]
     """Questions that `passed` answers."""
     linear: LinearResponse | None
     """The crane without control in the frequency domain; None if its swing is not damped."""
     remedies: tuple[Remedy, ...] = ()
     tried: tuple[str, ...] = ()
     """What else was tried, and does not pass all that was asked."""
-    turns: tuple[Turn, ...] | None = None
+    tipping_points: tuple[TippingPoint, ...] | None = None
     """Assumed or given numbers that would turn the answer, if they were others; None if none were
     looked for."""
 
     def __repr__(self) -> str:
-        return f"Judgment({count(len(self.study.seeds), 'seaway')}, {', '.join(self.names)})"
+        return f"Assessment({count(len(self.study.seeds), 'seaway')}, {', '.join(self.names)})"
 
     # --- numbers of variants ----------------------------------------------------------------------
 
@@ -145,40 +145,42 @@ class Judgment(Tabular, Drawn):
         return tuple(self.study.cases)
 
     @property
-    def judged(self) -> str:
+    def assessed_variant(self) -> str:
         """The variant that the verdict is on: the last one."""
         return self.names[-1]
 
-    def of(self, name: str) -> list[Outcome]:
+    def of(self, name: str) -> list[RunOutcome]:
         """Outcomes of a variant in each seaway."""
         check_names("There is no variant", [name], self.names)
         return [outcomes[self.names.index(name)] for outcomes in self.outcomes]
 
     def swing(self, name: str) -> Array:
-        """(n,) root mean square swing in each seaway [rad]; NaN where it left the model."""
+        """(n,) root mean square swing in each seaway [rad]; NaN if it left the model there."""
         return np.array([outcome.rms_swing for outcome in self.of(name)])
 
-    def left(self, name: str) -> dict[str, int]:
+    def departures(self, name: str) -> dict[str, int]:
         """Number of seaways in which a variant is not an operation any more, by reason."""
-        reasons = [outcome.left for outcome in self.of(name) if outcome.left]
+        reasons = [
+            outcome.departure_reason for outcome in self.of(name) if outcome.departure_reason
+        ]
         return {reason: reasons.count(reason) for reason in dict.fromkeys(reasons)}
 
-    def difference(self, name: str, other: str = NONE) -> Estimate:
+    def difference(self, name: str, other: str = NONE) -> ConfidenceInterval:
         """Mean paired difference of the root mean square swing to another variant. [rad]"""
         return mean_of(self.swing(name) - self.swing(other))
 
-    def worse(self, name: str) -> Estimate:
+    def share_worse(self, name: str) -> ConfidenceInterval:
         """Share of seaways in which a variant swings more than no control.
 
         One that leaves the model, or is stopped, is worse than one that does not; if both do, that
         seaway is not decided.
         """
-        return share_worse(self.of(name), self.of(NONE))
+        return share_worse_of(self.of(name), self.of(NONE))
 
-    def limited(self, name: str) -> tuple[Judged, ...]:
-        """All that has a limit, of a variant."""
+    def limited(self, name: str) -> tuple[AssessedQuantity, ...]:
+        """Quantities of a variant that have a limit."""
         outcomes = self.of(name)
-        return judged_limits(outcomes, self.study.crane.limits_si)
+        return assessed_limits(outcomes, self.study.crane.limits_si)
 
     def acting(self, name: str, axis: str, limit: Limit) -> float:
         """Mean share of time for which a limit of a drive acts; NaN if every run was stopped."""
@@ -189,34 +191,34 @@ class Judgment(Tabular, Drawn):
 
     @property
     def harmless(self) -> Decision:
-        """Whether the judged variant is worse than none as seldom as allowed."""
-        share = self.worse(self.judged)
-        if share.low > self.allowed:
+        """Whether the assessed variant is worse than none as seldom as allowed."""
+        share = self.share_worse(self.assessed_variant)
+        if share.low > self.allowed_share_worse:
             return "no"
-        return "yes" if share.high <= self.allowed else "not decided"
+        return "yes" if share.high <= self.allowed_share_worse else "not decided"
 
     @property
     def sufficient(self) -> Decision | None:
         """Whether all stays within its limits in three hours; None if the crane has no limits.
 
-        No, if the judged variant leaves the model once in three hours or more often.
+        No, if the assessed variant leaves the model once in three hours or more often.
         """
         if not self.study.crane.limits:
             return None
-        decisions = [judged.within for judged in self.limited(self.judged)]
+        decisions = [quantity.within for quantity in self.limited(self.assessed_variant)]
         return "no" if self._leaves_often else all_of(decisions)
 
     @property
     def _leaves_often(self) -> bool:
-        left = sum(self.left(self.judged).values())
-        return left * THREE_HOURS >= len(self.study.seeds) * self.study.length
+        departures = sum(self.departures(self.assessed_variant).values())
+        return departures * THREE_HOURS >= len(self.study.seeds) * self.study.length
 
     @property
     def idle(self) -> bool:
-        """Whether the judged variant swings as no control does, in every seaway."""
-        own, none = self.swing(self.judged), self.swing(NONE)
-        same = np.allclose(own, none, rtol=IDLE, equal_nan=True)
-        return bool(same and np.isfinite(own).any())
+        """Whether the assessed variant swings as no control does, in every seaway."""
+        controlled = self.swing(self.assessed_variant)
+        same = np.allclose(controlled, self.swing(NONE), rtol=IDLE, equal_nan=True)
+        return bool(same and np.isfinite(controlled).any())
 
     @property
     def passed(self) -> bool:
@@ -225,15 +227,15 @@ class Judgment(Tabular, Drawn):
             "harm": self.harmless,
             "sufficiency": self.sufficient,
         }
-        return not self.idle and all(answers[question] == "yes" for question in self.asked)
+        return not self.idle and all(answers[question] == "yes" for question in self.questions)
 
     @property
     def outcome(self) -> Literal["passes", "fails", "not decided"]:
-        """`passed`, or whether more seaways could tell."""
+        """Passes if `passed`; not decided if more seaways could decide; else fails."""
         if self.passed:
             return "passes"
-        answers = [self.harmless] if "harm" in self.asked else []
-        if "sufficiency" in self.asked and self.sufficient is not None:
+        answers = [self.harmless] if "harm" in self.questions else []
+        if "sufficiency" in self.questions and self.sufficient is not None:
             answers.append(self.sufficient)
         return "fails" if "no" in answers or self.idle else "not decided"
 
@@ -244,8 +246,8 @@ class Judgment(Tabular, Drawn):
         return " ".join(filter(None, [words, self.unusable_sentence()]))
 
     def unusable_sentence(self) -> str:
-        """Which fits are not usable that the judged variant rests on; empty if there is none."""
-        case = self.study.cases[self.judged]
+        """Which fits are not usable that the assessed variant rests on; empty if there is none."""
+        case = self.study.cases[self.assessed_variant]
         unusable = {
             axis
             for crane in case.cranes
@@ -258,54 +260,58 @@ class Judgment(Tabular, Drawn):
         return f"It rests on the fit of the {axes}, which is not usable."
 
     def verdict(self) -> str:
-        """Both answers on the judged variant, and what would do if it fails."""
+        """Both answers on the assessed variant, and what would do if it fails."""
         sentences = [self.harm_sentence(), self.sufficiency_sentence(), *self.remedy_sentences()]
         return " ".join(filter(None, sentences))
 
     def harm_sentence(self) -> str:
-        """Whether the judged variant harms, and by how much it changes the swing."""
-        share, seaways = self.worse(self.judged), len(self.study.seeds)
-        none, own = (np.degrees(rms_of(self.swing(name)).value) for name in (NONE, self.judged))
-        drives = f"With the drives '{self.judged}' the controller"
+        """Whether the assessed variant harms, and by how much it changes the swing."""
+        share = self.share_worse(self.assessed_variant)
+        seaways = len(self.study.seeds)
+        without = np.degrees(rms_of(self.swing(NONE)).value)
+        controlled = np.degrees(rms_of(self.swing(self.assessed_variant)).value)
+        drives = f"With the drives '{self.assessed_variant}' the controller"
         if self.idle:
             return (
-                f"{drives} changes nothing: {none:.2f} deg RMS without it, {own:.2f} with it, in "
-                f"{count(seaways, 'seaway')}."
+                f"{drives} changes nothing: {without:.2f} deg RMS without it, {controlled:.2f} "
+                f"with it, in {count(seaways, 'seaway')}."
             )
         worse = f"swing worse than none in {counted_words(share, seaways)}"
         if self.harmless == "yes":
-            return f"{drives} does no harm: it makes {worse}{_rms_words(none, own)}."
+            return f"{drives} does no harm: it makes {worse}{_rms_words(without, controlled)}."
         if self.harmless == "no":
-            return f"{drives} harms: it makes {worse}{_rms_words(none, own)}{self._cause()}."
-        both = sum(
-            bool(own.left and other.left)
-            for own, other in zip(self.of(self.judged), self.of(NONE), strict=True)
-        )
-        if both:
             return (
-                f"{drives} makes {worse}; in {both} both leave the model, so that it is not "
+                f"{drives} harms: it makes {worse}{_rms_words(without, controlled)}{self._cause()}."
+            )
+        pairs = zip(self.of(self.assessed_variant), self.of(NONE), strict=True)
+        undecided = sum(bool(run.departure_reason and none.departure_reason) for run, none in pairs)
+        if undecided:
+            return (
+                f"{drives} makes {worse}; in {undecided} both leave the model, so that it is not "
                 "decided whether control harms: take a smaller sea."
             )
         return (
             f"{drives} makes {worse}: that does not say whether it is more than the "
-            f"{100.0 * self.allowed:g} % allowed. Run more seaways "
-            f"({more_seaways(share.value, seaways, self.allowed)})."
+            f"{100.0 * self.allowed_share_worse:g} % allowed. Run more seaways "
+            f"({more_seaways(share.value, seaways, self.allowed_share_worse)})."
         )
 
     def sufficiency_sentence(self) -> str:
-        """Whether the judged variant stays within all limits; empty if the crane has none."""
+        """Whether the assessed variant stays within all limits; empty if the crane has none."""
         if self.sufficient is None:
             return ""
-        limited = self.limited(self.judged)
-        beyond = [judged.words() for judged in limited if judged.within == "no"]
-        open_ = [judged.words() for judged in limited if judged.within == "not decided"]
-        left = sum(self.left(self.judged).values())
+        limited = self.limited(self.assessed_variant)
+        beyond = [quantity.words() for quantity in limited if quantity.within == "no"]
+        undecided = [quantity.words() for quantity in limited if quantity.within == "not decided"]
         if self.sufficient == "yes":
             return "It suffices: in 3 h all stays within its limits."
         if self.sufficient == "no":
-            causes = beyond or [f"it leaves the model in {count(left, 'seaway')}"]
+            departures = sum(self.departures(self.assessed_variant).values())
+            causes = beyond or [f"it leaves the model in {count(departures, 'seaway')}"]
             return f"It does not suffice: in 3 h {'; '.join(causes)}."
-        return f"Whether it suffices is not decided: in 3 h {'; '.join(open_)}. Run more seaways."
+        return (
+            f"Whether it suffices is not decided: in 3 h {'; '.join(undecided)}. Run more seaways."
+        )
 
     def remedy_sentences(self) -> list[str]:
         """What would do, or that nothing that was tried would; none if nothing was."""
@@ -320,7 +326,7 @@ class Judgment(Tabular, Drawn):
         what = remedy.what.capitalize()
         if remedy.harmless == "not decided":
             seaways = len(self.study.seeds)
-            more = more_seaways(remedy.worse.value, seaways, self.allowed)
+            more = more_seaways(remedy.share_worse.value, seaways, self.allowed_share_worse)
             if remedy.sufficient == "no":
                 beyond = "; ".join(remedy.beyond)
                 return f"{what} may do no harm, but would not suffice: in 3 h {beyond}."
@@ -333,11 +339,13 @@ class Judgment(Tabular, Drawn):
 
     def _cause(self) -> str:
         """The limit that acts for the longest time."""
-        if not self.study.cases[self.judged].driven:
+        if not self.study.cases[self.assessed_variant].driven:
             return ""
         names = {Limit.ORIFICE: "acceleration limit", Limit.SWASH_STOP: "speed limit"}
         shares = [
-            (self.acting(self.judged, axis, limit), axis, limit) for axis in AXES for limit in names
+            (self.acting(self.assessed_variant, axis, limit), axis, limit)
+            for axis in AXES
+            for limit in names
         ]
         share, axis, limit = max(shares, key=lambda entry: float(np.nan_to_num(entry[0])))
         if np.isnan(share):
@@ -352,8 +360,8 @@ class Judgment(Tabular, Drawn):
 
     @property
     def typical(self) -> int:
-        """Seed of the seaway in which the judged variant swings as in half of them."""
-        order = np.argsort(self.swing(self.judged))
+        """Seed of the seaway in which the assessed variant swings as in half of them."""
+        order = np.argsort(self.swing(self.assessed_variant))
         return self.study.seeds[int(order[len(order) // 2])]
 
     def tables(self) -> list[Table]:
@@ -374,7 +382,8 @@ class Judgment(Tabular, Drawn):
         return [*tables, self._remedy_table()] if self.remedies else tables
 
     def _swing_table(self) -> Table:
-        seaways, minutes = len(self.study.seeds), self.study.length / 60.0
+        seaways = len(self.study.seeds)
+        minutes = self.study.length / 60.0
         interval = [Column(head, ".2f", "rad", none="–") for head in ("rms", "from", "to")]
         table = Table(
             f"Swing in {count(seaways, 'seaway')} of {minutes:g} min, 95 % intervals",
@@ -391,8 +400,8 @@ class Judgment(Tabular, Drawn):
                 name,
                 *rms_of(self.swing(name)),
                 largest_of(self.of(name), "swing").value,
-                sum(self.left(name).values()),
-                look=name != NONE and self.worse(name).value > self.allowed,
+                sum(self.departures(name).values()),
+                look=name != NONE and self.share_worse(name).value > self.allowed_share_worse,
             )
             if name == NONE and self.linear is not None:
                 swing = self.linear.values["swing"]
@@ -400,31 +409,39 @@ class Judgment(Tabular, Drawn):
         return table
 
     def _worse_table(self) -> Table:
-        share = [Column("worse than none", ".1%"), Column("from", ".1%"), Column("to", ".1%")]
-        columns = (Column("variant", wrap=True), Column("seaways", "d"), *share)
+        shares = [Column("worse than none", ".1%"), Column("from", ".1%"), Column("to", ".1%")]
+        columns = (Column("variant", wrap=True), Column("seaways", "d"), *shares)
         table = Table("More swing than without control, 95 % intervals", columns)
         seaways = len(self.study.seeds)
         for name in self.names[1:]:
-            found = self.worse(name)
-            look = found.value > self.allowed
-            table.add(name, round(found.value * seaways), *found, look=look)
+            share_worse = self.share_worse(name)
+            look = share_worse.value > self.allowed_share_worse
+            table.add(name, round(share_worse.value * seaways), *share_worse, look=look)
         return table
 
     def _limit_table(self) -> Table:
-        """What has a limit, of the judged variant."""
+        """What has a limit, of the assessed variant."""
         heads = ("limit", "in 3 h", "from", "to")
         numbers = [Column(head, ".3g", none="–") for head in heads]
         last = (Column("within"), Column(NONE, ".3g", none="–"))
         columns = (Column("quantity"), Column("unit"), *numbers, *last)
-        table = Table(f"Limits, '{self.judged}'", columns, "in 3 h: most probable largest value")
-        none = {judged.name: judged.largest.value for judged in self.limited(NONE)}
-        for judged in self.limited(self.judged):
-            unit, factor = judged.shown
+        table = Table(
+            f"Limits, '{self.assessed_variant}'", columns, "in 3 h: most probable largest value"
+        )
+        none = {quantity.name: quantity.largest.value for quantity in self.limited(NONE)}
+        for quantity in self.limited(self.assessed_variant):
+            unit, factor = quantity.shown
             # a side-lead without waves across the boom is 0, not a millionth of a degree
-            values = [round(factor * number, 3) for number in (judged.limit, *judged.largest)]
-            label, within = LIMITED[judged.name].label, judged.within
-            without = round(factor * none.get(judged.name, nan), 3)
-            table.add(label, unit, *values, within, without, look=within != "yes")
+            values = [round(factor * number, 3) for number in (quantity.limit, *quantity.largest)]
+            without = round(factor * none.get(quantity.name, nan), 3)
+            table.add(
+                LIMITED[quantity.name].label,
+                unit,
+                *values,
+                quantity.within,
+                without,
+                look=quantity.within != "yes",
+            )
         return table
 
     def _difference_table(self) -> Table:
@@ -442,7 +459,7 @@ class Judgment(Tabular, Drawn):
         note = f"tried on the crane's own drives; a clip with a position loop of {LOOP.gain:g} /s"
         table = Table("Remedies", (Column("remedy"), *share, *interval), note)
         for remedy in self.remedies:
-            table.add(remedy.what, *remedy.worse, *remedy.swing)
+            table.add(remedy.what, *remedy.share_worse, *remedy.swing)
         return table
 
     def to_polars(self) -> polars.DataFrame:
@@ -454,7 +471,10 @@ class Judgment(Tabular, Drawn):
         for seed, outcomes in zip(self.study.seeds, self.outcomes, strict=True):
             for name, outcome in zip(self.names, outcomes, strict=True):
                 row = {"seed": seed, "variant": name, "rms_swing": outcome.rms_swing}
-                row |= {"largest_swing": outcome.largest_swing, "left": outcome.left}
+                row |= {
+                    "largest_swing": outcome.largest_swing,
+                    "departure": outcome.departure_reason,
+                }
                 row |= dict(zip(limits, outcome.limits.ravel().tolist(), strict=True))
                 rows.append(row)
         return pl.DataFrame(rows)
@@ -465,40 +485,50 @@ class Judgment(Tabular, Drawn):
     def sentences(self) -> tuple[str, ...]:
         """The verdict, what it rests on, and what would turn it."""
         study = self.study
-        sentences = [self.verdict(), *self._rests()]
+        sentences = [self.verdict(), *self._basis()]
         for name in self.names:
-            for reason, seaways in self.left(name).items():
+            for reason, seaways in self.departures(name).items():
                 of = count(len(study.seeds), "seaway")
                 sentences.append(f"'{name}' is not an operation in {seaways} of {of}: {reason}.")
-        if self.turns is not None:
-            sentences += [turn.words() for turn in self.turns] or [NOTHING_TURNS]
+        if self.tipping_points is not None:
+            sentences += [point.words() for point in self.tipping_points] or [NO_TIPPING_POINT]
         sentences += study.seaway.sentences()
         return (*sentences, *study.provenance())
 
-    def _rests(self) -> list[str]:
-        """What the answers hang on, in sentences."""
-        study, crane = self.study, self.study.crane
+    def _basis(self) -> list[str]:
+        """What the answers rest on, in sentences."""
+        study = self.study
+        crane = study.crane
         none = study.cases[NONE]
         start = "a stationary swing" if none.swing_damping > 0.0 else "rest, as it is undamped"
         rule = (
             f"Each seaway counts for {study.length:g} s after {study.run_in:g} s from {start}. "
             "Control harms if it is worse than none in more than "
-            f"{100.0 * self.allowed:g} % of them; the 95 % interval of that share decides."
+            f"{100.0 * self.allowed_share_worse:g} % of them; the 95 % interval of that share "
+            "decides."
         )
-        seaway, spectrum = study.seaway, study.seaway.spectrum
+        seaway = study.seaway
+        spectrum = seaway.spectrum
         waves = (
             f"Waves of {spectrum.height:g} m with a peak at {spectrum.period:g} s and a peak "
             f"factor of {spectrum.peak_factor:g}, at a heading of {seaway.heading_deg:g} deg."
         )
-        damping, given = none.swing_damping, "swing_damping" in none.hangs
-        assumed = not given and crane.quantities["swing_damping"].status == "assumed"
-        words = f"The load's swing has a damping of {100.0 * damping:g} %"
-        case = study.cases[self.judged].words()
-        sentences = [case, rule, waves, f"{words}, assumed." if assumed else f"{words}."]
-        ship = study.seaway.ship
+        damping_assumed = (
+            "swing_damping" not in none.hangs
+            and crane.quantities["swing_damping"].status == "assumed"
+        )
+        damping = f"The load's swing has a damping of {100.0 * none.swing_damping:g} %"
+        case = study.cases[self.assessed_variant].words()
+        sentences = [
+            case,
+            rule,
+            waves,
+            f"{damping}, assumed." if damping_assumed else f"{damping}.",
+        ]
+        ship = seaway.ship
         if isinstance(ship, Hull):
-            words = f"The ship's roll period is {ship.roll_period:g} s"
-            sentences.append(f"{words}, assumed." if ship == CRANE_SHIP else f"{words}.")
+            roll = f"The ship's roll period is {ship.roll_period:g} s"
+            sentences.append(f"{roll}, assumed." if ship == CRANE_SHIP else f"{roll}.")
         peak = 1.0 / spectrum.period
         for axis, source in crane.sources.items():
             if 0.0 < source.fastest_sine < peak:
@@ -509,42 +539,57 @@ class Judgment(Tabular, Drawn):
         return [*sentences, *assumed_words(crane)]
 
 
-def _rms_words(none: float, own: float) -> str:
-    """Swing without control and with it, as far as either is known."""
-    without = "not an operation" if np.isnan(none) else f"{none:.2f} deg RMS"
-    with_it = "not an operation" if np.isnan(own) else f"{own:.2f}"
-    return f": {without} without it, {with_it} with it"
+def _rms_words(without: float, controlled: float) -> str:
+    """Swing without control and with it [deg], as far as either is known."""
+    without_it = "not an operation" if np.isnan(without) else f"{without:.2f} deg RMS"
+    with_it = "not an operation" if np.isnan(controlled) else f"{controlled:.2f}"
+    return f": {without_it} without it, {with_it} with it"
 
 
-def share_worse(own: Sequence[Outcome], none: Sequence[Outcome]) -> Estimate:
-    """Share of seaways in which control swings more than none; see `Judgment.worse`."""
-    worse = unknown = 0
-    for one, other in zip(own, none, strict=True):
-        if one.left and other.left:
-            unknown += 1
-        elif one.left or (not other.left and one.rms_swing > other.rms_swing):
+def share_worse_of(
+    controlled: Sequence[RunOutcome], none: Sequence[RunOutcome]
+) -> ConfidenceInterval:
+    """Share of seaways in which control swings more than none; see `Assessment.share_worse`."""
+    worse = 0
+    undecided = 0
+    for run, uncontrolled in zip(controlled, none, strict=True):
+        if run.departure_reason and uncontrolled.departure_reason:
+            undecided += 1
+        elif _is_worse(run, uncontrolled):
             worse += 1
-    return share_of(worse, len(own), unknown)
+    return share_of(worse, len(controlled), undecided)
 
 
-def largest_of(outcomes: Sequence[Outcome], name: str) -> Estimate:
+def _is_worse(run: RunOutcome, uncontrolled: RunOutcome) -> bool:
+    """Whether a run with control is worse than that without, of which one at least was whole."""
+    if run.departure_reason or uncontrolled.departure_reason:
+        return bool(run.departure_reason)
+    return run.rms_swing > uncontrolled.rms_swing
+
+
+def largest_of(outcomes: Sequence[RunOutcome], name: str) -> ConfidenceInterval:
     """Most probable largest value of a quantity in three hours, from its peaks in many runs."""
     runs = [outcome.peaks[name] for outcome in outcomes if name in outcome.peaks]
     observed = sum(outcome.counted for outcome in outcomes)
     return largest_of_peaks(runs, max(observed, 1.0))
 
 
-def judged_limits(outcomes: Sequence[Outcome], limits: Mapping[str, float]) -> tuple[Judged, ...]:
-    """All that has a limit; what the runs do not have, as a place if the operator moves, is not."""
-    judged = []
+def assessed_limits(
+    outcomes: Sequence[RunOutcome], limits: Mapping[str, float]
+) -> tuple[AssessedQuantity, ...]:
+    """Quantities that have a limit and that the runs have.
+
+    Limits of quantities that the runs lack, such as a place if the operator moves, are left out.
+    """
+    quantities = []
     for name, limit in limits.items():
         if name == "saturation":
             shares = np.array([outcome.saturation for outcome in outcomes])
             if np.isfinite(shares).any():
-                judged.append(Judged(name, limit, mean_of(shares, 0.0)))
+                quantities.append(AssessedQuantity(name, limit, mean_of(shares, 0.0)))
         elif any(name in outcome.peaks for outcome in outcomes):
-            judged.append(Judged(name, limit, largest_of(outcomes, name)))
-    return tuple(judged)
+            quantities.append(AssessedQuantity(name, limit, largest_of(outcomes, name)))
+    return tuple(quantities)
 
 
 def all_of(decisions: Sequence[Decision]) -> Decision:

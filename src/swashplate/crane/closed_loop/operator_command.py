@@ -1,4 +1,4 @@
-"""Sticks: what the operator asks for over time, as parts of each drive's full speed."""
+"""What the operator commands over time, as parts of each drive's full speed."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ Array = NDArray[np.float64]
 LONGEST = 86_400.0
 """A day, longer than any run. [s]"""
 TARGETS = {"hoist": "rope_m", "slew": "slew_deg", "luff": "boom_deg"}
-"""Where an axis is led to: rope below the tip, slew, elevation of the boom."""
+"""What the target of an axis is called: rope below the tip, slew, elevation of the boom."""
 
 
 @dataclass(frozen=True, eq=False)
-class Stick(Result):
+class OperatorCommand(Result):
     """Commands of hoist, slew and luff, each from -1 to 1.
 
     Positive ones hoist, slew to starboard, lift the boom. Made by `trapezoid`, `record`, `rest`.
@@ -55,13 +55,13 @@ class Stick(Result):
         start: float = 1.0,
         ramp: float = 0.5,
         length: float = 60.0,
-    ) -> Stick:
+    ) -> OperatorCommand:
         """Trapezoids of all axes from one moment on.
 
         Parameters
         ----------
         hoist, slew, luff : float
-            Part of the full speed, -1 to 1, its sign that of the way.
+            Part of the full speed, -1 to 1; its sign is that of the direction.
         until : mapping of str to float, optional
             Where an ideal drive would end: ``slew_deg`` from forward, ``boom_deg``, ``rope_m``,
             with what the luff pays out; each needs the command of its axis.
@@ -70,7 +70,8 @@ class Stick(Result):
         start, ramp, length : float
             Moment of the first ramp, time of each ramp, length of the record, at most a day. [s]
         """
-        parts, targets = {"hoist": hoist, "slew": slew, "luff": luff}, dict(until or {})
+        parts = {"hoist": hoist, "slew": slew, "luff": luff}
+        targets = dict(until or {})
         check_names("There is no target", targets, TARGETS.values())
         for axis, part in parts.items():
             target = TARGETS[axis]
@@ -92,31 +93,31 @@ class Stick(Result):
         return cls(length, start, ramp, moving, targets, duration)
 
     @classmethod
-    def record(cls, commands: ArrayLike, rate: float = 512.0) -> Stick:
+    def record(cls, commands: ArrayLike, rate: float = 512.0) -> OperatorCommand:
         """Commands as they were recorded at a rate [Hz], straight between samples.
 
         They are (n, 3), of hoist, slew and luff, -1 to 1.
         """
-        made = np.array(commands, dtype=np.float64)
-        if made.ndim != 2 or made.shape[1] != 3 or len(made) < 2 or not rate > 0.0:
+        samples = np.array(commands, dtype=np.float64)
+        if samples.ndim != 2 or samples.shape[1] != 3 or len(samples) < 2 or not rate > 0.0:
             raise InputError(
                 "A recorded stick has two or more rows of hoist, slew and luff, at a rate above "
                 "0 Hz."
             )
-        length = (len(made) - 1) / rate
+        length = (len(samples) - 1) / rate
         if not length <= LONGEST:
             raise InputError(
                 f"The recorded stick lasts {length:g} s at {rate:g} Hz, but a run at most "
                 f"{LONGEST:g} s: look at its rate."
             )
-        wrong = np.flatnonzero(~(np.abs(made) <= 1.0).all(axis=1))
+        wrong = np.flatnonzero(~(np.abs(samples) <= 1.0).all(axis=1))
         if wrong.size:
             raise InputError(f"Row {wrong[0]} of the stick is not within -1 to 1 on every axis.")
-        made.flags.writeable = False
-        return cls(length, samples=made, rate=float(rate))
+        samples.flags.writeable = False
+        return cls(length, samples=samples, rate=float(rate))
 
     @classmethod
-    def rest(cls, length: float = 60.0) -> Stick:
+    def rest(cls, length: float = 60.0) -> OperatorCommand:
         """Nothing, for so long. [s]"""
         return cls.trapezoid(length=length)
 
@@ -127,47 +128,68 @@ class Stick(Result):
         """
         time = np.arange(round(self.length * rate) + 1) / rate
         if self.samples is not None:
-            grid = np.arange(len(self.samples)) / self.rate
-            made = np.stack([np.interp(time, grid, each) for each in self.samples.T], axis=1)
-            busy = np.flatnonzero(np.any(self.samples != 0.0, axis=1))
-            return made, float(grid[busy[-1]]) if busy.size else 0.0
-        made, end, g = np.zeros((time.size, 3)), 0.0, crane.geometry
-        turned = 0.0  # by the shaft of the luff, whose way pays out rope below the tip
-        for axis in ("luff", "hoist", "slew"):
+            return self._recorded(self.samples, time)
+        commands = np.zeros((time.size, 3))
+        end = 0.0
+        luff_angle = 0.0
+        for axis in ("luff", "hoist", "slew"):  # what the luff pays out counts for the hoist
             if axis not in self.parts:
                 continue
             part = self.parts[axis]
             low, high = crane.inverse(axis).limits
             speed = part * high if part > 0.0 else -part * low
-            # time from zero to zero that brings an ideal drive to its target
-            name, lasts = TARGETS[axis], self.duration or 0.0
-            if name in self.until:
-                target = self.until[name]
-                boom = Boom(cos(radians(target)), sin(radians(target)))
-                way = (
-                    (home.rope - target + g.coupling * g.luff * turned) / g.hoist,
-                    radians(target) - home.slew,
-                    (home.luff_rope - luff_rope(boom, g)) / g.luff,
-                )[AXES.index(axis)]
-                if way * speed <= 0.0:
-                    raise InputError(
-                        f"The {axis} leads away from {name} = {target:g}, or is there already: "
-                        "change the sign of its command or the target."
-                    )
-                lasts = way / speed + self.ramp
+            duration = self._duration(axis, speed, crane, home, luff_angle)
             if axis == "luff":
-                turned = speed * (lasts - self.ramp)
-            if lasts < 2.0 * self.ramp:
+                luff_angle = speed * (duration - self.ramp)
+            corners = self.start + np.array([0.0, self.ramp, duration - self.ramp, duration])
+            commands[:, AXES.index(axis)] = np.interp(time, corners, [0.0, part, part, 0.0])
+            end = max(end, self.start + duration)
+        return commands, end
+
+    def _recorded(self, samples: Array, time: Array) -> tuple[Array, float]:
+        """Recorded commands at other times, and when the last of them ends. [s]"""
+        recorded_at = np.arange(len(samples)) / self.rate
+        columns = [np.interp(time, recorded_at, column) for column in samples.T]
+        moving = np.flatnonzero(np.any(samples != 0.0, axis=1))
+        end = float(recorded_at[moving[-1]]) if moving.size else 0.0
+        return np.stack(columns, axis=1), end
+
+    def _duration(
+        self, axis: str, speed: float, crane: Crane, home: Home, luff_angle: float
+    ) -> float:
+        """Time from zero to zero of an axis's command, by its target or as it is given. [s]
+
+        `speed` is that of an ideal drive [rad/s], `luff_angle` what the luff's shaft turns [rad].
+        """
+        duration = self.duration or 0.0
+        target = TARGETS[axis]
+        if target in self.until:
+            angle = _angle_to(axis, self.until[target], crane, home, luff_angle)
+            if angle * speed <= 0.0:
                 raise InputError(
-                    f"The {axis} moves for {lasts:.3g} s, less than its two ramps of "
-                    f"{self.ramp:g} s: take a smaller command or shorter ramps."
+                    f"The {axis} leads away from {target} = {self.until[target]:g}, or is there "
+                    "already: change the sign of its command or the target."
                 )
-            if self.start + lasts > self.length:
-                raise InputError(
-                    f"The stick of the {axis} ends at {self.start + lasts:.4g} s, but the record "
-                    f"at {self.length:g} s: take a longer record."
-                )
-            corners = self.start + np.array([0.0, self.ramp, lasts - self.ramp, lasts])
-            made[:, AXES.index(axis)] = np.interp(time, corners, [0.0, part, part, 0.0])
-            end = max(end, self.start + lasts)
-        return made, end
+            duration = angle / speed + self.ramp
+        if duration < 2.0 * self.ramp:
+            raise InputError(
+                f"The {axis} moves for {duration:.3g} s, less than its two ramps of "
+                f"{self.ramp:g} s: take a smaller command or shorter ramps."
+            )
+        if self.start + duration > self.length:
+            raise InputError(
+                f"The stick of the {axis} ends at {self.start + duration:.4g} s, but the record "
+                f"at {self.length:g} s: take a longer record."
+            )
+        return duration
+
+
+def _angle_to(axis: str, target: float, crane: Crane, home: Home, luff_angle: float) -> float:
+    """What the shaft of an axis turns from home to a target of `TARGETS`. [rad]"""
+    g = crane.geometry
+    if axis == "hoist":
+        return (home.rope - target + g.coupling * g.luff * luff_angle) / g.hoist
+    if axis == "slew":
+        return radians(target) - home.slew
+    boom = Boom(cos(radians(target)), sin(radians(target)))
+    return float((home.luff_rope - luff_rope(boom, g)) / g.luff)

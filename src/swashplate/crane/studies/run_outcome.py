@@ -17,16 +17,16 @@ from swashplate.drive import Limit
 Array = NDArray[np.float64]
 
 EVERY = 32
-"""Samples from one of those that count to the next: 16 a second, of periods of 2 s and more."""
+"""Every so many samples one counts: 16 a second, of periods of 2 s and more."""
 ELASTIC_EVERY = 4
-"""The same of the tension of an elastic rope, whose bounce has a few hertz."""
+"""The same for the tension of an elastic rope, whose bounce has a few hertz."""
 BITS = np.arange(2 ** len(PUMPS))[:, None] >> np.arange(len(PUMPS)) & 1
 """Which of `PUMPS` act, a row for each sum of the loop's bits."""
 SATURATED = (1 << PUMPS.index(Limit.ORIFICE)) | (1 << PUMPS.index(Limit.SWASH_STOP))
-"""Bits of the limits at which a drive does not do what it is asked to: acceleration and speed."""
+"""Bits of the limits at which a drive does not follow its command: acceleration and speed."""
 
 
-class Outcome(NamedTuple):
+class RunOutcome(NamedTuple):
     """What counts of one run, in SI."""
 
     rms_swing: float
@@ -40,19 +40,25 @@ class Outcome(NamedTuple):
     """Peaks of quantities by names of `limits.LIMITED`, until the run left the model."""
     counted: float
     """Time for which peaks count. [s]"""
-    left: str
+    departure_reason: str
     """Why the run is not an operation any more from some time on; empty if it is one."""
 
 
 LEAST = 10.0
 """Time below which nothing counts. [s]"""
-STOPPED = Outcome(
-    np.nan, np.nan, np.full((3, len(PUMPS)), np.nan), np.nan, {}, 0.0, "stopped at a limit"
+STOPPED = RunOutcome(
+    rms_swing=np.nan,
+    largest_swing=np.nan,
+    limits=np.full((3, len(PUMPS)), np.nan),
+    saturation=np.nan,
+    peaks={},
+    counted=0.0,
+    departure_reason="stopped at a limit",
 )
 """Of a run that met a limit of the crane's travel, or left the domain of a drive's model."""
 
 
-def outcome_of(run: CraneRun, start: float, wanted: tuple[float, float] | None) -> Outcome:
+def outcome_of(run: CraneRun, start: float, target: tuple[float, float] | None) -> RunOutcome:
     """What counts of a run from a time [s] on.
 
     Parameters
@@ -60,20 +66,23 @@ def outcome_of(run: CraneRun, start: float, wanted: tuple[float, float] | None) 
     run : CraneRun
     start : float
         [s]
-    wanted : (float, float), optional
+    target : (float, float), optional
         Where the load shall be, horizontal and inertial [m]; None if it shall move.
     """
-    first, left = round(start * RATE), run.left_model
-    last = len(run.stored) if left is None else round(left.time * RATE)
-    reason = "" if left is None else left.reason
+    first = round(start * RATE)
+    departure = run.departure
+    last = len(run.stored) if departure is None else round(departure.time * RATE)
+    reason = "" if departure is None else departure.reason
     counted = max(last - first, 0) / RATE
     if counted < LEAST:
-        return STOPPED._replace(left=reason)
-    some = slice(first, last, EVERY)
-    load, tip = run.load[some], run.tip[some]
+        return STOPPED._replace(departure_reason=reason)
+    counting = slice(first, last, EVERY)
+    load = run.load[counting]
+    tip = run.tip[counting]
+    hook = run.hook[counting]
     swing = swing_of(load, tip)
-    hook, slew = run.hook[some], run.fixed.home.slew + run["shaft_slew"][some]
-    out, across = rope_leads(hook - tip, slew, run.ship[some]).T
+    slew = run.fixed.home.slew + run["shaft_slew"][counting]
+    out, across = rope_leads(hook - tip, slew, run.ship[counting]).T
     speed = np.abs(np.diff(hook[:, 2])) * RATE / EVERY
     hoist = run.crane.geometry.hoist * min(np.abs(run.crane.inverse("hoist").limits))
     elastic = run.fixed.hanging.stiffness > 0.0
@@ -88,28 +97,33 @@ def outcome_of(run: CraneRun, start: float, wanted: tuple[float, float] | None) 
     jumps = run.actuation == "ideal" and run.fixed.settings.path
     if not jumps:  # of speed, which are impulses of the rope
         peaks["dynamic_factor"] = peaks_of(pull / GRAVITY)
-    if wanted is not None:
-        away = load[:, :2] - np.array(wanted)
+    if target is not None:
+        away = load[:, :2] - np.array(target)
         peaks["placement"] = peaks_of(np.hypot(away[:, 0], away[:, 1]))
-    limits = _acting(run, slice(first, last))
-    saturation = _saturated(run, slice(first, last))
-    rms = float(np.sqrt(np.mean(swing**2))) if left is None else np.nan
-    largest = float(swing.max()) if left is None else np.nan
-    return Outcome(rms, largest, limits, saturation, peaks, counted, reason)
+    whole = departure is None
+    return RunOutcome(
+        rms_swing=float(np.sqrt(np.mean(swing**2))) if whole else np.nan,
+        largest_swing=float(swing.max()) if whole else np.nan,
+        limits=_acting(run, slice(first, last)),
+        saturation=_saturated(run, slice(first, last)),
+        peaks=peaks,
+        counted=counted,
+        departure_reason=reason,
+    )
 
 
-def _acting(run: CraneRun, some: slice) -> Array:
+def _acting(run: CraneRun, samples: slice) -> Array:
     """(3, 5) shares of time for which `PUMPS` act on the drives."""
     shares = np.zeros((len(AXES), len(PUMPS)))
     for row, axis in zip(shares, AXES, strict=True):
-        bits = run[f"limits_{axis}"][some].astype(np.uint8)
+        bits = run[f"limits_{axis}"][samples].astype(np.uint8)
         row[:] = np.bincount(bits, minlength=len(BITS)) @ BITS / len(bits)
     return shares
 
 
-def _saturated(run: CraneRun, some: slice) -> float:
+def _saturated(run: CraneRun, samples: slice) -> float:
     """Largest share of time, over the drives, at the acceleration or the speed limit."""
     return max(
-        float(np.mean((run[f"limits_{axis}"][some].astype(np.uint8) & SATURATED) > 0))
+        float(np.mean((run[f"limits_{axis}"][samples].astype(np.uint8) & SATURATED) > 0))
         for axis in AXES
     )

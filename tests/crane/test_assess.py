@@ -1,4 +1,4 @@
-"""Judgment over seaways, sweeps, and what the axes can follow."""
+"""Assessment over seaways, sweeps, and what the axes can follow."""
 
 from dataclasses import replace
 from math import pi
@@ -11,23 +11,23 @@ from swashplate import Campaign, Drive, rig
 from swashplate.analysis.monte_carlo import Draws, stored_draws
 from swashplate.crane import (
     Crane,
+    OperatorCommand,
     Seaway,
     Spectrum,
-    Stick,
     Study,
+    assess,
     control,
     drawn_cranes,
     follow,
-    judge,
     simulate,
     sweep,
-    upgraded,
+    with_design_change,
 )
 from swashplate.crane.closed_loop.result import PUMPS
 from swashplate.crane.rope import GRAVITY
 from swashplate.crane.sea.confidence import fewest_seaways, mean_of, more_seaways, share_of
-from swashplate.crane.studies.judging import seaways_needed
-from swashplate.crane.studies.outcome import STOPPED
+from swashplate.crane.studies.assessing import seaways_needed
+from swashplate.crane.studies.run_outcome import STOPPED
 from swashplate.drive import Limit
 from swashplate.errors import InputError, ParameterError
 from swashplate.executors import Processes, Serial, Threads
@@ -39,7 +39,7 @@ from swashplate.maneuvers import source_tests
 MEANT = control.DelayedFeedback(0.2, 0.2) | control.ShipCompensation() | control.PositionLoop(1.5)
 CLIPPED = control.DelayedFeedback(0.2, 0.2) | control.ShipCompensation() | control.Clip()
 SHORT = {"length": 60.0, "run_in": 20.0}
-QUICK = {**SHORT, "remedies": False, "turns": False}
+QUICK = {**SHORT, "remedies": False, "tipping_points": False}
 
 
 @pytest.fixture(scope="module")
@@ -48,13 +48,13 @@ def crane():
 
 
 @pytest.fixture(scope="module")
-def judged(crane):
-    return judge(crane, CLIPPED, seeds=range(12), allowed=0.3, **QUICK)
+def assessed(crane):
+    return assess(crane, CLIPPED, seeds=range(12), allowed_share_worse=0.3, **QUICK)
 
 
-def test_numbers_are_those_of_whole_runs(judged):
-    run = judged.run("identified", 3)
-    outcome = judged.of("identified")[3]
+def test_numbers_are_those_of_whole_runs(assessed):
+    run = assessed.run("identified", 3)
+    outcome = assessed.of("identified")[3]
     some = slice(round(20.0 * 512), None, 32)
     swing = np.radians(run.swing_deg[some])
     assert outcome.rms_swing == pytest.approx(np.sqrt(np.mean(swing**2)), rel=1e-12)
@@ -81,11 +81,11 @@ def test_place_is_where_the_tip_hangs_without_waves(crane):
     seaway = Seaway("ss2", list_deg=3.0)
     case = Study.of(crane, CLIPPED, seeds=[0], sea=seaway).cases["no control"]
     lean = np.tile(seaway.lean, (1025, 1))
-    run = simulate(crane, Stick.rest(2.0), sea=lean, slew_deg=90.0, rope_m=27.0)
-    assert case.wanted(seaway) == pytest.approx(tuple(run.tip[-1, :2]), abs=1e-9)
-    moving = Study.of(crane, CLIPPED, seeds=[0], stick=Stick.trapezoid(slew=0.5, duration=30.0,
-                                                                       length=200.0))  # fmt: skip
-    assert moving.cases["no control"].wanted(seaway) is None
+    run = simulate(crane, OperatorCommand.rest(2.0), sea=lean, slew_deg=90.0, rope_m=27.0)
+    assert case.target(seaway) == pytest.approx(tuple(run.tip[-1, :2]), abs=1e-9)
+    stick = OperatorCommand.trapezoid(slew=0.5, duration=30.0, length=200.0)
+    moving = Study.of(crane, CLIPPED, seeds=[0], stick=stick)
+    assert moving.cases["no control"].target(seaway) is None
 
 
 @pytest.mark.parametrize(
@@ -93,10 +93,10 @@ def test_place_is_where_the_tip_hangs_without_waves(crane):
     [Serial(), Threads(3), pytest.param(Processes(2), marks=pytest.mark.slow)],
     ids=["one", "threads", "processes"],
 )
-def test_numbers_do_not_depend_on_who_runs_them(crane, judged, executor):
-    again = judge(crane, CLIPPED, seeds=[3, 5], executor=executor, **QUICK)
-    for name in judged.names:
-        np.testing.assert_array_equal(again.swing(name), judged.swing(name)[[3, 5]])
+def test_numbers_do_not_depend_on_who_runs_them(crane, assessed, executor):
+    again = assess(crane, CLIPPED, seeds=[3, 5], executor=executor, **QUICK)
+    for name in assessed.names:
+        np.testing.assert_array_equal(again.swing(name), assessed.swing(name)[[3, 5]])
 
 
 def test_runs_begin_in_the_stationary_swing_without_control(crane):
@@ -109,7 +109,9 @@ def test_runs_begin_in_the_stationary_swing_without_control(crane):
     motion = seaway.response(waves.frequency, waves.heading)
     tip = np.array([run.tip[0] - run.ship[0, :3]]).T
     moved = (motion[:3] + np.cross(motion[3:], tip, axis=0))[:2] * waves.amplitude
-    pendulum = waves.met**2 / (omega**2 - waves.met**2 + 2j * 0.005 * omega * waves.met)
+    pendulum = waves.encounter**2 / (
+        omega**2 - waves.encounter**2 + 2j * 0.005 * omega * waves.encounter
+    )
     expected = (pendulum * moved).sum(axis=1).real
     start = run.load[0] - run.tip[0]
     np.testing.assert_allclose(start[:2], expected, rtol=0.01, atol=0.02)
@@ -119,28 +121,32 @@ def test_runs_begin_in_the_stationary_swing_without_control(crane):
 
 def test_control_that_changes_nothing_does_not_pass(crane):
     idle = control.TipShaper("zv")  # there is no stick to shape
-    found = judge(crane, idle, seeds=range(3), drives=("ideal",), **QUICK)
+    found = assess(crane, idle, seeds=range(3), drives=("ideal",), **QUICK)
     assert not found.passed
     assert "the controller changes nothing: " in found.verdict()
 
 
-def test_two_questions_have_two_answers(crane, judged):
-    assert judged.names == ("no control", "ideal", "identified")
-    assert judged.asked == ("harm", "sufficiency")
+def test_two_questions_have_two_answers(crane, assessed):
+    assert assessed.names == ("no control", "ideal", "identified")
+    assert assessed.questions == ("harm", "sufficiency")
     # the clip does no harm, and the load still wanders
-    assert judged.harmless == "yes"
-    assert judged.sufficient == "no"
-    assert judged.outcome == "fails"
-    verdict = judged.verdict()
+    assert assessed.harmless == "yes"
+    assert assessed.sufficient == "no"
+    assert assessed.outcome == "fails"
+    verdict = assessed.verdict()
     assert "does no harm: it makes swing worse than none in 0 of 12 seaways" in verdict
     assert "It does not suffice: in 3 h " in verdict
-    harm = judge(crane, CLIPPED, seeds=range(12), allowed=0.3, asked=["harm"], **QUICK)
+    harm = assess(
+        crane, CLIPPED, seeds=range(12), allowed_share_worse=0.3, questions=["harm"], **QUICK
+    )
     assert harm.passed
-    assert replace(judged, asked=("harm",)).passed
+    assert replace(assessed, questions=("harm",)).passed
     # limits far beyond all that happens in a small sea: it suffices
     wide = crane.with_limits(swing=0.5, off_lead=0.5, side_lead=0.5, dynamic_factor=5.0,
                              hoist_demand=10.0, placement=100.0, saturation=1.0)  # fmt: skip
-    passed = judge(wide, CLIPPED, seeds=range(12), allowed=0.3, sea=Spectrum(0.1, 7.0), **QUICK)
+    passed = assess(
+        wide, CLIPPED, seeds=range(12), allowed_share_worse=0.3, sea=Spectrum(0.1, 7.0), **QUICK
+    )
     assert passed.sufficient == "yes"
     assert passed.passed
     assert "It suffices: in 3 h all stays within its limits." in passed.verdict()
@@ -148,22 +154,22 @@ def test_two_questions_have_two_answers(crane, judged):
 
 def test_a_crane_without_limits_is_asked_for_harm_alone(crane):
     bare = replace(crane, limits={})
-    found = judge(bare, CLIPPED, seeds=range(3), drives=("identified",), **QUICK)
-    assert found.asked == ("harm",)
+    found = assess(bare, CLIPPED, seeds=range(3), drives=("identified",), **QUICK)
+    assert found.questions == ("harm",)
     assert found.sufficient is None
     with pytest.raises(InputError, match="has no limits to suffice for"):
-        judge(bare, CLIPPED, seeds=range(3), asked=["sufficiency"], **QUICK)
+        assess(bare, CLIPPED, seeds=range(3), questions=["sufficiency"], **QUICK)
     with pytest.raises(InputError, match="no question 'safety'; there are harm, sufficiency"):
-        judge(crane, CLIPPED, seeds=range(3), asked=["safety"], **QUICK)
+        assess(crane, CLIPPED, seeds=range(3), questions=["safety"], **QUICK)
 
 
-def outcome(rms, left=""):
-    return STOPPED._replace(rms_swing=rms, left=left)
+def outcome(rms, departure_reason=""):
+    return STOPPED._replace(rms_swing=rms, departure_reason=departure_reason)
 
 
-def test_a_run_that_leaves_the_model_loses_to_one_that_does_not(judged):
+def test_a_run_that_leaves_the_model_loses_to_one_that_does_not(assessed):
     """If both leave it, nobody knows: the interval holds whatever that seaway is."""
-    study = replace(judged.study, seeds=tuple(range(6)))
+    study = replace(assessed.study, seeds=tuple(range(6)))
     cases = {"no control": study.cases["no control"], "own": study.cases["identified"]}
     pairs = [
         (outcome(0.10), outcome(0.05)),
@@ -173,20 +179,20 @@ def test_a_run_that_leaves_the_model_loses_to_one_that_does_not(judged):
         (outcome(np.nan, "slack"), outcome(np.nan, "slack")),
         (outcome(0.10), outcome(0.05)),
     ]
-    found = replace(judged, study=replace(study, cases=cases), outcomes=tuple(pairs), linear=None)
-    share = found.worse("own")
+    found = replace(assessed, study=replace(study, cases=cases), outcomes=tuple(pairs), linear=None)
+    share = found.share_worse("own")
     assert share.value == pytest.approx(2.0 / 6.0)
     assert share.low == pytest.approx(binomtest(2, 6).proportion_ci(0.95, "exact").low)
     assert share.high == pytest.approx(binomtest(3, 6).proportion_ci(0.95, "exact").high)
-    assert found.left("own") == {"slack": 2}
+    assert found.departures("own") == {"slack": 2}
     # what left the model is in no number
     rms = np.sqrt((0.05**2 + 0.2**2 + 0.2**2 + 0.05**2) / 4.0)
     assert found.tables()[0].rows[1].cells[1] == pytest.approx(rms)
 
 
 def test_no_seaway_in_the_model_is_no_verdict_for_control(crane):
-    """In waves of 6 m both leave the model at once: not decided, and never a number."""
-    found = judge(crane, MEANT, seeds=range(4), sea=Spectrum(6.0, 10.0),
+    """In waves of 6 m both leave the model at the same time: not decided, and never a number."""
+    found = assess(crane, MEANT, seeds=range(4), sea=Spectrum(6.0, 10.0),
                   drives=("identified",), **QUICK)  # fmt: skip
     assert found.harmless == "not decided"
     assert found.sufficient == "no"
@@ -196,26 +202,43 @@ def test_no_seaway_in_the_model_is_no_verdict_for_control(crane):
 
 
 def test_what_would_do(crane):
-    found = judge(crane, MEANT, seeds=range(8), allowed=0.4, asked=["harm"], turns=False,
-                  drives=("identified",), **SHORT)  # fmt: skip
+    found = assess(
+        crane,
+        MEANT,
+        seeds=range(8),
+        allowed_share_worse=0.4,
+        questions=["harm"],
+        tipping_points=False,
+        drives=("identified",),
+        **SHORT,
+    )
     assert found.harmless == "no"
     assert "luff at its acceleration limit" in found.verdict()
     clip = next(remedy for remedy in found.remedies if "clip" in remedy.what)
     assert clip.harmless == "yes"
     assert clip.sufficient is None
     assert f"{clip.what.capitalize()} would do." in found.verdict()
-    # a remedy, judged by itself, is what it was said to be
-    alone = judge(crane, CLIPPED, seeds=range(8), allowed=0.4, drives=("identified",), **QUICK)
-    assert alone.worse("identified") == clip.worse
-    both = judge(crane, MEANT, seeds=range(8), allowed=0.4, turns=False, drives=("identified",),
-                 **SHORT)  # fmt: skip
+    # a remedy, assessed by itself, is what it was said to be
+    alone = assess(
+        crane, CLIPPED, seeds=range(8), allowed_share_worse=0.4, drives=("identified",), **QUICK
+    )
+    assert alone.share_worse("identified") == clip.share_worse
+    both = assess(
+        crane,
+        MEANT,
+        seeds=range(8),
+        allowed_share_worse=0.4,
+        tipping_points=False,
+        drives=("identified",),
+        **SHORT,
+    )
     assert f"{clip.what.capitalize()} would do no harm, " in both.verdict()
     assert "Nothing that was tried surely does all that is asked." in both.verdict()
 
 
 def test_few_seaways_decide_nothing(crane):
-    one = judge(crane, CLIPPED, seeds=[0], drives=("ideal",), asked=["harm"], **QUICK)
-    assert one.worse("ideal") == (0.0, 0.0, pytest.approx(0.975))
+    one = assess(crane, CLIPPED, seeds=[0], drives=("ideal",), questions=["harm"], **QUICK)
+    assert one.share_worse("ideal") == (0.0, 0.0, pytest.approx(0.975))
     assert one.outcome == "not decided"
     assert not one.passed
     assert "in 0 of 1 seaway (95 % interval 0.0 to 97.5 %)" in one.verdict()
@@ -240,51 +263,51 @@ def test_more_seaways_are_those_that_tell_if_the_share_stays():
     ]
 
 
-def test_differences_are_paired(judged):
-    found = judged.difference("identified", "ideal")
+def test_differences_are_paired(assessed):
+    found = assessed.difference("identified", "ideal")
     assert found.value == pytest.approx(
-        judged.swing("identified").mean() - judged.swing("ideal").mean(), rel=1e-12
+        assessed.swing("identified").mean() - assessed.swing("ideal").mean(), rel=1e-12
     )
     assert found.low < found.value < found.high
-    titled = {table.title: table for table in judged.tables()}
+    titled = {table.title: table for table in assessed.tables()}
     table = titled["Differences of RMS swing within each seaway"]
     rows = {(row.cells[0], row.cells[1]): row.cells[2] for row in table.rows}
     assert rows["identified", "ideal"] == found.value
-    frame = judged.to_polars()
+    frame = assessed.to_polars()
     assert frame.height == 36
     assert frame.filter(variant="ideal")["rms_swing"].to_numpy() == pytest.approx(
-        judged.swing("ideal")
+        assessed.swing("ideal")
     )
 
 
-def test_what_the_answer_hangs_on_stands_with_it(crane, judged):
-    words = " ".join(judged.sentences())
+def test_what_the_answer_hangs_on_stands_with_it(crane, assessed):
+    words = " ".join(assessed.sentences())
     assert "Each seaway counts for 60 s after 20 s from a stationary swing." in words
     assert "a damping of 0.5 %, assumed." in words
     assert "14 of 15 quantities of the crane are assumed." in words
     assert "Limits that are assumed: swing, off-lead" in words
-    given = judge(crane, CLIPPED, seeds=range(2), swing_damping=0.01, drives=("ideal",), **QUICK)
+    given = assess(crane, CLIPPED, seeds=range(2), swing_damping=0.01, drives=("ideal",), **QUICK)
     assert "a damping of 1 %." in " ".join(given.sentences())
 
 
 def test_an_undamped_swing_has_no_stationary_answer(crane):
-    found = judge(crane, CLIPPED, seeds=range(2), swing_damping=0.0, drives=("ideal",),
-                  **{**QUICK, "turns": True})  # fmt: skip
+    found = assess(crane, CLIPPED, seeds=range(2), swing_damping=0.0, drives=("ideal",),
+                  **{**QUICK, "tipping_points": True})  # fmt: skip
     assert found.linear is None
-    assert found.turns is None
+    assert found.tipping_points is None
     assert "from rest, as it is undamped" in " ".join(found.sentences())
 
 
 @pytest.mark.slow
 def test_what_would_turn_the_answer(crane):
-    """Control that harms in sea state 3 passes in waves a quarter as high, and a turn says so."""
-    found = judge(crane, CLIPPED, seeds=range(6), drives=("identified",), remedies=False)
-    turned = {(turn.what, turn.other): turn for turn in found.turns}
-    for turn in found.turns:
-        assert turn.passes is not found.passed
-        assert turn.words().endswith("by a short run.")
+    """Control that harms in sea state 3 passes in waves a quarter as high: a tipping point."""
+    found = assess(crane, CLIPPED, seeds=range(6), drives=("identified",), remedies=False)
+    points = {(point.what, point.other): point for point in found.tipping_points}
+    for point in found.tipping_points:
+        assert point.passes is not found.passed
+        assert point.words().endswith("by a short run.")
     # along the ship's axis nothing rolls: a heading that is another turns it, if anything does
-    assert all(turn.what in turn.words() for turn in turned.values())
+    assert all(point.what in point.words() for point in points.values())
 
 
 def test_intervals_against_published_tables():
@@ -299,13 +322,13 @@ def test_intervals_against_published_tables():
 
 def test_a_stopped_run_is_counted(crane):
     # lowering while the load is held 3 m above the longest rope ends beyond it
-    stick = Stick.trapezoid(hoist=-0.5, duration=30.0, length=80.0)
-    found = judge(
+    stick = OperatorCommand.trapezoid(hoist=-0.5, duration=30.0, length=80.0)
+    found = assess(
         crane, {"none": control.Clip()}, seeds=[0], stick=stick, run_in=5.0, rope_m=47.0,
-        remedies=False, turns=False,
+        remedies=False, tipping_points=False,
     )  # fmt: skip
     assert np.isnan(found.swing("no control")).all()
-    assert found.left("no control") == {"stopped at a limit": 1}
+    assert found.departures("no control") == {"stopped at a limit": 1}
 
 
 def test_axes_follow_what_speed_and_acceleration_allow(crane):
@@ -343,7 +366,7 @@ def test_swing_without_control_is_proportional_to_small_waves(crane):
 def test_orifice_is_that_of_another_luff_drive(crane):
     found = sweep(crane, "orifice", CLIPPED, points=[1.0, 3.0], seeds=[1], **SHORT)
     larger = crane.with_drive(luff=crane.luff.scale(Z16=3.0))
-    alone = judge(crane, CLIPPED, seeds=[1], drives={"larger": larger}, **QUICK)
+    alone = assess(crane, CLIPPED, seeds=[1], drives={"larger": larger}, **QUICK)
     assert found.values[0, 1, 2] == alone.swing("larger")[0]
     assert found.values[0, 0, 0] == found.values[0, 1, 0] == alone.swing("no control")[0]
 
@@ -360,7 +383,9 @@ SLEWS = {
 
 @pytest.mark.parametrize("part", SLEWS)
 def test_residual_swing_over_the_stick_is_that_of_the_independent_crane(crane, part):
-    stick = Stick.trapezoid(slew=part, until={"slew_deg": 45.0}, length=45.0 / (4.2 * part) + 60.0)
+    stick = OperatorCommand.trapezoid(
+        slew=part, until={"slew_deg": 45.0}, length=45.0 / (4.2 * part) + 60.0
+    )
     runs = [
         simulate(crane, stick, actuation=actuation, swing_damping=0.0)
         for actuation in ("ideal", "volts", "inverse")
@@ -387,10 +412,10 @@ def fitted(tmp_path_factory):
     free = {"Z16": Free(relative=(0.5, 2.0))}
     setup = Setup(stages=(stage.model_copy(update={"free": free, "forces": None}),))
     result = fit(Drive.preset("luff").parameters, campaign.experiments, setup)
-    judged = Identification(campaign, result)
-    judged.save(place)
+    identified = Identification(campaign, result)
+    identified.save(place)
     result.drive.to_toml(place / "drive.toml")
-    return place, result, judged.verdict
+    return place, result, identified.verdict
 
 
 @pytest.mark.slow
@@ -407,14 +432,14 @@ def test_own_logs_lead_to_the_verdict_on_the_own_crane(crane, fitted):
     assert len(drawn) == 3
     source = own.sources["luff"]
     assert source.fit == place
-    assert (source.judged_usable, source.verdict) == (verdict.usable, verdict.headline)
+    assert (source.fit_usable, source.verdict) == (verdict.usable, verdict.headline)
     assert {each.sources["luff"].verdict for each in drawn} == {verdict.headline}
     assert crane.with_drive(luff=place / "drive.toml").sources["luff"].fit == place
     assert not own.with_drive(luff=crane.luff).sources
     assert {each.luff for each in drawn_cranes(own)} == set(stored_draws(place).drives)
-    found = judge(own, CLIPPED, seeds=range(4), drives={"drawn": drawn}, **QUICK)
+    found = assess(own, CLIPPED, seeds=range(4), drives={"drawn": drawn}, **QUICK)
     # the first and the fourth seaway have the first crane
-    alone = judge(own, CLIPPED, seeds=[3], drives={"one": drawn[0]}, **QUICK)
+    alone = assess(own, CLIPPED, seeds=[3], drives={"one": drawn[0]}, **QUICK)
     assert found.swing("drawn")[3] == alone.swing("one")[0]
     assert found.swing("drawn")[1] != alone.swing("one")[0]
 
@@ -446,9 +471,12 @@ def test_draws_of_two_axes_from_one_seed_are_not_correlated(crane):
 
 def test_control_does_not_know_the_draw_that_moves_the_crane(crane):
     weaker = crane.slew.scale(Z17=1.05)
-    stick = Stick.trapezoid(slew=0.5, until={"slew_deg": 30.0}, length=30.0)
+    stick = OperatorCommand.trapezoid(slew=0.5, until={"slew_deg": 30.0}, length=30.0)
     (drawn,) = drawn_cranes(crane, slew=Draws((weaker,), 0))
-    known, unknown = crane.with_drive(slew=weaker), crane.with_drive(slew=weaker, known=False)
+    known, unknown = (
+        crane.with_drive(slew=weaker),
+        crane.with_drive(slew=weaker, known_to_controller=False),
+    )
     runs = [simulate(each, stick) for each in (crane, drawn, unknown, known)]
     volts, ends = [each.voltage[:, 1] for each in runs], [each.slew_deg[-1] for each in runs]
     # the map of the drive before: the same voltages, and another end
@@ -460,9 +488,9 @@ def test_control_does_not_know_the_draw_that_moves_the_crane(crane):
     assert abs(ends[3] - ends[0]) < 0.1
     # the drive that the controller counts on is put back
     assert unknown.known_to_controller == {"slew": crane.slew}
-    assert not unknown.with_drive(slew=crane.slew, known=False).known_to_controller
+    assert not unknown.with_drive(slew=crane.slew, known_to_controller=False).known_to_controller
     # what is redesigned is known: the fitted drive moves with the drawn one
-    redesigned = upgraded(drawn, "slew", {"orifice": 2.0})
+    redesigned = with_design_change(drawn, "slew", {"orifice": 2.0})
     assert redesigned.slew == weaker.scale(Z16=2.0)
     assert redesigned.controller_drive("slew") == crane.slew.scale(Z16=2.0)
 
@@ -470,7 +498,7 @@ def test_control_does_not_know_the_draw_that_moves_the_crane(crane):
 def test_what_makes_no_study_is_said(crane):
     def refuse(message, **how):
         with pytest.raises(InputError, match=message):
-            judge(crane, MEANT, **{"seeds": [0], **how})
+            assess(crane, MEANT, **{"seeds": [0], **how})
 
     refuse("needs a controller, a set of drives and a seed", seeds=[])
     refuse("needs a controller, a set of drives and a seed", drives=())
@@ -478,9 +506,9 @@ def test_what_makes_no_study_is_said(crane):
     refuse("3. are 3, but must be a name, a crane or a list of cranes", drives=[3])
     refuse("drives is 3, but must be a list of names", drives=3)
     refuse("counts for 30 s after a run-in of 120 s, but must count for at least 60 s", length=30.0)
-    refuse("stick is 100 s long, but a run counts from 120 s on", stick=Stick.rest(100.0))
-    moving = Stick.record(np.full((153_600, 3), [0.0, 0.01, 0.0]))
-    refuse("Ideal drives follow at once, .* put a row of zeros before it", stick=moving)
+    refuse("stick is 100 s long, but a run counts from 120 s on", stick=OperatorCommand.rest(100.0))
+    moving = OperatorCommand.record(np.full((153_600, 3), [0.0, 0.01, 0.0]))
+    refuse("Ideal drives follow instantaneously, .* put a row of zeros before it", stick=moving)
     refuse("seeds is 3, but must be a sequence, as range", seeds=3)
     refuse("A sea is a name, as 'ss3', or a Spectrum, not of type ndarray", sea=np.zeros((9, 6)))
     refuse("A study has no 'see'; it has seeds, sea, drives, .*, slew_deg", see="ss3")
