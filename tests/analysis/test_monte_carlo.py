@@ -22,7 +22,7 @@ from swashplate.analysis import (
 from swashplate.campaign import Campaign
 from swashplate.identification.assessment import Identification
 from swashplate.identification.estimation.drive_model import DriveModel
-from swashplate.identification.estimation.setup import Free, Setup, load_setup
+from swashplate.identification.estimation.setup import FitSetup, Free, load_setup
 from swashplate.identification.estimation.unknowns import Unknown, Unknowns
 from swashplate.identification.fitting import Fit, fit
 from swashplate.identification.statistics.intervals import uncertainty_of
@@ -132,8 +132,8 @@ def test_a_band_by_hand(hoist):
     np.testing.assert_allclose(band.half_widths, half * np.array([1.0, down, 1.0]), rtol=1e-9)
 
 
-def small_setup() -> Setup:
-    """A card's gain and pump's size, two stages: the hoist's set-up with little that is free.
+def small_setup() -> FitSetup:
+    """A card's gain and pump's size, two stages: the hoist's fit setup with little that is free.
 
     The angle at the stops, which is fixed, may be off by about as much as the pump's estimate. The
     current has no hysteresis, which would hide how the estimates follow each other.
@@ -141,7 +141,7 @@ def small_setup() -> Setup:
     card, pump = load_setup("hoist").stages
     kept = {name: card.free[name] for name in ("J", "G1")}
     only_size = {"free": {"Z10": Free(relative=(0.5, 2.0))}, "forces": None}
-    return Setup(
+    return FitSetup(
         stages=(
             card.model_copy(update={"free": kept}),
             pump.model_copy(update={**only_size, "current_hysteresis": 0.0}),

@@ -1,4 +1,4 @@
-"""What is written down rather than measured or fitted: runs, linearised fits, noise, a set-up."""
+"""What is written down, not measured or fitted: runs, linearised fits, noise, a fit setup."""
 
 import re
 from collections.abc import Callable, Mapping, Sequence
@@ -19,7 +19,7 @@ from swashplate.identification.estimation.problem import (
     LinearisedRun,
     factor_of,
 )
-from swashplate.identification.estimation.setup import Setup
+from swashplate.identification.estimation.setup import FitSetup
 from swashplate.identification.estimation.unknowns import Unknown, Unknowns
 
 UNITS = {
@@ -152,7 +152,7 @@ def put(pattern: str, new: str, count: int = 0) -> Callable[[str], str]:
 LATER = {"from": 1.0, "to": 1.2, "factor": 10.0}
 CARD = {"free": {"J": {"relative": (0.5, 2.0)}}, "weights": {"rectified_current": [LATER]}}
 KNOWN = {"relative": (0.8, 1.25), "log": True, "prior": {"mean": 12.8, "deviation": 0.05}}
-TWO_STAGES = Setup.model_validate(
+TWO_STAGES = FitSetup.model_validate(
     {
         "title": "two stages",
         "stages": [

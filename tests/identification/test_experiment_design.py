@@ -8,7 +8,7 @@ import pytest
 from tests.identification.given import run_of, unknowns_of, virtual
 
 from swashplate import Campaign, Drive, Experiment, InputError, maneuvers
-from swashplate.identification.estimation.setup import Forces, Free, Setup, Stage, load_setup
+from swashplate.identification.estimation.setup import FitSetup, Forces, Free, Stage, load_setup
 from swashplate.identification.estimation.stages import smooth
 from swashplate.identification.estimation.unknowns import Prior
 from swashplate.identification.fitting import fit
@@ -91,8 +91,8 @@ def hoist_tests(tmp_path_factory: pytest.TempPathFactory) -> Campaign:
     return virtual(tmp_path_factory.mktemp("rig"), "hoist", seed=4, perturb=0.02)
 
 
-def setup(*names: str) -> Setup:
-    return Setup(stages=(Stage(name="pump", part="pump", free=dict.fromkeys(names, FACTOR)),))
+def setup(*names: str) -> FitSetup:
+    return FitSetup(stages=(Stage(name="pump", part="pump", free=dict.fromkeys(names, FACTOR)),))
 
 
 def run(name: str, volts: float, noise: float = 0.0) -> Experiment:
@@ -141,7 +141,7 @@ def test_the_free_zero_of_an_encoder_costs_what_it_must() -> None:
 
 def test_what_is_known_counts_once() -> None:
     prior = Free(relative=(0.5, 2.0), log=True, prior=Prior(mean=11.4, deviation=0.2))
-    plan = Setup(stages=(Stage(name="pump", part="pump", free={"Z10": prior}),))
+    plan = FitSetup(stages=(Stage(name="pump", part="pump", free={"Z10": prior}),))
     known = bench(HOIST.parameters, plan)
     np.testing.assert_allclose(np.abs(known.present), [[5.0]])
     rest = known.candidate(maneuvers.step(4.0), [Sensor("shaft_speed", 1e6)])

@@ -26,7 +26,7 @@ from swashplate.identification.estimation.problem import (
     influence,
     linearised_fit,
 )
-from swashplate.identification.estimation.setup import Setup, load_setup, setup_text
+from swashplate.identification.estimation.setup import FitSetup, load_setup, setup_text
 from swashplate.identification.estimation.solving import solve
 from swashplate.identification.estimation.unknowns import Prior, Unknown, Unknowns
 from swashplate.identification.noise import Covariance
@@ -390,7 +390,7 @@ DOUBTS = {"Z9": "3 %", "tau": 1e-3}
 ONE = {"lag": RANGES["lag"], "start.place": RANGES["start.place"]}
 
 
-def stated(**doubts: float | str) -> Setup:
+def stated(**doubts: float | str) -> FitSetup:
     return load_setup("hoist").model_copy(update={"standard_uncertainty": doubts})
 
 

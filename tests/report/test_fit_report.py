@@ -21,7 +21,7 @@ from swashplate import Campaign, Drive, FileError, InputError, maneuvers
 from swashplate.identification import verdict
 from swashplate.identification.assessment import Identification
 from swashplate.identification.diagnostics.causes import Cause
-from swashplate.identification.estimation.setup import Setup
+from swashplate.identification.estimation.setup import FitSetup
 from swashplate.identification.estimation.solving import Solution
 from swashplate.identification.fitting import Fit, fit
 from swashplate.identification.resampling import CrossValidation, Fold
@@ -57,7 +57,7 @@ FREE = {
     "pump": {"Z10": within(0.8, 1.4)},
 }
 STAGES = [{"name": part, "part": part, "free": free} for part, free in FREE.items()]
-SETUP = Setup.model_validate({"title": "two stages", "stages": STAGES})
+SETUP = FitSetup.model_validate({"title": "two stages", "stages": STAGES})
 
 
 @pytest.fixture(scope="module")

@@ -8,14 +8,14 @@ from .estimation.model import OwnModel as OwnModel
 from .estimation.model_setup import ModelSetup as ModelSetup
 from .estimation.problem import Problem as Problem
 from .estimation.problem import linearised_fit as linearised_fit
-from .estimation.setup import Setup as Setup
+from .estimation.setup import FitSetup as FitSetup
 from .estimation.setup import Stage as Stage
 from .estimation.setup import load_setup as load_setup
 from .estimation.solving import Solution as Solution
 from .estimation.solving import sobol_starts as sobol_starts
 from .estimation.solving import solve as solve
 from .estimation.solving import solve_from as solve_from
-from .estimation.stages import configuration as configuration
+from .estimation.stages import as_fit_setup as as_fit_setup
 from .estimation.unknowns import Prior as Prior
 from .estimation.unknowns import Unknown as Unknown
 from .estimation.unknowns import Unknowns as Unknowns

@@ -27,7 +27,7 @@ from swashplate.identification import tables
 from swashplate.identification.diagnostics.judging import REQUIRED, Verdict, verdict
 from swashplate.identification.estimation.model_setup import ModelSetup
 from swashplate.identification.estimation.problem import Problem
-from swashplate.identification.estimation.setup import Setup, Stage, setup_text
+from swashplate.identification.estimation.setup import FitSetup, Stage, setup_text
 from swashplate.identification.estimation.solving import Solution
 from swashplate.identification.estimation.stages import Parameters
 from swashplate.identification.estimation.unknowns import Unknown, Unknowns
@@ -64,8 +64,8 @@ from swashplate.tables import Table, write_text
 if TYPE_CHECKING:
     import polars
 
-CONFIGURATION, ESTIMATES, STORED = "setup.toml", "estimates.csv", "fit.json"
-"""In a fit's folder, beside the drive or the model's numbers: the fit configuration, the table of
+SETUP_FILE, ESTIMATES, STORED = "setup.toml", "estimates.csv", "fit.json"
+"""In a fit's folder, beside the drive or the model's numbers: the fit setup, the table of
 estimates, and what the fit keeps of itself."""
 
 
@@ -204,7 +204,7 @@ class Identification(Estimated):
     def save(self, folder: str | Path) -> tuple[Path, ...]:
         """Write the folder that `load`, `Drive.from_toml` and every command read.
 
-        Of a drive these are ``drive.toml`` and the fit configuration ``setup.toml``, of a
+        Of a drive these are ``drive.toml`` and the fit setup ``setup.toml``, of a
         user-defined model its numbers, ``parameters.toml``; of both ``estimates.csv`` and
         ``fit.json``. Samples stay in the campaign; a fingerprint of each run is stored. Older files
         of these names are replaced, each whole or not at all.
@@ -233,7 +233,7 @@ class Identification(Estimated):
         else:
             files = {
                 FITTED_DRIVE: dump_set(self.drive.parameters),
-                CONFIGURATION: setup_text(self.fit.setup),
+                SETUP_FILE: setup_text(self.fit.setup),
             }
         for name, text in files.items():
             write_text(text, place / name)
@@ -478,7 +478,7 @@ class FitFile(Entry):
     """What the input is between samples, as the fit took it."""
     nominal: str | dict[str, float]
     """What the fit began from: a drive's parameter file, or the numbers of a model of one's own."""
-    setup: Setup
+    setup: FitSetup
     stages: tuple[StoredStage, ...]
     profiles: tuple[Profile | tuple[str, Profile], ...]
     """Behind the name of their stage in older files, which do not name the unknown."""
@@ -556,7 +556,7 @@ def _loaded(
             sizes.add(len(entry.intervals))
         if ours != theirs or len(sizes) > 1:
             raise FileError(
-                f"{path}: stage {entry.name} has other parameters than its fit configuration "
+                f"{path}: stage {entry.name} has other parameters than its fit setup "
                 "makes: fit again."
             )
         return Solved(

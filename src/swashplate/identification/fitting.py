@@ -37,7 +37,7 @@ from swashplate.identification.estimation.drive_model import DriveModel, with_ca
 from swashplate.identification.estimation.model import EquationModel, Model, OwnModel
 from swashplate.identification.estimation.model_setup import ModelSetup
 from swashplate.identification.estimation.problem import Loss, Problem
-from swashplate.identification.estimation.setup import FreeParameters, Setup, Stage
+from swashplate.identification.estimation.setup import FitSetup, FreeParameters, Stage
 from swashplate.identification.estimation.solving import (
     Progress,
     Solution,
@@ -47,7 +47,7 @@ from swashplate.identification.estimation.solving import (
 )
 from swashplate.identification.estimation.stages import (
     Parameters,
-    configuration,
+    as_fit_setup,
     smooth,
     stage_problem,
     start_currents_of,
@@ -88,7 +88,7 @@ UNEXPLAINED = 5.0
 SPREAD = 0.05
 """Standard deviation of the logarithm by which a drawn parameter differs from the nominal one."""
 OF_FORCES = ("Z19", "Z21")
-"""The solenoids' coefficients that are drawn where a set-up frees forces: those of odd powers."""
+"""Coefficients of the solenoids that are drawn if a fit setup frees forces: those of odd powers."""
 
 
 class Solved(NamedTuple):
@@ -162,7 +162,7 @@ class Fit(Estimated):
     Estimates are there by name: ``fit["Z8"].standard_error``.
     """
 
-    setup: Setup
+    setup: FitSetup
     nominal: Parameters
     runs: tuple[Experiment, ...] = field(repr=False)
     """Those that were fitted."""
@@ -253,14 +253,14 @@ def fit(
     ----------
     model : Drive, ParameterSet, Model or ModelSetup
         A drive: where to begin, and what stays fixed. The decay's switch is split, see `smooth`,
-        the card's filter is its differential equation unless the configuration's `card_filter`
+        the card's filter is its differential equation unless the fit setup's `card_filter`
         says "recursion". Or a model of one's own: of equations,
         an `OwnModel` of them, any object with `simulate`, or a `ModelSetup`.
     tests : Campaign or sequence of Experiment
         The runs to fit; of a campaign those with the role ``"fit"``.
-    free : Setup, str, path or mapping
-        What to estimate. Of a drive a fit configuration: a `Setup`, a packaged one by name, a TOML
-        file, or a mapping as of `configuration`. Of a user-defined model a mapping to (low,
+    free : FitSetup, str, path or mapping
+        What to estimate. Of a drive a fit setup: a `FitSetup`, a packaged one by name, a TOML
+        file, or a mapping as of `as_fit_setup`. Of a user-defined model a mapping to (low,
         nominal, high) or an `Unknown`, see `ModelSetup`.
     channels, noise, fixed : optional
         Of a model of one's own, as of `ModelSetup`.
@@ -343,7 +343,7 @@ class _Stated(NamedTuple):
     """What is to be fitted, and what is doubtful about it."""
 
     nominal: Parameters
-    setup: Setup
+    setup: FitSetup
     doubts: tuple[str, ...]
 
 
@@ -354,9 +354,9 @@ def _of_drive(
     if free is None:
         raise InputError(
             "A fit of a drive needs to know what is free, such as 'hoist' or {'Z8': (0.5, 2)}; "
-            "swashplate.identify takes drive and fit configuration from the campaign."
+            "swashplate.identify takes drive and fit setup from the campaign."
         )
-    setup = configuration(free, runs, parameters.definitions)
+    setup = as_fit_setup(free, runs, parameters.definitions)
     nominal, changed = with_card_filter(setup.card_filter, runs, parameters)
     doubts = refuse_unsound(check_runs(runs, smooth(nominal)))
     doubts += refuse_unsound(unfitted_currents(runs, setup))
@@ -371,14 +371,14 @@ def _of_model(model: ModelSetup, runs: Sequence[Experiment]) -> _Stated:
 
 
 def staged(
-    setup: Setup,
+    setup: FitSetup,
     nominal: Parameters,
     runs: Sequence[Experiment],
     solved: Callable[[Stage, Problem], Solved],
     *,
     threads: int | None = None,
 ) -> tuple[StageFit, ...]:
-    """The stages of a set-up, each from what the ones before found, until one is interrupted."""
+    """The stages of a fit setup, each from what the ones before found, until one is interrupted."""
     parameters, stages, starts = smooth(nominal), list[StageFit](), dict[str, Mapping[str, float]]()
     instants = dict[tuple[str, str], Prior]()
     for stage in setup.stages:
@@ -595,7 +595,7 @@ def _origin(stage: Stage, problem: Problem, limits: Mapping[str, float]) -> dict
         forms = drive.pressure_root, drive.coulomb_sign, drive.rate, sorted(drive.options)
         known = sorted(drive.numbers.items()), forms
     marks = {
-        "stage of the fit configuration": stage.model_dump_json(),
+        "stage of the fit setup": stage.model_dump_json(),
         "tolerances": sorted(limits.items()),
         "nominal values": known,
         "runs and their weights": (problem.scales, [*map(fingerprint, problem.experiments)]),
@@ -618,8 +618,8 @@ def fingerprint(experiment: Experiment) -> str:
     return digest.hexdigest()
 
 
-def drawn(nominal: Drive, setup: Setup, seed: int, *, spread: float = SPREAD) -> Drive:
-    """A drive that differs from a nominal one in what a set-up frees, and in nothing else.
+def drawn(nominal: Drive, setup: FitSetup, seed: int, *, spread: float = SPREAD) -> Drive:
+    """A drive that differs from a nominal one in what a fit setup frees, and in nothing else.
 
     Each free parameter is multiplied by a log-normal factor, both directions apart, of which the
     logarithm has the standard deviation `spread`. The seed is not negative. A `ParameterError` says

@@ -13,7 +13,7 @@ from swashplate.campaign.experiment import Experiment
 from swashplate.errors import DomainError, InputError
 from swashplate.executors import Executor, Serial
 from swashplate.identification.estimation.problem import Loss
-from swashplate.identification.estimation.setup import Setup
+from swashplate.identification.estimation.setup import FitSetup
 from swashplate.identification.estimation.solving import NO_EFFECT
 from swashplate.identification.estimation.stages import Parameters
 from swashplate.identification.fitting import Search, fit
@@ -126,7 +126,7 @@ ONE_WAY = 0.25
 def cross_validate(
     experiments: Sequence[Experiment],
     nominal: Parameters,
-    setup: Setup,
+    setup: FitSetup,
     *,
     folds: int = 5,
     seed: int = 0,
@@ -214,7 +214,7 @@ def deal(experiments: Sequence[Experiment], folds: int, seed: int) -> tuple[tupl
 
 
 def _fold(
-    shared: tuple[tuple[Experiment, ...], Parameters, Setup, Loss, int | None],
+    shared: tuple[tuple[Experiment, ...], Parameters, FitSetup, Loss, int | None],
     item: tuple[int, tuple[int, ...]],
 ) -> tuple[Fold, list[_Held]]:
     (experiments, nominal, setup, loss, threads), (number, part) = shared, item

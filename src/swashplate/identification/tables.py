@@ -273,7 +273,7 @@ def unvalued_lines(stages: Sequence[StageFit]) -> list[str]:
         return []
     return [
         f"Without a value of their own, at a bound or not determined: {listed(lost)}. Fix them in "
-        "the fit configuration, widen their bounds, or add tests that determine them; for a drive "
+        "the fit setup, widen their bounds, or add tests that determine them; for a drive "
         "'swashplate advise' names some."
     ]
 

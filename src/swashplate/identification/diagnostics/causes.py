@@ -450,7 +450,7 @@ def _of_numbers(stage: StageFit) -> Iterator[Candidate]:
             f"spool and solenoids have a friction or hysteresis of ±{1e3 * size:.3g} mA, "
             f"{percent(size / largest)} of the largest current"
         ),
-        f"look at the dither; let the fit configuration estimate {name}",
+        f"look at the dither; let the fit setup estimate {name}",
         free=name,
     )
     numbers = stage.parameters.numbers
@@ -465,7 +465,7 @@ def _of_numbers(stage: StageFit) -> Iterator[Candidate]:
             high,
             partial(_with_number, stage, name),
             partial(_other_value, name, definition.unit, value),
-            f"measure it ({definition.name}), or let the fit configuration estimate it",
+            f"measure it ({definition.name}), or let the fit setup estimate it",
             free=name,
         )
 

@@ -28,7 +28,7 @@ from swashplate.identification.estimation.drive_model import (
 from swashplate.identification.estimation.model import EquationModel
 from swashplate.identification.estimation.model_setup import ModelSetup
 from swashplate.identification.estimation.problem import Loss, Problem
-from swashplate.identification.estimation.setup import Setup
+from swashplate.identification.estimation.setup import FitSetup
 from swashplate.identification.estimation.stages import smooth
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
@@ -59,7 +59,7 @@ class Finding(NamedTuple):
     severity: Literal["refuse", "warn"]
     """"refuse" where no result could mean anything; "warn" where some of it could."""
     run: str | None
-    """The experiment's name; None for the campaign or its set-up."""
+    """The experiment's name; None for the campaign or its fit setup."""
     channel: str | None
     sentence: str
     """What is wrong, where, and what would be right."""
@@ -94,7 +94,7 @@ def check_runs(experiments: Sequence[Experiment], nominal: ParameterSet) -> list
     return sorted(found, key=lambda each: each.severity != "refuse")
 
 
-def unfitted_currents(experiments: Sequence[Experiment], setup: Setup) -> list[Finding]:
+def unfitted_currents(experiments: Sequence[Experiment], setup: FitSetup) -> list[Finding]:
     """Currents of an amplifier that are measured, and fitted by no stage."""
     fitted = {kind for stage in setup.stages for kind in stage.channels or kinds_of(stage.part)}
     driving = any(stage.current == "measured" for stage in setup.stages)
@@ -109,7 +109,7 @@ def unfitted_currents(experiments: Sequence[Experiment], setup: Setup) -> list[F
             None,
             name,
             f"'{name}' is measured, but no stage fits it, so that the amplifier is not known: let "
-            "'swashplate guess' write a start and a fit configuration whose first stage fits the "
+            "'swashplate guess' write a start and a fit setup whose first stage fits the "
             "amplifier to it, and give them by --from and --setup.",
         )
         for name in ([] if driving else left)

@@ -270,7 +270,7 @@ def verdict(
     predicted : sequence of RunQuality
         Of runs that were held out of the fit, as `validation.predict` gives them.
     planned : sequence of str
-        Names of all stages of the fit configuration, to tell those that were never begun.
+        Names of all stages of the fit setup, to tell those that were never begun.
     required : float
         Largest error of a prediction in a new maneuver, over the range of the signal. [1]
     """

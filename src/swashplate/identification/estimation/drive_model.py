@@ -254,7 +254,7 @@ def with_card_filter(
     if fitted.rate is None:
         return fitted, changed
     return fitted, (
-        f"zeta, omega and C belong to a recursion at {fitted.rate:g} Hz, as the fit configuration "
+        f"zeta, omega and C belong to a recursion at {fitted.rate:g} Hz, as the fit setup "
         'asks for by card_filter = "recursion": they are not those of the card\'s filter, which '
         "`Drive.at_every_rate` gives.",
     )

@@ -31,8 +31,8 @@ from swashplate.errors import (
 from swashplate.identification.estimation.model import OwnModel, simulated, states_started_by
 from swashplate.identification.estimation.problem import Problem, noise_scales
 from swashplate.identification.estimation.setup import (
+    FitSetup,
     Free,
-    Setup,
     Stage,
     StandardUncertainty,
     deviation,
@@ -53,7 +53,7 @@ BY_ORDER = 10.0
 class ModelSetup(Result):
     """A user-defined model and what is to be found of it.
 
-    It is what a `ParameterSet` and a `Setup` together are of a drive.
+    It is what a `ParameterSet` and a `FitSetup` together are of a drive.
 
     An entry of `free` is (low, nominal, high), (low, nominal, high, unit) or an `Unknown`. A range
     of positive bounds, the upper one at least ten times the lower one, is searched by its
@@ -132,7 +132,7 @@ class ModelSetup(Result):
 
     @classmethod
     def from_file(cls, path: str | Path) -> ModelSetup:
-        """The set-up that a Python file states by its names ``model`` and ``free``.
+        """The fit setup that a Python file states by its names ``model`` and ``free``.
 
         Besides those it may have ``name``, ``channels``, ``noise``, ``fixed`` and
         ``standard_uncertainty``. The file is executed, as a module that worker processes import as
@@ -181,8 +181,8 @@ class ModelSetup(Result):
             raise type(error)(f"{path}: {error}") from None
 
     @property
-    def setup(self) -> Setup:
-        """The set-up as that of a fit in stages, of which it has one."""
+    def setup(self) -> FitSetup:
+        """The fit setup as that of a fit in stages, of which it has one."""
         free = {
             each.name: Free(bounds=(each.low, each.high), log=each.log, prior=each.prior)
             for each in self.free.values()
@@ -190,10 +190,10 @@ class ModelSetup(Result):
         stage = Stage(name=self.name, part="model", free=free)
         content = {"title": self.name, "stages": (stage,)}
         uncertain = {"standard_uncertainty": dict(self.standard_uncertainty)}
-        return validated(content | uncertain, Setup, self.name)
+        return validated(content | uncertain, FitSetup, self.name)
 
     def nominal(self, experiments: Sequence[Experiment]) -> ModelSetup:
-        """The set-up with the numbers before a fit to some runs."""
+        """The fit setup with the numbers before a fit to some runs."""
         had = dict.fromkeys(name for each in experiments for name in each.channels)
         if strange := [each for each in self.noise if each not in had]:
             raise InputError(

@@ -339,8 +339,8 @@ def noise_scales(experiments: Sequence[Experiment], channels: Sequence[str]) -> 
 TOLERANCE = 1e-10
 """Singular values below this part of the largest count as zero.
 
-With exact derivatives a gauge of the hoist set-up lies at 1e-15 and the weakest direction that the
-tests determine at 2e-5. Derivatives by central differences are good to about 1e-9: those take
+With exact derivatives a gauge of the hoist's fit setup lies at 1e-15, and the weakest direction that
+the tests determine at 2e-5. Derivatives by central differences are good to about 1e-9: those take
 `BY_DIFFERENCES`.
 """
 BY_DIFFERENCES = 1e-6

@@ -1,4 +1,4 @@
-"""Stages of a fit: what is fitted, its configuration, and the problem of each stage.
+"""Stages of a fit: what is fitted, its fit setup, and the problem of each stage.
 
 What is fitted is a drive or a user-defined model, `Parameters`; here, and where results are
 written and shown, it is asked which of them.
@@ -39,8 +39,8 @@ from swashplate.identification.estimation.drive_model import (
 from swashplate.identification.estimation.model_setup import ModelSetup
 from swashplate.identification.estimation.problem import Problem, noise_scales
 from swashplate.identification.estimation.setup import (
+    FitSetup,
     FreeParameters,
-    Setup,
     Stage,
     deviation,
     free_entries,
@@ -60,7 +60,7 @@ Fitted = TypeVar("Fitted", bound=Parameters)
 FORCE = Definition("force of the solenoids", "N", plausible=(0.0, 1e4))
 """What stands for their coefficients."""
 LARGEST_START_PRESSURE = 4e6
-"""Bound of a free pressure at the start where the set-up gives none. [Pa]"""
+"""Bound of a free pressure at the start where the fit setup gives none. [Pa]"""
 
 
 def smooth(parameters: Fitted) -> Fitted:
@@ -74,17 +74,17 @@ def smooth(parameters: Fitted) -> Fitted:
     return parameters
 
 
-def configuration(
+def as_fit_setup(
     free: FreeParameters,
     experiments: Sequence[Experiment],
     definitions: Definitions = DEFINITIONS,
-) -> Setup:
-    """A drive's fit configuration from any form that a caller may give it in.
+) -> FitSetup:
+    """A drive's fit setup from any form that a caller may give it in.
 
     Parameters
     ----------
-    free : Setup, str, path or mapping
-        A fit configuration, a packaged one by name, a TOML file, or a mapping: the contents of such
+    free : FitSetup, str, path or mapping
+        A fit setup, a packaged one by name, a TOML file, or a mapping: the contents of such
         a file, or free parameters by symbol as of `setup.free_entries`. Those are estimated in one
         stage: of the card alone if currents were measured, of pump and motor alone, or through the
         whole chain if both are free or no current was measured.
@@ -96,21 +96,21 @@ def configuration(
     Raises
     ------
     FileError, ParameterError
-        If the configuration cannot be read, or an entry is wrong.
+        If the fit setup cannot be read, or an entry is wrong.
     """
-    if isinstance(free, Setup):
-        return _with_known_names(free, "the fit configuration", definitions)
+    if isinstance(free, FitSetup):
+        return _with_known_names(free, "the fit setup", definitions)
     if isinstance(free, str | Path):
         return _with_known_names(load_setup(free), str(free), definitions)
     given: object = free
     if not isinstance(given, Mapping) or not given:
         raise InputError(
-            f"What is free is {free!r}, but must be a fit configuration, its name or file, or a "
+            f"What is free is {free!r}, but must be a fit setup, its name or file, or a "
             "mapping such as {'Z8': (0.5, 2)}."
         )
     if "stages" in free:
-        setup = validated(dict(free), Setup, "the fit configuration")
-        return _with_known_names(setup, "the fit configuration", definitions)
+        setup = validated(dict(free), FitSetup, "the fit setup")
+        return _with_known_names(setup, "the fit setup", definitions)
     entries = free_entries(free, definitions)
     in_card = {definitions.find(name).block == "control_card" for name in entries}
     blocks = {"card" if inside else "pump" for inside in in_card}
@@ -120,11 +120,11 @@ def configuration(
         part = "pump"
     elif blocks == {"card"} and not kinds.isdisjoint(CURRENTS):
         part = "card"
-    return Setup(stages=(Stage(name=part, part=part, free=entries),))
+    return FitSetup(stages=(Stage(name=part, part=part, free=entries),))
 
 
-def _with_known_names(setup: Setup, origin: str, definitions: Definitions) -> Setup:
-    """The fit configuration of a drive; a name in it that no parameter has is refused."""
+def _with_known_names(setup: FitSetup, origin: str, definitions: Definitions) -> FitSetup:
+    """The fit setup of a drive; a name in it that no parameter has is refused."""
     names = [
         (f"stage '{stage.name}', free", name)
         for stage in setup.stages
@@ -142,19 +142,19 @@ def _with_known_names(setup: Setup, origin: str, definitions: Definitions) -> Se
 
 def setup_of(
     campaign: Campaign, axis: str, drive: ParameterSet, free: FreeParameters | None = None
-) -> Setup:
-    """The fit configuration of an axis.
+) -> FitSetup:
+    """The fit setup of an axis.
 
     By default the packaged one of the drive that the campaign names, or else of the given one; an
-    `InputError` if there is none. `free` as of `configuration`.
+    `InputError` if there is none. `free` as of `as_fit_setup`.
     """
     if free is not None:
         runs = campaign.select(axis=axis, role="fit")
-        return configuration(free, runs, drive.definitions)
+        return as_fit_setup(free, runs, drive.definitions)
     name = drive.name if campaign.axes[axis].drive is None else campaign.drive(axis).name
     if name not in setup_names():
         raise InputError(
-            f"There is no packaged fit configuration for the drive '{name}': give one of your "
+            f"There is no packaged fit setup for the drive '{name}': give one of your "
             "own, a .toml file with stages and free parameters; 'swashplate guess' reads one off "
             "the logs."
         )
@@ -174,7 +174,7 @@ def stage_problem(
     """The problem of a stage, over the runs that have a channel of it.
 
     `parameters` are the nominal values, those of earlier stages already found; `uncertain` standard
-    uncertainties of what stays fixed, as of `Setup`; `starts` and `instants` what a stage before
+    uncertainties of what stays fixed, as of `FitSetup`; `starts` and `instants` what a stage before
     estimated of currents at the first sample, see `start_currents_of`, and of edges. Threads are
     all cores by default. An `InputError` says that no run has what the stage fits or asks for, a
     `ParameterError` that a free parameter is unknown or its bounds are wrong.
@@ -224,7 +224,7 @@ def _channels_of(stage: Stage, experiments: Sequence[Experiment]) -> tuple[str, 
     if not fitted:
         hint = ""
         if stage.part == "card":
-            hint = "; without a current, let 'swashplate guess' write start and fit configuration"
+            hint = "; without a current, let 'swashplate guess' write start and fit setup"
         raise InputError(
             f"The stage '{stage.name}' fits {', '.join(kinds)}, but the runs to fit have "
             f"{', '.join(dict.fromkeys(kind for _, kind in had)) or 'no channel'}{hint}."
@@ -233,7 +233,7 @@ def _channels_of(stage: Stage, experiments: Sequence[Experiment]) -> tuple[str, 
     if weighed and not fitted & set(weighed):
         raise InputError(
             f"The stage '{stage.name}' weighs {', '.join(weighed)}, but the runs have "
-            f"{', '.join(sorted(fitted))}: add weights for that, or take a fit configuration "
+            f"{', '.join(sorted(fitted))}: add weights for that, or take a fit setup "
             "without."
         )
     return tuple(dict.fromkeys(name for name, kind in had if kind in kinds))

@@ -29,7 +29,7 @@ from swashplate.identification.estimation.problem import (
     factor_of,
     linearised_fit,
 )
-from swashplate.identification.estimation.setup import Setup, Stage
+from swashplate.identification.estimation.setup import FitSetup, Stage
 from swashplate.identification.estimation.stages import stage_problem
 from swashplate.identification.estimation.unknowns import Unknowns
 from swashplate.identification.noise import spectral_covariance
@@ -224,7 +224,7 @@ class Bench(Result):
 
 def bench(
     parameters: ParameterSet,
-    setup: Setup,
+    setup: FitSetup,
     experiments: Sequence[Experiment] = (),
     *,
     fitted: bool = False,

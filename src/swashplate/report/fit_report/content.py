@@ -321,7 +321,7 @@ def _setup_section(
     else:
         made.add("drive", f"{drive.name}, card {drive.card}" if drive.card else drive.name)
     if title:
-        made.add("fit configuration", title)
+        made.add("fit setup", title)
     for key, words in notes.items():
         if key != "campaign":
             made.add(key, words)
@@ -329,7 +329,7 @@ def _setup_section(
     for each in stages:
         blocks.append(Block("heading", f"Stage {each.stage.name}", "h3"))
         blocks += listed_block(_stage_words(each))
-    return Section("setup", "Configuration", blocks)
+    return Section("setup", "Fit setup", blocks)
 
 
 def _stage_words(fit: StageFit) -> list[str]:
