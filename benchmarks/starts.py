@@ -3,7 +3,8 @@
     .venv/bin/python benchmarks/starts.py [--axis hoist] [--starts 50] [--sqp-starts 50]
 
 The stages of a fit setup on a realistic virtual campaign whose truth lies within 10 % of the
-published values, from Sobol points over all bounds. docs/multi-start.md has the table and what it means.
+published values, from Sobol points over all bounds. docs/multi-start.md has the table and what it
+means.
 """
 
 import argparse

@@ -3,8 +3,8 @@ from .diagnostics.judging import Verdict as Verdict
 from .diagnostics.judging import verdict as verdict
 from .estimation.drive_model import DriveModel as DriveModel
 from .estimation.model import Linearised as Linearised
-from .estimation.model import Model as Model
-from .estimation.model import OwnModel as OwnModel
+from .estimation.model import MachineModel as MachineModel
+from .estimation.model import UserModel as UserModel
 from .estimation.model_setup import ModelSetup as ModelSetup
 from .estimation.problem import Problem as Problem
 from .estimation.problem import linearised_fit as linearised_fit

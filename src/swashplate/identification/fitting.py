@@ -34,7 +34,7 @@ from swashplate.identification.diagnostics.data_checks import (
 )
 from swashplate.identification.estimation.between_samples import settle
 from swashplate.identification.estimation.drive_model import DriveModel, with_card_filter
-from swashplate.identification.estimation.model import EquationModel, Model, OwnModel
+from swashplate.identification.estimation.model import EquationModel, MachineModel, UserModel
 from swashplate.identification.estimation.model_setup import ModelSetup
 from swashplate.identification.estimation.problem import Loss, Problem
 from swashplate.identification.estimation.setup import FitSetup, FreeParameters, Stage
@@ -230,7 +230,7 @@ class Fit(Estimated):
 
 
 def fit(
-    model: Drive | Parameters | Model | Equations,
+    model: Drive | Parameters | MachineModel | Equations,
     tests: Campaign | Sequence[Experiment],
     free: FreeParameters | None = None,
     *,
@@ -251,11 +251,11 @@ def fit(
 
     Parameters
     ----------
-    model : Drive, ParameterSet, Model or ModelSetup
+    model : Drive, ParameterSet, MachineModel or ModelSetup
         A drive: where to begin, and what stays fixed. The decay's switch is split, see `smooth`,
         the card's filter is its differential equation unless the fit setup's `card_filter`
         says "recursion". Or a model of one's own: of equations,
-        an `OwnModel` of them, any object with `simulate`, or a `ModelSetup`.
+        a `UserModel` of them, any object with `simulate`, or a `ModelSetup`.
     tests : Campaign or sequence of Experiment
         The runs to fit; of a campaign those with the role ``"fit"``.
     free : FitSetup, str, path or mapping
@@ -587,7 +587,7 @@ def _explained(problem: Problem, solution: Solution) -> bool:
 
 def _origin(stage: Stage, problem: Problem, limits: Mapping[str, float]) -> dict[str, str]:
     """Fingerprints of all that the result of a start depends on."""
-    own = repr(problem.model) if isinstance(problem.model, OwnModel) else ""
+    own = repr(problem.model) if isinstance(problem.model, UserModel) else ""
     fixed = sorted(problem.fixed.items()), sorted(problem.zeros.items())
     known: object = (own, problem.start.tolist(), fixed)
     if isinstance(problem.model, DriveModel):

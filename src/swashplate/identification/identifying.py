@@ -21,7 +21,7 @@ from swashplate.identification.assessment import Identification, versions
 from swashplate.identification.diagnostics.data_checks import refuse_unsound, spike_findings
 from swashplate.identification.diagnostics.judging import REQUIRED
 from swashplate.identification.estimation.between_samples import doubt
-from swashplate.identification.estimation.model import Model
+from swashplate.identification.estimation.model import MachineModel
 from swashplate.identification.estimation.model_setup import ModelSetup
 from swashplate.identification.estimation.problem import Loss
 from swashplate.identification.estimation.setup import FitSetup, FreeParameters
@@ -38,7 +38,7 @@ MOST_EVALUATIONS = 600
 
 def identify(
     tests: str | Path | Campaign,
-    model: str | Path | Drive | ParameterSet | ModelSetup | Model | Equations | None = None,
+    model: str | Path | Drive | ParameterSet | ModelSetup | MachineModel | Equations | None = None,
     free: FreeParameters | None = None,
     *,
     axis: str | None = None,

@@ -26,7 +26,7 @@ INSTANT_STEP = 1e-5
 """Step of the differences by the instant of an edge of the command, see `InputSignal.edges`. [s]"""
 
 
-class Model(Protocol):
+class MachineModel(Protocol):
     """A model of the machine; with `simulate` alone it is differentiated by central differences.
 
     One that knows its derivatives has ``linearise(values, experiment, names)`` as well, which gives
@@ -80,7 +80,7 @@ RELATIVE_STEP = 1e-6
 
 
 def simulated(
-    model: Model, values: Mapping[str, float], experiment: Experiment
+    model: MachineModel, values: Mapping[str, float], experiment: Experiment
 ) -> Mapping[str, Array]:
     """What a model simulates; a `DomainError` names a sample that is not finite.
 
@@ -99,7 +99,7 @@ def simulated(
 
 
 def linearised(
-    model: Model, values: Mapping[str, float], experiment: Experiment, names: Sequence[str]
+    model: MachineModel, values: Mapping[str, float], experiment: Experiment, names: Sequence[str]
 ) -> Mapping[str, Linearised]:
     """Simulation with derivatives by names, its own or differences; raises as `simulated`."""
     if own := getattr(model, "linearise", None):
@@ -171,7 +171,7 @@ class Asked(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class EquationModel(ABC):
-    """What every model of equations has in common; see `OwnModel` and `DriveModel`."""
+    """What every model of equations has in common; see `UserModel` and `DriveModel`."""
 
     @abstractmethod
     def signals_of(self, experiment: Experiment) -> Mapping[str, str]:
@@ -228,7 +228,7 @@ class EquationModel(ABC):
         return ObservedRecord(record, seen, by, experiment.begins, others)
 
     def simulate(self, values: Mapping[str, float], experiment: Experiment) -> Mapping[str, Array]:
-        """Simulate the measured channels; see `model.Model`."""
+        """Simulate the measured channels; see `MachineModel`."""
         observed = self.observed(experiment, values=values)
         signals = enumerate(self.signals_of(experiment))
         flat = self.ready(values, experiment, Asked(observed)).residuals(observed)
@@ -237,7 +237,7 @@ class EquationModel(ABC):
     def linearise(
         self, values: Mapping[str, float], experiment: Experiment, names: Sequence[str]
     ) -> Mapping[str, Linearised]:
-        """Simulate with derivatives, those by edges by differences; see `model.Model`."""
+        """Simulate with derivatives, those by edges by differences; see `MachineModel`."""
         observed, (columns, chain) = self.observed(experiment, values=values), self.columns(names)
         found = self.ready(values, experiment, Asked(observed, columns)).jacobian(observed)
         flat, by, rows = found.residuals, found.columns @ chain, observed.rows_of
@@ -262,7 +262,7 @@ def states_started_by(model: Equations, name: str) -> list[str]:
 
 
 @dataclass(frozen=True, eq=False)
-class OwnModel(Result, EquationModel):
+class UserModel(Result, EquationModel):
     """A model of equations whose parameters, by their paths, are the unknowns.
 
     ``"start.PATH"`` is a number of the state at the first sample, by its path or as `free_start` of
@@ -274,7 +274,7 @@ class OwnModel(Result, EquationModel):
     Examples
     --------
     >>> problem = Problem(
-    ...     OwnModel(valve, rate=100.0, begin={"position": "position"}),
+    ...     UserModel(valve, rate=100.0, begin={"position": "position"}),
     ...     campaign.experiments,
     ...     Unknowns((Unknown("lag", 0.06, 0.005, 0.5, "s", log=True), ...)),
     ...     channels=("position",),
@@ -335,7 +335,7 @@ class OwnModel(Result, EquationModel):
         if rate is None:
             raise InputError(
                 f"{experiment.name}: the stamps of its input are not even, so the model needs a "
-                f"rate, as in OwnModel({model.name}, rate=100.0)."
+                f"rate, as in UserModel({model.name}, rate=100.0)."
             )
         record = on_grid(
             {left[0]: command.values},

@@ -28,7 +28,7 @@ from swashplate.errors import (
     UnknownNameError,
     meant,
 )
-from swashplate.identification.estimation.model import OwnModel, simulated, states_started_by
+from swashplate.identification.estimation.model import UserModel, simulated, states_started_by
 from swashplate.identification.estimation.problem import Problem, noise_scales
 from swashplate.identification.estimation.setup import (
     FitSetup,
@@ -62,7 +62,7 @@ class ModelSetup(Result):
     """
 
     model: Any
-    """A model of equations, an `OwnModel` of them with more said, or an object with `simulate`."""
+    """A model of equations, a `UserModel` of them with more said, or an object with `simulate`."""
     free: Mapping[str, Any]
     """What is to be found, by the model's names."""
     name: str = ""
@@ -85,13 +85,13 @@ class ModelSetup(Result):
             check_mapping(what, getattr(self, what))
         if isinstance(self.channels, str):
             raise InputError(f"Give the channels as ('{self.channels}',).")
-        own = OwnModel(self.model) if isinstance(self.model, Equations) else self.model
+        own = UserModel(self.model) if isinstance(self.model, Equations) else self.model
         if not callable(getattr(own, "simulate", None)):
             raise InputError(
                 f"A {type(own).__name__} is no model: give a Model of equations, or an object with "
                 "simulate(values, experiment)."
             )
-        equations = own.model if isinstance(own, OwnModel) else own
+        equations = own.model if isinstance(own, UserModel) else own
         kind = getattr(equations, "name", None) or type(equations).__name__
         name = self.name or str(kind).lower()
         if not self.free:
@@ -112,7 +112,7 @@ class ModelSetup(Result):
                         f"{name}: the {what} of '{key}' is {number!r}, but must be {must}."
                     )
         free = {key: _unknown(key, each) for key, each in self.free.items()}
-        if isinstance(own, OwnModel):
+        if isinstance(own, UserModel):
             targets = [name for unknown in free.values() for name in unknown.targets]
             _check_names(own, "free", targets)
             _check_names(own, "fixed", self.fixed)
@@ -237,7 +237,7 @@ class ModelSetup(Result):
                 {name: deviation(each, self.fixed[name])}
                 for name, each in self.standard_uncertainty.items()
             ),
-            threads=threads if isinstance(self.model, OwnModel) else 1,
+            threads=threads if isinstance(self.model, UserModel) else 1,
         )
 
     def _channels_given(self, experiments: Sequence[Experiment]) -> tuple[str, ...]:
@@ -245,7 +245,7 @@ class ModelSetup(Result):
         values = {each.name: each.start for each in self.free.values()} | dict(self.fixed)
         names = dict[str, None]()
         for experiment in experiments:
-            if isinstance(self.model, OwnModel):
+            if isinstance(self.model, UserModel):
                 names |= dict.fromkeys(self.model.signals_of(experiment))
             else:
                 names |= dict.fromkeys(simulated(self.model, values, experiment))
@@ -254,7 +254,7 @@ class ModelSetup(Result):
     def unknowns_of_run(self, experiment: Experiment) -> tuple[Unknown, ...]:
         """The unknowns of a single run: where its state begins, and the zeros of its sensors."""
         channels, run = {zero_name(name): name for name in experiment.channels}, experiment.name
-        equations = self.model.model if isinstance(self.model, OwnModel) else None
+        equations = self.model.model if isinstance(self.model, UserModel) else None
         found = list[Unknown]()
         for unknown in self.free.values():
             if unknown.run is not None:
@@ -299,7 +299,7 @@ def _without_zeros(
     return {name: value for name, value in values.items() if name not in names}, zeros
 
 
-def _check_names(model: OwnModel, table: str, names: Iterable[str]) -> None:
+def _check_names(model: UserModel, table: str, names: Iterable[str]) -> None:
     """Refuse a name that is neither a parameter, a start of a state nor the zero of a signal."""
     paths, zeros = parameter_paths(model.model), [*map(zero_name, model.signals)]
     for name in names:

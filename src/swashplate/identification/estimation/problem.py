@@ -27,8 +27,8 @@ from swashplate.identification.estimation.model import (
     Asked,
     EquationModel,
     Linearised,
-    Model,
-    OwnModel,
+    MachineModel,
+    UserModel,
     linearised,
     part_of,
     simulated,
@@ -70,8 +70,8 @@ class Problem(Result):
     The residual of a sample is sqrt(weight)/scale times (simulated less measured).
     """
 
-    model: Model
-    """One of equations stands for itself, or as an `OwnModel` with more said about it."""
+    model: MachineModel
+    """One of equations stands for itself, or as a `UserModel` with more said about it."""
     experiments: tuple[Experiment, ...]
     unknowns: Unknowns
     channels: tuple[str, ...]
@@ -94,7 +94,7 @@ class Problem(Result):
 
     def __post_init__(self) -> None:
         if isinstance(self.model, OfEquations):
-            object.__setattr__(self, "model", OwnModel(self.model))
+            object.__setattr__(self, "model", UserModel(self.model))
         for what, there in (("parameter", self.unknowns), ("experiment", self.experiments)):
             if not there:
                 raise InputError(f"A fit needs at least one {what}.")
@@ -339,9 +339,9 @@ def noise_scales(experiments: Sequence[Experiment], channels: Sequence[str]) -> 
 TOLERANCE = 1e-10
 """Singular values below this part of the largest count as zero.
 
-With exact derivatives a gauge of the hoist's fit setup lies at 1e-15, and the weakest direction that
-the tests determine at 2e-5. Derivatives by central differences are good to about 1e-9: those take
-`BY_DIFFERENCES`.
+With exact derivatives a gauge of the hoist's fit setup lies at 1e-15, and the weakest direction
+that the tests determine at 2e-5. Derivatives by central differences are good to about 1e-9: those
+take `BY_DIFFERENCES`.
 """
 BY_DIFFERENCES = 1e-6
 
