@@ -32,10 +32,10 @@ from swashplate.identification import (
     Unknown,
     Unknowns,
     UserModel,
+    assess_fit,
     fit,
     predict,
     solve,
-    verdict,
 )
 from swashplate.identification.estimation.model import linearised
 from swashplate.identification.statistics.intervals import uncertainty_of
@@ -340,7 +340,7 @@ def test_the_truth_is_found_judged_and_predicted() -> None:
     (quality,) = predict(made.parameters, HELD)
     assert quality.channel == "place"
     assert quality.measures.rmse == pytest.approx(0.01, rel=0.1)  # the noise, nothing else
-    assert verdict([stage], [quality]).headline.startswith("Usable")
+    assert assess_fit([stage], [quality]).headline.startswith("Usable")
 
 
 class Table:
@@ -541,7 +541,7 @@ def limited(seed: int) -> Experiment:
 def test_what_a_model_leaves_out_is_an_error_of_its_prediction() -> None:
     slow = Model("slow", parameters=Slow, state=State, step=slow_step)
     made = fit(slow, campaign(*map(limited, range(40))), {"lag": (0.01, 0.1, 3.0)})
-    found = verdict(made.stages, predict(made.parameters, [limited(99)]))
+    found = assess_fit(made.stages, predict(made.parameters, [limited(99)]))
     (stated,) = found.predictions
     # the noise is 1e-3 of a range of about 2
     assert stated.worst.error > 0.02
@@ -562,7 +562,7 @@ def test_a_run_with_a_scale_or_a_delay_of_its_own_is_named(gain, late, said) -> 
     read += random.normal(0.0, 0.005, read.shape)
     runs = [moved(each, own) for each, own in zip(runs, read, strict=True)]
     made = fit(OWN, campaign(*runs[:6]), {"lag": (0.05, 0.2, 2.0), "gain": (0.1, 1.0, 20.0)})
-    found = verdict(made.stages, predict(made.parameters, runs[6:]))
+    found = assess_fit(made.stages, predict(made.parameters, runs[6:]))
     assert not found.usable
     assert [each.run for each in found.unsound] == ["run 2"]
     assert said in found.headline

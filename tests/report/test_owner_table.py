@@ -13,7 +13,7 @@ from tests.identification.given import run_of
 from swashplate import Drive, Experiment, maneuvers
 from swashplate.analysis import envelope, standard_errors, variances_from_bounds
 from swashplate.drafting import guess_drive, guess_table, guessed_fit_setup, guessed_set
-from swashplate.identification import verdict
+from swashplate.identification import assess_fit
 from swashplate.identification.estimation.setup import FitSetup, Free
 from swashplate.identification.fitting import Fit, fit
 from swashplate.identification.statistics.determination import identifiability_of
@@ -165,7 +165,7 @@ def test_a_way_that_no_run_goes_has_no_interval(runs: list[Experiment]) -> None:
 
 
 def test_a_limit_that_the_model_has_not_is_not_called_unreached(found: Fit) -> None:
-    said = verdict(found.stages, predict(found.parameters, found.runs)).validity
+    said = assess_fit(found.stages, predict(found.parameters, found.runs)).validity
     reached, _, lacking = said.partition("not in the model")
     assert "Z14" in lacking
     assert "Z15" in lacking

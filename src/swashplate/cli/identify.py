@@ -45,7 +45,7 @@ from swashplate.tables import PRINTED, TABLE, check_folder, joined, made_folder
 
 if TYPE_CHECKING:
     from swashplate.identification.assessment import Identification
-    from swashplate.identification.diagnostics.judging import Verdict
+    from swashplate.identification.diagnostics.verdict import Verdict
     from swashplate.identification.estimation.stages import Parameters
     from swashplate.parameters.parameter_set import ParameterSet
 
@@ -327,7 +327,7 @@ def validate(
     from swashplate.identification import tables
     from swashplate.identification.assessment import versions
     from swashplate.identification.diagnostics.data_checks import refuse_unsound, spike_findings
-    from swashplate.identification.diagnostics.judging import verdict
+    from swashplate.identification.diagnostics.verdict import assess_fit
     from swashplate.identification.validation import predict, with_speeds
 
     if out is not None:
@@ -351,7 +351,7 @@ def validate(
         predicted = predict(parameters, runs)
         if not predicted:
             raise InputError(f"{path}: all samples of these runs are ignored; nothing is left.")
-        judged = verdict((), predicted, required=require / 100.0)
+        judged = assess_fit((), predicted, required=require / 100.0)
         measures = tables.runs_tables(with_speeds(predicted))
     lines = []
     if out is not None:

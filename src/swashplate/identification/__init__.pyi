@@ -1,6 +1,6 @@
 from .assessment import Identification as Identification
-from .diagnostics.judging import Verdict as Verdict
-from .diagnostics.judging import verdict as verdict
+from .diagnostics.verdict import Verdict as Verdict
+from .diagnostics.verdict import assess_fit as assess_fit
 from .estimation.drive_model import DriveModel as DriveModel
 from .estimation.model import Linearised as Linearised
 from .estimation.model import MachineModel as MachineModel

@@ -24,7 +24,7 @@ from swashplate.documents import read_json
 from swashplate.drive import Drive
 from swashplate.errors import DomainError, FileError, InputError, MissingFileError
 from swashplate.identification import tables
-from swashplate.identification.diagnostics.judging import REQUIRED, Verdict, verdict
+from swashplate.identification.diagnostics.verdict import REQUIRED, Verdict, assess_fit
 from swashplate.identification.estimation.model_setup import ModelSetup
 from swashplate.identification.estimation.problem import Problem
 from swashplate.identification.estimation.setup import FitSetup, Stage, setup_text
@@ -141,7 +141,9 @@ class Identification(Estimated):
             return self.stored.verdict
         planned = [each.name for each in self.fit.setup.stages]
         with working("Judging the fit"):
-            return verdict(self.fit.stages, self.predicted, planned=planned, required=self.required)
+            return assess_fit(
+                self.fit.stages, self.predicted, planned=planned, required=self.required
+            )
 
     def tables(self) -> list[Table]:
         """Stated errors, then estimates, profiles, errors of runs, cross-validation."""

@@ -19,7 +19,7 @@ from swashplate.errors import InputError, InputTypeError
 from swashplate.executors import Executor, Serial
 from swashplate.identification.assessment import Identification, versions
 from swashplate.identification.diagnostics.data_checks import refuse_unsound, spike_findings
-from swashplate.identification.diagnostics.judging import REQUIRED
+from swashplate.identification.diagnostics.verdict import REQUIRED
 from swashplate.identification.estimation.between_samples import doubt
 from swashplate.identification.estimation.model import MachineModel
 from swashplate.identification.estimation.model_setup import ModelSetup

@@ -16,7 +16,7 @@ from swashplate.drive import Drive
 from swashplate.errors import InputError
 from swashplate.identification import tables
 from swashplate.identification.assessment import Identification, motion_of
-from swashplate.identification.diagnostics.judging import Verdict, starts_of, verdict
+from swashplate.identification.diagnostics.verdict import Verdict, assess_fit, starts_of
 from swashplate.identification.estimation.model_setup import ModelSetup
 from swashplate.identification.estimation.solving import Solution
 from swashplate.identification.estimation.stages import Parameters
@@ -134,7 +134,7 @@ def write_validation_report(
         f"{count(len(runs), 'run')} predicted from the command alone · "
         f"{count(samples, 'sample')} that count"
     )
-    found = judged if judged is not None else verdict((), predicted)
+    found = judged if judged is not None else assess_fit((), predicted)
     setup = _setup_section(campaign, drive, "", notes or {}, ())
     write_text(_page("Validation", facts, campaign, drive, runs, found, setup), path)
 

@@ -23,7 +23,7 @@ from swashplate.analysis import (
 from swashplate.campaign import Campaign
 from swashplate.drive import Drive
 from swashplate.errors import SwashplateError
-from swashplate.identification.diagnostics.judging import Verdict
+from swashplate.identification.diagnostics.verdict import Verdict
 from swashplate.identification.stage_fit import StageFit
 from swashplate.identification.statistics.determination import weak_unknowns
 from swashplate.identification.statistics.intervals import unseen_limits

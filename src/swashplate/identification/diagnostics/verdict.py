@@ -49,7 +49,7 @@ MOTIONS: Mapping[Motion, str] = {
 
 @dataclass(frozen=True)
 class Verdict(Result):
-    """The judgment on a fit, or on a drive over some runs: three answers."""
+    """The assessment of a fit, or of a drive over some runs: three answers."""
 
     required: float
     """Largest error of a prediction over the range that is of use. [1]"""
@@ -254,7 +254,7 @@ class Verdict(Result):
         return "\n\n".join(part for part in parts if part)
 
 
-def verdict(
+def assess_fit(
     stages: Sequence[StageFit],
     predicted: Sequence[RunQuality],
     *,
