@@ -50,7 +50,7 @@ def test_draws_outside_the_bounds_are_drawn_again(hoist):
         own = SimpleNamespace(matrix=np.diag([variance, 0.0]), determined=np.array([True, False]))
         problem = SimpleNamespace(unknowns=unknowns, model=model, uncertain=())
         solution, name = SimpleNamespace(vector=unknowns.start), SimpleNamespace(name="pump")
-        known = SimpleNamespace(own=own, handed=(), systematic={})
+        known = SimpleNamespace(own=own, earlier_stages=(), systematic={})
         one = SimpleNamespace(stage=name, problem=problem, solution=solution, uncertainty=known)
         return drawn_drives([one], count, seed=1)
 
@@ -85,7 +85,7 @@ def test_standard_errors_where_no_draw_stays_within_the_bounds(hoist):
             unknowns=unknowns, model=DriveModel(hoist.parameters), uncertain=()
         ),
         solution=SimpleNamespace(vector=unknowns.start),
-        uncertainty=SimpleNamespace(own=own, handed=(), systematic={}),
+        uncertainty=SimpleNamespace(own=own, earlier_stages=(), systematic={}),
         drive=hoist,
     )
 
@@ -188,10 +188,10 @@ def test_a_stored_fit_gives_drives_of_its_quoted_errors(fit_and_folder):
     assert np.corrcoef(columns["Z10"], stop)[0, 1] < -0.5
     # what the card's stage does not know moves the pump along, by the slopes that are quoted
     card, pump = result.stages
-    (handed,) = uncertainty_of(pump).handed
-    joint = handed.slopes @ handed.covariance.matrix
+    (earlier_stages,) = uncertainty_of(pump).earlier_stages
+    joint = earlier_stages.slopes @ earlier_stages.covariance.matrix
     spread = np.outer(
-        uncertainty_of(pump).quoted.standard_errors, handed.covariance.standard_errors
+        uncertainty_of(pump).quoted.standard_errors, earlier_stages.covariance.standard_errors
     )
     names = card.problem.unknowns.names
     drawn_correlations = [np.corrcoef(columns["Z10"], columns[name])[0, 1] for name in names]

@@ -12,7 +12,7 @@ from scipy.signal import lfilter
 from swashplate import Campaign, Channel, Experiment, rig
 from swashplate.campaign.experiment import InputSignal, Source
 from swashplate.executors import Serial
-from swashplate.identification.estimation.arrow import Block
+from swashplate.identification.estimation.arrow import RunRows
 from swashplate.identification.estimation.problem import (
     TOLERANCE,
     LinearisedFit,
@@ -119,7 +119,7 @@ def linear_fit(
     """A fit of some runs, by unknowns of the machine alone; without priors by default."""
     rows = np.zeros((0, len(variables))) if prior is None else prior
     noise = np.ones(len(rows)) if prior_noise is None else prior_noise
-    priors = [Block("", np.arange(0), row[None, :]) for row in rows]
+    priors = [RunRows("", np.arange(0), row[None, :]) for row in rows]
     factor = factor_of(zip(runs, derivatives, strict=True), variables, priors)
     return LinearisedFit(tuple(runs), derivatives, variables, factor, rows, tolerance, noise)
 

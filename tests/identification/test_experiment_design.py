@@ -18,7 +18,7 @@ from swashplate.identification.statistics.determination import (
 )
 from swashplate.identification.statistics.experiment_design import (
     MEMORY,
-    Candidate,
+    CandidateTest,
     Outlook,
     Sensor,
     advice_table,
@@ -42,14 +42,14 @@ def diagonal(*errors: float) -> np.ndarray:
 
 def test_a_candidate_that_mixes_known_and_unknown_tells_of_the_unknown_alone() -> None:
     """It measures a + b: b becomes known as well as a, a no better than before."""
-    (found,) = advise(diagonal(0.1, np.inf), [Candidate("sum", np.array([[1e3, 1e3]]))], AB)
+    (found,) = advise(diagonal(0.1, np.inf), [CandidateTest("sum", np.array([[1e3, 1e3]]))], AB)
     assert found.newly_determined == ("b",)
     assert found.after[0] == pytest.approx(0.1)
     assert found.after[1] == pytest.approx(0.1, rel=1e-3)
     assert found.d_gain == pytest.approx(1.0)
     # what was not known before has no error to come from
     assert "b to 10 %" in str(advice_table("", [found]))
-    (sharper,) = advise(diagonal(0.1, 0.2), [Candidate("b", np.array([[0.0, 1e3]]))], AB)
+    (sharper,) = advise(diagonal(0.1, 0.2), [CandidateTest("b", np.array([[0.0, 1e3]]))], AB)
     assert "b 20 % to 0.1 %" in str(advice_table("", [sharper]))
 
 
@@ -57,7 +57,7 @@ def test_the_order_is_that_of_determinants_computed_apart() -> None:
     rng = np.random.default_rng(8)
     variables = unknowns_of("abcd", np.ones(4))
     present = rng.normal(size=(30, 4))
-    candidates = [Candidate(f"c{k}", rng.normal(size=(20, 4)) * (k + 1)) for k in range(5)]
+    candidates = [CandidateTest(f"c{k}", rng.normal(size=(20, 4)) * (k + 1)) for k in range(5)]
     gains = {
         each.name: np.linalg.slogdet(
             np.eye(4) + np.linalg.solve(present.T @ present, each.derivatives.T @ each.derivatives)
@@ -72,7 +72,7 @@ def test_the_order_is_that_of_determinants_computed_apart() -> None:
 
 def test_an_unknown_at_its_bound_counts_as_known() -> None:
     variables = unknowns_of("ab", np.ones(2), at_bound=[1, 0])
-    (found,) = advise(np.zeros((0, 2)), [Candidate("sum", np.array([[1.0, 4.0]]))], variables)
+    (found,) = advise(np.zeros((0, 2)), [CandidateTest("sum", np.array([[1.0, 4.0]]))], variables)
     assert found.names == ("b",)
     assert found.after[0] == pytest.approx(0.25)
 
@@ -106,7 +106,7 @@ def test_a_plan_by_hand() -> None:
     """After the first choice its like is worth little: the plan turns to the other unknown."""
     variables = unknowns_of("ab", np.ones(2))
     rows = {"a": [[10.0, 0.0]], "a again": [[9.0, 0.0]], "b": [[0.0, 1.0]], "rest": [[0.0, 0.0]]}
-    candidates = [Candidate(name, np.array(row)) for name, row in rows.items()]
+    candidates = [CandidateTest(name, np.array(row)) for name, row in rows.items()]
     plan = in_turn(np.diag([1.0, 1.0]), candidates, variables, 4)
     assert [each.candidate for each in plan] == ["a", "b", "a again"]
     # 1/√(1 + 100), and 1/√(1 + 100 + 81)

@@ -357,28 +357,28 @@ class Identification(Estimated):
             return {}
 
 
-def parts_of(found: Identification) -> list[tables.Part]:
+def parts_of(found: Identification) -> list[tables.FitPart]:
     """What a fit says besides its verdict, in the order in which the command prints it."""
     fit = found.fit
     notes = [overview.sentence for overview in found.campaign.overviews]
     notes += [f"{run.name}: {sentence}." for run in fit.runs for sentence in run.notes]
     doubts = [f"! {sentence}" for sentence in fit.doubts]
-    made = [tables.Part("Runs", (), (), notes), tables.Part("Doubts", (), doubts)]
+    made = [tables.FitPart("Runs", (), (), notes), tables.FitPart("Doubts", (), doubts)]
     made += map(tables.stage_part, fit.stages)
     if found.profiles:
         said = [sentence for profile in found.profiles for sentence in profile.sentences()]
         table = tables.profiles_table(found.profiles, fit.stages)
-        made.append(tables.Part("Profile likelihoods", [table], (), said))
+        made.append(tables.FitPart("Profile likelihoods", [table], (), said))
     made.append(tables.fixed_part(fit.stages, fit.nominal))
     fitted = tables.runs_tables([quality for each in fit.stages for quality in each.runs])
-    made.append(tables.Part("Errors of fitted runs", fitted, heading="Runs that were fitted"))
+    made.append(tables.FitPart("Errors of fitted runs", fitted, heading="Runs that were fitted"))
     if found.predicted:
         errors = tables.runs_tables(found.predicted)
         heading = "Runs that were held out and predicted"
-        made.append(tables.Part("Errors of held-out runs", errors, heading=heading))
+        made.append(tables.FitPart("Errors of held-out runs", errors, heading=heading))
     if found.folds is not None:
         held_out, _ = folds_tables(found.folds, fit.stages)
-        made.append(tables.Part("Cross-validation", [held_out], (), found.folds.sentences()))
+        made.append(tables.FitPart("Cross-validation", [held_out], (), found.folds.sentences()))
     return [part for part in made if part.tables or part.remarks or part.sentences]
 
 

@@ -365,7 +365,7 @@ def ignored_words(experiment: Experiment, channel: Channel) -> str:
 # --- a fit as it is read --------------------------------------------------------------------------
 
 
-class Part(NamedTuple):
+class FitPart(NamedTuple):
     """A part of what a fit says, as the command, a summary and a notebook show it."""
 
     title: str
@@ -387,10 +387,10 @@ class Part(NamedTuple):
         return "\n\n".join(block for block in blocks if block)
 
 
-def stage_part(stage: StageFit) -> Part:
+def stage_part(stage: StageFit) -> FitPart:
     """Estimates of a stage, how it ended, and what its estimates lack."""
     name, solution = stage.stage.name, stage.solution
-    return Part(
+    return FitPart(
         f"How stage {name} ended, and what its intervals are worth",
         [estimates_table(stage)],
         [f"{name}: {solution.message} after {solution.evaluations} evaluations."],
@@ -403,9 +403,9 @@ def stage_part(stage: StageFit) -> Part:
     )
 
 
-def fixed_part(stages: Sequence[StageFit], nominal: Parameters) -> Part:
+def fixed_part(stages: Sequence[StageFit], nominal: Parameters) -> FitPart:
     """What stayed as it was, and what has no value of its own."""
-    return Part("Fixed parameters", (), [fixed_line(stages, nominal)], unvalued_lines(stages))
+    return FitPart("Fixed parameters", (), [fixed_line(stages, nominal)], unvalued_lines(stages))
 
 
 def single_runs_line(stages: Sequence[StageFit]) -> list[str]:

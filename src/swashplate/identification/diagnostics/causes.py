@@ -85,7 +85,7 @@ class Cause(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Candidate(Result):
+class CandidateCause(Result):
     """One thing that may be wrong, or that the model may leave out."""
 
     name: str
@@ -188,7 +188,7 @@ def _causes_of_stage(stage: StageFit, before: Squares) -> tuple[Cause, ...]:
 
 
 class _Score(NamedTuple):
-    candidate: Candidate
+    candidate: CandidateCause
     size: float
     """After one Gauss-Newton step. [SI, or 1]"""
     share: float
@@ -337,7 +337,7 @@ def behind_lag(time: Array, values: Array, lag: float = SMALL_LAG) -> Array:
 # --- what is looked for ---------------------------------------------------------------------------
 
 
-def _candidates(stage: StageFit) -> Iterator[Candidate]:
+def _candidates(stage: StageFit) -> Iterator[CandidateCause]:
     """Everything that may be freed in a stage."""
     for name in stage.problem.channels:
         yield from _of_readings(stage, name)
@@ -346,12 +346,12 @@ def _candidates(stage: StageFit) -> Iterator[Candidate]:
         yield from _of_numbers(stage)
 
 
-def _of_readings(stage: StageFit, name: str) -> Iterator[Candidate]:
+def _of_readings(stage: StageFit, name: str) -> Iterator[CandidateCause]:
     """What may be wrong with an instrument, or with the motion that it reads."""
     channels = [run[name] for run in stage.problem.experiments if name in run.channels]
     read = partial(_with_reading, stage, name)
     check = f"check the instrument of {name}"
-    yield Candidate(
+    yield CandidateCause(
         SCALE.format(name),
         -0.3,
         0.3,
@@ -359,7 +359,7 @@ def _of_readings(stage: StageFit, name: str) -> Iterator[Candidate]:
         lambda size: f"{name} reads {percent(abs(size))} too {'much' if size > 0.0 else 'little'}",
         check,
     )
-    yield Candidate(
+    yield CandidateCause(
         f"time stamps of {name}",
         -LATEST,
         LATEST,
@@ -367,7 +367,7 @@ def _of_readings(stage: StageFit, name: str) -> Iterator[Candidate]:
         lambda size: f"{name} is {_time(abs(size))} {'late' if size > 0.0 else 'early'}",
         "compare its clock with that of the command, and look for a delay of the machine",
     )
-    yield Candidate(
+    yield CandidateCause(
         f"lag of {name}",
         0.0,
         LATEST,
@@ -377,7 +377,7 @@ def _of_readings(stage: StageFit, name: str) -> Iterator[Candidate]:
     )
     if channels[0].kind in CURRENTS:
         return
-    yield Candidate(
+    yield CandidateCause(
         DRIFT.format(name),
         -0.5,
         0.5,
@@ -394,7 +394,7 @@ def _of_readings(stage: StageFit, name: str) -> Iterator[Candidate]:
         (RESISTED, True, "a load that resists the motion"),
         (PULLED, False, "a load that pulls one way"),
     ):
-        yield Candidate(
+        yield CandidateCause(
             kind.format(name),
             0.0 if resisting else -np.inf,
             np.inf,
@@ -413,9 +413,9 @@ def _lost_speed(unit: str, load: str, size: float) -> str:
     return f"{shown.factor * size:.3g} {shown.name} of speed are lost to {load}"
 
 
-def _of_commands(stage: StageFit) -> Iterator[Candidate]:
+def _of_commands(stage: StageFit) -> Iterator[CandidateCause]:
     """What may be wrong with the command, or with what takes it."""
-    yield Candidate(
+    yield CandidateCause(
         COMMAND_GAIN,
         -0.3,
         0.3,
@@ -426,7 +426,7 @@ def _of_commands(stage: StageFit) -> Iterator[Candidate]:
         ),
         "check its converter",
     )
-    yield Candidate(
+    yield CandidateCause(
         COMMAND_LAG,
         0.0,
         LATEST,
@@ -436,12 +436,12 @@ def _of_commands(stage: StageFit) -> Iterator[Candidate]:
     )
 
 
-def _of_numbers(stage: StageFit) -> Iterator[Candidate]:
+def _of_numbers(stage: StageFit) -> Iterator[CandidateCause]:
     """What of the drive is fixed, and the hysteresis that it is taken not to have."""
     runs = stage.problem.experiments
     largest = max(float(np.abs(_driving(stage, run)).max()) for run in runs)
     name = "solenoid_hysteresis"
-    yield Candidate(
+    yield CandidateCause(
         name,
         0.0,
         0.1 * largest,
@@ -459,7 +459,7 @@ def _of_numbers(stage: StageFit) -> Iterator[Candidate]:
         low, high = sorted((-0.5 * value, value))
         if definition.unit == "s":
             low, high = -value, LATEST
-        yield Candidate(
+        yield CandidateCause(
             name,
             low,
             high,
@@ -539,7 +539,7 @@ def _refitted(stage: StageFit, score: _Score, before: Squares) -> Cause | None:
 
 
 def _solved(
-    stage: StageFit, candidate: Candidate, size: float, before: Squares
+    stage: StageFit, candidate: CandidateCause, size: float, before: Squares
 ) -> tuple[float, float] | None:
     """Size of a candidate and the share of the squares that a refit removes; None if it fails."""
     problem, vector = stage.problem, stage.solution.vector

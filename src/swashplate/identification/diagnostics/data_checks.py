@@ -244,7 +244,7 @@ def _idle_commands(experiments: Sequence[Experiment], nominal: ParameterSet) -> 
 # --- what channels do beside the nominal drive ----------------------------------------------------
 
 
-class Motion(NamedTuple):
+class SimulatedReadings(NamedTuple):
     """What a channel did in a run, measured and simulated, where it counts."""
 
     run: str
@@ -269,9 +269,11 @@ class Motion(NamedTuple):
         return float(left @ left) / total if total > 0.0 else 1.0
 
 
-def motions(experiments: Sequence[Experiment], parameters: ParameterSet) -> dict[str, list[Motion]]:
+def motions(
+    experiments: Sequence[Experiment], parameters: ParameterSet
+) -> dict[str, list[SimulatedReadings]]:
     """What each channel did in each run, by the channel's name; runs that hardly move left out."""
-    found: dict[str, list[Motion]] = {}
+    found: dict[str, list[SimulatedReadings]] = {}
     for experiment in experiments:
         simulation = simulated_run(experiment, parameters)
         for name, channel in experiment.channels.items():
@@ -294,7 +296,7 @@ def motions(experiments: Sequence[Experiment], parameters: ParameterSet) -> dict
                     for each in (measured, simulated)
                 )
                 time = 0.5 * (grid[1:] + grid[:-1])
-            ours = Motion(experiment.name, channel, time, measured, simulated)
+            ours = SimulatedReadings(experiment.name, channel, time, measured, simulated)
             found.setdefault(name, []).append(ours)
     for name, each in found.items():
         sizes = [float(np.sqrt(np.mean(np.square(one.simulated)))) for one in each]
@@ -304,7 +306,7 @@ def motions(experiments: Sequence[Experiment], parameters: ParameterSet) -> dict
     return found
 
 
-def _still(name: str, ours: Sequence[Motion]) -> Iterator[Finding]:
+def _still(name: str, ours: Sequence[SimulatedReadings]) -> Iterator[Finding]:
     """Sensors that show nothing while the drive moves, and positions that freeze for a while."""
     ranges = [float(np.ptp(each.simulated)) for each in ours]
     fastest = max((float(np.abs(each.simulated).max()) for each in ours), default=0.0)
@@ -328,7 +330,7 @@ def _still(name: str, ours: Sequence[Motion]) -> Iterator[Finding]:
                 break
 
 
-def contradictions(name: str, ours: Sequence[Motion]) -> Iterator[Finding]:
+def contradictions(name: str, ours: Sequence[SimulatedReadings]) -> Iterator[Finding]:
     """Runs whose sign or scale beside the drive cannot be right, or a channel's as a whole."""
     against = [turned(each.simulated, each.measured) for each in ours]
     if len(ours) > 1 and all(against):

@@ -28,9 +28,9 @@ from swashplate.identification.validation import RunQuality
 from swashplate.results import Result
 
 Array = NDArray[np.float64]
-Motion = Literal["large", "small", "fast"]
+MotionClass = Literal["large", "small", "fast"]
 
-WINDOWS: Mapping[Motion, float] = {"large": 0.5, "small": 0.5, "fast": 0.12}
+WINDOWS: Mapping[MotionClass, float] = {"large": 0.5, "small": 0.5, "fast": 0.12}
 """Time over which an error is taken in each class. [s]"""
 TIME = 0.1
 """Time in which a change of the signal counts as large as the signal. [s]"""
@@ -131,7 +131,7 @@ def _shifted(fit: LinearisedFit, run: LinearisedRun, jacobian: Array, shift: _Sh
 # --- errors over windows --------------------------------------------------------------------------
 
 
-class Record(NamedTuple):
+class ChannelErrors(NamedTuple):
     """One channel of one run, on an even grid, with the error of its simulation."""
 
     run: str
@@ -158,9 +158,9 @@ class Record(NamedTuple):
     is_position: bool
 
 
-def record_of(
+def channel_errors(
     quality: RunQuality, error: Array | None = None, *, held_out: bool = False
-) -> Record | None:
+) -> ChannelErrors | None:
     """One channel of one run; None if fewer than four samples count.
 
     Parameters
@@ -185,7 +185,7 @@ def record_of(
         rounding = step_of_counts * np.round(signal / step_of_counts) - signal
     if channel.is_position:
         signal = np.gradient(signal, step)
-    return Record(
+    return ChannelErrors(
         experiment.name,
         maneuver_of(experiment),
         held_out,
@@ -203,15 +203,15 @@ def record_of(
 
 
 @dataclass(frozen=True)
-class Records(Result):
+class ErrorsOfRuns(Result):
     """One channel of several runs, one record after another: those of many runs are large."""
 
     parts: tuple[tuple[RunQuality, Array | None, bool], ...]
-    """Arguments of `record_of`: the quality, the error, and whether the run was held out."""
+    """Arguments of `channel_errors`: the quality, the error, and whether the run was held out."""
 
-    def __iter__(self) -> Iterator[Record]:
+    def __iter__(self) -> Iterator[ChannelErrors]:
         for quality, error, held_out in self.parts:
-            record = record_of(quality, error, held_out=held_out)
+            record = channel_errors(quality, error, held_out=held_out)
             if record is not None:
                 yield record
 
@@ -238,7 +238,7 @@ def white_noise(error: Array, values: Array) -> float:
     return float(max(white, rounding))
 
 
-def over_window(record: Record, window: float) -> tuple[Array, float]:
+def over_window(record: ChannelErrors, window: float) -> tuple[Array, float]:
     """Errors (n,) over a window about each sample, NaN at both ends, and their noise's variance.
 
     Of a position the slope of the straight line through it, of anything else the mean.
@@ -247,7 +247,7 @@ def over_window(record: Record, window: float) -> tuple[Array, float]:
     return windowed(record.error, weights), record.noise**2 * float(weights @ weights)
 
 
-def window_weights(record: Record, window: float) -> Array:
+def window_weights(record: ChannelErrors, window: float) -> Array:
     """Odd number of weights of a slope, or of a mean, to be convolved with samples."""
     half = int(0.5 * window / record.step)
     if not record.is_position:
@@ -267,12 +267,14 @@ def windowed(values: Array, weights: Array) -> Array:
     return found
 
 
-def classes_of(record: Record, reach: float, largest: float) -> dict[Motion, NDArray[np.bool_]]:
+def classes_of(
+    record: ChannelErrors, reach: float, largest: float
+) -> dict[MotionClass, NDArray[np.bool_]]:
     """Samples of each class, by what the model itself does: known before a run is made.
 
     Parameters
     ----------
-    record : Record
+    record : ChannelErrors
     reach : float
         Range of the signal over all runs. [unit]
     largest : float
@@ -285,13 +287,13 @@ def classes_of(record: Record, reach: float, largest: float) -> dict[Motion, NDA
     return {"large": ~fast & ~slow, "small": ~fast & slow & commanded, "fast": fast}
 
 
-class Cell(NamedTuple):
+class WindowCell(NamedTuple):
     """Windows of one class in one run, one beside another, over the range of the signal."""
 
     run: str
     maneuver: str
     held_out: bool
-    motion: Motion
+    motion: MotionClass
     squares: Array
     """(m,) squared errors less their noise. [1]"""
     noise: float
@@ -300,7 +302,7 @@ class Cell(NamedTuple):
     """(m, 3) of the variance function: 1, the signal's square, that of its rate. [1]"""
 
 
-def cells_of(records: Iterable[Record]) -> tuple[list[Cell], float]:
+def cells_of(records: Iterable[ChannelErrors]) -> tuple[list[WindowCell], float]:
     """All windows, by run and class, and the range of what was measured. [unit]
 
     The records are gone through twice.
@@ -311,7 +313,7 @@ def cells_of(records: Iterable[Record]) -> tuple[list[Cell], float]:
         low = min(low, float(np.nanmin(values, initial=np.inf)))
         high = max(high, float(np.nanmax(values, initial=-np.inf)))
         largest = max(largest, float(np.abs(record.command).max()))
-    reach, cells = high - low, list[Cell]()
+    reach, cells = high - low, list[WindowCell]()
     for record in records if reach > 0.0 else ():
         for motion, inside in classes_of(record, reach, largest).items():
             errors, noise = over_window(record, WINDOWS[motion])
@@ -324,7 +326,7 @@ def cells_of(records: Iterable[Record]) -> tuple[list[Cell], float]:
             squares = (errors[rows] ** 2 - noise) / reach**2
             terms = variance_terms(record.signal[rows] / reach, record.rate[rows] / reach)
             of_run = record.run, record.maneuver, record.held_out
-            cells.append(Cell(*of_run, motion, squares, noise / reach**2, terms))
+            cells.append(WindowCell(*of_run, motion, squares, noise / reach**2, terms))
     return cells, max(reach, 0.0)
 
 
@@ -339,7 +341,7 @@ def variance_terms(signal: Array, rate: Array) -> Array:
 class ClassError(NamedTuple):
     """The stated error of one class of motion."""
 
-    motion: Motion
+    motion: MotionClass
     error: float
     """Root mean square that nine of ten new maneuvers do not exceed, over the range. [1]"""
     fitted: int
@@ -415,7 +417,7 @@ def prediction_errors(
     found = list[PredictionError]()
     for name in channels:
         measured = next(q.experiment[name] for q in qualities if q.channel == name)
-        cells, reach = cells_of(records_of(name, stages, predicted))
+        cells, reach = cells_of(errors_of_runs(name, stages, predicted))
         if not cells:
             continue
         coefficients = bound_of_variance(cells)
@@ -427,7 +429,7 @@ def prediction_errors(
                 sum(not cell.held_out for cell in alike),
                 sum(cell.held_out for cell in alike),
             )
-            for motion in get_args(Motion)
+            for motion in get_args(MotionClass)
             if (alike := [cell for cell in cells if cell.motion == motion])
         )
         unit = f"{measured.unit}/s" if measured.is_position else measured.unit
@@ -437,9 +439,9 @@ def prediction_errors(
     return tuple(found)
 
 
-def records_of(
+def errors_of_runs(
     channel: str, stages: Sequence[StageFit], predicted: Sequence[RunQuality]
-) -> Records:
+) -> ErrorsOfRuns:
     """A channel of all runs, as if the maneuver of each had been left out, or held out."""
     parts = list[tuple[RunQuality, Array | None, bool]]()
     for stage in stages:
@@ -457,10 +459,10 @@ def records_of(
             if each.channel == channel
         ]
     parts += [(each, None, True) for each in predicted if each.channel == channel]
-    return Records(tuple(parts))
+    return ErrorsOfRuns(tuple(parts))
 
 
-def variance_function(cells: Sequence[Cell]) -> Array:
+def variance_function(cells: Sequence[WindowCell]) -> Array:
     """(3,) coefficients of the mean squared error, over the squared range."""
     terms = np.vstack([cell.terms for cell in cells])
     squares = np.concatenate([cell.squares for cell in cells])
@@ -474,10 +476,10 @@ def variance_function(cells: Sequence[Cell]) -> Array:
     return np.asarray(coefficients)
 
 
-def bound_of_variance(cells: Sequence[Cell]) -> Array:
+def bound_of_variance(cells: Sequence[WindowCell]) -> Array:
     """(3,) the same for the squared error that nine of ten new maneuvers do not exceed."""
     coefficients = variance_function(cells)
-    maneuvers = defaultdict[str, list[Cell]](list)
+    maneuvers = defaultdict[str, list[WindowCell]](list)
     for cell in cells:
         maneuvers[cell.maneuver].append(cell)
     ratios = np.array([log_ratio(each, coefficients) for each in maneuvers.values()])
@@ -486,7 +488,7 @@ def bound_of_variance(cells: Sequence[Cell]) -> Array:
     return coefficients * float(np.exp(ratios.mean() + bound))
 
 
-def log_ratio(cells: Sequence[Cell], coefficients: Array) -> float:
+def log_ratio(cells: Sequence[WindowCell], coefficients: Array) -> float:
     """Logarithm of the observed over the fitted squares of some windows.
 
     Observed are at least what the noise's own scatter leaves open.

@@ -19,9 +19,9 @@ from swashplate.identification.diagnostics.data_checks import (
 from swashplate.identification.diagnostics.discrepancy import (
     USUAL_SPREAD,
     WORTH,
-    Cell,
-    Record,
-    Records,
+    ChannelErrors,
+    ErrorsOfRuns,
+    WindowCell,
     cells_of,
     log_ratio,
     variance_function,
@@ -130,7 +130,7 @@ def _records(
     channel: str,
     predicted: Sequence[RunQuality],
     without: Sequence[str],
-) -> Records:
+) -> ErrorsOfRuns:
     """A channel of all runs, as the fit without some of them simulates it.
 
     Those that were held out are predicted by the fit of all others: they are left out here if
@@ -147,7 +147,7 @@ def _records(
                 for run, error in without_runs(stage.linearised, without)
                 if run.channel == channel
             }
-    return Records(
+    return ErrorsOfRuns(
         (
             *((each, None, True) for each in held_out if each.channel == channel),
             *((each, errors.get(each.experiment.name), False) for each in fitted),
@@ -168,10 +168,10 @@ class _Compared:
     """Runs that the others are compared with."""
 
     @classmethod
-    def of(cls, records: Iterable[Record], without: Sequence[str]) -> _Compared | None:
+    def of(cls, records: Iterable[ChannelErrors], without: Sequence[str]) -> _Compared | None:
         """Those of some records; None if too few runs are left to compare with."""
         cells, _ = cells_of(records)
-        runs = defaultdict[str, list[Cell]](list)
+        runs = defaultdict[str, list[WindowCell]](list)
         for cell in cells:
             runs[cell.run].append(cell)
         kept = tuple(name for name in runs if name not in without)
@@ -219,7 +219,9 @@ class _Compared:
 # --- why ------------------------------------------------------------------------------------------
 
 
-def _sentence(own: Record, channel: str, records: Iterable[Record], times: float) -> str:
+def _sentence(
+    own: ChannelErrors, channel: str, records: Iterable[ChannelErrors], times: float
+) -> str:
     """What is wrong with a run, where that can be told, and the line to write."""
     said = f"{own.run}: '{channel}' is {times:.2g} times as far from what is simulated as in the "
     said += "other runs"
@@ -260,7 +262,7 @@ def _sentence(own: Record, channel: str, records: Iterable[Record], times: float
     return f"{said}. Is it a log of this axis and this command? If not, {ignored}."
 
 
-def _motion(record: Record) -> tuple[Array, Array]:
+def _motion(record: ChannelErrors) -> tuple[Array, Array]:
     """(m,) what was measured and what is simulated over short windows; of a position speeds."""
     weights = window_weights(record, WINDOW)
     measured = windowed(record.measured, weights)
@@ -269,7 +271,7 @@ def _motion(record: Record) -> tuple[Array, Array]:
     return measured[whole], simulated[whole]
 
 
-def _delayed(record: Record, measured: Array, simulated: Array) -> tuple[float, float]:
+def _delayed(record: ChannelErrors, measured: Array, simulated: Array) -> tuple[float, float]:
     """Delay of what was measured at which it is nearest [s], and the mean square left then."""
     most = min(int(LATEST / record.step), measured.size // 4)
     shifts = np.arange(-most, most + 1)
@@ -282,7 +284,7 @@ def _delayed(record: Record, measured: Array, simulated: Array) -> tuple[float, 
     return float(shifts[best] * record.step), float(left[best])
 
 
-def _still(record: Record) -> tuple[float, float] | None:
+def _still(record: ChannelErrors) -> tuple[float, float] | None:
     """First and last instant at which a position stands still though the model moves. [s]"""
     if not record.is_position:
         return None

@@ -14,7 +14,7 @@ from swashplate.identification.diagnostics.causes import Cause, causes_of, fixed
 from swashplate.identification.diagnostics.data_checks import Finding
 from swashplate.identification.diagnostics.discrepancy import (
     ClassError,
-    Motion,
+    MotionClass,
     PredictionError,
     prediction_errors,
 )
@@ -40,7 +40,7 @@ SHAFT = ("shaft_speed", "shaft_position")
 """Signals of a drive that are one motion."""
 SAME = 1e-6
 """Costs that differ by less than this part are the same optimum."""
-MOTIONS: Mapping[Motion, str] = {
+MOTIONS: Mapping[MotionClass, str] = {
     "large": "large motion",
     "small": "small motion, near the dead zone",
     "fast": "fast motion",
@@ -210,7 +210,7 @@ class Verdict(Result):
         )
         for each in self.predictions:
             tested = {found.motion: found for found in each.classes}
-            for motion in get_args(Motion):
+            for motion in get_args(MotionClass):
                 found = tested.get(motion, ClassError(motion, nan, 0, 0))
                 made.add(
                     each.signal,

@@ -38,7 +38,7 @@ from swashplate.equations.marching.record import (
     record_of,
 )
 from swashplate.errors import DomainError, InputError, ParameterError
-from swashplate.identification.estimation.model import Asked, EquationModel
+from swashplate.identification.estimation.model import EquationModel, SimulationRequest
 from swashplate.identification.estimation.problem import Problem
 from swashplate.identification.estimation.setup import Forces
 from swashplate.identification.estimation.unknowns import Prior, Unknown, Unknowns, zero_name
@@ -46,7 +46,7 @@ from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.results import Result
 
 Array = NDArray[np.float64]
-Part = Literal["card", "pump", "chain"]
+DrivePart = Literal["card", "pump", "chain"]
 """What of the drive is simulated: the card alone, pump and motor over a current, or all."""
 Starts = Mapping[str, Mapping[str, float]]
 """For some experiments by name the currents at the first sample, as `START_CURRENTS` has them."""
@@ -183,7 +183,9 @@ def simulated_current(
     seen = Observation("current", record.points, np.zeros(record.values.size))
     observed = ObservedRecord(record, (seen,), "voltage", experiment.begins)
     # refinements begin behind the card
-    ready = DriveModel(parameters.plain, "card").ready(start, experiment, Asked(observed))
+    ready = DriveModel(parameters.plain, "card").ready(
+        start, experiment, SimulationRequest(observed)
+    )
     return replace(record, values=ready.residuals(observed))
 
 
@@ -193,7 +195,7 @@ def simulated_run(experiment: Experiment, parameters: ParameterSet) -> Simulatio
     An `InputError` says that its input is neither a voltage nor a current, or cannot be marched, a
     `DomainError` that the model does not hold under it.
     """
-    part: Part = "pump" if experiment.input.kind == "current" else "chain"
+    part: DrivePart = "pump" if experiment.input.kind == "current" else "chain"
     try:
         driver, record, _ = DriveModel(parameters, part).driven(experiment)
         begin = experiment.begins, experiment.start_pressure
@@ -298,7 +300,7 @@ class DriveModel(Result, EquationModel):
 
     parameters: ParameterSet
     """Values of what is not unknown."""
-    part: Part = "chain"
+    part: DrivePart = "chain"
     currents: Mapping[str, Record] = field(default_factory=dict)
     """For the pump alone, signed currents by the experiments' names, if not as measured. [A]"""
     forces: Forces | None = None
@@ -328,7 +330,7 @@ class DriveModel(Result, EquationModel):
         return "current", measured_current(experiment) if given is None else given, {}
 
     def ready(
-        self, values: Mapping[str, float], experiment: Experiment, asked: Asked
+        self, values: Mapping[str, float], experiment: Experiment, asked: SimulationRequest
     ) -> BoundModel:
         """The drive with numbers; see `EquationModel.ready`."""
         states = {

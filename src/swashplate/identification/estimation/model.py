@@ -150,10 +150,10 @@ def _check(made: object, experiment: Experiment, names: int | None = None) -> No
                 )
 
 
-Part = TypeVar("Part")
+Output = TypeVar("Output")
 
 
-def part_of(outputs: Mapping[str, Part], experiment: Experiment, channel: str) -> Part:
+def part_of(outputs: Mapping[str, Output], experiment: Experiment, channel: str) -> Output:
     """What a model gives for a channel; an `InputError` if it gives nothing."""
     if channel not in outputs:
         known = ", ".join(outputs)
@@ -161,7 +161,7 @@ def part_of(outputs: Mapping[str, Part], experiment: Experiment, channel: str) -
     return outputs[channel]
 
 
-class Asked(NamedTuple):
+class SimulationRequest(NamedTuple):
     """What is asked of a model: an experiment as the march sees it, and derivatives by columns."""
 
     observed: ObservedRecord
@@ -185,7 +185,7 @@ class EquationModel(ABC):
 
     @abstractmethod
     def ready(
-        self, values: Mapping[str, float], experiment: Experiment, asked: Asked
+        self, values: Mapping[str, float], experiment: Experiment, asked: SimulationRequest
     ) -> BoundModel:
         """The model with numbers; columns as the engine names them."""
 
@@ -231,7 +231,7 @@ class EquationModel(ABC):
         """Simulate the measured channels; see `MachineModel`."""
         observed = self.observed(experiment, values=values)
         signals = enumerate(self.signals_of(experiment))
-        flat = self.ready(values, experiment, Asked(observed)).residuals(observed)
+        flat = self.ready(values, experiment, SimulationRequest(observed)).residuals(observed)
         return {name: flat[observed.rows_of(k)] for k, name in signals}
 
     def linearise(
@@ -239,7 +239,9 @@ class EquationModel(ABC):
     ) -> Mapping[str, Linearised]:
         """Simulate with derivatives, those by edges by differences; see `MachineModel`."""
         observed, (columns, chain) = self.observed(experiment, values=values), self.columns(names)
-        found = self.ready(values, experiment, Asked(observed, columns)).jacobian(observed)
+        found = self.ready(values, experiment, SimulationRequest(observed, columns)).jacobian(
+            observed
+        )
         flat, by, rows = found.residuals, found.columns @ chain, observed.rows_of
         channels = enumerate(self.signals_of(experiment))
         made = {name: Linearised(flat[rows(k)], by[rows(k)]) for k, name in channels}
@@ -348,7 +350,7 @@ class UserModel(Result, EquationModel):
         return left[0], record, {each.name: each.at(record.points) for each in others}
 
     def ready(
-        self, values: Mapping[str, float], experiment: Experiment, asked: Asked
+        self, values: Mapping[str, float], experiment: Experiment, asked: SimulationRequest
     ) -> BoundModel:
         """The model with numbers; a name that is not known, or no value of one, is refused."""
         model, given = self.model, self.given

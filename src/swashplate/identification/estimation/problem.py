@@ -16,7 +16,7 @@ from swashplate.equations.marching.observation import ObservedRecord
 from swashplate.errors import InputError
 from swashplate.identification.estimation.arrow import (
     ArrowFactor,
-    Block,
+    RunRows,
     Whitening,
     arrow_factor,
     stacked,
@@ -24,10 +24,10 @@ from swashplate.identification.estimation.arrow import (
     whitening,
 )
 from swashplate.identification.estimation.model import (
-    Asked,
     EquationModel,
     Linearised,
     MachineModel,
+    SimulationRequest,
     UserModel,
     linearised,
     part_of,
@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from swashplate.equations import BoundModel
 
 Array = NDArray[np.float64]
-Part = TypeVar("Part")
+Returned = TypeVar("Returned")
 Loss = Literal["linear", "soft_l1", "cauchy"]
 
 
@@ -235,13 +235,13 @@ class Problem(Result):
         values, by = zip(*self.linearised(vector, number).values(), strict=True)
         return Evaluation(np.concatenate(values), np.vstack(by))
 
-    def _factored(self, vector: Array, number: int) -> Block:
+    def _factored(self, vector: Array, number: int) -> RunRows:
         """[J r] of one experiment where the march cannot make its triangular factor."""
         residuals, jacobian = self._full(vector, number)
         factor = triangular_factor(np.column_stack([jacobian, residuals]))
         return self._block(number, factor)
 
-    def _reduced(self, vector: Array, number: int) -> Block:
+    def _reduced(self, vector: Array, number: int) -> RunRows:
         """The triangular factor of [J r] of one experiment, without ever holding J."""
         ready, observed = self._ready(vector, number)
         experiment, (_, names, zeros, asked, by) = self.experiments[number], self._own[number]
@@ -252,9 +252,9 @@ class Problem(Result):
         jacobian += factor[:, len(asked) : -1] @ zeros_chain
         return self._block(number, np.column_stack([jacobian, factor[:, -1]]))
 
-    def _block(self, number: int, rows: Array) -> Block:
+    def _block(self, number: int, rows: Array) -> RunRows:
         run = self.experiments[number].name
-        return Block(run, self.unknowns.of_run(run), rows)
+        return RunRows(run, self.unknowns.of_run(run), rows)
 
     @cached_property
     def _marched(self) -> tuple[bool, ...]:
@@ -267,7 +267,7 @@ class Problem(Result):
         """The model with the numbers of one experiment, and this as the march sees it."""
         experiment, (observed, _, _, asked, _) = self.experiments[number], self._own[number]
         model, zeros = cast("EquationModel", self.model), self._zeros(vector, number)
-        request = Asked(observed, asked, list(zeros.values()))
+        request = SimulationRequest(observed, asked, list(zeros.values()))
         return model.ready(self.model_values(vector, number), experiment, request), observed
 
     @cached_property
@@ -286,7 +286,7 @@ class Problem(Result):
             made.append((observed, names, zeros, *model.columns(names)))
         return made
 
-    def _each(self, work: Callable[[int], Part]) -> list[Part]:
+    def _each(self, work: Callable[[int], Returned]) -> list[Returned]:
         """What is found for each experiment, in their order."""
         numbers = range(len(self.experiments))
         alone = min(self.threads, len(numbers)) == 1
@@ -447,26 +447,26 @@ class LinearisedFit(Result):
         return spare
 
 
-def prior_blocks(unknowns: Unknowns, vector: Array) -> list[Block]:
+def prior_blocks(unknowns: Unknowns, vector: Array) -> list[RunRows]:
     """The derivatives of each prior's residual, as rows of the run that its unknown belongs to."""
     _, rows = unknowns.prior_rows(vector)
     having = [each for each in unknowns if each.prior is not None]
     runs = [each.run or "" for each in having]
     return [
-        Block(run, unknowns.of_run(run), row[None, unknowns.columns(run)])
+        RunRows(run, unknowns.of_run(run), row[None, unknowns.columns(run)])
         for run, row in zip(runs, rows, strict=True)
     ]
 
 
 def factor_of(
-    runs: Iterable[tuple[LinearisedRun, Array]], unknowns: Unknowns, priors: Iterable[Block] = ()
+    runs: Iterable[tuple[LinearisedRun, Array]], unknowns: Unknowns, priors: Iterable[RunRows] = ()
 ) -> ArrowFactor:
     """Factor of the derivatives of some runs, each (n, q + M), and of rows of priors."""
 
-    def blocks() -> Iterator[Block]:
+    def blocks() -> Iterator[RunRows]:
         yield from priors
         for run, jacobian in runs:
-            yield Block(run.name, unknowns.of_run(run.name), jacobian)
+            yield RunRows(run.name, unknowns.of_run(run.name), jacobian)
 
     return arrow_factor(len(unknowns), unknowns.shared, blocks())
 

@@ -128,7 +128,7 @@ GAUGES = (
 holds away from the swash plate's stops."""
 
 
-class Direction(NamedTuple):
+class NullDirection(NamedTuple):
     """A way for the unknowns to move together that the tests do not see, or hardly."""
 
     changes: Mapping[str, float]
@@ -190,9 +190,9 @@ class Identifiability(Result):
     """How many combinations of the unknowns are determined."""
     unexcited: tuple[str, ...]
     """Unknowns that change nothing by themselves: no test exercises them."""
-    null: tuple[Direction, ...]
+    null: tuple[NullDirection, ...]
     """Directions that change nothing."""
-    weak: tuple[Direction, ...]
+    weak: tuple[NullDirection, ...]
     """Directions along which intervals are wider than ±10 %, those before it fixed."""
 
     @property
@@ -288,7 +288,7 @@ def identifiability(
         place: int,
         gauge: Gauge | None = None,
         half: float = inf,
-    ) -> Direction:
+    ) -> NullDirection:
         """From changes (k,) of some of the solver's numbers, one of which is to be fixed."""
         # a short column needs a large change for the same effect: judged by effect, not by size
         effect = np.abs(moved) * lengths[places]
@@ -296,7 +296,7 @@ def identifiability(
         order = [k for k in np.argsort(-effect, kind="stable") if effect[k] >= least]
         largest = max((float(moved[k]) for k in order), key=abs)
         changes = {names[places[k]]: float(moved[k]) / largest for k in order}
-        return Direction(changes, half, gauge, names[places[place]])
+        return NullDirection(changes, half, gauge, names[places[place]])
 
     null, rank = [], 0
     if places.size:

@@ -211,7 +211,7 @@ class Bench(Result):
     sensors: tuple[Sensor, ...]
     """Those of the campaign, or of a fresh plan."""
 
-    def candidate(self, maneuver: Maneuver, sensors: Sequence[Sensor] = ()) -> Candidate:
+    def candidate(self, maneuver: Maneuver, sensors: Sequence[Sensor] = ()) -> CandidateTest:
         """A test with some sensors, by default those of the bench; free zeros are spent."""
         # what is known beforehand counts once, not once a test
         free = {k: v.model_copy(update={"prior": None}) for k, v in self.stage.free.items()}
@@ -219,7 +219,7 @@ class Bench(Result):
         for each in sensors or self.sensors:
             imagined = _imagined(maneuver, each)
             rows.append(_machine_rows(stage_problem(stage, self.parameters, [imagined])))
-        return Candidate(maneuver.name, triangular_factor(np.vstack(rows)), maneuver.length)
+        return CandidateTest(maneuver.name, triangular_factor(np.vstack(rows)), maneuver.length)
 
 
 def bench(
@@ -336,7 +336,7 @@ NAMED = 4
 
 
 @dataclass(frozen=True, eq=False)
-class Candidate(Result):
+class CandidateTest(Result):
     """A test that could be made."""
 
     name: str
@@ -373,7 +373,7 @@ class Advice(Result):
 
 
 def advise(
-    present: Array, candidates: Sequence[Candidate], variables: Unknowns
+    present: Array, candidates: Sequence[CandidateTest], variables: Unknowns
 ) -> tuple[Advice, ...]:
     """Rank candidate tests by what they would add.
 
@@ -384,7 +384,7 @@ def advise(
     present : (m, K) array
         What the tests made so far tell: derivatives of the weighted residuals over the deviation of
         an independent one; no rows if there are none.
-    candidates : sequence of Candidate
+    candidates : sequence of CandidateTest
         Tests to choose from; an `InputError` if there is none or its shape is wrong.
     variables : Unknowns
         The unknowns; those at a bound count as known.
@@ -419,7 +419,7 @@ def advise(
 
 
 def in_turn(
-    present: Array, candidates: Sequence[Candidate], variables: Unknowns, count: int
+    present: Array, candidates: Sequence[CandidateTest], variables: Unknowns, count: int
 ) -> tuple[Advice, ...]:
     """A plan of tests: the best one, then the best beside it, and so on, each at most once.
 

@@ -194,7 +194,7 @@ def estimates(
 # --- what is taken for granted --------------------------------------------------------------------
 
 
-class Handed(NamedTuple):
+class EarlierStage(NamedTuple):
     """An earlier stage's estimates as the later one takes them for granted."""
 
     def __repr__(self) -> str:
@@ -208,21 +208,23 @@ class Handed(NamedTuple):
     """Name of the earlier stage."""
 
 
-def with_handed(
-    own: Covariance, handed: Sequence[Handed], systematic: Systematic = MappingProxyType({})
+def with_earlier_stages(
+    own: Covariance,
+    earlier_stages: Sequence[EarlierStage],
+    systematic: Systematic = MappingProxyType({}),
 ) -> Covariance:
     """A stage's covariance with what earlier stages do not know, and systematic effects.
 
     The degrees of freedom are Satterthwaite's, of the sum of the variances; a standard uncertainty
     that was stated has infinitely many (JCGM 100:2008, G.4).
     """
-    if not handed and not systematic:
+    if not earlier_stages and not systematic:
         return own
     known = np.outer(own.determined, own.determined)
     columns = np.array(list(systematic.values())).reshape(-1, len(own.variables))
     total = own.matrix + np.where(known, columns.T @ columns, 0.0)
     spread = np.diag(own.matrix) ** 2 / own.degrees_of_freedom
-    for each in handed:
+    for each in earlier_stages:
         added = np.where(known, each.slopes @ each.covariance.matrix @ each.slopes.T, 0.0)
         total += added
         # of each earlier unknown by itself, as if they were independent of each other
@@ -264,7 +266,7 @@ class Uncertainty(Result):
     colours: tuple[NoiseColour, ...]
     noisy: bool
     """Whether there are any residuals at all."""
-    handed: tuple[Handed, ...]
+    earlier_stages: tuple[EarlierStage, ...]
     """What earlier stages do not know."""
     systematic: Systematic
     runs: RunToRun | None = None
@@ -277,12 +279,12 @@ class Uncertainty(Result):
     @cached_property
     def quoted(self) -> Covariance:
         """That of the stage's own noise with what is taken for granted."""
-        return with_handed(self.own, self.handed, self.systematic)
+        return with_earlier_stages(self.own, self.earlier_stages, self.systematic)
 
     @cached_property
     def sampled(self) -> Covariance:
         """That of all stages' noise: the quoted one without systematic effects."""
-        return with_handed(self.own, self.handed)
+        return with_earlier_stages(self.own, self.earlier_stages)
 
     @cached_property
     def estimates(self) -> tuple[Estimate, ...]:
@@ -330,9 +332,9 @@ class Uncertainty(Result):
     def _widened(self) -> Iterator[str]:
         """What earlier stages and systematic effects add to the intervals."""
         known = self.own.determined & (np.diag(self.own.matrix) > 0.0)
-        if not known.any() or not (self.handed or self.systematic):
+        if not known.any() or not (self.earlier_stages or self.systematic):
             return
-        what = ["the uncertainty of earlier stages"] if self.handed else []
+        what = ["the uncertainty of earlier stages"] if self.earlier_stages else []
         if self.systematic:
             what.append("what instruments, fixed parameters and the model may be off by")
         wider = np.ones(known.size)
@@ -367,14 +369,14 @@ class Uncertainty(Result):
 def uncertainty(
     fit: LinearisedFit,
     *,
-    handed: Sequence[Handed] = (),
+    earlier_stages: Sequence[EarlierStage] = (),
     systematic: Systematic = MappingProxyType({}),
     runs: RunToRun | None = None,
 ) -> Uncertainty:
     """Errors of a fit's estimates for coloured residuals.
 
-    `handed` is what earlier stages do not know, `systematic` what each systematic effect changes,
-    `runs` how runs differ. An `InputError` says that there are no more samples than unknowns.
+    `earlier_stages` are the estimates that this stage takes for granted, `systematic` what each
+    systematic effect changes, `runs` how runs differ. An `InputError` says that there are no more samples than unknowns.
     """
     bounded, fit = fit.variables, released(fit)
     own = replace(with_runs(coloured_noise_covariance(fit), runs), variables=bounded)
@@ -386,7 +388,7 @@ def uncertainty(
         np.maximum(ratio, 1.0),
         noise_colours(fit),
         fit.squares > 0.0,
-        tuple(handed),
+        tuple(earlier_stages),
         systematic,
         runs,
     )
@@ -401,7 +403,7 @@ def uncertainty_of(stage: StageFit) -> Uncertainty:
     InputError
         If there are no more samples than unknowns.
     """
-    problem, vector, handed = stage.problem, stage.solution.vector, []
+    problem, vector, earlier_stages = stage.problem, stage.solution.vector, []
     effects = effects_of(stage)
     systematic = dict(effects.systematic)
     for together, change in zip(
@@ -412,11 +414,13 @@ def uncertainty_of(stage: StageFit) -> Uncertainty:
         if follows_card(stage, earlier):
             slopes = slopes_by_earlier(stage, earlier)
             known = uncertainty_of(earlier)
-            handed.append(Handed(known.sampled, slopes, earlier.stage.name))
+            earlier_stages.append(EarlierStage(known.sampled, slopes, earlier.stage.name))
             # an effect acts on this stage by itself, and through what it does to others
             for effect, change in known.systematic.items():
                 systematic[effect] = systematic.get(effect, 0.0) + slopes @ change
-    found = uncertainty(stage.linearised, handed=handed, systematic=systematic, runs=effects.runs)
+    found = uncertainty(
+        stage.linearised, earlier_stages=earlier_stages, systematic=systematic, runs=effects.runs
+    )
     found = replace(found, priors=prior_sentences(problem.unknowns, vector, found.quoted))
     if not found.noisy:
         return found
