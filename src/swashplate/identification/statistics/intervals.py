@@ -376,7 +376,8 @@ def uncertainty(
     """Errors of a fit's estimates for coloured residuals.
 
     `earlier_stages` are the estimates that this stage takes for granted, `systematic` what each
-    systematic effect changes, `runs` how runs differ. An `InputError` says that there are no more samples than unknowns.
+    systematic effect changes, `runs` how runs differ. An `InputError` says that there are no more
+    samples than unknowns.
     """
     bounded, fit = fit.variables, released(fit)
     own = replace(with_runs(coloured_noise_covariance(fit), runs), variables=bounded)
