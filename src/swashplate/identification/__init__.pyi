@@ -28,10 +28,10 @@ from .resampling import cross_validate as cross_validate
 from .stage_fit import StageFit as StageFit
 from .statistics.determination import Identifiability as Identifiability
 from .statistics.determination import identifiability_of as identifiability_of
-from .statistics.experiment_design import Outlook as Outlook
+from .statistics.experiment_design import RunInformation as RunInformation
 from .statistics.experiment_design import advise as advise
-from .statistics.experiment_design import bench as bench
-from .statistics.experiment_design import outlook as outlook
+from .statistics.experiment_design import prior_information as prior_information
+from .statistics.experiment_design import run_information as run_information
 from .statistics.intervals import Estimate as Estimate
 from .statistics.intervals import Uncertainty as Uncertainty
 from .statistics.intervals import estimates_of as estimates_of

@@ -1,7 +1,8 @@
 """Design of experiments by Fisher information: what runs tell of each unknown, what a test adds.
 
-`outlook` is known before a fit: which run tells of which unknown, and what none tells of. `bench`
-and `advise` rank tests to come by what they would add.
+`run_information` says before a fit which run tells of which unknown, and of which unknowns none
+does. `prior_information` is what is known before the next test; `advise` ranks candidate tests by
+what they would add.
 """
 
 from __future__ import annotations
@@ -52,7 +53,7 @@ which the unknown is said to rest on that run."""
 
 
 @dataclass(frozen=True, eq=False)
-class Outlook(Result):
+class RunInformation(Result):
     """What the runs can tell of a stage's unknowns, at the nominal values: known before a fit."""
 
     stage: Stage
@@ -140,16 +141,16 @@ class Outlook(Result):
         return made
 
 
-def outlook(
+def run_information(
     stage: Stage, nominal: ParameterSet | HasParameters, experiments: Sequence[Experiment]
-) -> Outlook:
+) -> RunInformation:
     """What runs can tell of a stage's unknowns, before any fit.
 
     At the nominal values, best those that `stages.smooth` makes, as a fit takes them. Raises
     as `stages.stage_problem`, and a `DomainError` if the model does not hold there.
     """
     problem = stage_problem(stage, set_of(nominal), experiments)
-    return Outlook(stage, problem, linearised_fit(problem, problem.start))
+    return RunInformation(stage, problem, linearised_fit(problem, problem.start))
 
 
 # --- what is known so far -------------------------------------------------------------------------
@@ -198,7 +199,7 @@ def default_sensors(drive: Drive) -> tuple[Sensor, ...]:
 
 
 @dataclass(frozen=True, eq=False)
-class Bench(Result):
+class PriorInformation(Result):
     """A drive, what is to be found of it, and what is known so far: where candidates are tried."""
 
     parameters: ParameterSet
@@ -212,7 +213,7 @@ class Bench(Result):
     """Those of the campaign, or of a fresh plan."""
 
     def candidate(self, maneuver: Maneuver, sensors: Sequence[Sensor] = ()) -> CandidateTest:
-        """A test with some sensors, by default those of the bench; free zeros are spent."""
+        """A test with some sensors, by default those of the campaign; free zeros are spent."""
         # what is known beforehand counts once, not once a test
         free = {k: v.model_copy(update={"prior": None}) for k, v in self.stage.free.items()}
         stage, rows = self.stage.model_copy(update={"free": free}), []
@@ -222,14 +223,14 @@ class Bench(Result):
         return CandidateTest(maneuver.name, triangular_factor(np.vstack(rows)), maneuver.length)
 
 
-def bench(
+def prior_information(
     parameters: ParameterSet,
     setup: FitSetup,
     experiments: Sequence[Experiment] = (),
     *,
     fitted: bool = False,
     sensors: Sequence[Sensor] = (),
-) -> Bench:
+) -> PriorInformation:
     """What is known of a drive before the next test.
 
     The stages of `setup` are taken together, through the whole chain unless they all belong to one
@@ -253,7 +254,7 @@ def bench(
         _, prior = problem.unknowns.prior_rows(problem.start)
         machine = _machine(problem)
         variables = Unknowns(tuple(problem.unknowns[k] for k in machine))
-        return Bench(parameters, stage, variables, prior[:, machine], tuple(own))
+        return PriorInformation(parameters, stage, variables, prior[:, machine], tuple(own))
     problem = stage_problem(stage, parameters, experiments)
     fit, known = linearised_fit(problem, problem.start) if fitted else None, dict[str, Sensor]()
     scales, machine = {}, _machine(problem)
@@ -268,7 +269,7 @@ def bench(
         known[sensor.kind] = sensor
     variables = Unknowns(tuple(problem.unknowns[k] for k in machine))
     present = _machine_rows(replace(problem, scales=scales))
-    return Bench(parameters, stage, variables, present, tuple(known.values()))
+    return PriorInformation(parameters, stage, variables, present, tuple(known.values()))
 
 
 def _of_residuals(
@@ -418,7 +419,7 @@ def advise(
     return tuple(made)
 
 
-def in_turn(
+def sequential_plan(
     present: Array, candidates: Sequence[CandidateTest], variables: Unknowns, count: int
 ) -> tuple[Advice, ...]:
     """A plan of tests: the best one, then the best beside it, and so on, each at most once.
