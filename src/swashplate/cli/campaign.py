@@ -523,14 +523,14 @@ def advise(
         # a fit writes what it estimated next to the drive that it found
         estimated = source.parent / words.SETUP_FILE
         setup = str(estimated) if estimated.is_file() else None
-    informations = list[design.RunInformation]()
+    run_informations = list[design.RunInformation]()
     doubts = tuple[str, ...]()
     run_names = list[str]()
     with working("Evaluating the tests"):
         if tested:
             _, experiments, plan, start = words.fit_of(Path(subject), axis, setup, drive or begin)
             doubts = refuse_unsound(check_runs(experiments, smooth(start)))
-            informations = [
+            run_informations = [
                 design.run_information(stage, smooth(start), experiments) for stage in plan.stages
             ]
             run_names = [experiment.name for experiment in experiments]
@@ -546,24 +546,24 @@ def advise(
         candidates = [prior.candidate(each) for each in maneuvers.values()]
         ranked = design.advise(prior.present, candidates, prior.variables)
         plan_of_tests = design.sequential_plan(prior.present, candidates, prior.variables, tests)
-    determined = [information.table(run_names) for information in informations]
+    determined = [information.table(run_names) for information in run_informations]
     if determined:
         save(runs, "Shares of the information", joined(determined).write)
     save(out, "Tests", design.advice_table("", ranked).write)
     for sentence in doubts:
         say(f"! {sentence}")
-    for information, table in zip(informations, determined, strict=True):
+    for information, table in zip(run_informations, determined, strict=True):
         show(table)
         # what no run exercises is said with its reason
         bullets(
             replace(information.identifiability, unexcited=()).sentences(), information.sentences()
         )
-    if informations:
+    if run_informations:
         note("")
         for number, name in enumerate(run_names, start=1):
             note(f"run {number}: {name}")
         say(INFORMATION)
-        if all(information.identifiability.complete for information in informations):
+        if all(information.identifiability.complete for information in run_informations):
             note("The fit setup can stay as it is.")
     show(design.advice_table("Tests", ranked[:top]))
     if plan_of_tests:
