@@ -125,9 +125,9 @@ class Identification(Estimated):
     def held_out(self) -> tuple[Experiment, ...]:
         """Runs of the axis that were held out."""
         runs = self.fit.runs
-        names = {each.name for each in runs}
+        names = {quality.name for quality in runs}
         out = self.campaign.select(axis=runs[0].axis, role="validate")
-        return tuple(each for each in out if each.name not in names)
+        return tuple(name for name in out if name.name not in names)
 
     @cached_property
     def predicted(self) -> tuple[RunQuality, ...]:
@@ -139,7 +139,7 @@ class Identification(Estimated):
         """What it can be used for."""
         if self.stored is not None and self.stored.holds_for(self):
             return self.stored.verdict
-        planned = [each.name for each in self.fit.setup.stages]
+        planned = [stage.name for stage in self.fit.setup.stages]
         with working("Judging the fit"):
             return assess_fit(
                 self.fit.stages, self.predicted, planned=planned, required=self.required
@@ -293,19 +293,19 @@ class Identification(Estimated):
             swashplate=__version__,
             axis=self.fit.runs[0].axis,
             campaign=_seen_from(folder, self.campaign.path),
-            runs={each.name: fingerprint(each) for each in self.fit.runs},
+            runs={quality.name: fingerprint(quality) for quality in self.fit.runs},
             interpolation=self.fit.runs[0].input.interpolation,
             nominal=dict(start.numbers) if isinstance(start, ModelSetup) else dump_set(start),
             setup=self.fit.setup,
             stages=tuple(
                 StoredStage(
-                    name=each.stage.name,
-                    unknowns=each.problem.unknowns.items,
-                    solution=each.solution,
-                    starts=each.starts,
-                    intervals=intervals_of(each),
+                    name=stage.stage.name,
+                    unknowns=stage.problem.unknowns.items,
+                    solution=stage.solution,
+                    starts=stage.starts,
+                    intervals=intervals_of(stage),
                 )
-                for each in self.fit.stages
+                for stage in self.fit.stages
             ),
             profiles=tuple(self.profiles),
             folds=self.folds,
@@ -370,7 +370,7 @@ def parts_of(found: Identification) -> list[tables.FitPart]:
         table = tables.profiles_table(found.profiles, fit.stages)
         made.append(tables.FitPart("Profile likelihoods", [table], (), said))
     made.append(tables.fixed_part(fit.stages, fit.nominal))
-    fitted = tables.runs_tables([quality for each in fit.stages for quality in each.runs])
+    fitted = tables.runs_tables([quality for stage in fit.stages for quality in stage.runs])
     made.append(tables.FitPart("Errors of fitted runs", fitted, heading="Runs that were fitted"))
     if found.predicted:
         errors = tables.runs_tables(found.predicted)
@@ -387,24 +387,24 @@ def motion_of(runs: Iterable[Experiment]) -> Motion:
 
     Where none was, a rod if all speeds are in m/s.
     """
-    channels = [each for run in runs for each in run.channels.values()]
-    units = {each.unit for each in channels if each.is_position}
-    units = units or {each.unit for each in channels if each.kind == "shaft_speed"}
+    channels = [channel for run in runs for channel in run.channels.values()]
+    units = {channel.unit for channel in channels if channel.is_position}
+    units = units or {channel.unit for channel in channels if channel.kind == "shaft_speed"}
     return "rod" if units and units <= {"m", "m/s"} else "shaft"
 
 
 def _interval_words(stages: Sequence[StageFit], found: ParameterSet) -> dict[str, list[str]]:
     """Intervals of the fitted parameters in words, by symbol."""
     words: dict[str, list[str]] = {}
-    for each in stages:
-        unknowns = each.problem.unknowns
-        for estimate, unknown in zip(estimates_of(each), unknowns, strict=True):
+    for stage in stages:
+        unknowns = stage.problem.unknowns
+        for estimate, unknown in zip(estimates_of(stage), unknowns, strict=True):
             if unknown.kind == "force":
                 forces = ("Z19", "Z20", "Z21", "Z22")
                 words |= {symbol: ["from the fitted forces"] for symbol in forces}
             elif unknown.run is None:
                 ends = " to ".join(filter(None, estimate.ends()))
-                for target in (each for each in unknown.targets if each in found.numbers):
+                for target in (target for target in unknown.targets if target in found.numbers):
                     side = target.rpartition("_")[2]
                     side = f"{side} " if side in ("plus", "minus") else ""
                     words.setdefault(found.definitions.find(target).symbol, []).append(
@@ -517,9 +517,9 @@ def _loaded(
         )
     tests = fitted_to if tests is None else tests
     campaign = tests if isinstance(tests, Campaign) else Campaign.from_toml(tests)
-    if not all(each.input.settled for each in campaign if each.axis == file.axis):
+    if not all(run.input.settled for run in campaign if run.axis == file.axis):
         campaign = campaign.with_interpolation(file.axis, file.interpolation)
-    runs = {each.name: each for each in campaign}
+    runs = {run.name: run for run in campaign}
     for name, mark in file.runs.items():
         if name not in runs:
             raise InputError(
@@ -550,7 +550,13 @@ def _loaded(
     def stored(stage: Stage, problem: Problem) -> Solved:
         entry = next(entries)
         ours, theirs = (
-            (name, [(each.name, each.run, each.kind, each.channel) for each in unknowns])
+            (
+                name,
+                [
+                    (unknown.name, unknown.run, unknown.kind, unknown.channel)
+                    for unknown in unknowns
+                ],
+            )
             for name, unknowns in ((stage.name, problem.unknowns), (entry.name, entry.unknowns))
         )
         sizes = {entry.solution.vector.size, len(entry.unknowns)}

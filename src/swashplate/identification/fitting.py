@@ -142,7 +142,7 @@ class Estimated(Tabular, ABC):
             raise UnknownNameError(f"{name} has two directions: ask for {' or '.join(sides)}.")
         near = get_close_matches(str(name), self.estimates, 1)
         meant = f" (did you mean {near[0]}?)" if near else ""
-        known = ", ".join(key for key, each in self.estimates.items() if each.run is None)
+        known = ", ".join(key for key, estimate in self.estimates.items() if estimate.run is None)
         raise UnknownNameError(f"There is no parameter '{name}'{meant}; there are {known}.")
 
     def __contains__(self, name: object) -> bool:
@@ -200,15 +200,15 @@ class Fit(Estimated):
 
     def stage(self, name: str) -> StageFit:
         """The stage of a name; an `UnknownNameError` if there is none."""
-        for each in self.stages:
-            if each.stage.name == name:
-                return each
-        known = ", ".join(each.stage.name for each in self.stages)
+        for stage in self.stages:
+            if stage.stage.name == name:
+                return stage
+        known = ", ".join(earlier.stage.name for earlier in self.stages)
         raise UnknownNameError(f"The fit has no stage '{name}'; there are {known}.")
 
     def tables(self) -> list[Table]:
         """Estimates with their intervals, stage by stage, then the errors of each fitted run."""
-        runs = [quality for each in self.stages for quality in each.runs]
+        runs = [quality for stage in self.stages for quality in stage.runs]
         errors = tables.runs_tables(runs)
         errors = [replace(table, title=f"{table.title}, fitted runs") for table in errors]
         return [*map(tables.estimates_table, self.stages), *errors]
@@ -488,11 +488,11 @@ def _solved(
             )
         except KeyboardInterrupt:  # before the first of them ended
             others = ()
-        several = solution, *(replace(each, number=each.number + 1) for each in others)
+        several = solution, *(replace(solution, number=solution.number + 1) for solution in others)
         if _explained(problem, several[-1]):
             planned = len(several)
     if several:
-        best = min(several, key=lambda each: each.cost)
+        best = min(several, key=lambda solution: solution.cost)
         if solution.given_up and len(several) == planned:
             share = share_explained(problem, best.vector)
             if share < LEAST_EXPLAINED:
@@ -502,7 +502,7 @@ def _solved(
             solution = replace(best, converged=False, interrupted=True, message=words)
         elif search is not None or best.number or solution.given_up:
             solution = solved(problem, best.vector)
-    if any(each.prior is not None for each in problem.unknowns) and not solution.interrupted:
+    if any(unknown.prior is not None for unknown in problem.unknowns) and not solution.interrupted:
         # what the residuals are worth is known only now
         problem = weighed(problem, solution.vector)
         solution = solved(problem, solution.vector)

@@ -88,7 +88,7 @@ class CrossValidation(Result):
 def folds_tables(found: CrossValidation, stages: Sequence[StageFit] = ()) -> list[Table]:
     """Errors held out, beside those of the fit to all runs if its stages are given; the folds."""
     fitted_columns = "tpf" if stages else ""
-    whole = pooled(with_speeds(each for stage in stages for each in stage.runs))
+    whole = pooled(with_speeds(quality for stage in stages for quality in stage.runs))
     held_out = Table(
         "Cross-validation: each part predicted by a fit to the others",
         (
@@ -112,8 +112,8 @@ def folds_tables(found: CrossValidation, stages: Sequence[StageFit] = ()) -> lis
         state = "not fitted" if fold.failure else "converged" if fold.converged else "not converged"
         state = f"{state}; loses {', '.join(fold.lost)}" if fold.lost else state
         fits = (
-            f"{name} {'-' if each.fit_percent is None else f'{each.fit_percent:.2f}'} %"
-            for name, each in fold.measures.items()
+            f"{name} {'-' if measures.fit_percent is None else f'{measures.fit_percent:.2f}'} %"
+            for name, measures in fold.measures.items()
         )
         folds.add(fold.number + 1, ", ".join(fold.held), state, ", ".join(fits) or NONE)
     return [held_out, folds]
@@ -199,11 +199,14 @@ def deal(experiments: Sequence[Experiment], folds: int, seed: int) -> tuple[tupl
             f"{folds} folds need at least as many runs; there are {len(experiments)} to fit."
         )
     strata: dict[tuple[str, str], list[int]] = {}
-    for place, each in enumerate(experiments):
-        high, low = max(each.input.values.max(), 0.0), max(-each.input.values.min(), 0.0)
+    for place, experiment in enumerate(experiments):
+        high, low = (
+            max(experiment.input.values.max(), 0.0),
+            max(-experiment.input.values.min(), 0.0),
+        )
         way = "plus" if high >= low else "minus"
         way = "both" if min(high, low) > ONE_WAY * max(high, low) else way
-        strata.setdefault((each.maneuver.split(" ")[0], way), []).append(place)
+        strata.setdefault((experiment.maneuver.split(" ")[0], way), []).append(place)
     random = np.random.default_rng(seed)
     order = random.permutation(folds)
     dealt = [int(p) for _, places in sorted(strata.items()) for p in random.permutation(places)]
@@ -219,8 +222,8 @@ def _fold(
 ) -> tuple[Fold, list[_Held]]:
     (experiments, nominal, setup, loss, threads), (number, part) = shared, item
     left_out = [experiments[place] for place in part]
-    others = [each for place, each in enumerate(experiments) if place not in part]
-    names = tuple(each.name for each in left_out)
+    others = [experiment for place, experiment in enumerate(experiments) if place not in part]
+    names = tuple(run.name for run in left_out)
     try:
         result = fit(nominal, others, setup, loss=loss, threads=threads, search=Search(0))
         if result.stages[-1].solution.interrupted:
@@ -229,15 +232,15 @@ def _fold(
     except (InputError, DomainError) as error:
         return Fold(number, names, failure=str(error)), []
     held = []
-    for each in predicted:
-        channel = each.experiment[each.channel]
-        samples = channel.values[channel.used], each.simulated[channel.used]
-        held.append((each.channel, channel.unit, *samples))
+    for quality in predicted:
+        channel = quality.experiment[quality.channel]
+        samples = channel.values[channel.used], quality.simulated[channel.used]
+        held.append((quality.channel, channel.unit, *samples))
     lost = list[str]()
     for stage in result.stages:
         effects = np.linalg.norm(stage.problem.evaluate(stage.solution.vector).jacobian, axis=0)
         least = NO_EFFECT * effects.max()
         each_one = zip(stage.problem.unknowns, effects, strict=True)
-        lost += [each.name for each, effect in each_one if each.run is None and effect <= least]
-    converged = all(each.solution.converged for each in result.stages)
+        lost += [run.name for run, effect in each_one if run.run is None and effect <= least]
+    converged = all(stage.solution.converged for stage in result.stages)
     return Fold(number, names, tuple(lost), _measured(held), converged), held

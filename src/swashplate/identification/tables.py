@@ -139,7 +139,7 @@ def profiles_table(profiles: Sequence[Profile], stages: Sequence[StageFit]) -> T
         unknown = stage.problem.unknowns.items[one.index]
         ends_found = (None, None) if one.better is not None else (one.lower, one.upper)
         numbers = (float(stage.solution.vector[one.index]), *ends_found)
-        values = (None if each is None else unknown.to_value(each) for each in numbers)
+        values = (None if number is None else unknown.to_value(number) for number in numbers)
         made.add(one.stage, one.name, *values, unit=unknown.unit)
     return made
 
@@ -170,7 +170,7 @@ def all_estimates(stages: Sequence[StageFit]) -> Table:
 
 def truth_count(tables: Sequence[Table]) -> tuple[int, int]:
     """How many intervals of tables with a truth contain it, and of how many."""
-    names = [each.name for each in tables[0].columns]
+    names = [column.name for column in tables[0].columns]
     said = [row.cells[names.index("holds")] for table in tables for row in table.rows]
     return said.count("yes"), said.count("yes") + said.count("no")
 
@@ -212,9 +212,11 @@ def meaning_of_parameter(name: str) -> str:
 def _moved(stages: Sequence[StageFit]) -> set[str]:
     """Columns of the drive's parameters that some stage moved."""
     problems = [stage.problem for stage in stages]
-    moved = {target for each in problems for unknown in each.unknowns for target in unknown.targets}
-    forces = [each.model.forces for each in problems if isinstance(each.model, DriveModel)]
-    return moved.union(*(each.columns for each in forces if each is not None))
+    moved = {
+        target for problem in problems for unknown in problem.unknowns for target in unknown.targets
+    }
+    forces = [problem.model.forces for problem in problems if isinstance(problem.model, DriveModel)]
+    return moved.union(*(force.columns for force in forces if force is not None))
 
 
 def _is_moved(symbol: str, moved: Collection[str]) -> bool:
@@ -249,8 +251,8 @@ def fixed_table(stages: Sequence[StageFit], truth: ParameterSet | None = None) -
         why = "0: this effect is left out" if value == 0.0 else ""
         why = "inactive: no test reaches it" if one.status == "inactive" else why
         for gauge in GAUGES[::-1]:
-            fixed = next((each for each in gauge.fix if not _is_moved(each, moved)), None)
-            others = [each for each in gauge.moves if each != symbol and _is_moved(each, moved)]
+            fixed = next((name for name in gauge.fix if not _is_moved(name, moved)), None)
+            others = [name for name in gauge.moves if name != symbol and _is_moved(name, moved)]
             if fixed == symbol and others:
                 why = f"fixes the {gauge.name}: {gauge.determined}"
         true = None if truth is None else truth.numbers[column]
@@ -282,7 +284,7 @@ def scales_words(fit: StageFit) -> str:
     """What one unit of residual is, channel by channel."""
     parts = []
     for name, size in fit.problem.scales.items():
-        having = next(each for each in fit.problem.experiments if name in each.channels)
+        having = next(run for run in fit.problem.experiments if name in run.channels)
         unit = display_unit(having[name].shown_unit, size)
         parts.append(f"{plain(unit.factor * size, 3)} {unit.name} of {name}")
     return f"One unit of residual is {listed(parts)}."
@@ -320,8 +322,8 @@ def runs_tables(qualities: Sequence[RunQuality]) -> list[Table]:
             ),
         )
         unit = alike[0].experiment[name].shown_unit
-        for each in alike:
-            run, test = each.experiment, each.test
+        for quality in alike:
+            run, test = quality.experiment, quality.test
             tested: tuple[float | None, ...] = (None,) * 4
             if test is not None:
                 tested = (test.duration, test.peak[1], test.band, test.peak[0])
@@ -329,7 +331,7 @@ def runs_tables(qualities: Sequence[RunQuality]) -> list[Table]:
             table.add(
                 *(run.name, run.maneuver, run.role, name, start_words(run)),
                 Cell("; ".join(windows), ignored_words(run, run[name])),
-                *_measures(each.measures),
+                *_measures(quality.measures),
                 *tested,
                 unit=unit,
             )
@@ -410,7 +412,7 @@ def fixed_part(stages: Sequence[StageFit], nominal: Parameters) -> FitPart:
 
 def single_runs_line(stages: Sequence[StageFit]) -> list[str]:
     """A sentence on the numbers of single runs, which no table for people shows, if any."""
-    unknowns = [unknown for each in stages for unknown in each.problem.unknowns]
+    unknowns = [unknown for stage in stages for unknown in stage.problem.unknowns]
     names = [unknown.label for unknown in unknowns if unknown.run is not None]
     if not names:
         return []

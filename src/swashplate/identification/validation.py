@@ -183,7 +183,7 @@ def measures(*runs: tuple[Array, Array, Array | None]) -> Measures:
     # a constant channel's own mean is off by rounding
     about = measured - mean
     about[np.abs(about) <= 4.0 * np.finfo(np.float64).eps * abs(mean)] = 0.0
-    rmse, spread = (float(np.sqrt(np.mean(each**2))) for each in (errors, about))
+    rmse, spread = (float(np.sqrt(np.mean(values**2))) for values in (errors, about))
     return Measures(measured.size, rmse, spread)
 
 
@@ -269,24 +269,24 @@ def predict(
     parameters = model if isinstance(model, ModelSetup) else set_of(model)
     if isinstance(parameters, ModelSetup):
         return tuple(
-            compared(each, name, simulated)
-            for each in experiments
-            for name, simulated in parameters.predicted(each).items()
-            if each[name].used.any()
+            compared(experiment, name, simulated)
+            for experiment in experiments
+            for name, simulated in parameters.predicted(experiment).items()
+            if experiment[name].used.any()
         )
     made = []
-    for each in experiments:
-        if not any(channel.kind in SIGNALS for channel in each.channels.values()):
-            raise InputError(f"{each.name} has no channel that a drive has.")
-        own = DriveModel(parameters, "pump" if each.input.kind == "current" else "chain")
-        for name, simulated in own.simulate({}, at_instants(parameters, each)).items():
-            channel = each[name]
+    for run in experiments:
+        if not any(channel.kind in SIGNALS for channel in run.channels.values()):
+            raise InputError(f"{run.name} has no channel that a drive has.")
+        own = DriveModel(parameters, "pump" if run.input.kind == "current" else "chain")
+        for name, simulated in own.simulate({}, at_instants(parameters, run)).items():
+            channel = run[name]
             if not channel.used.any():
                 continue
             zero = 0.0
             if channel.is_position:
                 zero = np.average(channel.values - simulated, weights=channel.weight)
-            made.append(compared(each, name, simulated + zero))
+            made.append(compared(run, name, simulated + zero))
     return tuple(made)
 
 
@@ -307,30 +307,32 @@ def with_speeds(qualities: Iterable[RunQuality]) -> tuple[RunQuality, ...]:
     one in whose noise the speed drowns.
     """
     found = list[tuple[RunQuality, RunQuality | None]]()
-    for each in qualities:
-        found.append((each, None))
-        channel = each.experiment[each.channel]
+    for quality in qualities:
+        found.append((quality, None))
+        channel = quality.experiment[quality.channel]
         if not channel.is_position:
             continue
         unread = replace(channel, noise=None, limits=None, encoder=None, counts=None)
         try:
             filtered = speed_of(channel, "exact").speed
-            same = speed_of(replace(unread, values=each.simulated), "exact").speed
+            same = speed_of(replace(unread, values=quality.simulated), "exact").speed
         except InputError:
             continue
         name, unit = f"speed from {channel.name}", f"{channel.unit}/s"
-        noise = _noise_of_speed(each, same)
+        noise = _noise_of_speed(quality, same)
         speed = replace(unread, name=name, kind="shaft_speed", unit=unit, values=filtered)
         speed = replace(speed, noise=noise)
-        run = replace(each.experiment, channels={**each.experiment.channels, name: speed})
+        run = replace(quality.experiment, channels={**quality.experiment.channels, name: speed})
         # the residuals of a filtered signal are coloured by the filter: there is no test of them
         own = RunQuality(run, name, same, measures((filtered, same, speed.weight)), None, noise)
-        found[-1] = each, own
+        found[-1] = quality, own
     speeds = [own for _, own in found if own is not None]
     clean, raw = pooled(speeds, without_noise=True), pooled(speeds)
     clear = {name for name in raw if clean[name].spread ** 2 >= 0.5 * raw[name].spread ** 2}
     both = (own for pair in found for own in pair if own is not None)
-    return tuple(each for each in both if each.channel in clear or each.channel not in raw)
+    return tuple(
+        channel for channel in both if channel.channel in clear or channel.channel not in raw
+    )
 
 
 def _noise_of_speed(quality: RunQuality, speed: Array) -> float:
@@ -373,8 +375,8 @@ def pooled(qualities: Iterable[RunQuality], *, without_noise: bool = False) -> d
     movement; of the error at least what the noise's own scatter leaves open remains.
     """
     channels: dict[str, list[RunQuality]] = {}
-    for each in qualities:
-        channels.setdefault(each.channel, []).append(each)
+    for quality in qualities:
+        channels.setdefault(quality.channel, []).append(quality)
     made = {}
     for name, alike in channels.items():
         signals = [q.experiment[name] for q in alike]
@@ -393,25 +395,27 @@ def pooled(qualities: Iterable[RunQuality], *, without_noise: bool = False) -> d
 def _noise_square(alike: Sequence[RunQuality]) -> tuple[float, float]:
     """Mean square of the noise of a channel over some runs, and that one's standard error."""
     square = samples = values = 0.0
-    for each in alike:
-        channel = each.experiment[each.channel]
+    for quality in alike:
+        channel = quality.experiment[quality.channel]
         count = float(np.count_nonzero(channel.used))
         samples += count
-        if each.noise:
+        if quality.noise:
             # the filters pass noise of up to 30 Hz or so: twice as many independent values a second
             bandwidth = float(np.median(np.diff(channel.time))) * DIFFERENTIATOR / np.pi
             values += min(bandwidth, 1.0) * count
-            square += count * each.noise**2
+            square += count * quality.noise**2
         else:
             values += count
-            square += count * _white_noise(each) ** 2
+            square += count * _white_noise(quality) ** 2
     mean = square / samples
     return mean, mean * float(np.sqrt(2.0 / values))
 
 
 def range_of(qualities: Sequence[RunQuality]) -> float:
     """Largest less smallest value that was measured of a channel in some runs."""
-    counted = [x.values[x.used] for x in (each.experiment[each.channel] for each in qualities)]
+    counted = [
+        x.values[x.used] for x in (quality.experiment[quality.channel] for quality in qualities)
+    ]
     return max(float(x.max()) for x in counted) - min(float(x.min()) for x in counted)
 
 
@@ -423,8 +427,12 @@ def percent(part: float) -> str:
 
 def following(qualities: Sequence[RunQuality], name: str) -> tuple[int, list[float]]:
     """Runs of a channel that were tested, and correlations of those that follow the input."""
-    tests = [each.test for each in qualities if each.channel == name and each.test is not None]
-    return len(tests), [each.peak[1] for each in tests if each.follows]
+    tests = [
+        quality.test
+        for quality in qualities
+        if quality.channel == name and quality.test is not None
+    ]
+    return len(tests), [test.peak[1] for test in tests if test.follows]
 
 
 def ignored_windows(channel: Channel) -> tuple[tuple[float, float], ...]:

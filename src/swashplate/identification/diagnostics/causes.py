@@ -178,10 +178,10 @@ def _causes_of_stage(stage: StageFit, before: Squares) -> tuple[Cause, ...]:
     scored = [each for each in scored if each.size < each.candidate.most]
     scored.sort(key=lambda each: -each.share)
     found = list[Cause]()
-    for each in scored[:TRIED]:
-        if (cause := _refitted(stage, each, before)) is not None:
+    for score in scored[:TRIED]:
+        if (cause := _refitted(stage, score, before)) is not None:
             found.append(cause)
-    return tuple(sorted(found, key=lambda each: -each.share)[:NAMED])
+    return tuple(sorted(found, key=lambda cause: -cause.share)[:NAMED])
 
 
 # --- to first order -------------------------------------------------------------------------------
@@ -198,7 +198,7 @@ class _Score(NamedTuple):
 def _scores(stage: StageFit) -> Iterator[_Score]:
     """Each candidate of a stage, to first order."""
     fit = stage.linearised
-    candidates = {each.name: each for each in _candidates(stage)}
+    candidates = {candidate.name: candidate for candidate in _candidates(stage)}
     squares, products = dict[str, float](), dict[str, float]()
     along, scales = dict[str, Array](), dict[str, list[_RunScale]]()
     jacobians = fit.jacobians()
@@ -243,11 +243,11 @@ def _in_order(runs: Sequence[_RunScale]) -> float:
     Freed of what a line explains by chance (adjusted R², Draper and Smith 1998, section 5.1): a
     machine that differs between maneuvers differs between runs too, in whatever order they stand.
     """
-    moving = [each for each in runs if each.square > 0.0]
+    moving = [run_scale for run_scale in runs if run_scale.square > 0.0]
     if len(moving) < 3:
         return 0.0
-    place = np.array([float(each.place) for each in moving])
-    scale = np.array([each.product / each.square for each in moving])
+    place = np.array([float(scale.place) for scale in moving])
+    scale = np.array([scale.product / scale.square for scale in moving])
     total = float(np.sum((scale - scale.mean()) ** 2))
     along = place - place.mean()
     if not total > 0.0:
@@ -481,8 +481,8 @@ def fixed_numbers(stage: StageFit) -> list[str]:
         return []
     taken = {
         target
-        for each in (*stage.earlier, stage)
-        for unknown in each.problem.unknowns
+        for earlier in (*stage.earlier, stage)
+        for unknown in earlier.problem.unknowns
         for target in unknown.targets
     }
     if model.forces is not None:

@@ -80,18 +80,20 @@ def check_runs(experiments: Sequence[Experiment], nominal: ParameterSet) -> list
     """
     unsigned = {**unsigned_currents(experiments), **wrapped_positions(experiments)}
     found = [refusal(None, name, f"{said}.") for (_, name), said in unsigned.items()]
-    for each in experiments:
-        found += _samples(each, [n for n, c in each.channels.items() if c.kind in SIGNALS])
+    for run in experiments:
+        found += _samples(run, [n for n, c in run.channels.items() if c.kind in SIGNALS])
     if not _refused(found):
         found += _idle_commands(experiments, nominal)
     if not _refused(found):
         for name, ours in motions(experiments, nominal).items():
-            idle = {each.run for each in found if each.channel is None}
-            still = [*_still(name, [each for each in ours if each.run not in idle])]
-            seen = idle | {each.run for each in still}
+            idle = {finding.run for finding in found if finding.channel is None}
+            still = [*_still(name, [readings for readings in ours if readings.run not in idle])]
+            seen = idle | {finding.run for finding in still}
             found += still
-            found += contradictions(name, [each for each in ours if each.run not in seen])
-    return sorted(found, key=lambda each: each.severity != "refuse")
+            found += contradictions(
+                name, [readings for readings in ours if readings.run not in seen]
+            )
+    return sorted(found, key=lambda finding: finding.severity != "refuse")
 
 
 def unfitted_currents(experiments: Sequence[Experiment], setup: FitSetup) -> list[Finding]:
@@ -100,9 +102,9 @@ def unfitted_currents(experiments: Sequence[Experiment], setup: FitSetup) -> lis
     driving = any(stage.current == "measured" for stage in setup.stages)
     left = {
         name: None
-        for each in experiments
-        for name, channel in each.channels.items()
-        if each.input.kind == "voltage" and channel.kind in CURRENTS and channel.kind not in fitted
+        for run in experiments
+        for name, channel in run.channels.items()
+        if run.input.kind == "voltage" and channel.kind in CURRENTS and channel.kind not in fitted
     }
     return [
         warning(
@@ -125,26 +127,28 @@ def check_model(experiments: Sequence[Experiment], setup: ModelSetup) -> list[Fi
     wrapped, seen = wrapped_positions(experiments), dict[bytes, str]()
     fitted = setup.channels or tuple(name for _, name in wrapped)
     found = [refusal(None, n, f"{said}.") for (_, n), said in wrapped.items() if n in fitted]
-    for each in experiments:
-        found += _samples(each, setup.channels or tuple(each.channels))
+    for run in experiments:
+        found += _samples(run, setup.channels or tuple(run.channels))
     if _refused(found):
         return found
     problem = setup.problem(experiments)
     moving = {n for e in experiments for n, c in e.channels.items() if np.ptp(c.values) > 0.0}
-    for each in problem.experiments:
-        names = [name for name in problem.channels if name in each.channels]
-        arrays = [each.input.values, *(each[name].values for name in names)]
-        first = seen.setdefault(b"".join(array.tobytes() for array in arrays), each.name)
-        if first != each.name:
-            said = f"{each.name} has the samples of {first}, to the last bit, and counts twice; "
+    for experiment in problem.experiments:
+        names = [name for name in problem.channels if name in experiment.channels]
+        arrays = [experiment.input.values, *(experiment[name].values for name in names)]
+        first = seen.setdefault(b"".join(array.tobytes() for array in arrays), experiment.name)
+        if first != experiment.name:
+            said = (
+                f"{experiment.name} has the samples of {first}, to the last bit, and counts twice; "
+            )
             said += 'leave one of them out with role = "ignore".'
-            found.append(warning(each.name, None, said))
-        for name in names if np.ptp(each.input.values) > 0.0 else ():
-            used = each[name].values[each[name].used]
+            found.append(warning(experiment.name, None, said))
+        for name in names if np.ptp(experiment.input.values) > 0.0 else ():
+            used = experiment[name].values[experiment[name].used]
             if name in moving and used.size and np.ptp(used) == 0.0:
-                said = f"{each.name}: '{name}' never changes, though the input does and it moves in"
+                said = f"{experiment.name}: '{name}' never changes, though the input does and it moves in"
                 said += " other runs; look at the sensor, or ignore the channel in this run."
-                found.append(warning(each.name, name, said))
+                found.append(warning(experiment.name, name, said))
     return found
 
 
@@ -153,8 +157,8 @@ def contradicting_runs(
 ) -> list[Finding]:
     """Runs whose sign or scale contradicts the others, beside a drive that was fitted to all."""
     of_channels = motions(experiments, parameters).items()
-    found = (each for name, ours in of_channels for each in contradictions(name, ours))
-    return [each for each in found if each.run is not None]
+    found = (finding for name, ours in of_channels for finding in contradictions(name, ours))
+    return [finding for finding in found if finding.run is not None]
 
 
 def refuse_unsound(
@@ -168,7 +172,7 @@ def refuse_unsound(
         more = len(refused) - 1
         also = f" ({more} more finding{'s' if more > 1 else ''} of this weight.)" if more else ""
         raise error(refused[0].sentence + also)
-    return tuple(each.sentence for each in findings)
+    return tuple(finding.sentence for finding in findings)
 
 
 def spike_findings(experiments: Sequence[Experiment], loss: Loss) -> list[Finding]:
@@ -180,7 +184,7 @@ def spike_findings(experiments: Sequence[Experiment], loss: Loss) -> list[Findin
 
 
 def _refused(found: Sequence[Finding]) -> list[Finding]:
-    return [each for each in found if each.severity == "refuse"]
+    return [finding for finding in found if finding.severity == "refuse"]
 
 
 # --- samples and commands -------------------------------------------------------------------------
@@ -218,15 +222,21 @@ def _idle_commands(experiments: Sequence[Experiment], nominal: ParameterSet) -> 
     """Commands that move nothing."""
     idle, numbers = {}, nominal.numbers
     symbols = {"voltage": ("V_dz", "V_dz_minus", "V_dz_plus"), "current": ("Z17", "Z17", "Z17")}
-    for each in experiments:
-        if each.input.kind not in symbols:
+    for experiment in experiments:
+        if experiment.input.kind not in symbols:
             continue
-        symbol, minus, plus = symbols[each.input.kind]
+        symbol, minus, plus = symbols[experiment.input.kind]
         low, high = -numbers[minus], numbers[plus]
-        least, most, unit = each.input.values.min(), each.input.values.max(), each.input.unit
+        least, most, unit = (
+            experiment.input.values.min(),
+            experiment.input.values.max(),
+            experiment.input.unit,
+        )
         if low <= least and most <= high:
             zone = f"the dead zone {symbol} ({low:.3g} to {high:.3g} {unit})"
-            idle[each.name] = f"stays between {least:.3g} and {most:.3g} {unit}, within {zone}"
+            idle[experiment.name] = (
+                f"stays between {least:.3g} and {most:.3g} {unit}, within {zone}"
+            )
     if not idle or len(idle) < len(experiments):
         also = "; it shows the drive at rest only."
         return [warning(run, None, f"{run}: its command {why}{also}") for run, why in idle.items()]
@@ -234,7 +244,7 @@ def _idle_commands(experiments: Sequence[Experiment], nominal: ParameterSet) -> 
     others = ", and so it is in all other runs" if len(idle) > 1 else ""
     said = f"{first}: its command {why}{others}; a drive that does not move cannot be identified: "
     said += "use larger commands"
-    peak = 1e3 * max(float(np.abs(each.input.values).max()) for each in experiments)
+    peak = 1e3 * max(float(np.abs(run.input.values).max()) for run in experiments)
     if experiments[0].input.kind == "voltage" and 1.0 <= peak <= FULL_VOLTAGE:
         # a thousandth of a usual command, in volts that were declared as millivolts
         said += f', or, if the log is in V, write unit = "V": it then reaches {peak:.3g} V'
@@ -285,23 +295,23 @@ def motions(
             both = ("current_positive", "current_negative")
             parts = both if signal == "current_sum" else (signal,)
             simulated = np.sum(
-                [np.interp(time, simulation.time, simulation[each]) for each in parts], axis=0
+                [np.interp(time, simulation.time, simulation[part]) for part in parts], axis=0
             )
             if channel.is_position:
                 # mean speeds in short windows: where a position drifts to says little
                 windows = max(int((time[-1] - time[0]) / WINDOW), 4)
                 grid = np.linspace(time[0], time[-1], windows + 1)
                 measured, simulated = (
-                    np.diff(np.interp(grid, time, each)) / np.diff(grid)
-                    for each in (measured, simulated)
+                    np.diff(np.interp(grid, time, values)) / np.diff(grid)
+                    for values in (measured, simulated)
                 )
                 time = 0.5 * (grid[1:] + grid[:-1])
             ours = SimulatedReadings(experiment.name, channel, time, measured, simulated)
             found.setdefault(name, []).append(ours)
-    for name, each in found.items():
-        sizes = [float(np.sqrt(np.mean(np.square(one.simulated)))) for one in each]
+    for name, readings in found.items():
+        sizes = [float(np.sqrt(np.mean(np.square(one.simulated)))) for one in readings]
         least = MOVING * max(sizes)
-        kept = zip(each, sizes, strict=True)
+        kept = zip(readings, sizes, strict=True)
         found[name] = [one for one, size in kept if size > 0.0 and size >= least]
     return found
 
@@ -310,23 +320,25 @@ def _still(name: str, ours: Sequence[SimulatedReadings]) -> Iterator[Finding]:
     """Sensors that show nothing while the drive moves, and positions that freeze for a while."""
     ranges = [float(np.ptp(each.simulated)) for each in ours]
     fastest = max((float(np.abs(each.simulated).max()) for each in ours), default=0.0)
-    for each, moves in zip(ours, ranges, strict=True):
-        where, position = f"{each.run}: '{name}'", each.channel.is_position
-        if np.ptp(each.measured) == 0.0 and moves > DEAD * max(ranges):
-            unit = f"{each.channel.unit}/s" if position else each.channel.unit
+    for readings, moves in zip(ours, ranges, strict=True):
+        where, position = f"{readings.run}: '{name}'", readings.channel.is_position
+        if np.ptp(readings.measured) == 0.0 and moves > DEAD * max(ranges):
+            unit = f"{readings.channel.unit}/s" if position else readings.channel.unit
             said = f"never changes, though the drive should move it by about {moves:.3g} {unit}"
             also = "look at the sensor, and ignore the channel in this run."
-            yield refusal(each.run, name, f"{where} {said}; {also}")
+            yield refusal(readings.run, name, f"{where} {said}; {also}")
             continue
-        frozen = (each.measured == 0.0) & (np.abs(each.simulated) > DEAD * fastest) & position
+        frozen = (
+            (readings.measured == 0.0) & (np.abs(readings.simulated) > DEAD * fastest) & position
+        )
         edges = np.flatnonzero(np.diff(frozen, prepend=False, append=False))
-        half = 0.5 * float(np.median(np.diff(each.time)))
+        half = 0.5 * float(np.median(np.diff(readings.time)))
         for first, stop in edges.reshape(-1, 2):
-            begin, end = each.time[first] - half, each.time[stop - 1] + half
+            begin, end = readings.time[first] - half, readings.time[stop - 1] + half
             if end - begin > FROZEN:
                 said = f"stands still from {begin:.4g} to {end:.4g} s, though the drive should move"
                 also = "it; look at the sensor and at the machine's stops, and ignore that window."
-                yield warning(each.run, name, f"{where} {said} {also}")
+                yield warning(readings.run, name, f"{where} {said} {also}")
                 break
 
 
@@ -338,10 +350,10 @@ def contradictions(name: str, ours: Sequence[SimulatedReadings]) -> Iterator[Fin
         yield refusal(None, name, f"{said}sign = -1 in its channel, or the input's.")
         return
     others = "" if len(ours) == 1 else ", in the other runs with it"
-    for each in (each for each, wrong in zip(ours, against, strict=True) if wrong):
-        said = f"In {each.run} '{name}' goes against the command{others}: reverse it with "
+    for readings in (each for each, wrong in zip(ours, against, strict=True) if wrong):
+        said = f"In {readings.run} '{name}' goes against the command{others}: reverse it with "
         said += 'sign = -1 for this run, or leave the run out with role = "ignore".'
-        yield refusal(each.run, name, said)
+        yield refusal(readings.run, name, said)
     left = [each for each, wrong in zip(ours, against, strict=True) if not wrong]
     gains = np.array([abs(each.gain) for each in left])
     middle = float(np.median(gains)) if left else 1.0
@@ -369,23 +381,23 @@ def clipped_channels(experiments: Sequence[Experiment]) -> Iterator[Finding]:
     noise does, and one that reads it at a run's first sample is at rest. Positions are passed over,
     as they stand still by themselves.
     """
-    for name in dict.fromkeys(name for each in experiments for name in each.channels):
-        runs = [each for each in experiments if name in each.channels]
+    for name in dict.fromkeys(name for run in experiments for name in run.channels):
+        runs = [run for run in experiments if name in run.channels]
         if runs[0][name].is_position:
             continue
-        values = np.concatenate([each[name].values for each in runs])
+        values = np.concatenate([run[name].values for run in runs])
         low, high = float(values.min()), float(values.max())
-        reach = float(np.ptp(np.concatenate([each.input.values for each in runs])))
-        stated = (each[name].limits for each in runs)
+        reach = float(np.ptp(np.concatenate([run.input.values for run in runs])))
+        stated = (run[name].limits for run in runs)
         limits = [pair for pair in stated if pair is not None]
         for end in (low, high):
             # limits may be stated a little within the end at which the readings stand
             if any(not lower < end < upper for lower, upper in limits):
                 continue
-            spans = np.array([span for each in runs for span in _inputs_at(end, each, name)])
+            spans = np.array([span for run in runs for span in _inputs_at(end, run, name)])
             if not spans.size or low == high:
                 continue
-            rests = any(each[name].values[0] == end for each in runs)
+            rests = any(run[name].values[0] == end for run in runs)
             moved, apart = float(np.ptp(spans, axis=1).max()), float(np.ptp(spans))
             # a rounded reading stands still by itself for as long as a step of it lasts
             coarse = float(np.diff(np.unique(np.round(values / (high - low), 9))).min())
@@ -455,12 +467,12 @@ def beside_the_drives(campaign: Campaign) -> list[str]:
         if axis.drive is None:
             continue
         nominal, runs = smooth(campaign.drive(name).parameters), []
-        for each in campaign.select(axis=name):
-            beyond = beyond_the_card(each)
+        for run in campaign.select(axis=name):
+            beyond = beyond_the_card(run)
             found += [f"{said}; this run is not compared with the drive" for said in beyond]
-            runs += [] if beyond else [each]
+            runs += [] if beyond else [run]
         # a drive that is made up says nothing of what a machine does
-        made_up = all(each.status == "assumed" for each in nominal.values())
-        if runs and not made_up and all(each.input.kind != "other" for each in runs):
-            found += [each.sentence.rstrip(".") for each in check_runs(runs, nominal)]
+        made_up = all(parameter.status == "assumed" for parameter in nominal.values())
+        if runs and not made_up and all(experiment.input.kind != "other" for experiment in runs):
+            found += [finding.sentence.rstrip(".") for finding in check_runs(runs, nominal)]
     return found

@@ -105,10 +105,10 @@ def _shifts(fit: LinearisedFit, groups: Mapping[str, str]) -> dict[str, _Shift]:
             by = jacobian @ whitening
             parts[groups[run.name]].append((directions, by.T @ by, by.T @ run.residual))
     found = dict[str, _Shift]()
-    for group, each in parts.items():
-        moved = np.unique(np.concatenate([directions for directions, _, _ in each]))
+    for group, moved_by_runs in parts.items():
+        moved = np.unique(np.concatenate([directions for directions, _, _ in moved_by_runs]))
         products, along = np.zeros((moved.size, moved.size)), np.zeros(moved.size)
-        for directions, product, residual in each:
+        for directions, product, residual in moved_by_runs:
             place = np.searchsorted(moved, directions)
             products[np.ix_(place, place)] += product
             along[place] += residual
@@ -371,7 +371,7 @@ class PredictionError(Result):
     @property
     def worst(self) -> ClassError:
         """The class with the largest error."""
-        return max(self.classes, key=lambda each: each.error)
+        return max(self.classes, key=lambda stated: stated.error)
 
     @property
     def signal(self) -> str:
@@ -410,10 +410,10 @@ def prediction_errors(
     below exp(m + t d √(1 + 1/k)), the bound of a prediction. What the instrument's gain may be off
     is an error of the motion that no run of it shows.
     """
-    channels = dict.fromkeys(name for each in stages for name in each.problem.channels)
+    channels = dict.fromkeys(name for stage in stages for name in stage.problem.channels)
     if not stages:
-        channels = dict.fromkeys(each.channel for each in predicted)
-    qualities = [*(each for stage in stages for each in stage.runs), *predicted]
+        channels = dict.fromkeys(quality.channel for quality in predicted)
+    qualities = [*(quality for stage in stages for quality in stage.runs), *predicted]
     found = list[PredictionError]()
     for name in channels:
         measured = next(q.experiment[name] for q in qualities if q.channel == name)
@@ -454,11 +454,11 @@ def errors_of_runs(
             if run.channel == channel
         }
         parts += [
-            (each, errors[each.experiment.name], False)
-            for each in stage.runs
-            if each.channel == channel
+            (quality, errors[quality.experiment.name], False)
+            for quality in stage.runs
+            if quality.channel == channel
         ]
-    parts += [(each, None, True) for each in predicted if each.channel == channel]
+    parts += [(quality, None, True) for quality in predicted if quality.channel == channel]
     return ErrorsOfRuns(tuple(parts))
 
 
@@ -482,7 +482,9 @@ def bound_of_variance(cells: Sequence[WindowCell]) -> Array:
     maneuvers = defaultdict[str, list[WindowCell]](list)
     for cell in cells:
         maneuvers[cell.maneuver].append(cell)
-    ratios = np.array([log_ratio(each, coefficients) for each in maneuvers.values()])
+    ratios = np.array(
+        [log_ratio(cells_of_maneuver, coefficients) for cells_of_maneuver in maneuvers.values()]
+    )
     deviation, freedom = spread_of(ratios)
     bound = float(stdtrit(freedom, LEVEL)) * deviation * np.sqrt(1.0 + 1.0 / ratios.size)
     return coefficients * float(np.exp(ratios.mean() + bound))

@@ -63,15 +63,18 @@ def unsound_data(stages: Sequence[StageFit], predicted: Sequence[RunQuality]) ->
         Of runs that were held out.
     """
     fitted = {run.name: run for stage in stages for run in stage.problem.experiments}
-    held_out = {each.experiment.name: each.experiment for each in predicted}
+    held_out = {quality.experiment.name: quality.experiment for quality in predicted}
     runs = list((fitted | held_out).values())
     found = list[Finding]()
     last = stages[-1]
     if isinstance(last.problem.model, DriveModel):
         found += contradicting_runs(runs, last.drive.parameters)
     found += clipped_channels(runs)
-    seen = {each.run for each in found}
-    return [*found, *(each for each in outlying_runs(stages, predicted) if each.run not in seen)]
+    seen = {finding.run for finding in found}
+    return [
+        *found,
+        *(finding for finding in outlying_runs(stages, predicted) if finding.run not in seen),
+    ]
 
 
 def outlying_runs(stages: Sequence[StageFit], predicted: Sequence[RunQuality]) -> Iterator[Finding]:
@@ -90,7 +93,7 @@ def outlying_runs(stages: Sequence[StageFit], predicted: Sequence[RunQuality]) -
     """
     seen = set[str]()
     for stage in stages or (None,):
-        channels = [each.channel for each in predicted]
+        channels = [quality.channel for quality in predicted]
         if stage is not None:
             channels = list(stage.problem.channels)
         for channel in dict.fromkeys(channels):
@@ -117,7 +120,7 @@ def _of_channel(
         if after is None or after.apart(suspect) <= after.limit or after.alike(suspect):
             break
         names.append(suspect)
-        record = next(each for each in records if each.run == suspect)
+        record = next(record for record in records if record.run == suspect)
         times = float(np.exp(0.5 * after.apart(suspect)))
         found.append(refusal(suspect, channel, _sentence(record, channel, records, times)))
         if 2 * len(found) >= len(after.ratios):
@@ -139,8 +142,8 @@ def _records(
     fitted, held_out = list[RunQuality](), list(predicted)
     errors = dict[str, Array]()
     if stage is not None:
-        fitted = [each for each in stage.runs if each.channel == channel]
-        if any(each.experiment.name in without for each in fitted):
+        fitted = [quality for quality in stage.runs if quality.channel == channel]
+        if any(quality.experiment.name in without for quality in fitted):
             held_out = []
             errors = {
                 run.name: error
@@ -149,8 +152,8 @@ def _records(
             }
     return ErrorsOfRuns(
         (
-            *((each, None, True) for each in held_out if each.channel == channel),
-            *((each, errors.get(each.experiment.name), False) for each in fitted),
+            *((quality, None, True) for quality in held_out if quality.channel == channel),
+            *((quality, errors.get(quality.experiment.name), False) for quality in fitted),
         )
     )
 
@@ -179,7 +182,9 @@ class _Compared:
             return None
         others = [cell for name in kept for cell in runs[name]]
         coefficients = variance_function(others)
-        ratios = {name: log_ratio(each, coefficients) for name, each in runs.items()}
+        ratios = {
+            name: log_ratio(cells_of_run, coefficients) for name, cells_of_run in runs.items()
+        }
         maneuvers = {cell.run: cell.maneuver for cell in cells}
         fitted = {cell.maneuver for cell in cells if not cell.held_out}
         suspects = tuple(name for name in kept if not fitted or maneuvers[name] in fitted)

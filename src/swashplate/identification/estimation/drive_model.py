@@ -75,7 +75,7 @@ REACHED = (
     (Limit.RELIEF, "", "Z15", "the relief valve Z15"),
 )
 """Limits, the signal whose sign says which side acts, the parameter that sets them, and words."""
-LIMITS = {symbol: words for _, _, symbol, words in sorted(REACHED, key=lambda each: each[2])}
+LIMITS = {symbol: words for _, _, symbol, words in sorted(REACHED, key=lambda zone: zone[2])}
 """What a drive may never have reached in the fitted runs, by symbol."""
 EASED, SHOWN = 1.05, 1.02
 """Factors on limits: those at which a run is simulated to see how far it would go, and how far it
@@ -150,7 +150,7 @@ def measured_current(experiment: Experiment, scale: float = 1.0) -> Record:
     drive = experiment.input
     if drive.kind == "current":
         return _record(replace(drive, values=scale * drive.values))
-    signed = [(each, each.values) for each in experiment.of_kind("signed_current")]
+    signed = [(channel, channel.values) for channel in experiment.of_kind("signed_current")]
     both = experiment.of_kind("current_plus"), experiment.of_kind("current_minus")
     for plus, minus in zip(*both, strict=False):
         signed.append((plus, plus.values - np.interp(plus.time, minus.time, minus.values)))
@@ -226,8 +226,8 @@ def limits_unreached(
     limits = {column: parameters.numbers[column] for column in LIMIT_COLUMNS}
     eased = {c: EASED * limit for c, limit in limits.items() if isfinite(limit)}
     without, reached = parameters.with_numbers(eased), dict.fromkeys(LIMIT_COLUMNS, 0.0)
-    for each in experiments:
-        run = simulated_run(each, without)
+    for experiment in experiments:
+        run = simulated_run(experiment, without)
         for column, (signal, sign) in LIMIT_COLUMNS.items():
             values = np.abs(run[signal]) if sign == 0.0 else sign * run[signal]
             reached[column] = max(reached[column], float(values.max()))
@@ -270,14 +270,17 @@ def at_rate_of(
     It then has the filter's differential equation, if a run is marched at another rate than the one
     that its recursion belongs to.
     """
-    own, runs = parameters.rate, [each for each in experiments if each.input.kind == "voltage"]
+    own, runs = (
+        parameters.rate,
+        [experiment for experiment in experiments if experiment.input.kind == "voltage"],
+    )
     if own is None:
         return parameters, ()
-    for each in runs:
-        rate = 1.0 / voltage_record(each).step
+    for run in runs:
+        rate = 1.0 / voltage_record(run).step
         if abs(rate / own - 1.0) > OTHER_RATE:
             return at_every_rate(parameters), (
-                f"{each.name} is simulated at {rate:.4g} Hz, but the card's filter of "
+                f"{run.name} is simulated at {rate:.4g} Hz, but the card's filter of "
                 f"{parameters.name} is a recursion for {own:g} Hz: the fit takes the "
                 "differential equation with the same poles, which holds at every rate.",
             )
@@ -312,7 +315,7 @@ class DriveModel(Result, EquationModel):
         """Signal for each channel that this part of the drive gives."""
         kinds = kinds_of(self.part)
         channels = experiment.channels.items()
-        return {name: SIGNALS[each.kind] for name, each in channels if each.kind in kinds}
+        return {name: SIGNALS[channel.kind] for name, channel in channels if channel.kind in kinds}
 
     def driven(
         self, experiment: Experiment, values: Mapping[str, float] = MappingProxyType({})

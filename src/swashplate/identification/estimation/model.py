@@ -200,8 +200,8 @@ class EquationModel(ABC):
     def columns(self, names: Sequence[str]) -> tuple[list[str], Array]:
         """Columns that some names move, and (columns, names) their derivatives by these."""
         moved = [self.moves(name) for name in names]
-        asked = list(dict.fromkeys(column for each in moved for column in each))
-        rows = [[each.get(column, 0.0) for each in moved] for column in asked]
+        asked = list(dict.fromkeys(column for derivatives in moved for column in derivatives))
+        rows = [[derivatives.get(column, 0.0) for derivatives in moved] for column in asked]
         return asked, np.array(rows).reshape(len(asked), len(names))
 
     def observed(
@@ -347,7 +347,7 @@ class UserModel(Result, EquationModel):
             substeps=self.substeps,
         )[left[0]]
         record = replace(record, start=float(command.time[0]))
-        return left[0], record, {each.name: each.at(record.points) for each in others}
+        return left[0], record, {name.name: name.at(record.points) for name in others}
 
     def ready(
         self, values: Mapping[str, float], experiment: Experiment, asked: SimulationRequest

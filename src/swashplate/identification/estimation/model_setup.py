@@ -96,12 +96,12 @@ class ModelSetup(Result):
         name = self.name or str(kind).lower()
         if not self.free:
             raise InputError(f"Nothing of {name} is free: name what is to be found.")
-        if unknown := [each for each in self.standard_uncertainty if each not in self.fixed]:
+        if unknown := [name for name in self.standard_uncertainty if name not in self.fixed]:
             raise InputError(
                 f"{unknown[0]} has a standard uncertainty but no value: name it in fixed, or give "
                 "it a prior if it is free."
             )
-        if both := [each for each in self.free if each in self.fixed]:
+        if both := [name for name in self.free if name in self.fixed]:
             raise InputError(f"{both[0]} of {name} is free and fixed: name it in one of them.")
         numbers = (("noise", self.noise, 0.0), ("fixed value", self.fixed, -inf))
         for what, given, least in numbers:
@@ -111,7 +111,7 @@ class ModelSetup(Result):
                     raise InputError(
                         f"{name}: the {what} of '{key}' is {number!r}, but must be {must}."
                     )
-        free = {key: _unknown(key, each) for key, each in self.free.items()}
+        free = {key: _unknown(key, entry) for key, entry in self.free.items()}
         if isinstance(own, UserModel):
             targets = [name for unknown in free.values() for name in unknown.targets]
             _check_names(own, "free", targets)
@@ -184,8 +184,10 @@ class ModelSetup(Result):
     def setup(self) -> FitSetup:
         """The fit setup as that of a fit in stages, of which it has one."""
         free = {
-            each.name: Free(bounds=(each.low, each.high), log=each.log, prior=each.prior)
-            for each in self.free.values()
+            unknown.name: Free(
+                bounds=(unknown.low, unknown.high), log=unknown.log, prior=unknown.prior
+            )
+            for unknown in self.free.values()
         }
         stage = Stage(name=self.name, part="model", free=free)
         content = {"title": self.name, "stages": (stage,)}
@@ -194,8 +196,8 @@ class ModelSetup(Result):
 
     def nominal(self, experiments: Sequence[Experiment]) -> ModelSetup:
         """The fit setup with the numbers before a fit to some runs."""
-        had = dict.fromkeys(name for each in experiments for name in each.channels)
-        if strange := [each for each in self.noise if each not in had]:
+        had = dict.fromkeys(name for run in experiments for name in run.channels)
+        if strange := [name for name in self.noise if name not in had]:
             raise InputError(
                 f"{self.name}: noise is stated for '{strange[0]}', but the channels are "
                 f"{', '.join(had) or 'none'}."
@@ -207,9 +209,9 @@ class ModelSetup(Result):
     def problem(self, experiments: Sequence[Experiment], *, threads: int = 1) -> Problem:
         """The problem that it states for some runs, one of which has a channel that is fitted."""
         channels = tuple(self.channels) or self._channels_given(experiments)
-        runs = [each for each in experiments if any(name in each.channels for name in channels)]
+        runs = [run for run in experiments if any(name in run.channels for name in channels)]
         if not runs:
-            had = dict.fromkeys(name for each in experiments for name in each.channels)
+            had = dict.fromkeys(name for run in experiments for name in run.channels)
             raise InputError(
                 f"{self.name} is fitted to {', '.join(channels) or 'nothing'}, but the runs have "
                 f"{', '.join(had) or 'no channel'}."
@@ -220,8 +222,8 @@ class ModelSetup(Result):
                 for name, channel in run.channels.items()
             }
             runs[k] = replace(run, channels=noises)
-        of_any_run = {each.name for run in experiments for each in self.unknowns_of_run(run)}
-        unknowns = [each for each in self.free.values() if each.name not in of_any_run]
+        of_any_run = {unknown.name for run in experiments for unknown in self.unknowns_of_run(run)}
+        unknowns = [unknown for unknown in self.free.values() if unknown.name not in of_any_run]
         for run in runs:
             unknowns += self.unknowns_of_run(run)
         values, zeros = _without_zeros(self.fixed, channels)
@@ -234,15 +236,15 @@ class ModelSetup(Result):
             fixed=values,
             zeros=zeros,
             uncertain=tuple(
-                {name: deviation(each, self.fixed[name])}
-                for name, each in self.standard_uncertainty.items()
+                {name: deviation(stated, self.fixed[name])}
+                for name, stated in self.standard_uncertainty.items()
             ),
             threads=threads if isinstance(self.model, UserModel) else 1,
         )
 
     def _channels_given(self, experiments: Sequence[Experiment]) -> tuple[str, ...]:
         """Names of the channels that the model gives."""
-        values = {each.name: each.start for each in self.free.values()} | dict(self.fixed)
+        values = {unknown.name: unknown.start for unknown in self.free.values()} | dict(self.fixed)
         names = dict[str, None]()
         for experiment in experiments:
             if isinstance(self.model, UserModel):
@@ -272,7 +274,7 @@ class ModelSetup(Result):
         estimated from this run; everything else is as it is.
         """
         of_run = self.unknowns_of_run(experiment)
-        unknowns = tuple(each for each in of_run if each.name not in self.numbers)
+        unknowns = tuple(name for name in of_run if name.name not in self.numbers)
         channels = tuple(name for name in self.scales if name in experiment.channels)
         if not unknowns:
             found = simulated(self.model, self.numbers, experiment)

@@ -118,9 +118,9 @@ class Problem(Result):
     def weights(self) -> tuple[Mapping[str, Array], ...]:
         """For each experiment and fitted channel the (m,) factors on the residuals."""
         found = []
-        for each in self.experiments:
-            names = [name for name in self.channels if name in each.channels]
-            found.append({n: _factors(each[n].weight, self.scales[n]) for n in names})
+        for run in self.experiments:
+            names = [name for name in self.channels if name in run.channels]
+            found.append({n: _factors(run[n].weight, self.scales[n]) for n in names})
         return tuple(found)
 
     @property
@@ -143,7 +143,7 @@ class Problem(Result):
 
     def _compressed(self, vector: Array) -> Evaluation:
         """[J r] as the triangular factors of the runs, or as that of all."""
-        ways = [self._reduced if each else self._factored for each in self._marched]
+        ways = [self._reduced if experiment else self._factored for experiment in self._marched]
         blocks = self._each(lambda number: ways[number](vector, number))
         residuals, _ = self.unknowns.prior_rows(vector)
         priors = prior_blocks(self.unknowns, vector)
@@ -182,7 +182,9 @@ class Problem(Result):
             if np.isfinite(total := float(residuals @ residuals)):
                 return total
         # by channel, which also says what is not finite
-        return sum(float(np.sum(each**2)) for each in self.residuals(vector, number).values())
+        return sum(
+            float(np.sum(residual**2)) for residual in self.residuals(vector, number).values()
+        )
 
     def residuals(self, vector: Array, number: int) -> Mapping[str, Array]:
         """Weighted residuals (m,) of the fitted channels of one experiment, 0 if ignored."""
@@ -261,7 +263,7 @@ class Problem(Result):
         """Whether the march itself makes the residuals of each experiment."""
         whole = self.compare is None and isinstance(self.model, EquationModel)
         moved = {unknown.run for unknown in self.unknowns if unknown.kind == "instant"}
-        return tuple(whole and each.name not in moved for each in self.experiments)
+        return tuple(whole and run.name not in moved for run in self.experiments)
 
     def _ready(self, vector: Array, number: int) -> tuple[BoundModel, ObservedRecord]:
         """The model with the numbers of one experiment, and this as the march sees it."""
@@ -316,18 +318,18 @@ def noise_scales(experiments: Sequence[Experiment], channels: Sequence[str]) -> 
     """
     scales = {}
     for name in channels:
-        having: list[Channel] = [each[name] for each in experiments if name in each.channels]
+        having: list[Channel] = [run[name] for run in experiments if name in run.channels]
         if not having:
-            known = ", ".join(dict.fromkeys(c for each in experiments for c in each.channels))
+            known = ", ".join(dict.fromkeys(c for run in experiments for c in run.channels))
             raise InputError(f"No experiment has a channel '{name}'; there are {known}.")
-        stated = [each.noise for each in having if each.noise is not None]
+        stated = [run.noise for run in having if run.noise is not None]
         if stated:
             scales[name] = float(np.sqrt(np.mean(np.square(stated))))
         elif step := having[0].resolution:
             # rounding leaves an error between -1/2 and 1/2 of a step
             scales[name] = step / np.sqrt(12.0)
         else:  # an ignored spike says nothing of the range
-            ranges = [float(np.ptp(each.values[each.used])) for each in having if each.used.any()]
+            ranges = [float(np.ptp(run.values[run.used])) for run in having if run.used.any()]
             scales[name] = 0.01 * max(ranges, default=0.0)
         if scales[name] == 0.0:
             raise InputError(f"The channel '{name}' never changes: nothing can be fitted to it.")
@@ -450,8 +452,8 @@ class LinearisedFit(Result):
 def prior_blocks(unknowns: Unknowns, vector: Array) -> list[RunRows]:
     """The derivatives of each prior's residual, as rows of the run that its unknown belongs to."""
     _, rows = unknowns.prior_rows(vector)
-    having = [each for each in unknowns if each.prior is not None]
-    runs = [each.run or "" for each in having]
+    having = [unknown for unknown in unknowns if unknown.prior is not None]
+    runs = [unknown.run or "" for unknown in having]
     return [
         RunRows(run, unknowns.of_run(run), row[None, unknowns.columns(run)])
         for run, row in zip(runs, rows, strict=True)
@@ -509,7 +511,7 @@ class _Derivatives:
             elif used.any():
                 parts[name] = Linearised(part.values[used], part.by[used])
         arrays = [part.by for part in parts.values()]
-        size = sum(each.nbytes for each in arrays)
+        size = sum(array.nbytes for array in arrays)
         if number not in self._kept and size <= self._left:
             self._kept[number] = arrays
             self._left -= size
@@ -556,7 +558,7 @@ def linearised_fit(problem: Problem, vector: Array, loss: Loss = "linear") -> Li
             )
         for k, (bounded, _) in zip(mine, parts, strict=True):
             runs[k] = runs[k]._replace(residual=bounded / slope)
-    worths = np.array([each.worth for each in unknowns if each.prior is not None])
+    worths = np.array([unknown.worth for unknown in unknowns if unknown.prior is not None])
     tolerance = TOLERANCE if hasattr(problem.model, "linearise") else BY_DIFFERENCES
     return LinearisedFit(
         tuple(runs),

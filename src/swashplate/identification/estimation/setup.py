@@ -268,8 +268,8 @@ class FitSetup(Entry):
             if twice := sorted(set(merged["free"]) & set(stage.free)):
                 raise ParameterError(f"{twice[0]} is free in two stages; a joint fit needs one.")
             merged = {key: merged[key] | getattr(stage, key) for key in merged}
-        forces = next((each.forces for each in self.stages if each.forces is not None), None)
-        most = max((each.start_pressure or 0.0 for each in self.stages), default=0.0) or None
+        forces = next((stage.forces for stage in self.stages if stage.forces is not None), None)
+        most = max((stage.start_pressure or 0.0 for stage in self.stages), default=0.0) or None
         stage = Stage(name="chain", part="chain", forces=forces, start_pressure=most, **merged)
         return self.model_copy(update={"stages": (stage,)})
 
@@ -287,7 +287,7 @@ def deviation(uncertainty: float | str, value: float) -> float:
 
 def setup_names() -> tuple[str, ...]:
     """Names of the packaged fit setups."""
-    names = (each.name for each in _SETUPS.iterdir())
+    names = (file.name for file in _SETUPS.iterdir())
     return tuple(sorted(n.removesuffix(".toml") for n in names if n.endswith(".toml")))
 
 

@@ -93,7 +93,7 @@ class _Memory:
     def __init__(self, problem: Problem, fixed: Mapping[int, float], compressed: bool) -> None:
         self.problem, self.compressed, self.evaluations = problem, compressed, 0
         self.places, self.numbers = list(fixed), list(fixed.values())
-        self.bounds = tuple(np.delete(each, self.places) for each in problem.bounds)
+        self.bounds = tuple(np.delete(bound, self.places) for bound in problem.bounds)
         self.best: tuple[float, Array] | None = None
         self._last: tuple[bytes, Evaluation] | None = None
         self._refused = 0.0

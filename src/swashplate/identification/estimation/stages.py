@@ -185,32 +185,50 @@ def stage_problem(
     if stage.part == "model":
         raise InputError("part = 'model' needs a model of your own, not a drive.")
     channels = _channels_of(stage, experiments)
-    runs = tuple(each for each in experiments if any(name in each.channels for name in channels))
+    runs = tuple(
+        experiment
+        for experiment in experiments
+        if any(name in experiment.channels for name in channels)
+    )
     currents = {}
-    for each in runs if stage.part == "pump" else ():
-        if stage.current == "measured" or each.input.kind == "current":
-            currents[each.name] = measured_current(each, stage.current_scale)
+    for run in runs if stage.part == "pump" else ():
+        if stage.current == "measured" or run.input.kind == "current":
+            currents[run.name] = measured_current(run, stage.current_scale)
         else:
-            currents[each.name] = simulated_current(each, parameters, starts.get(each.name, {}))
+            currents[run.name] = simulated_current(run, parameters, starts.get(run.name, {}))
     free = _of_the_machine(stage, parameters)
-    begin = {column: each.start for each in free for column in each.targets if column in SWITCHES}
+    begin = {
+        column: unknown.start
+        for unknown in free
+        for column in unknown.targets
+        if column in SWITCHES
+    }
     on = parameters.options | {SWITCHES[column] for column in begin}
     begun = parameters.with_numbers(begin, on) if begin else parameters
-    own = [unknown for each in runs for unknown in _of_a_run(stage, each, channels, parameters)]
+    own = [
+        unknown
+        for experiment in runs
+        for unknown in _of_a_run(stage, experiment, channels, parameters)
+    ]
     simulated = stage.part != "pump" or stage.current != "measured"
-    jumps = [unknown for each in runs if simulated for unknown in unknown_instants(each, instants)]
+    jumps = [
+        unknown
+        for experiment in runs
+        if simulated
+        for unknown in unknown_instants(experiment, instants)
+    ]
     return Problem(
         DriveModel(begun, stage.part, currents, stage.forces, dict(starts)),
-        tuple(_weighted(each, stage) for each in runs),
+        tuple(_weighted(experiment, stage) for experiment in runs),
         Unknowns((*free, *own, *(jumps if len(jumps) <= MOST_EDGES else ()))),
         channels,
         noise_scales(runs, channels),
         uncertain=tuple(
             {
-                column: deviation(each, _nominal(parameters, column))
+                column: deviation(doubt, _nominal(parameters, column))
                 for column in parameters.definitions.columns_of([name])
             }
-            for name, each in uncertain.items()
+            for name, doubt in uncertain.items()
         ),
         threads=threads,
     )
@@ -219,7 +237,7 @@ def stage_problem(
 def _channels_of(stage: Stage, experiments: Sequence[Experiment]) -> tuple[str, ...]:
     """Names of the channels that a stage fits; weights of others would be lost in silence."""
     kinds = stage.channels or kinds_of(stage.part)
-    had = [(name, each.kind) for run in experiments for name, each in run.channels.items()]
+    had = [(name, channel.kind) for run in experiments for name, channel in run.channels.items()]
     fitted = {kind for _, kind in had if kind in kinds}
     if not fitted:
         hint = ""
@@ -283,7 +301,7 @@ def _of_the_machine(stage: Stage, parameters: ParameterSet) -> list[Unknown]:
         columns = tuple(parameters.definitions.columns_of([name]))
         least = -np.inf if definition.least is None else definition.least
         how: Any = {"unit": definition.unit, "log": entry.log, "prior": entry.prior}
-        for group in [columns] if entry.tied else [(each,) for each in columns]:
+        for group in [columns] if entry.tied else [(column,) for column in columns]:
             nominal = float(np.mean([_nominal(parameters, column) for column in group]))
             own, bounds = name if entry.tied else group[0], (entry.relative, entry.bounds)
             unknown = bounded(own, nominal, *bounds, least, sets=group, **how)

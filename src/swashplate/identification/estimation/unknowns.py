@@ -204,22 +204,24 @@ class Unknowns(Result):
     @cached_property
     def logarithmic(self) -> NDArray[np.bool_]:
         """(K,) which are moved by their logarithms."""
-        return np.array([each.log for each in self.items], dtype=np.bool_)
+        return np.array([unknown.log for unknown in self.items], dtype=np.bool_)
 
     @cached_property
     def scales(self) -> Array:
         """(K,) what one unit of the vector means; not used of logarithmic ones. [unit]"""
-        return np.array([each.scale for each in self.items])
+        return np.array([unknown.scale for unknown in self.items])
 
     @cached_property
     def start(self) -> Array:
         """(K,) vector of the nominal values."""
-        return self.to_vector(np.array([each.start for each in self.items]))
+        return self.to_vector(np.array([unknown.start for unknown in self.items]))
 
     @cached_property
     def bounds(self) -> tuple[Array, Array]:
         """(K,) lower and upper bounds of the vector."""
-        low, high = np.array([(each.low, each.high) for each in self.items]).reshape(-1, 2).T
+        low, high = (
+            np.array([(unknown.low, unknown.high) for unknown in self.items]).reshape(-1, 2).T
+        )
         return self.to_vector(low), self.to_vector(high)
 
     def at(self, vector: Array) -> Unknowns:
@@ -252,13 +254,13 @@ class Unknowns(Result):
     def released(self) -> Unknowns:
         """The same at the same point, with bounds so much wider that none is at one."""
         items = []
-        for each, side in zip(self.items, self.at_bound, strict=True):
-            low, high, reach = each.low, each.high, each.high - each.low
+        for unknown, side in zip(self.items, self.at_bound, strict=True):
+            low, high, reach = unknown.low, unknown.high, unknown.high - unknown.low
             if side < 0:
-                low = low * low / high if each.log else low - reach
+                low = low * low / high if unknown.log else low - reach
             if side > 0:
-                high = high * high / low if each.log else high + reach
-            items.append(replace(each, low=low, high=high))
+                high = high * high / low if unknown.log else high + reach
+            items.append(replace(unknown, low=low, high=high))
         return replace(self, items=tuple(items), point=self.vector)
 
     @property
@@ -279,7 +281,7 @@ class Unknowns(Result):
 
     def _within(self, vector: Array) -> list[float]:
         numbers = zip(self.items, vector.tolist(), strict=True)
-        return [each.to_value(number) for each, number in numbers]
+        return [unknown.to_value(number) for unknown, number in numbers]
 
     def values(self, vector: Array) -> dict[str, float]:
         """Values by name, within the bounds."""
@@ -288,25 +290,27 @@ class Unknowns(Result):
     def vector_of(self, values: Mapping[str, float]) -> Array:
         """(K,) vector of some values by name; those not named stay nominal."""
         named = zip(self.names, self.items, strict=True)
-        return self.to_vector(np.array([values.get(name, each.start) for name, each in named]))
+        return self.to_vector(
+            np.array([values.get(name, unknown.start) for name, unknown in named])
+        )
 
     @property
     def machine_targets(self) -> list[str]:
         """Names in the model that unknowns of no single run set."""
-        return [name for each in self.items if each.run is None for name in each.targets]
+        return [name for unknown in self.items if unknown.run is None for name in unknown.targets]
 
     @cached_property
     def shared(self) -> NDArray[np.intp]:
         """(M,) numbers of the unknowns of the machine, which all runs share."""
-        return np.array([k for k, each in enumerate(self.items) if each.run is None], np.intp)
+        return np.array([k for k, unknown in enumerate(self.items) if unknown.run is None], np.intp)
 
     @cached_property
     def _of_runs(self) -> Mapping[str, NDArray[np.intp]]:
         """By run the numbers of the unknowns that belong to it alone."""
         numbers: dict[str, list[int]] = {}
-        for k, each in enumerate(self.items):
-            if each.run is not None:
-                numbers.setdefault(each.run, []).append(k)
+        for k, unknown in enumerate(self.items):
+            if unknown.run is not None:
+                numbers.setdefault(unknown.run, []).append(k)
         return {run: np.array(own, np.intp) for run, own in numbers.items()}
 
     def of_run(self, run: str) -> NDArray[np.intp]:
@@ -361,17 +365,21 @@ class Unknowns(Result):
         """The same with these worths of the priors, in order; without any priors for None."""
         given, items = iter(worths or ()), self.items
         if worths is None:
-            return replace(self, items=tuple(replace(each, prior=None) for each in items))
-        changed = (replace(each, worth=next(given)) if each.prior else each for each in items)
+            return replace(self, items=tuple(replace(unknown, prior=None) for unknown in items))
+        changed = (
+            replace(unknown, worth=next(given)) if unknown.prior else unknown for unknown in items
+        )
         return replace(self, items=tuple(changed))
 
     def prior_rows(self, vector: Array) -> tuple[Array, Array]:
         """Residuals (p,) of the priors and their derivatives (p, K) by the vector."""
-        known = [(k, each, each.prior) for k, each in enumerate(self.items) if each.prior]
+        known = [
+            (k, unknown, unknown.prior) for k, unknown in enumerate(self.items) if unknown.prior
+        ]
         residuals, rows = np.zeros(len(known)), np.zeros((len(known), len(self.items)))
-        for row, (k, each, prior) in enumerate(known):
-            scale, mean = (1.0, np.log(prior.mean)) if each.log else (each.scale, prior.mean)
-            weight = np.sqrt(each.worth) / prior.deviation
+        for row, (k, unknown, prior) in enumerate(known):
+            scale, mean = (1.0, np.log(prior.mean)) if unknown.log else (unknown.scale, prior.mean)
+            weight = np.sqrt(unknown.worth) / prior.deviation
             residuals[row] = weight * (vector[k] * scale - mean)
             rows[row, k] = weight * scale
         return residuals, rows

@@ -82,15 +82,15 @@ def _gauge(
 ) -> Gauge:
     """A gauge along one of the models' symmetries, with others in proportion and `more` moves."""
     powers = {
-        symbol: each.symmetry[symmetry]
-        for symbol, each in CATALOGUE.items()
-        if symmetry in each.symmetry
+        symbol: definition.symmetry[symmetry]
+        for symbol, definition in CATALOGUE.items()
+        if symmetry in definition.symmetry
     } | dict.fromkeys(others, 1.0)
 
     def power(exponent: float) -> Move:
         return lambda value, known: exponent * value
 
-    moves = {symbol: power(each) for symbol, each in powers.items()} | more
+    moves = {symbol: power(definition) for symbol, definition in powers.items()} | more
     return Gauge(name, moves, f"only {determined} determined", tuple(fix.split()))
 
 
@@ -203,7 +203,7 @@ class Identifiability(Result):
     @property
     def to_fix(self) -> tuple[str, ...]:
         """Unknowns to fix so that all others are determined; nothing is lost by it."""
-        return (*self.unexcited, *(each.fix for each in self.null))
+        return (*self.unexcited, *(direction.fix for direction in self.null))
 
     @property
     def at_bounds(self) -> dict[str, str]:
@@ -216,7 +216,7 @@ class Identifiability(Result):
         free, rank = int(np.count_nonzero(self.variables.free)), self.rank
         told = f"{rank} combination{'' if rank == 1 else 's'} of {free} free parameters"
         told = f"all {free} free parameters" if rank == free else told
-        vague = [each.fix for each in self.weak if each.half_width >= VAGUE]
+        vague = [direction.fix for direction in self.weak if direction.half_width >= VAGUE]
         if vague and rank > len(vague):
             clear = rank - len(vague)
             told = f"{clear} combination{'' if clear == 1 else 's'} of {free} free parameters"
@@ -230,11 +230,11 @@ class Identifiability(Result):
             them = "them" if len(self.unexcited) > 1 else "it"
             names = ", ".join(self.unexcited)
             said.append(f"No test exercises {names}: fix {them}, or add a test that does.")
-        said += [each.sentence for each in self.null]
+        said += [direction.sentence for direction in self.null]
         if len(self.weak) == 1:
             said.append(self.weak[0].sentence)
         elif self.weak:
-            known = [f"{each.fix} {each.precision}" for each in self.weak]
+            known = [f"{direction.fix} {direction.precision}" for direction in self.weak]
             said.append(
                 f"Weak, each with those before it fixed: {listed(known)}. Add tests that determine "
                 "them, or fix those whose values you know."
@@ -324,14 +324,14 @@ def identifiability(
 
     # weak ones: how the others follow an unknown is its column of the covariance over its variance;
     # each found is fixed, so that the next ones are what is left without it
-    weak, places = [], places[~np.isin(places, [names.index(each.fix) for each in null])]
+    weak, places = [], places[~np.isin(places, [names.index(direction.fix) for direction in null])]
     if covariance is None:
         every = np.ones(places.size, dtype=np.bool_)
         inverse = whitening(dense_factor(triangle[:, places]), every, TOLERANCE).matrix
         left = inverse @ inverse.T
     else:
         left = covariance[np.ix_(places, places)]
-    machine = np.array([each.run is None for each in variables])
+    machine = np.array([unknown.run is None for unknown in variables])
     while places.size:
         variances = np.where(machine[places], np.diag(left), 0.0)
         place = int(np.argmax(variances))
@@ -397,7 +397,7 @@ def without_value(stage: StageFit) -> list[str]:
     """Unknowns of the machine that ended at a bound, or that the tests do not determine."""
     found = identifiability_of(stage)
     lost = {*found.at_bounds, *found.to_fix}
-    machine = (each.name for each in stage.problem.unknowns if each.run is None)
+    machine = (unknown.name for unknown in stage.problem.unknowns if unknown.run is None)
     return [name for name in machine if name in lost]
 
 
@@ -405,4 +405,4 @@ def weak_unknowns(stage: StageFit) -> list[str]:
     """Unknowns of the machine with an interval wider than 10 % of the value, or without one."""
     pairs = zip(estimates_of(stage), stage.problem.unknowns, strict=True)
     machine = [estimate for estimate, unknown in pairs if unknown.run is None]
-    return [each.name for each in machine if each.relative_half_width > WIDE]
+    return [unknown.name for unknown in machine if unknown.relative_half_width > WIDE]

@@ -63,7 +63,7 @@ class RunInformation(Result):
     @property
     def names(self) -> tuple[str, ...]:
         """The unknowns, those of single runs left out."""
-        return tuple(each.name for each in self.problem.unknowns if each.run is None)
+        return tuple(unknown.name for unknown in self.problem.unknowns if unknown.run is None)
 
     @property
     def _model(self) -> DriveModel:
@@ -73,7 +73,10 @@ class RunInformation(Result):
     @cached_property
     def identifiability(self) -> Identifiability:
         """Which unknowns the runs determine, and directions that change nothing."""
-        fit, taken = self.linearised, {t for each in self.problem.unknowns for t in each.targets}
+        fit, taken = (
+            self.linearised,
+            {t for unknown in self.problem.unknowns for t in unknown.targets},
+        )
         numbers = self._model.parameters.numbers
         fixed = {name: value for name, value in numbers.items() if name not in taken}
         return identifiability(fit.triangle, fit.variables, tolerance=fit.tolerance, fixed=fixed)
@@ -82,7 +85,7 @@ class RunInformation(Result):
     def shares(self) -> dict[str, dict[str, float]]:
         """Part of what is known of an unknown, by name, from each run, its channels together."""
         fit = self.linearised
-        squares = {each.name: np.zeros(len(fit.variables)) for each in self.problem.experiments}
+        squares = {run.name: np.zeros(len(fit.variables)) for run in self.problem.experiments}
         for run, jacobian in fit.jacobians():
             squares[run.name][fit.variables.columns(run.name)] += np.sum(jacobian**2, axis=0)
         total = np.maximum(sum(squares.values()), 1e-300)
@@ -119,7 +122,7 @@ class RunInformation(Result):
             for why, names in groups.items()
         ]
         for name, shares in self.shares.items() if len(self.problem.experiments) > 1 else ():
-            run = max(shares, key=lambda each: shares[each])
+            run = max(shares, key=lambda run_name: shares[run_name])
             if shares[run] >= ALONE:
                 part = f"{100.0 * shares[run]:.0f} %"
                 said.append(f"{name}: {part} of its information is from {run} alone.")
@@ -127,7 +130,7 @@ class RunInformation(Result):
 
     def table(self, runs: Sequence[str] = ()) -> Table:
         """What runs tell of each unknown, one letter a run; in a file their shares."""
-        named = runs or [each.name for each in self.problem.experiments]
+        named = runs or [run.name for run in self.problem.experiments]
         columns = (Column("parameter"), Column("needs", wrap=True), Column("effect", ".3g"))
         shown = (Column("stage", of="f"), *columns, Column("runs"))
         made = Table(
@@ -217,8 +220,8 @@ class PriorInformation(Result):
         # what is known beforehand counts once, not once a test
         free = {k: v.model_copy(update={"prior": None}) for k, v in self.stage.free.items()}
         stage, rows = self.stage.model_copy(update={"free": free}), []
-        for each in sensors or self.sensors:
-            imagined = _imagined(maneuver, each)
+        for sensor in sensors or self.sensors:
+            imagined = _imagined(maneuver, sensor)
             rows.append(_machine_rows(stage_problem(stage, self.parameters, [imagined])))
         return CandidateTest(maneuver.name, triangular_factor(np.vstack(rows)), maneuver.length)
 
@@ -242,13 +245,13 @@ def prior_information(
     is said to be fitted leaves residuals that are zero, or too large to be noise.
     """
     (stage,) = setup.joint().stages
-    parts = {each.part for each in setup.stages}
+    parts = {stage.part for stage in setup.stages}
     stage = stage.model_copy(update={"part": parts.pop()}) if len(parts) == 1 else stage
     if not experiments:
         asked, part = sensors or default_sensors(Drive(parameters)), stage.part
         own = [e for e in asked if part == "chain" or (e.kind in CURRENTS) == (part == "card")]
         if not own:
-            kinds = ", ".join(each.kind for each in asked)
+            kinds = ", ".join(sensor.kind for sensor in asked)
             raise InputError(f"A {part} shows nothing to {kinds}: name another sensor.")
         problem = stage_problem(stage, parameters, [_imagined(step(1.0), own[0])])
         _, prior = problem.unknowns.prior_rows(problem.start)
@@ -259,8 +262,8 @@ def prior_information(
     fit, known = linearised_fit(problem, problem.start) if fitted else None, dict[str, Sensor]()
     scales, machine = {}, _machine(problem)
     for name in problem.channels:
-        channels = [each[name] for each in problem.experiments if name in each.channels]
-        apart = float(np.median(np.concatenate([np.diff(each.time) for each in channels])))
+        channels = [run[name] for run in problem.experiments if name in run.channels]
+        apart = float(np.median(np.concatenate([np.diff(channel.time) for channel in channels])))
         sensor = Sensor(channels[0].kind, problem.scales[name], origin="as in the campaign")
         if fit is not None:
             sensor = _of_residuals(fit, channels, sensor, apart)
@@ -276,7 +279,7 @@ def _of_residuals(
     fit: LinearisedFit, channels: Sequence[Channel], stated: Sensor, step: float
 ) -> Sensor:
     """A channel's sensor with the noise that the residuals of a fitted drive show."""
-    name, largest = channels[0].name, max(float(np.ptp(each.values)) for each in channels)
+    name, largest = channels[0].name, max(float(np.ptp(channel.values)) for channel in channels)
     left, derivatives = [], []
     for run, jacobian in fit.jacobians():
         if run.channel != name:
@@ -317,7 +320,7 @@ def _imagined(maneuver: Maneuver, sensor: Sensor) -> Experiment:
 
 def _machine(problem: Problem) -> list[int]:
     """Places of the unknowns that are no run's own."""
-    return [k for k, each in enumerate(problem.unknowns) if each.run is None]
+    return [k for k, unknown in enumerate(problem.unknowns) if unknown.run is None]
 
 
 def _machine_rows(problem: Problem) -> Array:
@@ -403,8 +406,8 @@ def advise(
     known_now = whitening(dense_factor(present), free, TOLERANCE)
     now = known_now.matrix
     before = np.where(known_now.determined, np.linalg.norm(now, axis=1), inf)
-    for each in candidates:
-        both = dense_factor(np.vstack([present, each.derivatives]))
+    for candidate in candidates:
+        both = dense_factor(np.vstack([present, candidate.derivatives]))
         known = whitening(both, free, TOLERANCE)
         then = known.matrix
         after = np.where(known.determined, np.linalg.norm(then, axis=1), inf)
@@ -414,8 +417,8 @@ def advise(
         shrinking = -np.linalg.slogdet(along @ along.T)[1]
         d_gain = float(np.exp(0.5 * shrinking / max(now.shape[1], 1)))
         errors, ranks = (before[free], after[free]), then.shape[1] - now.shape[1]
-        made.append(Advice(each.name, each.duration, names, *errors, ranks, d_gain))
-    made.sort(key=lambda each: (-len(each.newly_determined), -each.ranks, -each.d_gain))
+        made.append(Advice(candidate.name, candidate.duration, names, *errors, ranks, d_gain))
+    made.sort(key=lambda advice: (-len(advice.newly_determined), -advice.ranks, -advice.d_gain))
     return tuple(made)
 
 
@@ -426,7 +429,7 @@ def sequential_plan(
 
     As many as `count`, fewer if none of the others tells anything new; otherwise as `advise`.
     """
-    left, chosen = {each.name: each for each in candidates}, list[Advice]()
+    left, chosen = {candidate.name: candidate for candidate in candidates}, list[Advice]()
     while left and len(chosen) < count:
         best = advise(present, [*left.values()], variables)[0]
         if not best.newly_determined and not best.ranks and best.d_gain < 1.0 + WORTH:
@@ -468,10 +471,10 @@ def advice_table(title: str, judged: Sequence[Advice]) -> Table:
             *(Column(f"error of {name}", ".6g", of="f") for name in judged[0].names),
         ),
     )
-    for each in judged:
-        first, more = each.newly_determined[:NAMED], len(each.newly_determined) - NAMED
+    for advice in judged:
+        first, more = advice.newly_determined[:NAMED], len(advice.newly_determined) - NAMED
         # the unknown whose error shrinks most, of those that are then known
-        pairs = zip(each.names, each.before.tolist(), each.after.tolist(), strict=True)
+        pairs = zip(advice.names, advice.before.tolist(), advice.after.tolist(), strict=True)
         known = [pair for pair in pairs if pair[2] <= KNOWN]
         gained = ""
         if known:
@@ -479,12 +482,12 @@ def advice_table(title: str, judged: Sequence[Advice]) -> Table:
             before = f"{_error(now)} " if now <= KNOWN else ""
             gained = f"{name} {before}to {_error(then)}"
         made.add(
-            each.candidate,
-            each.duration,
+            advice.candidate,
+            advice.duration,
             ", ".join(first) + (f" + {more}" if more > 0 else ""),
             gained,
-            f"{each.d_gain:.2f}x" if each.d_gain > 1.0 + WORTH else "",
-            *(error if error < inf else None for error in each.after.tolist()),
+            f"{advice.d_gain:.2f}x" if advice.d_gain > 1.0 + WORTH else "",
+            *(error if error < inf else None for error in advice.after.tolist()),
         )
     return made
 
@@ -494,7 +497,7 @@ def best_tests_table(judged: Sequence[Advice]) -> Table:
     columns = (Column("parameter"), Column("error now", "s"), Column("then", "s"))
     made = Table("For each parameter", (*columns, Column("best test", wrap=True)))
     for k, name in enumerate(judged[0].names):
-        errors = np.array([each.after[k] for each in judged])
+        errors = np.array([advice.after[k] for advice in judged])
         best, now = judged[int(np.argmin(errors))], judged[0].before[k]
         then, test = (now, "no further information")
         if best.after[k] < (1.0 - WORTH) * now:

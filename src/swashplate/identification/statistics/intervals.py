@@ -162,7 +162,7 @@ def estimates(
     """
     half, variables, made = reach(covariance), covariance.variables, []
     down, up = (
-        np.array([ends.get((k, upper), each) for k, each in enumerate(half)])
+        np.array([ends.get((k, upper), half_width) for k, half_width in enumerate(half)])
         for upper in (False, True)
     )
     with np.errstate(invalid="ignore"):
@@ -224,13 +224,13 @@ def with_earlier_stages(
     columns = np.array(list(systematic.values())).reshape(-1, len(own.variables))
     total = own.matrix + np.where(known, columns.T @ columns, 0.0)
     spread = np.diag(own.matrix) ** 2 / own.degrees_of_freedom
-    for each in earlier_stages:
-        added = np.where(known, each.slopes @ each.covariance.matrix @ each.slopes.T, 0.0)
+    for stage in earlier_stages:
+        added = np.where(known, stage.slopes @ stage.covariance.matrix @ stage.slopes.T, 0.0)
         total += added
         # of each earlier unknown by itself, as if they were independent of each other
-        parts = each.slopes**2 * np.diag(each.covariance.matrix)
+        parts = stage.slopes**2 * np.diag(stage.covariance.matrix)
         share = parts / np.maximum(parts.sum(axis=1, keepdims=True), 1e-300)
-        inverse = np.sum(share**2 / each.covariance.degrees_of_freedom, axis=1)
+        inverse = np.sum(share**2 / stage.covariance.degrees_of_freedom, axis=1)
         spread += np.diag(added) ** 2 * np.maximum(inverse, 1e-300)
     variance = np.diag(total)
     freedom = np.divide(variance**2, spread, out=np.full_like(variance, np.inf), where=spread > 0.0)
@@ -502,7 +502,7 @@ def weighed(problem: Problem, vector: Array) -> Problem:
     ratio = np.diag(own.matrix)[known] / assumed[known]
     found = np.full(known.size, float(np.median(ratio)) if known.any() else 1.0)
     found[known] = ratio
-    having = [each.prior is not None for each in problem.unknowns]
+    having = [unknown.prior is not None for unknown in problem.unknowns]
     worths = np.maximum(found[having], LEAST).tolist()
     return replace(problem, unknowns=problem.unknowns.with_worths(worths))
 

@@ -145,7 +145,7 @@ def profiles_of(
     variables, vector = found.own.variables, stage.solution.vector
     if names is None:
         known = zip(problem.unknowns, found.own.determined, strict=True)
-        chosen = [k for k, (each, told) in enumerate(known) if each.run is None and told]
+        chosen = [k for k, (unknown, told) in enumerate(known) if unknown.run is None and told]
     else:
         chosen = sorted({variables.index(name) for name in names})
     cost = problem.cost(vector)
@@ -155,10 +155,10 @@ def profiles_of(
     made: dict[str, Profile] = {}
     profiles = (executor or Serial()).run(_profiled, shared, chosen)
     words = f"Profiling {stage.stage.name}"
-    for position, each in counted(profiles, len(chosen), "parameters", words):
+    for position, profile in counted(profiles, len(chosen), "parameters", words):
         name = variables.names[chosen[position]]
         unknown = problem.unknowns.items[chosen[position]]
-        made[name] = replace(each, name=name, stage=stage.stage.name, unknown=unknown)
+        made[name] = replace(profile, name=name, stage=stage.stage.name, unknown=unknown)
         if watch is not None:
             watch(len(made))
     return {variables.names[k]: made[variables.names[k]] for k in chosen}
@@ -166,7 +166,7 @@ def profiles_of(
 
 def _profiled(shared: tuple[Problem, Array, float, dict[int, float], Array], index: int) -> Profile:
     problem, vector, cost, rises, steps = shared
-    low, high = (float(each[index]) for each in problem.bounds)
+    low, high = (float(bound[index]) for bound in problem.bounds)
     step = float(steps[index])
     if not (np.isfinite(step) and step > 0.0):
         step = 0.01 * (high - low)
