@@ -125,9 +125,9 @@ class Identification(Estimated):
     def held_out(self) -> tuple[Experiment, ...]:
         """Runs of the axis that were held out."""
         runs = self.fit.runs
-        names = {quality.name for quality in runs}
+        names = {run.name for run in runs}
         out = self.campaign.select(axis=runs[0].axis, role="validate")
-        return tuple(name for name in out if name.name not in names)
+        return tuple(run for run in out if run.name not in names)
 
     @cached_property
     def predicted(self) -> tuple[RunQuality, ...]:
@@ -293,7 +293,7 @@ class Identification(Estimated):
             swashplate=__version__,
             axis=self.fit.runs[0].axis,
             campaign=_seen_from(folder, self.campaign.path),
-            runs={quality.name: fingerprint(quality) for quality in self.fit.runs},
+            runs={run.name: fingerprint(run) for run in self.fit.runs},
             interpolation=self.fit.runs[0].input.interpolation,
             nominal=dict(start.numbers) if isinstance(start, ModelSetup) else dump_set(start),
             setup=self.fit.setup,
@@ -314,7 +314,7 @@ class Identification(Estimated):
                 verdict=self.verdict,
                 numbers=dict(self.fit.parameters.numbers),
                 required=self.required,
-                held_out={each.name: fingerprint(each) for each in self.held_out},
+                held_out={run.name: fingerprint(run) for run in self.held_out},
             ),
         )
 
@@ -577,8 +577,8 @@ def _loaded(
     begun = file.setup.model_copy(update={"stages": file.setup.stages[: len(file.stages)]})
     stages = staged(begun, nominal, experiments, stored, threads=threads)
     found, profiles = Fit(file.setup, nominal, experiments, stages), list[Profile]()
-    for each in file.profiles:
-        stage, profile = (each.stage, each) if isinstance(each, Profile) else each
+    for entry in file.profiles:
+        stage, profile = (entry.stage, entry) if isinstance(entry, Profile) else entry
         unknowns = found.stage(stage).problem.unknowns
         if not 0 <= profile.index < len(unknowns.names):
             raise FileError(f"{path}: stage {stage} has no parameter {profile.index + 1}.")

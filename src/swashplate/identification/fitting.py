@@ -203,7 +203,7 @@ class Fit(Estimated):
         for stage in self.stages:
             if stage.stage.name == name:
                 return stage
-        known = ", ".join(earlier.stage.name for earlier in self.stages)
+        known = ", ".join(stage.stage.name for stage in self.stages)
         raise UnknownNameError(f"The fit has no stage '{name}'; there are {known}.")
 
     def tables(self) -> list[Table]:

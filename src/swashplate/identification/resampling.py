@@ -241,6 +241,8 @@ def _fold(
         effects = np.linalg.norm(stage.problem.evaluate(stage.solution.vector).jacobian, axis=0)
         least = NO_EFFECT * effects.max()
         each_one = zip(stage.problem.unknowns, effects, strict=True)
-        lost += [run.name for run, effect in each_one if run.run is None and effect <= least]
+        lost += [
+            unknown.name for unknown, effect in each_one if unknown.run is None and effect <= least
+        ]
     converged = all(stage.solution.converged for stage in result.stages)
     return Fold(number, names, tuple(lost), _measured(held), converged), held

@@ -300,7 +300,7 @@ def runs_tables(qualities: Sequence[RunQuality]) -> list[Table]:
     """
     made = []
     for name, together in pooled(qualities).items():
-        alike = [each for each in qualities if each.channel == name]
+        alike = [quality for quality in qualities if quality.channel == name]
         table = Table(
             name,
             (

@@ -144,9 +144,12 @@ class Verdict(Result):
         """What may be predicted, and how well, in a sentence."""
         if not self.predictions:
             return "Unknown: no channel moves."
-        channels = {each.channel: each for each in self.predictions}
+        channels = {prediction.channel: prediction for prediction in self.predictions}
         decisive = [channels[name] for name in self.decisive]
-        stated = [f"{each.signal} within {percent(each.worst.error)}" for each in decisive]
+        stated = [
+            f"{prediction.signal} within {percent(prediction.worst.error)}"
+            for prediction in decisive
+        ]
         said = (
             f"In nine of ten new maneuvers {listed(stated)} of range; {percent(self.required)} is "
             "required."
@@ -352,7 +355,7 @@ def _unfinished(stages: Sequence[StageFit], planned: Sequence[str]) -> Iterator[
             yield f"stage {name} was interrupted, and its best so far is not an optimum"
         elif not solution.converged:
             yield f"stage {name} did not converge ({solution.message})"
-    done = {earlier.stage.name for earlier in stages}
+    done = {stage.stage.name for stage in stages}
     missing = [name for name in planned if name not in done]
     if missing:
         yield f"{listed(missing)} {'were' if len(missing) > 1 else 'was'} never fitted"
@@ -396,7 +399,12 @@ def _assumed(stages: Sequence[StageFit]) -> Iterator[str]:
     fixed = [name for stage in stages for name in fixed_numbers(stage)]
     symbols = list(dict.fromkeys(COLUMNS[name] for name in fixed))
     if symbols:
-        known = {name for stage in stages for column in stage.problem.uncertain for name in column}
+        known = {
+            name
+            for stage in stages
+            for deviations in stage.problem.uncertain
+            for name in deviations
+        }
         stated = list(dict.fromkeys(COLUMNS[name] for name in fixed if name in known))
         also = f", {listed(stated)} within a standard uncertainty" if stated else ""
         yield f"the fixed {listed(symbols)} as stated{also}"

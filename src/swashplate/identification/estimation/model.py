@@ -347,7 +347,7 @@ class UserModel(Result, EquationModel):
             substeps=self.substeps,
         )[left[0]]
         record = replace(record, start=float(command.time[0]))
-        return left[0], record, {name.name: name.at(record.points) for name in others}
+        return left[0], record, {signal.name: signal.at(record.points) for signal in others}
 
     def ready(
         self, values: Mapping[str, float], experiment: Experiment, asked: SimulationRequest

@@ -274,7 +274,7 @@ class ModelSetup(Result):
         estimated from this run; everything else is as it is.
         """
         of_run = self.unknowns_of_run(experiment)
-        unknowns = tuple(name for name in of_run if name.name not in self.numbers)
+        unknowns = tuple(unknown for unknown in of_run if unknown.name not in self.numbers)
         channels = tuple(name for name in self.scales if name in experiment.channels)
         if not unknowns:
             found = simulated(self.model, self.numbers, experiment)

@@ -143,7 +143,7 @@ class Problem(Result):
 
     def _compressed(self, vector: Array) -> Evaluation:
         """[J r] as the triangular factors of the runs, or as that of all."""
-        ways = [self._reduced if experiment else self._factored for experiment in self._marched]
+        ways = [self._reduced if marched else self._factored for marched in self._marched]
         blocks = self._each(lambda number: ways[number](vector, number))
         residuals, _ = self.unknowns.prior_rows(vector)
         priors = prior_blocks(self.unknowns, vector)
@@ -322,14 +322,18 @@ def noise_scales(experiments: Sequence[Experiment], channels: Sequence[str]) -> 
         if not having:
             known = ", ".join(dict.fromkeys(c for run in experiments for c in run.channels))
             raise InputError(f"No experiment has a channel '{name}'; there are {known}.")
-        stated = [run.noise for run in having if run.noise is not None]
+        stated = [channel.noise for channel in having if channel.noise is not None]
         if stated:
             scales[name] = float(np.sqrt(np.mean(np.square(stated))))
         elif step := having[0].resolution:
             # rounding leaves an error between -1/2 and 1/2 of a step
             scales[name] = step / np.sqrt(12.0)
         else:  # an ignored spike says nothing of the range
-            ranges = [float(np.ptp(run.values[run.used])) for run in having if run.used.any()]
+            ranges = [
+                float(np.ptp(channel.values[channel.used]))
+                for channel in having
+                if channel.used.any()
+            ]
             scales[name] = 0.01 * max(ranges, default=0.0)
         if scales[name] == 0.0:
             raise InputError(f"The channel '{name}' never changes: nothing can be fitted to it.")

@@ -124,8 +124,8 @@ class Forces(Entry):
 
     def slopes(self, name: str) -> dict[str, float]:
         """Derivatives by one force of the coefficients of its direction. [1/Aᵏ]"""
-        column = self._inverse[:, self.names.index(name)].tolist()
-        return {each: slope for each, slope in zip(self.columns, column, strict=True) if slope}
+        slopes = self._inverse[:, self.names.index(name)].tolist()
+        return {column: slope for column, slope in zip(self.columns, slopes, strict=True) if slope}
 
 
 @cache
@@ -244,7 +244,9 @@ class FitSetup(Entry):
         for name in self.standard_uncertainty:
             symbol = _symbol(name)
             for stage in self.stages:
-                free = any(each in (name, symbol) or _symbol(each) == name for each in stage.free)
+                free = any(
+                    entry in (name, symbol) or _symbol(entry) == name for entry in stage.free
+                )
                 if free or (stage.forces is not None and symbol in COEFFICIENTS):
                     raise ValueError(
                         f"{name} is free in the stage '{stage.name}': only what stays fixed has a "

@@ -459,7 +459,7 @@ def default_maneuvers() -> tuple[Maneuver, ...]:
 
 def advice_table(title: str, judged: Sequence[Advice]) -> Table:
     """Tests in the order given, what each would tell, and in a file all errors with it."""
-    new = any(each.newly_determined for each in judged)
+    new = any(advice.newly_determined for advice in judged)
     made = Table(
         title,
         (
