@@ -1,4 +1,4 @@
-"""The fit of a drive, stage after stage, or of a model of one's own."""
+"""The fit of a drive, stage after stage, or of a user-defined model."""
 
 from __future__ import annotations
 
@@ -142,8 +142,8 @@ class Estimated(Tabular, ABC):
             raise UnknownNameError(f"{name} has two directions: ask for {' or '.join(sides)}.")
         near = get_close_matches(str(name), self.estimates, 1)
         meant = f" (did you mean {near[0]}?)" if near else ""
-        known = ", ".join(key for key, estimate in self.estimates.items() if estimate.run is None)
-        raise UnknownNameError(f"There is no parameter '{name}'{meant}; there are {known}.")
+        names = ", ".join(key for key, estimate in self.estimates.items() if estimate.run is None)
+        raise UnknownNameError(f"There is no parameter '{name}'{meant}; there are {names}.")
 
     def __contains__(self, name: object) -> bool:
         return name in self.estimates
@@ -168,7 +168,7 @@ class Fit(Estimated):
     """Those that were fitted."""
     stages: tuple[StageFit, ...]
     doubts: tuple[str, ...] = ()
-    """What the runs lack, in sentences, where they could be fitted all the same."""
+    """What the runs lack, in sentences, if they could be fitted all the same."""
 
     @property
     def parameters(self) -> Parameters:
@@ -177,7 +177,7 @@ class Fit(Estimated):
 
     @property
     def drive(self) -> Drive:
-        """The fitted drive; refused where a model of one's own was fitted."""
+        """The fitted drive; refused if a user-defined model was fitted."""
         return self.stages[-1].drive
 
     @property
@@ -203,8 +203,8 @@ class Fit(Estimated):
         for stage in self.stages:
             if stage.stage.name == name:
                 return stage
-        known = ", ".join(stage.stage.name for stage in self.stages)
-        raise UnknownNameError(f"The fit has no stage '{name}'; there are {known}.")
+        names = ", ".join(stage.stage.name for stage in self.stages)
+        raise UnknownNameError(f"The fit has no stage '{name}'; there are {names}.")
 
     def tables(self) -> list[Table]:
         """Estimates with their intervals, stage by stage, then the errors of each fitted run."""
@@ -216,17 +216,17 @@ class Fit(Estimated):
     @property
     def sentences(self) -> tuple[str, ...]:
         """How each stage ended, what its estimates lack, and what stayed fixed."""
-        said = list(self.doubts)
+        sentences = list(self.doubts)
         for part in map(tables.stage_part, self.stages):
-            said += [*part.remarks, *part.sentences]
+            sentences += [*part.remarks, *part.sentences]
         unknowns = [unknown for stage in self.stages for unknown in stage.problem.unknowns]
         jumps = {unknown.label for unknown in unknowns if unknown.kind == "instant"}
         if jumps:
-            many = count(len(jumps), "time")
-            said.append(f"Commands jump {many} between two samples: when is estimated.")
-        said += tables.single_runs_line(self.stages)
+            times = count(len(jumps), "time")
+            sentences.append(f"Commands jump {times} between two samples: when is estimated.")
+        sentences += tables.single_runs_line(self.stages)
         fixed = tables.fixed_part(self.stages, self.nominal)
-        return (*said, *fixed.remarks, *fixed.sentences)
+        return (*sentences, *fixed.remarks, *fixed.sentences)
 
 
 def fit(
@@ -254,7 +254,7 @@ def fit(
     model : Drive, ParameterSet, MachineModel or ModelSetup
         A drive: where to begin, and what stays fixed. The decay's switch is split, see `smooth`,
         the card's filter is its differential equation unless the fit setup's `card_filter`
-        says "recursion". Or a model of one's own: of equations,
+        says "recursion". Or a user-defined model: of equations,
         a `UserModel` of them, any object with `simulate`, or a `ModelSetup`.
     tests : Campaign or sequence of Experiment
         The runs to fit; of a campaign those with the role ``"fit"``.
@@ -263,7 +263,7 @@ def fit(
         file, or a mapping as of `as_fit_setup`. Of a user-defined model a mapping to (low,
         nominal, high) or an `Unknown`, see `ModelSetup`.
     channels, noise, fixed : optional
-        Of a model of one's own, as of `ModelSetup`.
+        Of a user-defined model, as of `ModelSetup`.
     loss, tolerance, max_evaluations :
         As of `solving.solve`, in each stage.
     threads : int, optional
@@ -379,16 +379,17 @@ def staged(
     threads: int | None = None,
 ) -> tuple[StageFit, ...]:
     """The stages of a fit setup, each from what the ones before found, until one is interrupted."""
-    parameters, stages, starts = smooth(nominal), list[StageFit](), dict[str, Mapping[str, float]]()
+    parameters = smooth(nominal)
+    stages = list[StageFit]()
+    starts = dict[str, Mapping[str, float]]()
     instants = dict[tuple[str, str], Prior]()
     for stage in setup.stages:
-        uncertain = setup.standard_uncertainty
         problem = stage_problem(
             stage,
             parameters,
             runs,
             threads=threads,
-            uncertain=uncertain,
+            uncertain=setup.standard_uncertainty,
             starts=starts,
             instants=instants,
         )
@@ -421,92 +422,114 @@ def _instants_found(stage: StageFit) -> dict[tuple[str, str], Prior]:
     numbers = [k for k, unknown in enumerate(unknowns) if unknown.kind == "instant"]
     if not numbers:
         return {}
-    values, quoted = unknowns.at(stage.solution.vector).estimates, uncertainty_of(stage).quoted
-    found = dict[tuple[str, str], Prior]()
-    errors = quoted.standard_errors * unknowns.scales
+    values = unknowns.at(stage.solution.vector).estimates
+    errors = uncertainty_of(stage).quoted.standard_errors * unknowns.scales
+    priors = dict[tuple[str, str], Prior]()
     for k in numbers:
         unknown = unknowns[k]
         assert unknown.prior is not None
         assert unknown.run is not None
-        known = unknown.prior.deviation
-        error = min(float(errors[k]), known)
-        found[unknown.run, unknown.name] = Prior(float(values[k]), error if error > 0.0 else known)
-    return found
+        deviation = unknown.prior.deviation
+        error = min(float(errors[k]), deviation)
+        if not error > 0.0:
+            error = deviation
+        priors[unknown.run, unknown.name] = Prior(float(values[k]), error)
+    return priors
 
 
 def _solved(
     stage: Stage,
     problem: Problem,
-    solved: partial[Solution],
+    solver: partial[Solution],
     search: Search | None,
     doubts: Sequence[str],
 ) -> Solved:
     """See `Solved`."""
-    limits = {key: solved.keywords[key] for key in ("tolerance", "max_evaluations")}
-    several: tuple[Solution, ...] = ()
+    limits = {key: solver.keywords[key] for key in ("tolerance", "max_evaluations")}
     if search is not None and search.starts:
-        # starts run side by side, so each of them runs on one thread
-        alone, planned = replace(problem, threads=1), 1 + search.starts
-        several = solve_from(
-            alone,
-            [problem.start, *sobol_starts(alone, search.starts, search.seed)],
-            executor=search.executor,
-            store=None if search.store is None else search.store / stage.name,
-            origin=_origin(stage, problem, limits),
-            resume=search.resume,
-            watch=None if search.watch is None else partial(search.watch, stage.name),
-            **limits,
-        )
-        solution = several[0]
+        solutions = _from_starts(stage, problem, search, limits)
+        solution = solutions[0]
+        planned = 1 + search.starts
     else:
         hopeless = None
         if search is None and isinstance(problem.model, EquationModel):
             hopeless = partial(_is_hopeless, problem)
-        solution, planned = solved(problem, hopeless=hopeless), 1 + OTHERS
+        solution = solver(problem, hopeless=hopeless)
+        solutions = ()
+        planned = 1 + OTHERS
     if search is None and solution.loss == "linear" and _unexplained(problem, solution):
-        LOGGER.info(
-            "Stage %s: residuals exceed %g times their known measurement error: up to %d more "
-            "starts (starts=0 tries none)",
-            stage.name,
-            UNEXPLAINED,
-            OTHERS,
-        )
-        most = TRIAL if solution.given_up else int(limits["max_evaluations"])
-        starts = list[Array]()
-        # nobody asked for these starts: if few can be used, they are enough
-        with suppress(InputError):
-            for start in sobol_starts(problem, OTHERS, 0):
-                starts.append(start)
-        planned = 1 + len(starts)
-        try:
-            others = solve_from(
-                problem,
-                starts,
-                enough=partial(_explained, problem),
-                tolerance=ROUGH,
-                max_evaluations=most,
-            )
-        except KeyboardInterrupt:  # before the first of them ended
-            others = ()
-        several = solution, *(replace(solution, number=solution.number + 1) for solution in others)
-        if _explained(problem, several[-1]):
-            planned = len(several)
-    if several:
-        best = min(several, key=lambda solution: solution.cost)
-        if solution.given_up and len(several) == planned:
+        solutions, planned = _from_other_starts(stage, problem, solution, limits)
+    if solutions:
+        best = min(solutions, key=lambda solution: solution.cost)
+        if solution.given_up and len(solutions) == planned:
             share = share_explained(problem, best.vector)
             if share < LEAST_EXPLAINED:
                 raise InputError(_no_fit(stage, problem, planned, share, doubts))
-        if len(several) < planned:
-            words = f"interrupted after {len(several)} of {planned} starts: the best of them"
+        if len(solutions) < planned:
+            words = f"interrupted after {len(solutions)} of {planned} starts: the best of them"
             solution = replace(best, converged=False, interrupted=True, message=words)
         elif search is not None or best.number or solution.given_up:
-            solution = solved(problem, best.vector)
+            solution = solver(problem, best.vector)
     if any(unknown.prior is not None for unknown in problem.unknowns) and not solution.interrupted:
         # what the residuals are worth is known only now
         problem = weighed(problem, solution.vector)
-        solution = solved(problem, solution.vector)
-    return Solved(problem, solution, several)
+        solution = solver(problem, solution.vector)
+    return Solved(problem, solution, solutions)
+
+
+def _from_starts(
+    stage: Stage, problem: Problem, search: Search, limits: dict[str, Any]
+) -> tuple[Solution, ...]:
+    """Solutions from the nominal values and from the starts of a search."""
+    # starts run side by side, so each of them runs on one thread
+    alone = replace(problem, threads=1)
+    return solve_from(
+        alone,
+        [problem.start, *sobol_starts(alone, search.starts, search.seed)],
+        executor=search.executor,
+        store=None if search.store is None else search.store / stage.name,
+        origin=_origin(stage, problem, limits),
+        resume=search.resume,
+        watch=None if search.watch is None else partial(search.watch, stage.name),
+        **limits,
+    )
+
+
+def _from_other_starts(
+    stage: Stage, problem: Problem, solution: Solution, limits: Mapping[str, float]
+) -> tuple[tuple[Solution, ...], int]:
+    """A solution that leaves too much unexplained and those from a few other starts.
+
+    Beside them how many were planned.
+    """
+    LOGGER.info(
+        "Stage %s: residuals exceed %g times their known measurement error: up to %d more "
+        "starts (starts=0 tries none)",
+        stage.name,
+        UNEXPLAINED,
+        OTHERS,
+    )
+    most = TRIAL if solution.given_up else int(limits["max_evaluations"])
+    starts = list[Array]()
+    # nobody asked for these starts: if few can be used, they are enough
+    with suppress(InputError):
+        for start in sobol_starts(problem, OTHERS, 0):
+            starts.append(start)
+    try:
+        others = solve_from(
+            problem,
+            starts,
+            enough=partial(_explained, problem),
+            tolerance=ROUGH,
+            max_evaluations=most,
+        )
+    except KeyboardInterrupt:  # before the first of them ended
+        others = ()
+    numbered = [replace(other, number=other.number + 1) for other in others]
+    solutions = (solution, *numbered)
+    if _explained(problem, solutions[-1]):
+        return solutions, len(solutions)
+    return solutions, 1 + len(starts)
 
 
 def share_explained(problem: Problem, vector: Array) -> float:
@@ -515,22 +538,24 @@ def share_explained(problem: Problem, vector: Array) -> float:
     In units of the residuals, so that the channels that are measured best count most. Of a position
     that of its mean speeds: where it drifts to after minutes says little of how a drive moves.
     """
-    total, left = 0.0, 0.0
+    total = 0.0
+    unexplained = 0.0
     for number, experiment in enumerate(problem.experiments):
         for name, output in problem.outputs(vector, number).items():
             channel = experiment[name]
             used = channel.used
             if not used.any():
                 continue
-            measured, errors = channel.values[used], (output - channel.values)[used]
+            measured = channel.values[used]
+            errors = (output - channel.values)[used]
             if channel.is_position and measured.size > 1:
                 step = float(np.median(np.diff(channel.time[used])))
                 width = max(min(round(WINDOW / step), measured.size // 4), 1)
                 measured, errors = _changes(measured, width), _changes(errors, width)
             unit = problem.scales[name] ** 2
             total += float(np.sum((measured - measured.mean()) ** 2)) / unit
-            left += float(errors @ errors) / unit
-    return 1.0 - left / total if total > 0.0 else 1.0
+            unexplained += float(errors @ errors) / unit
+    return 1.0 - unexplained / total if total > 0.0 else 1.0
 
 
 def _changes(values: Array, width: int) -> Array:
@@ -563,13 +588,15 @@ def _unexplained(problem: Problem, solution: Solution) -> bool:
     """Whether residuals of a channel are far larger than its known measurement error."""
     if solution.interrupted or not isinstance(problem.model, EquationModel):
         return False  # any object with simulate may take minutes
-    left: dict[str, list[Array]] = {}
+    relative: dict[str, list[Array]] = {}
     for number, experiment in enumerate(problem.experiments):
         for name, output in problem.outputs(solution.vector, number).items():
             channel = experiment[name]
-            if (error := _known_error(channel)) is not None:
-                left.setdefault(name, []).append((output - channel.values)[channel.used] / error)
-    joined = map(np.concatenate, left.values())
+            error = _known_error(channel)
+            if error is not None:
+                residuals = (output - channel.values)[channel.used]
+                relative.setdefault(name, []).append(residuals / error)
+    joined = map(np.concatenate, relative.values())
     return any(float(r @ r) > UNEXPLAINED**2 * r.size for r in joined)
 
 
@@ -587,17 +614,17 @@ def _explained(problem: Problem, solution: Solution) -> bool:
 
 def _origin(stage: Stage, problem: Problem, limits: Mapping[str, float]) -> dict[str, str]:
     """Fingerprints of all that the result of a start depends on."""
-    own = repr(problem.model) if isinstance(problem.model, UserModel) else ""
+    model = repr(problem.model) if isinstance(problem.model, UserModel) else ""
     fixed = sorted(problem.fixed.items()), sorted(problem.zeros.items())
-    known: object = (own, problem.start.tolist(), fixed)
+    nominal: object = (model, problem.start.tolist(), fixed)
     if isinstance(problem.model, DriveModel):
         drive = problem.model.parameters
         forms = drive.pressure_root, drive.coulomb_sign, drive.rate, sorted(drive.options)
-        known = sorted(drive.numbers.items()), forms
+        nominal = sorted(drive.numbers.items()), forms
     marks = {
         "stage of the fit setup": stage.model_dump_json(),
         "tolerances": sorted(limits.items()),
-        "nominal values": known,
+        "nominal values": nominal,
         "runs and their weights": (problem.scales, [*map(fingerprint, problem.experiments)]),
     }
     hashes = {k: blake2b(repr(v).encode(), digest_size=8).hexdigest() for k, v in marks.items()}
