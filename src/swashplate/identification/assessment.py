@@ -124,10 +124,10 @@ class Identification(Estimated):
     @property
     def held_out(self) -> tuple[Experiment, ...]:
         """Runs of the axis that were held out."""
-        runs = self.fit.runs
-        names = {run.name for run in runs}
-        out = self.campaign.select(axis=runs[0].axis, role="validate")
-        return tuple(run for run in out if run.name not in names)
+        fitted = self.fit.runs
+        names = {run.name for run in fitted}
+        held_out = self.campaign.select(axis=fitted[0].axis, role="validate")
+        return tuple(run for run in held_out if run.name not in names)
 
     @cached_property
     def predicted(self) -> tuple[RunQuality, ...]:
@@ -323,12 +323,15 @@ class Identification(Estimated):
 
         Of a fitted one the source is campaign, date and 95 % interval; of a fixed one that of the
         set which the fit began from. The title of one that is not usable says so. A machine that
-        began at the start for any machine is called like its axis.
+        began at the start for any machine is called like its axis. Estimates and limits that no
+        run reached are computed for this, once for each stage.
         """
-        found, nominal = self.fit.drive.parameters, self.fit.nominal
+        fitted_set = self.fit.drive.parameters
+        nominal = self.fit.nominal
         assert isinstance(nominal, ParameterSet)
-        today, ends = f"{date.today():%d %b %Y}", _interval_words(self.fit.stages, found)
-        parameters = dict(found.parameters)
+        today = f"{date.today():%d %b %Y}"
+        ends = _interval_words(self.fit.stages, fitted_set)
+        parameters = dict(fitted_set.parameters)
         for symbol, parameter in parameters.items():
             if symbol in ends:
                 source = f"{self.campaign.path.name}, {today}; 95 %: {'; '.join(ends[symbol])}"
@@ -342,7 +345,7 @@ class Identification(Estimated):
         if not self.verdict.usable:
             title += f". {self.verdict.headline.rstrip('.')}"
         return {
-            "name": self.fit.runs[0].axis if found.name == NEUTRAL else found.name,
+            "name": self.fit.runs[0].axis if fitted_set.name == NEUTRAL else fitted_set.name,
             "title": title,
             "parameters": parameters,
             "motion": motion_of(self.fit.runs),
@@ -357,35 +360,35 @@ class Identification(Estimated):
             return {}
 
 
-def parts_of(found: Identification) -> list[tables.FitPart]:
+def parts_of(result: Identification) -> list[tables.FitPart]:
     """What a fit says besides its verdict, in the order in which the command prints it."""
-    fit = found.fit
-    notes = [overview.sentence for overview in found.campaign.overviews]
+    fit = result.fit
+    notes = [overview.sentence for overview in result.campaign.overviews]
     notes += [f"{run.name}: {sentence}." for run in fit.runs for sentence in run.notes]
     doubts = [f"! {sentence}" for sentence in fit.doubts]
-    made = [tables.FitPart("Runs", (), (), notes), tables.FitPart("Doubts", (), doubts)]
-    made += map(tables.stage_part, fit.stages)
-    if found.profiles:
-        said = [sentence for profile in found.profiles for sentence in profile.sentences()]
-        table = tables.profiles_table(found.profiles, fit.stages)
-        made.append(tables.FitPart("Profile likelihoods", [table], (), said))
-    made.append(tables.fixed_part(fit.stages, fit.nominal))
+    parts = [tables.FitPart("Runs", (), (), notes), tables.FitPart("Doubts", (), doubts)]
+    parts += map(tables.stage_part, fit.stages)
+    if result.profiles:
+        sentences = [sentence for profile in result.profiles for sentence in profile.sentences()]
+        table = tables.profiles_table(result.profiles, fit.stages)
+        parts.append(tables.FitPart("Profile likelihoods", [table], (), sentences))
+    parts.append(tables.fixed_part(fit.stages, fit.nominal))
     fitted = tables.runs_tables([quality for stage in fit.stages for quality in stage.runs])
-    made.append(tables.FitPart("Errors of fitted runs", fitted, heading="Runs that were fitted"))
-    if found.predicted:
-        errors = tables.runs_tables(found.predicted)
+    parts.append(tables.FitPart("Errors of fitted runs", fitted, heading="Runs that were fitted"))
+    if result.predicted:
+        errors = tables.runs_tables(result.predicted)
         heading = "Runs that were held out and predicted"
-        made.append(tables.FitPart("Errors of held-out runs", errors, heading=heading))
-    if found.folds is not None:
-        held_out, _ = folds_tables(found.folds, fit.stages)
-        made.append(tables.FitPart("Cross-validation", [held_out], (), found.folds.sentences()))
-    return [part for part in made if part.tables or part.remarks or part.sentences]
+        parts.append(tables.FitPart("Errors of held-out runs", errors, heading=heading))
+    if result.folds is not None:
+        held_out, _ = folds_tables(result.folds, fit.stages)
+        parts.append(tables.FitPart("Cross-validation", [held_out], (), result.folds.sentences()))
+    return [part for part in parts if part.tables or part.remarks or part.sentences]
 
 
 def motion_of(runs: Iterable[Experiment]) -> Motion:
-    """What the drive of some runs moves: a rod where all positions were measured in m.
+    """What the drive of some runs moves: a rod if all positions were measured in m.
 
-    Where none was, a rod if all speeds are in m/s.
+    Without positions, a rod if all speeds are in m/s.
     """
     channels = [channel for run in runs for channel in run.channels.values()]
     units = {channel.unit for channel in channels if channel.is_position}
@@ -393,7 +396,7 @@ def motion_of(runs: Iterable[Experiment]) -> Motion:
     return "rod" if units and units <= {"m", "m/s"} else "shaft"
 
 
-def _interval_words(stages: Sequence[StageFit], found: ParameterSet) -> dict[str, list[str]]:
+def _interval_words(stages: Sequence[StageFit], fitted: ParameterSet) -> dict[str, list[str]]:
     """Intervals of the fitted parameters in words, by symbol."""
     words: dict[str, list[str]] = {}
     for stage in stages:
@@ -404,10 +407,10 @@ def _interval_words(stages: Sequence[StageFit], found: ParameterSet) -> dict[str
                 words |= {symbol: ["from the fitted forces"] for symbol in forces}
             elif unknown.run is None:
                 ends = " to ".join(filter(None, estimate.ends()))
-                for target in (target for target in unknown.targets if target in found.numbers):
+                for target in (target for target in unknown.targets if target in fitted.numbers):
                     side = target.rpartition("_")[2]
                     side = f"{side} " if side in ("plus", "minus") else ""
-                    words.setdefault(found.definitions.find(target).symbol, []).append(
+                    words.setdefault(fitted.definitions.find(target).symbol, []).append(
                         f"{side}{ends}"
                     )
     return words
@@ -479,7 +482,7 @@ class FitFile(Entry):
     interpolation: Between = "linear"
     """What the input is between samples, as the fit took it."""
     nominal: str | dict[str, float]
-    """What the fit began from: a drive's parameter file, or the numbers of a model of one's own."""
+    """What the fit began from: a drive's parameter file, or the numbers of a user-defined model."""
     setup: FitSetup
     stages: tuple[StoredStage, ...]
     profiles: tuple[Profile | tuple[str, Profile], ...]
@@ -510,15 +513,44 @@ def _loaded(
         raise FileError(
             f"{path} was written by swashplate {file.swashplate}, this is {__version__}: fit again."
         )
-    fitted_to = Path(os.path.normpath(path.parent / file.campaign))
-    if tests is None and not fitted_to.is_file():
-        raise MissingFileError(
-            f"{path} was fitted to {fitted_to}, which is not there: name the campaign."
-        )
-    tests = fitted_to if tests is None else tests
+    campaign = _campaign_of(path, file, tests)
+    runs = _runs_of(path, file, campaign)
+    nominal = _nominal_of(path, file, model, runs)
+    entries = iter(file.stages)
+
+    def solved(stage: Stage, problem: Problem) -> Solved:
+        return _stored_stage(path, next(entries), stage, problem)
+
+    fitted = file.setup.model_copy(update={"stages": file.setup.stages[: len(file.stages)]})
+    stages = staged(fitted, nominal, runs, solved, threads=threads)
+    result = Fit(file.setup, nominal, runs, stages)
+    return Identification(
+        campaign,
+        result,
+        profiles=_profiles_of(path, file, result),
+        folds=file.folds,
+        notes=file.notes,
+        required=REQUIRED if file.verdict is None else file.verdict.required,
+        stored=file.verdict,
+    )
+
+
+def _campaign_of(path: Path, file: FitFile, tests: str | Path | Campaign | None) -> Campaign:
+    """The campaign of a stored fit, by default the one that it names."""
+    if tests is None:
+        tests = Path(os.path.normpath(path.parent / file.campaign))
+        if not tests.is_file():
+            raise MissingFileError(
+                f"{path} was fitted to {tests}, which is not there: name the campaign."
+            )
     campaign = tests if isinstance(tests, Campaign) else Campaign.from_toml(tests)
-    if not all(run.input.settled for run in campaign if run.axis == file.axis):
-        campaign = campaign.with_interpolation(file.axis, file.interpolation)
+    if all(run.input.settled for run in campaign if run.axis == file.axis):
+        return campaign
+    return campaign.with_interpolation(file.axis, file.interpolation)
+
+
+def _runs_of(path: Path, file: FitFile, campaign: Campaign) -> tuple[Experiment, ...]:
+    """The runs of a stored fit; refused unless they are as they were when it was fitted."""
     runs = {run.name: run for run in campaign}
     for name, mark in file.runs.items():
         if name not in runs:
@@ -532,64 +564,56 @@ def _loaded(
                 "samples, weights or ignored windows differ): name the campaign that was fitted, "
                 "or fit again."
             )
-    experiments = tuple(runs[name] for name in file.runs)
-    nominal: Parameters
+    return tuple(runs[name] for name in file.runs)
+
+
+def _nominal_of(
+    path: Path, file: FitFile, model: ModelSetup | None, runs: Sequence[Experiment]
+) -> Parameters:
+    """What a stored fit began from."""
     if isinstance(file.nominal, str):
-        nominal = read_set(file.nominal, str(path))
-    elif model is None:
+        return read_set(file.nominal, str(path))
+    if model is None:
         raise InputError(
             f"{path} is the fit of a user-defined model, which it does not hold: give the model, "
             "in Python by model=, on the command line by --model FILE."
         )
-    else:
-        nominal = model.nominal(experiments)
-    if isinstance(nominal, ModelSetup) and nominal.setup != file.setup:
+    nominal = model.nominal(runs)
+    if nominal.setup != file.setup:
         raise InputError(f"{path} is the fit of another model, or of other bounds: fit again.")
-    entries = iter(file.stages)
+    return nominal
 
-    def stored(stage: Stage, problem: Problem) -> Solved:
-        entry = next(entries)
-        ours, theirs = (
-            (
-                name,
-                [
-                    (unknown.name, unknown.run, unknown.kind, unknown.channel)
-                    for unknown in unknowns
-                ],
-            )
-            for name, unknowns in ((stage.name, problem.unknowns), (entry.name, entry.unknowns))
-        )
-        sizes = {entry.solution.vector.size, len(entry.unknowns)}
-        if entry.intervals is not None:
-            sizes.add(len(entry.intervals))
-        if ours != theirs or len(sizes) > 1:
-            raise FileError(
-                f"{path}: stage {entry.name} has other parameters than its fit setup "
-                "makes: fit again."
-            )
-        return Solved(
-            replace(problem, unknowns=Unknowns(entry.unknowns)),
-            entry.solution,
-            entry.starts,
-            entry.intervals,
-        )
 
-    begun = file.setup.model_copy(update={"stages": file.setup.stages[: len(file.stages)]})
-    stages = staged(begun, nominal, experiments, stored, threads=threads)
-    found, profiles = Fit(file.setup, nominal, experiments, stages), list[Profile]()
+def _stored_stage(path: Path, entry: StoredStage, stage: Stage, problem: Problem) -> Solved:
+    """A stage as it was stored; refused unless it has the unknowns of the problem."""
+    sizes = {entry.solution.vector.size, len(entry.unknowns)}
+    if entry.intervals is not None:
+        sizes.add(len(entry.intervals))
+    same = entry.name == stage.name and _identities(entry.unknowns) == _identities(problem.unknowns)
+    if not same or len(sizes) > 1:
+        raise FileError(
+            f"{path}: stage {entry.name} has other parameters than its fit setup makes: fit again."
+        )
+    return Solved(
+        problem=replace(problem, unknowns=Unknowns(entry.unknowns)),
+        solution=entry.solution,
+        starts=entry.starts,
+        intervals=entry.intervals,
+    )
+
+
+def _identities(unknowns: Iterable[Unknown]) -> list[tuple[str, str | None, str, str | None]]:
+    return [(unknown.name, unknown.run, unknown.kind, unknown.channel) for unknown in unknowns]
+
+
+def _profiles_of(path: Path, file: FitFile, result: Fit) -> list[Profile]:
+    """The stored profiles, with their stages and unknowns."""
+    profiles = list[Profile]()
     for entry in file.profiles:
         stage, profile = (entry.stage, entry) if isinstance(entry, Profile) else entry
-        unknowns = found.stage(stage).problem.unknowns
+        unknowns = result.stage(stage).problem.unknowns
         if not 0 <= profile.index < len(unknowns.names):
             raise FileError(f"{path}: stage {stage} has no parameter {profile.index + 1}.")
         name, unknown = unknowns.names[profile.index], unknowns.items[profile.index]
         profiles.append(replace(profile, stage=stage, name=name, unknown=unknown))
-    return Identification(
-        campaign,
-        found,
-        profiles=profiles,
-        folds=file.folds,
-        notes=file.notes,
-        required=REQUIRED if file.verdict is None else file.verdict.required,
-        stored=file.verdict,
-    )
+    return profiles

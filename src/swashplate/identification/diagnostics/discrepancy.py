@@ -96,35 +96,46 @@ class _Shift(NamedTuple):
     """(d,)"""
 
 
+class _RunPart(NamedTuple):
+    """What one channel of a run adds to the shift of its group."""
+
+    directions: NDArray[np.intp]
+    product: Array
+    """(d, d) of its derivatives along these directions."""
+    along: Array
+    """(d,) of these derivatives and the residuals."""
+
+
 def _shifts(fit: LinearisedFit, groups: Mapping[str, str]) -> dict[str, _Shift]:
     """Of each group of runs; products alone are kept of them."""
-    parts = defaultdict[str, list[tuple[NDArray[np.intp], Array, Array]]](list)
+    parts = defaultdict[str, list[_RunPart]](list)
     for run, jacobian in fit.jacobians():
         if run.name in groups:
             directions, whitening = fit.inverse.of_run(run.name)
             by = jacobian @ whitening
-            parts[groups[run.name]].append((directions, by.T @ by, by.T @ run.residual))
-    found = dict[str, _Shift]()
-    for group, moved_by_runs in parts.items():
-        moved = np.unique(np.concatenate([directions for directions, _, _ in moved_by_runs]))
-        products, along = np.zeros((moved.size, moved.size)), np.zeros(moved.size)
-        for directions, product, residual in moved_by_runs:
-            place = np.searchsorted(moved, directions)
-            products[np.ix_(place, place)] += product
-            along[place] += residual
+            parts[groups[run.name]].append(_RunPart(directions, by.T @ by, by.T @ run.residual))
+    shifts = dict[str, _Shift]()
+    for group, run_parts in parts.items():
+        moved = np.unique(np.concatenate([part.directions for part in run_parts]))
+        products = np.zeros((moved.size, moved.size))
+        along = np.zeros(moved.size)
+        for part in run_parts:
+            positions = np.searchsorted(moved, part.directions)
+            products[np.ix_(positions, positions)] += part.product
+            along[positions] += part.along
         leverages, axes = np.linalg.eigh(products)
         spare = 1.0 - np.minimum(leverages, 1.0)
         shared = spare > OWN
         gain = np.where(shared, 1.0 / np.where(shared, spare, 1.0), 0.0)
-        found[group] = _Shift(moved, axes @ (gain * (axes.T @ along)))
-    return found
+        shifts[group] = _Shift(moved, axes @ (gain * (axes.T @ along)))
+    return shifts
 
 
 def _shifted(fit: LinearisedFit, run: LinearisedRun, jacobian: Array, shift: _Shift) -> Array:
     """(n,) differences of a run, simulated less measured, after a shift. [unit]"""
     directions, whitening = fit.inverse.of_run(run.name)
-    _, own, theirs = np.intersect1d(directions, shift.directions, return_indices=True)
-    moved = run.residual + jacobian @ (whitening[:, own] @ shift.size[theirs])
+    _, of_run, of_shift = np.intersect1d(directions, shift.directions, return_indices=True)
+    moved = run.residual + jacobian @ (whitening[:, of_run] @ shift.size[of_shift])
     return np.asarray(moved if run.weight is None else moved / run.weight)
 
 
@@ -180,25 +191,26 @@ def channel_errors(
     grid = np.arange(time[0], time[-1] + 0.5 * step, step)
     signal = np.interp(grid, channel.time, quality.simulated)
     rounding = np.zeros(grid.size)
-    if step_of_counts := channel.resolution:
+    step_of_counts = channel.resolution
+    if step_of_counts:
         # at constant speed it is slow, and not independent from sample to sample
         rounding = step_of_counts * np.round(signal / step_of_counts) - signal
     if channel.is_position:
         signal = np.gradient(signal, step)
     return ChannelErrors(
-        experiment.name,
-        maneuver_of(experiment),
-        held_out,
-        float(time[0]),
-        step,
-        np.interp(grid, time, channel.values[channel.used]),
-        np.interp(grid, time, error),
-        white_noise(error, channel.values[channel.used]),
-        rounding,
-        signal,
-        TIME * np.gradient(signal, step),
-        experiment.input.at(grid),
-        channel.is_position,
+        run=experiment.name,
+        maneuver=maneuver_of(experiment),
+        held_out=held_out,
+        start=float(time[0]),
+        step=step,
+        measured=np.interp(grid, time, channel.values[channel.used]),
+        error=np.interp(grid, time, error),
+        noise=white_noise(error, channel.values[channel.used]),
+        rounding=rounding,
+        signal=signal,
+        rate=TIME * np.gradient(signal, step),
+        command=experiment.input.at(grid),
+        is_position=channel.is_position,
     )
 
 
@@ -252,19 +264,19 @@ def window_weights(record: ChannelErrors, window: float) -> Array:
     half = int(0.5 * window / record.step)
     if not record.is_position:
         return np.full(2 * half + 1, 1.0 / (2 * half + 1))
-    places = np.arange(-max(half, 1), max(half, 1) + 1.0)
-    return np.asarray(places[::-1] / (np.sum(places**2) * record.step))
+    offsets = np.arange(-max(half, 1), max(half, 1) + 1.0)
+    return np.asarray(offsets[::-1] / (np.sum(offsets**2) * record.step))
 
 
 def windowed(values: Array, weights: Array) -> Array:
     """(n,) weighted sums about each of (n,) samples, NaN where a part of the window is missing."""
     half = weights.size // 2
-    found = np.full(values.size, np.nan)
+    sums = np.full(values.size, np.nan)
     if values.size > weights.size:
         # about the first sample: a position may begin far from 0
-        sums = fftconvolve(values - values[0], weights, "valid") + values[0] * weights.sum()
-        found[half : values.size - half] = sums
-    return found
+        from_first = fftconvolve(values - values[0], weights, "valid")
+        sums[half : values.size - half] = from_first + values[0] * weights.sum()
+    return sums
 
 
 def classes_of(
@@ -305,7 +317,7 @@ class WindowCell(NamedTuple):
 def cells_of(records: Iterable[ChannelErrors]) -> tuple[list[WindowCell], float]:
     """All windows, by run and class, and the range of what was measured. [unit]
 
-    The records are gone through twice.
+    Goes through the records twice.
     """
     low, high, largest = np.inf, -np.inf, 0.0
     for record in records:
@@ -313,7 +325,8 @@ def cells_of(records: Iterable[ChannelErrors]) -> tuple[list[WindowCell], float]
         low = min(low, float(np.nanmin(values, initial=np.inf)))
         high = max(high, float(np.nanmax(values, initial=-np.inf)))
         largest = max(largest, float(np.abs(record.command).max()))
-    reach, cells = high - low, list[WindowCell]()
+    reach = high - low
+    cells = list[WindowCell]()
     for record in records if reach > 0.0 else ():
         for motion, inside in classes_of(record, reach, largest).items():
             errors, noise = over_window(record, WINDOWS[motion])
@@ -325,8 +338,17 @@ def cells_of(records: Iterable[ChannelErrors]) -> tuple[list[WindowCell], float]
             noise = max(noise, float(np.mean(rounded[rows] ** 2)))
             squares = (errors[rows] ** 2 - noise) / reach**2
             terms = variance_terms(record.signal[rows] / reach, record.rate[rows] / reach)
-            of_run = record.run, record.maneuver, record.held_out
-            cells.append(WindowCell(*of_run, motion, squares, noise / reach**2, terms))
+            cells.append(
+                WindowCell(
+                    run=record.run,
+                    maneuver=record.maneuver,
+                    held_out=record.held_out,
+                    motion=motion,
+                    squares=squares,
+                    noise=noise / reach**2,
+                    terms=terms,
+                )
+            )
     return cells, max(reach, 0.0)
 
 
@@ -414,35 +436,51 @@ def prediction_errors(
     if not stages:
         channels = dict.fromkeys(quality.channel for quality in predicted)
     qualities = [*(quality for stage in stages for quality in stage.runs), *predicted]
-    found = list[PredictionError]()
+    errors = list[PredictionError]()
     for name in channels:
-        measured = next(q.experiment[name] for q in qualities if q.channel == name)
+        measured = next(
+            quality.experiment[name] for quality in qualities if quality.channel == name
+        )
         cells, reach = cells_of(errors_of_runs(name, stages, predicted))
         if not cells:
             continue
         coefficients = bound_of_variance(cells)
         coefficients[1] += measured.instrument.gain**2 / 3.0
-        classes = tuple(
-            ClassError(
-                motion,
-                float(np.sqrt(np.mean(np.vstack([c.terms for c in alike]) @ coefficients))),
-                sum(not cell.held_out for cell in alike),
-                sum(cell.held_out for cell in alike),
+        constant, by_signal, by_rate = coefficients.tolist()
+        errors.append(
+            PredictionError(
+                channel=name,
+                unit=f"{measured.unit}/s" if measured.is_position else measured.unit,
+                reach=reach,
+                coefficients=(constant, by_signal, by_rate),
+                classes=tuple(_class_errors(cells, coefficients)),
+                of_position=measured.is_position,
             )
-            for motion in get_args(MotionClass)
-            if (alike := [cell for cell in cells if cell.motion == motion])
         )
-        unit = f"{measured.unit}/s" if measured.is_position else measured.unit
-        first, second, third = coefficients.tolist()
-        position = measured.is_position
-        found.append(PredictionError(name, unit, reach, (first, second, third), classes, position))
-    return tuple(found)
+    return tuple(errors)
+
+
+def _class_errors(cells: Sequence[WindowCell], coefficients: Array) -> Iterator[ClassError]:
+    """The stated error of each class of motion that some window has."""
+    for motion in get_args(MotionClass):
+        of_class = [cell for cell in cells if cell.motion == motion]
+        if of_class:
+            terms = np.vstack([cell.terms for cell in of_class])
+            yield ClassError(
+                motion=motion,
+                error=float(np.sqrt(np.mean(terms @ coefficients))),
+                fitted=sum(not cell.held_out for cell in of_class),
+                held_out=sum(cell.held_out for cell in of_class),
+            )
 
 
 def errors_of_runs(
     channel: str, stages: Sequence[StageFit], predicted: Sequence[RunQuality]
 ) -> ErrorsOfRuns:
-    """A channel of all runs, as if the maneuver of each had been left out, or held out."""
+    """A channel of all runs, as if the maneuver of each had been left out, or held out.
+
+    The linearised fit of each stage is computed if it is not there yet.
+    """
     parts = list[tuple[RunQuality, Array | None, bool]]()
     for stage in stages:
         if channel not in stage.problem.channels:
@@ -482,9 +520,7 @@ def bound_of_variance(cells: Sequence[WindowCell]) -> Array:
     maneuvers = defaultdict[str, list[WindowCell]](list)
     for cell in cells:
         maneuvers[cell.maneuver].append(cell)
-    ratios = np.array(
-        [log_ratio(cells_of_maneuver, coefficients) for cells_of_maneuver in maneuvers.values()]
-    )
+    ratios = np.array([log_ratio(of_maneuver, coefficients) for of_maneuver in maneuvers.values()])
     deviation, freedom = spread_of(ratios)
     bound = float(stdtrit(freedom, LEVEL)) * deviation * np.sqrt(1.0 + 1.0 / ratios.size)
     return coefficients * float(np.exp(ratios.mean() + bound))
