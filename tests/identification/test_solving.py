@@ -36,7 +36,7 @@ from swashplate.identification.estimation.unknowns import Prior, Unknown, Unknow
 def test_tied_directions_and_unknowns_of_one_experiment() -> None:
     unknowns = Unknowns(
         (
-            bounded("Z16", 2.0, relative=(0.5, 2.0), sets=("Z16_plus", "Z16_minus")),
+            bounded("Z16", 2.0, factors=(0.5, 2.0), sets=("Z16_plus", "Z16_minus")),
             Unknown("offset", 1.0, -9.0, 9.0, run="lift"),
             Unknown("offset", 3.0, -9.0, 9.0, run="lower"),
         )
@@ -53,8 +53,8 @@ def test_tied_directions_and_unknowns_of_one_experiment() -> None:
 GAIN, LAG = 3.0, 0.7
 UNKNOWNS = Unknowns(
     (
-        bounded("gain", 1.0, absolute=(0.1, 20.0), log=True),
-        bounded("lag", 2.0, absolute=(0.05, 5.0), log=True),
+        bounded("gain", 1.0, bounds=(0.1, 20.0), log=True),
+        bounded("lag", 2.0, bounds=(0.05, 5.0), log=True),
     )
 )
 
@@ -130,10 +130,10 @@ def made(*runs: Experiment, unknowns: Unknowns = UNKNOWNS) -> Problem:
 
 ZERO = Unknown("offset y", 0.0, -1.0, 1.0, run="lift", kind="zero", channel="y")
 REFUSED = {
-    "Z2 is nominally 0.*absolute bounds": lambda: bounded("Z2", 0.0, relative=(0.5, 2.0)),
+    "Z2 is nominally 0.*absolute bounds": lambda: bounded("Z2", 0.0, factors=(0.5, 2.0)),
     "begins at 5, outside its bounds 0 and 2": lambda: bounded("a", 5.0, **LOW),
     "from another value; 'swashplate guess' reads": lambda: Unknown("a", np.nan, 0.0, 2.0),
-    "lower one first": lambda: bounded("a", 1.0, absolute=(2.0, 0.0)),
+    "lower one first": lambda: bounded("a", 1.0, bounds=(2.0, 0.0)),
     "above 0": lambda: bounded("a", 1.0, **LOW, log=True),
     "positive": lambda: bounded("a", 1.0, **LOW, prior=Prior(1.0, 0.0)),
     "the zero of a sensor, and nothing else, names a channel": lambda: Unknown(
@@ -167,7 +167,7 @@ def test_starts_are_spread_seeded_and_inside(problem: Problem) -> None:
 
 
 def test_threads_and_processes_give_the_same_as_one_after_another(short_campaign: Campaign) -> None:
-    free = {name: Free(relative=(0.5, 2.0)) for name in ("J_plus", "G1_plus")}
+    free = {name: Free(factors=(0.5, 2.0)) for name in ("J_plus", "G1_plus")}
     stage = Stage(name="card", part="card", free=free)
     nominal = Drive.preset("hoist").parameters
     problem = stage_problem(stage, nominal, short_campaign.experiments[:1], threads=1)

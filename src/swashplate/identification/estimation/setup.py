@@ -163,7 +163,7 @@ class Stage(Entry):
     name: str
     part: Literal["card", "pump", "chain", "model"] = Field(
         description="What is simulated: the control card, pump and motor, the whole chain; 'model' "
-        "is for models of one's own, given by --model."
+        "is for user-defined models, given by --model."
     )
     current: Literal["simulated", "measured"] = Field(
         "simulated",
@@ -294,7 +294,7 @@ def setup_names() -> tuple[str, ...]:
 
 
 def load_setup(name: str | Path) -> FitSetup:
-    """A packaged fit setup by name, or one's own from a TOML file.
+    """A packaged fit setup by name, or a user-defined one from a TOML file.
 
     Raises
     ------

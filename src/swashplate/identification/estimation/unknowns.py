@@ -142,21 +142,22 @@ def zero_name(channel: str) -> str:
 def bounded(
     name: str,
     nominal: float,
-    relative: tuple[float, float] | None = None,
-    absolute: tuple[float, float] | None = None,
+    *,
+    factors: tuple[float, float] | None = None,
+    bounds: tuple[float, float] | None = None,
     least: float = -inf,
-    **more: Any,
+    **fields: Any,
 ) -> Unknown:
     """An unknown with bounds that are multiples of its nominal value, or numbers.
 
-    `relative` are factors on the nominal value, in either order, `absolute` the bounds as they are;
-    it never falls below `least`, and begins there at the lowest. `more` are fields of `Unknown`. A
-    nominal value of 0, which no factor moves, is refused in a `ParameterError`.
+    `factors` are those on the nominal value, in either order, `bounds` the bounds as they are; the
+    unknown never falls below `least`. `fields` are further ones of `Unknown`. A nominal value of 0,
+    which no factor moves, is refused in a `ParameterError`.
     """
-    if relative is not None and nominal == 0.0:
+    if factors is not None and nominal == 0.0:
         raise ParameterError(f"{name} is nominally 0, which no factor moves: give absolute bounds.")
-    low, high = absolute or sorted(factor * nominal for factor in relative or ())
-    return Unknown(name, max(nominal, least), max(low, least), high, **more)
+    low, high = bounds or sorted(factor * nominal for factor in factors or ())
+    return Unknown(name, max(nominal, least), max(low, least), high, **fields)
 
 
 @dataclass(frozen=True, eq=False)
