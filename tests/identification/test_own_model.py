@@ -478,7 +478,7 @@ SENSELESS = {
     "servo, fixed: lag .* is 500 s, .* 0.001 to 100 s": lambda: ModelSetup(
         documented, {"gain": (0.1, 1.0, 10.0)}, fixed={"lag": 500.0}
     ),
-    "A dict is no model": lambda: fit({}, RUNS, RANGES),
+    "A dict is not a model": lambda: fit({}, RUNS, RANGES),
     "Nothing of servo is free": lambda: fit(servo, RUNS, {}),
     "lag is free as 3: give lower bound": lambda: fit(servo, RUNS, {"lag": 3}),
     "no parameter 'lagg', which free names .*it has gain, lag": lambda: fit(
