@@ -333,7 +333,7 @@ class DriveModel(Result, EquationModel):
         return "current", measured_current(experiment) if given is None else given, {}
 
     def ready(
-        self, values: Mapping[str, float], experiment: Experiment, asked: SimulationRequest
+        self, values: Mapping[str, float], experiment: Experiment, request: SimulationRequest
     ) -> BoundModel:
         """The drive with numbers; see `EquationModel.ready`."""
         states = {
@@ -342,9 +342,10 @@ class DriveModel(Result, EquationModel):
             if name in values
             for state in self._states_started_by(name)
         }
-        parameters, own = self.parameters_at(values), Own(states, asked.offsets)
+        parameters = self.parameters_at(values)
+        run_values = Own(states, request.offsets)
         try:
-            return bound_drive(parameters, asked.observed, asked.columns, own)
+            return bound_drive(parameters, request.observed, request.columns, run_values)
         except InputError as error:  # a filter that is unstable at this step
             raise DomainError(str(error)) from None
 

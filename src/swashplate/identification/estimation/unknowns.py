@@ -182,8 +182,8 @@ class Unknowns(Result):
             if times > 1:
                 raise ParameterError(f"{target} is set by two parameters; let one set it.")
 
-    def __getitem__(self, place: int) -> Unknown:
-        return self.items[place]
+    def __getitem__(self, number: int) -> Unknown:
+        return self.items[number]
 
     def __len__(self) -> int:
         return len(self.items)
@@ -197,7 +197,7 @@ class Unknowns(Result):
         return tuple(unknown.label for unknown in self.items)
 
     def index(self, name: str) -> int:
-        """Place of an unknown; an `InputError` if there is none of that name."""
+        """Number of an unknown; an `InputError` if there is none of that name."""
         if name not in self.names:
             raise InputError(f"There is no parameter {name}; there are {', '.join(self.names)}.")
         return self.names.index(name)
@@ -220,9 +220,8 @@ class Unknowns(Result):
     @cached_property
     def bounds(self) -> tuple[Array, Array]:
         """(K,) lower and upper bounds of the vector."""
-        low, high = (
-            np.array([(unknown.low, unknown.high) for unknown in self.items]).reshape(-1, 2).T
-        )
+        low = np.array([unknown.low for unknown in self.items])
+        high = np.array([unknown.high for unknown in self.items])
         return self.to_vector(low), self.to_vector(high)
 
     def at(self, vector: Array) -> Unknowns:
@@ -256,11 +255,11 @@ class Unknowns(Result):
         """The same at the same point, with bounds so much wider that none is at one."""
         items = []
         for unknown, side in zip(self.items, self.at_bound, strict=True):
-            low, high, reach = unknown.low, unknown.high, unknown.high - unknown.low
+            low, high = unknown.low, unknown.high
             if side < 0:
-                low = low * low / high if unknown.log else low - reach
+                low = low * low / high if unknown.log else low - (high - low)
             if side > 0:
-                high = high * high / low if unknown.log else high + reach
+                high = high * high / low if unknown.log else high + (high - low)
             items.append(replace(unknown, low=low, high=high))
         return replace(self, items=tuple(items), point=self.vector)
 
@@ -312,7 +311,7 @@ class Unknowns(Result):
         for k, unknown in enumerate(self.items):
             if unknown.run is not None:
                 numbers.setdefault(unknown.run, []).append(k)
-        return {run: np.array(own, np.intp) for run, own in numbers.items()}
+        return {run: np.array(of_run, np.intp) for run, of_run in numbers.items()}
 
     def of_run(self, run: str) -> NDArray[np.intp]:
         """(q,) numbers of the unknowns that belong to one experiment alone."""
@@ -340,45 +339,49 @@ class Unknowns(Result):
     def chain(self, vector: Array, targets: Sequence[str], run: str) -> Array:
         """(len(targets), q + M) derivatives of the model's numbers by `columns` of the vector."""
         columns = self.columns(run)
-        places = dict[str, int]()
-        for place in np.argsort(columns).tolist():
-            places |= dict.fromkeys(self.items[columns[place]].targets, place)
-        return self._selected(vector, columns, [places.get(target) for target in targets])
+        positions = dict[str, int]()
+        for position in np.argsort(columns).tolist():
+            positions |= dict.fromkeys(self.items[columns[position]].targets, position)
+        return self._selected(vector, columns, [positions.get(target) for target in targets])
 
     def zeros_chain(self, vector: Array, channels: Sequence[str], run: str) -> Array:
         """(len(channels), q + M) derivatives of channels' zeros by `columns` of the vector."""
         columns = self.columns(run)
-        places = {self.items[column].channel: place for place, column in enumerate(columns)}
-        return self._selected(vector, columns, [places.get(channel) for channel in channels])
+        positions = {
+            self.items[column].channel: position for position, column in enumerate(columns)
+        }
+        return self._selected(vector, columns, [positions.get(channel) for channel in channels])
 
     def _selected(
-        self, vector: Array, columns: NDArray[np.intp], places: Sequence[int | None]
+        self, vector: Array, columns: NDArray[np.intp], positions: Sequence[int | None]
     ) -> Array:
-        """(len(places), columns) slope of the unknown at each place in its row, 0 elsewhere."""
+        """(len(positions), columns) slope of the unknown at each position in its row, 0 elsewhere."""
         slopes = np.where(self.logarithmic, self.to_values(vector), self.scales)[columns]
-        matrix = np.zeros((len(places), columns.size))
-        for row, place in enumerate(places):
-            if place is not None:
-                matrix[row, place] = slopes[place]
+        matrix = np.zeros((len(positions), columns.size))
+        for row, position in enumerate(positions):
+            if position is not None:
+                matrix[row, position] = slopes[position]
         return matrix
 
     def with_worths(self, worths: Sequence[float] | None) -> Unknowns:
         """The same with these worths of the priors, in order; without any priors for None."""
-        given, items = iter(worths or ()), self.items
         if worths is None:
-            return replace(self, items=tuple(replace(unknown, prior=None) for unknown in items))
-        changed = (
-            replace(unknown, worth=next(given)) if unknown.prior else unknown for unknown in items
+            without = tuple(replace(unknown, prior=None) for unknown in self.items)
+            return replace(self, items=without)
+        remaining = iter(worths)
+        items = tuple(
+            replace(unknown, worth=next(remaining)) if unknown.prior else unknown
+            for unknown in self.items
         )
-        return replace(self, items=tuple(changed))
+        return replace(self, items=items)
 
     def prior_rows(self, vector: Array) -> tuple[Array, Array]:
         """Residuals (p,) of the priors and their derivatives (p, K) by the vector."""
-        known = [
+        with_prior = [
             (k, unknown, unknown.prior) for k, unknown in enumerate(self.items) if unknown.prior
         ]
-        residuals, rows = np.zeros(len(known)), np.zeros((len(known), len(self.items)))
-        for row, (k, unknown, prior) in enumerate(known):
+        residuals, rows = np.zeros(len(with_prior)), np.zeros((len(with_prior), len(self.items)))
+        for row, (k, unknown, prior) in enumerate(with_prior):
             scale, mean = (1.0, np.log(prior.mean)) if unknown.log else (unknown.scale, prior.mean)
             weight = np.sqrt(unknown.worth) / prior.deviation
             residuals[row] = weight * (vector[k] * scale - mean)

@@ -207,7 +207,7 @@ class PriorInformation(Result):
 
     parameters: ParameterSet
     stage: Stage
-    """All unknowns at once."""
+    """All unknowns together."""
     variables: Unknowns
     """The machine's unknowns."""
     present: Array
@@ -237,97 +237,143 @@ def prior_information(
     """What is known of a drive before the next test.
 
     The stages of `setup` are taken together, through the whole chain unless they all belong to one
-    part of it. Where the drive is `fitted` to the tests made so far, noise and its colour are those
-    of the residuals; else noise is as the campaign states it, correlated over `MEMORY`. Without
+    part of it. If the drive is `fitted` to the tests made so far, noise and its colour are those of
+    the residuals; else noise is as the campaign states it, correlated over `MEMORY`. Without
     tests, a fresh plan, the `sensors` count, by default `default_sensors`.
 
     An `InputError` says that no sensor tells of the stage's part of the drive, or that a drive that
     is said to be fitted leaves residuals that are zero, or too large to be noise.
     """
     (stage,) = setup.joint().stages
-    parts = {stage.part for stage in setup.stages}
-    stage = stage.model_copy(update={"part": parts.pop()}) if len(parts) == 1 else stage
+    parts = {single.part for single in setup.stages}
+    if len(parts) == 1:
+        stage = stage.model_copy(update={"part": parts.pop()})
     if not experiments:
-        asked, part = sensors or default_sensors(Drive(parameters)), stage.part
-        own = [e for e in asked if part == "chain" or (e.kind in CURRENTS) == (part == "card")]
-        if not own:
-            kinds = ", ".join(sensor.kind for sensor in asked)
-            raise InputError(f"A {part} shows nothing to {kinds}: name another sensor.")
-        problem = stage_problem(stage, parameters, [_imagined(step(1.0), own[0])])
-        _, prior = problem.unknowns.prior_rows(problem.start)
-        machine = _machine(problem)
-        variables = Unknowns(tuple(problem.unknowns[k] for k in machine))
-        return PriorInformation(parameters, stage, variables, prior[:, machine], tuple(own))
+        return _without_tests(parameters, stage, sensors or default_sensors(Drive(parameters)))
     problem = stage_problem(stage, parameters, experiments)
-    fit, known = linearised_fit(problem, problem.start) if fitted else None, dict[str, Sensor]()
-    scales, machine = {}, _machine(problem)
+    fit = linearised_fit(problem, problem.start) if fitted else None
+    scales = {}
+    by_kind = dict[str, Sensor]()
     for name in problem.channels:
         channels = [run[name] for run in problem.experiments if name in run.channels]
-        apart = float(np.median(np.concatenate([np.diff(channel.time) for channel in channels])))
+        intervals = np.concatenate([np.diff(channel.time) for channel in channels])
+        interval = float(np.median(intervals))
         sensor = Sensor(channels[0].kind, problem.scales[name], origin="as in the campaign")
         if fit is not None:
-            sensor = _of_residuals(fit, channels, sensor, apart)
-        # an independent sample every so often: the others are worth nothing
-        scales[name] = sensor.deviation(apart)
-        known[sensor.kind] = sensor
-    variables = Unknowns(tuple(problem.unknowns[k] for k in machine))
-    present = _machine_rows(replace(problem, scales=scales))
-    return PriorInformation(parameters, stage, variables, present, tuple(known.values()))
+            sensor = _of_residuals(fit, channels, sensor, interval)
+        # one sample in each `memory` is independent: the others are worth nothing
+        scales[name] = sensor.deviation(interval)
+        by_kind[sensor.kind] = sensor
+    return PriorInformation(
+        parameters=parameters,
+        stage=stage,
+        variables=_machine_unknowns(problem),
+        present=_machine_rows(replace(problem, scales=scales)),
+        sensors=tuple(by_kind.values()),
+    )
+
+
+def _without_tests(
+    parameters: ParameterSet, stage: Stage, sensors: Sequence[Sensor]
+) -> PriorInformation:
+    """What priors alone tell, and those of some sensors that the stage's part of a drive moves."""
+    part = stage.part
+    useful = [
+        sensor
+        for sensor in sensors
+        if part == "chain" or (sensor.kind in CURRENTS) == (part == "card")
+    ]
+    if not useful:
+        kinds = ", ".join(sensor.kind for sensor in sensors)
+        raise InputError(f"A {part} shows nothing to {kinds}: name another sensor.")
+    problem = stage_problem(stage, parameters, [_imagined(step(1.0), useful[0])])
+    _, prior = problem.unknowns.prior_rows(problem.start)
+    return PriorInformation(
+        parameters=parameters,
+        stage=stage,
+        variables=_machine_unknowns(problem),
+        present=prior[:, _machine(problem)],
+        sensors=tuple(useful),
+    )
 
 
 def _of_residuals(
     fit: LinearisedFit, channels: Sequence[Channel], stated: Sensor, step: float
 ) -> Sensor:
     """A channel's sensor with the noise that the residuals of a fitted drive show."""
-    name, largest = channels[0].name, max(float(np.ptp(channel.values)) for channel in channels)
-    left, derivatives = [], []
+    name = channels[0].name
+    largest = max(float(np.ptp(channel.values)) for channel in channels)
+    runs = []
+    derivatives = []
     for run, jacobian in fit.jacobians():
         if run.channel != name:
             continue
         # with free zeros and other unknowns of single runs fitted
         own = jacobian[:, : fit.variables.of_run(run.name).size]
         shift = np.linalg.lstsq(own, -run.residual, rcond=None)[0]
-        left.append(run._replace(residual=run.residual + own @ shift))
+        runs.append(run._replace(residual=run.residual + own @ shift))
         derivatives.append(jacobian)
-    square = np.concatenate([run.residual for run in left]) ** 2
+    square = np.concatenate([run.residual for run in runs]) ** 2
     noise = stated.noise * float(np.sqrt(np.mean(square)))
     if not NOISELESS * stated.noise < noise or noise > FARTHEST * largest:
         raise InputError(
             f"The drive misses '{name}' by {100.0 * noise / largest:.2g} % of its range, so that "
-            "its residuals are no noise; give a drive that was fitted to these tests, or none."
+            "its residuals are not noise; give a drive that was fitted to these tests, or none."
         )
-    factor = factor_of(zip(left, derivatives, strict=True), fit.variables)
-    noisy = replace(fit, runs=tuple(left), derivatives=derivatives, factor=factor)
+    factor = factor_of(zip(runs, derivatives, strict=True), fit.variables)
+    noisy = replace(fit, runs=tuple(runs), derivatives=derivatives, factor=factor)
     # not of all that the residuals hold, but of what meets the unknowns' derivatives; of the noise
     # alone, since each run has been fitted by itself
     coloured = spectral_covariance(noisy)
     white = noisy.squares / noisy.spare_samples * np.sum(noisy.whitening**2, axis=1)
-    told = coloured.determined & (white > 0.0)
-    worth = max(float(np.median(np.diag(coloured.matrix)[told] / white[told])), 1.0)
-    return Sensor(stated.kind, noise, worth * step, "residuals of the drive")
+    determined = coloured.determined & (white > 0.0)
+    ratios = np.diag(coloured.matrix)[determined] / white[determined]
+    samples = max(float(np.median(ratios)), 1.0)
+    return Sensor(stated.kind, noise, samples * step, "residuals of the drive")
 
 
 def _imagined(maneuver: Maneuver, sensor: Sensor) -> Experiment:
     """A test that has not been made: only its stamps count, not its values."""
-    time, source = maneuver.time(RATE), Source(Path("none"), sensor.kind)
-    kind, unit = sensor.kind, KINDS[sensor.kind].units[0]
-    ones, noise = np.ones_like(time), sensor.deviation(1.0 / RATE)
-    channel = Channel(kind, kind, unit, time, 0.0 * ones, ones, source, noise=noise)
-    command = InputSignal("voltage", "V", time, maneuver.sample(RATE), "linear", source)
-    name = maneuver.name
-    return Experiment(name, "", name, "fit", "rest", None, command, {sensor.kind: channel})
+    time = maneuver.time(RATE)
+    source = Source(Path("none"), sensor.kind)
+    channel = Channel(
+        name=sensor.kind,
+        kind=sensor.kind,
+        unit=KINDS[sensor.kind].units[0],
+        time=time,
+        values=np.zeros_like(time),
+        weight=np.ones_like(time),
+        source=source,
+        noise=sensor.deviation(1.0 / RATE),
+    )
+    return Experiment(
+        name=maneuver.name,
+        axis="",
+        run=maneuver.name,
+        role="fit",
+        start="rest",
+        start_pressure=None,
+        input=InputSignal("voltage", "V", time, maneuver.sample(RATE), "linear", source),
+        channels={sensor.kind: channel},
+    )
 
 
 def _machine(problem: Problem) -> list[int]:
-    """Places of the unknowns that are no run's own."""
+    """Numbers of the unknowns that do not belong to a single run."""
     return [k for k, unknown in enumerate(problem.unknowns) if unknown.run is None]
+
+
+def _machine_unknowns(problem: Problem) -> Unknowns:
+    return Unknowns(tuple(problem.unknowns[k] for k in _machine(problem)))
 
 
 def _machine_rows(problem: Problem) -> Array:
     """(<= K, K) factor of the derivatives by the machine's unknowns, those of single runs spent."""
-    derivatives, machine = problem.evaluate(problem.start).jacobian, _machine(problem)
-    own = [k for k in range(derivatives.shape[1]) if k not in machine]
-    return triangular_factor(derivatives[:, [*own, *machine]])[len(own) :, len(own) :]
+    derivatives = problem.evaluate(problem.start).jacobian
+    machine = _machine(problem)
+    of_runs = [k for k in range(derivatives.shape[1]) if k not in machine]
+    size = len(of_runs)
+    return triangular_factor(derivatives[:, [*of_runs, *machine]])[size:, size:]
 
 
 # --- tests to come --------------------------------------------------------------------------------
@@ -401,25 +447,35 @@ def advise(
                 f"{name}: derivatives by {len(variables)} parameters are so many columns of "
                 f"finite numbers, not {rows.shape}."
             )
-    free, made = variables.free, []
+    free = variables.free
     names = tuple(variables.names[k] for k in np.flatnonzero(free))
     known_now = whitening(dense_factor(present), free, TOLERANCE)
     now = known_now.matrix
     before = np.where(known_now.determined, np.linalg.norm(now, axis=1), inf)
+    ranked = []
     for candidate in candidates:
         both = dense_factor(np.vstack([present, candidate.derivatives]))
-        known = whitening(both, free, TOLERANCE)
-        then = known.matrix
-        after = np.where(known.determined, np.linalg.norm(then, axis=1), inf)
+        known_then = whitening(both, free, TOLERANCE)
+        then = known_then.matrix
+        after = np.where(known_then.determined, np.linalg.norm(then, axis=1), inf)
         after = np.minimum(after, before)
         # errors then along the directions known now, in which they are 1 and independent now
         along = (present @ now).T @ (present @ then)
         shrinking = -np.linalg.slogdet(along @ along.T)[1]
         d_gain = float(np.exp(0.5 * shrinking / max(now.shape[1], 1)))
-        errors, ranks = (before[free], after[free]), then.shape[1] - now.shape[1]
-        made.append(Advice(candidate.name, candidate.duration, names, *errors, ranks, d_gain))
-    made.sort(key=lambda advice: (-len(advice.newly_determined), -advice.ranks, -advice.d_gain))
-    return tuple(made)
+        ranked.append(
+            Advice(
+                candidate=candidate.name,
+                duration=candidate.duration,
+                names=names,
+                before=before[free],
+                after=after[free],
+                ranks=then.shape[1] - now.shape[1],
+                d_gain=d_gain,
+            )
+        )
+    ranked.sort(key=lambda advice: (-len(advice.newly_determined), -advice.ranks, -advice.d_gain))
+    return tuple(ranked)
 
 
 def sequential_plan(
@@ -429,19 +485,20 @@ def sequential_plan(
 
     As many as `count`, fewer if none of the others tells anything new; otherwise as `advise`.
     """
-    left, chosen = {candidate.name: candidate for candidate in candidates}, list[Advice]()
-    while left and len(chosen) < count:
-        best = advise(present, [*left.values()], variables)[0]
+    remaining = {candidate.name: candidate for candidate in candidates}
+    plan = list[Advice]()
+    while remaining and len(plan) < count:
+        best = advise(present, list(remaining.values()), variables)[0]
         if not best.newly_determined and not best.ranks and best.d_gain < 1.0 + WORTH:
             break
-        chosen.append(best)
-        taken = left.pop(best.candidate).derivatives
-        present = triangular_factor(np.vstack([present, taken]))
-    return tuple(chosen)
+        plan.append(best)
+        derivatives = remaining.pop(best.candidate).derivatives
+        present = triangular_factor(np.vstack([present, derivatives]))
+    return tuple(plan)
 
 
 def default_maneuvers() -> tuple[Maneuver, ...]:
-    """Small and large, slow and fast, both ways: what to choose from where nothing is named."""
+    """Small and large, slow and fast, both ways: what to choose from if nothing is named."""
     both, up_and_down = (1.0, -1.0), (2.0, 4.0, 6.0, 8.0, 10.0, 8.0, 6.0, 4.0, 2.0, 0.0)
     climbs = {s: stairs([s * volts + 0.0 for volts in up_and_down], 2.0) for s in both}
     many = {volts: multisine(volts, (0.05, 2.0, 8), length=60.0) for volts in (4.0, 9.0)}
