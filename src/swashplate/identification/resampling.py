@@ -275,4 +275,5 @@ def _fold(
             unknown.name for unknown, effect in each_one if unknown.run is None and effect <= least
         ]
     converged = all(stage.solution.converged for stage in result.stages)
-    return Fold(number, names, tuple(lost), _measured(held), converged), held
+    fold = Fold(number, names, tuple(lost), _measures_of(predictions), converged)
+    return fold, predictions

@@ -355,7 +355,7 @@ class Unknowns(Result):
     def _selected(
         self, vector: Array, columns: NDArray[np.intp], positions: Sequence[int | None]
     ) -> Array:
-        """(len(positions), columns) slope of the unknown at each position in its row, 0 elsewhere."""
+        """(len(positions), columns) slope of the unknown at its position in each row, else 0."""
         slopes = np.where(self.logarithmic, self.to_values(vector), self.scales)[columns]
         matrix = np.zeros((len(positions), columns.size))
         for row, position in enumerate(positions):
