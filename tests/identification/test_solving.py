@@ -121,7 +121,7 @@ def test_interrupted_with_the_best_so_far(problem: Problem) -> None:
 
 
 RUN = bench_run("run", 1.0, risen(1.0, GAIN, LAG))
-LOW = {"absolute": (0.0, 2.0)}
+LOW = {"bounds": (0.0, 2.0)}
 
 
 def made(*runs: Experiment, unknowns: Unknowns = UNKNOWNS) -> Problem:
@@ -210,7 +210,7 @@ def test_results_of_another_fit_are_not_resumed(problem: Problem, tmp_path: Path
 
 
 POISON = {
-    "no object": (lambda text: "[1]", "no result of a start"),
+    "no object": (lambda text: "[1]", "not the result of a start"),
     "a key more": (put('"cost"', '"more": 1, "cost"'), "more"),
     "no number": (put(r'"cost": [^,]+', '"cost": NaN'), "cost"),
     "text for a vector": (put(r'"vector": \[[^]]+\]', '"vector": "abc"'), "vector"),
