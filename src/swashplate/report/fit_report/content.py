@@ -43,7 +43,7 @@ _PARTS = {
     "card": "the control card alone, from the command to the currents",
     "pump": "pump and motor, driven by the current",
     "chain": "card, pump and motor, from the command to the speed",
-    "model": "a model of one's own, from its inputs to its channels",
+    "model": "a user-defined model, from its inputs to its channels",
 }
 
 
@@ -111,7 +111,7 @@ def write_validation_report(
     Parameters
     ----------
     drive : ParameterSet or ModelSetup
-        The drive, or the model of one's own, that was held against the runs.
+        The drive, or the user-defined model, that was held against the runs.
     campaign : Campaign
         The tests.
     path : path

@@ -360,7 +360,7 @@ def summary_section(
     runs: Sequence[ShownRun],
     findings: int,
 ) -> Section:
-    """The first screen: `drive` is None for a model of one's own, which has no such numbers."""
+    """The first screen: `drive` is None for a user-defined model, which has no such numbers."""
     look: Light = "good" if judged.usable else "bad"
     headline = judged.headline.replace(" %", "\N{NO-BREAK SPACE}%")
     shown = [
