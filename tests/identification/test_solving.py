@@ -167,7 +167,7 @@ def test_starts_are_spread_seeded_and_inside(problem: Problem) -> None:
 
 
 def test_threads_and_processes_give_the_same_as_one_after_another(short_campaign: Campaign) -> None:
-    free = {name: Free(factors=(0.5, 2.0)) for name in ("J_plus", "G1_plus")}
+    free = {name: Free(relative=(0.5, 2.0)) for name in ("J_plus", "G1_plus")}
     stage = Stage(name="card", part="card", free=free)
     nominal = Drive.preset("hoist").parameters
     problem = stage_problem(stage, nominal, short_campaign.experiments[:1], threads=1)
