@@ -102,7 +102,7 @@ def draft(program, truth, folder):
 
 
 def with_forces(numbers, setup):
-    """Parameters by name, and the forces at the currents of a fit configuration."""
+    """Parameters by name, and the forces at the currents of a fit setup."""
     numbers = dict(numbers)
     for stage in setup.get("stages", ()):
         for direction, sign in (("plus", 1.0), ("minus", -1.0)):

@@ -6,7 +6,7 @@ Beside the machine's equations it knows nothing: bounds and initial values are r
 from typing import NamedTuple
 
 from swashplate.equations import Model, discretised, equation
-from swashplate.identification import OwnModel
+from swashplate.identification import UserModel
 
 
 class Cylinder(NamedTuple):
@@ -41,7 +41,7 @@ def rates(state: State, voltage: float, p: Cylinder) -> State:
 
 cylinder = Model("cylinder", parameters=Cylinder, state=State, step=discretised(rates, "midpoint"))
 # at a rate of its own, since the stamps of a log are rounded and not even
-model = OwnModel(cylinder, rate=512.0, substeps=2)
+model = UserModel(cylinder, rate=512.0, substeps=2)
 free = {
     "lag": (0.01, 0.1, 1.0, "s"),
     "d_plus": (0.0, 0.5, 2.0, "V"),

@@ -2,8 +2,9 @@
 
     .venv/bin/python benchmarks/starts.py [--axis hoist] [--starts 50] [--sqp-starts 50]
 
-The stages of a set-up on a realistic virtual campaign whose truth lies within 10 % of the published
-values, from Sobol points over all bounds. docs/multi-start.md has the table and what it means.
+The stages of a fit setup on a realistic virtual campaign whose truth lies within 10 % of the
+published values, from Sobol points over all bounds. docs/multi-start.md has the table and what it
+means.
 """
 
 import argparse
@@ -82,7 +83,7 @@ def main() -> None:
     setup = load_setup(name)
     nominal = smooth(campaign.drive(wanted.axis).parameters)
     staged = fit(nominal, runs, setup)
-    print("| set-up | stage | unknowns | solver | reach the best | within twice | evaluations |")
+    print("| fit setup | stage | unknowns | solver | reach the best | within twice | evaluations |")
     print("|---|---|--:|---|--:|--:|--:|")
     before = nominal
     for stage, done in zip(setup.stages, staged.stages, strict=True):

@@ -25,7 +25,7 @@ MARCHED, STUDIED = 0.1, 5.0
 
 
 def fit_study_rows() -> Iterator[Row]:
-    """The hoist's set-up on a realistic virtual campaign: fit, judging, report."""
+    """The hoist's fit setup on a realistic virtual campaign: fit, judging, report."""
     with tempfile.TemporaryDirectory() as folder:
         tests = rig.run("hoist", seed=1, perturb=0.1)
         campaign = Campaign.from_toml(rig.write(tests, Path(folder) / "virtual"))

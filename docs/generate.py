@@ -1,7 +1,7 @@
 """Pages of the reference that would only repeat what the package says of itself.
 
 The API from `api.toml` and docstrings, the command line from its own help, campaign files and
-set-ups from their schemas. The tables of the nomenclature, a page that is kept, are made of the
+fit setups from their schemas. The tables of the nomenclature, a page that is kept, are made of the
 parameters' definitions: ``python docs/generate.py`` writes them anew.
 """
 
@@ -18,7 +18,7 @@ from pydantic import BaseModel
 
 from swashplate.campaign import CampaignFile, json_schema
 from swashplate.cli import EPILOG, HELP, app
-from swashplate.identification.estimation.setup import Setup
+from swashplate.identification.estimation.setup import FitSetup
 from swashplate.parameters import CATALOGUE, REFINEMENTS, Block, Definition, SetFile
 from swashplate.results import Drawn
 
@@ -33,7 +33,7 @@ def pages(folder: Path) -> None:
     made["campaign-file.md"] = schema_page("Campaign file", CampaignFile, CAMPAIGN)
     made["parameter-file.md"] = schema_page("Parameter file", SetFile, PARAMETERS)
     made["campaign.schema.json"] = json_schema()
-    made["set-up-file.md"] = schema_page("Fit configuration file", Setup, SETUP)
+    made["fit-setup-file.md"] = schema_page("Fit setup file", FitSetup, SETUP)
     for path in folder.iterdir():
         if path.name not in made:
             path.unlink()

@@ -17,7 +17,14 @@ import numpy as np
 
 from swashplate import Campaign, Experiment
 from swashplate.equations import Model, discretised, equation
-from swashplate.identification import OwnModel, Problem, Unknown, Unknowns, sobol_starts, solve_from
+from swashplate.identification import (
+    Problem,
+    Unknown,
+    Unknowns,
+    UserModel,
+    sobol_starts,
+    solve_from,
+)
 
 # %% What is given
 CAMPAIGN = Path(__file__).with_name("actuator.toml")
@@ -61,7 +68,7 @@ def rates(state: State, u: float, p: Numbers) -> State:
 
 
 # the opening, straight between samples, is held over a quarter of one
-actuator = OwnModel(Model("actuator", Numbers, State, discretised(rates, "midpoint")), rate=4.0)
+actuator = UserModel(Model("actuator", Numbers, State, discretised(rates, "midpoint")), rate=4.0)
 
 
 def fitted(training: Experiment) -> dict[str, float]:

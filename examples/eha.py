@@ -19,10 +19,10 @@ from matplotlib.figure import Figure
 from swashplate import Campaign, Channel, Experiment
 from swashplate.equations import Model, Tap, equation
 from swashplate.identification import (
-    OwnModel,
     Problem,
     Unknown,
     Unknowns,
+    UserModel,
     linearised_fit,
     solve,
     uncertainty,
@@ -85,7 +85,7 @@ def step(
     return State(state.log_a + rise_a, state.log_b + rise_b, state.position + h * speed)
 
 
-ACTUATOR = OwnModel(Model("actuator", Actuator, State, step), begin={"position": "position"})
+ACTUATOR = UserModel(Model("actuator", Actuator, State, step), begin={"position": "position"})
 ACTUATOR_UNKNOWNS = (
     Unknown("stroke", 7e-4, 1e-4, 5e-3, "m", log=True),
     Unknown("area_ratio", 1.5, 1.0, 3.0),
@@ -123,7 +123,7 @@ def lag_step(state: Lagging, pump: float, p: Lag, h: float) -> Lagging:
     return Lagging(speed, state.position + h * speed)
 
 
-LAG = OwnModel(
+LAG = UserModel(
     Model("lag", Lag, Lagging, lag_step, taps={"pump": Tap("pump", delay="delay")}),
     begin={"position": "position"},
 )
@@ -151,7 +151,7 @@ def since_anchor(channel: Channel, rows: np.ndarray) -> np.ndarray:
 
 
 # %% Fits to one load case, errors in the other
-MODELS: Mapping[str, tuple[OwnModel, Sequence[Unknown], Values]] = {
+MODELS: Mapping[str, tuple[UserModel, Sequence[Unknown], Values]] = {
     "lag": (LAG, LAG_UNKNOWNS, {}),
     "without slip": (ACTUATOR, ACTUATOR_UNKNOWNS, {"slip": 0.0}),
     "without air": (ACTUATOR, ACTUATOR_UNKNOWNS, {"air_a": 0.0, "air_b": 0.0}),
@@ -159,7 +159,7 @@ MODELS: Mapping[str, tuple[OwnModel, Sequence[Unknown], Values]] = {
 }
 
 
-def error(model: OwnModel, values: Values, run: Experiment) -> np.ndarray:
+def error(model: UserModel, values: Values, run: Experiment) -> np.ndarray:
     """(m,) simulated less measured motion. [m]"""
     position = run["position"]
     return since_anchor(position, model.simulate(values, run)["position"] - position.values)
@@ -179,7 +179,7 @@ def line_error(fitted: Experiment, run: Experiment) -> np.ndarray:
     return columns(run) @ line - motion(run)
 
 
-def fit(model: OwnModel, unknowns: Sequence[Unknown], fixed: Values, run: Experiment) -> Values:
+def fit(model: UserModel, unknowns: Sequence[Unknown], fixed: Values, run: Experiment) -> Values:
     """Numbers of a model fitted to one load case; the actuator's are printed with intervals."""
     free = Unknowns(tuple(unknown for unknown in unknowns if unknown.name not in fixed))
     problem = Problem(

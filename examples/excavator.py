@@ -19,7 +19,15 @@ from scipy.stats import t as student
 
 from swashplate import Campaign, Channel, Drive, Experiment
 from swashplate.equations import Model, Tap, equation
-from swashplate.identification import DriveModel, OwnModel, Prior, Problem, Unknown, Unknowns, solve
+from swashplate.identification import (
+    DriveModel,
+    Prior,
+    Problem,
+    Unknown,
+    Unknowns,
+    UserModel,
+    solve,
+)
 
 # %% What is given
 CAMPAIGN = Path(__file__).with_name("excavator.toml")
@@ -130,7 +138,7 @@ def with_others(tests: Campaign, run: Experiment) -> Experiment:
 class Candidate(NamedTuple):
     """A model with its unknowns; to its full speeds in both directions it is proportional."""
 
-    model: OwnModel | DriveModel
+    model: UserModel | DriveModel
     unknowns: Sequence[Unknown]
     speeds: tuple[str, str]
 
@@ -149,7 +157,7 @@ LAG = Candidate(
     ("G1_plus", "G1_minus"),
 )
 VALVE = Candidate(
-    OwnModel(valve, rate=RATE, begin={"position": "position"}),
+    UserModel(valve, rate=RATE, begin={"position": "position"}),
     [
         Unknown(
             name,

@@ -19,7 +19,7 @@ from swashplate.identification.estimation.drive_model import true_value
 from swashplate.identification.estimation.setup import load_setup
 from swashplate.identification.estimation.stages import smooth
 from swashplate.identification.fitting import drawn
-from swashplate.identification.statistics.experiment_design import outlook
+from swashplate.identification.statistics.experiment_design import run_information
 from swashplate.identification.statistics.intervals import uncertainty_of
 from swashplate.identification.validation import with_speeds
 from swashplate.report.figures import plot_channel, save_figure
@@ -58,9 +58,9 @@ print(f"{len(runs)} runs to fit, {len(held_back)} held back")
 
 # %%
 for stage in setup.stages:
-    look = outlook(stage, smooth(start), runs)
-    print(f"{stage.name}: {len(look.problem.unknowns.names)} parameters")
-    for sentence in look.sentences():
+    information = run_information(stage, smooth(start), runs)
+    print(f"{stage.name}: {len(information.problem.unknowns.names)} parameters")
+    for sentence in information.sentences():
         print(f"  {sentence}")
 
 # %% [markdown]

@@ -125,7 +125,7 @@ def _explained(axis: str, seed: int) -> str:
         "published "
         f"{axis} behind {SEVERITY} instruments, seed {seed}, scored as it is (what instruments "
         "and filters alone make of no error at all), fitted to all of its tests with Kruse's "
-        f"set-up (the better of {STARTS} starts some {100 * SPREAD:g} % off), and the same with "
+        f"fit setup (the better of {STARTS} starts some {100 * SPREAD:g} % off), and the same with "
         f"{EFFECT_WORDS[axis]}, which the model does not have. Per cent of what is measured then."
     )
 

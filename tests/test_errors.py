@@ -27,7 +27,7 @@ MISSING: Mapping[str, Callable[[Path], object]] = {
     "fit's drive": lambda folder: Drive.from_toml(folder),
     "campaign": lambda folder: Campaign.from_toml(folder / "nothing.toml"),
     "log": lambda folder: open_log(folder / "nothing.csv"),
-    "configuration": lambda folder: load_setup(folder / "nothing.toml"),
+    "fit setup": lambda folder: load_setup(folder / "nothing.toml"),
     "fit": lambda folder: Identification.load(folder),
     "identify": lambda folder: swashplate.identify(folder / "nothing.toml"),
     "model": lambda folder: ModelSetup.from_file(folder / "nothing.py"),

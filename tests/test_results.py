@@ -44,7 +44,7 @@ from swashplate.crane import (
 )
 from swashplate.drafting import guess_drive
 from swashplate.full_order import compare
-from swashplate.identification import Fit, Identification, fit, outlook, predict
+from swashplate.identification import Fit, Identification, fit, predict, run_information
 from swashplate.results import LONGEST
 
 API = Path(__file__).parents[1] / "docs" / "api.toml"
@@ -149,7 +149,7 @@ def test_every_public_class_has_a_short_repr(work: Work) -> None:
             five,
             five.simulate(voltage),
             compare(five, five.drive.simulate(voltage)),
-            outlook(work.fitted.setup.stages[0], hoist, runs),
+            run_information(work.fitted.setup.stages[0], hoist, runs),
             guess_drive(runs),
             *analyses(hoist),
             examine(runs[0]),

@@ -22,7 +22,7 @@ from swashplate.analysis import (
 from swashplate.campaign import Campaign
 from swashplate.identification.assessment import Identification
 from swashplate.identification.estimation.drive_model import DriveModel
-from swashplate.identification.estimation.setup import Free, Setup, load_setup
+from swashplate.identification.estimation.setup import FitSetup, Free, load_setup
 from swashplate.identification.estimation.unknowns import Unknown, Unknowns
 from swashplate.identification.fitting import Fit, fit
 from swashplate.identification.statistics.intervals import uncertainty_of
@@ -50,7 +50,7 @@ def test_draws_outside_the_bounds_are_drawn_again(hoist):
         own = SimpleNamespace(matrix=np.diag([variance, 0.0]), determined=np.array([True, False]))
         problem = SimpleNamespace(unknowns=unknowns, model=model, uncertain=())
         solution, name = SimpleNamespace(vector=unknowns.start), SimpleNamespace(name="pump")
-        known = SimpleNamespace(own=own, handed=(), systematic={})
+        known = SimpleNamespace(own=own, earlier_stages=(), systematic={})
         one = SimpleNamespace(stage=name, problem=problem, solution=solution, uncertainty=known)
         return drawn_drives([one], count, seed=1)
 
@@ -85,7 +85,7 @@ def test_standard_errors_where_no_draw_stays_within_the_bounds(hoist):
             unknowns=unknowns, model=DriveModel(hoist.parameters), uncertain=()
         ),
         solution=SimpleNamespace(vector=unknowns.start),
-        uncertainty=SimpleNamespace(own=own, handed=(), systematic={}),
+        uncertainty=SimpleNamespace(own=own, earlier_stages=(), systematic={}),
         drive=hoist,
     )
 
@@ -132,8 +132,8 @@ def test_a_band_by_hand(hoist):
     np.testing.assert_allclose(band.half_widths, half * np.array([1.0, down, 1.0]), rtol=1e-9)
 
 
-def small_setup() -> Setup:
-    """A card's gain and pump's size, two stages: the hoist's set-up with little that is free.
+def small_setup() -> FitSetup:
+    """A card's gain and pump's size, two stages: the hoist's fit setup with little that is free.
 
     The angle at the stops, which is fixed, may be off by about as much as the pump's estimate. The
     current has no hysteresis, which would hide how the estimates follow each other.
@@ -141,7 +141,7 @@ def small_setup() -> Setup:
     card, pump = load_setup("hoist").stages
     kept = {name: card.free[name] for name in ("J", "G1")}
     only_size = {"free": {"Z10": Free(relative=(0.5, 2.0))}, "forces": None}
-    return Setup(
+    return FitSetup(
         stages=(
             card.model_copy(update={"free": kept}),
             pump.model_copy(update={**only_size, "current_hysteresis": 0.0}),
@@ -188,10 +188,10 @@ def test_a_stored_fit_gives_drives_of_its_quoted_errors(fit_and_folder):
     assert np.corrcoef(columns["Z10"], stop)[0, 1] < -0.5
     # what the card's stage does not know moves the pump along, by the slopes that are quoted
     card, pump = result.stages
-    (handed,) = uncertainty_of(pump).handed
-    joint = handed.slopes @ handed.covariance.matrix
+    (earlier_stages,) = uncertainty_of(pump).earlier_stages
+    joint = earlier_stages.slopes @ earlier_stages.covariance.matrix
     spread = np.outer(
-        uncertainty_of(pump).quoted.standard_errors, handed.covariance.standard_errors
+        uncertainty_of(pump).quoted.standard_errors, earlier_stages.covariance.standard_errors
     )
     names = card.problem.unknowns.names
     drawn_correlations = [np.corrcoef(columns["Z10"], columns[name])[0, 1] for name in names]

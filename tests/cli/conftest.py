@@ -19,7 +19,7 @@ STEPS = tuple(
 
 
 def stages(**free: str) -> str:
-    """A fit configuration: stages by their part, each with the parameters to estimate in words."""
+    """A fit setup: stages by their part, each with the parameters to estimate in words."""
     text = ""
     for part, names in free.items():
         text += f'[[stages]]\nname = "{part}"\npart = "{part}"\n'

@@ -20,7 +20,7 @@ from tests.shown import check_shown
 import swashplate
 from swashplate import Campaign, Drive
 from swashplate.identification.assessment import Identification
-from swashplate.identification.estimation.setup import Setup
+from swashplate.identification.estimation.setup import FitSetup
 from swashplate.identification.fitting import Fit, fit
 from swashplate.identification.statistics.intervals import uncertainty_of
 from swashplate.locks import locked
@@ -69,7 +69,7 @@ def test_a_campaign_becomes_a_drive(done, refused, campaign, tmp_path) -> None:
     header, *rows = (tmp_path / "fitted" / "estimates.csv").read_text("utf-8").splitlines()
     assert header.startswith("stage,parameter,unit,nominal,value,lower,upper,standard_error")
     assert len([row for row in rows if "offset" not in row]) == 6
-    # the folder knows what was free: no packaged configuration bears the drive's name
+    # the folder knows what was free: no packaged fit setup bears the drive's name
     Drive(parameters).renamed("winch").to_toml(tmp_path / "fitted" / "drive.toml")
     for named in (("fitted",), (CAMPAIGN, "--drive", "fitted/drive.toml")):
         advice = done("advise", *named, "--maneuver", "step:4", "--tests", "1")
@@ -195,7 +195,7 @@ def test_a_result_that_is_of_no_use_ends_with_1(run, campaign, tmp_path) -> None
 def test_fits_that_are_refused(refused: Words, virtual: Path, tmp_path: Path) -> None:
     (tmp_path / "setup.toml").write_text(SETUP, "utf-8")
     for words, said in (
-        ("--setup boom", "no packaged fit configuration 'boom'"),
+        ("--setup boom", "no packaged fit setup 'boom'"),
         ("--axis boom", "no axis 'boom'; it has hoist"),
         ("--setup setup.toml --profile Z99", "no parameter 'Z99'"),
     ):
@@ -299,7 +299,7 @@ def test_the_command_and_python_write_the_same(done: Words, held_out: Path, tmp_
 def fitted(held_out: Path, tmp_path: Path) -> Fit:
     """A fit and what it keeps of itself, in the folder fitted."""
     campaign = Campaign.from_toml(held_out)
-    setup = Setup.model_validate(tomllib.loads(stages(card="J_plus", pump="Z10")))
+    setup = FitSetup.model_validate(tomllib.loads(stages(card="J_plus", pump="Z10")))
     found = fit(Drive.preset("hoist").parameters, campaign.select(role="fit"), setup)
     Identification(campaign, found, notes={"seed": "7"}).save(tmp_path / "fitted")
     return found

@@ -32,7 +32,7 @@ from swashplate.drive import Limit
 from swashplate.errors import InputError, ParameterError
 from swashplate.executors import Processes, Serial, Threads
 from swashplate.identification.assessment import Identification
-from swashplate.identification.estimation.setup import Free, Setup, load_setup
+from swashplate.identification.estimation.setup import FitSetup, Free, load_setup
 from swashplate.identification.fitting import fit
 from swashplate.maneuvers import source_tests
 
@@ -410,7 +410,7 @@ def fitted(tmp_path_factory):
     campaign = Campaign.from_toml(path)
     (stage,) = (each for each in load_setup("luff").stages if each.name == "pump")
     free = {"Z16": Free(relative=(0.5, 2.0))}
-    setup = Setup(stages=(stage.model_copy(update={"free": free, "forces": None}),))
+    setup = FitSetup(stages=(stage.model_copy(update={"free": free, "forces": None}),))
     result = fit(Drive.preset("luff").parameters, campaign.experiments, setup)
     identified = Identification(campaign, result)
     identified.save(place)

@@ -11,7 +11,7 @@ it without a machine", the script that makes the logs of a reader who has none, 
   Node; ``$ head -n 4 FILE`` shows the first lines of a file;
 - ``c`` and ``js`` blocks begin with ``/* name.c */`` and are that file;
 - ``toml`` and ``csv`` blocks that begin with ``# name`` are that file; campaigns and fit
-  configurations are valid, other ``toml`` is a fragment;
+  fit setups are valid, other ``toml`` is a fragment;
 - ``diff`` blocks change a file: ``--- name``, then lines kept, taken out and put in;
 - another ``text`` block is a drawing, told by its lines and arrows.
 
@@ -40,7 +40,7 @@ from typer.testing import CliRunner
 from swashplate.campaign import CampaignFile
 from swashplate.cli import app
 from swashplate.documents import validated
-from swashplate.identification.estimation.setup import Setup
+from swashplate.identification.estimation.setup import FitSetup
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
@@ -146,7 +146,7 @@ def write_file(language: str, content: str) -> None:
     """Write a block that begins with its file's name; a fragment of TOML is only read."""
     if language == "toml":
         found = tomllib.loads(content)
-        kind = CampaignFile if "axes" in found else Setup if "stages" in found else None
+        kind = CampaignFile if "axes" in found else FitSetup if "stages" in found else None
         if kind is not None and "title" in found:
             validated(found, kind, "page")
     named = re.match(r"(?:# |/\* )(\S+\.\w+)(?: \*/)?\n", content)

@@ -32,7 +32,11 @@ OBJECTS = [
     for page in tomllib.loads((DOCS / "api.toml").read_text("utf-8"))["page"]
     for name in page["objects"]
 ]
-KEYS = {"campaign-file": "counts_per_turn", "parameter-file": "pump_motor", "set-up-file": "tied"}
+KEYS = {
+    "campaign-file": "counts_per_turn",
+    "parameter-file": "pump_motor",
+    "fit-setup-file": "tied",
+}
 
 
 @pytest.fixture

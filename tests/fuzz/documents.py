@@ -1,4 +1,4 @@
-"""Campaigns, drives, fit configurations and cranes as nobody should write them."""
+"""Campaigns, drives, fit setups and cranes as nobody should write them."""
 
 from __future__ import annotations
 

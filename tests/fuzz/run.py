@@ -1,6 +1,6 @@
 """Fuzzing of all readers for some minutes: damaged files must end in one sentence, or be read.
 
-Logs are damaged byte by byte; campaigns, drives, fit configurations and cranes also by what nobody
+Logs are damaged byte by byte; campaigns, drives, fit setups and cranes also by what nobody
 writes, such as keys of 20,000 parts, with logs whose headers have units that are none.
 
     python tests/fuzz/run.py [--minutes 3] [--kind hdf5] [--seed 1]

@@ -1,4 +1,4 @@
-"""What is written down rather than measured or fitted: runs, linearised fits, noise, a set-up."""
+"""What is written down, not measured or fitted: runs, linearised fits, noise, a fit setup."""
 
 import re
 from collections.abc import Callable, Mapping, Sequence
@@ -12,14 +12,14 @@ from scipy.signal import lfilter
 from swashplate import Campaign, Channel, Experiment, rig
 from swashplate.campaign.experiment import InputSignal, Source
 from swashplate.executors import Serial
-from swashplate.identification.estimation.arrow import Block
+from swashplate.identification.estimation.arrow import RunRows
 from swashplate.identification.estimation.problem import (
     TOLERANCE,
     LinearisedFit,
     LinearisedRun,
     factor_of,
 )
-from swashplate.identification.estimation.setup import Setup
+from swashplate.identification.estimation.setup import FitSetup
 from swashplate.identification.estimation.unknowns import Unknown, Unknowns
 
 UNITS = {
@@ -119,7 +119,7 @@ def linear_fit(
     """A fit of some runs, by unknowns of the machine alone; without priors by default."""
     rows = np.zeros((0, len(variables))) if prior is None else prior
     noise = np.ones(len(rows)) if prior_noise is None else prior_noise
-    priors = [Block("", np.arange(0), row[None, :]) for row in rows]
+    priors = [RunRows("", np.arange(0), row[None, :]) for row in rows]
     factor = factor_of(zip(runs, derivatives, strict=True), variables, priors)
     return LinearisedFit(tuple(runs), derivatives, variables, factor, rows, tolerance, noise)
 
@@ -152,7 +152,7 @@ def put(pattern: str, new: str, count: int = 0) -> Callable[[str], str]:
 LATER = {"from": 1.0, "to": 1.2, "factor": 10.0}
 CARD = {"free": {"J": {"relative": (0.5, 2.0)}}, "weights": {"rectified_current": [LATER]}}
 KNOWN = {"relative": (0.8, 1.25), "log": True, "prior": {"mean": 12.8, "deviation": 0.05}}
-TWO_STAGES = Setup.model_validate(
+TWO_STAGES = FitSetup.model_validate(
     {
         "title": "two stages",
         "stages": [

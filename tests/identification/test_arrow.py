@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.identification.given import TIME, bench_run
 
-from swashplate.identification.estimation.arrow import Block, arrow_factor, whitening
+from swashplate.identification.estimation.arrow import RunRows, arrow_factor, whitening
 from swashplate.identification.estimation.model import Linearised
 from swashplate.identification.estimation.problem import Problem, linearised_fit
 from swashplate.identification.estimation.solving import solve
@@ -18,7 +18,7 @@ TOLERANCE = 1e-10
 
 
 @st.composite
-def campaigns(draw: st.DrawFn) -> tuple[int, np.ndarray, list[Block]]:
+def campaigns(draw: st.DrawFn) -> tuple[int, np.ndarray, list[RunRows]]:
     """Derivatives of some runs: size, numbers of the shared unknowns, rows of each run.
 
     Columns are of sizes far apart; some are zero, some the same as others of their run, so that an
@@ -40,11 +40,11 @@ def campaigns(draw: st.DrawFn) -> tuple[int, np.ndarray, list[Block]]:
             first, other = rng.integers(0, max(rows.shape[1], 1), 2)
             if rows.shape[1]:
                 rows[:, first] = draw(st.sampled_from([0.0, 3.0])) * rows[:, other]
-        blocks.append(Block(f"run {k}", numbers[ends[k] : ends[k + 1]], rows))
+        blocks.append(RunRows(f"run {k}", numbers[ends[k] : ends[k + 1]], rows))
     return size, numbers[:shared], blocks
 
 
-def dense(size: int, shared: np.ndarray, blocks: list[Block]) -> np.ndarray:
+def dense(size: int, shared: np.ndarray, blocks: list[RunRows]) -> np.ndarray:
     parts = []
     for block in blocks:
         part = np.zeros((len(block.rows), size))

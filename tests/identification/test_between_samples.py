@@ -9,7 +9,7 @@ from tests.identification.given import model_of, run_of
 from swashplate import Drive
 from swashplate.campaign import Experiment
 from swashplate.identification.estimation.between_samples import doubt, joined
-from swashplate.identification.estimation.stages import configuration, smooth
+from swashplate.identification.estimation.stages import as_fit_setup, smooth
 from swashplate.identification.fitting import fit
 from swashplate.maneuvers import sine, step
 
@@ -59,7 +59,7 @@ def test_a_model_of_its_own_code_is_not_tried_and_that_is_said() -> None:
 def test_what_a_campaign_states_is_taken_but_doubted(way: str) -> None:
     other = {"linear": "previous", "previous": "linear"}[way]
     stated, wrong = joined(runs_of(way), way), joined(runs_of(way), other)
-    setup = configuration(FREE, stated)
+    setup = as_fit_setup(FREE, stated)
     assert doubt(stated, NOMINAL.parameters, setup) == ()
     (said,) = doubt(wrong, NOMINAL.parameters, setup)
     assert f'interpolation = "{other}"' in said

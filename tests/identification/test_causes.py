@@ -9,7 +9,7 @@ import pytest
 
 from swashplate import Campaign, Drive, rig
 from swashplate.identification.diagnostics.causes import behind_lag
-from swashplate.identification.diagnostics.judging import Verdict, verdict
+from swashplate.identification.diagnostics.verdict import Verdict, assess_fit
 from swashplate.identification.estimation.setup import load_setup
 from swashplate.identification.fitting import Fit, fit
 from swashplate.identification.validation import predict
@@ -59,7 +59,7 @@ def fitted(
     campaign = Campaign.from_toml(path)
     result = fit(NOMINAL.parameters, campaign.select(role="fit"), load_setup("slew"))
     predicted = predict(result.parameters, campaign.select(role="validate"))
-    return result, verdict(result.stages, predicted)
+    return result, assess_fit(result.stages, predicted)
 
 
 @pytest.fixture(scope="module")
@@ -217,8 +217,8 @@ def test_what_is_known_of_the_noise_changes_no_answer(sound) -> None:
             stage.problem, experiments=tuple(map(with_noise, stage.problem.experiments))
         )
         stages.append(replace(stage, problem=problem, earlier=tuple(stages)))
-    again = verdict(stages, ())
-    before = verdict(result.stages, ())
+    again = assess_fit(stages, ())
+    before = assess_fit(result.stages, ())
     assert again.predictions == before.predictions
     assert again.answers() == before.answers()
     assert again.usable == before.usable == found.usable

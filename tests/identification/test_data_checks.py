@@ -14,7 +14,7 @@ from swashplate.identification.diagnostics.data_checks import (
     check_runs,
     refuse_unsound,
 )
-from swashplate.identification.estimation.setup import Free, Setup, Stage
+from swashplate.identification.estimation.setup import FitSetup, Free, Stage
 from swashplate.identification.estimation.stages import smooth
 from swashplate.identification.fitting import fit
 
@@ -22,9 +22,9 @@ NOMINAL = smooth(Drive.preset("hoist").parameters)
 TRUTH = Drive(NOMINAL).scale(Z10=1.1)
 
 
-def pump(*names: str) -> Setup:
+def pump(*names: str) -> FitSetup:
     free = dict.fromkeys(names, Free(relative=(0.5, 2.0)))
-    return Setup(stages=(Stage(name="pump", part="pump", free=free),))
+    return FitSetup(stages=(Stage(name="pump", part="pump", free=free),))
 
 
 PUMP = pump("Z8", "Z10")
@@ -111,7 +111,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize(("runs", "setup", "said"), REFUSED.values(), ids=REFUSED)
-def test_what_no_fit_could_mean_anything_for_is_refused(runs, setup: Setup, said: str) -> None:
+def test_what_no_fit_could_mean_anything_for_is_refused(runs, setup: FitSetup, said: str) -> None:
     with pytest.raises(InputError, match=said) as caught:
         fit(NOMINAL, runs, setup)
     assert "\n" not in str(caught.value)

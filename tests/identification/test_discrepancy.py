@@ -9,15 +9,15 @@ from hypothesis import strategies as st
 from tests.identification.given import TIME, bench_run, linear_fit, unknowns_of
 
 from swashplate.identification.diagnostics.discrepancy import (
-    Cell,
+    ChannelErrors,
     PredictionError,
-    Record,
+    WindowCell,
     bound_of_variance,
     cells_of,
+    channel_errors,
     left_out,
     over_window,
     prediction_errors,
-    record_of,
     variance_function,
 )
 from swashplate.identification.estimation.problem import LinearisedRun
@@ -61,10 +61,10 @@ def test_maneuvers_left_out_are_those_of_a_refit_without_them() -> None:
                 np.testing.assert_allclose(found[run.name], run.residual + rows[k] @ change)
 
 
-def record(run: str, error: np.ndarray, signal: np.ndarray, maneuver: str = "") -> Record:
+def record(run: str, error: np.ndarray, signal: np.ndarray, maneuver: str = "") -> ChannelErrors:
     command = np.ones(error.size)
     rate = 0.1 * np.gradient(signal, STEP)
-    return Record(
+    return ChannelErrors(
         run,
         maneuver or run,
         False,
@@ -96,7 +96,7 @@ def test_a_window_takes_the_slope_of_a_position_and_the_mean_of_anything_else() 
     assert noise == pytest.approx(1.0 / 51)
 
 
-def drawn(rng: np.random.Generator, count: int, spread: float) -> list[Record]:
+def drawn(rng: np.random.Generator, count: int, spread: float) -> list[ChannelErrors]:
     """Maneuvers whose error has the variance 0.01² (1 + (3 s)²) times exp(2 spread z)."""
     made = []
     for k in range(count):
@@ -109,7 +109,7 @@ def drawn(rng: np.random.Generator, count: int, spread: float) -> list[Record]:
     return made
 
 
-def variance_of(cells: Sequence[Cell], coefficients: np.ndarray) -> float:
+def variance_of(cells: Sequence[WindowCell], coefficients: np.ndarray) -> float:
     return float(np.mean(np.vstack([cell.terms for cell in cells]) @ coefficients))
 
 
@@ -181,7 +181,9 @@ def test_a_channel_that_never_moves_has_no_error_to_state() -> None:
     still = compared(bench_run("still", 1.0, np.zeros(TIME.size)), "y", np.zeros(TIME.size))
     assert prediction_errors((), [still]) == ()
     short = bench_run("short", 1.0, np.zeros(TIME.size), weight=0.0)
-    assert record_of(compared(bench_run("a", 1.0, np.sin(TIME)), "y", np.sin(TIME))) is not None
+    assert (
+        channel_errors(compared(bench_run("a", 1.0, np.sin(TIME)), "y", np.sin(TIME))) is not None
+    )
     assert short["y"].used.sum() == 0
 
 

@@ -1,4 +1,4 @@
-"""A drive in a fit: set-ups, weights, what drives the pump, and what runs begin with."""
+"""A drive in a fit: fit setups, weights, what drives the pump, and what runs begin with."""
 
 from dataclasses import replace
 
@@ -14,7 +14,7 @@ from swashplate.identification.estimation.drive_model import (
     measured_current,
     simulated_current,
 )
-from swashplate.identification.estimation.setup import Free, Setup, Stage, load_setup
+from swashplate.identification.estimation.setup import FitSetup, Free, Stage, load_setup
 from swashplate.identification.estimation.stages import smooth, stage_problem, start_currents_of
 from swashplate.identification.estimation.unknowns import Unknown
 from swashplate.identification.fitting import fit
@@ -85,7 +85,7 @@ def test_a_recursion_of_another_rate_gives_way_to_its_equation() -> None:
     names = ("zeta_plus", "omega_plus")
     free = {name: Free(relative=(0.5, 2.0)) for name in names}
     stage = Stage(name="card", part="card", free=free)
-    setup = Setup(stages=(stage,), card_filter="recursion")
+    setup = FitSetup(stages=(stage,), card_filter="recursion")
     found = fit(Drive.preset("hoist").parameters, [run], setup, tolerance=1e-12)
     assert found.parameters.rate is found.nominal.rate is None
     for name in names:
@@ -136,7 +136,9 @@ def test_a_run_cut_out_of_a_rising_current_has_a_current_of_its_own(rate: float 
         runs.append(run_of(name, simulated.voltage[first:], current, time=time, **more))
     assert 0.1 < simulated.current[563] < 0.6
     free = {name: Free(relative=(0.5, 2.0), log=True) for name in ("lim1_plus", "omega_plus")}
-    (found,) = fit(drive, runs, Setup(stages=(Stage(name="card", part="card", free=free),))).stages
+    (found,) = fit(
+        drive, runs, FitSetup(stages=(Stage(name="card", part="card", free=free),))
+    ).stages
     assert found.values["start_current_plus (cut)"] == pytest.approx(
         simulated.current[563], abs=0.005
     )
@@ -180,7 +182,7 @@ def test_a_bound_that_was_reached_is_said_with_the_entry_that_states_it(campaign
     said = {}
     for upper in (1.3, 2.6):
         free = {"lim1": Free(relative=(0.5, upper), log=True)}
-        setup = Setup(stages=(Stage(name="card", part="card", free=free),))
+        setup = FitSetup(stages=(Stage(name="card", part="card", free=free),))
         (stage,) = fit(drive, runs, setup).stages
         said[upper] = [each for each in bounds_reached(stage) if "lim1_plus" in each]
     assert stage.values["lim1_plus"] == pytest.approx(2.2841, rel=0.01)

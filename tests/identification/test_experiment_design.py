@@ -8,7 +8,7 @@ import pytest
 from tests.identification.given import run_of, unknowns_of, virtual
 
 from swashplate import Campaign, Drive, Experiment, InputError, maneuvers
-from swashplate.identification.estimation.setup import Forces, Free, Setup, Stage, load_setup
+from swashplate.identification.estimation.setup import FitSetup, Forces, Free, Stage, load_setup
 from swashplate.identification.estimation.stages import smooth
 from swashplate.identification.estimation.unknowns import Prior
 from swashplate.identification.fitting import fit
@@ -18,16 +18,16 @@ from swashplate.identification.statistics.determination import (
 )
 from swashplate.identification.statistics.experiment_design import (
     MEMORY,
-    Candidate,
-    Outlook,
+    CandidateTest,
+    RunInformation,
     Sensor,
     advice_table,
     advise,
-    bench,
     best_tests_table,
     default_sensors,
-    in_turn,
-    outlook,
+    prior_information,
+    run_information,
+    sequential_plan,
 )
 from swashplate.identification.statistics.intervals import uncertainty_of
 from swashplate.maneuvers import sine, step
@@ -42,14 +42,14 @@ def diagonal(*errors: float) -> np.ndarray:
 
 def test_a_candidate_that_mixes_known_and_unknown_tells_of_the_unknown_alone() -> None:
     """It measures a + b: b becomes known as well as a, a no better than before."""
-    (found,) = advise(diagonal(0.1, np.inf), [Candidate("sum", np.array([[1e3, 1e3]]))], AB)
+    (found,) = advise(diagonal(0.1, np.inf), [CandidateTest("sum", np.array([[1e3, 1e3]]))], AB)
     assert found.newly_determined == ("b",)
     assert found.after[0] == pytest.approx(0.1)
     assert found.after[1] == pytest.approx(0.1, rel=1e-3)
     assert found.d_gain == pytest.approx(1.0)
     # what was not known before has no error to come from
     assert "b to 10 %" in str(advice_table("", [found]))
-    (sharper,) = advise(diagonal(0.1, 0.2), [Candidate("b", np.array([[0.0, 1e3]]))], AB)
+    (sharper,) = advise(diagonal(0.1, 0.2), [CandidateTest("b", np.array([[0.0, 1e3]]))], AB)
     assert "b 20 % to 0.1 %" in str(advice_table("", [sharper]))
 
 
@@ -57,7 +57,7 @@ def test_the_order_is_that_of_determinants_computed_apart() -> None:
     rng = np.random.default_rng(8)
     variables = unknowns_of("abcd", np.ones(4))
     present = rng.normal(size=(30, 4))
-    candidates = [Candidate(f"c{k}", rng.normal(size=(20, 4)) * (k + 1)) for k in range(5)]
+    candidates = [CandidateTest(f"c{k}", rng.normal(size=(20, 4)) * (k + 1)) for k in range(5)]
     gains = {
         each.name: np.linalg.slogdet(
             np.eye(4) + np.linalg.solve(present.T @ present, each.derivatives.T @ each.derivatives)
@@ -72,7 +72,7 @@ def test_the_order_is_that_of_determinants_computed_apart() -> None:
 
 def test_an_unknown_at_its_bound_counts_as_known() -> None:
     variables = unknowns_of("ab", np.ones(2), at_bound=[1, 0])
-    (found,) = advise(np.zeros((0, 2)), [Candidate("sum", np.array([[1.0, 4.0]]))], variables)
+    (found,) = advise(np.zeros((0, 2)), [CandidateTest("sum", np.array([[1.0, 4.0]]))], variables)
     assert found.names == ("b",)
     assert found.after[0] == pytest.approx(0.25)
 
@@ -91,8 +91,8 @@ def hoist_tests(tmp_path_factory: pytest.TempPathFactory) -> Campaign:
     return virtual(tmp_path_factory.mktemp("rig"), "hoist", seed=4, perturb=0.02)
 
 
-def setup(*names: str) -> Setup:
-    return Setup(stages=(Stage(name="pump", part="pump", free=dict.fromkeys(names, FACTOR)),))
+def setup(*names: str) -> FitSetup:
+    return FitSetup(stages=(Stage(name="pump", part="pump", free=dict.fromkeys(names, FACTOR)),))
 
 
 def run(name: str, volts: float, noise: float = 0.0) -> Experiment:
@@ -106,8 +106,8 @@ def test_a_plan_by_hand() -> None:
     """After the first choice its like is worth little: the plan turns to the other unknown."""
     variables = unknowns_of("ab", np.ones(2))
     rows = {"a": [[10.0, 0.0]], "a again": [[9.0, 0.0]], "b": [[0.0, 1.0]], "rest": [[0.0, 0.0]]}
-    candidates = [Candidate(name, np.array(row)) for name, row in rows.items()]
-    plan = in_turn(np.diag([1.0, 1.0]), candidates, variables, 4)
+    candidates = [CandidateTest(name, np.array(row)) for name, row in rows.items()]
+    plan = sequential_plan(np.diag([1.0, 1.0]), candidates, variables, 4)
     assert [each.candidate for each in plan] == ["a", "b", "a again"]
     # 1/√(1 + 100), and 1/√(1 + 100 + 81)
     assert plan[0].after[0] == pytest.approx(101.0**-0.5)
@@ -119,7 +119,7 @@ def test_a_plan_by_hand() -> None:
 
 def test_errors_are_those_of_least_squares_by_hand() -> None:
     """The speed is Z10 times an angle: the error of ln Z10 is noise over the speed's length."""
-    known = bench(HOIST.parameters, setup("Z10"))
+    known = prior_information(HOIST.parameters, setup("Z10"))
     test = maneuvers.step(4.0, start=0.5, stop=2.5, length=4.0)
     (found,) = advise(known.present, [known.candidate(test, [SPEED])], known.variables)
     speed = HOIST.simulate(test.sample(512.0)).shaft_speed
@@ -131,7 +131,7 @@ def test_errors_are_those_of_least_squares_by_hand() -> None:
 
 def test_the_free_zero_of_an_encoder_costs_what_it_must() -> None:
     """Position is Z10 times the angle's integral, from an unknown zero: only its scatter counts."""
-    known = bench(HOIST.parameters, setup("Z10"))
+    known = prior_information(HOIST.parameters, setup("Z10"))
     test = maneuvers.step(4.0, start=0.5, stop=2.5, length=4.0)
     encoder = Sensor("encoder_counts", 0.001, memory=1.0 / 512.0)
     (found,) = advise(known.present, [known.candidate(test, [encoder])], known.variables)
@@ -141,8 +141,8 @@ def test_the_free_zero_of_an_encoder_costs_what_it_must() -> None:
 
 def test_what_is_known_counts_once() -> None:
     prior = Free(relative=(0.5, 2.0), log=True, prior=Prior(mean=11.4, deviation=0.2))
-    plan = Setup(stages=(Stage(name="pump", part="pump", free={"Z10": prior}),))
-    known = bench(HOIST.parameters, plan)
+    plan = FitSetup(stages=(Stage(name="pump", part="pump", free={"Z10": prior}),))
+    known = prior_information(HOIST.parameters, plan)
     np.testing.assert_allclose(np.abs(known.present), [[5.0]])
     rest = known.candidate(maneuvers.step(4.0), [Sensor("shaft_speed", 1e6)])
     (found,) = advise(known.present, [rest], known.variables)
@@ -151,14 +151,14 @@ def test_what_is_known_counts_once() -> None:
 
 def test_residuals_of_a_fit_tell_the_noise() -> None:
     noisy = [run("up", 5.0, 0.04), run("down", -5.0, 0.04)]
-    stated = bench(HOIST.parameters, setup("Z10"), noisy)
-    fitted = bench(HOIST.parameters, setup("Z10"), noisy, fitted=True)
+    stated = prior_information(HOIST.parameters, setup("Z10"), noisy)
+    fitted = prior_information(HOIST.parameters, setup("Z10"), noisy, fitted=True)
     assert stated.sensors[0].noise == 0.01
     assert fitted.sensors[0].noise == pytest.approx(0.04, rel=0.05)
     # white: each sample counts, or nearly, as the larger of two estimates of the error is quoted
     assert 1.0 / 512.0 <= fitted.sensors[0].memory < 2.0 / 512.0
     with pytest.raises(InputError, match="The drive misses 'shaft_speed' by .* % of its range"):
-        bench(HOIST.parameters, setup("Z10"), [run("exact", 5.0)], fitted=True)
+        prior_information(HOIST.parameters, setup("Z10"), [run("exact", 5.0)], fitted=True)
 
 
 @pytest.mark.slow
@@ -167,7 +167,7 @@ def test_what_is_known_is_what_a_fit_of_the_same_tests_knows(hoist_tests: Campai
     setup = load_setup("hoist")
     runs = hoist_tests.select(role="fit")
     found = fit(Drive.preset("hoist").parameters, runs, setup)
-    known = bench(found.parameters, setup, runs, fitted=True)
+    known = prior_information(found.parameters, setup, runs, fitted=True)
     now = np.sqrt(np.diag(np.linalg.inv(known.present.T @ known.present)))
     errors = {}
     for stage in found.stages:
@@ -193,20 +193,22 @@ def test_sensors_of_a_fresh_plan() -> None:
 def test_runs_driven_by_a_current_are_counted() -> None:
     current, channels = np.full(2049, 0.5), {"shaft_speed": np.zeros(2049)}
     driven = run_of("by current", current, channels, kind="current", noise=0.01)
-    known = bench(HOIST.parameters, setup("Z10"), [driven])
+    known = prior_information(HOIST.parameters, setup("Z10"), [driven])
     speed = HOIST.simulate_current(current).shaft_speed
     expected = np.linalg.norm(speed) / (0.01 * np.sqrt(MEMORY * 512.0))
     np.testing.assert_allclose(np.abs(known.present), [[expected]])
     current = Sensor("rectified_current", 0.01)
     with pytest.raises(InputError, match="A pump shows nothing to rectified_current"):
-        bench(HOIST.parameters, setup("Z10"), sensors=[current])
+        prior_information(HOIST.parameters, setup("Z10"), sensors=[current])
 
 
 # --- what the runs tell, before a fit -------------------------------------------------------------
 
 
-def looked(free: Mapping[str, Free], *runs: Experiment, **more: object) -> Outlook:
-    return outlook(Stage(name="pump", part="pump", free=free, **more), HOIST.parameters, runs)
+def looked(free: Mapping[str, Free], *runs: Experiment, **more: object) -> RunInformation:
+    return run_information(
+        Stage(name="pump", part="pump", free=free, **more), HOIST.parameters, runs
+    )
 
 
 def test_before_a_fit_each_run_is_marked() -> None:

@@ -227,7 +227,7 @@ def two_axes(campaign: Campaign) -> Campaign:
 
 
 def pump(**entries: object) -> dict[str, object]:
-    """A fit configuration of the pump alone."""
+    """A fit setup of the pump alone."""
     stage = {"name": "pump", "part": "pump", "free": {"Z8": {"relative": (0.5, 2.0)}}}
     return {"stages": [stage | entries]}
 
@@ -304,10 +304,10 @@ REFUSED: Mapping[str, tuple[Callable[[Campaign], object], type[Exception], str]]
         InputError,
         "What is free is {}",
     ),
-    "an unknown configuration": (
+    "an unknown fit setup": (
         lambda tests: swashplate.identify(tests, free="hoost"),
         ParameterError,
-        "no packaged fit configuration 'hoost' .did you mean hoist",
+        "no packaged fit setup 'hoost' .did you mean hoist",
     ),
     "an unknown drive": (
         lambda tests: swashplate.identify(tests, "hoost"),
@@ -389,7 +389,7 @@ REFUSED: Mapping[str, tuple[Callable[[Campaign], object], type[Exception], str]]
     "a fit without what is free": (
         lambda tests: fit(Drive.preset("hoist"), tests),
         InputError,
-        "swashplate.identify takes drive and fit configuration from the campaign",
+        "swashplate.identify takes drive and fit setup from the campaign",
     ),
 }
 

@@ -26,20 +26,20 @@ from swashplate.identification.estimation.problem import (
     influence,
     linearised_fit,
 )
-from swashplate.identification.estimation.setup import Setup, load_setup, setup_text
+from swashplate.identification.estimation.setup import FitSetup, load_setup, setup_text
 from swashplate.identification.estimation.solving import solve
 from swashplate.identification.estimation.unknowns import Prior, Unknown, Unknowns
 from swashplate.identification.noise import Covariance
 from swashplate.identification.statistics.interval_ends import checked_ends
 from swashplate.identification.statistics.intervals import (
-    Handed,
+    EarlierStage,
     estimates,
     prior_sentences,
     reach,
     uncertainty,
     uncertainty_of,
     weighed,
-    with_handed,
+    with_earlier_stages,
 )
 from swashplate.identification.statistics.profiles import profile
 from swashplate.maneuvers import source_tests
@@ -390,7 +390,7 @@ DOUBTS = {"Z9": "3 %", "tau": 1e-3}
 ONE = {"lag": RANGES["lag"], "start.place": RANGES["start.place"]}
 
 
-def stated(**doubts: float | str) -> Setup:
+def stated(**doubts: float | str) -> FitSetup:
     return load_setup("hoist").model_copy(update={"standard_uncertainty": doubts})
 
 
@@ -483,8 +483,8 @@ def test_variances_add_up_and_so_do_degrees_of_freedom() -> None:
         np.ones(2, dtype=bool),
         np.array([8.0, 8.0]),
     )
-    both = with_handed(own, [Handed(earlier, np.array([[0.5, 1.0]]))])
+    both = with_earlier_stages(own, [EarlierStage(earlier, np.array([[0.5, 1.0]]))])
     assert both.matrix[0, 0] == pytest.approx(7.25)
     spread = (4.0**2 + 2.25**2 + 1.0**2) / 8.0
     assert both.degrees_of_freedom[0] == pytest.approx(7.25**2 / spread)
-    assert with_handed(own, []) is own
+    assert with_earlier_stages(own, []) is own

@@ -27,15 +27,15 @@ from swashplate.executors import Processes
 from swashplate.identification import (
     Identification,
     ModelSetup,
-    OwnModel,
     Problem,
     Search,
     Unknown,
     Unknowns,
+    UserModel,
+    assess_fit,
     fit,
     predict,
     solve,
-    verdict,
 )
 from swashplate.identification.estimation.model import linearised
 from swashplate.identification.statistics.intervals import uncertainty_of
@@ -89,7 +89,7 @@ FREE = (
     Unknown("gain", 1.0, 0.1, 20.0, log=True),
     Unknown("delay", 0.05, 0.0, 0.5, "s"),
 )
-OWN = OwnModel(valve, given=Load())
+OWN = UserModel(valve, given=Load())
 
 
 def trial(name: str, load: Load = Load(), begin: float = 0.0, **channels: np.ndarray) -> Experiment:  # noqa: B008
@@ -143,11 +143,11 @@ def test_a_run_has_a_load_a_beginning_and_a_zero_of_its_own() -> None:
         Unknown("offset position", 0.0, -2.0, 2.0, run="b", kind="zero", channel="position"),
     )
     runs = (first, moved(second, second["position"].values + 0.4))
-    values = found(problem(OwnModel(valve, given=loads), *runs, free=free))
+    values = found(problem(UserModel(valve, given=loads), *runs, free=free))
     own = {"start.position (a)": 0.7, "offset position (b)": 0.4}
     assert values == pytest.approx({**TRUTH._asdict(), **own}, rel=1e-6)
     # or it begins where a channel does
-    model = OwnModel(valve, given=loads, begin={"position": "position"})
+    model = UserModel(valve, given=loads, begin={"position": "position"})
     assert found(problem(model, first)) == pytest.approx(TRUTH._asdict(), rel=1e-7)
 
 
@@ -161,7 +161,7 @@ def test_uneven_stamps_are_put_on_a_grid(hold: str) -> None:
     fine = np.arange(int(time[-1] * 200.0) + 1) / 200.0
     level = simulate(valve, TRUTH, {"command": run.input.at(fine)}, 200.0, given=Load())["position"]
     run = moved(run, np.interp(time, fine, level))
-    values = found(problem(OwnModel(valve, given=Load(), rate=200.0), run))
+    values = found(problem(UserModel(valve, given=Load(), rate=200.0), run))
     assert values == pytest.approx(TRUTH._asdict(), rel=1e-3)
     with pytest.raises(InputError, match=r"a: the stamps of its input are not even, .* rate=100.0"):
         problem(OWN, run).cost(Unknowns(FREE).start)
@@ -181,11 +181,11 @@ def test_sub_steps_of_a_fit_are_those_of_a_simulation(hold) -> None:
     run = moved(trial("a"), made)
     run = replace(run, input=replace(run.input, interpolation=hold))
     expected = {"lag": TRUTH.lag, "gain": TRUTH.gain}
-    values = found(problem(OwnModel(coarse, substeps=3), run, free=FREE[:2]))
+    values = found(problem(UserModel(coarse, substeps=3), run, free=FREE[:2]))
     assert values == pytest.approx(expected, rel=1e-7)
     assert found(problem(coarse, run, free=FREE[:2]))["lag"] != pytest.approx(TRUTH.lag, rel=0.01)
     with pytest.raises(InputError, match="substeps is 0, but must be a whole number"):
-        problem(OwnModel(coarse, substeps=0), run).cost(Unknowns(FREE).start)
+        problem(UserModel(coarse, substeps=0), run).cost(Unknowns(FREE).start)
 
 
 @equation
@@ -204,7 +204,7 @@ def test_a_channel_that_is_an_input_is_what_its_campaign_says_between_samples(ho
     between = held if hold == "previous" else np.interp(TIME, TIME[slow], load)
     inputs = {"command": COMMAND, "load": between}
     expected = simulate(model, TRUTH, inputs, RATE)["position"]
-    made = OwnModel(model).simulate(TRUTH._asdict(), run)["position"]
+    made = UserModel(model).simulate(TRUTH._asdict(), run)["position"]
     assert made == pytest.approx(expected, abs=1e-12)
 
 
@@ -244,8 +244,8 @@ REFUSED = {
     "needs the signals command, supply; a has one input": lambda: solve(
         Problem(servo, (trial("a", place=TIME),), *PLACE)
     ),
-    "its given must be a Load": lambda: tried(OwnModel(valve)),
-    "no given numbers for a": lambda: tried(OwnModel(valve, given={"b": Load()})),
+    "its given must be a Load": lambda: tried(UserModel(valve)),
+    "no given numbers for a": lambda: tried(UserModel(valve, given={"b": Load()})),
 }
 
 
@@ -340,7 +340,7 @@ def test_the_truth_is_found_judged_and_predicted() -> None:
     (quality,) = predict(made.parameters, HELD)
     assert quality.channel == "place"
     assert quality.measures.rmse == pytest.approx(0.01, rel=0.1)  # the noise, nothing else
-    assert verdict([stage], [quality]).headline.startswith("Usable")
+    assert assess_fit([stage], [quality]).headline.startswith("Usable")
 
 
 class Table:
@@ -442,10 +442,10 @@ def test_a_fit_whose_other_starts_lie_out_of_the_domain() -> None:
 
 def test_starts_of_other_steps_are_not_resumed(tmp_path: Path) -> None:
     search = Search(1, store=tmp_path, resume=True)
-    made = fit(OwnModel(servo), RUNS, RANGES, noise=NOISE, search=search)
+    made = fit(UserModel(servo), RUNS, RANGES, noise=NOISE, search=search)
     assert len(made.stages[0].starts) == 2
     with pytest.raises(FileError, match="nominal values differ"):
-        fit(OwnModel(servo, substeps=2), RUNS, RANGES, noise=NOISE, search=search)
+        fit(UserModel(servo, substeps=2), RUNS, RANGES, noise=NOISE, search=search)
 
 
 def test_data_are_checked_before_the_search() -> None:
@@ -478,7 +478,7 @@ SENSELESS = {
     "servo, fixed: lag .* is 500 s, .* 0.001 to 100 s": lambda: ModelSetup(
         documented, {"gain": (0.1, 1.0, 10.0)}, fixed={"lag": 500.0}
     ),
-    "A dict is no model": lambda: fit({}, RUNS, RANGES),
+    "A dict is not a model": lambda: fit({}, RUNS, RANGES),
     "Nothing of servo is free": lambda: fit(servo, RUNS, {}),
     "lag is free as 3: give lower bound": lambda: fit(servo, RUNS, {"lag": 3}),
     "no parameter 'lagg', which free names .*it has gain, lag": lambda: fit(
@@ -541,7 +541,7 @@ def limited(seed: int) -> Experiment:
 def test_what_a_model_leaves_out_is_an_error_of_its_prediction() -> None:
     slow = Model("slow", parameters=Slow, state=State, step=slow_step)
     made = fit(slow, campaign(*map(limited, range(40))), {"lag": (0.01, 0.1, 3.0)})
-    found = verdict(made.stages, predict(made.parameters, [limited(99)]))
+    found = assess_fit(made.stages, predict(made.parameters, [limited(99)]))
     (stated,) = found.predictions
     # the noise is 1e-3 of a range of about 2
     assert stated.worst.error > 0.02
@@ -562,7 +562,7 @@ def test_a_run_with_a_scale_or_a_delay_of_its_own_is_named(gain, late, said) -> 
     read += random.normal(0.0, 0.005, read.shape)
     runs = [moved(each, own) for each, own in zip(runs, read, strict=True)]
     made = fit(OWN, campaign(*runs[:6]), {"lag": (0.05, 0.2, 2.0), "gain": (0.1, 1.0, 20.0)})
-    found = verdict(made.stages, predict(made.parameters, runs[6:]))
+    found = assess_fit(made.stages, predict(made.parameters, runs[6:]))
     assert not found.usable
     assert [each.run for each in found.unsound] == ["run 2"]
     assert said in found.headline
@@ -607,9 +607,9 @@ def documented_valve(tmp_path: Path, monkeypatch) -> Path:
 
 
 def test_the_documented_model_file_finds_a_lag_in_several_processes(documented_valve: Path) -> None:
-    """Workers find the model, which has no name of its own, as an attribute of the `OwnModel`."""
+    """Workers find the model, which has no name of its own, as an attribute of the `UserModel`."""
     setup = ModelSetup.from_file(documented_valve)
-    assert isinstance(setup.model, OwnModel)
+    assert isinstance(setup.model, UserModel)
     assert pickle.loads(pickle.dumps(setup.model.model)) is setup.model.model
     runs = [valve_test("slow", 0.2), valve_test("fast", 0.6)]
     search = Search(2, executor=Processes(2))

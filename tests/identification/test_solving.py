@@ -36,7 +36,7 @@ from swashplate.identification.estimation.unknowns import Prior, Unknown, Unknow
 def test_tied_directions_and_unknowns_of_one_experiment() -> None:
     unknowns = Unknowns(
         (
-            bounded("Z16", 2.0, relative=(0.5, 2.0), sets=("Z16_plus", "Z16_minus")),
+            bounded("Z16", 2.0, factors=(0.5, 2.0), sets=("Z16_plus", "Z16_minus")),
             Unknown("offset", 1.0, -9.0, 9.0, run="lift"),
             Unknown("offset", 3.0, -9.0, 9.0, run="lower"),
         )
@@ -53,8 +53,8 @@ def test_tied_directions_and_unknowns_of_one_experiment() -> None:
 GAIN, LAG = 3.0, 0.7
 UNKNOWNS = Unknowns(
     (
-        bounded("gain", 1.0, absolute=(0.1, 20.0), log=True),
-        bounded("lag", 2.0, absolute=(0.05, 5.0), log=True),
+        bounded("gain", 1.0, bounds=(0.1, 20.0), log=True),
+        bounded("lag", 2.0, bounds=(0.05, 5.0), log=True),
     )
 )
 
@@ -121,7 +121,7 @@ def test_interrupted_with_the_best_so_far(problem: Problem) -> None:
 
 
 RUN = bench_run("run", 1.0, risen(1.0, GAIN, LAG))
-LOW = {"absolute": (0.0, 2.0)}
+LOW = {"bounds": (0.0, 2.0)}
 
 
 def made(*runs: Experiment, unknowns: Unknowns = UNKNOWNS) -> Problem:
@@ -130,10 +130,10 @@ def made(*runs: Experiment, unknowns: Unknowns = UNKNOWNS) -> Problem:
 
 ZERO = Unknown("offset y", 0.0, -1.0, 1.0, run="lift", kind="zero", channel="y")
 REFUSED = {
-    "Z2 is nominally 0.*absolute bounds": lambda: bounded("Z2", 0.0, relative=(0.5, 2.0)),
+    "Z2 is nominally 0.*absolute bounds": lambda: bounded("Z2", 0.0, factors=(0.5, 2.0)),
     "begins at 5, outside its bounds 0 and 2": lambda: bounded("a", 5.0, **LOW),
     "from another value; 'swashplate guess' reads": lambda: Unknown("a", np.nan, 0.0, 2.0),
-    "lower one first": lambda: bounded("a", 1.0, absolute=(2.0, 0.0)),
+    "lower one first": lambda: bounded("a", 1.0, bounds=(2.0, 0.0)),
     "above 0": lambda: bounded("a", 1.0, **LOW, log=True),
     "positive": lambda: bounded("a", 1.0, **LOW, prior=Prior(1.0, 0.0)),
     "the zero of a sensor, and nothing else, names a channel": lambda: Unknown(
@@ -210,7 +210,7 @@ def test_results_of_another_fit_are_not_resumed(problem: Problem, tmp_path: Path
 
 
 POISON = {
-    "no object": (lambda text: "[1]", "no result of a start"),
+    "no object": (lambda text: "[1]", "not the result of a start"),
     "a key more": (put('"cost"', '"more": 1, "cost"'), "more"),
     "no number": (put(r'"cost": [^,]+', '"cost": NaN'), "cost"),
     "text for a vector": (put(r'"vector": \[[^]]+\]', '"vector": "abc"'), "vector"),

@@ -72,7 +72,7 @@ def test_a_fit_comes_back_as_it_was(path: Path, campaign: Campaign, fitted: Fit)
 COMPUTED = (
     "statistics.intervals.effects_of",
     "statistics.intervals.uncertainty",
-    "assessment.verdict",
+    "assessment.assess_fit",
 )
 
 

@@ -7,7 +7,7 @@ import pytest
 from tests.identification.given import RISE, TIME, bench_run, risen, run_of
 
 from swashplate import Drive
-from swashplate.identification import Verdict, verdict
+from swashplate.identification import Verdict, assess_fit
 from swashplate.identification.estimation.problem import Problem
 from swashplate.identification.estimation.setup import Stage
 from swashplate.identification.estimation.solving import solve
@@ -33,12 +33,12 @@ def worst(found: Verdict) -> float:
 
 def test_a_prediction_is_judged_by_what_is_required() -> None:
     runs = [quality(WAVE + bias, f"run {k}") for k, bias in enumerate((0.2, -0.2, 0.25, -0.15))]
-    found = verdict((), runs)
+    found = assess_fit((), runs)
     # a bias of 0.2 of a range of 20 is an error of 1 %; of nine of ten, twice to four times that
     assert 0.01 < worst(found) < 0.05
     assert found.usable
     assert found.headline.startswith("Usable: predicts y within ")
-    strict = verdict((), runs, required=0.005)
+    strict = assess_fit((), runs, required=0.005)
     assert not strict.usable
     assert strict.predictions == found.predictions
     assert strict.headline.startswith("Not usable: predicts y within ")
@@ -48,14 +48,14 @@ def test_a_prediction_is_judged_by_what_is_required() -> None:
 
 @pytest.mark.parametrize("factor", [-1.0, 0.4])
 def test_a_drive_that_hardly_simulates_is_not_usable(factor: float) -> None:
-    found = verdict((), [quality(factor * WAVE, f"run {k}") for k in range(3)])
+    found = assess_fit((), [quality(factor * WAVE, f"run {k}") for k in range(3)])
     assert not found.usable
     # half of the movement missed is a quarter of its range, and more
     assert worst(found) > 0.2
 
 
 def test_what_never_moves_is_not_judged() -> None:
-    found = verdict((), [quality(np.ones(81), "c", np.zeros(81))])
+    found = assess_fit((), [quality(np.ones(81), "c", np.zeros(81))])
     assert found.predictions == ()
     assert not found.usable
     assert found.headline.startswith("Not usable: no channel moves")
@@ -96,7 +96,7 @@ GOOD = held_out(0.0 * TIME)
 
 
 def test_a_good_fit_has_three_answers_and_they_are_yes() -> None:
-    found = verdict([stage()], [GOOD])
+    found = assess_fit([stage()], [GOOD])
     assert found.usable, found.headline
     assert set(found.answers()) == {"Data", "Prediction", "Values"}
     assert found.data.startswith("Sound")
@@ -106,19 +106,22 @@ def test_a_good_fit_has_three_answers_and_they_are_yes() -> None:
     assert max(each.fitted for each in error.classes) == 5
     # white noise of ±0.02 on a range of 6 is no error of the model
     assert worst(found) < 0.01
-    assert verdict([stage()], []).usable
+    assert assess_fit([stage()], []).usable
 
 
 def test_a_held_out_run_that_is_predicted_badly_widens_what_is_stated() -> None:
-    good, bad = verdict([stage()], [GOOD]), verdict([stage()], [held_out(0.3 * np.sqrt(TIME))])
+    good, bad = (
+        assess_fit([stage()], [GOOD]),
+        assess_fit([stage()], [held_out(0.3 * np.sqrt(TIME))]),
+    )
     assert worst(bad) > 2.0 * worst(good)
     required = 0.5 * (worst(good) + worst(bad))
-    assert verdict([stage()], [GOOD], required=required).predicts
-    assert not verdict([stage()], [held_out(0.3 * np.sqrt(TIME))], required=required).predicts
+    assert assess_fit([stage()], [GOOD], required=required).predicts
+    assert not assess_fit([stage()], [held_out(0.3 * np.sqrt(TIME))], required=required).predicts
 
 
 def test_a_run_that_stands_out_makes_the_data_unsound_whatever_it_predicts() -> None:
-    found = verdict([stage(levels=(1.0, 1.2, 1.5, 1.8, 2.0, 2.4, 3.0), spoiled=1.3)], [])
+    found = assess_fit([stage(levels=(1.0, 1.2, 1.5, 1.8, 2.0, 2.4, 3.0), spoiled=1.3)], [])
     assert not found.sound
     assert not found.usable
     (finding,) = found.unsound
@@ -132,12 +135,12 @@ def test_a_run_that_stands_out_makes_the_data_unsound_whatever_it_predicts() -> 
 def test_a_current_that_was_not_fitted_does_not_count() -> None:
     run = run_of("held", WAVE, {"rectified_current": WAVE}, time=TIME)
     current = compared(run, "rectified_current", 0.0 * WAVE)
-    assert verdict([stage()], [GOOD, current]).headline == verdict([stage()], [GOOD]).headline
-    assert "rectified_current" in verdict((), [current]).headline
+    assert assess_fit([stage()], [GOOD, current]).headline == assess_fit([stage()], [GOOD]).headline
+    assert "rectified_current" in assess_fit((), [current]).headline
 
 
 def test_values_at_a_bound_are_undetermined_and_never_decide_the_use() -> None:
-    found = verdict([stage(bounds=(0.1, 1.5), lags=(0.1, 5.0))], [GOOD])
+    found = assess_fit([stage(bounds=(0.1, 1.5), lags=(0.1, 5.0))], [GOOD])
     assert "gain" in found.undetermined
     assert found.quotable + len(found.undetermined) == 2
     assert "not known to within ±10 %: gain" in found.values
@@ -146,7 +149,7 @@ def test_values_at_a_bound_are_undetermined_and_never_decide_the_use() -> None:
 
 def test_wide_intervals_are_undetermined() -> None:
     unsure = replace(stage(), stored=(Interval("estimated", 0.5, 0.5, 2.5),) * 2)
-    found = verdict([unsure], [GOOD])
+    found = assess_fit([unsure], [GOOD])
     assert found.undetermined == ("gain", "lag")
     assert found.usable
 
@@ -163,7 +166,7 @@ def test_another_sensor_of_the_same_shaft_never_makes_it_worse(added: float) -> 
         run = run_of(f"run {k}", np.sign(speed), channels, time=time)
         angles.append(compared(run, "position", 1.001 * angle))
         both += [angles[-1], compared(run, "shaft_speed", speed)]
-    before, after = verdict((), angles, required=0.02), verdict((), both, required=0.02)
+    before, after = assess_fit((), angles, required=0.02), assess_fit((), both, required=0.02)
     assert before.usable
     assert after.usable
     assert worst(after) <= worst(before)
@@ -174,11 +177,11 @@ def test_another_sensor_of_the_same_shaft_never_makes_it_worse(added: float) -> 
 def test_an_interrupted_fit_is_not_usable() -> None:
     whole = stage()
     cut = replace(whole.solution, interrupted=True, converged=False)
-    found = verdict([replace(whole, solution=cut)], [GOOD], planned=["rise", "brake"])
+    found = assess_fit([replace(whole, solution=cut)], [GOOD], planned=["rise", "brake"])
     assert not found.usable
     assert "stage rise was interrupted" in found.headline
     assert "brake was never fitted" in found.headline
     unfinished = replace(whole.solution, converged=False, message="too many evaluations")
-    found = verdict([replace(whole, solution=unfinished)], [GOOD])
+    found = assess_fit([replace(whole, solution=unfinished)], [GOOD])
     assert not found.usable
     assert "did not converge (too many evaluations)" in found.headline

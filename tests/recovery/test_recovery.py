@@ -12,7 +12,7 @@ from swashplate.campaign import ChannelKind
 from swashplate.campaign.experiment import Experiment
 from swashplate.identification.estimation.model import Linearised
 from swashplate.identification.estimation.problem import Problem, linearised_fit
-from swashplate.identification.estimation.setup import Free, Setup, Stage, load_setup
+from swashplate.identification.estimation.setup import FitSetup, Free, Stage, load_setup
 from swashplate.identification.estimation.solving import solve
 from swashplate.identification.estimation.unknowns import Unknown, Unknowns
 from swashplate.identification.fitting import Fit, drawn, fit
@@ -202,7 +202,7 @@ def recorded(truth: Drive, path: Path, channel: ChannelKind) -> Campaign:
 
 
 def fitted(campaign: Campaign, start: Drive, stage: Stage) -> StageFit:
-    setup = Setup(stages=(stage,))
+    setup = FitSetup(stages=(stage,))
     (found,) = fit(start.parameters, campaign.experiments, setup, tolerance=1e-12).stages
     assert found.solution.converged
     return found

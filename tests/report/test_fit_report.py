@@ -18,10 +18,10 @@ from tests.identification.given import virtual
 from tests.report.conftest import injected, policy_of, with_script
 
 from swashplate import Campaign, Drive, FileError, InputError, maneuvers
-from swashplate.identification import verdict
+from swashplate.identification import assess_fit
 from swashplate.identification.assessment import Identification
 from swashplate.identification.diagnostics.causes import Cause
-from swashplate.identification.estimation.setup import Setup
+from swashplate.identification.estimation.setup import FitSetup
 from swashplate.identification.estimation.solving import Solution
 from swashplate.identification.fitting import Fit, fit
 from swashplate.identification.resampling import CrossValidation, Fold
@@ -57,7 +57,7 @@ FREE = {
     "pump": {"Z10": within(0.8, 1.4)},
 }
 STAGES = [{"name": part, "part": part, "free": free} for part, free in FREE.items()]
-SETUP = Setup.model_validate({"title": "two stages", "stages": STAGES})
+SETUP = FitSetup.model_validate({"title": "two stages", "stages": STAGES})
 
 
 @pytest.fixture(scope="module")
@@ -457,7 +457,7 @@ def test_a_validation_has_no_fit(validated: Path, campaign: Campaign, fitted: Fi
     roles = {row["run"]: row["role"] for row in page.rows("agreement")}
     assert roles == {each.name: each.role for each in campaign}
     predicted = predict(fitted.parameters, campaign.experiments)
-    assert verdict((), predicted).headline in page.words.replace("\N{NO-BREAK SPACE}", " ")
+    assert assess_fit((), predicted).headline in page.words.replace("\N{NO-BREAK SPACE}", " ")
 
 
 def test_a_page_that_cannot_be_written_leaves_the_old_one(tmp_path, write, judged) -> None:

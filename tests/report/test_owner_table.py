@@ -12,9 +12,9 @@ from tests.identification.given import run_of
 
 from swashplate import Drive, Experiment, maneuvers
 from swashplate.analysis import envelope, standard_errors, variances_from_bounds
-from swashplate.drafting import fit_configuration, guess_drive, guess_table, guessed_set
-from swashplate.identification import verdict
-from swashplate.identification.estimation.setup import Free, Setup
+from swashplate.drafting import guess_drive, guess_table, guessed_fit_setup, guessed_set
+from swashplate.identification import assess_fit
+from swashplate.identification.estimation.setup import FitSetup, Free
 from swashplate.identification.fitting import Fit, fit
 from swashplate.identification.statistics.determination import identifiability_of
 from swashplate.identification.validation import predict
@@ -53,10 +53,10 @@ def fitted(
     without: Sequence[str] = (),
     bounds: Mapping[str, tuple[float, float]] = MappingProxyType({}),
 ) -> Fit:
-    """The fit of a guess, by its configuration without some parameters or with other bounds."""
+    """The fit of a guess, by its fit setup without some parameters or with other bounds."""
     guess = guess_drive(runs)
     start = guessed_set(guess, "campaign.toml")
-    setup = Setup(**tomllib.loads(fit_configuration(guess, start)))
+    setup = FitSetup(**tomllib.loads(guessed_fit_setup(guess, start)))
     (stage,) = setup.stages
     free = {name: entry for name, entry in stage.free.items() if name not in without}
     free |= {name: Free(bounds=pair) for name, pair in bounds.items()}
@@ -165,7 +165,7 @@ def test_a_way_that_no_run_goes_has_no_interval(runs: list[Experiment]) -> None:
 
 
 def test_a_limit_that_the_model_has_not_is_not_called_unreached(found: Fit) -> None:
-    said = verdict(found.stages, predict(found.parameters, found.runs)).validity
+    said = assess_fit(found.stages, predict(found.parameters, found.runs)).validity
     reached, _, lacking = said.partition("not in the model")
     assert "Z14" in lacking
     assert "Z15" in lacking
@@ -179,7 +179,7 @@ def test_what_a_guess_did_not_see_is_looked_for(runs: list[Experiment], tmp_path
     guess = guess_drive(runs)._replace(top_speed=(inf, 6.4), acceleration=(inf, 20.0))
     start = guessed_set(guess, "campaign.toml")
     assert start.unreached.keys() == {"Z13_plus", "Z16_plus"}
-    setup = Setup(**tomllib.loads(fit_configuration(guess, start)))
+    setup = FitSetup(**tomllib.loads(guessed_fit_setup(guess, start)))
     assert {"Z13_plus", "Z16_plus"} <= setup.stages[0].free.keys()
     # where it starts the limits act under the largest command
     run = Drive(start).simulate(maneuvers.step(8.0))

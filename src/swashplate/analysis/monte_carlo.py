@@ -362,7 +362,7 @@ def _moved(
             assert isinstance(problem.model, DriveModel)
             uncertainty = uncertainty_of(stage)
             error = own_errors.get(stage.stage.name, np.zeros(len(problem.unknowns)))
-            for earlier in uncertainty.handed:
+            for earlier in uncertainty.earlier_stages:
                 error = error + earlier.slopes @ errors[earlier.stage]
             errors[stage.stage.name] = error
             vector = stage.solution.vector + error

@@ -420,7 +420,7 @@ def guess(
         parameters = drafting.guessed_set(found, path.name)
         made_folder(folder)
         Drive(parameters).to_toml(start)
-        write_text(drafting.fit_configuration(found, parameters), setup)
+        write_text(drafting.guessed_fit_setup(found, parameters), setup)
     show(drafting.guess_table(found))
     if found.amplifier is not None:
         show(drafting.amplifier_table(found.amplifier))
@@ -434,7 +434,7 @@ def guess(
         note(f"! {sentence}.")
     note(f"These numbers alone: fit {found.fit_percent:.1f} % of the mean speeds (100 % is best).")
     note(f"Start:             {start}")
-    note(f"Fit configuration: {setup}")
+    note(f"Fit setup: {setup}")
     then = ["swashplate", "fit", str(path), "--from", str(start), "--setup", str(setup)]
     note(f"Then run\n  {shlex.join(then)}")
 
@@ -521,51 +521,59 @@ def advise(
     source = None if named is None else words.drive_file(named)
     if setup is None and source is not None:
         # a fit writes what it estimated next to the drive that it found
-        estimated = source.parent / words.CONFIGURATION
+        estimated = source.parent / words.SETUP_FILE
         setup = str(estimated) if estimated.is_file() else None
-    looks, doubts, made = list[design.Outlook](), tuple[str, ...](), list[str]()
+    run_informations = list[design.RunInformation]()
+    doubts = tuple[str, ...]()
+    run_names = list[str]()
     with working("Evaluating the tests"):
         if tested:
             _, experiments, plan, start = words.fit_of(Path(subject), axis, setup, drive or begin)
             doubts = refuse_unsound(check_runs(experiments, smooth(start)))
-            looks = [design.outlook(stage, smooth(start), experiments) for stage in plan.stages]
-            made = [experiment.name for experiment in experiments]
-            bench = design.bench(smooth(start), plan, experiments, fitted=drive is not None)
+            run_informations = [
+                design.run_information(stage, smooth(start), experiments) for stage in plan.stages
+            ]
+            run_names = [experiment.name for experiment in experiments]
+            prior = design.prior_information(
+                smooth(start), plan, experiments, fitted=drive is not None
+            )
         else:
             start = words.parameters_of(subject)
-            bench = design.bench(smooth(start), load_setup(setup or start.name))
-        machine = Drive(bench.parameters)
+            prior = design.prior_information(smooth(start), load_setup(setup or start.name))
+        machine = Drive(prior.parameters)
         requested = [words.maneuver_of(word, machine) for word in maneuver or ()]
         maneuvers = {each.name: each for each in requested or design.default_maneuvers()}
-        candidates = [bench.candidate(each) for each in maneuvers.values()]
-        ranked = design.advise(bench.present, candidates, bench.variables)
-        in_turn = design.in_turn(bench.present, candidates, bench.variables, tests)
-    determined = [look.table(made) for look in looks]
+        candidates = [prior.candidate(each) for each in maneuvers.values()]
+        ranked = design.advise(prior.present, candidates, prior.variables)
+        plan_of_tests = design.sequential_plan(prior.present, candidates, prior.variables, tests)
+    determined = [information.table(run_names) for information in run_informations]
     if determined:
         save(runs, "Shares of the information", joined(determined).write)
     save(out, "Tests", design.advice_table("", ranked).write)
     for sentence in doubts:
         say(f"! {sentence}")
-    for look, table in zip(looks, determined, strict=True):
+    for information, table in zip(run_informations, determined, strict=True):
         show(table)
         # what no run exercises is said with its reason
-        bullets(replace(look.identifiability, unexcited=()).sentences(), look.sentences())
-    if looks:
+        bullets(
+            replace(information.identifiability, unexcited=()).sentences(), information.sentences()
+        )
+    if run_informations:
         note("")
-        for number, name in enumerate(made, start=1):
+        for number, name in enumerate(run_names, start=1):
             note(f"run {number}: {name}")
         say(INFORMATION)
-        if all(look.identifiability.complete for look in looks):
-            note("The fit configuration can stay as it is.")
+        if all(information.identifiability.complete for information in run_informations):
+            note("The fit setup can stay as it is.")
     show(design.advice_table("Tests", ranked[:top]))
-    if in_turn:
-        show(design.advice_table("Plan, each test in addition to those before it", in_turn))
-        errors = zip(in_turn[-1].names, in_turn[-1].after, strict=True)
+    if plan_of_tests:
+        show(design.advice_table("Plan, each test in addition to those before it", plan_of_tests))
+        errors = zip(plan_of_tests[-1].names, plan_of_tests[-1].after, strict=True)
         undetermined = [name for name, error in errors if not error <= 1.0]
         if undetermined:
             say(f"- Still not determined after these: {', '.join(undetermined)}.")
     show(design.best_tests_table(ranked))
-    for sensor in bench.sensors:
+    for sensor in prior.sensors:
         noise = f"{sensor.noise:.3g} {KINDS[sensor.kind].units[0]} ({sensor.origin})"
         note(f"{sensor.kind}: noise {noise}, one independent sample every {sensor.memory:.3g} s")
     say(

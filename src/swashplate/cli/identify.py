@@ -45,7 +45,7 @@ from swashplate.tables import PRINTED, TABLE, check_folder, joined, made_folder
 
 if TYPE_CHECKING:
     from swashplate.identification.assessment import Identification
-    from swashplate.identification.diagnostics.judging import Verdict
+    from swashplate.identification.diagnostics.verdict import Verdict
     from swashplate.identification.estimation.stages import Parameters
     from swashplate.parameters.parameter_set import ParameterSet
 
@@ -183,7 +183,7 @@ def fit(
 
     Fits the runs with the role 'fit', stage by stage, predicts those with the
     role 'validate', and shows which parameters the data determine. Writes the
-    fitted drive as a parameter file, the fit configuration, the estimates with
+    fitted drive as a parameter file, the fit setup, the estimates with
     their intervals, and the data that 'report' needs. Exit code 1: the result is
     not usable. Ctrl-C or SIGTERM keeps the best result so far (of several
     starts: those that ended) and exits with code 130.
@@ -327,7 +327,7 @@ def validate(
     from swashplate.identification import tables
     from swashplate.identification.assessment import versions
     from swashplate.identification.diagnostics.data_checks import refuse_unsound, spike_findings
-    from swashplate.identification.diagnostics.judging import verdict
+    from swashplate.identification.diagnostics.verdict import assess_fit
     from swashplate.identification.validation import predict, with_speeds
 
     if out is not None:
@@ -351,7 +351,7 @@ def validate(
         predicted = predict(parameters, runs)
         if not predicted:
             raise InputError(f"{path}: all samples of these runs are ignored; nothing is left.")
-        judged = verdict((), predicted, required=require / 100.0)
+        judged = assess_fit((), predicted, required=require / 100.0)
         measures = tables.runs_tables(with_speeds(predicted))
     lines = []
     if out is not None:

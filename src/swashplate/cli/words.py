@@ -22,15 +22,15 @@ if TYPE_CHECKING:
     from swashplate.drive import Drive, Simulation
     from swashplate.drive.simulation import Array
     from swashplate.identification.estimation.model_setup import ModelSetup
-    from swashplate.identification.estimation.setup import Setup
+    from swashplate.identification.estimation.setup import FitSetup
     from swashplate.maneuvers import Maneuver
     from swashplate.parameters.parameter_set import Change, ParameterSet
 
 _NUMBER = r"[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|inf\b|nan\b)"
 _VALUE = re.compile(rf"\s*({_NUMBER})(?:/({_NUMBER}))?\s*((?:1/)?[^\W\d_].*|°.*)?")
 _ENDING = re.compile(r"\.[A-Za-z]\w*$")
-CONFIGURATION, NUMBERS = "setup.toml", "parameters.toml"
-"""In a folder that a fit wrote: its fit configuration, or the numbers of a user-defined model."""
+SETUP_FILE, NUMBERS = "setup.toml", "parameters.toml"
+"""In a folder that a fit wrote: its fit setup, or the numbers of a user-defined model."""
 UNFELT, FEELING = "load_torque", ("motor_leakage", "motor_constant")
 """A load, and what makes the speed depend on it."""
 SURPRISING = 1000.0
@@ -42,7 +42,7 @@ _NAMES = {
     "log": "a log",
     "campaign": "a campaign",
     "drive": "a drive",
-    "setup": "a fit configuration",
+    "setup": "a fit setup",
 }
 _MARKS = {"runs": "campaign", "stages": "setup", "control_card": "drive", "pump_motor": "drive"}
 _INSTEAD = {
@@ -103,7 +103,7 @@ def campaign_of(path: Path, axis: str | None = None) -> tuple[Campaign, str]:
 
 def fit_of(
     path: Path, axis: str | None, setup: str | None, begin: str | None
-) -> tuple[Campaign, tuple[Experiment, ...], Setup, ParameterSet]:
+) -> tuple[Campaign, tuple[Experiment, ...], FitSetup, ParameterSet]:
     """What a fit is about: campaign, runs to fit, what is free, and the drive it begins at."""
     from swashplate.identification.estimation.stages import setup_of
     from swashplate.identification.identifying import runs_to_fit

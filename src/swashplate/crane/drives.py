@@ -13,7 +13,7 @@ from swashplate.errors import ParameterError, SwashplateError
 from swashplate.parameters.files import preset_names
 
 if TYPE_CHECKING:
-    from swashplate.identification.diagnostics.judging import Verdict
+    from swashplate.identification.diagnostics.verdict import Verdict
 
 DRIVE_FILE, FIT_FILE = "drive.toml", "fit.json"
 """What a fit writes into its folder: the drive, and the fit itself with its verdict."""

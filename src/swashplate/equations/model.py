@@ -201,7 +201,7 @@ class Model:
         """By its recipe, or its name in a module, from which another process imports it.
 
         The name is the model's own, or that of an object with the model in an attribute, as an
-        `OwnModel` has.
+        `UserModel` has.
         """
         if self.recipe:
             return self.recipe
@@ -590,7 +590,7 @@ def discretised(
         Explicit Runge-Kutta method, of order 1, 2, 2 and 4.
     substeps : int
         Steps of the method from one sample to the next, of equal length. They are written out, so
-        that many take long to compile; those of `simulate` and `OwnModel` do not.
+        that many take long to compile; those of `simulate` and `UserModel` do not.
     project : equation, optional
         Of the same arguments: the state within its bounds, such as end stops, done to the state at
         the end of each sub-step.

@@ -24,10 +24,10 @@ from swashplate.documents import read_json
 from swashplate.drive import Drive
 from swashplate.errors import DomainError, FileError, InputError, MissingFileError
 from swashplate.identification import tables
-from swashplate.identification.diagnostics.judging import REQUIRED, Verdict, verdict
+from swashplate.identification.diagnostics.verdict import REQUIRED, Verdict, assess_fit
 from swashplate.identification.estimation.model_setup import ModelSetup
 from swashplate.identification.estimation.problem import Problem
-from swashplate.identification.estimation.setup import Setup, Stage, setup_text
+from swashplate.identification.estimation.setup import FitSetup, Stage, setup_text
 from swashplate.identification.estimation.solving import Solution
 from swashplate.identification.estimation.stages import Parameters
 from swashplate.identification.estimation.unknowns import Unknown, Unknowns
@@ -64,8 +64,8 @@ from swashplate.tables import Table, write_text
 if TYPE_CHECKING:
     import polars
 
-CONFIGURATION, ESTIMATES, STORED = "setup.toml", "estimates.csv", "fit.json"
-"""In a fit's folder, beside the drive or the model's numbers: the fit configuration, the table of
+SETUP_FILE, ESTIMATES, STORED = "setup.toml", "estimates.csv", "fit.json"
+"""In a fit's folder, beside the drive or the model's numbers: the fit setup, the table of
 estimates, and what the fit keeps of itself."""
 
 
@@ -124,10 +124,10 @@ class Identification(Estimated):
     @property
     def held_out(self) -> tuple[Experiment, ...]:
         """Runs of the axis that were held out."""
-        runs = self.fit.runs
-        names = {each.name for each in runs}
-        out = self.campaign.select(axis=runs[0].axis, role="validate")
-        return tuple(each for each in out if each.name not in names)
+        fitted = self.fit.runs
+        names = {run.name for run in fitted}
+        held_out = self.campaign.select(axis=fitted[0].axis, role="validate")
+        return tuple(run for run in held_out if run.name not in names)
 
     @cached_property
     def predicted(self) -> tuple[RunQuality, ...]:
@@ -139,9 +139,11 @@ class Identification(Estimated):
         """What it can be used for."""
         if self.stored is not None and self.stored.holds_for(self):
             return self.stored.verdict
-        planned = [each.name for each in self.fit.setup.stages]
+        planned = [stage.name for stage in self.fit.setup.stages]
         with working("Judging the fit"):
-            return verdict(self.fit.stages, self.predicted, planned=planned, required=self.required)
+            return assess_fit(
+                self.fit.stages, self.predicted, planned=planned, required=self.required
+            )
 
     def tables(self) -> list[Table]:
         """Stated errors, then estimates, profiles, errors of runs, cross-validation."""
@@ -204,7 +206,7 @@ class Identification(Estimated):
     def save(self, folder: str | Path) -> tuple[Path, ...]:
         """Write the folder that `load`, `Drive.from_toml` and every command read.
 
-        Of a drive these are ``drive.toml`` and the fit configuration ``setup.toml``, of a
+        Of a drive these are ``drive.toml`` and the fit setup ``setup.toml``, of a
         user-defined model its numbers, ``parameters.toml``; of both ``estimates.csv`` and
         ``fit.json``. Samples stay in the campaign; a fingerprint of each run is stored. Older files
         of these names are replaced, each whole or not at all.
@@ -233,7 +235,7 @@ class Identification(Estimated):
         else:
             files = {
                 FITTED_DRIVE: dump_set(self.drive.parameters),
-                CONFIGURATION: setup_text(self.fit.setup),
+                SETUP_FILE: setup_text(self.fit.setup),
             }
         for name, text in files.items():
             write_text(text, place / name)
@@ -291,19 +293,19 @@ class Identification(Estimated):
             swashplate=__version__,
             axis=self.fit.runs[0].axis,
             campaign=_seen_from(folder, self.campaign.path),
-            runs={each.name: fingerprint(each) for each in self.fit.runs},
+            runs={run.name: fingerprint(run) for run in self.fit.runs},
             interpolation=self.fit.runs[0].input.interpolation,
             nominal=dict(start.numbers) if isinstance(start, ModelSetup) else dump_set(start),
             setup=self.fit.setup,
             stages=tuple(
                 StoredStage(
-                    name=each.stage.name,
-                    unknowns=each.problem.unknowns.items,
-                    solution=each.solution,
-                    starts=each.starts,
-                    intervals=intervals_of(each),
+                    name=stage.stage.name,
+                    unknowns=stage.problem.unknowns.items,
+                    solution=stage.solution,
+                    starts=stage.starts,
+                    intervals=intervals_of(stage),
                 )
-                for each in self.fit.stages
+                for stage in self.fit.stages
             ),
             profiles=tuple(self.profiles),
             folds=self.folds,
@@ -312,7 +314,7 @@ class Identification(Estimated):
                 verdict=self.verdict,
                 numbers=dict(self.fit.parameters.numbers),
                 required=self.required,
-                held_out={each.name: fingerprint(each) for each in self.held_out},
+                held_out={run.name: fingerprint(run) for run in self.held_out},
             ),
         )
 
@@ -321,12 +323,15 @@ class Identification(Estimated):
 
         Of a fitted one the source is campaign, date and 95 % interval; of a fixed one that of the
         set which the fit began from. The title of one that is not usable says so. A machine that
-        began at the start for any machine is called like its axis.
+        began at the start for any machine is called like its axis. Estimates and limits that no
+        run reached are computed for this, once for each stage.
         """
-        found, nominal = self.fit.drive.parameters, self.fit.nominal
+        fitted_set = self.fit.drive.parameters
+        nominal = self.fit.nominal
         assert isinstance(nominal, ParameterSet)
-        today, ends = f"{date.today():%d %b %Y}", _interval_words(self.fit.stages, found)
-        parameters = dict(found.parameters)
+        today = f"{date.today():%d %b %Y}"
+        ends = _interval_words(self.fit.stages, fitted_set)
+        parameters = dict(fitted_set.parameters)
         for symbol, parameter in parameters.items():
             if symbol in ends:
                 source = f"{self.campaign.path.name}, {today}; 95 %: {'; '.join(ends[symbol])}"
@@ -340,7 +345,7 @@ class Identification(Estimated):
         if not self.verdict.usable:
             title += f". {self.verdict.headline.rstrip('.')}"
         return {
-            "name": self.fit.runs[0].axis if found.name == NEUTRAL else found.name,
+            "name": self.fit.runs[0].axis if fitted_set.name == NEUTRAL else fitted_set.name,
             "title": title,
             "parameters": parameters,
             "motion": motion_of(self.fit.runs),
@@ -355,57 +360,57 @@ class Identification(Estimated):
             return {}
 
 
-def parts_of(found: Identification) -> list[tables.Part]:
+def parts_of(result: Identification) -> list[tables.FitPart]:
     """What a fit says besides its verdict, in the order in which the command prints it."""
-    fit = found.fit
-    notes = [overview.sentence for overview in found.campaign.overviews]
+    fit = result.fit
+    notes = [overview.sentence for overview in result.campaign.overviews]
     notes += [f"{run.name}: {sentence}." for run in fit.runs for sentence in run.notes]
     doubts = [f"! {sentence}" for sentence in fit.doubts]
-    made = [tables.Part("Runs", (), (), notes), tables.Part("Doubts", (), doubts)]
-    made += map(tables.stage_part, fit.stages)
-    if found.profiles:
-        said = [sentence for profile in found.profiles for sentence in profile.sentences()]
-        table = tables.profiles_table(found.profiles, fit.stages)
-        made.append(tables.Part("Profile likelihoods", [table], (), said))
-    made.append(tables.fixed_part(fit.stages, fit.nominal))
-    fitted = tables.runs_tables([quality for each in fit.stages for quality in each.runs])
-    made.append(tables.Part("Errors of fitted runs", fitted, heading="Runs that were fitted"))
-    if found.predicted:
-        errors = tables.runs_tables(found.predicted)
+    parts = [tables.FitPart("Runs", (), (), notes), tables.FitPart("Doubts", (), doubts)]
+    parts += map(tables.stage_part, fit.stages)
+    if result.profiles:
+        sentences = [sentence for profile in result.profiles for sentence in profile.sentences()]
+        table = tables.profiles_table(result.profiles, fit.stages)
+        parts.append(tables.FitPart("Profile likelihoods", [table], (), sentences))
+    parts.append(tables.fixed_part(fit.stages, fit.nominal))
+    fitted = tables.runs_tables([quality for stage in fit.stages for quality in stage.runs])
+    parts.append(tables.FitPart("Errors of fitted runs", fitted, heading="Runs that were fitted"))
+    if result.predicted:
+        errors = tables.runs_tables(result.predicted)
         heading = "Runs that were held out and predicted"
-        made.append(tables.Part("Errors of held-out runs", errors, heading=heading))
-    if found.folds is not None:
-        held_out, _ = folds_tables(found.folds, fit.stages)
-        made.append(tables.Part("Cross-validation", [held_out], (), found.folds.sentences()))
-    return [part for part in made if part.tables or part.remarks or part.sentences]
+        parts.append(tables.FitPart("Errors of held-out runs", errors, heading=heading))
+    if result.folds is not None:
+        held_out, _ = folds_tables(result.folds, fit.stages)
+        parts.append(tables.FitPart("Cross-validation", [held_out], (), result.folds.sentences()))
+    return [part for part in parts if part.tables or part.remarks or part.sentences]
 
 
 def motion_of(runs: Iterable[Experiment]) -> Motion:
-    """What the drive of some runs moves: a rod where all positions were measured in m.
+    """What the drive of some runs moves: a rod if all positions were measured in m.
 
-    Where none was, a rod if all speeds are in m/s.
+    Without positions, a rod if all speeds are in m/s.
     """
-    channels = [each for run in runs for each in run.channels.values()]
-    units = {each.unit for each in channels if each.is_position}
-    units = units or {each.unit for each in channels if each.kind == "shaft_speed"}
+    channels = [channel for run in runs for channel in run.channels.values()]
+    units = {channel.unit for channel in channels if channel.is_position}
+    units = units or {channel.unit for channel in channels if channel.kind == "shaft_speed"}
     return "rod" if units and units <= {"m", "m/s"} else "shaft"
 
 
-def _interval_words(stages: Sequence[StageFit], found: ParameterSet) -> dict[str, list[str]]:
+def _interval_words(stages: Sequence[StageFit], fitted: ParameterSet) -> dict[str, list[str]]:
     """Intervals of the fitted parameters in words, by symbol."""
     words: dict[str, list[str]] = {}
-    for each in stages:
-        unknowns = each.problem.unknowns
-        for estimate, unknown in zip(estimates_of(each), unknowns, strict=True):
+    for stage in stages:
+        unknowns = stage.problem.unknowns
+        for estimate, unknown in zip(estimates_of(stage), unknowns, strict=True):
             if unknown.kind == "force":
                 forces = ("Z19", "Z20", "Z21", "Z22")
                 words |= {symbol: ["from the fitted forces"] for symbol in forces}
             elif unknown.run is None:
                 ends = " to ".join(filter(None, estimate.ends()))
-                for target in (each for each in unknown.targets if each in found.numbers):
+                for target in (target for target in unknown.targets if target in fitted.numbers):
                     side = target.rpartition("_")[2]
                     side = f"{side} " if side in ("plus", "minus") else ""
-                    words.setdefault(found.definitions.find(target).symbol, []).append(
+                    words.setdefault(fitted.definitions.find(target).symbol, []).append(
                         f"{side}{ends}"
                     )
     return words
@@ -477,8 +482,8 @@ class FitFile(Entry):
     interpolation: Between = "linear"
     """What the input is between samples, as the fit took it."""
     nominal: str | dict[str, float]
-    """What the fit began from: a drive's parameter file, or the numbers of a model of one's own."""
-    setup: Setup
+    """What the fit began from: a drive's parameter file, or the numbers of a user-defined model."""
+    setup: FitSetup
     stages: tuple[StoredStage, ...]
     profiles: tuple[Profile | tuple[str, Profile], ...]
     """Behind the name of their stage in older files, which do not name the unknown."""
@@ -508,16 +513,45 @@ def _loaded(
         raise FileError(
             f"{path} was written by swashplate {file.swashplate}, this is {__version__}: fit again."
         )
-    fitted_to = Path(os.path.normpath(path.parent / file.campaign))
-    if tests is None and not fitted_to.is_file():
-        raise MissingFileError(
-            f"{path} was fitted to {fitted_to}, which is not there: name the campaign."
-        )
-    tests = fitted_to if tests is None else tests
+    campaign = _campaign_of(path, file, tests)
+    runs = _runs_of(path, file, campaign)
+    nominal = _nominal_of(path, file, model, runs)
+    entries = iter(file.stages)
+
+    def solved(stage: Stage, problem: Problem) -> Solved:
+        return _stored_stage(path, next(entries), stage, problem)
+
+    fitted = file.setup.model_copy(update={"stages": file.setup.stages[: len(file.stages)]})
+    stages = staged(fitted, nominal, runs, solved, threads=threads)
+    result = Fit(file.setup, nominal, runs, stages)
+    return Identification(
+        campaign,
+        result,
+        profiles=_profiles_of(path, file, result),
+        folds=file.folds,
+        notes=file.notes,
+        required=REQUIRED if file.verdict is None else file.verdict.required,
+        stored=file.verdict,
+    )
+
+
+def _campaign_of(path: Path, file: FitFile, tests: str | Path | Campaign | None) -> Campaign:
+    """The campaign of a stored fit, by default the one that it names."""
+    if tests is None:
+        tests = Path(os.path.normpath(path.parent / file.campaign))
+        if not tests.is_file():
+            raise MissingFileError(
+                f"{path} was fitted to {tests}, which is not there: name the campaign."
+            )
     campaign = tests if isinstance(tests, Campaign) else Campaign.from_toml(tests)
-    if not all(each.input.settled for each in campaign if each.axis == file.axis):
-        campaign = campaign.with_interpolation(file.axis, file.interpolation)
-    runs = {each.name: each for each in campaign}
+    if all(run.input.settled for run in campaign if run.axis == file.axis):
+        return campaign
+    return campaign.with_interpolation(file.axis, file.interpolation)
+
+
+def _runs_of(path: Path, file: FitFile, campaign: Campaign) -> tuple[Experiment, ...]:
+    """The runs of a stored fit; refused unless they are as they were when it was fitted."""
+    runs = {run.name: run for run in campaign}
     for name, mark in file.runs.items():
         if name not in runs:
             raise InputError(
@@ -530,58 +564,56 @@ def _loaded(
                 "samples, weights or ignored windows differ): name the campaign that was fitted, "
                 "or fit again."
             )
-    experiments = tuple(runs[name] for name in file.runs)
-    nominal: Parameters
+    return tuple(runs[name] for name in file.runs)
+
+
+def _nominal_of(
+    path: Path, file: FitFile, model: ModelSetup | None, runs: Sequence[Experiment]
+) -> Parameters:
+    """What a stored fit began from."""
     if isinstance(file.nominal, str):
-        nominal = read_set(file.nominal, str(path))
-    elif model is None:
+        return read_set(file.nominal, str(path))
+    if model is None:
         raise InputError(
             f"{path} is the fit of a user-defined model, which it does not hold: give the model, "
             "in Python by model=, on the command line by --model FILE."
         )
-    else:
-        nominal = model.nominal(experiments)
-    if isinstance(nominal, ModelSetup) and nominal.setup != file.setup:
+    nominal = model.nominal(runs)
+    if nominal.setup != file.setup:
         raise InputError(f"{path} is the fit of another model, or of other bounds: fit again.")
-    entries = iter(file.stages)
+    return nominal
 
-    def stored(stage: Stage, problem: Problem) -> Solved:
-        entry = next(entries)
-        ours, theirs = (
-            (name, [(each.name, each.run, each.kind, each.channel) for each in unknowns])
-            for name, unknowns in ((stage.name, problem.unknowns), (entry.name, entry.unknowns))
-        )
-        sizes = {entry.solution.vector.size, len(entry.unknowns)}
-        if entry.intervals is not None:
-            sizes.add(len(entry.intervals))
-        if ours != theirs or len(sizes) > 1:
-            raise FileError(
-                f"{path}: stage {entry.name} has other parameters than its fit configuration "
-                "makes: fit again."
-            )
-        return Solved(
-            replace(problem, unknowns=Unknowns(entry.unknowns)),
-            entry.solution,
-            entry.starts,
-            entry.intervals,
-        )
 
-    begun = file.setup.model_copy(update={"stages": file.setup.stages[: len(file.stages)]})
-    stages = staged(begun, nominal, experiments, stored, threads=threads)
-    found, profiles = Fit(file.setup, nominal, experiments, stages), list[Profile]()
-    for each in file.profiles:
-        stage, profile = (each.stage, each) if isinstance(each, Profile) else each
-        unknowns = found.stage(stage).problem.unknowns
+def _stored_stage(path: Path, entry: StoredStage, stage: Stage, problem: Problem) -> Solved:
+    """A stage as it was stored; refused unless it has the unknowns of the problem."""
+    sizes = {entry.solution.vector.size, len(entry.unknowns)}
+    if entry.intervals is not None:
+        sizes.add(len(entry.intervals))
+    same = entry.name == stage.name and _identities(entry.unknowns) == _identities(problem.unknowns)
+    if not same or len(sizes) > 1:
+        raise FileError(
+            f"{path}: stage {entry.name} has other parameters than its fit setup makes: fit again."
+        )
+    return Solved(
+        problem=replace(problem, unknowns=Unknowns(entry.unknowns)),
+        solution=entry.solution,
+        starts=entry.starts,
+        intervals=entry.intervals,
+    )
+
+
+def _identities(unknowns: Iterable[Unknown]) -> list[tuple[str, str | None, str, str | None]]:
+    return [(unknown.name, unknown.run, unknown.kind, unknown.channel) for unknown in unknowns]
+
+
+def _profiles_of(path: Path, file: FitFile, result: Fit) -> list[Profile]:
+    """The stored profiles, with their stages and unknowns."""
+    profiles = list[Profile]()
+    for entry in file.profiles:
+        stage, profile = (entry.stage, entry) if isinstance(entry, Profile) else entry
+        unknowns = result.stage(stage).problem.unknowns
         if not 0 <= profile.index < len(unknowns.names):
             raise FileError(f"{path}: stage {stage} has no parameter {profile.index + 1}.")
         name, unknown = unknowns.names[profile.index], unknowns.items[profile.index]
         profiles.append(replace(profile, stage=stage, name=name, unknown=unknown))
-    return Identification(
-        campaign,
-        found,
-        profiles=profiles,
-        folds=file.folds,
-        notes=file.notes,
-        required=REQUIRED if file.verdict is None else file.verdict.required,
-        stored=file.verdict,
-    )
+    return profiles

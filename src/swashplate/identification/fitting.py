@@ -1,4 +1,4 @@
-"""The fit of a drive, stage after stage, or of a model of one's own."""
+"""The fit of a drive, stage after stage, or of a user-defined model."""
 
 from __future__ import annotations
 
@@ -34,10 +34,10 @@ from swashplate.identification.diagnostics.data_checks import (
 )
 from swashplate.identification.estimation.between_samples import settle
 from swashplate.identification.estimation.drive_model import DriveModel, with_card_filter
-from swashplate.identification.estimation.model import EquationModel, Model, OwnModel
+from swashplate.identification.estimation.model import EquationModel, MachineModel, UserModel
 from swashplate.identification.estimation.model_setup import ModelSetup
 from swashplate.identification.estimation.problem import Loss, Problem
-from swashplate.identification.estimation.setup import FreeParameters, Setup, Stage
+from swashplate.identification.estimation.setup import FitSetup, FreeParameters, Stage
 from swashplate.identification.estimation.solving import (
     Progress,
     Solution,
@@ -47,7 +47,7 @@ from swashplate.identification.estimation.solving import (
 )
 from swashplate.identification.estimation.stages import (
     Parameters,
-    configuration,
+    as_fit_setup,
     smooth,
     stage_problem,
     start_currents_of,
@@ -88,7 +88,7 @@ UNEXPLAINED = 5.0
 SPREAD = 0.05
 """Standard deviation of the logarithm by which a drawn parameter differs from the nominal one."""
 OF_FORCES = ("Z19", "Z21")
-"""The solenoids' coefficients that are drawn where a set-up frees forces: those of odd powers."""
+"""Coefficients of the solenoids that are drawn if a fit setup frees forces: those of odd powers."""
 
 
 class Solved(NamedTuple):
@@ -142,8 +142,8 @@ class Estimated(Tabular, ABC):
             raise UnknownNameError(f"{name} has two directions: ask for {' or '.join(sides)}.")
         near = get_close_matches(str(name), self.estimates, 1)
         meant = f" (did you mean {near[0]}?)" if near else ""
-        known = ", ".join(key for key, each in self.estimates.items() if each.run is None)
-        raise UnknownNameError(f"There is no parameter '{name}'{meant}; there are {known}.")
+        names = ", ".join(key for key, estimate in self.estimates.items() if estimate.run is None)
+        raise UnknownNameError(f"There is no parameter '{name}'{meant}; there are {names}.")
 
     def __contains__(self, name: object) -> bool:
         return name in self.estimates
@@ -162,13 +162,13 @@ class Fit(Estimated):
     Estimates are there by name: ``fit["Z8"].standard_error``.
     """
 
-    setup: Setup
+    setup: FitSetup
     nominal: Parameters
     runs: tuple[Experiment, ...] = field(repr=False)
     """Those that were fitted."""
     stages: tuple[StageFit, ...]
     doubts: tuple[str, ...] = ()
-    """What the runs lack, in sentences, where they could be fitted all the same."""
+    """What the runs lack, in sentences, if they could be fitted all the same."""
 
     @property
     def parameters(self) -> Parameters:
@@ -177,7 +177,7 @@ class Fit(Estimated):
 
     @property
     def drive(self) -> Drive:
-        """The fitted drive; refused where a model of one's own was fitted."""
+        """The fitted drive; refused if a user-defined model was fitted."""
         return self.stages[-1].drive
 
     @property
@@ -200,15 +200,15 @@ class Fit(Estimated):
 
     def stage(self, name: str) -> StageFit:
         """The stage of a name; an `UnknownNameError` if there is none."""
-        for each in self.stages:
-            if each.stage.name == name:
-                return each
-        known = ", ".join(each.stage.name for each in self.stages)
-        raise UnknownNameError(f"The fit has no stage '{name}'; there are {known}.")
+        for stage in self.stages:
+            if stage.stage.name == name:
+                return stage
+        names = ", ".join(stage.stage.name for stage in self.stages)
+        raise UnknownNameError(f"The fit has no stage '{name}'; there are {names}.")
 
     def tables(self) -> list[Table]:
         """Estimates with their intervals, stage by stage, then the errors of each fitted run."""
-        runs = [quality for each in self.stages for quality in each.runs]
+        runs = [quality for stage in self.stages for quality in stage.runs]
         errors = tables.runs_tables(runs)
         errors = [replace(table, title=f"{table.title}, fitted runs") for table in errors]
         return [*map(tables.estimates_table, self.stages), *errors]
@@ -216,21 +216,21 @@ class Fit(Estimated):
     @property
     def sentences(self) -> tuple[str, ...]:
         """How each stage ended, what its estimates lack, and what stayed fixed."""
-        said = list(self.doubts)
+        sentences = list(self.doubts)
         for part in map(tables.stage_part, self.stages):
-            said += [*part.remarks, *part.sentences]
+            sentences += [*part.remarks, *part.sentences]
         unknowns = [unknown for stage in self.stages for unknown in stage.problem.unknowns]
         jumps = {unknown.label for unknown in unknowns if unknown.kind == "instant"}
         if jumps:
-            many = count(len(jumps), "time")
-            said.append(f"Commands jump {many} between two samples: when is estimated.")
-        said += tables.single_runs_line(self.stages)
+            times = count(len(jumps), "time")
+            sentences.append(f"Commands jump {times} between two samples: when is estimated.")
+        sentences += tables.single_runs_line(self.stages)
         fixed = tables.fixed_part(self.stages, self.nominal)
-        return (*said, *fixed.remarks, *fixed.sentences)
+        return (*sentences, *fixed.remarks, *fixed.sentences)
 
 
 def fit(
-    model: Drive | Parameters | Model | Equations,
+    model: Drive | Parameters | MachineModel | Equations,
     tests: Campaign | Sequence[Experiment],
     free: FreeParameters | None = None,
     *,
@@ -251,19 +251,19 @@ def fit(
 
     Parameters
     ----------
-    model : Drive, ParameterSet, Model or ModelSetup
+    model : Drive, ParameterSet, MachineModel or ModelSetup
         A drive: where to begin, and what stays fixed. The decay's switch is split, see `smooth`,
-        the card's filter is its differential equation unless the configuration's `card_filter`
-        says "recursion". Or a model of one's own: of equations,
-        an `OwnModel` of them, any object with `simulate`, or a `ModelSetup`.
+        the card's filter is its differential equation unless the fit setup's `card_filter`
+        says "recursion". Or a user-defined model: of equations,
+        a `UserModel` of them, any object with `simulate`, or a `ModelSetup`.
     tests : Campaign or sequence of Experiment
         The runs to fit; of a campaign those with the role ``"fit"``.
-    free : Setup, str, path or mapping
-        What to estimate. Of a drive a fit configuration: a `Setup`, a packaged one by name, a TOML
-        file, or a mapping as of `configuration`. Of a user-defined model a mapping to (low,
+    free : FitSetup, str, path or mapping
+        What to estimate. Of a drive a fit setup: a `FitSetup`, a packaged one by name, a TOML
+        file, or a mapping as of `as_fit_setup`. Of a user-defined model a mapping to (low,
         nominal, high) or an `Unknown`, see `ModelSetup`.
     channels, noise, fixed : optional
-        Of a model of one's own, as of `ModelSetup`.
+        Of a user-defined model, as of `ModelSetup`.
     loss, tolerance, max_evaluations :
         As of `solving.solve`, in each stage.
     threads : int, optional
@@ -343,7 +343,7 @@ class _Stated(NamedTuple):
     """What is to be fitted, and what is doubtful about it."""
 
     nominal: Parameters
-    setup: Setup
+    setup: FitSetup
     doubts: tuple[str, ...]
 
 
@@ -354,9 +354,9 @@ def _of_drive(
     if free is None:
         raise InputError(
             "A fit of a drive needs to know what is free, such as 'hoist' or {'Z8': (0.5, 2)}; "
-            "swashplate.identify takes drive and fit configuration from the campaign."
+            "swashplate.identify takes drive and fit setup from the campaign."
         )
-    setup = configuration(free, runs, parameters.definitions)
+    setup = as_fit_setup(free, runs, parameters.definitions)
     nominal, changed = with_card_filter(setup.card_filter, runs, parameters)
     doubts = refuse_unsound(check_runs(runs, smooth(nominal)))
     doubts += refuse_unsound(unfitted_currents(runs, setup))
@@ -371,24 +371,25 @@ def _of_model(model: ModelSetup, runs: Sequence[Experiment]) -> _Stated:
 
 
 def staged(
-    setup: Setup,
+    setup: FitSetup,
     nominal: Parameters,
     runs: Sequence[Experiment],
     solved: Callable[[Stage, Problem], Solved],
     *,
     threads: int | None = None,
 ) -> tuple[StageFit, ...]:
-    """The stages of a set-up, each from what the ones before found, until one is interrupted."""
-    parameters, stages, starts = smooth(nominal), list[StageFit](), dict[str, Mapping[str, float]]()
+    """The stages of a fit setup, each from what the ones before found, until one is interrupted."""
+    parameters = smooth(nominal)
+    stages = list[StageFit]()
+    starts = dict[str, Mapping[str, float]]()
     instants = dict[tuple[str, str], Prior]()
     for stage in setup.stages:
-        uncertain = setup.standard_uncertainty
         problem = stage_problem(
             stage,
             parameters,
             runs,
             threads=threads,
-            uncertain=uncertain,
+            uncertain=setup.standard_uncertainty,
             starts=starts,
             instants=instants,
         )
@@ -421,92 +422,114 @@ def _instants_found(stage: StageFit) -> dict[tuple[str, str], Prior]:
     numbers = [k for k, unknown in enumerate(unknowns) if unknown.kind == "instant"]
     if not numbers:
         return {}
-    values, quoted = unknowns.at(stage.solution.vector).estimates, uncertainty_of(stage).quoted
-    found = dict[tuple[str, str], Prior]()
-    errors = quoted.standard_errors * unknowns.scales
+    values = unknowns.at(stage.solution.vector).estimates
+    errors = uncertainty_of(stage).quoted.standard_errors * unknowns.scales
+    priors = dict[tuple[str, str], Prior]()
     for k in numbers:
         unknown = unknowns[k]
         assert unknown.prior is not None
         assert unknown.run is not None
-        known = unknown.prior.deviation
-        error = min(float(errors[k]), known)
-        found[unknown.run, unknown.name] = Prior(float(values[k]), error if error > 0.0 else known)
-    return found
+        deviation = unknown.prior.deviation
+        error = min(float(errors[k]), deviation)
+        if not error > 0.0:
+            error = deviation
+        priors[unknown.run, unknown.name] = Prior(float(values[k]), error)
+    return priors
 
 
 def _solved(
     stage: Stage,
     problem: Problem,
-    solved: partial[Solution],
+    solver: partial[Solution],
     search: Search | None,
     doubts: Sequence[str],
 ) -> Solved:
     """See `Solved`."""
-    limits = {key: solved.keywords[key] for key in ("tolerance", "max_evaluations")}
-    several: tuple[Solution, ...] = ()
+    limits = {key: solver.keywords[key] for key in ("tolerance", "max_evaluations")}
     if search is not None and search.starts:
-        # starts run side by side, so each of them runs on one thread
-        alone, planned = replace(problem, threads=1), 1 + search.starts
-        several = solve_from(
-            alone,
-            [problem.start, *sobol_starts(alone, search.starts, search.seed)],
-            executor=search.executor,
-            store=None if search.store is None else search.store / stage.name,
-            origin=_origin(stage, problem, limits),
-            resume=search.resume,
-            watch=None if search.watch is None else partial(search.watch, stage.name),
-            **limits,
-        )
-        solution = several[0]
+        solutions = _from_starts(stage, problem, search, limits)
+        solution = solutions[0]
+        planned = 1 + search.starts
     else:
         hopeless = None
         if search is None and isinstance(problem.model, EquationModel):
             hopeless = partial(_is_hopeless, problem)
-        solution, planned = solved(problem, hopeless=hopeless), 1 + OTHERS
+        solution = solver(problem, hopeless=hopeless)
+        solutions = ()
+        planned = 1 + OTHERS
     if search is None and solution.loss == "linear" and _unexplained(problem, solution):
-        LOGGER.info(
-            "Stage %s: residuals exceed %g times their known measurement error: up to %d more "
-            "starts (starts=0 tries none)",
-            stage.name,
-            UNEXPLAINED,
-            OTHERS,
-        )
-        most = TRIAL if solution.given_up else int(limits["max_evaluations"])
-        starts = list[Array]()
-        # nobody asked for these starts: if few can be used, they are enough
-        with suppress(InputError):
-            for start in sobol_starts(problem, OTHERS, 0):
-                starts.append(start)
-        planned = 1 + len(starts)
-        try:
-            others = solve_from(
-                problem,
-                starts,
-                enough=partial(_explained, problem),
-                tolerance=ROUGH,
-                max_evaluations=most,
-            )
-        except KeyboardInterrupt:  # before the first of them ended
-            others = ()
-        several = solution, *(replace(each, number=each.number + 1) for each in others)
-        if _explained(problem, several[-1]):
-            planned = len(several)
-    if several:
-        best = min(several, key=lambda each: each.cost)
-        if solution.given_up and len(several) == planned:
+        solutions, planned = _from_other_starts(stage, problem, solution, limits)
+    if solutions:
+        best = min(solutions, key=lambda solution: solution.cost)
+        if solution.given_up and len(solutions) == planned:
             share = share_explained(problem, best.vector)
             if share < LEAST_EXPLAINED:
                 raise InputError(_no_fit(stage, problem, planned, share, doubts))
-        if len(several) < planned:
-            words = f"interrupted after {len(several)} of {planned} starts: the best of them"
+        if len(solutions) < planned:
+            words = f"interrupted after {len(solutions)} of {planned} starts: the best of them"
             solution = replace(best, converged=False, interrupted=True, message=words)
         elif search is not None or best.number or solution.given_up:
-            solution = solved(problem, best.vector)
-    if any(each.prior is not None for each in problem.unknowns) and not solution.interrupted:
+            solution = solver(problem, best.vector)
+    if any(unknown.prior is not None for unknown in problem.unknowns) and not solution.interrupted:
         # what the residuals are worth is known only now
         problem = weighed(problem, solution.vector)
-        solution = solved(problem, solution.vector)
-    return Solved(problem, solution, several)
+        solution = solver(problem, solution.vector)
+    return Solved(problem, solution, solutions)
+
+
+def _from_starts(
+    stage: Stage, problem: Problem, search: Search, limits: dict[str, Any]
+) -> tuple[Solution, ...]:
+    """Solutions from the nominal values and from the starts of a search."""
+    # starts run side by side, so each of them runs on one thread
+    alone = replace(problem, threads=1)
+    return solve_from(
+        alone,
+        [problem.start, *sobol_starts(alone, search.starts, search.seed)],
+        executor=search.executor,
+        store=None if search.store is None else search.store / stage.name,
+        origin=_origin(stage, problem, limits),
+        resume=search.resume,
+        watch=None if search.watch is None else partial(search.watch, stage.name),
+        **limits,
+    )
+
+
+def _from_other_starts(
+    stage: Stage, problem: Problem, solution: Solution, limits: Mapping[str, float]
+) -> tuple[tuple[Solution, ...], int]:
+    """A solution that leaves too much unexplained and those from a few other starts.
+
+    Beside them how many were planned.
+    """
+    LOGGER.info(
+        "Stage %s: residuals exceed %g times their known measurement error: up to %d more "
+        "starts (starts=0 tries none)",
+        stage.name,
+        UNEXPLAINED,
+        OTHERS,
+    )
+    most = TRIAL if solution.given_up else int(limits["max_evaluations"])
+    starts = list[Array]()
+    # nobody asked for these starts: if few can be used, they are enough
+    with suppress(InputError):
+        for start in sobol_starts(problem, OTHERS, 0):
+            starts.append(start)
+    try:
+        others = solve_from(
+            problem,
+            starts,
+            enough=partial(_explained, problem),
+            tolerance=ROUGH,
+            max_evaluations=most,
+        )
+    except KeyboardInterrupt:  # before the first of them ended
+        others = ()
+    numbered = [replace(other, number=other.number + 1) for other in others]
+    solutions = (solution, *numbered)
+    if _explained(problem, solutions[-1]):
+        return solutions, len(solutions)
+    return solutions, 1 + len(starts)
 
 
 def share_explained(problem: Problem, vector: Array) -> float:
@@ -515,22 +538,24 @@ def share_explained(problem: Problem, vector: Array) -> float:
     In units of the residuals, so that the channels that are measured best count most. Of a position
     that of its mean speeds: where it drifts to after minutes says little of how a drive moves.
     """
-    total, left = 0.0, 0.0
+    total = 0.0
+    unexplained = 0.0
     for number, experiment in enumerate(problem.experiments):
         for name, output in problem.outputs(vector, number).items():
             channel = experiment[name]
             used = channel.used
             if not used.any():
                 continue
-            measured, errors = channel.values[used], (output - channel.values)[used]
+            measured = channel.values[used]
+            errors = (output - channel.values)[used]
             if channel.is_position and measured.size > 1:
                 step = float(np.median(np.diff(channel.time[used])))
                 width = max(min(round(WINDOW / step), measured.size // 4), 1)
                 measured, errors = _changes(measured, width), _changes(errors, width)
             unit = problem.scales[name] ** 2
             total += float(np.sum((measured - measured.mean()) ** 2)) / unit
-            left += float(errors @ errors) / unit
-    return 1.0 - left / total if total > 0.0 else 1.0
+            unexplained += float(errors @ errors) / unit
+    return 1.0 - unexplained / total if total > 0.0 else 1.0
 
 
 def _changes(values: Array, width: int) -> Array:
@@ -563,13 +588,15 @@ def _unexplained(problem: Problem, solution: Solution) -> bool:
     """Whether residuals of a channel are far larger than its known measurement error."""
     if solution.interrupted or not isinstance(problem.model, EquationModel):
         return False  # any object with simulate may take minutes
-    left: dict[str, list[Array]] = {}
+    relative: dict[str, list[Array]] = {}
     for number, experiment in enumerate(problem.experiments):
         for name, output in problem.outputs(solution.vector, number).items():
             channel = experiment[name]
-            if (error := _known_error(channel)) is not None:
-                left.setdefault(name, []).append((output - channel.values)[channel.used] / error)
-    joined = map(np.concatenate, left.values())
+            error = _known_error(channel)
+            if error is not None:
+                residuals = (output - channel.values)[channel.used]
+                relative.setdefault(name, []).append(residuals / error)
+    joined = map(np.concatenate, relative.values())
     return any(float(r @ r) > UNEXPLAINED**2 * r.size for r in joined)
 
 
@@ -587,17 +614,17 @@ def _explained(problem: Problem, solution: Solution) -> bool:
 
 def _origin(stage: Stage, problem: Problem, limits: Mapping[str, float]) -> dict[str, str]:
     """Fingerprints of all that the result of a start depends on."""
-    own = repr(problem.model) if isinstance(problem.model, OwnModel) else ""
+    model = repr(problem.model) if isinstance(problem.model, UserModel) else ""
     fixed = sorted(problem.fixed.items()), sorted(problem.zeros.items())
-    known: object = (own, problem.start.tolist(), fixed)
+    nominal: object = (model, problem.start.tolist(), fixed)
     if isinstance(problem.model, DriveModel):
         drive = problem.model.parameters
         forms = drive.pressure_root, drive.coulomb_sign, drive.rate, sorted(drive.options)
-        known = sorted(drive.numbers.items()), forms
+        nominal = sorted(drive.numbers.items()), forms
     marks = {
-        "stage of the fit configuration": stage.model_dump_json(),
+        "stage of the fit setup": stage.model_dump_json(),
         "tolerances": sorted(limits.items()),
-        "nominal values": known,
+        "nominal values": nominal,
         "runs and their weights": (problem.scales, [*map(fingerprint, problem.experiments)]),
     }
     hashes = {k: blake2b(repr(v).encode(), digest_size=8).hexdigest() for k, v in marks.items()}
@@ -618,8 +645,8 @@ def fingerprint(experiment: Experiment) -> str:
     return digest.hexdigest()
 
 
-def drawn(nominal: Drive, setup: Setup, seed: int, *, spread: float = SPREAD) -> Drive:
-    """A drive that differs from a nominal one in what a set-up frees, and in nothing else.
+def drawn(nominal: Drive, setup: FitSetup, seed: int, *, spread: float = SPREAD) -> Drive:
+    """A drive that differs from a nominal one in what a fit setup frees, and in nothing else.
 
     Each free parameter is multiplied by a log-normal factor, both directions apart, of which the
     logarithm has the standard deviation `spread`. The seed is not negative. A `ParameterError` says

@@ -19,12 +19,12 @@ from swashplate.errors import InputError, InputTypeError
 from swashplate.executors import Executor, Serial
 from swashplate.identification.assessment import Identification, versions
 from swashplate.identification.diagnostics.data_checks import refuse_unsound, spike_findings
-from swashplate.identification.diagnostics.judging import REQUIRED
+from swashplate.identification.diagnostics.verdict import REQUIRED
 from swashplate.identification.estimation.between_samples import doubt
-from swashplate.identification.estimation.model import Model
+from swashplate.identification.estimation.model import MachineModel
 from swashplate.identification.estimation.model_setup import ModelSetup
 from swashplate.identification.estimation.problem import Loss
-from swashplate.identification.estimation.setup import FreeParameters, Setup
+from swashplate.identification.estimation.setup import FitSetup, FreeParameters
 from swashplate.identification.estimation.stages import Parameters, setup_of
 from swashplate.identification.fitting import Fit, Search, fit
 from swashplate.identification.resampling import cross_validate
@@ -38,7 +38,7 @@ MOST_EVALUATIONS = 600
 
 def identify(
     tests: str | Path | Campaign,
-    model: str | Path | Drive | ParameterSet | ModelSetup | Model | Equations | None = None,
+    model: str | Path | Drive | ParameterSet | ModelSetup | MachineModel | Equations | None = None,
     free: FreeParameters | None = None,
     *,
     axis: str | None = None,
@@ -68,11 +68,11 @@ def identify(
         name, a parameter file, or the folder of a fit. Or what is fitted instead of a drive: a
         model of equations or any object with `simulate`, with `free`; a `ModelSetup`; a Python file
         that states one.
-    free : Setup, str, path or mapping, optional
-        What to estimate. By default the packaged fit configuration of the campaign's drive. Or
-        another packaged one by its name, a TOML file, a `Setup`, or a mapping of the drive's
+    free : FitSetup, str, path or mapping, optional
+        What to estimate. By default the packaged fit setup of the campaign's drive. Or
+        another packaged one by its name, a TOML file, a `FitSetup`, or a mapping of the drive's
         parameters to factors on their nominal values, ``{"Z8": (0.5, 2)}``; see
-        `swashplate.identification.configuration`. Of a user-defined model (low, nominal, high) by
+        `swashplate.identification.as_fit_setup`. Of a user-defined model (low, nominal, high) by
         name, see `ModelSetup`.
     axis : str, optional
         The axis; needed if the campaign has several.
@@ -235,7 +235,7 @@ def _stated(
     model: object,
     free: FreeParameters | None,
     runs: Sequence[Experiment],
-) -> tuple[Parameters, Setup]:
+) -> tuple[Parameters, FitSetup]:
     """The nominal parameters, and what is estimated of them in which stages."""
     if isinstance(model, str | Path) and Path(model).suffix == ".py":
         model = ModelSetup.from_file(model)

@@ -302,7 +302,7 @@ class _Pooled:
     """Noise spectrum of a channel: its shape is common to its runs, its level each run's own."""
 
     def __init__(self, frequencies: list[Array], powers: list[Array], left: list[Array]) -> None:
-        ends = np.cumsum([each.size for each in frequencies])[:-1]
+        ends = np.cumsum([frequency.size for frequency in frequencies])[:-1]
         order = np.argsort(np.concatenate(frequencies), kind="stable")
         seen, rest = np.concatenate(powers)[order], np.concatenate(left)[order]
         shape = np.empty(order.size)
@@ -442,7 +442,7 @@ def _pooled(fit: LinearisedFit) -> dict[str, _Pooled]:
         frequencies.append(spectrum.frequencies)
         powers.append(np.abs(spectrum.residual) ** 2 / (spectrum.level or 1.0))
         left.append(spectrum.left)
-    return {channel: _Pooled(*each) for channel, each in parts.items()}
+    return {channel: _Pooled(*part) for channel, part in parts.items()}
 
 
 def _smoothed(values: Array) -> Array:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import chain
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +14,7 @@ from swashplate.campaign.experiment import Experiment
 from swashplate.errors import DomainError, InputError
 from swashplate.executors import Executor, Serial
 from swashplate.identification.estimation.problem import Loss
-from swashplate.identification.estimation.setup import Setup
+from swashplate.identification.estimation.setup import FitSetup
 from swashplate.identification.estimation.solving import NO_EFFECT
 from swashplate.identification.estimation.stages import Parameters
 from swashplate.identification.fitting import Search, fit
@@ -88,7 +89,7 @@ class CrossValidation(Result):
 def folds_tables(found: CrossValidation, stages: Sequence[StageFit] = ()) -> list[Table]:
     """Errors held out, beside those of the fit to all runs if its stages are given; the folds."""
     fitted_columns = "tpf" if stages else ""
-    whole = pooled(with_speeds(each for stage in stages for each in stage.runs))
+    whole = pooled(with_speeds(quality for stage in stages for quality in stage.runs))
     held_out = Table(
         "Cross-validation: each part predicted by a fit to the others",
         (
@@ -103,17 +104,26 @@ def folds_tables(found: CrossValidation, stages: Sequence[StageFit] = ()) -> lis
     )
     for name, predicted in found.measures.items():
         fitted = whole[name].rmse if name in whole else None
-        ratio = predicted.rmse / fitted if fitted else None
-        cells = (name, predicted.fit_percent, predicted.rmse, fitted, ratio)
-        held_out.add(*cells, predicted.samples, unit=found.units[name])
+        held_out.add(
+            name,
+            predicted.fit_percent,
+            predicted.rmse,
+            fitted,
+            predicted.rmse / fitted if fitted else None,
+            predicted.samples,
+            unit=found.units[name],
+        )
     columns = (Column("fold", "d"), Column("held out", wrap=True), Column("fit to the others"))
     folds = Table("Folds", (*columns, Column("fit % of those held out")))
     for fold in found.folds:
-        state = "not fitted" if fold.failure else "converged" if fold.converged else "not converged"
-        state = f"{state}; loses {', '.join(fold.lost)}" if fold.lost else state
+        state = "converged" if fold.converged else "not converged"
+        if fold.failure:
+            state = "not fitted"
+        if fold.lost:
+            state += f"; loses {', '.join(fold.lost)}"
         fits = (
-            f"{name} {'-' if each.fit_percent is None else f'{each.fit_percent:.2f}'} %"
-            for name, each in fold.measures.items()
+            f"{name} {'-' if measures.fit_percent is None else f'{measures.fit_percent:.2f}'} %"
+            for name, measures in fold.measures.items()
         )
         folds.add(fold.number + 1, ", ".join(fold.held), state, ", ".join(fits) or NONE)
     return [held_out, folds]
@@ -126,7 +136,7 @@ ONE_WAY = 0.25
 def cross_validate(
     experiments: Sequence[Experiment],
     nominal: Parameters,
-    setup: Setup,
+    setup: FitSetup,
     *,
     folds: int = 5,
     seed: int = 0,
@@ -148,7 +158,7 @@ def cross_validate(
     executor : Executor, optional
         Where the fits run; here by default. The results do not depend on it.
     watch : callable, optional
-        Told of each fold and how many there are by now. Ctrl-C ends it; folds that are done are
+        Called with each fold and how many there are by now. Ctrl-C ends it; folds that are done are
         returned.
 
     Raises
@@ -160,37 +170,49 @@ def cross_validate(
     here = executor or Serial()
     # fits run side by side elsewhere, so each of them runs on one thread
     shared = tuple(experiments), nominal, setup, loss, None if isinstance(here, Serial) else 1
-    done: dict[int, tuple[Fold, list[_Held]]] = {}
+    done: dict[int, tuple[Fold, list[_Prediction]]] = {}
     try:
         folds_done = here.run(_fold, shared, list(enumerate(parts)))
-        for place, found in counted(folds_done, folds, "folds", "Cross-validating"):
-            done[place] = found
+        for number, (fold, predictions) in counted(folds_done, folds, "folds", "Cross-validating"):
+            done[number] = fold, predictions
             if watch is not None:
-                watch(found[0], len(done))
+                watch(fold, len(done))
     except KeyboardInterrupt:
         if not done:
             raise
-    made, of_folds = zip(*(done[place] for place in sorted(done)), strict=True)
-    held = list(chain.from_iterable(of_folds))
-    units = {name: unit for name, unit, *_ in held}
-    return CrossValidation(seed, len(parts), made, _measured(held), units)
+    results = [done[number] for number in sorted(done)]
+    predictions = [prediction for _, of_fold in results for prediction in of_fold]
+    return CrossValidation(
+        seed,
+        len(parts),
+        tuple(fold for fold, _ in results),
+        _measures_of(predictions),
+        {prediction.channel: prediction.unit for prediction in predictions},
+    )
 
 
-_Held = tuple[str, str, Array, Array]
-"""Channel, unit, and what was measured and predicted of the samples that count in one run."""
+class _Prediction(NamedTuple):
+    """A channel of a run that was held out: the samples that count."""
+
+    channel: str
+    unit: str
+    measured: Array
+    predicted: Array
 
 
-def _measured(held: Sequence[_Held]) -> dict[str, Measures]:
+def _measures_of(predictions: Sequence[_Prediction]) -> dict[str, Measures]:
     """Measures of each channel over some runs."""
-    names = dict.fromkeys(name for name, *_ in held)
-    return {n: measures(*((a, b, None) for name, _, a, b in held if name == n)) for n in names}
+    by_channel = defaultdict[str, list[tuple[Array, Array, None]]](list)
+    for prediction in predictions:
+        by_channel[prediction.channel].append((prediction.measured, prediction.predicted, None))
+    return {channel: measures(*runs) for channel, runs in by_channel.items()}
 
 
 def deal(experiments: Sequence[Experiment], folds: int, seed: int) -> tuple[tuple[int, ...], ...]:
     """Deal runs into folds, those of a kind and direction apart as far as there are folds.
 
-    Places of each fold's runs, increasing; folds differ by at most one run. The seed is that of the
-    order within each kind.
+    Gives the numbers of each fold's runs, increasing; folds differ by at most one run. The seed is
+    that of the order within each kind.
     """
     if folds < 2:
         raise InputError(f"Cross-validation needs at least 2 folds, not {folds}.")
@@ -199,28 +221,33 @@ def deal(experiments: Sequence[Experiment], folds: int, seed: int) -> tuple[tupl
             f"{folds} folds need at least as many runs; there are {len(experiments)} to fit."
         )
     strata: dict[tuple[str, str], list[int]] = {}
-    for place, each in enumerate(experiments):
-        high, low = max(each.input.values.max(), 0.0), max(-each.input.values.min(), 0.0)
-        way = "plus" if high >= low else "minus"
-        way = "both" if min(high, low) > ONE_WAY * max(high, low) else way
-        strata.setdefault((each.maneuver.split(" ")[0], way), []).append(place)
+    for number, experiment in enumerate(experiments):
+        high = max(experiment.input.values.max(), 0.0)
+        low = max(-experiment.input.values.min(), 0.0)
+        direction = "plus" if high >= low else "minus"
+        if min(high, low) > ONE_WAY * max(high, low):
+            direction = "both"
+        kind = experiment.maneuver.split(" ")[0]
+        strata.setdefault((kind, direction), []).append(number)
     random = np.random.default_rng(seed)
     order = random.permutation(folds)
-    dealt = [int(p) for _, places in sorted(strata.items()) for p in random.permutation(places)]
+    dealt = [
+        int(number) for _, runs in sorted(strata.items()) for number in random.permutation(runs)
+    ]
     parts: list[list[int]] = [[] for _ in range(folds)]
-    for number, place in enumerate(dealt):
-        parts[order[number % folds]].append(place)
+    for position, number in enumerate(dealt):
+        parts[order[position % folds]].append(number)
     return tuple(tuple(sorted(part)) for part in parts)
 
 
 def _fold(
-    shared: tuple[tuple[Experiment, ...], Parameters, Setup, Loss, int | None],
-    item: tuple[int, tuple[int, ...]],
-) -> tuple[Fold, list[_Held]]:
-    (experiments, nominal, setup, loss, threads), (number, part) = shared, item
-    left_out = [experiments[place] for place in part]
-    others = [each for place, each in enumerate(experiments) if place not in part]
-    names = tuple(each.name for each in left_out)
+    shared: tuple[tuple[Experiment, ...], Parameters, FitSetup, Loss, int | None],
+    task: tuple[int, tuple[int, ...]],
+) -> tuple[Fold, list[_Prediction]]:
+    (experiments, nominal, setup, loss, threads), (number, part) = shared, task
+    left_out = [experiments[k] for k in part]
+    others = [experiment for k, experiment in enumerate(experiments) if k not in part]
+    names = tuple(run.name for run in left_out)
     try:
         result = fit(nominal, others, setup, loss=loss, threads=threads, search=Search(0))
         if result.stages[-1].solution.interrupted:
@@ -228,16 +255,25 @@ def _fold(
         predicted = with_speeds(predict(result.parameters, left_out))
     except (InputError, DomainError) as error:
         return Fold(number, names, failure=str(error)), []
-    held = []
-    for each in predicted:
-        channel = each.experiment[each.channel]
-        samples = channel.values[channel.used], each.simulated[channel.used]
-        held.append((each.channel, channel.unit, *samples))
+    predictions = []
+    for quality in predicted:
+        channel = quality.experiment[quality.channel]
+        predictions.append(
+            _Prediction(
+                channel=quality.channel,
+                unit=channel.unit,
+                measured=channel.values[channel.used],
+                predicted=quality.simulated[channel.used],
+            )
+        )
     lost = list[str]()
     for stage in result.stages:
         effects = np.linalg.norm(stage.problem.evaluate(stage.solution.vector).jacobian, axis=0)
         least = NO_EFFECT * effects.max()
         each_one = zip(stage.problem.unknowns, effects, strict=True)
-        lost += [each.name for each, effect in each_one if each.run is None and effect <= least]
-    converged = all(each.solution.converged for each in result.stages)
-    return Fold(number, names, tuple(lost), _measured(held), converged), held
+        lost += [
+            unknown.name for unknown, effect in each_one if unknown.run is None and effect <= least
+        ]
+    converged = all(stage.solution.converged for stage in result.stages)
+    fold = Fold(number, names, tuple(lost), _measures_of(predictions), converged)
+    return fold, predictions

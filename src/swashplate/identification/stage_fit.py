@@ -60,7 +60,7 @@ class StageFit(Result):
     problem: Problem
     solution: Solution
     parameters: Parameters
-    """The drive, or the model of one's own, with what was found."""
+    """The drive, or the user-defined model, with what was found."""
     starts: tuple[Solution, ...] = ()
     """How each start ended, if there was more than one."""
     earlier: tuple[StageFit, ...] = field(default=(), repr=False)
@@ -78,9 +78,9 @@ class StageFit(Result):
 
     @property
     def drive(self) -> Drive:
-        """The drive with what was found; an `InputError` if it is a model of one's own."""
+        """The drive with what was found; an `InputError` if it is a user-defined model."""
         if isinstance(self.parameters, ModelSetup):
-            raise InputError(f"{self.parameters.name} is a model of your own, no drive.")
+            raise InputError(f"{self.parameters.name} is a user-defined model, not a drive.")
         return Drive(self.parameters)
 
     @cached_property

@@ -87,9 +87,11 @@ def estimates_table(
     for unknown, estimate in zip(unknowns, estimates_of(stage), strict=True):
         if (unknown.run is None) == own:
             continue
-        name, value = estimate.name, estimate.value
+        value = estimate.value
         low, high = estimate.interval
-        factor, true, holds = chosen_unit(unknown.unit).factor, None, ""
+        factor = chosen_unit(unknown.unit).factor
+        true = None
+        holds = ""
         if truth is not None:
             assert isinstance(stage.problem.model, DriveModel)
             true = true_value(unknown, stage.problem.model, truth)
@@ -101,7 +103,7 @@ def estimates_table(
             holds = "yes" if inside else "no"
         made.add(
             stage.stage.name,
-            name,
+            estimate.name,
             meaning_of(unknown, stage),
             *(() if truth is None else (Cell(unknown.unit, chosen_unit(unknown.unit).name),)),
             unknown.start,
@@ -128,20 +130,36 @@ def _half_width(value: float, low: float | None, high: float | None) -> str:
 
 
 def profiles_table(profiles: Sequence[Profile], stages: Sequence[StageFit]) -> Table:
-    """Ends of the intervals that profiles give; none where the cost does not rise enough."""
+    """Ends of the intervals that profiles give; none if the cost does not rise enough."""
     by_name = {stage.stage.name: stage for stage in stages}
     ends = f"{100.0 * LEVEL:g} %"
-    lower, upper = (Column(f"{side} {ends}", ".5g", none=NONE) for side in ("lower", "upper"))
-    columns = (Column("stage"), Column("parameter"), UNIT, Column("estimate", ".5g"), lower, upper)
-    made = Table("Profile likelihoods, of the noise alone", columns, si=True)
-    for one in profiles:
-        stage = by_name[one.stage]
-        unknown = stage.problem.unknowns.items[one.index]
-        ends_found = (None, None) if one.better is not None else (one.lower, one.upper)
-        numbers = (float(stage.solution.vector[one.index]), *ends_found)
-        values = (None if each is None else unknown.to_value(each) for each in numbers)
-        made.add(one.stage, one.name, *values, unit=unknown.unit)
-    return made
+    table = Table(
+        "Profile likelihoods, of the noise alone",
+        (
+            Column("stage"),
+            Column("parameter"),
+            UNIT,
+            Column("estimate", ".5g"),
+            Column(f"lower {ends}", ".5g", none=NONE),
+            Column(f"upper {ends}", ".5g", none=NONE),
+        ),
+        si=True,
+    )
+    for profile in profiles:
+        stage = by_name[profile.stage]
+        unknown = stage.problem.unknowns.items[profile.index]
+        lower, upper = profile.lower, profile.upper
+        if profile.better is not None:
+            lower = upper = None
+        table.add(
+            profile.stage,
+            profile.name,
+            unknown.to_value(float(stage.solution.vector[profile.index])),
+            None if lower is None else unknown.to_value(lower),
+            None if upper is None else unknown.to_value(upper),
+            unit=unknown.unit,
+        )
+    return table
 
 
 def estimates_by_name(stages: Sequence[StageFit]) -> dict[str, Estimate]:
@@ -149,18 +167,18 @@ def estimates_by_name(stages: Sequence[StageFit]) -> dict[str, Estimate]:
 
     A parameter that is tied in both directions is there by its symbol and by both columns.
     """
-    made: dict[str, Estimate] = {}
+    by_name: dict[str, Estimate] = {}
     for stage in stages:
         for unknown, estimate in zip(stage.problem.unknowns, estimates_of(stage), strict=True):
-            made[estimate.name] = estimate
+            by_name[estimate.name] = estimate
             if unknown.run is None:
-                made.update(dict.fromkeys(unknown.targets, estimate))
+                by_name.update(dict.fromkeys(unknown.targets, estimate))
     parameters, moved = stages[-1].parameters, _moved(stages)
     for name, value in parameters.numbers.items():
         unit = "" if isinstance(parameters, ModelSetup) else parameters[name].unit
         status: Status = "from the forces" if name in moved else "fixed"
-        made.setdefault(name, Estimate(name, value, unit, source=Interval(status)))
-    return made
+        by_name.setdefault(name, Estimate(name, value, unit, source=Interval(status)))
+    return by_name
 
 
 def all_estimates(stages: Sequence[StageFit]) -> Table:
@@ -170,9 +188,10 @@ def all_estimates(stages: Sequence[StageFit]) -> Table:
 
 def truth_count(tables: Sequence[Table]) -> tuple[int, int]:
     """How many intervals of tables with a truth contain it, and of how many."""
-    names = [each.name for each in tables[0].columns]
-    said = [row.cells[names.index("holds")] for table in tables for row in table.rows]
-    return said.count("yes"), said.count("yes") + said.count("no")
+    names = [column.name for column in tables[0].columns]
+    answers = [row.cells[names.index("holds")] for table in tables for row in table.rows]
+    holding = answers.count("yes")
+    return holding, holding + answers.count("no")
 
 
 MEANINGS: Mapping[Kind, str] = {
@@ -194,8 +213,8 @@ def meaning_of(unknown: Unknown, stage: StageFit) -> str:
     if unknown.kind == "force":
         assert stage.stage.forces is not None
         current = stage.stage.forces.currents[unknown.name]
-        way = "positive" if current > 0.0 else "negative"
-        return f"solenoid force {abs(current):g} A beyond the dead zone, {way}"
+        direction = "positive" if current > 0.0 else "negative"
+        return f"solenoid force {abs(current):g} A beyond the dead zone, {direction}"
     return MEANINGS[unknown.kind]
 
 
@@ -205,16 +224,18 @@ def meaning_of_parameter(name: str) -> str:
     if definition is None:
         return ""
     side = name.rpartition("_")[2]
-    way = {"plus": ", positive", "minus": ", negative"}.get(side, "")
-    return definition.name + (way if definition.directional else "")
+    direction = {"plus": ", positive", "minus": ", negative"}.get(side, "")
+    return definition.name + (direction if definition.directional else "")
 
 
 def _moved(stages: Sequence[StageFit]) -> set[str]:
     """Columns of the drive's parameters that some stage moved."""
     problems = [stage.problem for stage in stages]
-    moved = {target for each in problems for unknown in each.unknowns for target in unknown.targets}
-    forces = [each.model.forces for each in problems if isinstance(each.model, DriveModel)]
-    return moved.union(*(each.columns for each in forces if each is not None))
+    moved = {
+        target for problem in problems for unknown in problem.unknowns for target in unknown.targets
+    }
+    forces = [problem.model.forces for problem in problems if isinstance(problem.model, DriveModel)]
+    return moved.union(*(force.columns for force in forces if force is not None))
 
 
 def _is_moved(symbol: str, moved: Collection[str]) -> bool:
@@ -223,7 +244,7 @@ def _is_moved(symbol: str, moved: Collection[str]) -> bool:
 
 def fixed_table(stages: Sequence[StageFit], truth: ParameterSet | None = None) -> Table:
     """The parameters that no stage moved; `truth` as it is, in no other scales."""
-    made = Table(
+    table = Table(
         "Fixed at their nominal values",
         (
             Column("parameter"),
@@ -236,34 +257,45 @@ def fixed_table(stages: Sequence[StageFit], truth: ParameterSet | None = None) -
         ),
         si=True,
     )
-    moved, parameters = _moved(stages), stages[-1].parameters
+    moved = _moved(stages)
+    parameters = stages[-1].parameters
     if isinstance(parameters, ModelSetup):
         for name, value in parameters.numbers.items():
             if name not in moved:
-                made.add(name, "", value, None, "given with the model", "")
-        return made
+                table.add(name, "", value, None, "given with the model", "")
+        return table
     for column, symbol in COLUMNS.items():
         if column in moved:
             continue
-        one, value = parameters[symbol], parameters.numbers[column]
-        why = "0: this effect is left out" if value == 0.0 else ""
-        why = "inactive: no test reaches it" if one.status == "inactive" else why
+        parameter, value = parameters[symbol], parameters.numbers[column]
+        reason = ""
+        if value == 0.0:
+            reason = "0: this effect is left out"
+        if parameter.status == "inactive":
+            reason = "inactive: no test reaches it"
         for gauge in GAUGES[::-1]:
-            fixed = next((each for each in gauge.fix if not _is_moved(each, moved)), None)
-            others = [each for each in gauge.moves if each != symbol and _is_moved(each, moved)]
+            fixed = next((name for name in gauge.fix if not _is_moved(name, moved)), None)
+            others = [name for name in gauge.moves if name != symbol and _is_moved(name, moved)]
             if fixed == symbol and others:
-                why = f"fixes the {gauge.name}: {gauge.determined}"
-        true = None if truth is None else truth.numbers[column]
-        made.add(column, meaning_of_parameter(column), value, true, why, one.source, unit=one.unit)
-    return made
+                reason = f"fixes the {gauge.name}: {gauge.determined}"
+        table.add(
+            column,
+            meaning_of_parameter(column),
+            value,
+            None if truth is None else truth.numbers[column],
+            reason,
+            parameter.source,
+            unit=parameter.unit,
+        )
+    return table
 
 
 def fixed_line(stages: Sequence[StageFit], nominal: Parameters) -> str:
     """The symbols that kept their nominal values, in a sentence."""
     moved = _moved(stages)
     plain_names = (n.removesuffix("_plus").removesuffix("_minus") for n in nominal.numbers)
-    kept = [name for name in dict.fromkeys(plain_names) if not _is_moved(name, moved)]
-    return f"Fixed at their nominal values: {', '.join(kept) or 'none'}."
+    fixed = [name for name in dict.fromkeys(plain_names) if not _is_moved(name, moved)]
+    return f"Fixed at their nominal values: {', '.join(fixed) or 'none'}."
 
 
 def unvalued_lines(stages: Sequence[StageFit]) -> list[str]:
@@ -273,7 +305,7 @@ def unvalued_lines(stages: Sequence[StageFit]) -> list[str]:
         return []
     return [
         f"Without a value of their own, at a bound or not determined: {listed(lost)}. Fix them in "
-        "the fit configuration, widen their bounds, or add tests that determine them; for a drive "
+        "the fit setup, widen their bounds, or add tests that determine them; for a drive "
         "'swashplate advise' names some."
     ]
 
@@ -282,7 +314,7 @@ def scales_words(fit: StageFit) -> str:
     """What one unit of residual is, channel by channel."""
     parts = []
     for name, size in fit.problem.scales.items():
-        having = next(each for each in fit.problem.experiments if name in each.channels)
+        having = next(run for run in fit.problem.experiments if name in run.channels)
         unit = display_unit(having[name].shown_unit, size)
         parts.append(f"{plain(unit.factor * size, 3)} {unit.name} of {name}")
     return f"One unit of residual is {listed(parts)}."
@@ -296,9 +328,9 @@ def runs_tables(qualities: Sequence[RunQuality]) -> list[Table]:
 
     All of its runs together are in the last row.
     """
-    made = []
+    tables = []
     for name, together in pooled(qualities).items():
-        alike = [each for each in qualities if each.channel == name]
+        of_channel = [quality for quality in qualities if quality.channel == name]
         table = Table(
             name,
             (
@@ -319,29 +351,33 @@ def runs_tables(qualities: Sequence[RunQuality]) -> list[Table]:
                 Column("correlation_lag_s", "+.2f", "1", of="f"),
             ),
         )
-        unit = alike[0].experiment[name].shown_unit
-        for each in alike:
-            run, test = each.experiment, each.test
+        unit = of_channel[0].experiment[name].shown_unit
+        for quality in of_channel:
+            run, test = quality.experiment, quality.test
             tested: tuple[float | None, ...] = (None,) * 4
             if test is not None:
                 tested = (test.duration, test.peak[1], test.band, test.peak[0])
             windows = [f"{a:.6g} to {b:.6g} s" for a, b in ignored_windows(run[name])]
             table.add(
-                *(run.name, run.maneuver, run.role, name, start_words(run)),
+                run.name,
+                run.maneuver,
+                run.role,
+                name,
+                start_words(run),
                 Cell("; ".join(windows), ignored_words(run, run[name])),
-                *_measures(each.measures),
+                *_measures(quality.measures),
                 *tested,
                 unit=unit,
             )
-        if len(alike) > 1:
+        if len(of_channel) > 1:
             cells = ("all", "", "", name, "", "", *_measures(together), *(None,) * 4)
             table.add(*cells, unit=unit, total=True)
-        made.append(table)
-    return made
+        tables.append(table)
+    return tables
 
 
-def _measures(found: Measures) -> tuple[float | None, ...]:
-    return found.samples, found.rmse, found.nrmse, found.fit_percent
+def _measures(measures: Measures) -> tuple[float | None, ...]:
+    return measures.samples, measures.rmse, measures.nrmse, measures.fit_percent
 
 
 def start_words(experiment: Experiment) -> str:
@@ -353,19 +389,23 @@ def start_words(experiment: Experiment) -> str:
 
 def ignored_words(experiment: Experiment, channel: Channel) -> str:
     """What of a channel does not count, and why as far as the campaign says."""
-    said = []
+    windows = []
     for first, last in ignored_windows(channel):
-        reasons = [why for a, b, why in experiment.ignored if why and a <= last and first <= b]
-        why = f" ({listed(list(dict.fromkeys(reasons)))})" if reasons else ""
-        # to the millisecond: jitter of the stamps is no information
-        said.append(f"{round(first, 3) + 0.0:g} to {round(last, 3):g} s{why}")
-    return "; ".join(said) or "nothing"
+        reasons = [
+            reason
+            for begin, end, reason in experiment.ignored
+            if reason and begin <= last and first <= end
+        ]
+        reason = f" ({listed(list(dict.fromkeys(reasons)))})" if reasons else ""
+        # to the millisecond: jitter of the stamps is not information
+        windows.append(f"{round(first, 3) + 0.0:g} to {round(last, 3):g} s{reason}")
+    return "; ".join(windows) or "nothing"
 
 
 # --- a fit as it is read --------------------------------------------------------------------------
 
 
-class Part(NamedTuple):
+class FitPart(NamedTuple):
     """A part of what a fit says, as the command, a summary and a notebook show it."""
 
     title: str
@@ -376,7 +416,7 @@ class Part(NamedTuple):
     sentences: Sequence[str] = ()
     """and a list below these."""
     heading: str = ""
-    """Line above the tables where they do not say what they are of."""
+    """Line above the tables if they do not say what they are of."""
     opened: bool = False
     """Whether a notebook shows its tables without being asked."""
 
@@ -387,10 +427,10 @@ class Part(NamedTuple):
         return "\n\n".join(block for block in blocks if block)
 
 
-def stage_part(stage: StageFit) -> Part:
+def stage_part(stage: StageFit) -> FitPart:
     """Estimates of a stage, how it ended, and what its estimates lack."""
     name, solution = stage.stage.name, stage.solution
-    return Part(
+    return FitPart(
         f"How stage {name} ended, and what its intervals are worth",
         [estimates_table(stage)],
         [f"{name}: {solution.message} after {solution.evaluations} evaluations."],
@@ -403,16 +443,16 @@ def stage_part(stage: StageFit) -> Part:
     )
 
 
-def fixed_part(stages: Sequence[StageFit], nominal: Parameters) -> Part:
+def fixed_part(stages: Sequence[StageFit], nominal: Parameters) -> FitPart:
     """What stayed as it was, and what has no value of its own."""
-    return Part("Fixed parameters", (), [fixed_line(stages, nominal)], unvalued_lines(stages))
+    return FitPart("Fixed parameters", (), [fixed_line(stages, nominal)], unvalued_lines(stages))
 
 
 def single_runs_line(stages: Sequence[StageFit]) -> list[str]:
     """A sentence on the numbers of single runs, which no table for people shows, if any."""
-    unknowns = [unknown for each in stages for unknown in each.problem.unknowns]
+    unknowns = [unknown for stage in stages for unknown in stage.problem.unknowns]
     names = [unknown.label for unknown in unknowns if unknown.run is not None]
     if not names:
         return []
-    many = count(len(names), "number of a single run", "numbers of single runs")
-    return [f"Estimated, too: {many}, such as {names[0]}; all are in to_pandas()."]
+    numbers = count(len(names), "number of a single run", "numbers of single runs")
+    return [f"Estimated, too: {numbers}, such as {names[0]}; all are in to_pandas()."]

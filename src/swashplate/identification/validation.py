@@ -170,21 +170,25 @@ def measures(*runs: tuple[Array, Array, Array | None]) -> Measures:
     parts = []
     for values, simulated, weight in runs:
         used = np.ones(values.shape, np.bool_) if weight is None else weight > 0.0
-        for what, samples in (("measured", values), ("simulated", simulated)):
+        for origin, samples in (("measured", values), ("simulated", simulated)):
             bad = used & ~np.isfinite(samples)
             if bad.any():
                 row = int(np.argmax(bad)) + 1
-                raise InputError(f"Sample {row} of what was {what} is not finite; ignore it.")
+                raise InputError(f"Sample {row} of what was {origin} is not finite; ignore it.")
         parts.append(np.stack([values[used], simulated[used]]))
     measured, errors = np.hstack(parts)
     if not measured.size:
         raise InputError("No sample counts: all are ignored or have weight 0.")
-    errors, mean = errors - measured, float(measured.mean())
+    errors = errors - measured
+    mean = float(measured.mean())
     # a constant channel's own mean is off by rounding
     about = measured - mean
     about[np.abs(about) <= 4.0 * np.finfo(np.float64).eps * abs(mean)] = 0.0
-    rmse, spread = (float(np.sqrt(np.mean(each**2))) for each in (errors, about))
-    return Measures(measured.size, rmse, spread)
+    return Measures(
+        samples=measured.size,
+        rmse=float(np.sqrt(np.mean(errors**2))),
+        spread=float(np.sqrt(np.mean(about**2))),
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -232,12 +236,14 @@ def run_qualities(problem: Problem, vector: Array) -> tuple[RunQuality, ...]:
 def compared(experiment: Experiment, name: str, simulated: Array) -> RunQuality:
     """Quality of one channel of one run, simulated at its stamps."""
     channel = experiment[name]
-    used, test = channel.used, None
+    used = channel.used
+    test = None
     if np.count_nonzero(used) >= FEWEST:
-        time, residual = channel.time[used], (simulated - channel.values)[used]
+        time = channel.time[used]
+        residual = (simulated - channel.values)[used]
         test = residual_test(time, residual, experiment.input.at(time))
-    found = measures((channel.values, simulated, channel.weight))
-    return RunQuality(experiment, name, simulated, found, test)
+    of_run = measures((channel.values, simulated, channel.weight))
+    return RunQuality(experiment, name, simulated, of_run, test)
 
 
 def predict(
@@ -248,7 +254,7 @@ def predict(
     Parameters
     ----------
     model : Drive, ParameterSet or ModelSetup
-        The drive, or a model of one's own with its numbers.
+        The drive, or a user-defined model with its numbers.
     experiments : sequence of Experiment
         Runs that it was not fitted to. A voltage goes through the whole chain, a current through
         pump and motor.
@@ -269,25 +275,25 @@ def predict(
     parameters = model if isinstance(model, ModelSetup) else set_of(model)
     if isinstance(parameters, ModelSetup):
         return tuple(
-            compared(each, name, simulated)
-            for each in experiments
-            for name, simulated in parameters.predicted(each).items()
-            if each[name].used.any()
+            compared(experiment, name, simulated)
+            for experiment in experiments
+            for name, simulated in parameters.predicted(experiment).items()
+            if experiment[name].used.any()
         )
-    made = []
-    for each in experiments:
-        if not any(channel.kind in SIGNALS for channel in each.channels.values()):
-            raise InputError(f"{each.name} has no channel that a drive has.")
-        own = DriveModel(parameters, "pump" if each.input.kind == "current" else "chain")
-        for name, simulated in own.simulate({}, at_instants(parameters, each)).items():
-            channel = each[name]
+    qualities = []
+    for run in experiments:
+        if not any(channel.kind in SIGNALS for channel in run.channels.values()):
+            raise InputError(f"{run.name} has no channel that a drive has.")
+        drive = DriveModel(parameters, "pump" if run.input.kind == "current" else "chain")
+        for name, simulated in drive.simulate({}, at_instants(parameters, run)).items():
+            channel = run[name]
             if not channel.used.any():
                 continue
             zero = 0.0
             if channel.is_position:
                 zero = np.average(channel.values - simulated, weights=channel.weight)
-            made.append(compared(each, name, simulated + zero))
-    return tuple(made)
+            qualities.append(compared(run, name, simulated + zero))
+    return tuple(qualities)
 
 
 def at_instants(parameters: ParameterSet, experiment: Experiment) -> Experiment:
@@ -306,31 +312,42 @@ def with_speeds(qualities: Iterable[RunQuality]) -> tuple[RunQuality, ...]:
     beside measures that contain it. A position whose stamps no filter takes has no speed, nor has
     one in whose noise the speed drowns.
     """
-    found = list[tuple[RunQuality, RunQuality | None]]()
-    for each in qualities:
-        found.append((each, None))
-        channel = each.experiment[each.channel]
+    pairs = list[tuple[RunQuality, RunQuality | None]]()
+    for quality in qualities:
+        pairs.append((quality, None))
+        channel = quality.experiment[quality.channel]
         if not channel.is_position:
             continue
         unread = replace(channel, noise=None, limits=None, encoder=None, counts=None)
         try:
             filtered = speed_of(channel, "exact").speed
-            same = speed_of(replace(unread, values=each.simulated), "exact").speed
+            simulated = speed_of(replace(unread, values=quality.simulated), "exact").speed
         except InputError:
             continue
         name, unit = f"speed from {channel.name}", f"{channel.unit}/s"
-        noise = _noise_of_speed(each, same)
+        noise = _noise_of_speed(quality, simulated)
         speed = replace(unread, name=name, kind="shaft_speed", unit=unit, values=filtered)
         speed = replace(speed, noise=noise)
-        run = replace(each.experiment, channels={**each.experiment.channels, name: speed})
+        run = replace(quality.experiment, channels={**quality.experiment.channels, name: speed})
         # the residuals of a filtered signal are coloured by the filter: there is no test of them
-        own = RunQuality(run, name, same, measures((filtered, same, speed.weight)), None, noise)
-        found[-1] = each, own
-    speeds = [own for _, own in found if own is not None]
+        quality_of_speed = RunQuality(
+            experiment=run,
+            channel=name,
+            simulated=simulated,
+            measures=measures((filtered, simulated, speed.weight)),
+            test=None,
+            noise=noise,
+        )
+        pairs[-1] = quality, quality_of_speed
+    speeds = [of_speed for _, of_speed in pairs if of_speed is not None]
     clean, raw = pooled(speeds, without_noise=True), pooled(speeds)
     clear = {name for name in raw if clean[name].spread ** 2 >= 0.5 * raw[name].spread ** 2}
-    both = (own for pair in found for own in pair if own is not None)
-    return tuple(each for each in both if each.channel in clear or each.channel not in raw)
+    return tuple(
+        quality
+        for pair in pairs
+        for quality in pair
+        if quality is not None and (quality.channel in clear or quality.channel not in raw)
+    )
 
 
 def _noise_of_speed(quality: RunQuality, speed: Array) -> float:
@@ -341,8 +358,8 @@ def _noise_of_speed(quality: RunQuality, speed: Array) -> float:
     """
     channel = quality.experiment[quality.channel]
     if channel.encoder is not None and (step := channel.resolution):
-        each = step / channel.encoder.angle_per_count
-        counts = each * np.round(quality.simulated / step)
+        counts_per_step = step / channel.encoder.angle_per_count
+        counts = counts_per_step * np.round(quality.simulated / step)
         rounded = speed_of(replace(channel, counts=counts), "exact").speed - speed
         return float(np.sqrt(np.mean(rounded[channel.used] ** 2)))
     pulse = np.zeros(channel.time.size)
@@ -358,11 +375,12 @@ def _white_noise(quality: RunQuality) -> float:
     a model's error, and spikes count little in their median.
     """
     channel = quality.experiment[quality.channel]
-    left, steps = quality.residual[channel.used], np.abs(np.diff(channel.values[channel.used]))
-    if left.size < FEWEST or not steps.any():
+    residual = quality.residual[channel.used]
+    steps = np.abs(np.diff(channel.values[channel.used]))
+    if residual.size < FEWEST or not steps.any():
         return 0.0
     # 20 = 1 + 9 + 9 + 1, and the median of a normal magnitude is 0.6745 standard deviations
-    white = np.median(np.abs(np.diff(left, 3))) / (0.6745 * np.sqrt(20.0))
+    white = np.median(np.abs(np.diff(residual, 3))) / (0.6745 * np.sqrt(20.0))
     return float(max(white, steps[steps > 0.0].min() / np.sqrt(12.0)))
 
 
@@ -373,46 +391,48 @@ def pooled(qualities: Iterable[RunQuality], *, without_noise: bool = False) -> d
     movement; of the error at least what the noise's own scatter leaves open remains.
     """
     channels: dict[str, list[RunQuality]] = {}
-    for each in qualities:
-        channels.setdefault(each.channel, []).append(each)
-    made = {}
-    for name, alike in channels.items():
-        signals = [q.experiment[name] for q in alike]
-        found = measures(
-            *((s.values, q.simulated, s.weight) for s, q in zip(signals, alike, strict=True))
-        )
-        if without_noise and any(each.noise for each in alike):
-            square, scatter = _noise_square(alike)
-            rmse = max(found.rmse**2 - square, min(scatter, found.rmse**2))
-            spread = max(found.spread**2 - square, 0.0)
-            found = found._replace(rmse=rmse**0.5, spread=spread**0.5)
-        made[name] = found
-    return made
+    for quality in qualities:
+        channels.setdefault(quality.channel, []).append(quality)
+    by_channel = {}
+    for name, of_channel in channels.items():
+        of_runs = []
+        for quality in of_channel:
+            channel = quality.experiment[name]
+            of_runs.append((channel.values, quality.simulated, channel.weight))
+        together = measures(*of_runs)
+        if without_noise and any(quality.noise for quality in of_channel):
+            square, scatter = _noise_square(of_channel)
+            rmse = max(together.rmse**2 - square, min(scatter, together.rmse**2))
+            spread = max(together.spread**2 - square, 0.0)
+            together = together._replace(rmse=rmse**0.5, spread=spread**0.5)
+        by_channel[name] = together
+    return by_channel
 
 
-def _noise_square(alike: Sequence[RunQuality]) -> tuple[float, float]:
+def _noise_square(qualities: Sequence[RunQuality]) -> tuple[float, float]:
     """Mean square of the noise of a channel over some runs, and that one's standard error."""
     square = samples = values = 0.0
-    for each in alike:
-        channel = each.experiment[each.channel]
+    for quality in qualities:
+        channel = quality.experiment[quality.channel]
         count = float(np.count_nonzero(channel.used))
         samples += count
-        if each.noise:
+        if quality.noise:
             # the filters pass noise of up to 30 Hz or so: twice as many independent values a second
             bandwidth = float(np.median(np.diff(channel.time))) * DIFFERENTIATOR / np.pi
             values += min(bandwidth, 1.0) * count
-            square += count * each.noise**2
+            square += count * quality.noise**2
         else:
             values += count
-            square += count * _white_noise(each) ** 2
+            square += count * _white_noise(quality) ** 2
     mean = square / samples
     return mean, mean * float(np.sqrt(2.0 / values))
 
 
 def range_of(qualities: Sequence[RunQuality]) -> float:
     """Largest less smallest value that was measured of a channel in some runs."""
-    counted = [x.values[x.used] for x in (each.experiment[each.channel] for each in qualities)]
-    return max(float(x.max()) for x in counted) - min(float(x.min()) for x in counted)
+    channels = [quality.experiment[quality.channel] for quality in qualities]
+    used = [channel.values[channel.used] for channel in channels]
+    return max(float(values.max()) for values in used) - min(float(values.min()) for values in used)
 
 
 def percent(part: float) -> str:
@@ -423,8 +443,12 @@ def percent(part: float) -> str:
 
 def following(qualities: Sequence[RunQuality], name: str) -> tuple[int, list[float]]:
     """Runs of a channel that were tested, and correlations of those that follow the input."""
-    tests = [each.test for each in qualities if each.channel == name and each.test is not None]
-    return len(tests), [each.peak[1] for each in tests if each.follows]
+    tests = [
+        quality.test
+        for quality in qualities
+        if quality.channel == name and quality.test is not None
+    ]
+    return len(tests), [test.peak[1] for test in tests if test.follows]
 
 
 def ignored_windows(channel: Channel) -> tuple[tuple[float, float], ...]:

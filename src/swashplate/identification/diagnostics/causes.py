@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from math import isfinite
@@ -85,7 +85,7 @@ class Cause(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Candidate(Result):
+class CandidateCause(Result):
     """One thing that may be wrong, or that the model may leave out."""
 
     name: str
@@ -118,10 +118,10 @@ def causes_of(stages: Sequence[StageFit]) -> tuple[Cause, ...] | None:
 
     Notes
     -----
-    Which are tried first says Rao's score test (Rao 1948): the derivative of the residuals by each
+    Rao's score test (Rao 1948) says which are tried first: the derivative of the residuals by each
     cause, freed of what the estimates can make up for, is projected on the residuals.
     """
-    found: tuple[Cause, ...] | None = None
+    causes: tuple[Cause, ...] | None = None
     for stage in stages:
         # a robust loss has taken what stands out already; any object with simulate may take minutes
         quick = isinstance(stage.problem.model, EquationModel)
@@ -130,11 +130,11 @@ def causes_of(stages: Sequence[StageFit]) -> tuple[Cause, ...] | None:
         before = squares_of(stage.problem, stage.solution.vector)
         if before.noise_share >= EXPLAINED:
             continue
-        found = _causes_of_stage(stage, before)
-        if found:
+        causes = _causes_of_stage(stage, before)
+        if causes:
             # what an earlier stage lacks, the later ones inherit
             break
-    return found
+    return causes
 
 
 class Squares(NamedTuple):
@@ -161,34 +161,42 @@ def squares_of(problem: Problem, vector: Array) -> Squares:
     for number, run in enumerate(problem.experiments):
         for name, residual in problem.residuals(vector, number).items():
             used = run[name].used
-            time, left = run[name].time[used], residual[used]
+            time = run[name].time[used]
+            counted = residual[used]
             if time.size < 2:
                 continue
-            size = max(round(BLOCK / float(np.median(np.diff(time)))), 2)
-            starts = np.arange(0, left.size, size)
-            counts = np.diff(np.append(starts, left.size))
-            slow += float(np.sum(np.add.reduceat(left, starts) ** 2 / counts))
-            total += float(left @ left)
-            samples, blocks = samples + left.size, blocks + starts.size
+            block = max(round(BLOCK / float(np.median(np.diff(time)))), 2)
+            starts = np.arange(0, counted.size, block)
+            counts = np.diff(np.append(starts, counted.size))
+            slow += float(np.sum(np.add.reduceat(counted, starts) ** 2 / counts))
+            total += float(counted @ counted)
+            samples += counted.size
+            blocks += starts.size
     return Squares(slow, max(total - slow, 0.0), samples / max(blocks, 1.0))
 
 
 def _causes_of_stage(stage: StageFit, before: Squares) -> tuple[Cause, ...]:
-    scored = [each for each in _scores(stage) if each.candidate.least < each.size]
-    scored = [each for each in scored if each.size < each.candidate.most]
-    scored.sort(key=lambda each: -each.share)
-    found = list[Cause]()
-    for each in scored[:TRIED]:
-        if (cause := _refitted(stage, each, before)) is not None:
-            found.append(cause)
-    return tuple(sorted(found, key=lambda each: -each.share)[:NAMED])
+    """Causes of one stage's residuals, the largest share first."""
+    plausible = [
+        score
+        for score in _scores(stage)
+        if score.candidate.least < score.size < score.candidate.most
+    ]
+    plausible.sort(key=lambda score: -score.share)
+    causes = list[Cause]()
+    for score in plausible[:TRIED]:
+        cause = _refitted(stage, score, before)
+        if cause is not None:
+            causes.append(cause)
+    causes.sort(key=lambda cause: -cause.share)
+    return tuple(causes[:NAMED])
 
 
 # --- to first order -------------------------------------------------------------------------------
 
 
 class _Score(NamedTuple):
-    candidate: Candidate
+    candidate: CandidateCause
     size: float
     """After one Gauss-Newton step. [SI, or 1]"""
     share: float
@@ -198,9 +206,11 @@ class _Score(NamedTuple):
 def _scores(stage: StageFit) -> Iterator[_Score]:
     """Each candidate of a stage, to first order."""
     fit = stage.linearised
-    candidates = {each.name: each for each in _candidates(stage)}
-    squares, products = dict[str, float](), dict[str, float]()
-    along, scales = dict[str, Array](), dict[str, list[_RunScale]]()
+    candidates = {candidate.name: candidate for candidate in _candidates(stage)}
+    squares = dict[str, float]()
+    products = dict[str, float]()
+    along = dict[str, Array]()
+    scales = dict[str, list[_RunScale]]()
     jacobians = fit.jacobians()
     for number in range(len(stage.problem.experiments)):
         parts = RunParts(stage, number, jacobians)
@@ -213,13 +223,17 @@ def _scores(stage: StageFit) -> Iterator[_Score]:
                 if name == SCALE.format(run.channel):
                     # a position has a free zero
                     motion = change - change.mean()
-                    own = _RunScale(number, motion @ run.residual, motion @ motion)
-                    scales.setdefault(run.channel, []).append(own)
+                    run_scale = _RunScale(
+                        position=number, product=motion @ run.residual, square=motion @ motion
+                    )
+                    scales.setdefault(run.channel, []).append(run_scale)
             along[name] = along.get(name, 0.0) + parts.along(changes)
     for name, square in squares.items():
-        apart = square - float(along[name] @ along[name])
-        if square > 0.0 and apart > SAME_DIRECTION**2 * square:
-            size, share = -products[name] / apart, products[name] ** 2 / (apart * fit.squares)
+        # what the estimates cannot make up for
+        remaining = square - float(along[name] @ along[name])
+        if square > 0.0 and remaining > SAME_DIRECTION**2 * square:
+            size = -products[name] / remaining
+            share = products[name] ** 2 / (remaining * fit.squares)
             for channel, of_runs in scales.items():
                 if name == DRIFT.format(channel):
                     share *= _in_order(of_runs)
@@ -229,7 +243,7 @@ def _scores(stage: StageFit) -> Iterator[_Score]:
 class _RunScale(NamedTuple):
     """What the residuals of one run say of the scale of its motion."""
 
-    place: int
+    position: int
     """Of the run among all of its stage."""
     product: float
     """Of motion and residuals."""
@@ -243,39 +257,32 @@ def _in_order(runs: Sequence[_RunScale]) -> float:
     Freed of what a line explains by chance (adjusted R², Draper and Smith 1998, section 5.1): a
     machine that differs between maneuvers differs between runs too, in whatever order they stand.
     """
-    moving = [each for each in runs if each.square > 0.0]
+    moving = [run_scale for run_scale in runs if run_scale.square > 0.0]
     if len(moving) < 3:
         return 0.0
-    place = np.array([float(each.place) for each in moving])
-    scale = np.array([each.product / each.square for each in moving])
-    total = float(np.sum((scale - scale.mean()) ** 2))
-    along = place - place.mean()
+    positions = np.array([float(run_scale.position) for run_scale in moving])
+    scales = np.array([run_scale.product / run_scale.square for run_scale in moving])
+    total = float(np.sum((scales - scales.mean()) ** 2))
+    along = positions - positions.mean()
     if not total > 0.0:
         return 0.0
-    line = float(along @ scale) ** 2 / float(along @ along)
-    return max(1.0 - (1.0 - line / total) * (scale.size - 1) / (scale.size - 2), 0.0)
+    line = float(along @ scales) ** 2 / float(along @ along)
+    return max(1.0 - (1.0 - line / total) * (scales.size - 1) / (scales.size - 2), 0.0)
 
 
 def _effects(stage: StageFit, number: int) -> Iterator[tuple[str, Changes]]:
     """By what the residuals of one run change with one unit of each candidate."""
-    problem, experiment = stage.problem, stage.problem.experiments[number]
+    problem = stage.problem
+    experiment = problem.experiments[number]
     simulation = SimulatedRun(stage, number)
-    middle = simulation.of(experiment)
-    place = number / max(len(problem.experiments) - 1, 1) - 0.5
+    outputs = simulation.of(experiment)
+    position = number / max(len(problem.experiments) - 1, 1) - 0.5
     for name in problem.channels:
-        if name in middle and name in experiment.channels:
-            for effect, change in _of_channel(experiment, name, middle[name], place).items():
+        if name in outputs and name in experiment.channels:
+            for effect, change in _of_channel(experiment, name, outputs[name], position).items():
                 yield effect, {name: change}
     if _drives(stage, experiment):
-        command = experiment.input
-        lagged = replace(command, values=behind_lag(command.time, command.values))
-        weaker = replace(command, values=(1.0 - SMALL_GAIN) * command.values)
-        for effect, signal, part in (
-            (COMMAND_GAIN, weaker, -SMALL_GAIN),
-            (COMMAND_LAG, lagged, SMALL_LAG),
-        ):
-            moved = simulation.of(replace(experiment, input=signal))
-            yield effect, {name: (moved[name] - middle[name]) / part for name in middle}
+        yield from _effects_of_command(simulation, experiment, outputs)
     width = stage.stage.current_hysteresis
     if width > 0.0:
         late = simulation.behind_hysteresis(experiment)
@@ -289,10 +296,28 @@ def _effects(stage: StageFit, number: int) -> Iterator[tuple[str, Changes]]:
             yield name, {channel: part.by[:, k] for channel, part in by.items()}
 
 
-def _of_channel(experiment: Experiment, name: str, output: Array, place: float) -> dict[str, Array]:
-    """Changes (m,) of simulated less measured if one unit of each is simulated.
+def _effects_of_command(
+    simulation: SimulatedRun, experiment: Experiment, outputs: Mapping[str, Array]
+) -> Iterator[tuple[str, Changes]]:
+    """By what a run changes with one unit of what may be wrong with its command."""
+    command = experiment.input
+    lagged = replace(command, values=behind_lag(command.time, command.values))
+    weaker = replace(command, values=(1.0 - SMALL_GAIN) * command.values)
+    for effect, signal, size in (
+        (COMMAND_GAIN, weaker, -SMALL_GAIN),
+        (COMMAND_LAG, lagged, SMALL_LAG),
+    ):
+        changed = simulation.of(replace(experiment, input=signal))
+        yield effect, {name: (changed[name] - outputs[name]) / size for name in outputs}
 
-    Of an instrument's faults, and of a motion that the model leaves out.
+
+def _of_channel(
+    experiment: Experiment, name: str, output: Array, position: float
+) -> dict[str, Array]:
+    """Changes (m,) of simulated less measured for one unit of each fault of a channel.
+
+    Faults are those of its instrument, and a motion that the model leaves out. `position` is that
+    of the run among all, from -0.5 to 0.5.
     """
     channel, time = experiment[name], experiment[name].time
     slope = np.gradient(output, time) if time.size > 2 else np.zeros_like(output)
@@ -303,7 +328,7 @@ def _of_channel(experiment: Experiment, name: str, output: Array, place: float) 
         f"lag of {name}": (behind_lag(time, output) - output) / SMALL_LAG,
     }
     if channel.kind not in CURRENTS:
-        effects[DRIFT.format(name)] = moved * place
+        effects[DRIFT.format(name)] = moved * position
         effects[RESISTED.format(name)] = -lost(experiment, name, output, resisting=True)
         effects[PULLED.format(name)] = -lost(experiment, name, output, resisting=False)
     return effects
@@ -319,25 +344,25 @@ def lost(experiment: Experiment, name: str, output: Array, *, resisting: bool) -
         return time - time[0] if channel.is_position else np.ones_like(time)
     speed = np.gradient(output, time) if channel.is_position else output
     moves = np.abs(speed) > 0.01 * float(np.abs(speed).max(initial=0.0))
-    way = np.sign(speed) * moves
+    direction = np.sign(speed) * moves
     if not channel.is_position:
-        return way
-    return np.cumsum(way * np.diff(time, prepend=time[:1]))
+        return direction
+    return np.cumsum(direction * np.diff(time, prepend=time[:1]))
 
 
 def behind_lag(time: Array, values: Array, lag: float = SMALL_LAG) -> Array:
     """(m,) values behind a first-order lag [s], at rest before."""
-    kept = np.exp(-np.diff(time) / lag)
-    bands = np.vstack([np.ones(time.size), np.append(-kept, 0.0)])
-    made = solve_banded((1, 0), bands, np.append(values[:1], (1.0 - kept) * values[1:]))
+    decay = np.exp(-np.diff(time) / lag)
+    bands = np.vstack([np.ones(time.size), np.append(-decay, 0.0)])
+    lagged = solve_banded((1, 0), bands, np.append(values[:1], (1.0 - decay) * values[1:]))
     # a full command stays one, whatever the last digit
-    return np.asarray(np.clip(made, values.min(), values.max()))
+    return np.asarray(np.clip(lagged, values.min(), values.max()))
 
 
 # --- what is looked for ---------------------------------------------------------------------------
 
 
-def _candidates(stage: StageFit) -> Iterator[Candidate]:
+def _candidates(stage: StageFit) -> Iterator[CandidateCause]:
     """Everything that may be freed in a stage."""
     for name in stage.problem.channels:
         yield from _of_readings(stage, name)
@@ -346,47 +371,49 @@ def _candidates(stage: StageFit) -> Iterator[Candidate]:
         yield from _of_numbers(stage)
 
 
-def _of_readings(stage: StageFit, name: str) -> Iterator[Candidate]:
+def _of_readings(stage: StageFit, name: str) -> Iterator[CandidateCause]:
     """What may be wrong with an instrument, or with the motion that it reads."""
     channels = [run[name] for run in stage.problem.experiments if name in run.channels]
     read = partial(_with_reading, stage, name)
     check = f"check the instrument of {name}"
-    yield Candidate(
-        SCALE.format(name),
-        -0.3,
-        0.3,
-        partial(read, _scaled),
-        lambda size: f"{name} reads {percent(abs(size))} too {'much' if size > 0.0 else 'little'}",
-        check,
+    yield CandidateCause(
+        name=SCALE.format(name),
+        least=-0.3,
+        most=0.3,
+        freed=partial(read, _scaled),
+        states=lambda size: (
+            f"{name} reads {percent(abs(size))} too {'much' if size > 0.0 else 'little'}"
+        ),
+        advice=check,
     )
-    yield Candidate(
-        f"time stamps of {name}",
-        -LATEST,
-        LATEST,
-        partial(read, _late),
-        lambda size: f"{name} is {_time(abs(size))} {'late' if size > 0.0 else 'early'}",
-        "compare its clock with that of the command, and look for a delay of the machine",
+    yield CandidateCause(
+        name=f"time stamps of {name}",
+        least=-LATEST,
+        most=LATEST,
+        freed=partial(read, _late),
+        states=lambda size: f"{name} is {_time(abs(size))} {'late' if size > 0.0 else 'early'}",
+        advice="compare its clock with that of the command, and look for a delay of the machine",
     )
-    yield Candidate(
-        f"lag of {name}",
-        0.0,
-        LATEST,
-        partial(read, _undone_lag),
-        lambda size: f"{name} lags by {_time(size)}",
-        f"{check} for a filter",
+    yield CandidateCause(
+        name=f"lag of {name}",
+        least=0.0,
+        most=LATEST,
+        freed=partial(read, _undone_lag),
+        states=lambda size: f"{name} lags by {_time(size)}",
+        advice=f"{check} for a filter",
     )
     if channels[0].kind in CURRENTS:
         return
-    yield Candidate(
-        DRIFT.format(name),
-        -0.5,
-        0.5,
-        partial(read, _undone_drift),
-        lambda size: (
+    yield CandidateCause(
+        name=DRIFT.format(name),
+        least=-0.5,
+        most=0.5,
+        freed=partial(read, _undone_drift),
+        states=lambda size: (
             f"{name} {'rises' if size > 0.0 else 'falls'} by {percent(abs(size))} from the first "
             "run to the last"
         ),
-        "warm the oil as it is in use, and test again",
+        advice="warm the oil as it is in use, and test again",
     )
     unit = channels[0].unit
     unit = unit if unit.endswith("/s") else f"{unit}/s"
@@ -394,13 +421,13 @@ def _of_readings(stage: StageFit, name: str) -> Iterator[Candidate]:
         (RESISTED, True, "a load that resists the motion"),
         (PULLED, False, "a load that pulls one way"),
     ):
-        yield Candidate(
-            kind.format(name),
-            0.0 if resisting else -np.inf,
-            np.inf,
-            partial(read, partial(_undone_loss, resisting=resisting)),
-            partial(_lost_speed, unit, load),
-            "look for that load, and for a leaking motor",
+        yield CandidateCause(
+            name=kind.format(name),
+            least=0.0 if resisting else -np.inf,
+            most=np.inf,
+            freed=partial(read, partial(_undone_loss, resisting=resisting)),
+            states=partial(_lost_speed, unit, load),
+            advice="look for that load, and for a leaking motor",
         )
 
 
@@ -413,44 +440,44 @@ def _lost_speed(unit: str, load: str, size: float) -> str:
     return f"{shown.factor * size:.3g} {shown.name} of speed are lost to {load}"
 
 
-def _of_commands(stage: StageFit) -> Iterator[Candidate]:
+def _of_commands(stage: StageFit) -> Iterator[CandidateCause]:
     """What may be wrong with the command, or with what takes it."""
-    yield Candidate(
-        COMMAND_GAIN,
-        -0.3,
-        0.3,
-        partial(_with_command, stage, _gained),
+    yield CandidateCause(
+        name=COMMAND_GAIN,
+        least=-0.3,
+        most=0.3,
+        freed=partial(_with_command, stage, _gained),
         # what acts is larger than what is read
-        lambda size: (
+        states=lambda size: (
             f"the command reads {percent(abs(size))} too {'little' if size > 0.0 else 'much'}"
         ),
-        "check its converter",
+        advice="check its converter",
     )
-    yield Candidate(
-        COMMAND_LAG,
-        0.0,
-        LATEST,
-        partial(_with_command, stage, _lagging),
-        lambda size: f"the command lags by {_time(size)} on its way to the amplifier",
-        "look for a filter or delay there",
+    yield CandidateCause(
+        name=COMMAND_LAG,
+        least=0.0,
+        most=LATEST,
+        freed=partial(_with_command, stage, _lagging),
+        states=lambda size: f"the command lags by {_time(size)} on its way to the amplifier",
+        advice="look for a filter or delay there",
     )
 
 
-def _of_numbers(stage: StageFit) -> Iterator[Candidate]:
+def _of_numbers(stage: StageFit) -> Iterator[CandidateCause]:
     """What of the drive is fixed, and the hysteresis that it is taken not to have."""
     runs = stage.problem.experiments
     largest = max(float(np.abs(_driving(stage, run)).max()) for run in runs)
     name = "solenoid_hysteresis"
-    yield Candidate(
-        name,
-        0.0,
-        0.1 * largest,
-        partial(_with_number, stage, name),
-        lambda size: (
+    yield CandidateCause(
+        name=name,
+        least=0.0,
+        most=0.1 * largest,
+        freed=partial(_with_number, stage, name),
+        states=lambda size: (
             f"spool and solenoids have a friction or hysteresis of ±{1e3 * size:.3g} mA, "
             f"{percent(size / largest)} of the largest current"
         ),
-        f"look at the dither; let the fit configuration estimate {name}",
+        advice=f"look at the dither; let the fit setup estimate {name}",
         free=name,
     )
     numbers = stage.parameters.numbers
@@ -459,13 +486,13 @@ def _of_numbers(stage: StageFit) -> Iterator[Candidate]:
         low, high = sorted((-0.5 * value, value))
         if definition.unit == "s":
             low, high = -value, LATEST
-        yield Candidate(
-            name,
-            low,
-            high,
-            partial(_with_number, stage, name),
-            partial(_other_value, name, definition.unit, value),
-            f"measure it ({definition.name}), or let the fit configuration estimate it",
+        yield CandidateCause(
+            name=name,
+            least=low,
+            most=high,
+            freed=partial(_with_number, stage, name),
+            states=partial(_other_value, name, definition.unit, value),
+            advice=f"measure it ({definition.name}), or let the fit setup estimate it",
             free=name,
         )
 
@@ -481,8 +508,8 @@ def fixed_numbers(stage: StageFit) -> list[str]:
         return []
     taken = {
         target
-        for each in (*stage.earlier, stage)
-        for unknown in each.problem.unknowns
+        for earlier in (*stage.earlier, stage)
+        for unknown in earlier.problem.unknowns
         for target in unknown.targets
     }
     if model.forces is not None:
@@ -539,24 +566,24 @@ def _refitted(stage: StageFit, score: _Score, before: Squares) -> Cause | None:
 
 
 def _solved(
-    stage: StageFit, candidate: Candidate, size: float, before: Squares
+    stage: StageFit, candidate: CandidateCause, size: float, before: Squares
 ) -> tuple[float, float] | None:
     """Size of a candidate and the share of the squares that a refit removes; None if it fails."""
     problem, vector = stage.problem, stage.solution.vector
     try:
         freed = candidate.freed(size)
         start = freed.start.copy()
-        places = {name: k for k, name in enumerate(problem.unknowns.names)}
+        estimated = dict(zip(problem.unknowns.names, vector, strict=True))
         for k, name in enumerate(freed.unknowns.names):
-            if name in places:
-                start[k] = vector[places[name]]
+            if name in estimated:
+                start[k] = estimated[name]
         most = min(max(WORK // problem.samples, FEWEST_EVALUATIONS), MOST_EVALUATIONS)
-        found: Solution = solve(freed, start, tolerance=TOLERANCE, max_evaluations=most)
-        share = 1.0 - squares_of(freed, found.vector).slow / before.slow
+        solution: Solution = solve(freed, start, tolerance=TOLERANCE, max_evaluations=most)
+        share = 1.0 - squares_of(freed, solution.vector).slow / before.slow
     except (DomainError, InputError, ParameterError):
         return None
     if candidate.free:
-        value = freed.unknowns.values(found.vector)[candidate.free]
+        value = freed.unknowns.values(solution.vector)[candidate.free]
         size = value - stage.parameters.numbers.get(candidate.free, 0.0)
     return size, share
 
@@ -589,8 +616,8 @@ def _with_reading(
     for number, run in enumerate(problem.experiments):
         if name in run.channels:
             output = problem.outputs(stage.solution.vector, number)[name]
-            place = number / max(count - 1, 1) - 0.5
-            run = undo(run, name, output, place, size)
+            position = number / max(count - 1, 1) - 0.5
+            run = undo(run, name, output, position, size)
         runs.append(run)
     return replace(problem, experiments=tuple(runs))
 
@@ -612,9 +639,9 @@ def _scaled(run: Experiment, name: str, _: Array, __: float, size: float) -> Exp
     return _with_values(run, name, zero + moved / (1.0 + size))
 
 
-def _undone_drift(run: Experiment, name: str, _: Array, place: float, size: float) -> Experiment:
+def _undone_drift(run: Experiment, name: str, _: Array, position: float, size: float) -> Experiment:
     moved, zero = _moved(run, name)
-    return _with_values(run, name, zero + moved / (1.0 + size * place))
+    return _with_values(run, name, zero + moved / (1.0 + size * position))
 
 
 def _late(run: Experiment, name: str, _: Array, __: float, size: float) -> Experiment:

@@ -18,6 +18,7 @@ from swashplate.campaign.quality import (
     unsigned_currents,
     wrapped_positions,
 )
+from swashplate.drive import Simulation
 from swashplate.errors import InputError, UnsoundDataError
 from swashplate.identification.estimation.drive_model import (
     CURRENTS,
@@ -28,7 +29,7 @@ from swashplate.identification.estimation.drive_model import (
 from swashplate.identification.estimation.model import EquationModel
 from swashplate.identification.estimation.model_setup import ModelSetup
 from swashplate.identification.estimation.problem import Loss, Problem
-from swashplate.identification.estimation.setup import Setup
+from swashplate.identification.estimation.setup import FitSetup
 from swashplate.identification.estimation.stages import smooth
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import FULL_VOLTAGE
@@ -57,9 +58,9 @@ class Finding(NamedTuple):
     """Something that stands in the way of a fit."""
 
     severity: Literal["refuse", "warn"]
-    """"refuse" where no result could mean anything; "warn" where some of it could."""
+    """"refuse" if no result could mean anything; "warn" if some of it could."""
     run: str | None
-    """The experiment's name; None for the campaign or its set-up."""
+    """The experiment's name; None for the campaign or its fit setup."""
     channel: str | None
     sentence: str
     """What is wrong, where, and what would be right."""
@@ -79,82 +80,116 @@ def check_runs(experiments: Sequence[Experiment], nominal: ParameterSet) -> list
     refused in an `InputError` or a `DomainError`.
     """
     unsigned = {**unsigned_currents(experiments), **wrapped_positions(experiments)}
-    found = [refusal(None, name, f"{said}.") for (_, name), said in unsigned.items()]
-    for each in experiments:
-        found += _samples(each, [n for n, c in each.channels.items() if c.kind in SIGNALS])
-    if not _refused(found):
-        found += _idle_commands(experiments, nominal)
-    if not _refused(found):
-        for name, ours in motions(experiments, nominal).items():
-            idle = {each.run for each in found if each.channel is None}
-            still = [*_still(name, [each for each in ours if each.run not in idle])]
-            seen = idle | {each.run for each in still}
-            found += still
-            found += contradictions(name, [each for each in ours if each.run not in seen])
-    return sorted(found, key=lambda each: each.severity != "refuse")
+    findings = [refusal(None, name, f"{clause}.") for (_, name), clause in unsigned.items()]
+    for run in experiments:
+        of_the_drive = [name for name, channel in run.channels.items() if channel.kind in SIGNALS]
+        findings += _samples(run, of_the_drive)
+    if not _refused(findings):
+        findings += _idle_commands(experiments, nominal)
+    if not _refused(findings):
+        for name, runs in simulated_readings(experiments, nominal).items():
+            named = {finding.run for finding in findings if finding.channel is None}
+            still = list(_still(name, [readings for readings in runs if readings.run not in named]))
+            named |= {finding.run for finding in still}
+            findings += still
+            others = [readings for readings in runs if readings.run not in named]
+            findings += contradictions(name, others)
+    return sorted(findings, key=lambda finding: finding.severity != "refuse")
 
 
-def unfitted_currents(experiments: Sequence[Experiment], setup: Setup) -> list[Finding]:
+def unfitted_currents(experiments: Sequence[Experiment], setup: FitSetup) -> list[Finding]:
     """Currents of an amplifier that are measured, and fitted by no stage."""
     fitted = {kind for stage in setup.stages for kind in stage.channels or kinds_of(stage.part)}
-    driving = any(stage.current == "measured" for stage in setup.stages)
-    left = {
-        name: None
-        for each in experiments
-        for name, channel in each.channels.items()
-        if each.input.kind == "voltage" and channel.kind in CURRENTS and channel.kind not in fitted
-    }
+    if any(stage.current == "measured" for stage in setup.stages):
+        return []
+    unfitted = dict.fromkeys(
+        name
+        for run in experiments
+        for name, channel in run.channels.items()
+        if run.input.kind == "voltage" and channel.kind in CURRENTS and channel.kind not in fitted
+    )
     return [
         warning(
             None,
             name,
             f"'{name}' is measured, but no stage fits it, so that the amplifier is not known: let "
-            "'swashplate guess' write a start and a fit configuration whose first stage fits the "
+            "'swashplate guess' write a start and a fit setup whose first stage fits the "
             "amplifier to it, and give them by --from and --setup.",
         )
-        for name in ([] if driving else left)
+        for name in unfitted
     ]
 
 
 def check_model(experiments: Sequence[Experiment], setup: ModelSetup) -> list[Finding]:
-    """What stands in the way of a fit of a model of one's own, as `check_runs` of a drive.
+    """What stands in the way of a fit of a user-defined model, as `check_runs` of a drive.
 
-    Whatever the model: samples that are no numbers, angles that begin anew, sensors that stand
+    Whatever the model: samples that are not numbers, angles that begin again, sensors that stand
     still while their input moves, and a run that is there twice.
     """
-    wrapped, seen = wrapped_positions(experiments), dict[bytes, str]()
+    wrapped = wrapped_positions(experiments)
     fitted = setup.channels or tuple(name for _, name in wrapped)
-    found = [refusal(None, n, f"{said}.") for (_, n), said in wrapped.items() if n in fitted]
-    for each in experiments:
-        found += _samples(each, setup.channels or tuple(each.channels))
-    if _refused(found):
-        return found
+    findings = [
+        refusal(None, name, f"{clause}.") for (_, name), clause in wrapped.items() if name in fitted
+    ]
+    for run in experiments:
+        findings += _samples(run, setup.channels or tuple(run.channels))
+    if _refused(findings):
+        return findings
     problem = setup.problem(experiments)
-    moving = {n for e in experiments for n, c in e.channels.items() if np.ptp(c.values) > 0.0}
-    for each in problem.experiments:
-        names = [name for name in problem.channels if name in each.channels]
-        arrays = [each.input.values, *(each[name].values for name in names)]
-        first = seen.setdefault(b"".join(array.tobytes() for array in arrays), each.name)
-        if first != each.name:
-            said = f"{each.name} has the samples of {first}, to the last bit, and counts twice; "
-            said += 'leave one of them out with role = "ignore".'
-            found.append(warning(each.name, None, said))
-        for name in names if np.ptp(each.input.values) > 0.0 else ():
-            used = each[name].values[each[name].used]
-            if name in moving and used.size and np.ptp(used) == 0.0:
-                said = f"{each.name}: '{name}' never changes, though the input does and it moves in"
-                said += " other runs; look at the sensor, or ignore the channel in this run."
-                found.append(warning(each.name, name, said))
-    return found
+    moving = {
+        name
+        for run in experiments
+        for name, channel in run.channels.items()
+        if np.ptp(channel.values) > 0.0
+    }
+    first_with = dict[bytes, str]()
+    for run in problem.experiments:
+        names = [name for name in problem.channels if name in run.channels]
+        findings += _repeated(run, names, first_with)
+        if np.ptp(run.input.values) > 0.0:
+            findings += _unchanging(run, [name for name in names if name in moving])
+    return findings
+
+
+def _repeated(
+    run: Experiment, names: Sequence[str], first_with: dict[bytes, str]
+) -> Iterator[Finding]:
+    """A run with the samples of an earlier one; `first_with` gets those of a new one."""
+    arrays = [run.input.values, *(run[name].values for name in names)]
+    samples = b"".join(array.tobytes() for array in arrays)
+    first = first_with.setdefault(samples, run.name)
+    if first != run.name:
+        yield warning(
+            run.name,
+            None,
+            f"{run.name} has the samples of {first}, to the last bit, and counts twice; leave one "
+            'of them out with role = "ignore".',
+        )
+
+
+def _unchanging(run: Experiment, names: Sequence[str]) -> Iterator[Finding]:
+    """Channels that stand still in a run, of those that move in another one."""
+    for name in names:
+        used = run[name].values[run[name].used]
+        if used.size and np.ptp(used) == 0.0:
+            yield warning(
+                run.name,
+                name,
+                f"{run.name}: '{name}' never changes, though the input does and it moves in other "
+                "runs; look at the sensor, or ignore the channel in this run.",
+            )
 
 
 def contradicting_runs(
     experiments: Sequence[Experiment], parameters: ParameterSet
 ) -> list[Finding]:
     """Runs whose sign or scale contradicts the others, beside a drive that was fitted to all."""
-    of_channels = motions(experiments, parameters).items()
-    found = (each for name, ours in of_channels for each in contradictions(name, ours))
-    return [each for each in found if each.run is not None]
+    return [
+        finding
+        for name, runs in simulated_readings(experiments, parameters).items()
+        for finding in contradictions(name, runs)
+        if finding.run is not None
+    ]
 
 
 def refuse_unsound(
@@ -164,11 +199,14 @@ def refuse_unsound(
 
     It says the first of these, and how many more there are.
     """
-    if refused := _refused(findings):
-        more = len(refused) - 1
-        also = f" ({more} more finding{'s' if more > 1 else ''} of this weight.)" if more else ""
-        raise error(refused[0].sentence + also)
-    return tuple(each.sentence for each in findings)
+    refused = _refused(findings)
+    if refused:
+        others = len(refused) - 1
+        remark = ""
+        if others:
+            remark = f" ({others} more finding{'s' if others > 1 else ''} of this weight.)"
+        raise error(refused[0].sentence + remark)
+    return tuple(finding.sentence for finding in findings)
 
 
 def spike_findings(experiments: Sequence[Experiment], loss: Loss) -> list[Finding]:
@@ -179,72 +217,102 @@ def spike_findings(experiments: Sequence[Experiment], loss: Loss) -> list[Findin
     ]
 
 
-def _refused(found: Sequence[Finding]) -> list[Finding]:
-    return [each for each in found if each.severity == "refuse"]
+def _refused(findings: Sequence[Finding]) -> list[Finding]:
+    return [finding for finding in findings if finding.severity == "refuse"]
 
 
 # --- samples and commands -------------------------------------------------------------------------
 
 
 def _samples(experiment: Experiment, fitted: Collection[str]) -> Iterator[Finding]:
-    """Runs without two samples, and numbers that are none."""
-    run, signal = experiment.name, experiment.input
-    bad = ~(np.isfinite(signal.values) & np.isfinite(signal.time))
+    """Runs without two samples, and samples that are not finite."""
+    run = experiment.name
+    signal = experiment.input
     if signal.values.size < 2:
-        had = count(signal.values.size, "sample")
-        said = f"{run}: its input has {had}; at least two are needed, and a run with motion has "
-        yield refusal(run, None, f"{said}hundreds.")
+        samples = count(signal.values.size, "sample")
+        yield refusal(
+            run,
+            None,
+            f"{run}: its input has {samples}; at least two are needed, and a run with motion has "
+            "hundreds.",
+        )
         return
+    bad = ~(np.isfinite(signal.values) & np.isfinite(signal.time))
     if bad.any():
-        said = f"{run}: its input is not finite at sample {int(np.argmax(bad))}; mend the log or "
-        yield refusal(run, None, f"{said}cut the run with a span.")
+        yield refusal(
+            run,
+            None,
+            f"{run}: its input is not finite at sample {int(np.argmax(bad))}; mend the log or "
+            "cut the run with a span.",
+        )
         return
     for name, channel in experiment.channels.items():
-        used, samples = channel.used, int(np.count_nonzero(channel.used))
-        if name not in fitted or (channel.values.size and not samples):
+        used = int(np.count_nonzero(channel.used))
+        if name not in fitted or (channel.values.size and not used):
             continue
-        bad = used & ~(np.isfinite(channel.values) & np.isfinite(channel.time))
+        bad = channel.used & ~(np.isfinite(channel.values) & np.isfinite(channel.time))
         if bad.any():
-            had = count(int(np.count_nonzero(bad)), "sample")
-            said = f"{run}: '{name}' is not finite in {had}, the first at "
-            said += f'{channel.time[np.argmax(bad)]:.6g} s; say missing = "drop", or ignore a '
-            yield refusal(run, name, f"{said}window, the channel or the run.")
-        elif samples < 2:
-            said = f"{run}: '{name}' has {count(samples, 'sample')} that can count, which shows no "
-            yield refusal(run, name, f'{said}motion; leave the run out with role = "ignore".')
+            samples = count(int(np.count_nonzero(bad)), "sample")
+            yield refusal(
+                run,
+                name,
+                f"{run}: '{name}' is not finite in {samples}, the first at "
+                f'{channel.time[np.argmax(bad)]:.6g} s; say missing = "drop", or ignore a '
+                "window, the channel or the run.",
+            )
+        elif used < 2:
+            yield refusal(
+                run,
+                name,
+                f"{run}: '{name}' has {count(used, 'sample')} that can count, which shows no "
+                'motion; leave the run out with role = "ignore".',
+            )
 
 
 def _idle_commands(experiments: Sequence[Experiment], nominal: ParameterSet) -> list[Finding]:
     """Commands that move nothing."""
-    idle, numbers = {}, nominal.numbers
-    symbols = {"voltage": ("V_dz", "V_dz_minus", "V_dz_plus"), "current": ("Z17", "Z17", "Z17")}
-    for each in experiments:
-        if each.input.kind not in symbols:
-            continue
-        symbol, minus, plus = symbols[each.input.kind]
-        low, high = -numbers[minus], numbers[plus]
-        least, most, unit = each.input.values.min(), each.input.values.max(), each.input.unit
-        if low <= least and most <= high:
-            zone = f"the dead zone {symbol} ({low:.3g} to {high:.3g} {unit})"
-            idle[each.name] = f"stays between {least:.3g} and {most:.3g} {unit}, within {zone}"
-    if not idle or len(idle) < len(experiments):
-        also = "; it shows the drive at rest only."
-        return [warning(run, None, f"{run}: its command {why}{also}") for run, why in idle.items()]
-    first, why = next(iter(idle.items()))
-    others = ", and so it is in all other runs" if len(idle) > 1 else ""
-    said = f"{first}: its command {why}{others}; a drive that does not move cannot be identified: "
-    said += "use larger commands"
-    peak = 1e3 * max(float(np.abs(each.input.values).max()) for each in experiments)
+    clauses = dict[str, str]()
+    for run in experiments:
+        clause = _within_dead_zone(run, nominal)
+        if clause:
+            clauses[run.name] = clause
+    if not clauses or len(clauses) < len(experiments):
+        return [
+            warning(name, None, f"{name}: its command {clause}; it shows the drive at rest only.")
+            for name, clause in clauses.items()
+        ]
+    first, clause = next(iter(clauses.items()))
+    others = ", and so it is in all other runs" if len(clauses) > 1 else ""
+    sentence = (
+        f"{first}: its command {clause}{others}; a drive that does not move cannot be identified: "
+        "use larger commands"
+    )
+    peak = 1e3 * max(float(np.abs(run.input.values).max()) for run in experiments)
     if experiments[0].input.kind == "voltage" and 1.0 <= peak <= FULL_VOLTAGE:
         # a thousandth of a usual command, in volts that were declared as millivolts
-        said += f', or, if the log is in V, write unit = "V": it then reaches {peak:.3g} V'
-    return [refusal(first, None, f"{said}.")]
+        sentence += f', or, if the log is in V, write unit = "V": it then reaches {peak:.3g} V'
+    return [refusal(first, None, f"{sentence}.")]
+
+
+def _within_dead_zone(run: Experiment, nominal: ParameterSet) -> str:
+    """Clause on a command that never leaves the dead zone; empty if it does."""
+    symbols = {"voltage": ("V_dz", "V_dz_minus", "V_dz_plus"), "current": ("Z17", "Z17", "Z17")}
+    if run.input.kind not in symbols:
+        return ""
+    symbol, minus, plus = symbols[run.input.kind]
+    low, high = -nominal.numbers[minus], nominal.numbers[plus]
+    least, most = run.input.values.min(), run.input.values.max()
+    if least < low or most > high:
+        return ""
+    unit = run.input.unit
+    zone = f"the dead zone {symbol} ({low:.3g} to {high:.3g} {unit})"
+    return f"stays between {least:.3g} and {most:.3g} {unit}, within {zone}"
 
 
 # --- what channels do beside the nominal drive ----------------------------------------------------
 
 
-class Motion(NamedTuple):
+class SimulatedReadings(NamedTuple):
     """What a channel did in a run, measured and simulated, where it counts."""
 
     run: str
@@ -265,94 +333,140 @@ class Motion(NamedTuple):
     def unlike(self) -> float:
         """Share of the measured square sum that the best multiple of the simulated one leaves."""
         total = float(self.measured @ self.measured)
-        left = self.measured - self.gain * self.simulated
-        return float(left @ left) / total if total > 0.0 else 1.0
+        if not total > 0.0:
+            return 1.0
+        remainder = self.measured - self.gain * self.simulated
+        return float(remainder @ remainder) / total
 
 
-def motions(experiments: Sequence[Experiment], parameters: ParameterSet) -> dict[str, list[Motion]]:
+def simulated_readings(
+    experiments: Sequence[Experiment], parameters: ParameterSet
+) -> dict[str, list[SimulatedReadings]]:
     """What each channel did in each run, by the channel's name; runs that hardly move left out."""
-    found: dict[str, list[Motion]] = {}
+    by_channel = dict[str, list[SimulatedReadings]]()
     for experiment in experiments:
         simulation = simulated_run(experiment, parameters)
         for name, channel in experiment.channels.items():
-            used, signal = channel.used, SIGNALS.get(channel.kind)
             driven = experiment.input.kind == "current" and "current" in channel.kind
-            if signal is None or driven or np.count_nonzero(used) < 2:
+            if channel.kind not in SIGNALS or driven or np.count_nonzero(channel.used) < 2:
                 continue
-            time, measured = channel.time[used], channel.values[used]
-            both = ("current_positive", "current_negative")
-            parts = both if signal == "current_sum" else (signal,)
-            simulated = np.sum(
-                [np.interp(time, simulation.time, simulation[each]) for each in parts], axis=0
-            )
-            if channel.is_position:
-                # mean speeds in short windows: where a position drifts to says little
-                windows = max(int((time[-1] - time[0]) / WINDOW), 4)
-                grid = np.linspace(time[0], time[-1], windows + 1)
-                measured, simulated = (
-                    np.diff(np.interp(grid, time, each)) / np.diff(grid)
-                    for each in (measured, simulated)
-                )
-                time = 0.5 * (grid[1:] + grid[:-1])
-            ours = Motion(experiment.name, channel, time, measured, simulated)
-            found.setdefault(name, []).append(ours)
-    for name, each in found.items():
-        sizes = [float(np.sqrt(np.mean(np.square(one.simulated)))) for one in each]
-        least = MOVING * max(sizes)
-        kept = zip(each, sizes, strict=True)
-        found[name] = [one for one, size in kept if size > 0.0 and size >= least]
-    return found
+            readings = _readings_of(experiment.name, channel, simulation)
+            by_channel.setdefault(name, []).append(readings)
+    return {name: _moving(runs) for name, runs in by_channel.items()}
 
 
-def _still(name: str, ours: Sequence[Motion]) -> Iterator[Finding]:
+def _readings_of(run: str, channel: Channel, simulation: Simulation) -> SimulatedReadings:
+    """A channel of a run beside its simulation."""
+    time, measured = channel.time[channel.used], channel.values[channel.used]
+    signal = SIGNALS[channel.kind]
+    parts = ("current_positive", "current_negative") if signal == "current_sum" else (signal,)
+    simulated = np.sum(
+        [np.interp(time, simulation.time, simulation[part]) for part in parts], axis=0
+    )
+    if channel.is_position:
+        # mean speeds in short windows: where a position drifts to says little
+        windows = max(int((time[-1] - time[0]) / WINDOW), 4)
+        grid = np.linspace(time[0], time[-1], windows + 1)
+        measured = np.diff(np.interp(grid, time, measured)) / np.diff(grid)
+        simulated = np.diff(np.interp(grid, time, simulated)) / np.diff(grid)
+        time = 0.5 * (grid[1:] + grid[:-1])
+    return SimulatedReadings(run, channel, time, measured, simulated)
+
+
+def _moving(runs: Sequence[SimulatedReadings]) -> list[SimulatedReadings]:
+    """The runs of a channel in which it should move."""
+    sizes = [float(np.sqrt(np.mean(np.square(readings.simulated)))) for readings in runs]
+    least = MOVING * max(sizes)
+    return [
+        readings for readings, size in zip(runs, sizes, strict=True) if size > 0.0 and size >= least
+    ]
+
+
+def _still(name: str, runs: Sequence[SimulatedReadings]) -> Iterator[Finding]:
     """Sensors that show nothing while the drive moves, and positions that freeze for a while."""
-    ranges = [float(np.ptp(each.simulated)) for each in ours]
-    fastest = max((float(np.abs(each.simulated).max()) for each in ours), default=0.0)
-    for each, moves in zip(ours, ranges, strict=True):
-        where, position = f"{each.run}: '{name}'", each.channel.is_position
-        if np.ptp(each.measured) == 0.0 and moves > DEAD * max(ranges):
-            unit = f"{each.channel.unit}/s" if position else each.channel.unit
-            said = f"never changes, though the drive should move it by about {moves:.3g} {unit}"
-            also = "look at the sensor, and ignore the channel in this run."
-            yield refusal(each.run, name, f"{where} {said}; {also}")
-            continue
-        frozen = (each.measured == 0.0) & (np.abs(each.simulated) > DEAD * fastest) & position
-        edges = np.flatnonzero(np.diff(frozen, prepend=False, append=False))
-        half = 0.5 * float(np.median(np.diff(each.time)))
-        for first, stop in edges.reshape(-1, 2):
-            begin, end = each.time[first] - half, each.time[stop - 1] + half
-            if end - begin > FROZEN:
-                said = f"stands still from {begin:.4g} to {end:.4g} s, though the drive should move"
-                also = "it; look at the sensor and at the machine's stops, and ignore that window."
-                yield warning(each.run, name, f"{where} {said} {also}")
-                break
+    ranges = [float(np.ptp(readings.simulated)) for readings in runs]
+    fastest = max((float(np.abs(readings.simulated).max()) for readings in runs), default=0.0)
+    for readings, simulated_range in zip(runs, ranges, strict=True):
+        channel = readings.channel
+        if np.ptp(readings.measured) == 0.0 and simulated_range > DEAD * max(ranges):
+            unit = f"{channel.unit}/s" if channel.is_position else channel.unit
+            yield refusal(
+                readings.run,
+                name,
+                f"{readings.run}: '{name}' never changes, though the drive should move it by about "
+                f"{simulated_range:.3g} {unit}; look at the sensor, and ignore the channel in this "
+                "run.",
+            )
+        elif channel.is_position:
+            yield from _frozen(name, readings, DEAD * fastest)
 
 
-def contradictions(name: str, ours: Sequence[Motion]) -> Iterator[Finding]:
+def _frozen(name: str, readings: SimulatedReadings, least: float) -> Iterator[Finding]:
+    """The first long stretch in which a position stands still though it should move."""
+    frozen = (readings.measured == 0.0) & (np.abs(readings.simulated) > least)
+    edges = np.flatnonzero(np.diff(frozen, prepend=False, append=False))
+    half = 0.5 * float(np.median(np.diff(readings.time)))
+    for first, stop in edges.reshape(-1, 2):
+        begin, end = readings.time[first] - half, readings.time[stop - 1] + half
+        if end - begin > FROZEN:
+            yield warning(
+                readings.run,
+                name,
+                f"{readings.run}: '{name}' stands still from {begin:.4g} to {end:.4g} s, though "
+                "the drive should move it; look at the sensor and at the machine's stops, and "
+                "ignore that window.",
+            )
+            return
+
+
+def contradictions(name: str, runs: Sequence[SimulatedReadings]) -> Iterator[Finding]:
     """Runs whose sign or scale beside the drive cannot be right, or a channel's as a whole."""
-    against = [turned(each.simulated, each.measured) for each in ours]
-    if len(ours) > 1 and all(against):
-        said = f"In all {len(ours)} runs '{name}' goes against the command: reverse it with "
-        yield refusal(None, name, f"{said}sign = -1 in its channel, or the input's.")
+    against = [turned(readings.simulated, readings.measured) for readings in runs]
+    if len(runs) > 1 and all(against):
+        yield refusal(
+            None,
+            name,
+            f"In all {len(runs)} runs '{name}' goes against the command: reverse it with "
+            "sign = -1 in its channel, or the input's.",
+        )
         return
-    others = "" if len(ours) == 1 else ", in the other runs with it"
-    for each in (each for each, wrong in zip(ours, against, strict=True) if wrong):
-        said = f"In {each.run} '{name}' goes against the command{others}: reverse it with "
-        said += 'sign = -1 for this run, or leave the run out with role = "ignore".'
-        yield refusal(each.run, name, said)
-    left = [each for each, wrong in zip(ours, against, strict=True) if not wrong]
-    gains = np.array([abs(each.gain) for each in left])
-    middle = float(np.median(gains)) if left else 1.0
-    hint = "check its unit, scale, counts_per_turn (quadrature included) and the drive."
-    if not 1.0 / FAR_OFF < middle < FAR_OFF:
-        said = f"'{name}' moves {middle:.3g} times as far as in the nominal drive: {hint}"
-        yield warning(None, name, said)
+    others = "" if len(runs) == 1 else ", in the other runs with it"
+    along = list[SimulatedReadings]()
+    for readings, is_against in zip(runs, against, strict=True):
+        if not is_against:
+            along.append(readings)
+            continue
+        yield refusal(
+            readings.run,
+            name,
+            f"In {readings.run} '{name}' goes against the command{others}: reverse it with "
+            'sign = -1 for this run, or leave the run out with role = "ignore".',
+        )
+    yield from _far_off_gains(name, along)
+
+
+def _far_off_gains(name: str, runs: Sequence[SimulatedReadings]) -> Iterator[Finding]:
+    """Channels that move much more or less than the drive, in all runs or in one."""
+    if not runs:
         return
-    for each, gain in zip(left, gains, strict=True):
-        if not 1.0 / FAR_OFF < gain / middle < FAR_OFF:
-            said = f"In {each.run} '{name}' moves {gain:.3g} times as far as in the nominal drive, "
-            said += f"in the other runs {middle:.3g} times: {hint}"
-            yield warning(each.run, name, said)
+    gains = np.array([abs(readings.gain) for readings in runs])
+    median = float(np.median(gains))
+    remedy = "check its unit, scale, counts_per_turn (quadrature included) and the drive."
+    if not 1.0 / FAR_OFF < median < FAR_OFF:
+        yield warning(
+            None,
+            name,
+            f"'{name}' moves {median:.3g} times as far as in the nominal drive: {remedy}",
+        )
+        return
+    for readings, gain in zip(runs, gains, strict=True):
+        if not 1.0 / FAR_OFF < gain / median < FAR_OFF:
+            yield warning(
+                readings.run,
+                name,
+                f"In {readings.run} '{name}' moves {gain:.3g} times as far as in the nominal "
+                f"drive, in the other runs {median:.3g} times: {remedy}",
+            )
 
 
 # --- ends of instruments --------------------------------------------------------------------------
@@ -367,23 +481,23 @@ def clipped_channels(experiments: Sequence[Experiment]) -> Iterator[Finding]:
     noise does, and one that reads it at a run's first sample is at rest. Positions are passed over,
     as they stand still by themselves.
     """
-    for name in dict.fromkeys(name for each in experiments for name in each.channels):
-        runs = [each for each in experiments if name in each.channels]
+    for name in dict.fromkeys(name for run in experiments for name in run.channels):
+        runs = [run for run in experiments if name in run.channels]
         if runs[0][name].is_position:
             continue
-        values = np.concatenate([each[name].values for each in runs])
+        values = np.concatenate([run[name].values for run in runs])
         low, high = float(values.min()), float(values.max())
-        reach = float(np.ptp(np.concatenate([each.input.values for each in runs])))
-        stated = (each[name].limits for each in runs)
+        reach = float(np.ptp(np.concatenate([run.input.values for run in runs])))
+        stated = (run[name].limits for run in runs)
         limits = [pair for pair in stated if pair is not None]
         for end in (low, high):
             # limits may be stated a little within the end at which the readings stand
             if any(not lower < end < upper for lower, upper in limits):
                 continue
-            spans = np.array([span for each in runs for span in _inputs_at(end, each, name)])
+            spans = np.array([span for run in runs for span in _inputs_at(end, run, name)])
             if not spans.size or low == high:
                 continue
-            rests = any(each[name].values[0] == end for each in runs)
+            rests = any(run[name].values[0] == end for run in runs)
             moved, apart = float(np.ptp(spans, axis=1).max()), float(np.ptp(spans))
             # a rounded reading stands still by itself for as long as a step of it lasts
             coarse = float(np.diff(np.unique(np.round(values / (high - low), 9))).min())
@@ -453,12 +567,12 @@ def beside_the_drives(campaign: Campaign) -> list[str]:
         if axis.drive is None:
             continue
         nominal, runs = smooth(campaign.drive(name).parameters), []
-        for each in campaign.select(axis=name):
-            beyond = beyond_the_card(each)
+        for run in campaign.select(axis=name):
+            beyond = beyond_the_card(run)
             found += [f"{said}; this run is not compared with the drive" for said in beyond]
-            runs += [] if beyond else [each]
+            runs += [] if beyond else [run]
         # a drive that is made up says nothing of what a machine does
-        made_up = all(each.status == "assumed" for each in nominal.values())
-        if runs and not made_up and all(each.input.kind != "other" for each in runs):
-            found += [each.sentence.rstrip(".") for each in check_runs(runs, nominal)]
+        made_up = all(parameter.status == "assumed" for parameter in nominal.values())
+        if runs and not made_up and all(experiment.input.kind != "other" for experiment in runs):
+            found += [finding.sentence.rstrip(".") for finding in check_runs(runs, nominal)]
     return found

@@ -28,9 +28,9 @@ from swashplate.identification.validation import RunQuality
 from swashplate.results import Result
 
 Array = NDArray[np.float64]
-Motion = Literal["large", "small", "fast"]
+MotionClass = Literal["large", "small", "fast"]
 
-WINDOWS: Mapping[Motion, float] = {"large": 0.5, "small": 0.5, "fast": 0.12}
+WINDOWS: Mapping[MotionClass, float] = {"large": 0.5, "small": 0.5, "fast": 0.12}
 """Time over which an error is taken in each class. [s]"""
 TIME = 0.1
 """Time in which a change of the signal counts as large as the signal. [s]"""
@@ -96,42 +96,53 @@ class _Shift(NamedTuple):
     """(d,)"""
 
 
+class _RunPart(NamedTuple):
+    """What one channel of a run adds to the shift of its group."""
+
+    directions: NDArray[np.intp]
+    product: Array
+    """(d, d) of its derivatives along these directions."""
+    along: Array
+    """(d,) of these derivatives and the residuals."""
+
+
 def _shifts(fit: LinearisedFit, groups: Mapping[str, str]) -> dict[str, _Shift]:
     """Of each group of runs; products alone are kept of them."""
-    parts = defaultdict[str, list[tuple[NDArray[np.intp], Array, Array]]](list)
+    parts = defaultdict[str, list[_RunPart]](list)
     for run, jacobian in fit.jacobians():
         if run.name in groups:
             directions, whitening = fit.inverse.of_run(run.name)
             by = jacobian @ whitening
-            parts[groups[run.name]].append((directions, by.T @ by, by.T @ run.residual))
-    found = dict[str, _Shift]()
-    for group, each in parts.items():
-        moved = np.unique(np.concatenate([directions for directions, _, _ in each]))
-        products, along = np.zeros((moved.size, moved.size)), np.zeros(moved.size)
-        for directions, product, residual in each:
-            place = np.searchsorted(moved, directions)
-            products[np.ix_(place, place)] += product
-            along[place] += residual
+            parts[groups[run.name]].append(_RunPart(directions, by.T @ by, by.T @ run.residual))
+    shifts = dict[str, _Shift]()
+    for group, run_parts in parts.items():
+        moved = np.unique(np.concatenate([part.directions for part in run_parts]))
+        products = np.zeros((moved.size, moved.size))
+        along = np.zeros(moved.size)
+        for part in run_parts:
+            positions = np.searchsorted(moved, part.directions)
+            products[np.ix_(positions, positions)] += part.product
+            along[positions] += part.along
         leverages, axes = np.linalg.eigh(products)
         spare = 1.0 - np.minimum(leverages, 1.0)
         shared = spare > OWN
         gain = np.where(shared, 1.0 / np.where(shared, spare, 1.0), 0.0)
-        found[group] = _Shift(moved, axes @ (gain * (axes.T @ along)))
-    return found
+        shifts[group] = _Shift(moved, axes @ (gain * (axes.T @ along)))
+    return shifts
 
 
 def _shifted(fit: LinearisedFit, run: LinearisedRun, jacobian: Array, shift: _Shift) -> Array:
     """(n,) differences of a run, simulated less measured, after a shift. [unit]"""
     directions, whitening = fit.inverse.of_run(run.name)
-    _, own, theirs = np.intersect1d(directions, shift.directions, return_indices=True)
-    moved = run.residual + jacobian @ (whitening[:, own] @ shift.size[theirs])
+    _, of_run, of_shift = np.intersect1d(directions, shift.directions, return_indices=True)
+    moved = run.residual + jacobian @ (whitening[:, of_run] @ shift.size[of_shift])
     return np.asarray(moved if run.weight is None else moved / run.weight)
 
 
 # --- errors over windows --------------------------------------------------------------------------
 
 
-class Record(NamedTuple):
+class ChannelErrors(NamedTuple):
     """One channel of one run, on an even grid, with the error of its simulation."""
 
     run: str
@@ -158,9 +169,9 @@ class Record(NamedTuple):
     is_position: bool
 
 
-def record_of(
+def channel_errors(
     quality: RunQuality, error: Array | None = None, *, held_out: bool = False
-) -> Record | None:
+) -> ChannelErrors | None:
     """One channel of one run; None if fewer than four samples count.
 
     Parameters
@@ -180,38 +191,39 @@ def record_of(
     grid = np.arange(time[0], time[-1] + 0.5 * step, step)
     signal = np.interp(grid, channel.time, quality.simulated)
     rounding = np.zeros(grid.size)
-    if step_of_counts := channel.resolution:
+    step_of_counts = channel.resolution
+    if step_of_counts:
         # at constant speed it is slow, and not independent from sample to sample
         rounding = step_of_counts * np.round(signal / step_of_counts) - signal
     if channel.is_position:
         signal = np.gradient(signal, step)
-    return Record(
-        experiment.name,
-        maneuver_of(experiment),
-        held_out,
-        float(time[0]),
-        step,
-        np.interp(grid, time, channel.values[channel.used]),
-        np.interp(grid, time, error),
-        white_noise(error, channel.values[channel.used]),
-        rounding,
-        signal,
-        TIME * np.gradient(signal, step),
-        experiment.input.at(grid),
-        channel.is_position,
+    return ChannelErrors(
+        run=experiment.name,
+        maneuver=maneuver_of(experiment),
+        held_out=held_out,
+        start=float(time[0]),
+        step=step,
+        measured=np.interp(grid, time, channel.values[channel.used]),
+        error=np.interp(grid, time, error),
+        noise=white_noise(error, channel.values[channel.used]),
+        rounding=rounding,
+        signal=signal,
+        rate=TIME * np.gradient(signal, step),
+        command=experiment.input.at(grid),
+        is_position=channel.is_position,
     )
 
 
 @dataclass(frozen=True)
-class Records(Result):
+class ErrorsOfRuns(Result):
     """One channel of several runs, one record after another: those of many runs are large."""
 
     parts: tuple[tuple[RunQuality, Array | None, bool], ...]
-    """Arguments of `record_of`: the quality, the error, and whether the run was held out."""
+    """Arguments of `channel_errors`: the quality, the error, and whether the run was held out."""
 
-    def __iter__(self) -> Iterator[Record]:
+    def __iter__(self) -> Iterator[ChannelErrors]:
         for quality, error, held_out in self.parts:
-            record = record_of(quality, error, held_out=held_out)
+            record = channel_errors(quality, error, held_out=held_out)
             if record is not None:
                 yield record
 
@@ -238,7 +250,7 @@ def white_noise(error: Array, values: Array) -> float:
     return float(max(white, rounding))
 
 
-def over_window(record: Record, window: float) -> tuple[Array, float]:
+def over_window(record: ChannelErrors, window: float) -> tuple[Array, float]:
     """Errors (n,) over a window about each sample, NaN at both ends, and their noise's variance.
 
     Of a position the slope of the straight line through it, of anything else the mean.
@@ -247,32 +259,34 @@ def over_window(record: Record, window: float) -> tuple[Array, float]:
     return windowed(record.error, weights), record.noise**2 * float(weights @ weights)
 
 
-def window_weights(record: Record, window: float) -> Array:
+def window_weights(record: ChannelErrors, window: float) -> Array:
     """Odd number of weights of a slope, or of a mean, to be convolved with samples."""
     half = int(0.5 * window / record.step)
     if not record.is_position:
         return np.full(2 * half + 1, 1.0 / (2 * half + 1))
-    places = np.arange(-max(half, 1), max(half, 1) + 1.0)
-    return np.asarray(places[::-1] / (np.sum(places**2) * record.step))
+    offsets = np.arange(-max(half, 1), max(half, 1) + 1.0)
+    return np.asarray(offsets[::-1] / (np.sum(offsets**2) * record.step))
 
 
 def windowed(values: Array, weights: Array) -> Array:
     """(n,) weighted sums about each of (n,) samples, NaN where a part of the window is missing."""
     half = weights.size // 2
-    found = np.full(values.size, np.nan)
+    sums = np.full(values.size, np.nan)
     if values.size > weights.size:
         # about the first sample: a position may begin far from 0
-        sums = fftconvolve(values - values[0], weights, "valid") + values[0] * weights.sum()
-        found[half : values.size - half] = sums
-    return found
+        from_first = fftconvolve(values - values[0], weights, "valid")
+        sums[half : values.size - half] = from_first + values[0] * weights.sum()
+    return sums
 
 
-def classes_of(record: Record, reach: float, largest: float) -> dict[Motion, NDArray[np.bool_]]:
+def classes_of(
+    record: ChannelErrors, reach: float, largest: float
+) -> dict[MotionClass, NDArray[np.bool_]]:
     """Samples of each class, by what the model itself does: known before a run is made.
 
     Parameters
     ----------
-    record : Record
+    record : ChannelErrors
     reach : float
         Range of the signal over all runs. [unit]
     largest : float
@@ -285,13 +299,13 @@ def classes_of(record: Record, reach: float, largest: float) -> dict[Motion, NDA
     return {"large": ~fast & ~slow, "small": ~fast & slow & commanded, "fast": fast}
 
 
-class Cell(NamedTuple):
+class WindowCell(NamedTuple):
     """Windows of one class in one run, one beside another, over the range of the signal."""
 
     run: str
     maneuver: str
     held_out: bool
-    motion: Motion
+    motion: MotionClass
     squares: Array
     """(m,) squared errors less their noise. [1]"""
     noise: float
@@ -300,10 +314,10 @@ class Cell(NamedTuple):
     """(m, 3) of the variance function: 1, the signal's square, that of its rate. [1]"""
 
 
-def cells_of(records: Iterable[Record]) -> tuple[list[Cell], float]:
+def cells_of(records: Iterable[ChannelErrors]) -> tuple[list[WindowCell], float]:
     """All windows, by run and class, and the range of what was measured. [unit]
 
-    The records are gone through twice.
+    Goes through the records twice.
     """
     low, high, largest = np.inf, -np.inf, 0.0
     for record in records:
@@ -311,7 +325,8 @@ def cells_of(records: Iterable[Record]) -> tuple[list[Cell], float]:
         low = min(low, float(np.nanmin(values, initial=np.inf)))
         high = max(high, float(np.nanmax(values, initial=-np.inf)))
         largest = max(largest, float(np.abs(record.command).max()))
-    reach, cells = high - low, list[Cell]()
+    reach = high - low
+    cells = list[WindowCell]()
     for record in records if reach > 0.0 else ():
         for motion, inside in classes_of(record, reach, largest).items():
             errors, noise = over_window(record, WINDOWS[motion])
@@ -323,8 +338,17 @@ def cells_of(records: Iterable[Record]) -> tuple[list[Cell], float]:
             noise = max(noise, float(np.mean(rounded[rows] ** 2)))
             squares = (errors[rows] ** 2 - noise) / reach**2
             terms = variance_terms(record.signal[rows] / reach, record.rate[rows] / reach)
-            of_run = record.run, record.maneuver, record.held_out
-            cells.append(Cell(*of_run, motion, squares, noise / reach**2, terms))
+            cells.append(
+                WindowCell(
+                    run=record.run,
+                    maneuver=record.maneuver,
+                    held_out=record.held_out,
+                    motion=motion,
+                    squares=squares,
+                    noise=noise / reach**2,
+                    terms=terms,
+                )
+            )
     return cells, max(reach, 0.0)
 
 
@@ -339,7 +363,7 @@ def variance_terms(signal: Array, rate: Array) -> Array:
 class ClassError(NamedTuple):
     """The stated error of one class of motion."""
 
-    motion: Motion
+    motion: MotionClass
     error: float
     """Root mean square that nine of ten new maneuvers do not exceed, over the range. [1]"""
     fitted: int
@@ -369,7 +393,7 @@ class PredictionError(Result):
     @property
     def worst(self) -> ClassError:
         """The class with the largest error."""
-        return max(self.classes, key=lambda each: each.error)
+        return max(self.classes, key=lambda stated: stated.error)
 
     @property
     def signal(self) -> str:
@@ -408,39 +432,55 @@ def prediction_errors(
     below exp(m + t d √(1 + 1/k)), the bound of a prediction. What the instrument's gain may be off
     is an error of the motion that no run of it shows.
     """
-    channels = dict.fromkeys(name for each in stages for name in each.problem.channels)
+    channels = dict.fromkeys(name for stage in stages for name in stage.problem.channels)
     if not stages:
-        channels = dict.fromkeys(each.channel for each in predicted)
-    qualities = [*(each for stage in stages for each in stage.runs), *predicted]
-    found = list[PredictionError]()
+        channels = dict.fromkeys(quality.channel for quality in predicted)
+    qualities = [*(quality for stage in stages for quality in stage.runs), *predicted]
+    errors = list[PredictionError]()
     for name in channels:
-        measured = next(q.experiment[name] for q in qualities if q.channel == name)
-        cells, reach = cells_of(records_of(name, stages, predicted))
+        measured = next(
+            quality.experiment[name] for quality in qualities if quality.channel == name
+        )
+        cells, reach = cells_of(errors_of_runs(name, stages, predicted))
         if not cells:
             continue
         coefficients = bound_of_variance(cells)
         coefficients[1] += measured.instrument.gain**2 / 3.0
-        classes = tuple(
-            ClassError(
-                motion,
-                float(np.sqrt(np.mean(np.vstack([c.terms for c in alike]) @ coefficients))),
-                sum(not cell.held_out for cell in alike),
-                sum(cell.held_out for cell in alike),
+        constant, by_signal, by_rate = coefficients.tolist()
+        errors.append(
+            PredictionError(
+                channel=name,
+                unit=f"{measured.unit}/s" if measured.is_position else measured.unit,
+                reach=reach,
+                coefficients=(constant, by_signal, by_rate),
+                classes=tuple(_class_errors(cells, coefficients)),
+                of_position=measured.is_position,
             )
-            for motion in get_args(Motion)
-            if (alike := [cell for cell in cells if cell.motion == motion])
         )
-        unit = f"{measured.unit}/s" if measured.is_position else measured.unit
-        first, second, third = coefficients.tolist()
-        position = measured.is_position
-        found.append(PredictionError(name, unit, reach, (first, second, third), classes, position))
-    return tuple(found)
+    return tuple(errors)
 
 
-def records_of(
+def _class_errors(cells: Sequence[WindowCell], coefficients: Array) -> Iterator[ClassError]:
+    """The stated error of each class of motion that some window has."""
+    for motion in get_args(MotionClass):
+        of_class = [cell for cell in cells if cell.motion == motion]
+        if of_class:
+            terms = np.vstack([cell.terms for cell in of_class])
+            yield ClassError(
+                motion=motion,
+                error=float(np.sqrt(np.mean(terms @ coefficients))),
+                fitted=sum(not cell.held_out for cell in of_class),
+                held_out=sum(cell.held_out for cell in of_class),
+            )
+
+
+def errors_of_runs(
     channel: str, stages: Sequence[StageFit], predicted: Sequence[RunQuality]
-) -> Records:
-    """A channel of all runs, as if the maneuver of each had been left out, or held out."""
+) -> ErrorsOfRuns:
+    """A channel of all runs, as if the maneuver of each had been left out, or held out.
+
+    The linearised fit of each stage is computed if it is not there yet.
+    """
     parts = list[tuple[RunQuality, Array | None, bool]]()
     for stage in stages:
         if channel not in stage.problem.channels:
@@ -452,15 +492,15 @@ def records_of(
             if run.channel == channel
         }
         parts += [
-            (each, errors[each.experiment.name], False)
-            for each in stage.runs
-            if each.channel == channel
+            (quality, errors[quality.experiment.name], False)
+            for quality in stage.runs
+            if quality.channel == channel
         ]
-    parts += [(each, None, True) for each in predicted if each.channel == channel]
-    return Records(tuple(parts))
+    parts += [(quality, None, True) for quality in predicted if quality.channel == channel]
+    return ErrorsOfRuns(tuple(parts))
 
 
-def variance_function(cells: Sequence[Cell]) -> Array:
+def variance_function(cells: Sequence[WindowCell]) -> Array:
     """(3,) coefficients of the mean squared error, over the squared range."""
     terms = np.vstack([cell.terms for cell in cells])
     squares = np.concatenate([cell.squares for cell in cells])
@@ -474,19 +514,19 @@ def variance_function(cells: Sequence[Cell]) -> Array:
     return np.asarray(coefficients)
 
 
-def bound_of_variance(cells: Sequence[Cell]) -> Array:
+def bound_of_variance(cells: Sequence[WindowCell]) -> Array:
     """(3,) the same for the squared error that nine of ten new maneuvers do not exceed."""
     coefficients = variance_function(cells)
-    maneuvers = defaultdict[str, list[Cell]](list)
+    maneuvers = defaultdict[str, list[WindowCell]](list)
     for cell in cells:
         maneuvers[cell.maneuver].append(cell)
-    ratios = np.array([log_ratio(each, coefficients) for each in maneuvers.values()])
+    ratios = np.array([log_ratio(of_maneuver, coefficients) for of_maneuver in maneuvers.values()])
     deviation, freedom = spread_of(ratios)
     bound = float(stdtrit(freedom, LEVEL)) * deviation * np.sqrt(1.0 + 1.0 / ratios.size)
     return coefficients * float(np.exp(ratios.mean() + bound))
 
 
-def log_ratio(cells: Sequence[Cell], coefficients: Array) -> float:
+def log_ratio(cells: Sequence[WindowCell], coefficients: Array) -> float:
     """Logarithm of the observed over the fitted squares of some windows.
 
     Observed are at least what the noise's own scatter leaves open.

@@ -19,9 +19,9 @@ from swashplate.identification.diagnostics.data_checks import (
 from swashplate.identification.diagnostics.discrepancy import (
     USUAL_SPREAD,
     WORTH,
-    Cell,
-    Record,
-    Records,
+    ChannelErrors,
+    ErrorsOfRuns,
+    WindowCell,
     cells_of,
     log_ratio,
     variance_function,
@@ -36,7 +36,7 @@ from swashplate.identification.validation import RunQuality
 Array = NDArray[np.float64]
 
 FALSE_ALARM = 0.01
-"""Probability with which one run of a sound campaign is taken for unsound."""
+"""Probability that a run of a sound campaign is taken for unsound."""
 FEWEST_RUNS = 3
 """Of which one can stand out."""
 WINDOW = 0.12
@@ -46,7 +46,7 @@ EXPLAINED = 0.25
 LATEST = 2.0
 """Delay that is looked for. [s]"""
 STANDS_STILL = 0.5
-"""Time for which a reading stands still at once if it is not that of a machine. [s]"""
+"""Time for which the reading of a sound sensor on a moving machine does not stand still. [s]"""
 MOVES, STEPS = 0.2, 10.0
 """Part of the largest speed from which a machine moves, and steps of the reading that it then moves
 by at least."""
@@ -63,22 +63,24 @@ def unsound_data(stages: Sequence[StageFit], predicted: Sequence[RunQuality]) ->
         Of runs that were held out.
     """
     fitted = {run.name: run for stage in stages for run in stage.problem.experiments}
-    held_out = {each.experiment.name: each.experiment for each in predicted}
+    held_out = {quality.experiment.name: quality.experiment for quality in predicted}
     runs = list((fitted | held_out).values())
-    found = list[Finding]()
+    findings = list[Finding]()
     last = stages[-1]
     if isinstance(last.problem.model, DriveModel):
-        found += contradicting_runs(runs, last.drive.parameters)
-    found += clipped_channels(runs)
-    seen = {each.run for each in found}
-    return [*found, *(each for each in outlying_runs(stages, predicted) if each.run not in seen)]
+        findings += contradicting_runs(runs, last.drive.parameters)
+    findings += clipped_channels(runs)
+    named = {finding.run for finding in findings}
+    outlying = outlying_runs(stages, predicted)
+    return [*findings, *(finding for finding in outlying if finding.run not in named)]
 
 
 def outlying_runs(stages: Sequence[StageFit], predicted: Sequence[RunQuality]) -> Iterator[Finding]:
     """Runs whose errors are far larger than those of the others, each once, and why.
 
-    A maneuver of which every run stands out shows what the model lacks, and not an unsound log. So
-    may a run that was held out, unless a run of its maneuver was fitted.
+    A maneuver of which every run stands out shows what the model lacks, and not an unsound log. A
+    held-out run is named only if a run of its maneuver was fitted. The linearised fit of each stage
+    is computed if it is not there yet.
 
     Notes
     -----
@@ -88,15 +90,15 @@ def outlying_runs(stages: Sequence[StageFit], predicted: Sequence[RunQuality]) -
     robust deviation is joined with what is usual, as in `discrepancy`; the limit is a quantile of
     Student's distribution, shared among the runs.
     """
-    seen = set[str]()
+    named = set[str]()
     for stage in stages or (None,):
-        channels = [each.channel for each in predicted]
+        channels = [quality.channel for quality in predicted]
         if stage is not None:
             channels = list(stage.problem.channels)
         for channel in dict.fromkeys(channels):
             for finding in _of_channel(stage, channel, predicted):
-                if finding.run not in seen:
-                    seen.add(str(finding.run))
+                if finding.run not in named:
+                    named.add(str(finding.run))
                     yield finding
 
 
@@ -107,22 +109,24 @@ def _of_channel(
 
     Empty if these would be half of all: runs that disagree altogether show what the model lacks.
     """
-    found, names = list[Finding](), list[str]()
+    findings = list[Finding]()
+    names = list[str]()
     while True:
-        before = _Compared.of(_records(stage, channel, predicted, names), names)
-        if before is None or (suspect := before.farthest) is None:
+        before = _ErrorRatios.of(_records(stage, channel, predicted, names), names)
+        suspect = None if before is None else before.farthest
+        if suspect is None:
             break
         records = _records(stage, channel, predicted, [*names, suspect])
-        after = _Compared.of(records, [*names, suspect])
-        if after is None or after.apart(suspect) <= after.limit or after.alike(suspect):
+        after = _ErrorRatios.of(records, [*names, suspect])
+        if after is None or after.excess(suspect) <= after.limit or after.is_shared(suspect):
             break
         names.append(suspect)
-        record = next(each for each in records if each.run == suspect)
-        times = float(np.exp(0.5 * after.apart(suspect)))
-        found.append(refusal(suspect, channel, _sentence(record, channel, records, times)))
-        if 2 * len(found) >= len(after.ratios):
+        record = next(record for record in records if record.run == suspect)
+        times = float(np.exp(0.5 * after.excess(suspect)))
+        findings.append(refusal(suspect, channel, _sentence(record, channel, records, times)))
+        if 2 * len(findings) >= len(after.ratios):
             return []
-    return found
+    return findings
 
 
 def _records(
@@ -130,7 +134,7 @@ def _records(
     channel: str,
     predicted: Sequence[RunQuality],
     without: Sequence[str],
-) -> Records:
+) -> ErrorsOfRuns:
     """A channel of all runs, as the fit without some of them simulates it.
 
     Those that were held out are predicted by the fit of all others: they are left out here if
@@ -139,150 +143,167 @@ def _records(
     fitted, held_out = list[RunQuality](), list(predicted)
     errors = dict[str, Array]()
     if stage is not None:
-        fitted = [each for each in stage.runs if each.channel == channel]
-        if any(each.experiment.name in without for each in fitted):
+        fitted = [quality for quality in stage.runs if quality.channel == channel]
+        if any(quality.experiment.name in without for quality in fitted):
             held_out = []
             errors = {
                 run.name: error
                 for run, error in without_runs(stage.linearised, without)
                 if run.channel == channel
             }
-    return Records(
+    return ErrorsOfRuns(
         (
-            *((each, None, True) for each in held_out if each.channel == channel),
-            *((each, errors.get(each.experiment.name), False) for each in fitted),
+            *((quality, None, True) for quality in held_out if quality.channel == channel),
+            *((quality, errors.get(quality.experiment.name), False) for quality in fitted),
         )
     )
 
 
 @dataclass(frozen=True)
-class _Compared:
-    """Logarithms of the runs' errors, beside those of the runs that are kept."""
+class _ErrorRatios:
+    """Logarithms of the runs' errors, beside those of the runs that count as sound."""
 
     suspects: tuple[str, ...]
     """Runs that may be unsound."""
     ratios: Mapping[str, float]
     """By run."""
     maneuvers: Mapping[str, str]
-    kept: tuple[str, ...]
+    sound: tuple[str, ...]
     """Runs that the others are compared with."""
 
     @classmethod
-    def of(cls, records: Iterable[Record], without: Sequence[str]) -> _Compared | None:
+    def of(cls, records: Iterable[ChannelErrors], without: Sequence[str]) -> _ErrorRatios | None:
         """Those of some records; None if too few runs are left to compare with."""
         cells, _ = cells_of(records)
-        runs = defaultdict[str, list[Cell]](list)
+        runs = defaultdict[str, list[WindowCell]](list)
         for cell in cells:
             runs[cell.run].append(cell)
-        kept = tuple(name for name in runs if name not in without)
-        if len(kept) < FEWEST_RUNS - 1:
+        sound = tuple(name for name in runs if name not in without)
+        if len(sound) < FEWEST_RUNS - 1:
             return None
-        others = [cell for name in kept for cell in runs[name]]
-        coefficients = variance_function(others)
-        ratios = {name: log_ratio(each, coefficients) for name, each in runs.items()}
+        coefficients = variance_function([cell for name in sound for cell in runs[name]])
+        ratios = {
+            name: log_ratio(cells_of_run, coefficients) for name, cells_of_run in runs.items()
+        }
         maneuvers = {cell.run: cell.maneuver for cell in cells}
         fitted = {cell.maneuver for cell in cells if not cell.held_out}
-        suspects = tuple(name for name in kept if not fitted or maneuvers[name] in fitted)
-        return cls(suspects, ratios, maneuvers, kept)
+        suspects = tuple(name for name in sound if not fitted or maneuvers[name] in fitted)
+        return cls(suspects, ratios, maneuvers, sound)
 
     @property
-    def _own(self) -> Array:
-        return np.array([self.ratios[name] for name in self.kept])
+    def _sound_ratios(self) -> Array:
+        return np.array([self.ratios[name] for name in self.sound])
 
-    def apart(self, run: str) -> float:
-        """How far a run is above the median of those kept."""
-        return self.ratios[run] - float(np.median(self._own)) if run in self.ratios else 0.0
+    def excess(self, run: str) -> float:
+        """How far a run is above the median of the sound ones."""
+        if run not in self.ratios:
+            return 0.0
+        return self.ratios[run] - float(np.median(self._sound_ratios))
 
     @property
     def farthest(self) -> str | None:
         """The suspect that is farthest above the median."""
-        if len(self.kept) < FEWEST_RUNS:
+        if len(self.sound) < FEWEST_RUNS:
             return None
         return max(self.suspects, key=lambda run: self.ratios[run], default=None)
 
     @property
     def limit(self) -> float:
         """How far a run may be above the median."""
-        own, count = self._own, len(self.kept)
-        squared = (float(np.median(np.abs(own - np.median(own)))) / 0.6745) ** 2
+        ratios = self._sound_ratios
+        count = len(self.sound)
+        squared = (float(np.median(np.abs(ratios - np.median(ratios)))) / 0.6745) ** 2
         freedom = count - 1.0 + WORTH
         variance = ((count - 1.0) * squared + WORTH * USUAL_SPREAD**2) / freedom
         quantile = float(stdtrit(freedom, 1.0 - FALSE_ALARM / (count + 1.0)))
         return quantile * float(np.sqrt(variance * (1.0 + 1.0 / count)))
 
-    def alike(self, run: str) -> bool:
+    def is_shared(self, run: str) -> bool:
         """Whether each other run of its maneuver stands out, too."""
-        own = [name for name in self.kept if self.maneuvers[name] == self.maneuvers[run]]
-        return bool(own) and all(self.apart(name) > 0.5 * self.apart(run) for name in own)
+        others = [name for name in self.sound if self.maneuvers[name] == self.maneuvers[run]]
+        half = 0.5 * self.excess(run)
+        return bool(others) and all(self.excess(name) > half for name in others)
 
 
 # --- why ------------------------------------------------------------------------------------------
 
 
-def _sentence(own: Record, channel: str, records: Iterable[Record], times: float) -> str:
-    """What is wrong with a run, where that can be told, and the line to write."""
-    said = f"{own.run}: '{channel}' is {times:.2g} times as far from what is simulated as in the "
-    said += "other runs"
-    measured, simulated = _motion(own)
-    left = float(np.mean((simulated - measured) ** 2))
+def _sentence(
+    record: ChannelErrors, channel: str, records: Iterable[ChannelErrors], times: float
+) -> str:
+    """What is wrong with a run, if that can be found out, and the line to write."""
+    fault = (
+        f"{record.run}: '{channel}' is {times:.2g} times as far from what is simulated as in the "
+        "other runs"
+    )
+    measured, simulated = _motion(record)
+    mean_square = float(np.mean((simulated - measured) ** 2))
     ignored = 'leave it out with role = "ignore"'
-    if (span := _still(own)) is not None:
+    span = _still(record)
+    if span is not None:
         first, last = span
         return (
-            f"{said}: it stands still from {first:.4g} to {last:.4g} s. Look at the sensor; ignore "
-            f"this window, or {ignored}."
+            f"{fault}: it stands still from {first:.4g} to {last:.4g} s. Look at the sensor; "
+            f"ignore this window, or {ignored}."
         )
-    delay, after = _delayed(own, measured, simulated)
-    if after < EXPLAINED * left:
-        way = "late" if delay > 0.0 else "early"
+    delay, mean_square_delayed = _delayed(record, measured, simulated)
+    if mean_square_delayed < EXPLAINED * mean_square:
+        side = "late" if delay > 0.0 else "early"
         return (
-            f"{said}: it comes {1e3 * abs(delay):.3g} ms {way} beside its command. Look at the "
+            f"{fault}: it comes {1e3 * abs(delay):.3g} ms {side} beside its command. Look at the "
             f"logger's clock in this run, shift the log, or {ignored}."
         )
     gain = float(measured @ simulated) / float(simulated @ simulated or 1.0)
-    if np.mean((gain * simulated - measured) ** 2) < EXPLAINED * left:
+    if np.mean((gain * simulated - measured) ** 2) < EXPLAINED * mean_square:
         return (
-            f"{said}: it moves {gain:.3g} times as far. Check its unit, scale and counts_per_turn, "
-            f"or {ignored}."
+            f"{fault}: it moves {gain:.3g} times as far. Check its unit, scale and "
+            f"counts_per_turn, or {ignored}."
         )
     for other in records:
-        if other.maneuver == own.maneuver or abs(other.step - own.step) > 1e-9:
-            continue
-        theirs = _motion(other)[1]
-        size = min(theirs.size, measured.size)
-        if size < 0.5 * max(theirs.size, measured.size):
-            continue
-        if np.mean((theirs[:size] - measured[:size]) ** 2) < EXPLAINED * left:
+        if _follows(record, measured, other, EXPLAINED * mean_square):
             return (
-                f"{said}, but follows the command of {other.run}: are their logs swapped? Give "
+                f"{fault}, but follows the command of {other.run}: are their logs swapped? Give "
                 f"each run its own file, or {ignored}."
             )
-    return f"{said}. Is it a log of this axis and this command? If not, {ignored}."
+    return f"{fault}. Is it a log of this axis and this command? If not, {ignored}."
 
 
-def _motion(record: Record) -> tuple[Array, Array]:
+def _follows(record: ChannelErrors, measured: Array, other: ChannelErrors, least: float) -> bool:
+    """Whether a run moves as another run of another maneuver is simulated."""
+    if other.maneuver == record.maneuver or abs(other.step - record.step) > 1e-9:
+        return False
+    _, simulated = _motion(other)
+    size = min(simulated.size, measured.size)
+    if size < 0.5 * max(simulated.size, measured.size):
+        return False
+    return bool(np.mean((simulated[:size] - measured[:size]) ** 2) < least)
+
+
+def _motion(record: ChannelErrors) -> tuple[Array, Array]:
     """(m,) what was measured and what is simulated over short windows; of a position speeds."""
     weights = window_weights(record, WINDOW)
     measured = windowed(record.measured, weights)
     simulated = windowed(record.measured + record.error, weights)
-    whole = np.isfinite(measured)
-    return measured[whole], simulated[whole]
+    complete = np.isfinite(measured)
+    return measured[complete], simulated[complete]
 
 
-def _delayed(record: Record, measured: Array, simulated: Array) -> tuple[float, float]:
+def _delayed(record: ChannelErrors, measured: Array, simulated: Array) -> tuple[float, float]:
     """Delay of what was measured at which it is nearest [s], and the mean square left then."""
     most = min(int(LATEST / record.step), measured.size // 4)
     shifts = np.arange(-most, most + 1)
-    left = np.full(shifts.size, np.inf)
+    mean_squares = np.full(shifts.size, np.inf)
     for k, shift in enumerate(shifts.tolist()):
-        later = measured[shift:] if shift >= 0 else measured[:shift]
-        own = simulated[: simulated.size - shift] if shift >= 0 else simulated[-shift:]
-        left[k] = np.mean((later - own) ** 2)
-    best = int(np.argmin(left))
-    return float(shifts[best] * record.step), float(left[best])
+        if shift >= 0:
+            errors = measured[shift:] - simulated[: simulated.size - shift]
+        else:
+            errors = measured[:shift] - simulated[-shift:]
+        mean_squares[k] = np.mean(errors**2)
+    best = int(np.argmin(mean_squares))
+    return float(shifts[best] * record.step), float(mean_squares[best])
 
 
-def _still(record: Record) -> tuple[float, float] | None:
+def _still(record: ChannelErrors) -> tuple[float, float] | None:
     """First and last instant at which a position stands still though the model moves. [s]"""
     if not record.is_position:
         return None
@@ -296,6 +317,6 @@ def _still(record: Record) -> tuple[float, float] | None:
     for first, after in edges.tolist():
         long = (after - first) * record.step > STANDS_STILL
         if long and float(moved[first:after].sum()) > STEPS * count:
-            begin = record.start
-            return begin + (first - 1) * record.step, begin + (after - 1) * record.step
+            start, step = record.start, record.step
+            return start + (first - 1) * step, start + (after - 1) * step
     return None

@@ -43,7 +43,7 @@ def triangular_factor_of(columns: Sequence[Array] | Array) -> Array:
     return factor
 
 
-class Block(NamedTuple):
+class RunRows(NamedTuple):
     """Rows of derivatives that belong to one run."""
 
     run: str
@@ -99,7 +99,7 @@ class ArrowFactor:
         return matrix
 
 
-def arrow_factor(size: int, shared: Numbers, blocks: Iterable[Block]) -> ArrowFactor:
+def arrow_factor(size: int, shared: Numbers, blocks: Iterable[RunRows]) -> ArrowFactor:
     """The factor of the derivatives of some runs.
 
     Parameters
@@ -108,7 +108,7 @@ def arrow_factor(size: int, shared: Numbers, blocks: Iterable[Block]) -> ArrowFa
         Number K of unknowns.
     shared : (M,) array of int
         Numbers of the unknowns that all runs share.
-    blocks : iterable of Block
+    blocks : iterable of RunRows
         Rows of each run; several of one run are taken together. They are reduced one by one.
     """
     own, triangles = dict[str, Numbers](), dict[str, Array]()
@@ -128,7 +128,7 @@ def arrow_factor(size: int, shared: Numbers, blocks: Iterable[Block]) -> ArrowFa
     return ArrowFactor(size, shared, runs, triangular_factor(np.vstack(gathered)))
 
 
-def stacked(size: int, shared: Numbers, blocks: Sequence[Block]) -> Array:
+def stacked(size: int, shared: Numbers, blocks: Sequence[RunRows]) -> Array:
     """(n, K) rows of all blocks by all unknowns; arguments as of `arrow_factor`."""
     matrix, first = np.zeros((sum(len(block.rows) for block in blocks), size)), 0
     for block in blocks:
@@ -141,7 +141,7 @@ def stacked(size: int, shared: Numbers, blocks: Sequence[Block]) -> Array:
 def dense_factor(matrix: Array) -> ArrowFactor:
     """The factor of a matrix (n, K) of derivatives by unknowns that are all shared."""
     count = matrix.shape[1]
-    return arrow_factor(count, np.arange(count), [Block("", np.arange(0), matrix)])
+    return arrow_factor(count, np.arange(count), [RunRows("", np.arange(0), matrix)])
 
 
 # --- its inverse ----------------------------------------------------------------------------------

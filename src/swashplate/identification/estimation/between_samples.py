@@ -17,7 +17,7 @@ from swashplate.campaign.schema import Between
 from swashplate.errors import DomainError
 from swashplate.identification.estimation.model import EquationModel
 from swashplate.identification.estimation.problem import Loss
-from swashplate.identification.estimation.setup import Setup
+from swashplate.identification.estimation.setup import FitSetup
 from swashplate.identification.estimation.solving import solve
 from swashplate.identification.estimation.stages import Parameters, stage_problem
 
@@ -43,7 +43,7 @@ def joined(runs: Sequence[Experiment], between: Between) -> tuple[Experiment, ..
 def settle(
     runs: Sequence[Experiment],
     nominal: Parameters,
-    setup: Setup,
+    setup: FitSetup,
     *,
     loss: Loss = "linear",
     threads: int | None = None,
@@ -78,7 +78,7 @@ def settle(
 def doubt(
     runs: Sequence[Experiment],
     nominal: Parameters,
-    setup: Setup,
+    setup: FitSetup,
     *,
     loss: Loss = "linear",
     threads: int | None = None,
@@ -100,7 +100,7 @@ def doubt(
 def _costs(
     runs: Sequence[Experiment],
     nominal: Parameters,
-    setup: Setup,
+    setup: FitSetup,
     loss: Loss,
     threads: int | None,
 ) -> dict[Between, float] | None:

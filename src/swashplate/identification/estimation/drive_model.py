@@ -38,7 +38,7 @@ from swashplate.equations.marching.record import (
     record_of,
 )
 from swashplate.errors import DomainError, InputError, ParameterError
-from swashplate.identification.estimation.model import Asked, EquationModel
+from swashplate.identification.estimation.model import EquationModel, SimulationRequest
 from swashplate.identification.estimation.problem import Problem
 from swashplate.identification.estimation.setup import Forces
 from swashplate.identification.estimation.unknowns import Prior, Unknown, Unknowns, zero_name
@@ -46,7 +46,7 @@ from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.results import Result
 
 Array = NDArray[np.float64]
-Part = Literal["card", "pump", "chain"]
+DrivePart = Literal["card", "pump", "chain"]
 """What of the drive is simulated: the card alone, pump and motor over a current, or all."""
 Starts = Mapping[str, Mapping[str, float]]
 """For some experiments by name the currents at the first sample, as `START_CURRENTS` has them."""
@@ -75,7 +75,7 @@ REACHED = (
     (Limit.RELIEF, "", "Z15", "the relief valve Z15"),
 )
 """Limits, the signal whose sign says which side acts, the parameter that sets them, and words."""
-LIMITS = {symbol: words for _, _, symbol, words in sorted(REACHED, key=lambda each: each[2])}
+LIMITS = {symbol: words for _, _, symbol, words in sorted(REACHED, key=lambda zone: zone[2])}
 """What a drive may never have reached in the fitted runs, by symbol."""
 EASED, SHOWN = 1.05, 1.02
 """Factors on limits: those at which a run is simulated to see how far it would go, and how far it
@@ -150,7 +150,7 @@ def measured_current(experiment: Experiment, scale: float = 1.0) -> Record:
     drive = experiment.input
     if drive.kind == "current":
         return _record(replace(drive, values=scale * drive.values))
-    signed = [(each, each.values) for each in experiment.of_kind("signed_current")]
+    signed = [(channel, channel.values) for channel in experiment.of_kind("signed_current")]
     both = experiment.of_kind("current_plus"), experiment.of_kind("current_minus")
     for plus, minus in zip(*both, strict=False):
         signed.append((plus, plus.values - np.interp(plus.time, minus.time, minus.values)))
@@ -183,7 +183,9 @@ def simulated_current(
     seen = Observation("current", record.points, np.zeros(record.values.size))
     observed = ObservedRecord(record, (seen,), "voltage", experiment.begins)
     # refinements begin behind the card
-    ready = DriveModel(parameters.plain, "card").ready(start, experiment, Asked(observed))
+    ready = DriveModel(parameters.plain, "card").ready(
+        start, experiment, SimulationRequest(observed)
+    )
     return replace(record, values=ready.residuals(observed))
 
 
@@ -193,7 +195,7 @@ def simulated_run(experiment: Experiment, parameters: ParameterSet) -> Simulatio
     An `InputError` says that its input is neither a voltage nor a current, or cannot be marched, a
     `DomainError` that the model does not hold under it.
     """
-    part: Part = "pump" if experiment.input.kind == "current" else "chain"
+    part: DrivePart = "pump" if experiment.input.kind == "current" else "chain"
     try:
         driver, record, _ = DriveModel(parameters, part).driven(experiment)
         begin = experiment.begins, experiment.start_pressure
@@ -224,8 +226,8 @@ def limits_unreached(
     limits = {column: parameters.numbers[column] for column in LIMIT_COLUMNS}
     eased = {c: EASED * limit for c, limit in limits.items() if isfinite(limit)}
     without, reached = parameters.with_numbers(eased), dict.fromkeys(LIMIT_COLUMNS, 0.0)
-    for each in experiments:
-        run = simulated_run(each, without)
+    for experiment in experiments:
+        run = simulated_run(experiment, without)
         for column, (signal, sign) in LIMIT_COLUMNS.items():
             values = np.abs(run[signal]) if sign == 0.0 else sign * run[signal]
             reached[column] = max(reached[column], float(values.max()))
@@ -254,7 +256,7 @@ def with_card_filter(
     if fitted.rate is None:
         return fitted, changed
     return fitted, (
-        f"zeta, omega and C belong to a recursion at {fitted.rate:g} Hz, as the fit configuration "
+        f"zeta, omega and C belong to a recursion at {fitted.rate:g} Hz, as the fit setup "
         'asks for by card_filter = "recursion": they are not those of the card\'s filter, which '
         "`Drive.at_every_rate` gives.",
     )
@@ -268,14 +270,17 @@ def at_rate_of(
     It then has the filter's differential equation, if a run is marched at another rate than the one
     that its recursion belongs to.
     """
-    own, runs = parameters.rate, [each for each in experiments if each.input.kind == "voltage"]
+    own, runs = (
+        parameters.rate,
+        [experiment for experiment in experiments if experiment.input.kind == "voltage"],
+    )
     if own is None:
         return parameters, ()
-    for each in runs:
-        rate = 1.0 / voltage_record(each).step
+    for run in runs:
+        rate = 1.0 / voltage_record(run).step
         if abs(rate / own - 1.0) > OTHER_RATE:
             return at_every_rate(parameters), (
-                f"{each.name} is simulated at {rate:.4g} Hz, but the card's filter of "
+                f"{run.name} is simulated at {rate:.4g} Hz, but the card's filter of "
                 f"{parameters.name} is a recursion for {own:g} Hz: the fit takes the "
                 "differential equation with the same poles, which holds at every rate.",
             )
@@ -298,7 +303,7 @@ class DriveModel(Result, EquationModel):
 
     parameters: ParameterSet
     """Values of what is not unknown."""
-    part: Part = "chain"
+    part: DrivePart = "chain"
     currents: Mapping[str, Record] = field(default_factory=dict)
     """For the pump alone, signed currents by the experiments' names, if not as measured. [A]"""
     forces: Forces | None = None
@@ -310,7 +315,7 @@ class DriveModel(Result, EquationModel):
         """Signal for each channel that this part of the drive gives."""
         kinds = kinds_of(self.part)
         channels = experiment.channels.items()
-        return {name: SIGNALS[each.kind] for name, each in channels if each.kind in kinds}
+        return {name: SIGNALS[channel.kind] for name, channel in channels if channel.kind in kinds}
 
     def driven(
         self, experiment: Experiment, values: Mapping[str, float] = MappingProxyType({})
@@ -328,7 +333,7 @@ class DriveModel(Result, EquationModel):
         return "current", measured_current(experiment) if given is None else given, {}
 
     def ready(
-        self, values: Mapping[str, float], experiment: Experiment, asked: Asked
+        self, values: Mapping[str, float], experiment: Experiment, request: SimulationRequest
     ) -> BoundModel:
         """The drive with numbers; see `EquationModel.ready`."""
         states = {
@@ -337,9 +342,10 @@ class DriveModel(Result, EquationModel):
             if name in values
             for state in self._states_started_by(name)
         }
-        parameters, own = self.parameters_at(values), RunValues(states, asked.offsets)
+        parameters = self.parameters_at(values)
+        run_values = RunValues(states, request.offsets)
         try:
-            return bound_drive(parameters, asked.observed, asked.columns, own)
+            return bound_drive(parameters, request.observed, request.columns, run_values)
         except InputError as error:  # a filter that is unstable at this step
             raise DomainError(str(error)) from None
 

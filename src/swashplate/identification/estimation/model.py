@@ -26,7 +26,7 @@ INSTANT_STEP = 1e-5
 """Step of the differences by the instant of an edge of the command, see `InputSignal.edges`. [s]"""
 
 
-class Model(Protocol):
+class MachineModel(Protocol):
     """A model of the machine; with `simulate` alone it is differentiated by central differences.
 
     One that knows its derivatives has ``linearise(values, experiment, names)`` as well, which gives
@@ -80,7 +80,7 @@ RELATIVE_STEP = 1e-6
 
 
 def simulated(
-    model: Model, values: Mapping[str, float], experiment: Experiment
+    model: MachineModel, values: Mapping[str, float], experiment: Experiment
 ) -> Mapping[str, Array]:
     """What a model simulates; a `DomainError` names a sample that is not finite.
 
@@ -99,7 +99,7 @@ def simulated(
 
 
 def linearised(
-    model: Model, values: Mapping[str, float], experiment: Experiment, names: Sequence[str]
+    model: MachineModel, values: Mapping[str, float], experiment: Experiment, names: Sequence[str]
 ) -> Mapping[str, Linearised]:
     """Simulation with derivatives by names, its own or differences; raises as `simulated`."""
     if own := getattr(model, "linearise", None):
@@ -119,22 +119,26 @@ def linearised(
     return found
 
 
-def _check(made: object, experiment: Experiment, names: int | None = None) -> None:
+def _check(outputs: object, experiment: Experiment, names: int | None = None) -> None:
     """Refuse what a model must not return: arrays, or with `names` Linearised by so many."""
-    method, each = "linearise", "a Linearised"
+    method, of_channel = "linearise", "a Linearised"
     if names is None:
-        method, each = "simulate", "an array of floats"
+        method, of_channel = "simulate", "an array of floats"
 
-    def refused(must: str, other: object) -> InputError:
-        said = "None (is a return missing?)" if other is None else f"a {type(other).__name__}"
-        if isinstance(other, np.ndarray):
-            said = f"an array of {other.dtype.name}"
-        return InputError(f"{experiment.name}: {method} must return {must}, not {said}.")
+    def refused(must: str, returned: object) -> InputError:
+        words = f"a {type(returned).__name__}"
+        if returned is None:
+            words = "None (is a return missing?)"
+        elif isinstance(returned, np.ndarray):
+            words = f"an array of {returned.dtype.name}"
+        return InputError(f"{experiment.name}: {method} must return {must}, not {words}.")
 
-    if not isinstance(made, Mapping):
+    if not isinstance(outputs, Mapping):
         first = next(iter(experiment.channels), "speed")
-        raise refused(f"a mapping of channel names to {each}, such as {{'{first}': ...}}", made)
-    for name, part in made.items():
+        raise refused(
+            f"a mapping of channel names to {of_channel}, such as {{'{first}': ...}}", outputs
+        )
+    for name, part in outputs.items():
         if names is not None and not isinstance(part, Linearised):
             raise refused(f"a Linearised for {name}", part)
         for k, array in enumerate((part,) if names is None else part):
@@ -150,28 +154,29 @@ def _check(made: object, experiment: Experiment, names: int | None = None) -> No
                 )
 
 
-Part = TypeVar("Part")
+Output = TypeVar("Output")
 
 
-def part_of(outputs: Mapping[str, Part], experiment: Experiment, channel: str) -> Part:
+def part_of(outputs: Mapping[str, Output], experiment: Experiment, channel: str) -> Output:
     """What a model gives for a channel; an `InputError` if it gives nothing."""
     if channel not in outputs:
-        known = ", ".join(outputs)
-        raise InputError(f"{experiment.name}: the model gives no '{channel}'; it gives {known}.")
+        names = ", ".join(outputs)
+        raise InputError(f"{experiment.name}: the model gives no '{channel}'; it gives {names}.")
     return outputs[channel]
 
 
-class Asked(NamedTuple):
+class SimulationRequest(NamedTuple):
     """What is asked of a model: an experiment as the march sees it, and derivatives by columns."""
 
     observed: ObservedRecord
     columns: Sequence[str] = ()
-    offsets: Sequence[float] = ()  # Of the observations, where they are free.
+    offsets: Sequence[float] = ()
+    """Of the observations, if they are free."""
 
 
 @dataclass(frozen=True, eq=False)
 class EquationModel(ABC):
-    """What every model of equations has in common; see `OwnModel` and `DriveModel`."""
+    """What every model of equations has in common; see `UserModel` and `DriveModel`."""
 
     @abstractmethod
     def signals_of(self, experiment: Experiment) -> Mapping[str, str]:
@@ -185,7 +190,7 @@ class EquationModel(ABC):
 
     @abstractmethod
     def ready(
-        self, values: Mapping[str, float], experiment: Experiment, asked: Asked
+        self, values: Mapping[str, float], experiment: Experiment, request: SimulationRequest
     ) -> BoundModel:
         """The model with numbers; columns as the engine names them."""
 
@@ -200,9 +205,9 @@ class EquationModel(ABC):
     def columns(self, names: Sequence[str]) -> tuple[list[str], Array]:
         """Columns that some names move, and (columns, names) their derivatives by these."""
         moved = [self.moves(name) for name in names]
-        asked = list(dict.fromkeys(column for each in moved for column in each))
-        rows = [[each.get(column, 0.0) for each in moved] for column in asked]
-        return asked, np.array(rows).reshape(len(asked), len(names))
+        columns = list(dict.fromkeys(column for derivatives in moved for column in derivatives))
+        rows = [[derivatives.get(column, 0.0) for derivatives in moved] for column in columns]
+        return columns, np.array(rows).reshape(len(columns), len(names))
 
     def observed(
         self,
@@ -217,39 +222,48 @@ class EquationModel(ABC):
         without, all channels that the model gives, against zero. `offsets` are the
         channels whose zero is free.
         """
-        signals, seen = self.signals_of(experiment), []
+        signals = self.signals_of(experiment)
+        observations = []
         for name in signals if weights is None else weights:
             signal, channel = part_of(signals, experiment, name), experiment[name]
-            against: tuple[Array, Array | float] = np.zeros(channel.time.size), 1.0
+            measured = np.zeros(channel.time.size)
+            factors: Array | float = 1.0
             if weights is not None:
-                against = channel.values, weights[name]
-            seen.append(Observation(signal, channel.time, *against, name in offsets))
+                measured = channel.values
+                factors = weights[name]
+            observations.append(
+                Observation(signal, channel.time, measured, factors, name in offsets)
+            )
         by, record, others = self.driven(experiment, values)
-        return ObservedRecord(record, seen, by, experiment.begins, others)
+        return ObservedRecord(record, observations, by, experiment.begins, others)
 
     def simulate(self, values: Mapping[str, float], experiment: Experiment) -> Mapping[str, Array]:
-        """Simulate the measured channels; see `model.Model`."""
+        """Simulate the measured channels; see `MachineModel`."""
         observed = self.observed(experiment, values=values)
         signals = enumerate(self.signals_of(experiment))
-        flat = self.ready(values, experiment, Asked(observed)).residuals(observed)
+        flat = self.ready(values, experiment, SimulationRequest(observed)).residuals(observed)
         return {name: flat[observed.rows_of(k)] for k, name in signals}
 
     def linearise(
         self, values: Mapping[str, float], experiment: Experiment, names: Sequence[str]
     ) -> Mapping[str, Linearised]:
-        """Simulate with derivatives, those by edges by differences; see `model.Model`."""
-        observed, (columns, chain) = self.observed(experiment, values=values), self.columns(names)
-        found = self.ready(values, experiment, Asked(observed, columns)).jacobian(observed)
-        flat, by, rows = found.residuals, found.columns @ chain, observed.rows_of
-        channels = enumerate(self.signals_of(experiment))
-        made = {name: Linearised(flat[rows(k)], by[rows(k)]) for k, name in channels}
+        """Simulate with derivatives, those by edges by differences; see `MachineModel`."""
+        observed = self.observed(experiment, values=values)
+        columns, chain = self.columns(names)
+        model = self.ready(values, experiment, SimulationRequest(observed, columns))
+        jacobian = model.jacobian(observed)
+        by_names = jacobian.columns @ chain
+        outputs = dict[str, Linearised]()
+        for number, channel in enumerate(self.signals_of(experiment)):
+            rows = observed.rows_of(number)
+            outputs[channel] = Linearised(jacobian.residuals[rows], by_names[rows])
         instants = self.instants_of(experiment)
-        for place, name in enumerate(names):
+        for column, name in enumerate(names):
             if name in instants:
                 later = self.simulate({**values, name: values[name] + INSTANT_STEP}, experiment)
-                for channel, part in made.items():
-                    part.by[:, place] = (later[channel] - part.values) / INSTANT_STEP
-        return made
+                for channel, output in outputs.items():
+                    output.by[:, column] = (later[channel] - output.values) / INSTANT_STEP
+        return outputs
 
 
 def states_started_by(model: Equations, name: str) -> list[str]:
@@ -262,7 +276,7 @@ def states_started_by(model: Equations, name: str) -> list[str]:
 
 
 @dataclass(frozen=True, eq=False)
-class OwnModel(Result, EquationModel):
+class UserModel(Result, EquationModel):
     """A model of equations whose parameters, by their paths, are the unknowns.
 
     ``"start.PATH"`` is a number of the state at the first sample, by its path or as `free_start` of
@@ -274,7 +288,7 @@ class OwnModel(Result, EquationModel):
     Examples
     --------
     >>> problem = Problem(
-    ...     OwnModel(valve, rate=100.0, begin={"position": "position"}),
+    ...     UserModel(valve, rate=100.0, begin={"position": "position"}),
     ...     campaign.experiments,
     ...     Unknowns((Unknown("lag", 0.06, 0.005, 0.5, "s", log=True), ...)),
     ...     channels=("position",),
@@ -302,29 +316,30 @@ class OwnModel(Result, EquationModel):
 
     def signals_of(self, experiment: Experiment) -> Mapping[str, str]:
         """Signal of the model for each channel that it gives; one of none is refused."""
-        known = self.signals
-        found = {name: name for name in experiment.channels if name in known}
-        if not found:
+        signals = self.signals
+        given = {name: name for name in experiment.channels if name in signals}
+        if not given:
             raise InputError(
                 f"{experiment.name} has the channels {', '.join(experiment.channels)}, of which "
-                f"{self.model.name} gives none; it gives {', '.join(known)}."
+                f"{self.model.name} gives none; it gives {', '.join(signals)}."
             )
-        return found
+        return given
 
     def driven(
         self, experiment: Experiment, values: Mapping[str, float] = MappingProxyType({})
     ) -> tuple[str, Record, Mapping[str, Array]]:
         """The experiment's input on the grid, and external signals that are channels.
 
-        Refused where stamps are uneven and no rate is said, or it is not clear which signal the
+        Refused if stamps are uneven and no rate is given, or if it is not clear which signal the
         input is.
         """
-        model, command = self.model, experiment.input
+        model = self.model
+        command = experiment.input
         defaults = {p.tap(name).signal for p in model.parts for name in p.defaults}
         others = [experiment[name] for name in model.external if name in experiment.channels]
-        left = [name for name in model.external if name not in experiment.channels]
-        left = [name for name in left if name not in defaults] or left
-        if len(left) != 1:
+        inputs = [name for name in model.external if name not in experiment.channels]
+        inputs = [name for name in inputs if name not in defaults] or inputs
+        if len(inputs) != 1:
             raise InputError(
                 f"{model.name} needs the signals {', '.join(model.external)}; {experiment.name} "
                 "has one input, for one of them, and the channels "
@@ -335,20 +350,20 @@ class OwnModel(Result, EquationModel):
         if rate is None:
             raise InputError(
                 f"{experiment.name}: the stamps of its input are not even, so the model needs a "
-                f"rate, as in OwnModel({model.name}, rate=100.0)."
+                f"rate, as in UserModel({model.name}, rate=100.0)."
             )
         record = on_grid(
-            {left[0]: command.values},
+            {inputs[0]: command.values},
             rate,
             time=None if rate == even else command.time,
             interpolation="previous" if command.is_held else "linear",
             substeps=self.substeps,
-        )[left[0]]
+        )[inputs[0]]
         record = replace(record, start=float(command.time[0]))
-        return left[0], record, {each.name: each.at(record.points) for each in others}
+        return inputs[0], record, {signal.name: signal.at(record.points) for signal in others}
 
     def ready(
-        self, values: Mapping[str, float], experiment: Experiment, asked: Asked
+        self, values: Mapping[str, float], experiment: Experiment, request: SimulationRequest
     ) -> BoundModel:
         """The model with numbers; a name that is not known, or no value of one, is refused."""
         model, given = self.model, self.given
@@ -360,12 +375,13 @@ class OwnModel(Result, EquationModel):
             started = states_started_by(model, name)
             begin |= dict.fromkeys(started, value)
             if name not in paths and not started:
-                known = ", ".join(paths)
-                raise InputError(f"{model.name} has no parameter '{name}'; it has {known}.")
+                parameters = ", ".join(paths)
+                raise InputError(f"{model.name} has no parameter '{name}'; it has {parameters}.")
         for path in begin:
             if path not in states:
-                known = ", ".join(states)
-                raise InputError(f"{model.name} has no state '{path}' to begin at; it has {known}.")
+                raise InputError(
+                    f"{model.name} has no state '{path}' to begin at; it has {', '.join(states)}."
+                )
         try:
             p = made(model.parameters, {name: values[name] for name in values if name in paths})
         except KeyError as error:
@@ -377,4 +393,4 @@ class OwnModel(Result, EquationModel):
                 raise InputError(f"{model.name} has no given numbers for {experiment.name}.")
             given = given[experiment.name]
         instance = instance_of(model, p, options=self.options, given=given)
-        return BoundModel(instance, RunValues(begin, asked.offsets), asked.columns)
+        return BoundModel(instance, RunValues(begin, request.offsets), request.columns)

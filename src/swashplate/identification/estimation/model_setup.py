@@ -28,11 +28,11 @@ from swashplate.errors import (
     UnknownNameError,
     meant,
 )
-from swashplate.identification.estimation.model import OwnModel, simulated, states_started_by
+from swashplate.identification.estimation.model import UserModel, simulated, states_started_by
 from swashplate.identification.estimation.problem import Problem, noise_scales
 from swashplate.identification.estimation.setup import (
+    FitSetup,
     Free,
-    Setup,
     Stage,
     StandardUncertainty,
     deviation,
@@ -53,7 +53,7 @@ BY_ORDER = 10.0
 class ModelSetup(Result):
     """A user-defined model and what is to be found of it.
 
-    It is what a `ParameterSet` and a `Setup` together are of a drive.
+    It is what a `ParameterSet` and a `FitSetup` together are of a drive.
 
     An entry of `free` is (low, nominal, high), (low, nominal, high, unit) or an `Unknown`. A range
     of positive bounds, the upper one at least ten times the lower one, is searched by its
@@ -62,7 +62,7 @@ class ModelSetup(Result):
     """
 
     model: Any
-    """A model of equations, an `OwnModel` of them with more said, or an object with `simulate`."""
+    """A model of equations, a `UserModel` of them with more said, or an object with `simulate`."""
     free: Mapping[str, Any]
     """What is to be found, by the model's names."""
     name: str = ""
@@ -70,7 +70,7 @@ class ModelSetup(Result):
     channels: tuple[str, ...] = ()
     """Those that are fitted; all that the model gives by default."""
     noise: Mapping[str, float] = field(default_factory=dict)
-    """Standard deviation of a channel, where the campaign does not state it. [unit]"""
+    """Standard deviation of a channel, if the campaign does not state it. [unit]"""
     fixed: Mapping[str, float] = field(default_factory=dict)
     """Values of names that are not free."""
     standard_uncertainty: Mapping[str, StandardUncertainty] = field(default_factory=dict)
@@ -81,58 +81,51 @@ class ModelSetup(Result):
     """What one unit of residual is, by channel: its noise. [unit]"""
 
     def __post_init__(self) -> None:
-        for what in ("free", "noise", "fixed", "standard_uncertainty"):
-            check_mapping(what, getattr(self, what))
+        for table in ("free", "noise", "fixed", "standard_uncertainty"):
+            check_mapping(table, getattr(self, table))
         if isinstance(self.channels, str):
             raise InputError(f"Give the channels as ('{self.channels}',).")
-        own = OwnModel(self.model) if isinstance(self.model, Equations) else self.model
-        if not callable(getattr(own, "simulate", None)):
+        model = UserModel(self.model) if isinstance(self.model, Equations) else self.model
+        if not callable(getattr(model, "simulate", None)):
             raise InputError(
-                f"A {type(own).__name__} is no model: give a Model of equations, or an object with "
-                "simulate(values, experiment)."
+                f"A {type(model).__name__} is not a model: give a Model of equations, or an object "
+                "with simulate(values, experiment)."
             )
-        equations = own.model if isinstance(own, OwnModel) else own
+        equations = model.model if isinstance(model, UserModel) else model
         kind = getattr(equations, "name", None) or type(equations).__name__
         name = self.name or str(kind).lower()
+        self._check_free_and_fixed(name)
+        _check_numbers(f"{name}: the noise", self.noise, 0.0)
+        _check_numbers(f"{name}: the fixed value", self.fixed, -inf)
+        free = {key: _unknown(key, entry) for key, entry in self.free.items()}
+        if isinstance(model, UserModel):
+            targets = [target for unknown in free.values() for target in unknown.targets]
+            _check_names(model, "free", targets)
+            _check_names(model, "fixed", self.fixed)
+        if isinstance(equations, Equations):
+            _check_ranges(name, equations, free, self.fixed)
+        object.__setattr__(self, "model", model)
+        object.__setattr__(self, "name", name)
+        object.__setattr__(self, "free", free)
+        _ = self.setup  # refuses what is not an uncertainty
+
+    def _check_free_and_fixed(self, name: str) -> None:
+        """Refuse a setup without anything free, or with a name in two tables."""
         if not self.free:
             raise InputError(f"Nothing of {name} is free: name what is to be found.")
-        if unknown := [each for each in self.standard_uncertainty if each not in self.fixed]:
+        without_value = [key for key in self.standard_uncertainty if key not in self.fixed]
+        if without_value:
             raise InputError(
-                f"{unknown[0]} has a standard uncertainty but no value: name it in fixed, or give "
-                "it a prior if it is free."
+                f"{without_value[0]} has a standard uncertainty but no value: name it in fixed, or "
+                "give it a prior if it is free."
             )
-        if both := [each for each in self.free if each in self.fixed]:
+        both = [key for key in self.free if key in self.fixed]
+        if both:
             raise InputError(f"{both[0]} of {name} is free and fixed: name it in one of them.")
-        numbers = (("noise", self.noise, 0.0), ("fixed value", self.fixed, -inf))
-        for what, given, least in numbers:
-            for key, number in given.items():
-                if not is_real(number) or not least < number < inf:
-                    must = "finite" if least < 0.0 else "above 0"
-                    raise InputError(
-                        f"{name}: the {what} of '{key}' is {number!r}, but must be {must}."
-                    )
-        free = {key: _unknown(key, each) for key, each in self.free.items()}
-        if isinstance(own, OwnModel):
-            targets = [name for unknown in free.values() for name in unknown.targets]
-            _check_names(own, "free", targets)
-            _check_names(own, "fixed", self.fixed)
-        ranges = equations.ranges if isinstance(equations, Equations) else {}
-        for key, definition in ranges.items():
-            if key in free:
-                for bound in (free[key].low, free[key].high):
-                    if not definition.holds(bound):
-                        raise ParameterError(f"{name}, a bound: {definition.broken(key, bound)}.")
-                    check_plausible(f"{name}, a bound: {key}", definition, bound)
-                check_plausible(f"{name}: {key}", definition, free[key].start)
-            if key in self.fixed:
-                check_plausible(f"{name}, fixed: {key}", definition, self.fixed[key])
-        for key, made in {"model": own, "name": name, "free": free}.items():
-            object.__setattr__(self, key, made)
-        _ = self.setup  # refuses what is no uncertainty
 
     @classmethod
     def from_file(cls, path: str | Path) -> ModelSetup:
-        """The set-up that a Python file states by its names ``model`` and ``free``.
+        """The fit setup that a Python file states by its names ``model`` and ``free``.
 
         Besides those it may have ``name``, ``channels``, ``noise``, ``fixed`` and
         ``standard_uncertainty``. The file is executed, as a module that worker processes import as
@@ -149,7 +142,7 @@ class ModelSetup(Result):
         if not file.exists():
             raise MissingFileError(f"There is no file {path}: name a Python file with a model.")
         if not file.is_file() or file.suffix != ".py" or not file.stem.isidentifier():
-            raise FileError(f"{path} is no Python file with a model, such as valve.py.")
+            raise FileError(f"{path} is not a Python file with a model, such as valve.py.")
         if str(file.parent) not in sys.path:
             sys.path.insert(0, str(file.parent))
         try:
@@ -162,8 +155,9 @@ class ModelSetup(Result):
             ) from None
         except Exception as error:  # the user's own code, which can raise anything
             sys.modules.pop(file.stem, None)
-            own = [e.lineno for e in extract_tb(error.__traceback__) if e.filename == str(file)]
-            line = getattr(error, "lineno", None) or (own[-1] if own else None)
+            trace = extract_tb(error.__traceback__)
+            lines = [entry.lineno for entry in trace if entry.filename == str(file)]
+            line = getattr(error, "lineno", None) or (lines[-1] if lines else None)
             where = f"{path}, line {line}" if line else f"{path}"
             raise FileError(f"{where}: {type(error).__name__}: {error}.") from None
         if module.__file__ is None or Path(module.__file__).resolve() != file:
@@ -174,31 +168,34 @@ class ModelSetup(Result):
                     f"{path} has no '{name}': it needs model = Model(...) and free = "
                     "{'lag': (0.005, 0.06, 0.5), ...}, lower bound, nominal value and upper bound."
                 )
-        known = ("model", "free", "name", "channels", "noise", "fixed", "standard_uncertainty")
+        names = ("model", "free", "name", "channels", "noise", "fixed", "standard_uncertainty")
         try:
-            return cls(**{key: getattr(module, key) for key in known if hasattr(module, key)})
+            return cls(**{key: getattr(module, key) for key in names if hasattr(module, key)})
         except SwashplateError as error:
             raise type(error)(f"{path}: {error}") from None
 
     @property
-    def setup(self) -> Setup:
-        """The set-up as that of a fit in stages, of which it has one."""
+    def setup(self) -> FitSetup:
+        """The fit setup as that of a fit in stages, of which it has one."""
         free = {
-            each.name: Free(bounds=(each.low, each.high), log=each.log, prior=each.prior)
-            for each in self.free.values()
+            unknown.name: Free(
+                bounds=(unknown.low, unknown.high), log=unknown.log, prior=unknown.prior
+            )
+            for unknown in self.free.values()
         }
         stage = Stage(name=self.name, part="model", free=free)
         content = {"title": self.name, "stages": (stage,)}
         uncertain = {"standard_uncertainty": dict(self.standard_uncertainty)}
-        return validated(content | uncertain, Setup, self.name)
+        return validated(content | uncertain, FitSetup, self.name)
 
     def nominal(self, experiments: Sequence[Experiment]) -> ModelSetup:
-        """The set-up with the numbers before a fit to some runs."""
-        had = dict.fromkeys(name for each in experiments for name in each.channels)
-        if strange := [each for each in self.noise if each not in had]:
+        """The fit setup with the numbers before a fit to some runs."""
+        measured = dict.fromkeys(name for run in experiments for name in run.channels)
+        strange = [name for name in self.noise if name not in measured]
+        if strange:
             raise InputError(
                 f"{self.name}: noise is stated for '{strange[0]}', but the channels are "
-                f"{', '.join(had) or 'none'}."
+                f"{', '.join(measured) or 'none'}."
             )
         problem = self.problem(experiments)
         numbers = {**self.fixed, **problem.unknowns.targets(problem.start, "")}
@@ -207,12 +204,12 @@ class ModelSetup(Result):
     def problem(self, experiments: Sequence[Experiment], *, threads: int = 1) -> Problem:
         """The problem that it states for some runs, one of which has a channel that is fitted."""
         channels = tuple(self.channels) or self._channels_given(experiments)
-        runs = [each for each in experiments if any(name in each.channels for name in channels)]
+        runs = [run for run in experiments if any(name in run.channels for name in channels)]
         if not runs:
-            had = dict.fromkeys(name for each in experiments for name in each.channels)
+            measured = dict.fromkeys(name for run in experiments for name in run.channels)
             raise InputError(
                 f"{self.name} is fitted to {', '.join(channels) or 'nothing'}, but the runs have "
-                f"{', '.join(had) or 'no channel'}."
+                f"{', '.join(measured) or 'no channel'}."
             )
         for k, run in enumerate(runs):  # the noise of channels that the campaign does not state
             noises = {
@@ -220,8 +217,8 @@ class ModelSetup(Result):
                 for name, channel in run.channels.items()
             }
             runs[k] = replace(run, channels=noises)
-        of_any_run = {each.name for run in experiments for each in self.unknowns_of_run(run)}
-        unknowns = [each for each in self.free.values() if each.name not in of_any_run]
+        of_any_run = {unknown.name for run in experiments for unknown in self.unknowns_of_run(run)}
+        unknowns = [unknown for unknown in self.free.values() if unknown.name not in of_any_run]
         for run in runs:
             unknowns += self.unknowns_of_run(run)
         values, zeros = _without_zeros(self.fixed, channels)
@@ -234,18 +231,18 @@ class ModelSetup(Result):
             fixed=values,
             zeros=zeros,
             uncertain=tuple(
-                {name: deviation(each, self.fixed[name])}
-                for name, each in self.standard_uncertainty.items()
+                {name: deviation(stated, self.fixed[name])}
+                for name, stated in self.standard_uncertainty.items()
             ),
-            threads=threads if isinstance(self.model, OwnModel) else 1,
+            threads=threads if isinstance(self.model, UserModel) else 1,
         )
 
     def _channels_given(self, experiments: Sequence[Experiment]) -> tuple[str, ...]:
         """Names of the channels that the model gives."""
-        values = {each.name: each.start for each in self.free.values()} | dict(self.fixed)
+        values = {unknown.name: unknown.start for unknown in self.free.values()} | dict(self.fixed)
         names = dict[str, None]()
         for experiment in experiments:
-            if isinstance(self.model, OwnModel):
+            if isinstance(self.model, UserModel):
                 names |= dict.fromkeys(self.model.signals_of(experiment))
             else:
                 names |= dict.fromkeys(simulated(self.model, values, experiment))
@@ -253,17 +250,19 @@ class ModelSetup(Result):
 
     def unknowns_of_run(self, experiment: Experiment) -> tuple[Unknown, ...]:
         """The unknowns of a single run: where its state begins, and the zeros of its sensors."""
-        channels, run = {zero_name(name): name for name in experiment.channels}, experiment.name
-        equations = self.model.model if isinstance(self.model, OwnModel) else None
-        found = list[Unknown]()
+        run = experiment.name
+        channels = {zero_name(name): name for name in experiment.channels}
+        equations = self.model.model if isinstance(self.model, UserModel) else None
+        unknowns = list[Unknown]()
         for unknown in self.free.values():
             if unknown.run is not None:
                 continue
-            if channel := channels.get(unknown.name):
-                found.append(replace(unknown, run=run, kind="zero", channel=channel))
+            channel = channels.get(unknown.name)
+            if channel:
+                unknowns.append(replace(unknown, run=run, kind="zero", channel=channel))
             elif equations is not None and states_started_by(equations, unknown.name):
-                found.append(replace(unknown, run=run, kind="start"))
-        return tuple(found)
+                unknowns.append(replace(unknown, run=run, kind="start"))
+        return tuple(unknowns)
 
     def predicted(self, experiment: Experiment) -> Mapping[str, Array]:
         """A run predicted from its input: for each channel (m,) samples at its stamps. [unit]
@@ -272,11 +271,11 @@ class ModelSetup(Result):
         estimated from this run; everything else is as it is.
         """
         of_run = self.unknowns_of_run(experiment)
-        unknowns = tuple(each for each in of_run if each.name not in self.numbers)
+        unknowns = tuple(unknown for unknown in of_run if unknown.name not in self.numbers)
         channels = tuple(name for name in self.scales if name in experiment.channels)
         if not unknowns:
-            found = simulated(self.model, self.numbers, experiment)
-            return {name: found[name] for name in channels}
+            outputs = simulated(self.model, self.numbers, experiment)
+            return {name: outputs[name] for name in channels}
         values, zeros = _without_zeros(self.numbers, channels)
         problem = Problem(
             self.model,
@@ -299,7 +298,30 @@ def _without_zeros(
     return {name: value for name, value in values.items() if name not in names}, zeros
 
 
-def _check_names(model: OwnModel, table: str, names: Iterable[str]) -> None:
+def _check_numbers(table: str, numbers: Mapping[str, float], least: float) -> None:
+    """Refuse what is not a finite number above `least`."""
+    for key, number in numbers.items():
+        if not is_real(number) or not least < number < inf:
+            must = "finite" if least < 0.0 else "above 0"
+            raise InputError(f"{table} of '{key}' is {number!r}, but must be {must}.")
+
+
+def _check_ranges(
+    name: str, equations: Equations, free: Mapping[str, Unknown], fixed: Mapping[str, float]
+) -> None:
+    """Refuse bounds and values that the model's parameters cannot have."""
+    for key, definition in equations.ranges.items():
+        if key in free:
+            for bound in (free[key].low, free[key].high):
+                if not definition.holds(bound):
+                    raise ParameterError(f"{name}, a bound: {definition.broken(key, bound)}.")
+                check_plausible(f"{name}, a bound: {key}", definition, bound)
+            check_plausible(f"{name}: {key}", definition, free[key].start)
+        if key in fixed:
+            check_plausible(f"{name}, fixed: {key}", definition, fixed[key])
+
+
+def _check_names(model: UserModel, table: str, names: Iterable[str]) -> None:
     """Refuse a name that is neither a parameter, a start of a state nor the zero of a signal."""
     paths, zeros = parameter_paths(model.model), [*map(zero_name, model.signals)]
     for name in names:

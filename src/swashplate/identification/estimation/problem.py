@@ -16,7 +16,7 @@ from swashplate.equations.marching.observation import ObservedRecord
 from swashplate.errors import InputError
 from swashplate.identification.estimation.arrow import (
     ArrowFactor,
-    Block,
+    RunRows,
     Whitening,
     arrow_factor,
     stacked,
@@ -24,11 +24,11 @@ from swashplate.identification.estimation.arrow import (
     whitening,
 )
 from swashplate.identification.estimation.model import (
-    Asked,
     EquationModel,
     Linearised,
-    Model,
-    OwnModel,
+    MachineModel,
+    SimulationRequest,
+    UserModel,
     linearised,
     part_of,
     simulated,
@@ -43,7 +43,7 @@ if TYPE_CHECKING:
     from swashplate.equations import BoundModel
 
 Array = NDArray[np.float64]
-Part = TypeVar("Part")
+Returned = TypeVar("Returned")
 Loss = Literal["linear", "soft_l1", "cauchy"]
 
 
@@ -70,8 +70,8 @@ class Problem(Result):
     The residual of a sample is sqrt(weight)/scale times (simulated less measured).
     """
 
-    model: Model
-    """One of equations stands for itself, or as an `OwnModel` with more said about it."""
+    model: MachineModel
+    """One of equations stands for itself, or as a `UserModel` with more said about it."""
     experiments: tuple[Experiment, ...]
     unknowns: Unknowns
     channels: tuple[str, ...]
@@ -94,7 +94,7 @@ class Problem(Result):
 
     def __post_init__(self) -> None:
         if isinstance(self.model, OfEquations):
-            object.__setattr__(self, "model", OwnModel(self.model))
+            object.__setattr__(self, "model", UserModel(self.model))
         for what, there in (("parameter", self.unknowns), ("experiment", self.experiments)):
             if not there:
                 raise InputError(f"A fit needs at least one {what}.")
@@ -118,9 +118,9 @@ class Problem(Result):
     def weights(self) -> tuple[Mapping[str, Array], ...]:
         """For each experiment and fitted channel the (m,) factors on the residuals."""
         found = []
-        for each in self.experiments:
-            names = [name for name in self.channels if name in each.channels]
-            found.append({n: _factors(each[n].weight, self.scales[n]) for n in names})
+        for run in self.experiments:
+            names = [name for name in self.channels if name in run.channels]
+            found.append({n: _factors(run[n].weight, self.scales[n]) for n in names})
         return tuple(found)
 
     @property
@@ -143,7 +143,7 @@ class Problem(Result):
 
     def _compressed(self, vector: Array) -> Evaluation:
         """[J r] as the triangular factors of the runs, or as that of all."""
-        ways = [self._reduced if each else self._factored for each in self._marched]
+        ways = [self._reduced if marched else self._factored for marched in self._marched]
         blocks = self._each(lambda number: ways[number](vector, number))
         residuals, _ = self.unknowns.prior_rows(vector)
         priors = prior_blocks(self.unknowns, vector)
@@ -182,7 +182,9 @@ class Problem(Result):
             if np.isfinite(total := float(residuals @ residuals)):
                 return total
         # by channel, which also says what is not finite
-        return sum(float(np.sum(each**2)) for each in self.residuals(vector, number).values())
+        return sum(
+            float(np.sum(residual**2)) for residual in self.residuals(vector, number).values()
+        )
 
     def residuals(self, vector: Array, number: int) -> Mapping[str, Array]:
         """Weighted residuals (m,) of the fitted channels of one experiment, 0 if ignored."""
@@ -235,13 +237,13 @@ class Problem(Result):
         values, by = zip(*self.linearised(vector, number).values(), strict=True)
         return Evaluation(np.concatenate(values), np.vstack(by))
 
-    def _factored(self, vector: Array, number: int) -> Block:
+    def _factored(self, vector: Array, number: int) -> RunRows:
         """[J r] of one experiment where the march cannot make its triangular factor."""
         residuals, jacobian = self._full(vector, number)
         factor = triangular_factor(np.column_stack([jacobian, residuals]))
         return self._block(number, factor)
 
-    def _reduced(self, vector: Array, number: int) -> Block:
+    def _reduced(self, vector: Array, number: int) -> RunRows:
         """The triangular factor of [J r] of one experiment, without ever holding J."""
         ready, observed = self._ready(vector, number)
         experiment, (_, names, zeros, asked, by) = self.experiments[number], self._own[number]
@@ -252,22 +254,22 @@ class Problem(Result):
         jacobian += factor[:, len(asked) : -1] @ zeros_chain
         return self._block(number, np.column_stack([jacobian, factor[:, -1]]))
 
-    def _block(self, number: int, rows: Array) -> Block:
+    def _block(self, number: int, rows: Array) -> RunRows:
         run = self.experiments[number].name
-        return Block(run, self.unknowns.of_run(run), rows)
+        return RunRows(run, self.unknowns.of_run(run), rows)
 
     @cached_property
     def _marched(self) -> tuple[bool, ...]:
         """Whether the march itself makes the residuals of each experiment."""
         whole = self.compare is None and isinstance(self.model, EquationModel)
         moved = {unknown.run for unknown in self.unknowns if unknown.kind == "instant"}
-        return tuple(whole and each.name not in moved for each in self.experiments)
+        return tuple(whole and run.name not in moved for run in self.experiments)
 
     def _ready(self, vector: Array, number: int) -> tuple[BoundModel, ObservedRecord]:
         """The model with the numbers of one experiment, and this as the march sees it."""
         experiment, (observed, _, _, asked, _) = self.experiments[number], self._own[number]
         model, zeros = cast("EquationModel", self.model), self._zeros(vector, number)
-        request = Asked(observed, asked, list(zeros.values()))
+        request = SimulationRequest(observed, asked, list(zeros.values()))
         return model.ready(self.model_values(vector, number), experiment, request), observed
 
     @cached_property
@@ -286,7 +288,7 @@ class Problem(Result):
             made.append((observed, names, zeros, *model.columns(names)))
         return made
 
-    def _each(self, work: Callable[[int], Part]) -> list[Part]:
+    def _each(self, work: Callable[[int], Returned]) -> list[Returned]:
         """What is found for each experiment, in their order."""
         numbers = range(len(self.experiments))
         alone = min(self.threads, len(numbers)) == 1
@@ -316,18 +318,22 @@ def noise_scales(experiments: Sequence[Experiment], channels: Sequence[str]) -> 
     """
     scales = {}
     for name in channels:
-        having: list[Channel] = [each[name] for each in experiments if name in each.channels]
+        having: list[Channel] = [run[name] for run in experiments if name in run.channels]
         if not having:
-            known = ", ".join(dict.fromkeys(c for each in experiments for c in each.channels))
+            known = ", ".join(dict.fromkeys(c for run in experiments for c in run.channels))
             raise InputError(f"No experiment has a channel '{name}'; there are {known}.")
-        stated = [each.noise for each in having if each.noise is not None]
+        stated = [channel.noise for channel in having if channel.noise is not None]
         if stated:
             scales[name] = float(np.sqrt(np.mean(np.square(stated))))
         elif step := having[0].resolution:
             # rounding leaves an error between -1/2 and 1/2 of a step
             scales[name] = step / np.sqrt(12.0)
         else:  # an ignored spike says nothing of the range
-            ranges = [float(np.ptp(each.values[each.used])) for each in having if each.used.any()]
+            ranges = [
+                float(np.ptp(channel.values[channel.used]))
+                for channel in having
+                if channel.used.any()
+            ]
             scales[name] = 0.01 * max(ranges, default=0.0)
         if scales[name] == 0.0:
             raise InputError(f"The channel '{name}' never changes: nothing can be fitted to it.")
@@ -339,9 +345,9 @@ def noise_scales(experiments: Sequence[Experiment], channels: Sequence[str]) -> 
 TOLERANCE = 1e-10
 """Singular values below this part of the largest count as zero.
 
-With exact derivatives a gauge of the hoist set-up lies at 1e-15 and the weakest direction that the
-tests determine at 2e-5. Derivatives by central differences are good to about 1e-9: those take
-`BY_DIFFERENCES`.
+With exact derivatives a gauge of the hoist's fit setup lies at 1e-15, and the weakest direction
+that the tests determine at 2e-5. Derivatives by central differences are good to about 1e-9: those
+take `BY_DIFFERENCES`.
 """
 BY_DIFFERENCES = 1e-6
 
@@ -447,26 +453,26 @@ class LinearisedFit(Result):
         return spare
 
 
-def prior_blocks(unknowns: Unknowns, vector: Array) -> list[Block]:
+def prior_blocks(unknowns: Unknowns, vector: Array) -> list[RunRows]:
     """The derivatives of each prior's residual, as rows of the run that its unknown belongs to."""
     _, rows = unknowns.prior_rows(vector)
-    having = [each for each in unknowns if each.prior is not None]
-    runs = [each.run or "" for each in having]
+    having = [unknown for unknown in unknowns if unknown.prior is not None]
+    runs = [unknown.run or "" for unknown in having]
     return [
-        Block(run, unknowns.of_run(run), row[None, unknowns.columns(run)])
+        RunRows(run, unknowns.of_run(run), row[None, unknowns.columns(run)])
         for run, row in zip(runs, rows, strict=True)
     ]
 
 
 def factor_of(
-    runs: Iterable[tuple[LinearisedRun, Array]], unknowns: Unknowns, priors: Iterable[Block] = ()
+    runs: Iterable[tuple[LinearisedRun, Array]], unknowns: Unknowns, priors: Iterable[RunRows] = ()
 ) -> ArrowFactor:
     """Factor of the derivatives of some runs, each (n, q + M), and of rows of priors."""
 
-    def blocks() -> Iterator[Block]:
+    def blocks() -> Iterator[RunRows]:
         yield from priors
         for run, jacobian in runs:
-            yield Block(run.name, unknowns.of_run(run.name), jacobian)
+            yield RunRows(run.name, unknowns.of_run(run.name), jacobian)
 
     return arrow_factor(len(unknowns), unknowns.shared, blocks())
 
@@ -509,7 +515,7 @@ class _Derivatives:
             elif used.any():
                 parts[name] = Linearised(part.values[used], part.by[used])
         arrays = [part.by for part in parts.values()]
-        size = sum(each.nbytes for each in arrays)
+        size = sum(array.nbytes for array in arrays)
         if number not in self._kept and size <= self._left:
             self._kept[number] = arrays
             self._left -= size
@@ -556,7 +562,7 @@ def linearised_fit(problem: Problem, vector: Array, loss: Loss = "linear") -> Li
             )
         for k, (bounded, _) in zip(mine, parts, strict=True):
             runs[k] = runs[k]._replace(residual=bounded / slope)
-    worths = np.array([each.worth for each in unknowns if each.prior is not None])
+    worths = np.array([unknown.worth for unknown in unknowns if unknown.prior is not None])
     tolerance = TOLERANCE if hasattr(problem.model, "linearise") else BY_DIFFERENCES
     return LinearisedFit(
         tuple(runs),

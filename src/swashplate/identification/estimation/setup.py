@@ -1,8 +1,8 @@
-"""Fit configuration: what a fit is to find, in one stage or several.
+"""Fit setup: what a fit is to find, in one stage or several.
 
 A drive's is written in TOML or packaged, and goes with the numbers of a `ParameterSet`. Of a
 user-defined model a `model_setup.ModelSetup` is both, the numbers and what is to be found: its
-`setup` is a fit configuration of one stage, so that all that comes after sees the same two things.
+`setup` is a fit setup of one stage, so that all that comes after sees the same two things.
 """
 
 from __future__ import annotations
@@ -124,8 +124,8 @@ class Forces(Entry):
 
     def slopes(self, name: str) -> dict[str, float]:
         """Derivatives by one force of the coefficients of its direction. [1/Aᵏ]"""
-        column = self._inverse[:, self.names.index(name)].tolist()
-        return {each: slope for each, slope in zip(self.columns, column, strict=True) if slope}
+        slopes = self._inverse[:, self.names.index(name)].tolist()
+        return {column: slope for column, slope in zip(self.columns, slopes, strict=True) if slope}
 
 
 @cache
@@ -163,7 +163,7 @@ class Stage(Entry):
     name: str
     part: Literal["card", "pump", "chain", "model"] = Field(
         description="What is simulated: the control card, pump and motor, the whole chain; 'model' "
-        "is for models of one's own, given by --model."
+        "is for user-defined models, given by --model."
     )
     current: Literal["simulated", "measured"] = Field(
         "simulated",
@@ -221,7 +221,7 @@ class Stage(Entry):
         return f"to let it go on, widen {where} of the stage '{self.name}' and fit again"
 
 
-class Setup(Entry):
+class FitSetup(Entry):
     """A fit in one stage or several, each starting from what the ones before found."""
 
     title: str = ""
@@ -240,11 +240,13 @@ class Setup(Entry):
     )
 
     @model_validator(mode="after")
-    def _fixed(self) -> Setup:
+    def _fixed(self) -> FitSetup:
         for name in self.standard_uncertainty:
             symbol = _symbol(name)
             for stage in self.stages:
-                free = any(each in (name, symbol) or _symbol(each) == name for each in stage.free)
+                free = any(
+                    entry in (name, symbol) or _symbol(entry) == name for entry in stage.free
+                )
                 if free or (stage.forces is not None and symbol in COEFFICIENTS):
                     raise ValueError(
                         f"{name} is free in the stage '{stage.name}': only what stays fixed has a "
@@ -252,7 +254,7 @@ class Setup(Entry):
                     )
         return self
 
-    def joint(self) -> Setup:
+    def joint(self) -> FitSetup:
         """The same unknowns, all at once through the whole chain.
 
         A `ParameterError` says that two stages free the same parameter, or that one is driven by a
@@ -268,8 +270,8 @@ class Setup(Entry):
             if twice := sorted(set(merged["free"]) & set(stage.free)):
                 raise ParameterError(f"{twice[0]} is free in two stages; a joint fit needs one.")
             merged = {key: merged[key] | getattr(stage, key) for key in merged}
-        forces = next((each.forces for each in self.stages if each.forces is not None), None)
-        most = max((each.start_pressure or 0.0 for each in self.stages), default=0.0) or None
+        forces = next((stage.forces for stage in self.stages if stage.forces is not None), None)
+        most = max((stage.start_pressure or 0.0 for stage in self.stages), default=0.0) or None
         stage = Stage(name="chain", part="chain", forces=forces, start_pressure=most, **merged)
         return self.model_copy(update={"stages": (stage,)})
 
@@ -286,13 +288,13 @@ def deviation(uncertainty: float | str, value: float) -> float:
 
 
 def setup_names() -> tuple[str, ...]:
-    """Names of the packaged set-ups."""
-    names = (each.name for each in _SETUPS.iterdir())
+    """Names of the packaged fit setups."""
+    names = (file.name for file in _SETUPS.iterdir())
     return tuple(sorted(n.removesuffix(".toml") for n in names if n.endswith(".toml")))
 
 
-def load_setup(name: str | Path) -> Setup:
-    """A packaged set-up by name, or one's own from a TOML file.
+def load_setup(name: str | Path) -> FitSetup:
+    """A packaged fit setup by name, or a user-defined one from a TOML file.
 
     Raises
     ------
@@ -309,14 +311,14 @@ def load_setup(name: str | Path) -> Setup:
         text = _SETUPS.joinpath(file).read_text("utf-8")
     else:
         raise ParameterError(
-            f"There is no packaged fit configuration '{name}'{meant(file, setup_names())}; there "
+            f"There is no packaged fit setup '{name}'{meant(file, setup_names())}; there "
             f"are {', '.join(setup_names())}, or give a .toml file."
         )
-    return validated(parse_toml(text, file), Setup, file)
+    return validated(parse_toml(text, file), FitSetup, file)
 
 
-FreeParameters = Setup | str | Path | Mapping[str, Any]
-"""What a fit is to estimate: a fit configuration, its packaged name or file, or a mapping."""
+FreeParameters = FitSetup | str | Path | Mapping[str, Any]
+"""What a fit is to estimate: a fit setup, its packaged name or file, or a mapping."""
 
 
 def free_entries(free: Mapping[str, Any], definitions: Definitions) -> dict[str, Free]:
@@ -343,8 +345,8 @@ def free_entries(free: Mapping[str, Any], definitions: Definitions) -> dict[str,
     return entries
 
 
-def setup_text(setup: Setup) -> str:
-    """A fit configuration as TOML that `load_setup` reads as an equal one."""
+def setup_text(setup: FitSetup) -> str:
+    """A fit setup as TOML that `load_setup` reads as an equal one."""
     from tomlkit import dumps, inline_table
 
     content = setup.model_dump(mode="json", by_alias=True, exclude_defaults=True)

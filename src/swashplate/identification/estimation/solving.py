@@ -24,7 +24,7 @@ from swashplate.tables import count, made_folder, write_text
 Array = NDArray[np.float64]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Cost = Annotated[float, Field(ge=0.0)]
-"""Half a sum of squares; infinite where the model does not hold."""
+"""Half a sum of squares; infinite if the model does not hold."""
 
 REFUSED = 1e6
 """A point outside the model's domain costs this many times the start: the step is taken back."""
@@ -33,14 +33,14 @@ LEG = 30
 as a step that just reaches the swash plate's stop, it shrinks to nothing."""
 GAINED = 1e-6
 """Relative gain of a leg from which another one is worth it."""
-RETURNS = 3
-"""How often a search is taken back from where it lost an unknown."""
+REVIVALS = 3
+"""How often unknowns that lost their effect are given one again."""
 NO_EFFECT = 1e-12
-"""Share of its nominal effect that rounding may leave of none."""
+"""Share of its nominal effect up to which an effect is mere rounding."""
 SOME_EFFECT = 0.05
-"""Share of its nominal effect at which an unknown counts as having one again."""
+"""Share of its nominal effect from which an unknown has an effect again."""
 VALUES = 25
-"""Within its bounds that are tried for one."""
+"""Values of such an unknown, evenly over its bounds, that are tried."""
 UNCHANGED, INTERRUPTED, GIVEN_UP = 2, -1, -2
 _ENDINGS = {
     GIVEN_UP: "given up: it explains too little of what was measured",
@@ -79,7 +79,7 @@ class Solution(Result):
     loss: Loss = "linear"
     """What of each residual was summed."""
     number: int = 0
-    """Of the start, where there were several: 0 is the nominal one, others are Sobol points."""
+    """Of the start, if there were several: 0 is the nominal one, others are Sobol points."""
 
     @property
     def given_up(self) -> bool:
@@ -91,19 +91,22 @@ class _Memory:
     """Evaluates, remembers the last point and the best one, and refuses what is out of domain."""
 
     def __init__(self, problem: Problem, fixed: Mapping[int, float], compressed: bool) -> None:
-        self.problem, self.compressed, self.evaluations = problem, compressed, 0
-        self.places, self.numbers = list(fixed), list(fixed.values())
-        self.bounds = tuple(np.delete(each, self.places) for each in problem.bounds)
+        self.problem = problem
+        self.compressed = compressed
+        self.evaluations = 0
+        self.fixed_indices = list(fixed)
+        self.fixed_numbers = list(fixed.values())
+        self.bounds = tuple(np.delete(bound, self.fixed_indices) for bound in problem.bounds)
         self.best: tuple[float, Array] | None = None
         self._last: tuple[bytes, Evaluation] | None = None
         self._refused = 0.0
 
-    def whole(self, vector: Array) -> Array:
-        """(K,) vector with the fixed numbers in their places."""
-        made = np.empty(vector.size + len(self.places))
-        made[self.places] = self.numbers
-        made[np.delete(np.arange(made.size), self.places)] = vector
-        return made
+    def full(self, vector: Array) -> Array:
+        """(K,) vector of free and fixed numbers."""
+        full = np.empty(vector.size + len(self.fixed_indices))
+        full[self.fixed_indices] = self.fixed_numbers
+        full[np.delete(np.arange(full.size), self.fixed_indices)] = vector
+        return full
 
     def __call__(self, vector: Array) -> Evaluation:
         key = vector.tobytes()
@@ -112,22 +115,22 @@ class _Memory:
         self.evaluations += 1
         try:
             residuals, jacobian = self.problem.evaluate(
-                self.whole(vector), compressed=self.compressed
+                self.full(vector), compressed=self.compressed
             )
         except DomainError:
             if self._last is None:
                 raise  # the start itself: there is nothing to go back to
             residuals, jacobian = self._last[1]
-            made = Evaluation(np.full_like(residuals, self._refused), jacobian)
+            evaluation = Evaluation(np.full_like(residuals, self._refused), jacobian)
         else:
-            made = Evaluation(residuals, np.delete(jacobian, self.places, axis=1))
+            evaluation = Evaluation(residuals, np.delete(jacobian, self.fixed_indices, axis=1))
             cost = 0.5 * float(residuals @ residuals)
             if self.best is None:
                 self._refused = float(np.sqrt(REFUSED * (2.0 * cost + 1e-300)))
             if self.best is None or cost < self.best[0]:
                 self.best = (cost, vector.copy())
-        self._last = (key, made)
-        return made
+        self._last = (key, evaluation)
+        return evaluation
 
 
 def solve(
@@ -150,7 +153,7 @@ def solve(
     start : (K,) array, optional
         Where to begin instead of at the nominal values; a `DomainError` if the model does not hold.
     fixed : mapping of int to float, optional
-        Places and numbers of the vector that stay where they are.
+        Numbers of the vector that are not free, by their index.
     loss : Loss
         Robust loss on each residual.
     tolerance : float
@@ -160,31 +163,35 @@ def solve(
     watch : callable, optional
         Called at each iteration. Ctrl-C ends the search with the best point so far.
     hopeless : callable, optional
-        Asked of the best point after each `LEG` evaluations; the search is given up if it says so.
+        Called with the best point after each `LEG` evaluations; true gives the search up.
     """
     from scipy.optimize import least_squares
 
     # a robust loss looks at each residual, which the triangular factor has mixed
     memory = _Memory(problem, fixed or {}, compressed=loss == "linear")
-    begin = np.delete(problem.start if start is None else start, memory.places)
+    begin = np.delete(problem.start if start is None else start, memory.fixed_indices)
     best = begin = np.clip(begin, *memory.bounds)
     iteration = 0
 
-    def seen(intermediate_result) -> None:  # type: ignore[no-untyped-def]
+    def report(intermediate_result) -> None:  # type: ignore[no-untyped-def]
         nonlocal iteration
         iteration += 1
         if watch is not None:
             watch(Progress(iteration, float(intermediate_result.cost), memory.evaluations))
 
-    lowest, spent, before, returns = np.inf, 0, np.inf, 0
-    # an unknown that got its effect back is fixed for a leg, in which the others follow
-    still = np.zeros(begin.size, dtype=bool)
+    lowest = np.inf
+    spent = 0
+    revivals = 0
+    lowest_at_revival = np.inf
+    # After an unknown without effect was moved to where it has one, it is held for one leg, while
+    # the others adapt.
+    held = np.zeros(begin.size, dtype=bool)
     try:
         while True:
-            found = least_squares(
+            leg = least_squares(
                 lambda vector: memory(vector).residuals.copy(),
                 begin,
-                jac=lambda vector, still=still: np.where(still, 0.0, memory(vector).jacobian),
+                jac=lambda vector, held=held: np.where(held, 0.0, memory(vector).jacobian),
                 bounds=memory.bounds,
                 x_scale="jac",
                 loss=loss,
@@ -192,57 +199,73 @@ def solve(
                 xtol=tolerance,
                 gtol=1e-14,
                 max_nfev=min(LEG, max_evaluations - spent),
-                callback=seen,
+                callback=report,
             )
-            gained = lowest - found.cost > GAINED * found.cost
-            ending = int(found.status)
-            if found.cost < lowest:
-                best, lowest = found.x, float(found.cost)
+            gained = lowest - leg.cost > GAINED * leg.cost
+            ending = int(leg.status)
+            if leg.cost < lowest:
+                best = leg.x
+                lowest = float(leg.cost)
             # steps that round to nothing are counted by SciPy alone
-            spent = max(spent + int(found.nfev), memory.evaluations)
-            if hopeless is not None and ending == 0 and hopeless(memory.whole(best)):
+            spent = max(spent + int(leg.nfev), memory.evaluations)
+            if hopeless is not None and ending == 0 and hopeless(memory.full(best)):
                 ending = GIVEN_UP
                 break
             if spent >= max_evaluations:
                 break
-            released, point = still.any(), None
-            if not released and returns < RETURNS and lowest < before * (1.0 - GAINED):
-                point, still = _returned(memory, best)
-                before, returns = lowest, returns + (point is not None)
-            else:
-                still = np.zeros_like(still)
+            released = held.any()
+            point = None
+            held = np.zeros_like(held)
+            may_revive = not released and revivals < REVIVALS
+            if may_revive and lowest < lowest_at_revival * (1.0 - GAINED):
+                point, held = _with_effect_again(memory, best)
+                lowest_at_revival = lowest
+                if point is not None:
+                    revivals += 1
             if point is None and not (released or (ending == 0 and gained)):
                 ending = ending or UNCHANGED
                 break
-            begin = found.x if point is None else point
+            begin = leg.x if point is None else point
     except KeyboardInterrupt:
         if memory.best is None:
             raise
-        (lowest, best), ending = memory.best, INTERRUPTED
-    how = memory.evaluations, ending > 0, ending == INTERRUPTED, _ENDINGS[ending], loss
-    return Solution(memory.whole(best), lowest, *how)
+        lowest, best = memory.best
+        ending = INTERRUPTED
+    return Solution(
+        vector=memory.full(best),
+        cost=lowest,
+        evaluations=memory.evaluations,
+        converged=ending > 0,
+        interrupted=ending == INTERRUPTED,
+        message=_ENDINGS[ending],
+        loss=loss,
+    )
 
 
-def _returned(memory: _Memory, vector: Array) -> tuple[Array | None, NDArray[np.bool_]]:
+def _with_effect_again(memory: _Memory, vector: Array) -> tuple[Array | None, NDArray[np.bool_]]:
     """A point where unknowns that had lost their effect have one, and which those are.
 
-    A stop that the swash plate no longer reaches has no derivative, and no descent finds back to
-    it. Such an unknown goes to the nearest value within its bounds that has an effect.
+    No descent finds back from a derivative of 0, such as that of a stop that the swash plate no
+    longer reaches. Such an unknown is set to the nearest value within its bounds that has an
+    effect. None if there is no such unknown.
     """
 
     def effects(vector: Array) -> Array:
         memory.evaluations += 1
         try:
-            jacobian = memory.problem.evaluate(memory.whole(vector)).jacobian
+            jacobian = memory.problem.evaluate(memory.full(vector)).jacobian
         except DomainError:
             return np.zeros(vector.size)
-        return np.asarray(np.linalg.norm(np.delete(jacobian, memory.places, axis=1), axis=0))
+        free = np.delete(jacobian, memory.fixed_indices, axis=1)
+        return np.asarray(np.linalg.norm(free, axis=0))
 
     present = np.linalg.norm(memory(vector).jacobian, axis=0)
-    lost, point = np.zeros(present.size, dtype=bool), vector.copy()
+    lost = np.zeros(present.size, dtype=bool)
     if present.min(initial=np.inf) > NO_EFFECT * present.max(initial=0.0):
         return None, lost
-    start, (low, high) = np.delete(memory.problem.start, memory.places), memory.bounds
+    point = vector.copy()
+    start = np.delete(memory.problem.start, memory.fixed_indices)
+    low, high = memory.bounds
     nominal = effects(start)
     for k in np.flatnonzero(present < NO_EFFECT * nominal):
         values = np.linspace(low[k], high[k], VALUES)
@@ -250,7 +273,8 @@ def _returned(memory: _Memory, vector: Array) -> tuple[Array | None, NDArray[np.
         for value in values[np.lexsort((np.abs(values - vector[k]), far))]:
             trial = np.where(np.arange(point.size) == k, value, point)
             if effects(trial)[k] > SOME_EFFECT * nominal[k]:
-                point, lost[k] = trial, True
+                point = trial
+                lost[k] = True
                 break
     return (point if lost.any() else None), lost
 
@@ -259,7 +283,7 @@ def _returned(memory: _Memory, vector: Array) -> tuple[Array | None, NDArray[np.
 
 
 def sobol_starts(problem: Problem, count: int, seed: int) -> Iterator[Array]:
-    """So many points (K,) spread evenly over the bounds; others where the model does not hold.
+    """So many points (K,) spread evenly over the bounds, all in the model's domain.
 
     The same seed gives the same points, however many are asked for. If hardly any point can be
     used, an `InputError` says so.
@@ -268,11 +292,12 @@ def sobol_starts(problem: Problem, count: int, seed: int) -> Iterator[Array]:
 
     low, high = problem.bounds
     sequence = Sobol(low.size, scramble=True, rng=np.random.default_rng(seed))
-    found, tried = 0, 0
-    while found < count:
-        if tried > TRIES * (found + 1):
+    usable = 0
+    tried = 0
+    while usable < count:
+        if tried > TRIES * (usable + 1):
             raise InputError(
-                f"Of {tried} starts within the bounds only {found} lie in the model's domain; "
+                f"Of {tried} starts within the bounds only {usable} lie in the model's domain; "
                 "narrow the bounds."
             )
         tried += 1
@@ -281,7 +306,7 @@ def sobol_starts(problem: Problem, count: int, seed: int) -> Iterator[Array]:
             problem.cost(vector)
         except DomainError:
             continue
-        found += 1
+        usable += 1
         yield vector
 
 
@@ -345,10 +370,10 @@ def solve_from(
         for _, result in counted(results, len(tasks), "starts", words):
             done[result.number] = result
             if store is not None:
-                begun = tuple(starts[result.number].tolist())
-                kept = _StartFile(origin=origin, start=begun, result=result)
+                start = tuple(starts[result.number].tolist())
+                file = _StartFile(origin=origin, start=start, result=result)
                 name = f"start-{result.number:05d}.json"
-                write_text(kept.model_dump_json(indent=1) + "\n", store / name)
+                write_text(file.model_dump_json(indent=1) + "\n", store / name)
             if watch is not None:
                 watch(result, len(done))
             if enough is not None and enough(result):
@@ -376,7 +401,8 @@ def _stored(
     store: Path, origin: dict[str, str], starts: Sequence[Array], resume: bool
 ) -> dict[int, Solution]:
     """Results that a folder holds; the folder is made if there is none."""
-    done, files = {}, sorted(made_folder(store).glob("start-*.json"))
+    done = {}
+    files = sorted(made_folder(store).glob("start-*.json"))
     if files and not resume:
         raise FileError(
             f"{store} holds the starts of an earlier fit: resume it, or remove the folder."
@@ -385,13 +411,14 @@ def _stored(
         try:
             file = read_json(path, _StartFile)
         except SwashplateError as error:
-            said = str(error).rstrip(".")
-            raise FileError(f"{said}: it is no result of a start, remove it.") from None
+            reason = str(error).rstrip(".")
+            raise FileError(f"{reason}: it is not the result of a start, remove it.") from None
         differing = [name for name, mark in origin.items() if file.origin.get(name) != mark]
         result = file.result
         if not differing and result.number < len(starts):
             start = tuple(starts[result.number].tolist())
-            differing = ["starts"] * (file.start != start or result.vector.size != len(start))
+            if file.start != start or result.vector.size != len(start):
+                differing = ["starts"]
         if differing:
             raise FileError(
                 f"{path} belongs to another fit: its {' and '.join(differing)} differ. Resume with "

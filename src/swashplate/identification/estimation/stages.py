@@ -1,4 +1,4 @@
-"""Stages of a fit: what is fitted, its configuration, and the problem of each stage.
+"""Stages of a fit: what is fitted, its fit setup, and the problem of each stage.
 
 What is fitted is a drive or a user-defined model, `Parameters`; here, and where results are
 written and shown, it is asked which of them.
@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Literal, TypeVar
+from typing import Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,7 @@ from swashplate.campaign.campaign import Campaign
 from swashplate.campaign.experiment import Experiment
 from swashplate.documents import validated
 from swashplate.drive import Drive
+from swashplate.equations.marching.record import Record
 from swashplate.errors import InputError, UnknownParameterError
 from swashplate.executors import available_cores
 from swashplate.identification.estimation.drive_model import (
@@ -39,8 +40,8 @@ from swashplate.identification.estimation.drive_model import (
 from swashplate.identification.estimation.model_setup import ModelSetup
 from swashplate.identification.estimation.problem import Problem, noise_scales
 from swashplate.identification.estimation.setup import (
+    FitSetup,
     FreeParameters,
-    Setup,
     Stage,
     deviation,
     free_entries,
@@ -55,16 +56,16 @@ from swashplate.parameters.rules import FULL_VOLTAGE
 
 Array = NDArray[np.float64]
 Parameters = ParameterSet | ModelSetup
-"""The numbers of what is fitted: a drive, or a model of one's own."""
+"""The numbers of what is fitted: a drive, or a user-defined model."""
 Fitted = TypeVar("Fitted", bound=Parameters)
 FORCE = Definition("force of the solenoids", "N", plausible=(0.0, 1e4))
 """What stands for their coefficients."""
 LARGEST_START_PRESSURE = 4e6
-"""Bound of a free pressure at the start where the set-up gives none. [Pa]"""
+"""Bound of a free pressure at the start if the fit setup gives none. [Pa]"""
 
 
 def smooth(parameters: Fitted) -> Fitted:
-    """The set with the decay's switch split within the step; a model of one's own has none.
+    """The set with the decay's switch split within the step; a user-defined model has none.
 
     Sampled, as published, it makes the current jump by up to 0.7 mA as any of the card's parameters
     varies, and a fit ends where it was caught (docs/decisions/0008).
@@ -74,17 +75,17 @@ def smooth(parameters: Fitted) -> Fitted:
     return parameters
 
 
-def configuration(
+def as_fit_setup(
     free: FreeParameters,
     experiments: Sequence[Experiment],
     definitions: Definitions = DEFINITIONS,
-) -> Setup:
-    """A drive's fit configuration from any form that a caller may give it in.
+) -> FitSetup:
+    """A drive's fit setup from any form that a caller may give it in.
 
     Parameters
     ----------
-    free : Setup, str, path or mapping
-        A fit configuration, a packaged one by name, a TOML file, or a mapping: the contents of such
+    free : FitSetup, str, path or mapping
+        A fit setup, a packaged one by name, a TOML file, or a mapping: the contents of such
         a file, or free parameters by symbol as of `setup.free_entries`. Those are estimated in one
         stage: of the card alone if currents were measured, of pump and motor alone, or through the
         whole chain if both are free or no current was measured.
@@ -96,21 +97,21 @@ def configuration(
     Raises
     ------
     FileError, ParameterError
-        If the configuration cannot be read, or an entry is wrong.
+        If the fit setup cannot be read, or an entry is wrong.
     """
-    if isinstance(free, Setup):
-        return _with_known_names(free, "the fit configuration", definitions)
+    if isinstance(free, FitSetup):
+        return _with_known_names(free, "the fit setup", definitions)
     if isinstance(free, str | Path):
         return _with_known_names(load_setup(free), str(free), definitions)
-    given: object = free
-    if not isinstance(given, Mapping) or not given:
+    entries_given: object = free
+    if not isinstance(entries_given, Mapping) or not entries_given:
         raise InputError(
-            f"What is free is {free!r}, but must be a fit configuration, its name or file, or a "
+            f"What is free is {free!r}, but must be a fit setup, its name or file, or a "
             "mapping such as {'Z8': (0.5, 2)}."
         )
     if "stages" in free:
-        setup = validated(dict(free), Setup, "the fit configuration")
-        return _with_known_names(setup, "the fit configuration", definitions)
+        setup = validated(dict(free), FitSetup, "the fit setup")
+        return _with_known_names(setup, "the fit setup", definitions)
     entries = free_entries(free, definitions)
     in_card = {definitions.find(name).block == "control_card" for name in entries}
     blocks = {"card" if inside else "pump" for inside in in_card}
@@ -120,11 +121,11 @@ def configuration(
         part = "pump"
     elif blocks == {"card"} and not kinds.isdisjoint(CURRENTS):
         part = "card"
-    return Setup(stages=(Stage(name=part, part=part, free=entries),))
+    return FitSetup(stages=(Stage(name=part, part=part, free=entries),))
 
 
-def _with_known_names(setup: Setup, origin: str, definitions: Definitions) -> Setup:
-    """The fit configuration of a drive; a name in it that no parameter has is refused."""
+def _with_known_names(setup: FitSetup, origin: str, definitions: Definitions) -> FitSetup:
+    """The fit setup of a drive; a name in it that no parameter has is refused."""
     names = [
         (f"stage '{stage.name}', free", name)
         for stage in setup.stages
@@ -142,21 +143,20 @@ def _with_known_names(setup: Setup, origin: str, definitions: Definitions) -> Se
 
 def setup_of(
     campaign: Campaign, axis: str, drive: ParameterSet, free: FreeParameters | None = None
-) -> Setup:
-    """The fit configuration of an axis.
+) -> FitSetup:
+    """The fit setup of an axis.
 
     By default the packaged one of the drive that the campaign names, or else of the given one; an
-    `InputError` if there is none. `free` as of `configuration`.
+    `InputError` if there is none. `free` as of `as_fit_setup`.
     """
     if free is not None:
         runs = campaign.select(axis=axis, role="fit")
-        return configuration(free, runs, drive.definitions)
+        return as_fit_setup(free, runs, drive.definitions)
     name = drive.name if campaign.axes[axis].drive is None else campaign.drive(axis).name
     if name not in setup_names():
         raise InputError(
-            f"There is no packaged fit configuration for the drive '{name}': give one of your "
-            "own, a .toml file with stages and free parameters; 'swashplate guess' reads one off "
-            "the logs."
+            f"There is no packaged fit setup for the drive '{name}': give a user-defined one, a "
+            ".toml file with stages and free parameters; 'swashplate guess' reads one off the logs."
         )
     return load_setup(name)
 
@@ -174,7 +174,7 @@ def stage_problem(
     """The problem of a stage, over the runs that have a channel of it.
 
     `parameters` are the nominal values, those of earlier stages already found; `uncertain` standard
-    uncertainties of what stays fixed, as of `Setup`; `starts` and `instants` what a stage before
+    uncertainties of what stays fixed, as of `FitSetup`; `starts` and `instants` what a stage before
     estimated of currents at the first sample, see `start_currents_of`, and of edges. Threads are
     all cores by default. An `InputError` says that no run has what the stage fits or asks for, a
     `ParameterError` that a free parameter is unknown or its bounds are wrong.
@@ -183,79 +183,111 @@ def stage_problem(
     if isinstance(parameters, ModelSetup):
         return parameters.problem(experiments, threads=threads)
     if stage.part == "model":
-        raise InputError("part = 'model' needs a model of your own, not a drive.")
+        raise InputError("part = 'model' needs a user-defined model, not a drive.")
     channels = _channels_of(stage, experiments)
-    runs = tuple(each for each in experiments if any(name in each.channels for name in channels))
-    currents = {}
-    for each in runs if stage.part == "pump" else ():
-        if stage.current == "measured" or each.input.kind == "current":
-            currents[each.name] = measured_current(each, stage.current_scale)
-        else:
-            currents[each.name] = simulated_current(each, parameters, starts.get(each.name, {}))
-    free = _of_the_machine(stage, parameters)
-    begin = {column: each.start for each in free for column in each.targets if column in SWITCHES}
-    on = parameters.options | {SWITCHES[column] for column in begin}
-    begun = parameters.with_numbers(begin, on) if begin else parameters
-    own = [unknown for each in runs for unknown in _of_a_run(stage, each, channels, parameters)]
-    simulated = stage.part != "pump" or stage.current != "measured"
-    jumps = [unknown for each in runs if simulated for unknown in unknown_instants(each, instants)]
+    runs = tuple(run for run in experiments if any(name in run.channels for name in channels))
+    unknowns = _of_the_machine(stage, parameters)
+    model = DriveModel(
+        parameters=_switched_on(parameters, unknowns),
+        part=stage.part,
+        currents=_currents(stage, runs, parameters, starts),
+        forces=stage.forces,
+        starts=dict(starts),
+    )
+    for run in runs:
+        unknowns += _of_a_run(stage, run, channels, parameters)
+    if stage.part != "pump" or stage.current != "measured":
+        edges = [unknown for run in runs for unknown in unknown_instants(run, instants)]
+        if len(edges) <= MOST_EDGES:
+            unknowns += edges
     return Problem(
-        DriveModel(begun, stage.part, currents, stage.forces, dict(starts)),
-        tuple(_weighted(each, stage) for each in runs),
-        Unknowns((*free, *own, *(jumps if len(jumps) <= MOST_EDGES else ()))),
+        model,
+        tuple(_weighted(run, stage) for run in runs),
+        Unknowns(tuple(unknowns)),
         channels,
         noise_scales(runs, channels),
         uncertain=tuple(
             {
-                column: deviation(each, _nominal(parameters, column))
+                column: deviation(doubt, _nominal(parameters, column))
                 for column in parameters.definitions.columns_of([name])
             }
-            for name, each in uncertain.items()
+            for name, doubt in uncertain.items()
         ),
         threads=threads,
     )
 
 
+def _currents(
+    stage: Stage, runs: Sequence[Experiment], parameters: ParameterSet, starts: Starts
+) -> dict[str, Record]:
+    """Currents that drive the pump, by run; none for a stage of another part."""
+    if stage.part != "pump":
+        return {}
+    currents = {}
+    for run in runs:
+        if stage.current == "measured" or run.input.kind == "current":
+            currents[run.name] = measured_current(run, stage.current_scale)
+        else:
+            currents[run.name] = simulated_current(run, parameters, starts.get(run.name, {}))
+    return currents
+
+
+def _switched_on(parameters: ParameterSet, unknowns: Sequence[Unknown]) -> ParameterSet:
+    """The set with the refinements that are estimated, at the values that the fit begins with."""
+    numbers = {
+        column: unknown.start
+        for unknown in unknowns
+        for column in unknown.targets
+        if column in SWITCHES
+    }
+    if not numbers:
+        return parameters
+    options = parameters.options | {SWITCHES[column] for column in numbers}
+    return parameters.with_numbers(numbers, options)
+
+
 def _channels_of(stage: Stage, experiments: Sequence[Experiment]) -> tuple[str, ...]:
     """Names of the channels that a stage fits; weights of others would be lost in silence."""
     kinds = stage.channels or kinds_of(stage.part)
-    had = [(name, each.kind) for run in experiments for name, each in run.channels.items()]
-    fitted = {kind for _, kind in had if kind in kinds}
+    measured = [
+        (name, channel.kind) for run in experiments for name, channel in run.channels.items()
+    ]
+    fitted = {kind for _, kind in measured if kind in kinds}
     if not fitted:
         hint = ""
         if stage.part == "card":
-            hint = "; without a current, let 'swashplate guess' write start and fit configuration"
+            hint = "; without a current, let 'swashplate guess' write start and fit setup"
         raise InputError(
             f"The stage '{stage.name}' fits {', '.join(kinds)}, but the runs to fit have "
-            f"{', '.join(dict.fromkeys(kind for _, kind in had)) or 'no channel'}{hint}."
+            f"{', '.join(dict.fromkeys(kind for _, kind in measured)) or 'no channel'}{hint}."
         )
     weighed = {**stage.weights, **stage.weights_by_input}
     if weighed and not fitted & set(weighed):
         raise InputError(
             f"The stage '{stage.name}' weighs {', '.join(weighed)}, but the runs have "
-            f"{', '.join(sorted(fitted))}: add weights for that, or take a fit configuration "
+            f"{', '.join(sorted(fitted))}: add weights for that, or take a fit setup "
             "without."
         )
-    return tuple(dict.fromkeys(name for name, kind in had if kind in kinds))
+    return tuple(dict.fromkeys(name for name, kind in measured if kind in kinds))
 
 
 def start_currents_of(problem: Problem, vector: Array) -> Starts:
     """Currents at the first sample that a stage estimated, by run; for the stages after it."""
-    found: dict[str, dict[str, float]] = {}
+    currents: dict[str, dict[str, float]] = {}
     values = problem.unknowns.at(vector).estimates.tolist()
     for unknown, value in zip(problem.unknowns, values, strict=True):
         if unknown.run is not None and unknown.kind == "start current":
-            found.setdefault(unknown.run, {})[unknown.name] = value
-    return found
+            currents.setdefault(unknown.run, {})[unknown.name] = value
+    return currents
 
 
 def with_estimates(parameters: Parameters, problem: Problem, vector: Array) -> Parameters:
     """The parameters with what a stage found; a `DomainError` if a value breaks a rule."""
-    found = problem.unknowns.targets(vector, "")
+    numbers = problem.unknowns.targets(vector, "")
     if isinstance(parameters, ModelSetup):
-        return replace(parameters, numbers={**parameters.numbers, **found}, scales=problem.scales)
+        return replace(parameters, numbers={**parameters.numbers, **numbers}, scales=problem.scales)
     assert isinstance(problem.model, DriveModel)
-    return problem.model.parameters_at(found)
+    return problem.model.parameters_at(numbers)
 
 
 def _weighted(experiment: Experiment, stage: Stage) -> Experiment:
@@ -282,26 +314,40 @@ def _of_the_machine(stage: Stage, parameters: ParameterSet) -> list[Unknown]:
         definition = parameters.definitions.find(name)
         columns = tuple(parameters.definitions.columns_of([name]))
         least = -np.inf if definition.least is None else definition.least
-        how: Any = {"unit": definition.unit, "log": entry.log, "prior": entry.prior}
-        for group in [columns] if entry.tied else [(each,) for each in columns]:
+        for group in [columns] if entry.tied else [(column,) for column in columns]:
             nominal = float(np.mean([_nominal(parameters, column) for column in group]))
-            own, bounds = name if entry.tied else group[0], (entry.relative, entry.bounds)
-            unknown = bounded(own, nominal, *bounds, least, sets=group, **how)
-            check_plausible(f"a bound of {own}", definition, unknown.low, unknown.high)
+            unknown = bounded(
+                name if entry.tied else group[0],
+                nominal,
+                factors=entry.relative,
+                bounds=entry.bounds,
+                least=least,
+                sets=group,
+                unit=definition.unit,
+                log=entry.log,
+                prior=entry.prior,
+            )
+            check_plausible(f"a bound of {unknown.name}", definition, unknown.low, unknown.high)
             if entry.prior is not None:
-                check_plausible(f"the prior mean of {own}", definition, entry.prior.mean)
+                check_plausible(f"the prior mean of {unknown.name}", definition, entry.prior.mean)
             unknowns.append(unknown)
     if stage.forces is not None:
         for name, value in stage.forces.values(parameters).items():
-            log = value > 0.0
-            force = bounded(name, value, stage.forces.relative, unit="N", log=log, kind="force")
+            force = bounded(
+                name,
+                value,
+                factors=stage.forces.relative,
+                unit="N",
+                log=value > 0.0,
+                kind="force",
+            )
             check_plausible(f"a bound of {name}", FORCE, force.low, force.high)
             unknowns.append(force)
     return unknowns
 
 
 def _nominal(parameters: ParameterSet, column: str) -> float:
-    """Where a parameter begins: a refinement that the set does not give, where it is off."""
+    """Where a parameter begins; for a refinement that the set does not give, where it is off."""
     if column in parameters.numbers:
         return parameters.numbers[column]
     return parameters[column].values[0]
@@ -311,15 +357,16 @@ def _of_a_run(
     stage: Stage, experiment: Experiment, channels: Sequence[str], parameters: ParameterSet
 ) -> Iterator[Unknown]:
     """Unknowns of one experiment: free zeros of positions, pressure and current at the start."""
-    own = {name: experiment.channels[name] for name in channels if name in experiment.channels}
-    run, estimated = experiment.name, experiment.start == "estimated"
-    for name, channel in own.items():
+    run = experiment.name
+    estimated = experiment.start == "estimated"
+    fitted = {name: experiment.channels[name] for name in channels if name in experiment.channels}
+    for name, channel in fitted.items():
         if channel.is_position:
             yield free_zero(name, channel, experiment)
     if stage.part != "card" and (stage.start_pressure is not None or estimated):
         most = stage.start_pressure or LARGEST_START_PRESSURE
         yield Unknown(START_PRESSURE, 0.0, -most, most, "Pa", run=run, kind="start pressure")
-    measured = any(channel.kind in CURRENTS for channel in own.values())
+    measured = any(channel.kind in CURRENTS for channel in fitted.values())
     if estimated and measured and stage.part != "pump" and experiment.input.kind == "voltage":
         first = float(measured_current(experiment).values[0])
         if first != 0.0:  # else neither channel is the driven one

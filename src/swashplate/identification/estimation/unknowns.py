@@ -142,21 +142,22 @@ def zero_name(channel: str) -> str:
 def bounded(
     name: str,
     nominal: float,
-    relative: tuple[float, float] | None = None,
-    absolute: tuple[float, float] | None = None,
+    *,
+    factors: tuple[float, float] | None = None,
+    bounds: tuple[float, float] | None = None,
     least: float = -inf,
-    **more: Any,
+    **fields: Any,
 ) -> Unknown:
     """An unknown with bounds that are multiples of its nominal value, or numbers.
 
-    `relative` are factors on the nominal value, in either order, `absolute` the bounds as they are;
-    it never falls below `least`, and begins there at the lowest. `more` are fields of `Unknown`. A
-    nominal value of 0, which no factor moves, is refused in a `ParameterError`.
+    `factors` are those on the nominal value, in either order, `bounds` the bounds as they are; the
+    unknown never falls below `least`. `fields` are further ones of `Unknown`. A nominal value of 0,
+    which no factor moves, is refused in a `ParameterError`.
     """
-    if relative is not None and nominal == 0.0:
+    if factors is not None and nominal == 0.0:
         raise ParameterError(f"{name} is nominally 0, which no factor moves: give absolute bounds.")
-    low, high = absolute or sorted(factor * nominal for factor in relative or ())
-    return Unknown(name, max(nominal, least), max(low, least), high, **more)
+    low, high = bounds or sorted(factor * nominal for factor in factors or ())
+    return Unknown(name, max(nominal, least), max(low, least), high, **fields)
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,8 +182,8 @@ class Unknowns(Result):
             if times > 1:
                 raise ParameterError(f"{target} is set by two parameters; let one set it.")
 
-    def __getitem__(self, place: int) -> Unknown:
-        return self.items[place]
+    def __getitem__(self, number: int) -> Unknown:
+        return self.items[number]
 
     def __len__(self) -> int:
         return len(self.items)
@@ -196,7 +197,7 @@ class Unknowns(Result):
         return tuple(unknown.label for unknown in self.items)
 
     def index(self, name: str) -> int:
-        """Place of an unknown; an `InputError` if there is none of that name."""
+        """Number of an unknown; an `InputError` if there is none of that name."""
         if name not in self.names:
             raise InputError(f"There is no parameter {name}; there are {', '.join(self.names)}.")
         return self.names.index(name)
@@ -204,22 +205,23 @@ class Unknowns(Result):
     @cached_property
     def logarithmic(self) -> NDArray[np.bool_]:
         """(K,) which are moved by their logarithms."""
-        return np.array([each.log for each in self.items], dtype=np.bool_)
+        return np.array([unknown.log for unknown in self.items], dtype=np.bool_)
 
     @cached_property
     def scales(self) -> Array:
         """(K,) what one unit of the vector means; not used of logarithmic ones. [unit]"""
-        return np.array([each.scale for each in self.items])
+        return np.array([unknown.scale for unknown in self.items])
 
     @cached_property
     def start(self) -> Array:
         """(K,) vector of the nominal values."""
-        return self.to_vector(np.array([each.start for each in self.items]))
+        return self.to_vector(np.array([unknown.start for unknown in self.items]))
 
     @cached_property
     def bounds(self) -> tuple[Array, Array]:
         """(K,) lower and upper bounds of the vector."""
-        low, high = np.array([(each.low, each.high) for each in self.items]).reshape(-1, 2).T
+        low = np.array([unknown.low for unknown in self.items])
+        high = np.array([unknown.high for unknown in self.items])
         return self.to_vector(low), self.to_vector(high)
 
     def at(self, vector: Array) -> Unknowns:
@@ -252,13 +254,13 @@ class Unknowns(Result):
     def released(self) -> Unknowns:
         """The same at the same point, with bounds so much wider that none is at one."""
         items = []
-        for each, side in zip(self.items, self.at_bound, strict=True):
-            low, high, reach = each.low, each.high, each.high - each.low
+        for unknown, side in zip(self.items, self.at_bound, strict=True):
+            low, high = unknown.low, unknown.high
             if side < 0:
-                low = low * low / high if each.log else low - reach
+                low = low * low / high if unknown.log else low - (high - low)
             if side > 0:
-                high = high * high / low if each.log else high + reach
-            items.append(replace(each, low=low, high=high))
+                high = high * high / low if unknown.log else high + (high - low)
+            items.append(replace(unknown, low=low, high=high))
         return replace(self, items=tuple(items), point=self.vector)
 
     @property
@@ -279,7 +281,7 @@ class Unknowns(Result):
 
     def _within(self, vector: Array) -> list[float]:
         numbers = zip(self.items, vector.tolist(), strict=True)
-        return [each.to_value(number) for each, number in numbers]
+        return [unknown.to_value(number) for unknown, number in numbers]
 
     def values(self, vector: Array) -> dict[str, float]:
         """Values by name, within the bounds."""
@@ -288,26 +290,28 @@ class Unknowns(Result):
     def vector_of(self, values: Mapping[str, float]) -> Array:
         """(K,) vector of some values by name; those not named stay nominal."""
         named = zip(self.names, self.items, strict=True)
-        return self.to_vector(np.array([values.get(name, each.start) for name, each in named]))
+        return self.to_vector(
+            np.array([values.get(name, unknown.start) for name, unknown in named])
+        )
 
     @property
     def machine_targets(self) -> list[str]:
         """Names in the model that unknowns of no single run set."""
-        return [name for each in self.items if each.run is None for name in each.targets]
+        return [name for unknown in self.items if unknown.run is None for name in unknown.targets]
 
     @cached_property
     def shared(self) -> NDArray[np.intp]:
         """(M,) numbers of the unknowns of the machine, which all runs share."""
-        return np.array([k for k, each in enumerate(self.items) if each.run is None], np.intp)
+        return np.array([k for k, unknown in enumerate(self.items) if unknown.run is None], np.intp)
 
     @cached_property
     def _of_runs(self) -> Mapping[str, NDArray[np.intp]]:
         """By run the numbers of the unknowns that belong to it alone."""
         numbers: dict[str, list[int]] = {}
-        for k, each in enumerate(self.items):
-            if each.run is not None:
-                numbers.setdefault(each.run, []).append(k)
-        return {run: np.array(own, np.intp) for run, own in numbers.items()}
+        for k, unknown in enumerate(self.items):
+            if unknown.run is not None:
+                numbers.setdefault(unknown.run, []).append(k)
+        return {run: np.array(of_run, np.intp) for run, of_run in numbers.items()}
 
     def of_run(self, run: str) -> NDArray[np.intp]:
         """(q,) numbers of the unknowns that belong to one experiment alone."""
@@ -335,43 +339,51 @@ class Unknowns(Result):
     def chain(self, vector: Array, targets: Sequence[str], run: str) -> Array:
         """(len(targets), q + M) derivatives of the model's numbers by `columns` of the vector."""
         columns = self.columns(run)
-        places = dict[str, int]()
-        for place in np.argsort(columns).tolist():
-            places |= dict.fromkeys(self.items[columns[place]].targets, place)
-        return self._selected(vector, columns, [places.get(target) for target in targets])
+        positions = dict[str, int]()
+        for position in np.argsort(columns).tolist():
+            positions |= dict.fromkeys(self.items[columns[position]].targets, position)
+        return self._selected(vector, columns, [positions.get(target) for target in targets])
 
     def zeros_chain(self, vector: Array, channels: Sequence[str], run: str) -> Array:
         """(len(channels), q + M) derivatives of channels' zeros by `columns` of the vector."""
         columns = self.columns(run)
-        places = {self.items[column].channel: place for place, column in enumerate(columns)}
-        return self._selected(vector, columns, [places.get(channel) for channel in channels])
+        positions = {
+            self.items[column].channel: position for position, column in enumerate(columns)
+        }
+        return self._selected(vector, columns, [positions.get(channel) for channel in channels])
 
     def _selected(
-        self, vector: Array, columns: NDArray[np.intp], places: Sequence[int | None]
+        self, vector: Array, columns: NDArray[np.intp], positions: Sequence[int | None]
     ) -> Array:
-        """(len(places), columns) slope of the unknown at each place in its row, 0 elsewhere."""
+        """(len(positions), columns) slope of the unknown at its position in each row, else 0."""
         slopes = np.where(self.logarithmic, self.to_values(vector), self.scales)[columns]
-        matrix = np.zeros((len(places), columns.size))
-        for row, place in enumerate(places):
-            if place is not None:
-                matrix[row, place] = slopes[place]
+        matrix = np.zeros((len(positions), columns.size))
+        for row, position in enumerate(positions):
+            if position is not None:
+                matrix[row, position] = slopes[position]
         return matrix
 
     def with_worths(self, worths: Sequence[float] | None) -> Unknowns:
         """The same with these worths of the priors, in order; without any priors for None."""
-        given, items = iter(worths or ()), self.items
         if worths is None:
-            return replace(self, items=tuple(replace(each, prior=None) for each in items))
-        changed = (replace(each, worth=next(given)) if each.prior else each for each in items)
-        return replace(self, items=tuple(changed))
+            without = tuple(replace(unknown, prior=None) for unknown in self.items)
+            return replace(self, items=without)
+        remaining = iter(worths)
+        items = tuple(
+            replace(unknown, worth=next(remaining)) if unknown.prior else unknown
+            for unknown in self.items
+        )
+        return replace(self, items=items)
 
     def prior_rows(self, vector: Array) -> tuple[Array, Array]:
         """Residuals (p,) of the priors and their derivatives (p, K) by the vector."""
-        known = [(k, each, each.prior) for k, each in enumerate(self.items) if each.prior]
-        residuals, rows = np.zeros(len(known)), np.zeros((len(known), len(self.items)))
-        for row, (k, each, prior) in enumerate(known):
-            scale, mean = (1.0, np.log(prior.mean)) if each.log else (each.scale, prior.mean)
-            weight = np.sqrt(each.worth) / prior.deviation
+        with_prior = [
+            (k, unknown, unknown.prior) for k, unknown in enumerate(self.items) if unknown.prior
+        ]
+        residuals, rows = np.zeros(len(with_prior)), np.zeros((len(with_prior), len(self.items)))
+        for row, (k, unknown, prior) in enumerate(with_prior):
+            scale, mean = (1.0, np.log(prior.mean)) if unknown.log else (unknown.scale, prior.mean)
+            weight = np.sqrt(unknown.worth) / prior.deviation
             residuals[row] = weight * (vector[k] * scale - mean)
             rows[row, k] = weight * scale
         return residuals, rows

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from math import inf, isfinite, sqrt
 from typing import NamedTuple
@@ -60,13 +60,16 @@ class Gauge:
         the unknowns nor among the `fixed` ones, by symbol.
         """
         symbols = [symbol_of(unknown) for unknown in variables]
-        pairs = [*zip(symbols, variables.estimates.tolist(), strict=True)]
-        known = {**(fixed or {}), **dict(pairs)}
+        estimates = variables.estimates.tolist()
+        known = {**(fixed or {}), **dict(zip(symbols, estimates, strict=True))}
+        slopes = np.zeros(len(variables))
         try:
-            slopes = [self.moves[s](v, known) if s in self.moves else 0.0 for s, v in pairs]
+            for k, (symbol, value) in enumerate(zip(symbols, estimates, strict=True)):
+                if symbol in self.moves:
+                    slopes[k] = self.moves[symbol](value, known)
         except KeyError:
             return np.zeros(len(variables))
-        return np.array(slopes) / variables.slopes
+        return np.asarray(slopes / variables.slopes)
 
 
 def symbol_of(unknown: Unknown) -> str:
@@ -78,20 +81,20 @@ def symbol_of(unknown: Unknown) -> str:
 
 
 def _gauge(
-    name: str, symmetry: str, determined: str, fix: str, *others: str, **more: Move
+    name: str, symmetry: str, determined: str, fix: str, *others: str, **moves: Move
 ) -> Gauge:
-    """A gauge along one of the models' symmetries, with others in proportion and `more` moves."""
+    """A gauge along one of the models' symmetries, with others in proportion and further moves."""
     powers = {
-        symbol: each.symmetry[symmetry]
-        for symbol, each in CATALOGUE.items()
-        if symmetry in each.symmetry
+        symbol: definition.symmetry[symmetry]
+        for symbol, definition in CATALOGUE.items()
+        if symmetry in definition.symmetry
     } | dict.fromkeys(others, 1.0)
 
     def power(exponent: float) -> Move:
         return lambda value, known: exponent * value
 
-    moves = {symbol: power(each) for symbol, each in powers.items()} | more
-    return Gauge(name, moves, f"only {determined} determined", tuple(fix.split()))
+    in_proportion = {symbol: power(exponent) for symbol, exponent in powers.items()}
+    return Gauge(name, in_proportion | moves, f"only {determined} determined", tuple(fix.split()))
 
 
 GAUGES = (
@@ -128,7 +131,7 @@ GAUGES = (
 holds away from the swash plate's stops."""
 
 
-class Direction(NamedTuple):
+class NullDirection(NamedTuple):
     """A way for the unknowns to move together that the tests do not see, or hardly."""
 
     changes: Mapping[str, float]
@@ -181,7 +184,7 @@ def _in_order(name: str) -> tuple[str | int, ...]:
 
 @dataclass(frozen=True, eq=False)
 class Identifiability(Result):
-    """Verdict on a fit's unknowns, before a fit or after."""
+    """Which unknowns the tests determine, before a fit or after."""
 
     variables: Unknowns
     sensitivity: Array
@@ -190,9 +193,9 @@ class Identifiability(Result):
     """How many combinations of the unknowns are determined."""
     unexcited: tuple[str, ...]
     """Unknowns that change nothing by themselves: no test exercises them."""
-    null: tuple[Direction, ...]
+    null: tuple[NullDirection, ...]
     """Directions that change nothing."""
-    weak: tuple[Direction, ...]
+    weak: tuple[NullDirection, ...]
     """Directions along which intervals are wider than ±10 %, those before it fixed."""
 
     @property
@@ -203,7 +206,7 @@ class Identifiability(Result):
     @property
     def to_fix(self) -> tuple[str, ...]:
         """Unknowns to fix so that all others are determined; nothing is lost by it."""
-        return (*self.unexcited, *(each.fix for each in self.null))
+        return (*self.unexcited, *(direction.fix for direction in self.null))
 
     @property
     def at_bounds(self) -> dict[str, str]:
@@ -213,38 +216,47 @@ class Identifiability(Result):
 
     def sentences(self) -> tuple[str, ...]:
         """The verdict in words, one sentence each."""
-        free, rank = int(np.count_nonzero(self.variables.free)), self.rank
-        told = f"{rank} combination{'' if rank == 1 else 's'} of {free} free parameters"
-        told = f"all {free} free parameters" if rank == free else told
-        vague = [each.fix for each in self.weak if each.half_width >= VAGUE]
-        if vague and rank > len(vague):
-            clear = rank - len(vague)
-            told = f"{clear} combination{'' if clear == 1 else 's'} of {free} free parameters"
-            told += f", and hardly {listed(vague)}"
-        elif self.weak and rank == free:
-            told += f", {len(self.weak)} of them weakly"
-        said = [f"The tests determine {told if rank else 'none of the parameters'}."]
-        if not free:
-            said = ["All parameters are at a bound: there is nothing left to determine."]
+        sentences = [self._determined()]
         if self.unexcited:
             them = "them" if len(self.unexcited) > 1 else "it"
             names = ", ".join(self.unexcited)
-            said.append(f"No test exercises {names}: fix {them}, or add a test that does.")
-        said += [each.sentence for each in self.null]
+            sentences.append(f"No test exercises {names}: fix {them}, or add a test that does.")
+        sentences += [direction.sentence for direction in self.null]
         if len(self.weak) == 1:
-            said.append(self.weak[0].sentence)
+            sentences.append(self.weak[0].sentence)
         elif self.weak:
-            known = [f"{each.fix} {each.precision}" for each in self.weak]
-            said.append(
-                f"Weak, each with those before it fixed: {listed(known)}. Add tests that determine "
-                "them, or fix those whose values you know."
+            precisions = [f"{direction.fix} {direction.precision}" for direction in self.weak]
+            sentences.append(
+                f"Weak, each with those before it fixed: {listed(precisions)}. Add tests that "
+                "determine them, or fix those whose values you know."
             )
         for name, side in self.at_bounds.items():
-            said.append(
-                f"{name} = {self.variables.estimates[self.variables.index(name)]:.4g} is at its "
-                f"{side} bound and has no interval; the intervals of the others let it change."
+            value = self.variables.estimates[self.variables.index(name)]
+            sentences.append(
+                f"{name} = {value:.4g} is at its {side} bound and has no interval; the intervals "
+                "of the others let it change."
             )
-        return tuple(said)
+        return tuple(sentences)
+
+    def _determined(self) -> str:
+        """How many combinations of the unknowns the tests determine, in a sentence."""
+        free, rank = int(np.count_nonzero(self.variables.free)), self.rank
+        if not free:
+            return "All parameters are at a bound: there is nothing left to determine."
+        if not rank:
+            return "The tests determine none of the parameters."
+        vague = [direction.fix for direction in self.weak if direction.half_width >= VAGUE]
+        if vague and rank > len(vague):
+            clear = _combinations(rank - len(vague), free)
+            return f"The tests determine {clear}, and hardly {listed(vague)}."
+        if rank < free:
+            return f"The tests determine {_combinations(rank, free)}."
+        weakly = f", {len(self.weak)} of them weakly" if self.weak else ""
+        return f"The tests determine all {free} free parameters{weakly}."
+
+
+def _combinations(number: int, free: int) -> str:
+    return f"{number} combination{'' if number == 1 else 's'} of {free} free parameters"
 
 
 def identifiability(
@@ -269,91 +281,133 @@ def identifiability(
     tolerance : float
         See `problem.TOLERANCE`.
     fixed : mapping of str to float, optional
-        Values of parameters that are no unknowns, by symbol; some gauges need them.
+        Values of parameters that are not unknowns, by symbol; some gauges need them.
     """
-    triangle, names = np.asarray(derivatives, dtype=np.float64), variables.names
+    triangle = np.asarray(derivatives, dtype=np.float64)
+    names = variables.names
     if not np.isfinite(triangle).all():
         column = int(np.argwhere(~np.isfinite(triangle))[0][1])
         raise InputError(f"The derivatives by {names[column]} are not all finite.")
     if triangle.shape[0] > len(variables):
         triangle = triangular_factor(triangle)
     lengths = np.linalg.norm(triangle, axis=0)
-    # a column of mere rounding is none
+    # a column of mere rounding changes nothing
     moving = variables.free & (lengths > 1e-14 * lengths.max(initial=0.0))
-    places = np.flatnonzero(moving)
-
-    def direction(
-        moved: Array,
-        places: NDArray[np.intp],
-        place: int,
-        gauge: Gauge | None = None,
-        half: float = inf,
-    ) -> Direction:
-        """From changes (k,) of some of the solver's numbers, one of which is to be fixed."""
-        # a short column needs a large change for the same effect: judged by effect, not by size
-        effect = np.abs(moved) * lengths[places]
-        least = MENTIONED * effect.max()
-        order = [k for k in np.argsort(-effect, kind="stable") if effect[k] >= least]
-        largest = max((float(moved[k]) for k in order), key=abs)
-        changes = {names[places[k]]: float(moved[k]) / largest for k in order}
-        return Direction(changes, half, gauge, names[places[place]])
-
-    null, rank = [], 0
-    if places.size:
-        scale = lengths[places]
-        symbols = [symbol_of(variables[int(k)]) for k in places]
-        _, sizes, rows = np.linalg.svd(triangle[:, places] / scale, full_matrices=True)
-        rank = int(np.count_nonzero(sizes > tolerance * sizes[0]))
-        free, fixes = rows[rank:].T, list[int]()
-        for gauge in GAUGES:
-            vector = gauge.tangent(variables, fixed)[places] * scale
-            vector /= np.linalg.norm(vector) or 1.0
-            # as long as its part in the null space: it changes nothing
-            if np.linalg.norm(free.T @ vector) >= 1.0 - 1e-6:
-                wanted = [k for fix in gauge.fix for k, s in enumerate(symbols) if s == fix]
-                place = _fixing([*wanted, *np.argsort(-np.abs(vector))], vector, free, fixes)
-                if place is not None:
-                    fixes.append(place)
-                    null.append(direction(vector / scale, places, place, gauge))
-        # what is left when those are fixed, with one unknown of its own for each direction
-        left = free @ null_space(free[fixes]) if fixes else free
-        if left.shape[1]:
-            order = qr(left.T, mode="r", pivoting=True)[1][: left.shape[1]]
-            for column, place in zip((left @ np.linalg.inv(left[order])).T, order, strict=True):
-                null.append(direction(column / scale, places, int(place)))
-
-    # weak ones: how the others follow an unknown is its column of the covariance over its variance;
-    # each found is fixed, so that the next ones are what is left without it
-    weak, places = [], places[~np.isin(places, [names.index(each.fix) for each in null])]
+    columns = np.flatnonzero(moving)
+    null, rank = _null_directions(
+        triangle, variables, columns, lengths, tolerance=tolerance, fixed=fixed
+    )
+    # those found are fixed, so that the weak ones are what is left without them
+    fixed_columns = [names.index(direction.fix) for direction in null]
+    columns = columns[~np.isin(columns, fixed_columns)]
     if covariance is None:
-        every = np.ones(places.size, dtype=np.bool_)
-        inverse = whitening(dense_factor(triangle[:, places]), every, TOLERANCE).matrix
-        left = inverse @ inverse.T
+        every = np.ones(columns.size, dtype=np.bool_)
+        inverse = whitening(dense_factor(triangle[:, columns]), every, TOLERANCE).matrix
+        remaining = inverse @ inverse.T
     else:
-        left = covariance[np.ix_(places, places)]
-    machine = np.array([each.run is None for each in variables])
-    while places.size:
-        variances = np.where(machine[places], np.diag(left), 0.0)
-        place = int(np.argmax(variances))
-        half = HALF * sqrt(max(variances[place], 0.0))
-        if half <= WIDE:
-            break
-        follow = left[place] / left[place, place]
-        weak.append(direction(follow, places, place, half=half))
-        rest = np.arange(places.size) != place
-        left = (left - np.outer(left[place], follow))[rest][:, rest]
-        places = places[rest]
-    unexcited = tuple(names[k] for k in np.flatnonzero(variables.free & ~moving))
-    return Identifiability(variables, 0.01 * lengths, rank, unexcited, tuple(null), tuple(weak))
+        remaining = covariance[np.ix_(columns, columns)]
+    return Identifiability(
+        variables=variables,
+        sensitivity=0.01 * lengths,
+        rank=rank,
+        unexcited=tuple(names[k] for k in np.flatnonzero(variables.free & ~moving)),
+        null=tuple(null),
+        weak=tuple(_weak_directions(remaining, variables, columns, lengths)),
+    )
 
 
-def _fixing(places: list[int], vector: Array, null: Array, fixed: list[int]) -> int | None:
+def _null_directions(
+    triangle: Array,
+    variables: Unknowns,
+    columns: NDArray[np.intp],
+    lengths: Array,
+    *,
+    tolerance: float,
+    fixed: Known | None,
+) -> tuple[list[NullDirection], int]:
+    """Directions that change nothing, the model's gauges first, and the rank of the others.
+
+    Of the unknowns in some columns; `lengths` (K,) are those of all columns of the triangle.
+    """
+    null = list[NullDirection]()
+    if not columns.size:
+        return null, 0
+    scale = lengths[columns]
+    symbols = [symbol_of(variables[int(k)]) for k in columns]
+    _, sizes, rows = np.linalg.svd(triangle[:, columns] / scale, full_matrices=True)
+    rank = int(np.count_nonzero(sizes > tolerance * sizes[0]))
+    free = rows[rank:].T
+    fixes = list[int]()
+    for gauge in GAUGES:
+        vector = gauge.tangent(variables, fixed)[columns] * scale
+        vector /= np.linalg.norm(vector) or 1.0
+        # as long as its part in the null space: it changes nothing
+        if np.linalg.norm(free.T @ vector) >= 1.0 - 1e-6:
+            preferred = [k for fix in gauge.fix for k, s in enumerate(symbols) if s == fix]
+            fix = _fixing([*preferred, *np.argsort(-np.abs(vector))], vector, free, fixes)
+            if fix is not None:
+                fixes.append(fix)
+                null.append(
+                    _direction(vector / scale, variables, columns, lengths, fix=fix, gauge=gauge)
+                )
+    # the rest of the null space, with one unknown to fix for each direction
+    rest = free @ null_space(free[fixes]) if fixes else free
+    if rest.shape[1]:
+        order = qr(rest.T, mode="r", pivoting=True)[1][: rest.shape[1]]
+        for vector, fix in zip((rest @ np.linalg.inv(rest[order])).T, order, strict=True):
+            null.append(_direction(vector / scale, variables, columns, lengths, fix=int(fix)))
+    return null, rank
+
+
+def _weak_directions(
+    covariance: Array, variables: Unknowns, columns: NDArray[np.intp], lengths: Array
+) -> Iterator[NullDirection]:
+    """Directions with wide intervals, each with those before it fixed.
+
+    How the others follow an unknown is its column of the covariance over its variance.
+    """
+    machine = np.array([unknown.run is None for unknown in variables])
+    while columns.size:
+        variances = np.where(machine[columns], np.diag(covariance), 0.0)
+        widest = int(np.argmax(variances))
+        half_width = HALF * sqrt(max(variances[widest], 0.0))
+        if half_width <= WIDE:
+            return
+        follow = covariance[widest] / covariance[widest, widest]
+        yield _direction(follow, variables, columns, lengths, fix=widest, half_width=half_width)
+        others = np.arange(columns.size) != widest
+        covariance = (covariance - np.outer(covariance[widest], follow))[others][:, others]
+        columns = columns[others]
+
+
+def _direction(
+    moved: Array,
+    variables: Unknowns,
+    columns: NDArray[np.intp],
+    lengths: Array,
+    *,
+    fix: int,
+    gauge: Gauge | None = None,
+    half_width: float = inf,
+) -> NullDirection:
+    """From changes (k,) of the unknowns in some columns, of which number `fix` is to be fixed."""
+    # a short column needs a large change for the same effect: judged by effect, not by size
+    effect = np.abs(moved) * lengths[columns]
+    least = MENTIONED * effect.max()
+    order = [k for k in np.argsort(-effect, kind="stable") if effect[k] >= least]
+    largest = max((float(moved[k]) for k in order), key=abs)
+    names = variables.names
+    changes = {names[columns[k]]: float(moved[k]) / largest for k in order}
+    return NullDirection(changes, half_width, gauge, names[columns[fix]])
+
+
+def _fixing(candidates: list[int], vector: Array, null: Array, fixed: list[int]) -> int | None:
     """The first unknown that removes a gauge beside those fixed already; None if none does."""
-    for place in map(int, places):
-        if abs(vector[place]) >= 1e-3 and place not in fixed:
-            singular = np.linalg.svd(null[[*fixed, place]], compute_uv=False)
+    for candidate in map(int, candidates):
+        if abs(vector[candidate]) >= 1e-3 and candidate not in fixed:
+            singular = np.linalg.svd(null[[*fixed, candidate]], compute_uv=False)
             if singular.size == len(fixed) + 1 and singular[-1] > 1e-6:
-                return place
+                return candidate
     return None
 
 
@@ -363,7 +417,8 @@ def _fixing(places: list[int], vector: Array, null: Array, fixed: list[int]) -> 
 @once_per_stage
 def identifiability_of(stage: StageFit) -> Identifiability:
     """Which unknowns of a stage the tests determine."""
-    linearised, names = stage.linearised, stage.problem.unknowns.names
+    linearised = stage.linearised
+    names = stage.problem.unknowns.names
     fixed = {name: value for name, value in stage.parameters.numbers.items() if name not in names}
     try:
         quoted = uncertainty_of(stage).quoted.matrix
@@ -395,9 +450,9 @@ def bounds_reached(stage: StageFit) -> tuple[str, ...]:
 
 def without_value(stage: StageFit) -> list[str]:
     """Unknowns of the machine that ended at a bound, or that the tests do not determine."""
-    found = identifiability_of(stage)
-    lost = {*found.at_bounds, *found.to_fix}
-    machine = (each.name for each in stage.problem.unknowns if each.run is None)
+    judged = identifiability_of(stage)
+    lost = {*judged.at_bounds, *judged.to_fix}
+    machine = (unknown.name for unknown in stage.problem.unknowns if unknown.run is None)
     return [name for name in machine if name in lost]
 
 
@@ -405,4 +460,4 @@ def weak_unknowns(stage: StageFit) -> list[str]:
     """Unknowns of the machine with an interval wider than 10 % of the value, or without one."""
     pairs = zip(estimates_of(stage), stage.problem.unknowns, strict=True)
     machine = [estimate for estimate, unknown in pairs if unknown.run is None]
-    return [each.name for each in machine if each.relative_half_width > WIDE]
+    return [estimate.name for estimate in machine if estimate.relative_half_width > WIDE]

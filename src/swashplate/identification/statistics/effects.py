@@ -22,7 +22,7 @@ from swashplate.identification.estimation.drive_model import (
     measured_current,
     simulated_current,
 )
-from swashplate.identification.estimation.model import Model, simulated
+from swashplate.identification.estimation.model import MachineModel, simulated
 from swashplate.identification.estimation.model import linearised as linearised_model
 from swashplate.identification.estimation.problem import LinearisedFit, LinearisedRun
 from swashplate.identification.stage_fit import StageFit
@@ -57,7 +57,7 @@ def follows_card(stage: StageFit, earlier: StageFit) -> bool:
     return pump and driven and earlier.stage.part == "card"
 
 
-def source_of(stage: StageFit) -> Callable[[Experiment], Model]:
+def source_of(stage: StageFit) -> Callable[[Experiment], MachineModel]:
     """The model of a run of a stage: the whole chain if the fitted card drives the pump."""
     model = stage.problem.model
     if not isinstance(model, DriveModel):

@@ -1,7 +1,8 @@
 """Design of experiments by Fisher information: what runs tell of each unknown, what a test adds.
 
-`outlook` is known before a fit: which run tells of which unknown, and what none tells of. `bench`
-and `advise` rank tests to come by what they would add.
+`run_information` says before a fit which run tells of which unknown, and of which unknowns none
+does. `prior_information` is what is known before the next test; `advise` ranks candidate tests by
+what they would add.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ from swashplate.identification.estimation.problem import (
     factor_of,
     linearised_fit,
 )
-from swashplate.identification.estimation.setup import Setup, Stage
+from swashplate.identification.estimation.setup import FitSetup, Stage
 from swashplate.identification.estimation.stages import stage_problem
 from swashplate.identification.estimation.unknowns import Unknowns
 from swashplate.identification.noise import spectral_covariance
@@ -52,7 +53,7 @@ which the unknown is said to rest on that run."""
 
 
 @dataclass(frozen=True, eq=False)
-class Outlook(Result):
+class RunInformation(Result):
     """What the runs can tell of a stage's unknowns, at the nominal values: known before a fit."""
 
     stage: Stage
@@ -62,7 +63,7 @@ class Outlook(Result):
     @property
     def names(self) -> tuple[str, ...]:
         """The unknowns, those of single runs left out."""
-        return tuple(each.name for each in self.problem.unknowns if each.run is None)
+        return tuple(unknown.name for unknown in self.problem.unknowns if unknown.run is None)
 
     @property
     def _model(self) -> DriveModel:
@@ -72,7 +73,10 @@ class Outlook(Result):
     @cached_property
     def identifiability(self) -> Identifiability:
         """Which unknowns the runs determine, and directions that change nothing."""
-        fit, taken = self.linearised, {t for each in self.problem.unknowns for t in each.targets}
+        fit, taken = (
+            self.linearised,
+            {t for unknown in self.problem.unknowns for t in unknown.targets},
+        )
         numbers = self._model.parameters.numbers
         fixed = {name: value for name, value in numbers.items() if name not in taken}
         return identifiability(fit.triangle, fit.variables, tolerance=fit.tolerance, fixed=fixed)
@@ -81,7 +85,7 @@ class Outlook(Result):
     def shares(self) -> dict[str, dict[str, float]]:
         """Part of what is known of an unknown, by name, from each run, its channels together."""
         fit = self.linearised
-        squares = {each.name: np.zeros(len(fit.variables)) for each in self.problem.experiments}
+        squares = {run.name: np.zeros(len(fit.variables)) for run in self.problem.experiments}
         for run, jacobian in fit.jacobians():
             squares[run.name][fit.variables.columns(run.name)] += np.sum(jacobian**2, axis=0)
         total = np.maximum(sum(squares.values()), 1e-300)
@@ -118,7 +122,7 @@ class Outlook(Result):
             for why, names in groups.items()
         ]
         for name, shares in self.shares.items() if len(self.problem.experiments) > 1 else ():
-            run = max(shares, key=lambda each: shares[each])
+            run = max(shares, key=lambda run_name: shares[run_name])
             if shares[run] >= ALONE:
                 part = f"{100.0 * shares[run]:.0f} %"
                 said.append(f"{name}: {part} of its information is from {run} alone.")
@@ -126,7 +130,7 @@ class Outlook(Result):
 
     def table(self, runs: Sequence[str] = ()) -> Table:
         """What runs tell of each unknown, one letter a run; in a file their shares."""
-        named = runs or [each.name for each in self.problem.experiments]
+        named = runs or [run.name for run in self.problem.experiments]
         columns = (Column("parameter"), Column("needs", wrap=True), Column("effect", ".3g"))
         shown = (Column("stage", of="f"), *columns, Column("runs"))
         made = Table(
@@ -140,16 +144,16 @@ class Outlook(Result):
         return made
 
 
-def outlook(
+def run_information(
     stage: Stage, nominal: ParameterSet | HasParameters, experiments: Sequence[Experiment]
-) -> Outlook:
+) -> RunInformation:
     """What runs can tell of a stage's unknowns, before any fit.
 
     At the nominal values, best those that `stages.smooth` makes, as a fit takes them. Raises
     as `stages.stage_problem`, and a `DomainError` if the model does not hold there.
     """
     problem = stage_problem(stage, set_of(nominal), experiments)
-    return Outlook(stage, problem, linearised_fit(problem, problem.start))
+    return RunInformation(stage, problem, linearised_fit(problem, problem.start))
 
 
 # --- what is known so far -------------------------------------------------------------------------
@@ -198,12 +202,12 @@ def default_sensors(drive: Drive) -> tuple[Sensor, ...]:
 
 
 @dataclass(frozen=True, eq=False)
-class Bench(Result):
+class PriorInformation(Result):
     """A drive, what is to be found of it, and what is known so far: where candidates are tried."""
 
     parameters: ParameterSet
     stage: Stage
-    """All unknowns at once."""
+    """All unknowns together."""
     variables: Unknowns
     """The machine's unknowns."""
     present: Array
@@ -211,119 +215,165 @@ class Bench(Result):
     sensors: tuple[Sensor, ...]
     """Those of the campaign, or of a fresh plan."""
 
-    def candidate(self, maneuver: Maneuver, sensors: Sequence[Sensor] = ()) -> Candidate:
-        """A test with some sensors, by default those of the bench; free zeros are spent."""
+    def candidate(self, maneuver: Maneuver, sensors: Sequence[Sensor] = ()) -> CandidateTest:
+        """A test with some sensors, by default those of the campaign; free zeros are spent."""
         # what is known beforehand counts once, not once a test
         free = {k: v.model_copy(update={"prior": None}) for k, v in self.stage.free.items()}
         stage, rows = self.stage.model_copy(update={"free": free}), []
-        for each in sensors or self.sensors:
-            imagined = _imagined(maneuver, each)
+        for sensor in sensors or self.sensors:
+            imagined = _imagined(maneuver, sensor)
             rows.append(_machine_rows(stage_problem(stage, self.parameters, [imagined])))
-        return Candidate(maneuver.name, triangular_factor(np.vstack(rows)), maneuver.length)
+        return CandidateTest(maneuver.name, triangular_factor(np.vstack(rows)), maneuver.length)
 
 
-def bench(
+def prior_information(
     parameters: ParameterSet,
-    setup: Setup,
+    setup: FitSetup,
     experiments: Sequence[Experiment] = (),
     *,
     fitted: bool = False,
     sensors: Sequence[Sensor] = (),
-) -> Bench:
+) -> PriorInformation:
     """What is known of a drive before the next test.
 
     The stages of `setup` are taken together, through the whole chain unless they all belong to one
-    part of it. Where the drive is `fitted` to the tests made so far, noise and its colour are those
-    of the residuals; else noise is as the campaign states it, correlated over `MEMORY`. Without
+    part of it. If the drive is `fitted` to the tests made so far, noise and its colour are those of
+    the residuals; else noise is as the campaign states it, correlated over `MEMORY`. Without
     tests, a fresh plan, the `sensors` count, by default `default_sensors`.
 
     An `InputError` says that no sensor tells of the stage's part of the drive, or that a drive that
     is said to be fitted leaves residuals that are zero, or too large to be noise.
     """
     (stage,) = setup.joint().stages
-    parts = {each.part for each in setup.stages}
-    stage = stage.model_copy(update={"part": parts.pop()}) if len(parts) == 1 else stage
+    parts = {single.part for single in setup.stages}
+    if len(parts) == 1:
+        stage = stage.model_copy(update={"part": parts.pop()})
     if not experiments:
-        asked, part = sensors or default_sensors(Drive(parameters)), stage.part
-        own = [e for e in asked if part == "chain" or (e.kind in CURRENTS) == (part == "card")]
-        if not own:
-            kinds = ", ".join(each.kind for each in asked)
-            raise InputError(f"A {part} shows nothing to {kinds}: name another sensor.")
-        problem = stage_problem(stage, parameters, [_imagined(step(1.0), own[0])])
-        _, prior = problem.unknowns.prior_rows(problem.start)
-        machine = _machine(problem)
-        variables = Unknowns(tuple(problem.unknowns[k] for k in machine))
-        return Bench(parameters, stage, variables, prior[:, machine], tuple(own))
+        return _without_tests(parameters, stage, sensors or default_sensors(Drive(parameters)))
     problem = stage_problem(stage, parameters, experiments)
-    fit, known = linearised_fit(problem, problem.start) if fitted else None, dict[str, Sensor]()
-    scales, machine = {}, _machine(problem)
+    fit = linearised_fit(problem, problem.start) if fitted else None
+    scales = {}
+    by_kind = dict[str, Sensor]()
     for name in problem.channels:
-        channels = [each[name] for each in problem.experiments if name in each.channels]
-        apart = float(np.median(np.concatenate([np.diff(each.time) for each in channels])))
+        channels = [run[name] for run in problem.experiments if name in run.channels]
+        intervals = np.concatenate([np.diff(channel.time) for channel in channels])
+        interval = float(np.median(intervals))
         sensor = Sensor(channels[0].kind, problem.scales[name], origin="as in the campaign")
         if fit is not None:
-            sensor = _of_residuals(fit, channels, sensor, apart)
-        # an independent sample every so often: the others are worth nothing
-        scales[name] = sensor.deviation(apart)
-        known[sensor.kind] = sensor
-    variables = Unknowns(tuple(problem.unknowns[k] for k in machine))
-    present = _machine_rows(replace(problem, scales=scales))
-    return Bench(parameters, stage, variables, present, tuple(known.values()))
+            sensor = _of_residuals(fit, channels, sensor, interval)
+        # one sample in each `memory` is independent: the others are worth nothing
+        scales[name] = sensor.deviation(interval)
+        by_kind[sensor.kind] = sensor
+    return PriorInformation(
+        parameters=parameters,
+        stage=stage,
+        variables=_machine_unknowns(problem),
+        present=_machine_rows(replace(problem, scales=scales)),
+        sensors=tuple(by_kind.values()),
+    )
+
+
+def _without_tests(
+    parameters: ParameterSet, stage: Stage, sensors: Sequence[Sensor]
+) -> PriorInformation:
+    """What priors alone tell, and those of some sensors that the stage's part of a drive moves."""
+    part = stage.part
+    useful = [
+        sensor
+        for sensor in sensors
+        if part == "chain" or (sensor.kind in CURRENTS) == (part == "card")
+    ]
+    if not useful:
+        kinds = ", ".join(sensor.kind for sensor in sensors)
+        raise InputError(f"A {part} shows nothing to {kinds}: name another sensor.")
+    problem = stage_problem(stage, parameters, [_imagined(step(1.0), useful[0])])
+    _, prior = problem.unknowns.prior_rows(problem.start)
+    return PriorInformation(
+        parameters=parameters,
+        stage=stage,
+        variables=_machine_unknowns(problem),
+        present=prior[:, _machine(problem)],
+        sensors=tuple(useful),
+    )
 
 
 def _of_residuals(
     fit: LinearisedFit, channels: Sequence[Channel], stated: Sensor, step: float
 ) -> Sensor:
     """A channel's sensor with the noise that the residuals of a fitted drive show."""
-    name, largest = channels[0].name, max(float(np.ptp(each.values)) for each in channels)
-    left, derivatives = [], []
+    name = channels[0].name
+    largest = max(float(np.ptp(channel.values)) for channel in channels)
+    runs = []
+    derivatives = []
     for run, jacobian in fit.jacobians():
         if run.channel != name:
             continue
         # with free zeros and other unknowns of single runs fitted
         own = jacobian[:, : fit.variables.of_run(run.name).size]
         shift = np.linalg.lstsq(own, -run.residual, rcond=None)[0]
-        left.append(run._replace(residual=run.residual + own @ shift))
+        runs.append(run._replace(residual=run.residual + own @ shift))
         derivatives.append(jacobian)
-    square = np.concatenate([run.residual for run in left]) ** 2
+    square = np.concatenate([run.residual for run in runs]) ** 2
     noise = stated.noise * float(np.sqrt(np.mean(square)))
     if not NOISELESS * stated.noise < noise or noise > FARTHEST * largest:
         raise InputError(
             f"The drive misses '{name}' by {100.0 * noise / largest:.2g} % of its range, so that "
-            "its residuals are no noise; give a drive that was fitted to these tests, or none."
+            "its residuals are not noise; give a drive that was fitted to these tests, or none."
         )
-    factor = factor_of(zip(left, derivatives, strict=True), fit.variables)
-    noisy = replace(fit, runs=tuple(left), derivatives=derivatives, factor=factor)
+    factor = factor_of(zip(runs, derivatives, strict=True), fit.variables)
+    noisy = replace(fit, runs=tuple(runs), derivatives=derivatives, factor=factor)
     # not of all that the residuals hold, but of what meets the unknowns' derivatives; of the noise
     # alone, since each run has been fitted by itself
     coloured = spectral_covariance(noisy)
     white = noisy.squares / noisy.spare_samples * np.sum(noisy.whitening**2, axis=1)
-    told = coloured.determined & (white > 0.0)
-    worth = max(float(np.median(np.diag(coloured.matrix)[told] / white[told])), 1.0)
-    return Sensor(stated.kind, noise, worth * step, "residuals of the drive")
+    determined = coloured.determined & (white > 0.0)
+    ratios = np.diag(coloured.matrix)[determined] / white[determined]
+    samples = max(float(np.median(ratios)), 1.0)
+    return Sensor(stated.kind, noise, samples * step, "residuals of the drive")
 
 
 def _imagined(maneuver: Maneuver, sensor: Sensor) -> Experiment:
     """A test that has not been made: only its stamps count, not its values."""
-    time, source = maneuver.time(RATE), Source(Path("none"), sensor.kind)
-    kind, unit = sensor.kind, KINDS[sensor.kind].units[0]
-    ones, noise = np.ones_like(time), sensor.deviation(1.0 / RATE)
-    channel = Channel(kind, kind, unit, time, 0.0 * ones, ones, source, noise=noise)
-    command = InputSignal("voltage", "V", time, maneuver.sample(RATE), "linear", source)
-    name = maneuver.name
-    return Experiment(name, "", name, "fit", "rest", None, command, {sensor.kind: channel})
+    time = maneuver.time(RATE)
+    source = Source(Path("none"), sensor.kind)
+    channel = Channel(
+        name=sensor.kind,
+        kind=sensor.kind,
+        unit=KINDS[sensor.kind].units[0],
+        time=time,
+        values=np.zeros_like(time),
+        weight=np.ones_like(time),
+        source=source,
+        noise=sensor.deviation(1.0 / RATE),
+    )
+    return Experiment(
+        name=maneuver.name,
+        axis="",
+        run=maneuver.name,
+        role="fit",
+        start="rest",
+        start_pressure=None,
+        input=InputSignal("voltage", "V", time, maneuver.sample(RATE), "linear", source),
+        channels={sensor.kind: channel},
+    )
 
 
 def _machine(problem: Problem) -> list[int]:
-    """Places of the unknowns that are no run's own."""
-    return [k for k, each in enumerate(problem.unknowns) if each.run is None]
+    """Numbers of the unknowns that do not belong to a single run."""
+    return [k for k, unknown in enumerate(problem.unknowns) if unknown.run is None]
+
+
+def _machine_unknowns(problem: Problem) -> Unknowns:
+    return Unknowns(tuple(problem.unknowns[k] for k in _machine(problem)))
 
 
 def _machine_rows(problem: Problem) -> Array:
     """(<= K, K) factor of the derivatives by the machine's unknowns, those of single runs spent."""
-    derivatives, machine = problem.evaluate(problem.start).jacobian, _machine(problem)
-    own = [k for k in range(derivatives.shape[1]) if k not in machine]
-    return triangular_factor(derivatives[:, [*own, *machine]])[len(own) :, len(own) :]
+    derivatives = problem.evaluate(problem.start).jacobian
+    machine = _machine(problem)
+    of_runs = [k for k in range(derivatives.shape[1]) if k not in machine]
+    size = len(of_runs)
+    return triangular_factor(derivatives[:, [*of_runs, *machine]])[size:, size:]
 
 
 # --- tests to come --------------------------------------------------------------------------------
@@ -336,7 +386,7 @@ NAMED = 4
 
 
 @dataclass(frozen=True, eq=False)
-class Candidate(Result):
+class CandidateTest(Result):
     """A test that could be made."""
 
     name: str
@@ -373,7 +423,7 @@ class Advice(Result):
 
 
 def advise(
-    present: Array, candidates: Sequence[Candidate], variables: Unknowns
+    present: Array, candidates: Sequence[CandidateTest], variables: Unknowns
 ) -> tuple[Advice, ...]:
     """Rank candidate tests by what they would add.
 
@@ -384,7 +434,7 @@ def advise(
     present : (m, K) array
         What the tests made so far tell: derivatives of the weighted residuals over the deviation of
         an independent one; no rows if there are none.
-    candidates : sequence of Candidate
+    candidates : sequence of CandidateTest
         Tests to choose from; an `InputError` if there is none or its shape is wrong.
     variables : Unknowns
         The unknowns; those at a bound count as known.
@@ -397,47 +447,58 @@ def advise(
                 f"{name}: derivatives by {len(variables)} parameters are so many columns of "
                 f"finite numbers, not {rows.shape}."
             )
-    free, made = variables.free, []
+    free = variables.free
     names = tuple(variables.names[k] for k in np.flatnonzero(free))
     known_now = whitening(dense_factor(present), free, TOLERANCE)
     now = known_now.matrix
     before = np.where(known_now.determined, np.linalg.norm(now, axis=1), inf)
-    for each in candidates:
-        both = dense_factor(np.vstack([present, each.derivatives]))
-        known = whitening(both, free, TOLERANCE)
-        then = known.matrix
-        after = np.where(known.determined, np.linalg.norm(then, axis=1), inf)
+    ranked = []
+    for candidate in candidates:
+        both = dense_factor(np.vstack([present, candidate.derivatives]))
+        known_then = whitening(both, free, TOLERANCE)
+        then = known_then.matrix
+        after = np.where(known_then.determined, np.linalg.norm(then, axis=1), inf)
         after = np.minimum(after, before)
         # errors then along the directions known now, in which they are 1 and independent now
         along = (present @ now).T @ (present @ then)
         shrinking = -np.linalg.slogdet(along @ along.T)[1]
         d_gain = float(np.exp(0.5 * shrinking / max(now.shape[1], 1)))
-        errors, ranks = (before[free], after[free]), then.shape[1] - now.shape[1]
-        made.append(Advice(each.name, each.duration, names, *errors, ranks, d_gain))
-    made.sort(key=lambda each: (-len(each.newly_determined), -each.ranks, -each.d_gain))
-    return tuple(made)
+        ranked.append(
+            Advice(
+                candidate=candidate.name,
+                duration=candidate.duration,
+                names=names,
+                before=before[free],
+                after=after[free],
+                ranks=then.shape[1] - now.shape[1],
+                d_gain=d_gain,
+            )
+        )
+    ranked.sort(key=lambda advice: (-len(advice.newly_determined), -advice.ranks, -advice.d_gain))
+    return tuple(ranked)
 
 
-def in_turn(
-    present: Array, candidates: Sequence[Candidate], variables: Unknowns, count: int
+def sequential_plan(
+    present: Array, candidates: Sequence[CandidateTest], variables: Unknowns, count: int
 ) -> tuple[Advice, ...]:
     """A plan of tests: the best one, then the best beside it, and so on, each at most once.
 
     As many as `count`, fewer if none of the others tells anything new; otherwise as `advise`.
     """
-    left, chosen = {each.name: each for each in candidates}, list[Advice]()
-    while left and len(chosen) < count:
-        best = advise(present, [*left.values()], variables)[0]
+    remaining = {candidate.name: candidate for candidate in candidates}
+    plan = list[Advice]()
+    while remaining and len(plan) < count:
+        best = advise(present, list(remaining.values()), variables)[0]
         if not best.newly_determined and not best.ranks and best.d_gain < 1.0 + WORTH:
             break
-        chosen.append(best)
-        taken = left.pop(best.candidate).derivatives
-        present = triangular_factor(np.vstack([present, taken]))
-    return tuple(chosen)
+        plan.append(best)
+        derivatives = remaining.pop(best.candidate).derivatives
+        present = triangular_factor(np.vstack([present, derivatives]))
+    return tuple(plan)
 
 
 def default_maneuvers() -> tuple[Maneuver, ...]:
-    """Small and large, slow and fast, both ways: what to choose from where nothing is named."""
+    """Small and large, slow and fast, both ways: what to choose from if nothing is named."""
     both, up_and_down = (1.0, -1.0), (2.0, 4.0, 6.0, 8.0, 10.0, 8.0, 6.0, 4.0, 2.0, 0.0)
     climbs = {s: stairs([s * volts + 0.0 for volts in up_and_down], 2.0) for s in both}
     many = {volts: multisine(volts, (0.05, 2.0, 8), length=60.0) for volts in (4.0, 9.0)}
@@ -455,7 +516,7 @@ def default_maneuvers() -> tuple[Maneuver, ...]:
 
 def advice_table(title: str, judged: Sequence[Advice]) -> Table:
     """Tests in the order given, what each would tell, and in a file all errors with it."""
-    new = any(each.newly_determined for each in judged)
+    new = any(advice.newly_determined for advice in judged)
     made = Table(
         title,
         (
@@ -467,10 +528,10 @@ def advice_table(title: str, judged: Sequence[Advice]) -> Table:
             *(Column(f"error of {name}", ".6g", of="f") for name in judged[0].names),
         ),
     )
-    for each in judged:
-        first, more = each.newly_determined[:NAMED], len(each.newly_determined) - NAMED
+    for advice in judged:
+        first, more = advice.newly_determined[:NAMED], len(advice.newly_determined) - NAMED
         # the unknown whose error shrinks most, of those that are then known
-        pairs = zip(each.names, each.before.tolist(), each.after.tolist(), strict=True)
+        pairs = zip(advice.names, advice.before.tolist(), advice.after.tolist(), strict=True)
         known = [pair for pair in pairs if pair[2] <= KNOWN]
         gained = ""
         if known:
@@ -478,12 +539,12 @@ def advice_table(title: str, judged: Sequence[Advice]) -> Table:
             before = f"{_error(now)} " if now <= KNOWN else ""
             gained = f"{name} {before}to {_error(then)}"
         made.add(
-            each.candidate,
-            each.duration,
+            advice.candidate,
+            advice.duration,
             ", ".join(first) + (f" + {more}" if more > 0 else ""),
             gained,
-            f"{each.d_gain:.2f}x" if each.d_gain > 1.0 + WORTH else "",
-            *(error if error < inf else None for error in each.after.tolist()),
+            f"{advice.d_gain:.2f}x" if advice.d_gain > 1.0 + WORTH else "",
+            *(error if error < inf else None for error in advice.after.tolist()),
         )
     return made
 
@@ -493,7 +554,7 @@ def best_tests_table(judged: Sequence[Advice]) -> Table:
     columns = (Column("parameter"), Column("error now", "s"), Column("then", "s"))
     made = Table("For each parameter", (*columns, Column("best test", wrap=True)))
     for k, name in enumerate(judged[0].names):
-        errors = np.array([each.after[k] for each in judged])
+        errors = np.array([advice.after[k] for advice in judged])
         best, now = judged[int(np.argmin(errors))], judged[0].before[k]
         then, test = (now, "no further information")
         if best.after[k] < (1.0 - WORTH) * now:

@@ -56,8 +56,8 @@ open."""
 class Estimate(Result):
     """One number of a model with what is known of its error.
 
-    The value is there at once. Status, standard error and interval are computed when one of them is
-    first asked for, unless the estimate is that of a folder which has stored them.
+    The value is there immediately. Status, standard error and interval are computed when one of
+    them is first asked for, unless the estimate is that of a folder which has stored them.
 
     Examples
     --------
@@ -106,7 +106,7 @@ class Estimate(Result):
 
     @property
     def interval(self) -> tuple[float | None, float | None]:
-        """Both ends of the 95 % interval; None where there is no end."""
+        """Both ends of the 95 % interval; None if there is no end."""
         return self.lower, self.upper
 
     def __eq__(self, other: object) -> bool:
@@ -124,15 +124,16 @@ class Estimate(Result):
         return self.status != "fixed"
 
     def ends(self, factor: float = 1.0) -> tuple[str, str]:
-        """Both ends in words, times a factor; the status where there is none."""
+        """Both ends in words, times a factor; the status if there is none."""
         if self.lower is None and self.upper is None:
             return self.status, ""
         low = "none below" if self.lower is None else f"{factor * self.lower:.5g}"
-        return low, "none above" if self.upper is None else f"{factor * self.upper:.5g}"
+        high = "none above" if self.upper is None else f"{factor * self.upper:.5g}"
+        return low, high
 
     @property
     def relative_half_width(self) -> float:
-        """Half of the interval over the value's size; infinite where an end is missing."""
+        """Half of the interval over the value's size; infinite if an end is missing."""
         if self.lower is None or self.upper is None or self.value == 0.0:
             return inf
         return 0.5 * (self.upper - self.lower) / abs(self.value)
@@ -141,8 +142,8 @@ class Estimate(Result):
 def reach(covariance: Covariance) -> Array:
     """(K,) half widths of the intervals in the solver's vector; 0 for unknowns without one."""
     known = covariance.determined & covariance.variables.free
-    half: Array = covariance.quantiles * np.where(known, covariance.standard_errors, 0.0)
-    return half
+    half_widths: Array = covariance.quantiles * np.where(known, covariance.standard_errors, 0.0)
+    return half_widths
 
 
 def estimates(
@@ -160,41 +161,53 @@ def estimates(
     the normal quantile, because the variance is itself estimated, from a number of independent
     stretches of residual that may be small.
     """
-    half, variables, made = reach(covariance), covariance.variables, []
-    down, up = (
-        np.array([ends.get((k, upper), each) for k, each in enumerate(half)])
-        for upper in (False, True)
-    )
+    half_widths = reach(covariance)
+    variables = covariance.variables
+    below = np.array([ends.get((k, False), width) for k, width in enumerate(half_widths)])
+    above = np.array([ends.get((k, True), width) for k, width in enumerate(half_widths)])
     with np.errstate(invalid="ignore"):
-        lower = variables.to_values(variables.vector - down)
-        upper = variables.to_values(variables.vector + up)
+        lower = variables.to_values(variables.vector - below)
+        upper = variables.to_values(variables.vector + above)
     errors = np.abs(variables.slopes) * covariance.standard_errors
-    vast = half > np.where(variables.logarithmic, log(DECADES), DECADES)
-    for k, name in enumerate(variables.names):
-        below, above = bool(np.isinf(down[k])), bool(np.isinf(up[k]))
-        status: Status = "estimated"
-        if side := variables.at_bound[k]:
-            status = "at its lower bound" if side < 0 else "at its upper bound"
-        elif not covariance.determined[k] or (below and above) or vast[k]:
-            status = "undetermined"
-        elif below or above:
-            status = "no lower end" if below else "no upper end"
-        told = not side and status != "undetermined"
-        interval = Interval(
-            status,
-            float(errors[k]) if status == "estimated" else None,
-            float(lower[k]) if told and not below else None,
-            float(upper[k]) if told and not above else None,
+    vast = half_widths > np.where(variables.logarithmic, log(DECADES), DECADES)
+    has_interval = covariance.determined & ~vast
+    return tuple(
+        Estimate(
+            name=name,
+            value=float(variables.estimates[k]),
+            unit=unknown.unit,
+            run=unknown.run,
+            source=_interval(
+                side=int(variables.at_bound[k]),
+                has_interval=bool(has_interval[k]),
+                error=float(errors[k]),
+                lower=None if np.isinf(below[k]) else float(lower[k]),
+                upper=None if np.isinf(above[k]) else float(upper[k]),
+            ),
         )
-        value, unknown = float(variables.estimates[k]), variables.items[k]
-        made.append(Estimate(name, value, unknown.unit, unknown.run, interval))
-    return tuple(made)
+        for k, (name, unknown) in enumerate(zip(variables.names, variables.items, strict=True))
+    )
+
+
+def _interval(
+    *, side: int, has_interval: bool, error: float, lower: float | None, upper: float | None
+) -> Interval:
+    """The interval of one unknown, and its status; `side` is that of the bound at which it is."""
+    if side:
+        return Interval("at its lower bound" if side < 0 else "at its upper bound")
+    if not has_interval or (lower is None and upper is None):
+        return Interval("undetermined")
+    if lower is None:
+        return Interval("no lower end", None, None, upper)
+    if upper is None:
+        return Interval("no upper end", None, lower, None)
+    return Interval("estimated", error, lower, upper)
 
 
 # --- what is taken for granted --------------------------------------------------------------------
 
 
-class Handed(NamedTuple):
+class EarlierStage(NamedTuple):
     """An earlier stage's estimates as the later one takes them for granted."""
 
     def __repr__(self) -> str:
@@ -208,27 +221,29 @@ class Handed(NamedTuple):
     """Name of the earlier stage."""
 
 
-def with_handed(
-    own: Covariance, handed: Sequence[Handed], systematic: Systematic = MappingProxyType({})
+def with_earlier_stages(
+    own: Covariance,
+    earlier_stages: Sequence[EarlierStage],
+    systematic: Systematic = MappingProxyType({}),
 ) -> Covariance:
     """A stage's covariance with what earlier stages do not know, and systematic effects.
 
     The degrees of freedom are Satterthwaite's, of the sum of the variances; a standard uncertainty
     that was stated has infinitely many (JCGM 100:2008, G.4).
     """
-    if not handed and not systematic:
+    if not earlier_stages and not systematic:
         return own
     known = np.outer(own.determined, own.determined)
     columns = np.array(list(systematic.values())).reshape(-1, len(own.variables))
     total = own.matrix + np.where(known, columns.T @ columns, 0.0)
     spread = np.diag(own.matrix) ** 2 / own.degrees_of_freedom
-    for each in handed:
-        added = np.where(known, each.slopes @ each.covariance.matrix @ each.slopes.T, 0.0)
+    for stage in earlier_stages:
+        added = np.where(known, stage.slopes @ stage.covariance.matrix @ stage.slopes.T, 0.0)
         total += added
         # of each earlier unknown by itself, as if they were independent of each other
-        parts = each.slopes**2 * np.diag(each.covariance.matrix)
+        parts = stage.slopes**2 * np.diag(stage.covariance.matrix)
         share = parts / np.maximum(parts.sum(axis=1, keepdims=True), 1e-300)
-        inverse = np.sum(share**2 / each.covariance.degrees_of_freedom, axis=1)
+        inverse = np.sum(share**2 / stage.covariance.degrees_of_freedom, axis=1)
         spread += np.diag(added) ** 2 * np.maximum(inverse, 1e-300)
     variance = np.diag(total)
     freedom = np.divide(variance**2, spread, out=np.full_like(variance, np.inf), where=spread > 0.0)
@@ -264,7 +279,7 @@ class Uncertainty(Result):
     colours: tuple[NoiseColour, ...]
     noisy: bool
     """Whether there are any residuals at all."""
-    handed: tuple[Handed, ...]
+    earlier_stages: tuple[EarlierStage, ...]
     """What earlier stages do not know."""
     systematic: Systematic
     runs: RunToRun | None = None
@@ -277,19 +292,19 @@ class Uncertainty(Result):
     @cached_property
     def quoted(self) -> Covariance:
         """That of the stage's own noise with what is taken for granted."""
-        return with_handed(self.own, self.handed, self.systematic)
+        return with_earlier_stages(self.own, self.earlier_stages, self.systematic)
 
     @cached_property
     def sampled(self) -> Covariance:
         """That of all stages' noise: the quoted one without systematic effects."""
-        return with_handed(self.own, self.handed)
+        return with_earlier_stages(self.own, self.earlier_stages)
 
     @cached_property
     def estimates(self) -> tuple[Estimate, ...]:
         """Values with the quoted intervals; ends that were checked stand in place of others."""
-        more = np.maximum(reach(self.quoted) ** 2 - reach(self.own) ** 2, 0.0)
+        added = np.maximum(reach(self.quoted) ** 2 - reach(self.own) ** 2, 0.0)
         ends = {
-            (end.number, end.upper): float(np.sqrt(end.distance**2 + more[end.number]))
+            (end.number, end.upper): float(np.sqrt(end.distance**2 + added[end.number]))
             for end in self.ends
         }
         return estimates(self.quoted, ends)
@@ -298,53 +313,43 @@ class Uncertainty(Result):
         """What the errors rest on."""
         if not self.noisy:
             return ("The residuals are exactly zero: errors of zero do not apply to other tests.",)
-        said = []
+        sentences = []
         for colour in self.colours:
-            said.append(colour.sentence)
+            sentences.append(colour.sentence)
             if colour.drifting:
-                said.append(
+                sentences.append(
                     f"That is a large part of a run: residuals of {colour.channel} are model error "
                     "or a spectral line rather than noise, of which intervals know little."
                 )
-        said += self.priors
-        for end in self.ends:
-            side, name = "upper" if end.upper else "lower", self.own.variables.names[end.number]
-            words = f"{name} has no {side} end: the cost does not rise enough on that side."
-            if end.better is not None:
-                words = (
-                    f"The search had not found the best fit: the interval of {name} led to a "
-                    f"better one, cost {end.better:.6g}. Fit again with --starts 20 (in Python "
-                    "search = Search(20))."
-                )
-            elif np.isfinite(end.distance):
-                words = f"The {side} end of {name} is that of its profile, which is asymmetric."
-            said.append(words)
+        sentences += self.priors
+        sentences += [_end_sentence(self.own.variables.names[end.number], end) for end in self.ends]
         if self.runs is not None:
-            said.append(
+            sentences.append(
                 f"From run to run the motion's scale differs by {100.0 * self.runs.deviation:.2g} "
                 "% (standard deviation), which the intervals include."
             )
-        said += self._widened()
-        return tuple(said)
+        sentences += self._widened()
+        return tuple(sentences)
 
     def _widened(self) -> Iterator[str]:
         """What earlier stages and systematic effects add to the intervals."""
         known = self.own.determined & (np.diag(self.own.matrix) > 0.0)
-        if not known.any() or not (self.handed or self.systematic):
+        if not known.any() or not (self.earlier_stages or self.systematic):
             return
-        what = ["the uncertainty of earlier stages"] if self.handed else []
+        causes = ["the uncertainty of earlier stages"] if self.earlier_stages else []
         if self.systematic:
-            what.append("what instruments, fixed parameters and the model may be off by")
+            causes.append("what instruments, fixed parameters and the model may be off by")
         wider = np.ones(known.size)
         wider[known] = self.quoted.standard_errors[known] / self.own.standard_errors[known]
         most = int(np.argmax(wider))
         name = self.own.variables.names[most]
         text = (
-            f"Intervals include {' and '.join(what)}, which widens them by a factor of "
+            f"Intervals include {' and '.join(causes)}, which widens them by a factor of "
             f"{float(np.median(wider[known])):.2f} in the median and of {wider[most]:.2f} for "
             f"{name}"
         )
-        if shares := self.budget(most):
+        shares = self.budget(most)
+        if shares:
             effect, share = next(iter(shares.items()))
             text += f", {percent(share, 1.0)} of whose variance is the {effect}"
         yield f"{text}."
@@ -364,17 +369,31 @@ class Uncertainty(Result):
         return dict(sorted(shares.items(), key=lambda item: -item[1]))
 
 
+def _end_sentence(name: str, end: CheckedEnd) -> str:
+    """What a checked end of an unknown's interval says."""
+    side = "upper" if end.upper else "lower"
+    if end.better is not None:
+        return (
+            f"The search had not found the best fit: the interval of {name} led to a better one, "
+            f"cost {end.better:.6g}. Fit again with --starts 20 (in Python search = Search(20))."
+        )
+    if np.isfinite(end.distance):
+        return f"The {side} end of {name} is that of its profile, which is asymmetric."
+    return f"{name} has no {side} end: the cost does not rise enough on that side."
+
+
 def uncertainty(
     fit: LinearisedFit,
     *,
-    handed: Sequence[Handed] = (),
+    earlier_stages: Sequence[EarlierStage] = (),
     systematic: Systematic = MappingProxyType({}),
     runs: RunToRun | None = None,
 ) -> Uncertainty:
     """Errors of a fit's estimates for coloured residuals.
 
-    `handed` is what earlier stages do not know, `systematic` what each systematic effect changes,
-    `runs` how runs differ. An `InputError` says that there are no more samples than unknowns.
+    `earlier_stages` are the estimates that this stage takes for granted, `systematic` what each
+    systematic effect changes, `runs` how runs differ. An `InputError` says that there are no more
+    samples than unknowns.
     """
     bounded, fit = fit.variables, released(fit)
     own = replace(with_runs(coloured_noise_covariance(fit), runs), variables=bounded)
@@ -382,13 +401,13 @@ def uncertainty(
     ratio = np.ones_like(white)
     np.divide(np.diag(own.matrix), white, out=ratio, where=own.determined & (white > 0.0))
     return Uncertainty(
-        own,
-        np.maximum(ratio, 1.0),
-        noise_colours(fit),
-        fit.squares > 0.0,
-        tuple(handed),
-        systematic,
-        runs,
+        own=own,
+        inflation=np.maximum(ratio, 1.0),
+        colours=noise_colours(fit),
+        noisy=fit.squares > 0.0,
+        earlier_stages=tuple(earlier_stages),
+        systematic=systematic,
+        runs=runs,
     )
 
 
@@ -401,33 +420,37 @@ def uncertainty_of(stage: StageFit) -> Uncertainty:
     InputError
         If there are no more samples than unknowns.
     """
-    problem, vector, handed = stage.problem, stage.solution.vector, []
+    problem = stage.problem
+    vector = stage.solution.vector
     effects = effects_of(stage)
     systematic = dict(effects.systematic)
-    for together, change in zip(
-        problem.uncertain, slopes_by(stage, problem.uncertain).T, strict=True
-    ):
-        systematic[effect_of_fixed(together)] = change
+    changes = slopes_by(stage, problem.uncertain).T
+    for deviations, change in zip(problem.uncertain, changes, strict=True):
+        systematic[effect_of_fixed(deviations)] = change
+    earlier_stages = []
     for earlier in stage.earlier:
         if follows_card(stage, earlier):
             slopes = slopes_by_earlier(stage, earlier)
-            known = uncertainty_of(earlier)
-            handed.append(Handed(known.sampled, slopes, earlier.stage.name))
+            errors = uncertainty_of(earlier)
+            earlier_stages.append(EarlierStage(errors.sampled, slopes, earlier.stage.name))
             # an effect acts on this stage by itself, and through what it does to others
-            for effect, change in known.systematic.items():
+            for effect, change in errors.systematic.items():
                 systematic[effect] = systematic.get(effect, 0.0) + slopes @ change
-    found = uncertainty(stage.linearised, handed=handed, systematic=systematic, runs=effects.runs)
-    found = replace(found, priors=prior_sentences(problem.unknowns, vector, found.quoted))
-    if not found.noisy:
-        return found
-    half, fit = reach(found.own), released(stage.linearised)
+    result = uncertainty(
+        stage.linearised, earlier_stages=earlier_stages, systematic=systematic, runs=effects.runs
+    )
+    result = replace(result, priors=prior_sentences(problem.unknowns, vector, result.quoted))
+    if not result.noisy:
+        return result
+    half_widths = reach(result.own)
+    fit = released(stage.linearised)
     limits = [
         number
         for number, unknown in enumerate(problem.unknowns)
         if unknown.kind == "parameter" and unknown.targets[0].startswith(tuple(LIMITS))
     ]
-    ends = checked_ends(problem, vector, fit, half, limits)
-    return replace(found, ends=tuple(ends))
+    ends = checked_ends(problem, vector, fit, half_widths, limits)
+    return replace(result, ends=tuple(ends))
 
 
 @once_per_stage
@@ -439,12 +462,12 @@ def intervals_of(stage: StageFit) -> tuple[Interval, ...]:
     if stage.stored is not None:
         return stage.stored
     try:
-        known = uncertainty_of(stage).estimates
+        computed = uncertainty_of(stage).estimates
     except InputError:
         return (Interval("undetermined"),) * len(stage.problem.unknowns)
     return tuple(
         Interval(estimate.status, estimate.standard_error, estimate.lower, estimate.upper)
-        for estimate in known
+        for estimate in computed
     )
 
 
@@ -458,11 +481,11 @@ def estimates_of(stage: StageFit) -> tuple[Estimate, ...]:
     values = point.estimates.tolist()
     return tuple(
         Estimate(
-            unknown.label,
-            values[number],
-            unknown.unit,
-            unknown.run,
-            partial(_interval_of, stage, number),
+            name=unknown.label,
+            value=values[number],
+            unit=unknown.unit,
+            run=unknown.run,
+            source=partial(_interval_of, stage, number),
         )
         for number, unknown in enumerate(point)
     )
@@ -484,27 +507,28 @@ def released(fit: LinearisedFit) -> LinearisedFit:
 def weighed(problem: Problem, vector: Array) -> Problem:
     """The problem with priors that count as much as the residuals are really worth.
 
-    The cost takes every residual for an independent one of variance 1. Where a hundred of them are
+    The cost takes every residual for an independent one of variance 1. If a hundred of them are
     worth one, data would outweigh a prior a hundred times too much. So a prior counts as often as
     that: by the ratio of its unknown's variance under the noise that the residuals show to its
     variance under the noise that the cost assumes, both from the data alone; by the median of the
-    others where the data alone do not determine the unknown. `vector` (K,) is at or near the
+    others if the data alone do not determine the unknown. `vector` (K,) is at or near the
     optimum; an `InputError` says that there are no more samples than unknowns.
     """
     fit = linearised_fit(replace(problem, unknowns=problem.unknowns.with_worths(None)), vector)
-    own, assumed = spectral_covariance(fit), np.sum(fit.whitening**2, axis=1)
-    known = own.determined & (assumed > 0.0)
-    ratio = np.diag(own.matrix)[known] / assumed[known]
-    found = np.full(known.size, float(np.median(ratio)) if known.any() else 1.0)
-    found[known] = ratio
-    having = [each.prior is not None for each in problem.unknowns]
-    worths = np.maximum(found[having], LEAST).tolist()
+    covariance = spectral_covariance(fit)
+    assumed = np.sum(fit.whitening**2, axis=1)
+    determined = covariance.determined & (assumed > 0.0)
+    ratio = np.diag(covariance.matrix)[determined] / assumed[determined]
+    ratios = np.full(determined.size, float(np.median(ratio)) if determined.any() else 1.0)
+    ratios[determined] = ratio
+    has_prior = [unknown.prior is not None for unknown in problem.unknowns]
+    worths = np.maximum(ratios[has_prior], LEAST).tolist()
     return replace(problem, unknowns=problem.unknowns.with_worths(worths))
 
 
 def prior_sentences(unknowns: Unknowns, vector: Array, quoted: Covariance) -> tuple[str, ...]:
     """What each prior of the machine adds, and how far from it the estimate lies."""
-    said = []
+    sentences = []
     for unknown, number, error in zip(unknowns, vector, quoted.standard_errors, strict=True):
         prior = unknown.prior
         if prior is None or unknown.run is not None:
@@ -514,12 +538,12 @@ def prior_sentences(unknowns: Unknowns, vector: Array, quoted: Covariance) -> tu
         pull = (float(number) * scale - middle) / prior.deviation
         share = min(float(error * scale / prior.deviation) ** 2, 1.0)
         spread = f"{100.0 * prior.deviation:.3g} %" if unknown.log else f"{prior.deviation:.4g}"
-        said.append(
+        sentences.append(
             f"The prior of {unknown.name}, {prior.mean:.5g} ± {spread}, contributes "
             f"{percent(share, 1.0)} of the information on it; the estimate lies "
             f"{abs(pull):.2g} deviations {'above' if pull >= 0.0 else 'below'} its mean."
         )
-    return tuple(said)
+    return tuple(sentences)
 
 
 def unseen_limits(stages: Sequence[StageFit]) -> dict[str, float]:

@@ -132,8 +132,8 @@ def profiles_of(
     """Profile likelihoods of a stage's unknowns by name, in their order.
 
     By default of all unknowns of the machine that have an interval; an `InputError` for a name that
-    is none of the stage's. What earlier stages do not know is not in them. `watch` is told how many
-    are done.
+    is none of the stage's. What earlier stages do not know is not in them. `watch` is called with
+    how many are done.
 
     Notes
     -----
@@ -141,32 +141,43 @@ def profiles_of(
     that count as one independent sample: on a linear model exactly the estimate ± q standard
     errors.
     """
-    problem, found, fit = stage.problem, uncertainty_of(stage), stage.linearised
-    variables, vector = found.own.variables, stage.solution.vector
+    problem = stage.problem
+    vector = stage.solution.vector
+    errors = uncertainty_of(stage)
+    covariance = errors.own
+    variables = covariance.variables
     if names is None:
-        known = zip(problem.unknowns, found.own.determined, strict=True)
-        chosen = [k for k, (each, told) in enumerate(known) if each.run is None and told]
+        pairs = zip(problem.unknowns, covariance.determined, strict=True)
+        numbers = [
+            k for k, (unknown, determined) in enumerate(pairs) if unknown.run is None and determined
+        ]
     else:
-        chosen = sorted({variables.index(name) for name in names})
+        numbers = sorted({variables.index(name) for name in names})
     cost = problem.cost(vector)
-    every = found.own.quantiles**2 * found.inflation * cost / fit.spare_samples
-    rises = {k: float(every[k]) for k in chosen}
-    shared = replace(problem, threads=1), vector, cost, rises, found.own.standard_errors
-    made: dict[str, Profile] = {}
-    profiles = (executor or Serial()).run(_profiled, shared, chosen)
+    rises = covariance.quantiles**2 * errors.inflation * cost / stage.linearised.spare_samples
+    shared = (
+        replace(problem, threads=1),
+        vector,
+        cost,
+        {k: float(rises[k]) for k in numbers},
+        covariance.standard_errors,
+    )
+    by_name: dict[str, Profile] = {}
+    profiles = (executor or Serial()).run(_profiled, shared, numbers)
     words = f"Profiling {stage.stage.name}"
-    for position, each in counted(profiles, len(chosen), "parameters", words):
-        name = variables.names[chosen[position]]
-        unknown = problem.unknowns.items[chosen[position]]
-        made[name] = replace(each, name=name, stage=stage.stage.name, unknown=unknown)
+    for position, profile in counted(profiles, len(numbers), "parameters", words):
+        number = numbers[position]
+        name = variables.names[number]
+        unknown = problem.unknowns.items[number]
+        by_name[name] = replace(profile, name=name, stage=stage.stage.name, unknown=unknown)
         if watch is not None:
-            watch(len(made))
-    return {variables.names[k]: made[variables.names[k]] for k in chosen}
+            watch(len(by_name))
+    return {variables.names[k]: by_name[variables.names[k]] for k in numbers}
 
 
 def _profiled(shared: tuple[Problem, Array, float, dict[int, float], Array], index: int) -> Profile:
     problem, vector, cost, rises, steps = shared
-    low, high = (float(each[index]) for each in problem.bounds)
+    low, high = (float(bound[index]) for bound in problem.bounds)
     step = float(steps[index])
     if not (np.isfinite(step) and step > 0.0):
         step = 0.01 * (high - low)

@@ -16,7 +16,7 @@ from swashplate.drive import Drive
 from swashplate.errors import InputError
 from swashplate.identification import tables
 from swashplate.identification.assessment import Identification, motion_of
-from swashplate.identification.diagnostics.judging import Verdict, starts_of, verdict
+from swashplate.identification.diagnostics.verdict import Verdict, assess_fit, starts_of
 from swashplate.identification.estimation.model_setup import ModelSetup
 from swashplate.identification.estimation.solving import Solution
 from swashplate.identification.estimation.stages import Parameters
@@ -43,7 +43,7 @@ _PARTS = {
     "card": "the control card alone, from the command to the currents",
     "pump": "pump and motor, driven by the current",
     "chain": "card, pump and motor, from the command to the speed",
-    "model": "a model of one's own, from its inputs to its channels",
+    "model": "a user-defined model, from its inputs to its channels",
 }
 
 
@@ -111,7 +111,7 @@ def write_validation_report(
     Parameters
     ----------
     drive : ParameterSet or ModelSetup
-        The drive, or the model of one's own, that was held against the runs.
+        The drive, or the user-defined model, that was held against the runs.
     campaign : Campaign
         The tests.
     path : path
@@ -134,7 +134,7 @@ def write_validation_report(
         f"{count(len(runs), 'run')} predicted from the command alone · "
         f"{count(samples, 'sample')} that count"
     )
-    found = judged if judged is not None else verdict((), predicted)
+    found = judged if judged is not None else assess_fit((), predicted)
     setup = _setup_section(campaign, drive, "", notes or {}, ())
     write_text(_page("Validation", facts, campaign, drive, runs, found, setup), path)
 
@@ -321,7 +321,7 @@ def _setup_section(
     else:
         made.add("drive", f"{drive.name}, card {drive.card}" if drive.card else drive.name)
     if title:
-        made.add("fit configuration", title)
+        made.add("fit setup", title)
     for key, words in notes.items():
         if key != "campaign":
             made.add(key, words)
@@ -329,7 +329,7 @@ def _setup_section(
     for each in stages:
         blocks.append(Block("heading", f"Stage {each.stage.name}", "h3"))
         blocks += listed_block(_stage_words(each))
-    return Section("setup", "Configuration", blocks)
+    return Section("setup", "Fit setup", blocks)
 
 
 def _stage_words(fit: StageFit) -> list[str]:

@@ -234,7 +234,7 @@ def _levers(values: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
 
 def run_of(experiment: Experiment) -> dict[str, Any]:
     """A run that a voltage drives, with its channels that a drive simulates."""
-    channels = [_channel(each) for each in _comparable(experiment.channels.values())]
+    channels = [_channel(channel) for channel in _comparable(experiment.channels.values())]
     return {
         **_record(voltage_record(experiment)),
         "name": experiment.name,
@@ -255,8 +255,11 @@ def _record(record: Record) -> dict[str, Any]:
 
 
 def _comparable(channels: Iterable[Channel]) -> list[Channel]:
-    """Channels that a drive simulates; of a position its speed, if the filters take its stamps."""
-    made = []
+    """Channels that a drive simulates; positions only if the filters of `speed_of` take them.
+
+    The page compares the speed of a position, see `_channel`.
+    """
+    comparable = []
     for channel in channels:
         if channel.kind not in SIGNALS or not channel.used.any():
             continue
@@ -265,8 +268,8 @@ def _comparable(channels: Iterable[Channel]) -> list[Channel]:
                 speed_of(channel, "exact")
             except InputError:
                 continue
-        made.append(channel)
-    return made
+        comparable.append(channel)
+    return comparable
 
 
 def _channel(channel: Channel) -> dict[str, Any]:

@@ -23,7 +23,7 @@ from swashplate.analysis import (
 from swashplate.campaign import Campaign
 from swashplate.drive import Drive
 from swashplate.errors import SwashplateError
-from swashplate.identification.diagnostics.judging import Verdict
+from swashplate.identification.diagnostics.verdict import Verdict
 from swashplate.identification.stage_fit import StageFit
 from swashplate.identification.statistics.determination import weak_unknowns
 from swashplate.identification.statistics.intervals import unseen_limits
@@ -360,7 +360,7 @@ def summary_section(
     runs: Sequence[ShownRun],
     findings: int,
 ) -> Section:
-    """The first screen: `drive` is None for a model of one's own, which has no such numbers."""
+    """The first screen: `drive` is None for a user-defined model, which has no such numbers."""
     look: Light = "good" if judged.usable else "bad"
     headline = judged.headline.replace(" %", "\N{NO-BREAK SPACE}%")
     shown = [

@@ -14,7 +14,7 @@ from swashplate.identification.diagnostics.causes import Cause, causes_of, fixed
 from swashplate.identification.diagnostics.data_checks import Finding
 from swashplate.identification.diagnostics.discrepancy import (
     ClassError,
-    Motion,
+    MotionClass,
     PredictionError,
     prediction_errors,
 )
@@ -40,7 +40,7 @@ SHAFT = ("shaft_speed", "shaft_position")
 """Signals of a drive that are one motion."""
 SAME = 1e-6
 """Costs that differ by less than this part are the same optimum."""
-MOTIONS: Mapping[Motion, str] = {
+MOTIONS: Mapping[MotionClass, str] = {
     "large": "large motion",
     "small": "small motion, near the dead zone",
     "fast": "fast motion",
@@ -49,7 +49,7 @@ MOTIONS: Mapping[Motion, str] = {
 
 @dataclass(frozen=True)
 class Verdict(Result):
-    """The judgment on a fit, or on a drive over some runs: three answers."""
+    """The assessment of a fit, or of a drive over some runs: three answers."""
 
     required: float
     """Largest error of a prediction over the range that is of use. [1]"""
@@ -93,11 +93,11 @@ class Verdict(Result):
         The first one, which is that of the shaft if there is one, unless another one errs by more
         than required.
         """
-        channels = {each.channel: each for each in self.predictions}
+        channels = {prediction.channel: prediction for prediction in self.predictions}
         decisive = [channels[name] for name in self.decisive]
-        late = [each for each in decisive if each.worst.error > self.required]
+        late = [prediction for prediction in decisive if prediction.worst.error > self.required]
         if late:
-            return max(late, key=lambda each: each.worst.error)
+            return max(late, key=lambda prediction: prediction.worst.error)
         return decisive[0] if decisive else None
 
     @property
@@ -127,14 +127,14 @@ class Verdict(Result):
                 f"Not usable: predicts {within} in {MOTIONS[error.worst.motion]}; "
                 f"{percent(self.required)} is required."
             )
-        classes = ", ".join(f"{each.motion} {percent(each.error)}" for each in error.classes)
+        classes = ", ".join(f"{stated.motion} {percent(stated.error)}" for stated in error.classes)
         return f"Usable: predicts {within} in a new maneuver ({classes})."
 
     @property
     def data(self) -> str:
         """Whether the data are sound, in a sentence."""
         if self.unsound:
-            return f"Not sound: {' '.join(each.sentence for each in self.unsound)}"
+            return f"Not sound: {' '.join(finding.sentence for finding in self.unsound)}"
         if not self.fitted:
             return "Not judged: a drive that was not fitted to these runs says little of them."
         return "Sound: no run stands out from the others, none is clipped."
@@ -144,18 +144,21 @@ class Verdict(Result):
         """What may be predicted, and how well, in a sentence."""
         if not self.predictions:
             return "Unknown: no channel moves."
-        channels = {each.channel: each for each in self.predictions}
+        channels = {prediction.channel: prediction for prediction in self.predictions}
         decisive = [channels[name] for name in self.decisive]
-        stated = [f"{each.signal} within {percent(each.worst.error)}" for each in decisive]
+        stated = [
+            f"{prediction.signal} within {percent(prediction.worst.error)}"
+            for prediction in decisive
+        ]
         said = (
             f"In nine of ten new maneuvers {listed(stated)} of range; {percent(self.required)} is "
             "required."
         )
-        for each in decisive:
-            tested = {found.motion for found in each.classes}
+        for prediction in decisive:
+            tested = {found.motion for found in prediction.classes}
             unknown = [words for motion, words in MOTIONS.items() if motion not in tested]
             if unknown:
-                said += f" {each.signal}: unknown in {listed(unknown)}, as no run has it."
+                said += f" {prediction.signal}: unknown in {listed(unknown)}, as no run has it."
         return said
 
     @property
@@ -208,20 +211,20 @@ class Verdict(Result):
                 Column("required"),
             ),
         )
-        for each in self.predictions:
-            tested = {found.motion: found for found in each.classes}
-            for motion in get_args(Motion):
+        for prediction in self.predictions:
+            tested = {found.motion: found for found in prediction.classes}
+            for motion in get_args(MotionClass):
                 found = tested.get(motion, ClassError(motion, nan, 0, 0))
                 made.add(
-                    each.signal,
+                    prediction.signal,
                     motion,
-                    found.error * each.reach,
+                    found.error * prediction.reach,
                     found.error,
                     float(found.fitted + found.held_out),
                     float(found.held_out),
-                    _state(found, self.required) if each.channel in self.decisive else "-",
-                    unit=each.unit,
-                    look=each.channel in self.decisive and found.error > self.required,
+                    _state(found, self.required) if prediction.channel in self.decisive else "-",
+                    unit=prediction.unit,
+                    look=prediction.channel in self.decisive and found.error > self.required,
                 )
         return made
 
@@ -244,7 +247,11 @@ class Verdict(Result):
     def sentences(self) -> tuple[str, ...]:
         """What it holds for, what asks for attention, and what is assumed."""
         validity = (self.validity,) if self.validity else ()
-        return (*validity, *self.remarks, *(f"Assumed: {each}." for each in self.assumed))
+        return (
+            *validity,
+            *self.remarks,
+            *(f"Assumed: {assumption}." for assumption in self.assumed),
+        )
 
     def summary(self) -> str:
         """Text: headline, answers, sentences, the stated errors."""
@@ -254,7 +261,7 @@ class Verdict(Result):
         return "\n\n".join(part for part in parts if part)
 
 
-def verdict(
+def assess_fit(
     stages: Sequence[StageFit],
     predicted: Sequence[RunQuality],
     *,
@@ -270,7 +277,7 @@ def verdict(
     predicted : sequence of RunQuality
         Of runs that were held out of the fit, as `validation.predict` gives them.
     planned : sequence of str
-        Names of all stages of the fit configuration, to tell those that were never begun.
+        Names of all stages of the fit setup, to tell those that were never begun.
     required : float
         Largest error of a prediction in a new maneuver, over the range of the signal. [1]
     """
@@ -288,8 +295,8 @@ def verdict(
         if unknown.run is None
     ]
     causes = None if unfinished or unsound else causes_of(stages)
-    tested = {each.name: each for each in _fitted_runs(stages)}
-    tested |= {each.experiment.name: each.experiment for each in predicted}
+    tested = {run.name: run for run in _fitted_runs(stages)}
+    tested |= {quality.experiment.name: quality.experiment for quality in predicted}
     return Verdict(
         required,
         predictions,
@@ -308,7 +315,7 @@ def verdict(
 
 def starts_of(stages: Sequence[StageFit]) -> dict[str, Sequence[Solution]]:
     """Starts by stage, of the stages that had several."""
-    return {each.stage.name: each.starts for each in stages if len(each.starts) > 1}
+    return {stage.stage.name: stage.starts for stage in stages if len(stage.starts) > 1}
 
 
 def _fitted_runs(stages: Sequence[StageFit]) -> list[Experiment]:
@@ -325,12 +332,16 @@ def _decisive(
     predicted: Sequence[RunQuality],
 ) -> tuple[str, ...]:
     """Channels that decide: of those that measure a drive's shaft the best, then all others."""
-    runs = [*_fitted_runs(stages), *(each.experiment for each in predicted)]
+    runs = [*_fitted_runs(stages), *(quality.experiment for quality in predicted)]
     kinds = {name: channel.kind for run in runs for name, channel in run.channels.items()}
-    drive = all(isinstance(each.problem.model, DriveModel) for each in stages)
-    shaft = [each for each in predictions if drive and SIGNALS.get(kinds[each.channel]) in SHAFT]
-    best = min(shaft, key=lambda each: each.worst.error, default=None)
-    others = [each.channel for each in predictions if each not in shaft]
+    drive = all(isinstance(stage.problem.model, DriveModel) for stage in stages)
+    shaft = [
+        prediction
+        for prediction in predictions
+        if drive and SIGNALS.get(kinds[prediction.channel]) in SHAFT
+    ]
+    best = min(shaft, key=lambda prediction: prediction.worst.error, default=None)
+    others = [prediction.channel for prediction in predictions if prediction not in shaft]
     if best is None:
         return tuple(others)
     return (best.channel, *others)
@@ -338,13 +349,13 @@ def _decisive(
 
 def _unfinished(stages: Sequence[StageFit], planned: Sequence[str]) -> Iterator[str]:
     """Clauses on stages that did not come to their end."""
-    for each in stages:
-        name, solution = each.stage.name, each.solution
+    for stage in stages:
+        name, solution = stage.stage.name, stage.solution
         if solution.interrupted:
             yield f"stage {name} was interrupted, and its best so far is not an optimum"
         elif not solution.converged:
             yield f"stage {name} did not converge ({solution.message})"
-    done = {each.stage.name for each in stages}
+    done = {stage.stage.name for stage in stages}
     missing = [name for name in planned if name not in done]
     if missing:
         yield f"{listed(missing)} {'were' if len(missing) > 1 else 'was'} never fitted"
@@ -363,12 +374,12 @@ def _state(found: ClassError, required: float) -> str:
 def _starts(stages: Sequence[StageFit]) -> Iterator[str]:
     """How many starts reached the best optimum."""
     for stage, results in starts_of(stages).items():
-        costs = [each.cost for each in results]
+        costs = [solution.cost for solution in results]
         best = min(costs)
         if isinf(best):
             yield f"{stage}: no start ended with a finite cost."
             continue
-        alike = sum(each <= best * (1.0 + SAME) for each in costs)
+        alike = sum(cost <= best * (1.0 + SAME) for cost in costs)
         yield f"{stage}: {alike} of {len(costs)} starts reached the best cost, {best:.6g}."
 
 
@@ -388,7 +399,12 @@ def _assumed(stages: Sequence[StageFit]) -> Iterator[str]:
     fixed = [name for stage in stages for name in fixed_numbers(stage)]
     symbols = list(dict.fromkeys(COLUMNS[name] for name in fixed))
     if symbols:
-        known = {name for stage in stages for each in stage.problem.uncertain for name in each}
+        known = {
+            name
+            for stage in stages
+            for deviations in stage.problem.uncertain
+            for name in deviations
+        }
         stated = list(dict.fromkeys(COLUMNS[name] for name in fixed if name in known))
         also = f", {listed(stated)} within a standard uncertainty" if stated else ""
         yield f"the fixed {listed(symbols)} as stated{also}"
@@ -397,14 +413,14 @@ def _assumed(stages: Sequence[StageFit]) -> Iterator[str]:
 def maneuvers_tested(tested: Mapping[str, Experiment]) -> str:
     """``ramps, steps and sines of up to 0.3 Hz from -9 to 9 V``."""
     runs, fastest = list(tested.values()), _fastest_sine(tested)
-    several = {each: f"{each}s" for each in ("ramp", "step", "sine", "chirp")}
+    several = {kind: f"{kind}s" for kind in ("ramp", "step", "sine", "chirp")}
     several["unnamed"] = "unnamed motions"
     kinds = dict[str, None]()
-    for each in runs:
-        word = each.maneuver.split(" ")[0]
+    for run in runs:
+        word = run.maneuver.split(" ")[0]
         kinds[several.get(word, word)] = None
-    low = min(float(each.input.values.min()) for each in runs)
-    high = max(float(each.input.values.max()) for each in runs)
+    low = min(float(experiment.input.values.min()) for experiment in runs)
+    high = max(float(experiment.input.values.max()) for experiment in runs)
     words = [f"sines of up to {fastest:.3g} Hz" if k == "sines" and fastest else k for k in kinds]
     return f"{listed(words)} from {low:.3g} to {high:.3g} {runs[0].input.unit}"
 
@@ -422,7 +438,7 @@ def _validity(stages: Sequence[StageFit], tested: Mapping[str, Experiment]) -> s
         return f"{said}."
     try:
         runs, parameters = _fitted_runs(stages), stage.drive.parameters
-        reached = {limit for each in runs for limit in limits_reached(each, parameters)}
+        reached = {limit for run in runs for limit in limits_reached(run, parameters)}
     except (DomainError, InputError):
         return f"{said}."
     never, lacking = list[str](), list[str]()
