@@ -51,7 +51,7 @@ class Campaign(Result):
     title: str
     virtual: bool
     """Whether the tests are simulated."""
-    axes: Mapping[str, schema.Axis]
+    axes: Mapping[str, schema.AxisEntry]
     experiments: tuple[Experiment, ...]
     ignored: tuple[str, ...] = ()
     """Runs with the role ``"ignore"``, whose logs were not opened."""

@@ -43,7 +43,7 @@ VARIED = 8
 """Changes of an encoder's steps from which their common divisor is the decoder's."""
 
 
-class Source(NamedTuple):
+class SignalOrigin(NamedTuple):
     """Where a signal comes from."""
 
     file: Path
@@ -131,7 +131,7 @@ class InputSignal(Result):
     interpolation: Between
     """What it is between two stamps: ``"jumps"`` is straight but for sudden changes, which come at
     once in the middle of both."""
-    source: Source
+    source: SignalOrigin
     limits: tuple[float, float] | None = None
     """Range of the instrument, in `unit`."""
     dropped: int = 0
@@ -263,7 +263,7 @@ class Channel(Result):
     """(m,) samples, in `unit`; of an encoder the angle of the shaft."""
     weight: Array
     """(m,) factors on the squared error; 0 is ignored."""
-    source: Source
+    source: SignalOrigin
     noise: float | None = None
     """Standard deviation of the noise, in `unit`."""
     limits: tuple[float, float] | None = None

@@ -38,7 +38,7 @@ class LogWindow(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Envelope(Result):
+class BlockRanges(Result):
     """Lowest and highest samples of a signal in each of the blocks of a long log."""
 
     name: str
@@ -74,7 +74,7 @@ class Overview(Result):
 
     run: str
     rows: int
-    signals: tuple[Envelope, ...]
+    signals: tuple[BlockRanges, ...]
     """The input and the channels of each axis."""
     windows: tuple[LogWindow, ...]
     """Those with motion, in the order of time."""

@@ -555,7 +555,7 @@ def beyond_the_card(experiment: Experiment) -> tuple[str, ...]:
 
 def _unused(
     where: str,
-    windows: Iterable[schema.Window],
+    windows: Iterable[schema.TimeWindow],
     runs: Sequence[Experiment],
     long: Mapping[str, tuple[float, float]],
     channel: str | None = None,

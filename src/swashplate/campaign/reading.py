@@ -21,20 +21,20 @@ from swashplate.campaign.experiment import (
     Encoder,
     Experiment,
     InputSignal,
-    Source,
+    SignalOrigin,
     assumed_accuracy,
 )
-from swashplate.campaign.overview import Envelope, LogWindow, Overview
+from swashplate.campaign.overview import BlockRanges, LogWindow, Overview
 from swashplate.campaign.recognition import recognise
 from swashplate.campaign.samples import ambiguous_gaps, unwrap_counts, unwrap_position
 from swashplate.campaign.schema import applying, conversion, ends, inside
 from swashplate.documents import toml_string, validated
 from swashplate.errors import FileError, InputError
-from swashplate.logs import Column, Log, check_duration, check_stamps, in_parts, unit_of
+from swashplate.logs import Log, LogColumn, check_duration, check_stamps, in_parts, unit_of
 from swashplate.units import to_si
 
 Array = NDArray[np.float64]
-Axes = Mapping[str, schema.Axis]
+Axes = Mapping[str, schema.AxisEntry]
 AnySignal = TypeVar("AnySignal", InputSignal, Channel)
 
 SINCE_1970 = 1e8
@@ -44,7 +44,7 @@ LARGEST = 1e30
 
 
 def read_run(
-    place: str, name: str, run: schema.Run, axes: Axes, log: Log
+    place: str, name: str, run: schema.RunEntry, axes: Axes, log: Log
 ) -> tuple[list[Experiment], Overview | None]:
     """Experiments of a run: one for each axis that it tests, window of a long log, and split.
 
@@ -99,7 +99,7 @@ def read_run(
     return experiments, overview
 
 
-def _axes_of(place: str, run: schema.Run, axes: Axes) -> dict[str, schema.Axis]:
+def _axes_of(place: str, run: schema.RunEntry, axes: Axes) -> dict[str, schema.AxisEntry]:
     """The axes that a run tests, with what differs in it."""
     for name in (*run.only, *run.axes):
         if name not in axes:
@@ -118,7 +118,7 @@ def _axes_of(place: str, run: schema.Run, axes: Axes) -> dict[str, schema.Axis]:
         content = _merged(axis.model_dump(by_alias=True, exclude_unset=True), changes)
         if not content["channels"]:
             raise InputError(f'{origin} has no channel left; say role = "ignore" instead.')
-        tested[name] = validated(content, schema.Axis, origin)
+        tested[name] = validated(content, schema.AxisEntry, origin)
     return tested
 
 
@@ -144,14 +144,14 @@ def _merged(content: dict[str, Any], changes: Mapping[str, Any]) -> dict[str, An
 # --- signals in SI --------------------------------------------------------------------------------
 
 
-def _signals(axis: schema.Axis) -> dict[str, schema.Input | schema.Channel]:
+def _signals(axis: schema.AxisEntry) -> dict[str, schema.InputEntry | schema.ChannelEntry]:
     """An axis's signals, by how sentences call them."""
     return {"the input": axis.input} | {f"channel '{n}'": c for n, c in axis.channels.items()}
 
 
-def _found(log: Log, axes: Axes) -> dict[str, Column]:
+def _found(log: Log, axes: Axes) -> dict[str, LogColumn]:
     """Columns that some axes need, by the names that they are wanted by."""
-    found = dict[str, Column]()
+    found = dict[str, LogColumn]()
     for axis in axes.values():
         for what, signal in _signals(axis).items():
             clocks = [clock.column for clock in (signal.time, axis.time) if clock is not None]
@@ -172,9 +172,9 @@ class _Columns:
         self.values = log.read(list(self.found))
         first = replace(log, first=0, last=1).read(list(self.found)) if log.first else self.values
         self._begins = {name: values[:1] for name, values in first.items()}
-        self._stamps: dict[tuple[schema.Clock, int], Array] = {}
+        self._stamps: dict[tuple[schema.ClockEntry, int], Array] = {}
 
-    def stamps(self, signal: schema.Signal, axis: schema.Axis) -> Array:
+    def stamps(self, signal: schema.SignalEntry, axis: schema.AxisEntry) -> Array:
         """Increasing stamps of a signal; those of a calendar from the axis's first one on. [s]"""
         clock, main, size = signal.time or axis.time, axis.time, self.values[signal.column].size
         # signals share an array: whoever compares stamps sees at once that they are the same
@@ -196,7 +196,7 @@ class _Columns:
             time = self._stamps[clock, size] = check_duration(self.log, source, time)
         return time
 
-    def zero(self, axis: schema.Axis, recorded: datetime | None) -> float | None:
+    def zero(self, axis: schema.AxisEntry, recorded: datetime | None) -> float | None:
         """Calendar time at which an axis's stamps are 0, in seconds since 1970; None if unknown.
 
         `recorded` is when the log begins, if the campaign file says so.
@@ -210,18 +210,18 @@ class _Columns:
             return _seconds(recorded) - first
         return begin - clock.offset if of_calendar else None
 
-    def _second(self, clock: schema.Clock) -> float:
+    def _second(self, clock: schema.ClockEntry) -> float:
         """Size of the unit of a column of stamps [s]."""
         column = self.found[clock.column or ""]
         unit = clock.unit or unit_of(column, clock.column or "", "s")
         return to_si(1.0, unit, "s", f"{self.log.path}: column '{column.name}' (the time)")
 
-    def _called(self, what: str, signal: schema.Signal) -> str:
+    def _called(self, what: str, signal: schema.SignalEntry) -> str:
         """A signal, for the sentence of an error."""
         return f"{self.log.path}: column '{self.found[signal.column].name}' ({what})"
 
     def _conversion(
-        self, what: str, signal: schema.Input | schema.Channel
+        self, what: str, signal: schema.InputEntry | schema.ChannelEntry
     ) -> tuple[str, float, float]:
         """The SI unit of a signal, with factor and zero, as of `schema.conversion`."""
         usual = (*schema.KINDS[signal.kind].units, "1")[0]
@@ -229,7 +229,7 @@ class _Columns:
         return conversion(signal.kind, unit, self._called(what, signal))
 
     def as_recorded(
-        self, what: str, signal: schema.Input | schema.Channel
+        self, what: str, signal: schema.InputEntry | schema.ChannelEntry
     ) -> tuple[str, NDArray[np.float64]]:
         """The SI unit of a signal, and all its samples (n,) in it; NaN if one is not finite.
 
@@ -237,7 +237,7 @@ class _Columns:
         """
         si, factor, zero = self._conversion(what, signal)
         numbers = signal.scale * self.values[signal.column] + signal.offset
-        if isinstance(signal, schema.Channel) and signal.counts_per_turn is not None:
+        if isinstance(signal, schema.ChannelEntry) and signal.counts_per_turn is not None:
             encoder = Encoder(signal.counts_per_turn, signal.gear_ratio, signal.sign, None)
             factor *= encoder.angle_per_count
         else:
@@ -247,12 +247,16 @@ class _Columns:
         return si, values
 
     def samples(
-        self, what: str, signal: schema.Input | schema.Channel, axis: schema.Axis, run: schema.Run
+        self,
+        what: str,
+        signal: schema.InputEntry | schema.ChannelEntry,
+        axis: schema.AxisEntry,
+        run: schema.RunEntry,
     ) -> tuple[dict[str, Any], float]:
         """What a signal is made of, in SI, and the size of its unit; empty where all is missing."""
         log, column, numbers = self.log, self.found[signal.column], self.values[signal.column]
         said = self._called(what, signal)
-        time, is_input = self.stamps(signal, axis), isinstance(signal, schema.Input)
+        time, is_input = self.stamps(signal, axis), isinstance(signal, schema.InputEntry)
         if time.size != numbers.size:
             raise FileError(f"{said} has {numbers.size} samples, but its time {time.size}.")
         kept = np.ones(numbers.size, np.bool_) if run.span is None else inside(run.span, time)
@@ -286,23 +290,23 @@ class _Columns:
             "unit": si,
             "time": time if kept.all() else np.ascontiguousarray(time[kept]),
             "values": values,
-            "source": Source(log.path, column.name),
+            "source": SignalOrigin(log.path, column.name),
             "limits": signal.limits and tuple(factor * end + zero for end in signal.limits),
             "accuracy": _accuracy(signal, factor),
             "dropped": rows.size,
         }, factor
 
 
-def _accuracy(signal: schema.Input | schema.Channel, factor: float) -> Accuracy | None:
+def _accuracy(signal: schema.InputEntry | schema.ChannelEntry, factor: float) -> Accuracy | None:
     """What a campaign file states of an instrument, SI; the rest as assumed of its kind.
 
     A command that is said to be held is logged by what gives it: it changes at its samples.
     """
-    held = isinstance(signal, schema.Input) and signal.interpolation == "previous"
+    held = isinstance(signal, schema.InputEntry) and signal.interpolation == "previous"
     if signal.accuracy is None and not held:
         return None
-    stated = signal.accuracy or schema.Accuracy()
-    assumed = assumed_accuracy(signal.kind, is_input=isinstance(signal, schema.Input))
+    stated = signal.accuracy or schema.AccuracyEntry()
+    assumed = assumed_accuracy(signal.kind, is_input=isinstance(signal, schema.InputEntry))
     gain = assumed.gain if stated.gain is None else stated.gain
     zero = assumed.zero if stated.zero is None else factor * stated.zero
     time = stated.time
@@ -318,8 +322,8 @@ def _experiments(
     name: str,
     run_name: str,
     key: str,
-    run: schema.Run,
-    axis: schema.Axis,
+    run: schema.RunEntry,
+    axis: schema.AxisEntry,
     columns: _Columns,
     *,
     windowed: bool,
@@ -423,12 +427,12 @@ def _within(signal: AnySignal, begin: float, end: float) -> AnySignal:
 
 
 def _finished(
-    entry: schema.Channel,
+    entry: schema.ChannelEntry,
     read: Channel,
     drive: InputSignal,
     maneuver: str,
-    ignored: Sequence[schema.Window],
-    run: schema.Run,
+    ignored: Sequence[schema.TimeWindow],
+    run: schema.RunEntry,
 ) -> Channel:
     """A channel whose counts are unwrapped, with the product of all factors that apply."""
     encoder, counts, values = read.encoder, read.counts, read.values
@@ -486,10 +490,10 @@ class _Trace:
     def __init__(
         self,
         key: str,
-        axis: schema.Axis,
+        axis: schema.AxisEntry,
         what: str,
         name: str,
-        signal: schema.Input | schema.Channel,
+        signal: schema.InputEntry | schema.ChannelEntry,
         grains: int,
     ) -> None:
         self.key, self.axis, self.what, self.name, self.signal = key, axis, what, name, signal
@@ -520,9 +524,9 @@ class _Trace:
         self.low[here] = np.fmin.reduceat(values, edges)
         self.high[here] = np.fmax.reduceat(values, edges)
 
-    def envelope(self) -> Envelope:
+    def ranges(self) -> BlockRanges:
         """What was kept of it."""
-        return Envelope(
+        return BlockRanges(
             name=self.name,
             axis=self.key,
             kind=self.signal.kind,
@@ -537,7 +541,9 @@ class _Trace:
         )
 
 
-def _overview(name: str, axes: Axes, log: Log, rows: int, span: schema.Window | None) -> Overview:
+def _overview(
+    name: str, axes: Axes, log: Log, rows: int, span: schema.TimeWindow | None
+) -> Overview:
     """A log of more rows than `LONG` as a whole, and its windows in which an input moves.
 
     The windows are within the span of the run, if it has one. The log is looked through once, block
@@ -560,7 +566,7 @@ def _overview(name: str, axes: Axes, log: Log, rows: int, span: schema.Window | 
         columns = _Columns(part, axes)
         for trace in traces:
             trace.take(columns, first)
-    inputs = [trace for trace in traces if isinstance(trace.signal, schema.Input)]
+    inputs = [trace for trace in traces if isinstance(trace.signal, schema.InputEntry)]
     moving = np.zeros(grains, dtype=np.bool_)
     for trace in inputs:
         extremes = np.stack((trace.low, trace.high), axis=1)
@@ -575,7 +581,7 @@ def _overview(name: str, axes: Axes, log: Log, rows: int, span: schema.Window | 
     return Overview(
         run=name,
         rows=rows,
-        signals=tuple(trace.envelope() for trace in traces),
+        signals=tuple(trace.ranges() for trace in traces),
         windows=_windows(moving, rows, min(trace.period for trace in inputs), inputs[0].time),
         read_from=log.table,
     )

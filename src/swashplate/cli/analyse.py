@@ -10,10 +10,11 @@ from typing import Annotated, Literal
 
 import typer
 
-from swashplate.cli import words
+from swashplate.cli import parsing
 from swashplate.cli.commands import command
 from swashplate.cli.options import (
     NO_VALUE,
+    CommandSampling,
     DriveArgument,
     DriveChoice,
     FigureFile,
@@ -21,7 +22,6 @@ from swashplate.cli.options import (
     Interpolation,
     ManeuverOrLog,
     OptionalCommand,
-    Sampling,
     SetFile,
     Simulating,
     TableFile,
@@ -88,8 +88,8 @@ def limits(
         show(found.table())
         return
     with working("Simulating"):
-        chosen = words.at_rate(drive.chosen, sampling.rate)
-        name, run = words.simulated_as(chosen, maneuver, sampling)
+        chosen = parsing.at_rate(drive.chosen, sampling.rate)
+        name, run = parsing.simulated_as(chosen, maneuver, sampling)
         shares = shares_of(chosen, run)
     title = f"{drive.title}, {name}"
     save(out, "Shares of each limit, in SI", shares.write)
@@ -162,7 +162,7 @@ def whatif(
             is_eager=True,
         ),
     ] = False,
-    sampling: Sampling,
+    sampling: CommandSampling,
     force: Force = False,
 ) -> None:
     """Predict the effect of a change to the machine.
@@ -175,10 +175,10 @@ def whatif(
     from swashplate.analysis import monte_carlo
     from swashplate.analysis.whatif import AS_IS, CHANGED, what_if
 
-    moved = words.factors_of(factors)
+    moved = parsing.factors_of(factors)
     choice = DriveChoice(drive)
     with working("Simulating"):
-        name, trial = words.trial_of(choice.chosen, maneuver, sampling)
+        name, trial = parsing.trial_of(choice.chosen, maneuver, sampling)
         result = what_if(choice.chosen, moved, trial, outcomes=(*OUTCOMES, "travel"))
     bands, said = dict[str, monte_carlo.Bands](), list[str]()
     if uncertainty is not None:
@@ -202,7 +202,7 @@ def whatif(
     draw(plot, "plot_whatif", result, bands=bands, title=f"{title}: {changes}")
     choice.note(title)
     before, after = (each.drive.parameters for each in (result.before, result.after))
-    for line in words.changes_between(before, after):
+    for line in parsing.changes_between(before, after):
         note(line)
     show(result.table(bands))
     bullets(result.sentences(), said)
@@ -267,9 +267,9 @@ def size(
     speed, acceleration, error = (None if each is None else radians(each) for each in given)
     required = sizing.Requirements(speed, acceleration, error, direction)
     with working("Sizing"):
-        follow, ranges = None, words.ranges_of(variables or SIZED, sizing.DEFAULT_RANGE)
+        follow, ranges = None, parsing.ranges_of(variables or SIZED, sizing.DEFAULT_RANGE)
         if maneuver is not None:
-            voltage = words.maneuver_of(maneuver, drive.chosen).sample()
+            voltage = parsing.maneuver_of(maneuver, drive.chosen).sample()
             # a larger drive may well be what it takes to reach it
             reference = proportional_speed(drive.chosen, voltage, limited=False)
             follow = trial_of(drive.chosen, voltage, reference=reference)
@@ -313,15 +313,15 @@ def sensitivity(
     maneuver: ManeuverOrLog = "step:9",
     plot: FigureFile = None,
     out: TableFile = None,
-    sampling: Sampling,
+    sampling: CommandSampling,
     force: Force = False,
 ) -> None:
     """Show the effect of each design variable, changed down and up by itself."""
     from swashplate.analysis import one_at_a_time
 
     with working("Simulating"):
-        name, trial = words.trial_of(drive.chosen, maneuver, sampling)
-        ranges = words.ranges_of(variables or (*VARIED, "spool_offset"), SPAN)
+        name, trial = parsing.trial_of(drive.chosen, maneuver, sampling)
+        ranges = parsing.ranges_of(variables or (*VARIED, "spool_offset"), SPAN)
         found = one_at_a_time(drive.chosen, ranges, trial, outcomes=tuple(outcomes or OUTCOMES))
     title = f"{drive.title}, {name}"
     save(out, "All numbers, in SI", joined(found.tables(every=True)).write)
@@ -373,7 +373,7 @@ def compensate(
         ),
     ] = None,
     plot: FigureFile = None,
-    sampling: Sampling,
+    sampling: CommandSampling,
     force: Force = False,
 ) -> None:
     """Invert a drive's steady-state map: find the voltage for a required speed.
@@ -392,11 +392,11 @@ def compensate(
             f"--speed-deg-s {stick}."
         )
     with working("Inverting"):
-        chosen = words.at_rate(drive.chosen, sampling.rate)
+        chosen = parsing.at_rate(drive.chosen, sampling.rate)
         found, bought = compensation.inverse_map(chosen, points), None
         tables = found.tables([radians(each) for each in speeds_deg_s or ()])
         if stick is not None:
-            name, run = words.simulated(chosen, stick, sampling)
+            name, run = parsing.simulated(chosen, stick, sampling)
             reference = compensation.speed_of_command(found, run["voltage"])
             bought = compensation.improvement(chosen, reference, run.record.rate, inverse=found)
             tables.append(replace(bought.table(), title=f"Error of the speed under {name}"))
@@ -616,9 +616,9 @@ def full_order(
 
     if maneuver is None and plot is not None:
         raise InputError("--plot draws one run; name a maneuver or a log, such as step:9.")
-    given = words.physical_values(physical or ())
+    given = parsing.physical_values(physical or ())
     with working("Completing the physical values"):
-        chosen = words.at_rate(drive.chosen, sampling.rate)
+        chosen = parsing.at_rate(drive.chosen, sampling.rate)
         axis = physical_set.nearest_set(chosen.name) if like is None else like
         whole = full.FullOrderDrive.from_drive(chosen.plain, axis, **given)
         tables = [physical_set.choices_table(axis, given), whole.modes().table()]
@@ -627,7 +627,7 @@ def full_order(
             found = full.validity(whole, sampling.rate)
             title, said = drive.title, f"{len(found.rows)} maneuvers"
         else:
-            name, run = words.simulated_as(whole.drive, maneuver, sampling)
+            name, run = parsing.simulated_as(whole.drive, maneuver, sampling)
             both = full.compare(whole, run, start=sampling.start)
             found = full.validity_table(whole.physical.name, [(name, both)])
             title = f"{drive.title}, {name}"

@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from swashplate.cli import words
+from swashplate.cli import parsing
 from swashplate.cli.commands import command
 from swashplate.cli.options import (
     CAMPAIGN,
@@ -137,14 +137,14 @@ def init(
 
     target = out or logs[0].parent / "campaign.toml"
     check_output(target, CAMPAIGN_FILE, force=force)
-    file = None if drive is None else words.drive_file(drive)
+    file = None if drive is None else parsing.drive_file(drive)
     if file is not None:  # a drive as a campaign file names it
         place, root = file.resolve(), target.parent.resolve()
         drive = (place.relative_to(root) if place.is_relative_to(root) else place).as_posix()
     kinds = {
-        name: kind for kind, name in words.pairs_of("--column", column, "voltage=u", often=True)
+        name: kind for kind, name in parsing.pairs_of("--column", column, "voltage=u", often=True)
     }
-    units = dict(words.pairs_of("--unit", unit, "u=mV"))
+    units = dict(parsing.pairs_of("--unit", unit, "u=mV"))
     with working("Reading"):
         text = draft_campaign(
             logs,
@@ -196,7 +196,7 @@ def check(
     from swashplate import campaign as tests
     from swashplate.identification.diagnostics.data_checks import beside_the_drives
 
-    words.check_kind(path, "campaign")
+    parsing.check_kind(path, "campaign")
     with working(f"Reading {path}"):
         campaign = tests.Campaign.from_toml(path)
         unsigned = {name for _, name in tests.unsigned_currents(campaign)}
@@ -204,7 +204,7 @@ def check(
         of_file = dict.fromkeys((*tests.campaign_findings(campaign), *beside_the_drives(campaign)))
     roles = [each.role for each in campaign]
     counted = ", ".join(f"{roles.count(role)} to {role}" for role in dict.fromkeys(roles))
-    note(f"{words.title_of(campaign)}: {len(campaign)} experiments ({counted})")
+    note(f"{parsing.title_of(campaign)}: {len(campaign)} experiments ({counted})")
     for overview in campaign.overviews:
         show(overview.table())
         bullets([overview.sentence])
@@ -285,11 +285,11 @@ def plot(
         if shown.kind in SIGNALS and drive is not None and not shown.is_position:
             found = predict(campaign.drive(experiment.axis), [experiment])
             simulated = next((each.simulated for each in found if each.channel == channel), None)
-        window = words.window_of(shown.time, begin, end)
+        window = parsing.window_of(shown.time, begin, end)
         how = {"window": window, "title": f"{run}, {channel}"}
         draw(out, "plot_channel", shown, simulated, **how)
     else:
-        figures = campaign.plot(title=words.title_of(campaign))
+        figures = campaign.plot(title=parsing.title_of(campaign))
         several = [out.with_stem(f"{out.stem}-{k}") for k in range(1, len(figures) + 1)]
         check_free(*several, force=force)
         for path, figure in zip([out] if len(figures) == 1 else several, figures, strict=True):
@@ -350,10 +350,10 @@ def rig(
 
     check_free(out, force=force)
     with working("Simulating"):
-        nominal = words.drive_of(drive.drive)
+        nominal = parsing.drive_of(drive.drive)
         tests = bench.run(
-            nominal if words.drive_file(drive.drive) else drive.drive,
-            [words.maneuver_of(each, nominal) for each in maneuver or ()] or None,
+            nominal if parsing.drive_file(drive.drive) else drive.drive,
+            [parsing.maneuver_of(each, nominal) for each in maneuver or ()] or None,
             seed=seed,
             severity=severity,
             instruments=replace(bench.SEVERITIES[severity], backlash=radians(backlash_deg)),
@@ -413,7 +413,7 @@ def guess(
     start, setup = folder / "start.toml", folder / "setup.toml"
     with working(f"Reading {path}"):
         check_free(start, setup, force=force)
-        campaign, chosen = words.campaign_of(path, axis)
+        campaign, chosen = parsing.campaign_of(path, axis)
         check_folder(folder)
         runs = runs_to_fit(campaign, chosen)
         found = drafting.guess_drive(runs)
@@ -508,7 +508,7 @@ def advise(
     from swashplate.identification.estimation.stages import smooth
     from swashplate.identification.statistics import experiment_design as design
 
-    tested = words.file_kind(Path(subject)) == "campaign"
+    tested = parsing.file_kind(Path(subject)) == "campaign"
     given = {"--axis": axis, "--from": begin, "--drive": drive, "--runs": runs}
     for option, value in given.items():
         if value is not None and not tested:
@@ -518,24 +518,24 @@ def advise(
             "--from is the initial drive before a fit, --drive the fitted one: give one of them."
         )
     named = drive if tested else subject
-    source = None if named is None else words.drive_file(named)
+    source = None if named is None else parsing.drive_file(named)
     if setup is None and source is not None:
         # a fit writes what it estimated next to the drive that it found
-        estimated = source.parent / words.CONFIGURATION
+        estimated = source.parent / parsing.CONFIGURATION
         setup = str(estimated) if estimated.is_file() else None
     looks, doubts, made = list[design.Outlook](), tuple[str, ...](), list[str]()
     with working("Evaluating the tests"):
         if tested:
-            _, experiments, plan, start = words.fit_of(Path(subject), axis, setup, drive or begin)
+            _, experiments, plan, start = parsing.fit_of(Path(subject), axis, setup, drive or begin)
             doubts = refuse_unsound(check_runs(experiments, smooth(start)))
             looks = [design.outlook(stage, smooth(start), experiments) for stage in plan.stages]
             made = [experiment.name for experiment in experiments]
             bench = design.bench(smooth(start), plan, experiments, fitted=drive is not None)
         else:
-            start = words.parameters_of(subject)
+            start = parsing.parameters_of(subject)
             bench = design.bench(smooth(start), load_setup(setup or start.name))
         machine = Drive(bench.parameters)
-        requested = [words.maneuver_of(word, machine) for word in maneuver or ()]
+        requested = [parsing.maneuver_of(word, machine) for word in maneuver or ()]
         maneuvers = {each.name: each for each in requested or design.default_maneuvers()}
         candidates = [bench.candidate(each) for each in maneuvers.values()]
         ranked = design.advise(bench.present, candidates, bench.variables)

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from swashplate.cli.options import force_option
+from swashplate.cli.parsing import pairs_of
 from swashplate.cli.terminal import long_work, side
-from swashplate.cli.words import pairs_of
 from swashplate.errors import InputError
 
 if TYPE_CHECKING:

@@ -18,8 +18,8 @@ from swashplate.cli.options import (
     Force,
     new_file,
 )
+from swashplate.cli.parsing import campaign_of, drive_file, maneuver_of
 from swashplate.cli.terminal import check_free, note, save, working
-from swashplate.cli.words import campaign_of, drive_file, maneuver_of
 from swashplate.errors import InputError
 from swashplate.tables import PAGE, Form, check_folder
 

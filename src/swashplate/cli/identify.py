@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from swashplate.cli import words
+from swashplate.cli import parsing
 from swashplate.cli.commands import command
 from swashplate.cli.options import (
     CAMPAIGN,
@@ -71,7 +71,7 @@ Role = Literal["validate", "fit", "all"]
 app = typer.Typer(rich_markup_mode="rich")
 
 
-class Clock:
+class StageClock:
     """Time spent in each part; loading kernels, which happens in any of them, counts separately."""
 
     def __init__(self) -> None:
@@ -188,7 +188,7 @@ def fit(
     not usable. Ctrl-C or SIGTERM keeps the best result so far (of several
     starts: those that ended) and exits with code 130.
     """
-    clock = Clock()
+    clock = StageClock()
     check_folder(out)
     lock(out)
     if not resume:
@@ -204,10 +204,10 @@ def fit(
         from swashplate.executors import Dask, Processes
         from swashplate.identification.identifying import identify
     with working(f"Reading {path}"), clock.part("reading"):
-        campaign, chosen = words.campaign_of(path, axis)
+        campaign, chosen = parsing.campaign_of(path, axis)
         start: Path | ParameterSet | None = model
         if begin is not None:
-            start = words.parameters_of(begin)
+            start = parsing.parameters_of(begin)
     with working("Fitting"), clock.part("search"):
         result = identify(
             campaign,
@@ -238,7 +238,7 @@ def fit(
     with clock.part("report"):
         lines = _written(result, out)
         lines += [_reported(result, out)] if report else []
-    note(words.title_of(campaign))
+    note(parsing.title_of(campaign))
     _say_fit(result)
     for line in [*lines, f"Time:      {clock}"] if timing else lines:
         note(line)
@@ -334,8 +334,8 @@ def validate(
         check_folder(out)
         check_free(out / "measures.csv", out / "report.html", force=force)
     with working(f"Reading {path}"):
-        parameters: Parameters | None = None if model else words.parameters_of(drive)
-        campaign, chosen = words.campaign_of(path, axis)
+        parameters: Parameters | None = None if model else parsing.parameters_of(drive)
+        campaign, chosen = parsing.campaign_of(path, axis)
         roles = ("fit", "validate") if role == "all" else (role,)
         runs = [each for each in campaign.select(axis=chosen) if each.role in roles]
     if not runs:
@@ -346,7 +346,7 @@ def validate(
     with working("Predicting"):
         refuse_unsound(spike_findings(runs, "linear"))
         if model is not None:
-            parameters = words.model_parameters_of(drive, model, runs)
+            parameters = parsing.model_parameters_of(drive, model, runs)
         assert parameters is not None
         predicted = predict(parameters, runs)
         if not predicted:
@@ -364,7 +364,7 @@ def validate(
                 parameters, campaign, page, predicted, judged=judged, notes=notes
             )
         lines = [f"Measures:  {out / 'measures.csv'}", f"Report:    {page}"]
-    note(f"{words.title_of(campaign)}, {chosen}: {parameters.name} from {drive}")
+    note(f"{parsing.title_of(campaign)}, {chosen}: {parameters.name} from {drive}")
     show(*measures)
     say(MEASURES)
     for line in lines:
@@ -426,7 +426,7 @@ def report(
         find_browser()
     folder = fitted if fitted.is_dir() else fitted.parent
     with working(f"Reading {folder / 'fit.json'}"):
-        true = None if truth is None else words.parameters_of(truth)
+        true = None if truth is None else parsing.parameters_of(truth)
         found = Identification.load(fitted, path, model=model)
         if true is not None and not found.campaign.virtual:
             raise InputError(
@@ -434,7 +434,7 @@ def report(
                 "leave out --truth."
             )
         if fitted.suffix.lower() == ".toml":
-            given, numbers = words.parameters_of(str(fitted)).numbers, found.fit.parameters
+            given, numbers = parsing.parameters_of(str(fitted)).numbers, found.fit.parameters
             other = [name for name, value in numbers.numbers.items() if given[name] != value]
             if other:
                 raise InputError(

@@ -185,7 +185,7 @@ class DriveChoice:
     @cached_property
     def chosen(self) -> Drive:
         """The drive."""
-        from swashplate.cli.words import drive_of
+        from swashplate.cli.parsing import drive_of
 
         made = drive_of(self.drive, self.values or (), self.factors or ())
         if made.parameters.motion == "rod":
@@ -201,7 +201,7 @@ class DriveChoice:
     @property
     def changes(self) -> list[str]:
         """A line for each parameter that is not as its file has it."""
-        from swashplate.cli.words import changes_between, parameters_of
+        from swashplate.cli.parsing import changes_between, parameters_of
 
         return changes_between(parameters_of(self.drive), self.chosen.parameters)
 
@@ -226,7 +226,7 @@ class DriveChoice:
 
 
 @dataclass(frozen=True)
-class Sampling:
+class CommandSampling:
     """How a command is sampled, and read if it is a file."""
 
     rate: RateOption = 512.0
@@ -251,7 +251,7 @@ class Sampling:
 
 
 @dataclass(frozen=True)
-class Simulating(Sampling):
+class Simulating(CommandSampling):
     """How a command is sampled, and simulated."""
 
     start: Annotated[

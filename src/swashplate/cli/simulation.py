@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from swashplate.cli import words
+from swashplate.cli import parsing
 from swashplate.cli.commands import command
 from swashplate.cli.options import (
     NO_VALUE,
@@ -61,11 +61,11 @@ def simulate(
     maneuvers.
     """
     with working("Simulating"):
-        chosen = words.at_rate(drive.chosen, sampling.rate)
-        name, run = words.simulated_as(chosen, maneuver, sampling)
+        chosen = parsing.at_rate(drive.chosen, sampling.rate)
+        name, run = parsing.simulated_as(chosen, maneuver, sampling)
         tables, title = run.tables(), f"{drive.title}, {name}"
     save(out, "All signals, in SI", run.write)
-    window = words.window_of(run.time, begin, end)
+    window = parsing.window_of(run.time, begin, end)
     draw(plot, "plot_simulation", run, window=window, title=title)
     duration = f"{run.time[-1] - run.time[0]:.6g} s"
     drive.note(f"{title}: {run.time.size} samples at {sampling.rate:g} Hz, {duration}")
@@ -102,12 +102,12 @@ def compare(
     with working("Simulating"):
         from swashplate.analysis.outcomes import rms_difference, side_by_side
 
-        pair = [words.at_rate(words.drive_of(each), rate) for each in (first, second)]
+        pair = [parsing.at_rate(parsing.drive_of(each), rate) for each in (first, second)]
         labels = [each.name for each in pair]
         if labels[0] == labels[1]:  # then by what was typed
             labels = [first, second if second != first else f"{second} (2)"]
         drives = dict(zip(labels, pair, strict=True))
-        chosen = words.maneuver_of(maneuver, *pair)
+        chosen = parsing.maneuver_of(maneuver, *pair)
         voltage = chosen.sample(rate)
         runs = {label: drive.simulate(voltage, rate) for label, drive in drives.items()}
         made = side_by_side(runs)
@@ -166,14 +166,14 @@ def show_parameters(
         show(packaged_drives())
         return
     # in SI: a rod's drive has angles inside, which chosen units of its motion would change
-    parameters = words.drive_of(drive, values or (), factors or ()).parameters
+    parameters = parsing.drive_of(drive, values or (), factors or ()).parameters
     if toml:
         from swashplate.parameters.files import dump_set
 
         typer.echo(dump_set(parameters), nl=False)
         return
     say(f"{parameters.name}: {parameters.title}")
-    for line in words.changes_between(words.parameters_of(drive), parameters):
+    for line in parsing.changes_between(parsing.parameters_of(drive), parameters):
         note(line)
     show(*parameters.tables())
     rate = "any rate" if parameters.rate is None else f"{parameters.rate:g} Hz"

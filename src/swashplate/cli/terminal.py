@@ -194,7 +194,7 @@ def say_error(error: Exception, lead: str = "Error") -> None:
     side.print(f"{lead}: {shown}.", soft_wrap=True)
 
 
-class Shown:
+class TerminalProgress:
     """Progress of the package's functions, in the words of a spinner or a bar."""
 
     def __init__(self, update: Callable[[str], object]) -> None:
@@ -216,7 +216,7 @@ def working(text: str) -> Iterator[Status]:
     """
     with (
         side.status(f"{text} ...") as status,
-        shown_by(Shown(lambda line: status.update(f"{line} ..."))),
+        shown_by(TerminalProgress(lambda line: status.update(f"{line} ..."))),
     ):
         yield status
 
@@ -242,7 +242,7 @@ def long_work(text: str, steps: int = 0) -> Iterator[Callable[..., None]]:
             total = None if share is None else 1.0
             bar.update(task, description=what, total=total, completed=share or 0.0)
 
-        with shown_by(Shown(lambda line: bar.update(task, description=line))):
+        with shown_by(TerminalProgress(lambda line: bar.update(task, description=line))):
             yield show
 
 

@@ -25,7 +25,7 @@ from swashplate.campaign.samples import rolls_over_at, turns_over
 from swashplate.campaign.schema import KINDS, ROD, TURNS, CampaignFile, InputKind, conversion
 from swashplate.documents import parse_toml, toml_key, toml_string, validated
 from swashplate.errors import FileError, InputError
-from swashplate.logs import Column, Log, open_log
+from swashplate.logs import Log, LogColumn, open_log
 from swashplate.parameters.files import NEUTRAL, preset_names
 from swashplate.units import speed_unit, to_si
 
@@ -153,7 +153,7 @@ def draft_campaign(
     """
     given, units, folder = dict(columns or {}), dict(units or {}), Path(folder).resolve()
     opened = [open_log(path) for path in logs]
-    headers = dict[str, Column]()
+    headers = dict[str, LogColumn]()
     for column in (column for log in opened for column in log.columns):
         headers.setdefault(column.name, column)
     why = "" if logs else "A draft needs at least one log"
@@ -220,7 +220,7 @@ def _words(name: str) -> str:
     return re.sub(r"(?<=[a-z])(?=[A-Z])|[_./\-\s]+", " ", name).strip().lower()
 
 
-def _by_words(column: Column, name: str, unit: str | None) -> _Guess:
+def _by_words(column: LogColumn, name: str, unit: str | None) -> _Guess:
     """What a name and a unit say: the first kind in the table that has either."""
     words = _words(name)
     if re.fullmatch(TIME, _words(name.rpartition("/")[2])):
@@ -236,7 +236,7 @@ def _by_words(column: Column, name: str, unit: str | None) -> _Guess:
     return _Guess(column.name, next(kinds, ""), axis or "", column.unit)
 
 
-def _by_header(column: Column, kind: str | None) -> _Guess:
+def _by_header(column: LogColumn, kind: str | None) -> _Guess:
     """What a header says, of a kind if one is given; the unit may be the end of its name."""
     name = re.sub(r"[\[(].*[\])]", "", column.name).strip()
     word = PLC.fullmatch(name) if column.unit is None else None
@@ -279,7 +279,7 @@ def _measures(kind: str, unit: str) -> bool:
 
 
 def _guesses(
-    headers: Mapping[str, Column],
+    headers: Mapping[str, LogColumn],
     parts: Mapping[str, list[Array]],
     counts_per_turn: float | None,
     given: Mapping[str, str],

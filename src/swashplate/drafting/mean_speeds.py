@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.campaign.experiment import Channel, Experiment, InputSignal
-from swashplate.drafting.plain_drive import MODEL, Edge, PlainDrive
+from swashplate.drafting.plain_drive import MODEL, JumpWidth, PlainDrive
 from swashplate.equations.marching.derivatives import jacobian, residuals
 from swashplate.equations.marching.observation import ObservedRecord, Own, every_sample
 from swashplate.equations.marching.record import Record
@@ -142,7 +142,7 @@ class MovingRun(NamedTuple):
 def _model(run: MovingRun, numbers: Array) -> tuple[Instance, Own]:
     """The plain drive with numbers, and the speed that it begins with."""
     finite = PlainDrive(*np.minimum(numbers[:12], UNLIMITED).tolist())
-    instance = instance_of(MODEL, finite, given=Edge(run.edge))
+    instance = instance_of(MODEL, finite, given=JumpWidth(run.edge))
     return instance, Own({"speed": run.start})
 
 

@@ -344,7 +344,7 @@ def _add_units(root: ET.Element, table: Sequence[Variable]) -> None:
 
 
 @dataclass(frozen=True)
-class Comparison(Result):
+class FmuComparison(Result):
     """An FMU's outputs beside those of the drive, sample by sample."""
 
     name: str
@@ -369,7 +369,7 @@ class Comparison(Result):
         return [made]
 
 
-def compare(path: str | Path, drive: Drive, voltage: ArrayLike) -> Comparison:
+def compare(path: str | Path, drive: Drive, voltage: ArrayLike) -> FmuComparison:
     """Run an FMU with FMPy and compare it with the drive, at the FMU's own step.
 
     Parameters
@@ -383,7 +383,7 @@ def compare(path: str | Path, drive: Drive, voltage: ArrayLike) -> Comparison:
 
     Returns
     -------
-    Comparison
+    FmuComparison
         Largest differences, 0 where the FMU's numbers are the drive's.
 
     Raises
@@ -437,7 +437,7 @@ def compare(path: str | Path, drive: Drive, voltage: ArrayLike) -> Comparison:
         raise InputError(f"{path} gave {len(found)} samples for a command of {command.size}.")
     differences = {name: float(np.abs(found[name] - run[name]).max()) for name in names}
     units = {each.name: each.unit for each in table}
-    return Comparison(chosen.name, command.size, differences, units)
+    return FmuComparison(chosen.name, command.size, differences, units)
 
 
 def _step_of(path: Path, fmpy: Any) -> float:

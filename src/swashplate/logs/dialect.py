@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, ClassVar, Literal, NamedTuple
 
 from swashplate.errors import FileError, InputError
-from swashplate.logs.log import Column, check_kind, printable, split_unit
+from swashplate.logs.log import LogColumn, check_kind, printable, split_unit
 from swashplate.units import speed_unit
 
 _NAMED = {"comma": ",", "semicolon": ";", "tab": "\t", "space": " ", "spaces": " ", "bar": "|"}
@@ -181,7 +181,7 @@ _NAMES = {",": "commas", ";": "semicolons", "\t": "tabs", " ": "spaces", "|": "b
 _THREE = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")
 
 
-class Layout(NamedTuple):
+class TextLayout(NamedTuple):
     """How the rows of a text file are to be taken apart."""
 
     delimiter: str
@@ -230,7 +230,7 @@ class Layout(NamedTuple):
         return self.delimiter != "\t" or len(self.cells(line)) != self.width
 
 
-def find_layout(lines: Sequence[str], options: TextOptions, path: Path) -> Layout:
+def find_layout(lines: Sequence[str], options: TextOptions, path: Path) -> TextLayout:
     """Delimiter and decimal sign under which a sample of lines makes most sense as rows of numbers.
 
     Comments and blank lines must not be among the lines; header lines may. Two readings that are as
@@ -244,7 +244,7 @@ def find_layout(lines: Sequence[str], options: TextOptions, path: Path) -> Layou
         for delimiter in ([mark] if mark else [",", ";", "\t", " ", "|"])
         for decimal in ([options.decimal] if options.decimal else [".", ","])
         if delimiter != decimal or quoted or None not in given.values()
-        for trial in _tried(lines, Layout(delimiter, decimal))
+        for trial in _tried(lines, TextLayout(delimiter, decimal))
     ]
     if not trials:
         said = " and ".join(f"{key} {value!r}" for key, value in given.items() if value)
@@ -278,7 +278,7 @@ def find_layout(lines: Sequence[str], options: TextOptions, path: Path) -> Layou
     return chosen
 
 
-def _tried(lines: Sequence[str], layout: Layout) -> Iterator[tuple[float, int, Layout]]:
+def _tried(lines: Sequence[str], layout: TextLayout) -> Iterator[tuple[float, int, TextLayout]]:
     """A layout with its width and columns of numbers, behind its score and its number of rows.
 
     The score is the share of rows that fit times the share of their characters in numbers; a header
@@ -321,8 +321,8 @@ _Units = list[str | None]
 
 
 def read_heading(
-    head: Sequence[str], layout: Layout, options: TextOptions, path: Path
-) -> tuple[tuple[Column, ...], int]:
+    head: Sequence[str], layout: TextLayout, options: TextOptions, path: Path
+) -> tuple[tuple[LogColumn, ...], int]:
     """Columns by the first lines of a file, and the line of the first row; the first line is 1."""
     numbered = [each for each in enumerate(head, 1) if not layout.is_blank(each[1])]
     marks = "|".join(map(re.escape, options.marks))
@@ -379,7 +379,7 @@ def read_heading(
     return tuple(_columns(names, units, layout, layout.cells(row))), begin
 
 
-def _names_and_units(above: Sequence[str], layout: Layout) -> tuple[list[str], _Units | None]:
+def _names_and_units(above: Sequence[str], layout: TextLayout) -> tuple[list[str], _Units | None]:
     """Names and units in the last one or two of some lines; no names where these are none."""
     if not above:
         return [], None
@@ -395,7 +395,7 @@ def _names_and_units(above: Sequence[str], layout: Layout) -> tuple[list[str], _
     return (before, units) if len(before) == layout.width else (names, None)
 
 
-def _wrong_header(number: int, line: str, layout: Layout, path: Path) -> FileError:
+def _wrong_header(number: int, line: str, layout: TextLayout, path: Path) -> FileError:
     count, hint = len(layout.names(line)), ""
     if layout.delimiter == "," and layout.width >= 2 * count - 1:
         hint = " Do decimal commas stand between commas? Export it with semicolons."
@@ -406,8 +406,8 @@ def _wrong_header(number: int, line: str, layout: Layout, path: Path) -> FileErr
 
 
 def _columns(
-    names: Sequence[str], units: _Units | None, layout: Layout, cells: Sequence[str]
-) -> Iterator[Column]:
+    names: Sequence[str], units: _Units | None, layout: TextLayout, cells: Sequence[str]
+) -> Iterator[LogColumn]:
     """Columns by names, each its own, and units; a first cell that is a date makes it seconds."""
     named = [*names] or [""] * layout.width
     if names and not names[-1] and not layout.numeric[-1] and not cells[-1]:
@@ -419,7 +419,7 @@ def _columns(
         unit = split_unit(name)[1] or (units[place] if units else None)
         if place < len(cells) and date_form(cells[place]):
             unit = "s"
-        yield Column(printable(f"{name} #{seen[name]}" if counts[name] > 1 else name), unit)
+        yield LogColumn(printable(f"{name} #{seen[name]}" if counts[name] > 1 else name), unit)
 
 
 _KNOWN = frozenset(

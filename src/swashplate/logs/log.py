@@ -17,7 +17,7 @@ from swashplate.units import to_si
 Array = NDArray[np.float64]
 
 
-class Column(NamedTuple):
+class LogColumn(NamedTuple):
     """A column of a log."""
 
     name: str
@@ -33,7 +33,7 @@ class Log:
     path: Path
     format: str
     """What it was read as, for people: ``CSV, semicolons, decimal comma``."""
-    columns: tuple[Column, ...]
+    columns: tuple[LogColumn, ...]
     """The columns that hold numbers; in text, all columns."""
     load: Callable[[Sequence[int], int, int | None], Sequence[Array]] = field(repr=False)
     """Columns at some positions, each once, from a row to before a last one (None: to the end)."""
@@ -53,12 +53,14 @@ class Log:
 
     def __post_init__(self) -> None:
         """Make all that may get into a sentence printable: names are what a file says they are."""
-        columns = (Column(printable(name), unit and printable(unit)) for name, unit in self.columns)
+        columns = (
+            LogColumn(printable(name), unit and printable(unit)) for name, unit in self.columns
+        )
         left_out = {printable(name): printable(why) for name, why in self.left_out.items()}
         object.__setattr__(self, "columns", tuple(columns))
         object.__setattr__(self, "left_out", left_out)
 
-    def find(self, wanted: str) -> Column:
+    def find(self, wanted: str) -> LogColumn:
         """The column of a name.
 
         Parameters
@@ -204,7 +206,7 @@ def split_unit(name: str) -> tuple[str, str | None]:
     return match[1], (match[2] if match[2] is not None else match[3]).strip()
 
 
-def unit_of(column: Column, wanted: str, si: str) -> str:
+def unit_of(column: LogColumn, wanted: str, si: str) -> str:
     """Unit of a column that `Log.find` returned: its own, the ending of its name, or else `si`.
 
     A name like ``time_ms`` means milliseconds where that is a unit of the same quantity, or where
@@ -223,7 +225,7 @@ def unit_of(column: Column, wanted: str, si: str) -> str:
     return ending if underscore else si
 
 
-def _without_unit(column: Column) -> str:
+def _without_unit(column: LogColumn) -> str:
     # x(1,:) is a row of a matrix and no x in the unit 1,:
     name, unit = split_unit(column.name)
     return name if unit is not None and unit == column.unit else column.name

@@ -26,7 +26,7 @@ import numpy as np
 
 from swashplate.errors import FileError, InputError, SwashplateError
 from swashplate.logs.binary import look
-from swashplate.logs.log import Array, Column, Log, printable, said
+from swashplate.logs.log import Array, Log, LogColumn, printable, said
 
 _PATIENCE = 30.0
 """How long a small file may take [s]."""
@@ -53,7 +53,7 @@ def open_in_subprocess(reader: str, path: Path) -> Log:
         return ask([*positions], first, last)[1]
 
     found = ask()[0]
-    columns = tuple(Column(*column) for column in found["columns"])
+    columns = tuple(LogColumn(*column) for column in found["columns"])
     return Log(path, found["format"], columns, load, found["left_out"], tuple(found["lengths"]))
 
 

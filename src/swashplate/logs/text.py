@@ -20,7 +20,7 @@ from swashplate.logs.dialect import (
     INFINITE,
     NOT_A_NUMBER,
     SIGNS,
-    Layout,
+    TextLayout,
     TextOptions,
     date_form,
     encoding_of,
@@ -29,7 +29,7 @@ from swashplate.logs.dialect import (
     read_heading,
     shown,
 )
-from swashplate.logs.log import Array, Column, Log, printable
+from swashplate.logs.log import Array, Log, LogColumn, printable
 
 if TYPE_CHECKING:
     import polars
@@ -103,8 +103,8 @@ class _Table:
     path: Path
     encoding: str
     skipped: int
-    layout: Layout
-    columns: tuple[Column, ...]
+    layout: TextLayout
+    columns: tuple[LogColumn, ...]
     first: int
     marks: tuple[str, ...]
 

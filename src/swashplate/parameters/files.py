@@ -6,10 +6,10 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from swashplate.documents import parse_toml, read_text, validated
-from swashplate.entries import Name, NotNegative, Number, Positive, Version
+from swashplate.entries import FileTable, Name, NotNegative, Number, Positive, Version
 from swashplate.equations.replacement import Replacement, again, found_at, uses
 from swashplate.errors import InputError, MissingFileError, ParameterError, meant
 from swashplate.parameters.definitions import Block, Definition, definitions_of, options_of
@@ -32,13 +32,7 @@ from swashplate.units import to_si
 TwoNumbers = Annotated[list[Number], Field(min_length=2, max_length=2)]
 
 
-class FilePart(BaseModel):
-    """What a file may have, and nothing else."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class Entry(FilePart):
+class ParameterEntry(FileTable):
     """One parameter: ``Z16 = { value = [1.2e-4, 1.5e-4], unit = "m", source = "table 7.2" }``."""
 
     value: Number | TwoNumbers
@@ -48,7 +42,7 @@ class Entry(FilePart):
     bounds: TwoNumbers | None = None
 
 
-class EquationPlaces(FilePart):
+class EquationPlaces(FileTable):
     """An equation in the place of another one, each as ``module:name``."""
 
     old: str
@@ -56,7 +50,7 @@ class EquationPlaces(FilePart):
     parameters: str | None = None
 
 
-class ModelOptions(FilePart):
+class ModelOptions(FileTable):
     """Variants of the equations; the defaults are those the published values belong to."""
 
     pressure_root: PressureRoot = "published"
@@ -67,14 +61,14 @@ class ModelOptions(FilePart):
     differential equation, for any rate."""
     options: list[str] | None = None
     """Terms of the pump that count; where they are not given, those whose parameters are not 0."""
-    equations: list[EquationPlaces] = []
+    equations: list[EquationPlaces] = Field([])
     """One's own equations in place of the package's, each as ``module:name``."""
     motion: Motion = "shaft"
-    unreached: dict[str, NotNegative] = {}
+    unreached: dict[str, NotNegative] = Field({})
     """Limits that the tests never reached, by column, and how far they went. [SI]"""
 
 
-class CardFile(FilePart):
+class CardFile(FileTable):
     """A control card by itself, so that several sets can use it."""
 
     format: Version = 1
@@ -82,21 +76,21 @@ class CardFile(FilePart):
     title: str = ""
     rate: Positive | None = None
     """Of the recursion that its filter belongs to."""
-    control_card: dict[str, Entry]
+    control_card: dict[str, ParameterEntry]
 
 
-class SetFile(FilePart):
+class SetFile(FileTable):
     """A whole drive; `control_card` is the name of a packaged card or the card's own table."""
 
     format: Version = 1
     name: Name
     title: str = ""
-    control_card: str | dict[str, Entry]
+    control_card: str | dict[str, ParameterEntry]
     card: Name = ""
     """Name of a card that is given by its own table."""
-    pump_motor: dict[str, Entry]
+    pump_motor: dict[str, ParameterEntry]
     model: ModelOptions = ModelOptions()
-    refinements: dict[str, Entry] = {}
+    refinements: dict[str, ParameterEntry] = Field({})
     """What goes beyond Kruse's equations; all of it is off where it is not given."""
 
 
@@ -204,7 +198,7 @@ def read_set(text: str, origin: str) -> ParameterSet:
     else:
         card_name, entries = contents.card or f"{contents.name} card", contents.control_card
     equations = _replacements(model.equations, origin)
-    blocks: dict[Block, Mapping[str, Entry]] = {
+    blocks: dict[Block, Mapping[str, ParameterEntry]] = {
         "control_card": entries,
         "pump_motor": contents.pump_motor,
         "refinements": contents.refinements,
@@ -274,7 +268,7 @@ def _packaged_card(name: str, origin: str) -> CardFile:
     return validated(parse_toml(text, f"{name}.toml"), CardFile, f"{name}.toml")
 
 
-def parameter_of(definition: Definition, entry: Entry) -> Parameter:
+def parameter_of(definition: Definition, entry: ParameterEntry) -> Parameter:
     """A parameter from its entry, in SI; what does not fit the definition is a `ParameterError`."""
     what = f"{definition.symbol} ({definition.name})"
     given = entry.value if isinstance(entry.value, list) else [entry.value]

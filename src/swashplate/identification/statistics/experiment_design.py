@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.campaign import KINDS, ChannelKind
-from swashplate.campaign.experiment import Channel, Experiment, InputSignal, Source
+from swashplate.campaign.experiment import Channel, Experiment, InputSignal, SignalOrigin
 from swashplate.drive import Drive
 from swashplate.errors import InputError
 from swashplate.identification.estimation.arrow import dense_factor, triangular_factor, whitening
@@ -305,7 +305,7 @@ def _of_residuals(
 
 def _imagined(maneuver: Maneuver, sensor: Sensor) -> Experiment:
     """A test that has not been made: only its stamps count, not its values."""
-    time, source = maneuver.time(RATE), Source(Path("none"), sensor.kind)
+    time, source = maneuver.time(RATE), SignalOrigin(Path("none"), sensor.kind)
     kind, unit = sensor.kind, KINDS[sensor.kind].units[0]
     ones, noise = np.ones_like(time), sensor.deviation(1.0 / RATE)
     channel = Channel(kind, kind, unit, time, 0.0 * ones, ones, source, noise=noise)

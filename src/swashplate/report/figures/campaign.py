@@ -56,7 +56,7 @@ from swashplate.report.style import (
 from swashplate.units import DisplayUnit, display_unit
 
 if TYPE_CHECKING:
-    from swashplate.campaign import Channel, Envelope, Experiment, InputSignal, Overview
+    from swashplate.campaign import BlockRanges, Channel, Experiment, InputSignal, Overview
     from swashplate.identification.validation import RunQuality
 
 # --- pages of a campaign --------------------------------------------------------------------------
@@ -75,7 +75,7 @@ _NEAR_ZERO = 0.02
 _ROLES = {"fit": "for the fit", "validate": "for validation"}
 
 
-class Column(NamedTuple):
+class PanelColumn(NamedTuple):
     """What a column of panels shows: a channel by name and unit; the input has no name."""
 
     key: tuple[str, str]
@@ -107,7 +107,7 @@ def _counted(signal: InputSignal | Channel) -> Array:
     return signal.values if used is None else signal.values[_scale_rows(used)]
 
 
-def _column(key: tuple[str, str], signals: Sequence[InputSignal | Channel]) -> Column:
+def _column(key: tuple[str, str], signals: Sequence[InputSignal | Channel]) -> PanelColumn:
     # what is ignored may leave the panel: one spike would flatten all runs
     shown = [_counted(signal) for signal in signals]
     low, high = min(float(each.min()) for each in shown), max(float(each.max()) for each in shown)
@@ -118,7 +118,7 @@ def _column(key: tuple[str, str], signals: Sequence[InputSignal | Channel]) -> C
         low = -high
     words = {"encoder_counts": "encoder's angle", "other": signals[0].source.column}
     label = unit.label(words.get(kind, kind.replace("_", " ")))
-    return Column(key, label, unit, unit.factor * low, unit.factor * high, free)
+    return PanelColumn(key, label, unit, unit.factor * low, unit.factor * high, free)
 
 
 def plot_campaign(experiments: Iterable[Experiment], *, title: str | None = None) -> list[Figure]:
@@ -173,7 +173,7 @@ def plot_campaign(experiments: Iterable[Experiment], *, title: str | None = None
     return figures
 
 
-def _page(experiments: Sequence[Experiment], columns: Sequence[Column], title: str) -> Figure:
+def _page(experiments: Sequence[Experiment], columns: Sequence[PanelColumn], title: str) -> Figure:
     rows, across = len(experiments), len(columns)
     width = max(WIDTH, across * (NARROWEST + BETWEEN))
     room = width / across - 1.3 * BETWEEN
@@ -223,7 +223,9 @@ def shorten(words: str, letters: float) -> str:
     return words if len(words) <= letters else f"{words[: int(letters) - 1]}…"
 
 
-def _fill(ax: Axes, column: Column, signal: InputSignal | Channel, experiment: Experiment) -> None:
+def _fill(
+    ax: Axes, column: PanelColumn, signal: InputSignal | Channel, experiment: Experiment
+) -> None:
     """A signal, with marks where it is ignored, weighted, clipped or missing."""
     time, factor = signal.time, column.unit.factor
     values, counted = factor * signal.values, factor * _counted(signal)
@@ -330,30 +332,30 @@ def plot_overview(overview: Overview, *, title: str | None = None) -> Figure:
     heights = [1.3] * len(overview.signals)
     words = f"{overview.run}, the whole log" if title is None else title
     figure, axes = sheet(heights, words, labels, "time (s)", legend=legend)
-    for ax, envelope, unit in zip(axes, overview.signals, units, strict=True):
+    for ax, ranges, unit in zip(axes, overview.signals, units, strict=True):
         zero_line(ax)
         for spans, look in shades:
             shade(ax, spans, look)
-        color = INK if envelope.name == "input" else BLUE
-        _draw_envelope(ax, envelope, unit.factor, color)
-        mark_gaps(ax, envelope.time)
+        color = INK if ranges.name == "input" else BLUE
+        _draw_ranges(ax, ranges, unit.factor, color)
+        mark_gaps(ax, ranges.time)
     axes[-1].set_xlim(overview.begin, overview.end)
     return figure
 
 
-def _largest(envelope: Envelope) -> float:
+def _largest(ranges: BlockRanges) -> float:
     """Largest size of a signal, 0 if it has no number. [unit]"""
-    known = np.isfinite(envelope.low)
-    ends = np.concatenate((envelope.low[known], envelope.high[known]))
+    known = np.isfinite(ranges.low)
+    ends = np.concatenate((ranges.low[known], ranges.high[known]))
     return float(np.abs(ends).max(initial=0.0))
 
 
-def _draw_envelope(ax: Axes, envelope: Envelope, factor: float, color: str) -> None:
+def _draw_ranges(ax: Axes, ranges: BlockRanges, factor: float, color: str) -> None:
     """Draw a signal between its extremes, open where it has none and over gaps of the stamps."""
-    first = np.arange(0, envelope.time.size, -(-envelope.time.size // STRETCHES))
-    time = envelope.time[first]
-    low = np.fmin.reduceat(envelope.low, first)
-    high = np.fmax.reduceat(envelope.high, first)
+    first = np.arange(0, ranges.time.size, -(-ranges.time.size // STRETCHES))
+    time = ranges.time[first]
+    low = np.fmin.reduceat(ranges.low, first)
+    high = np.fmax.reduceat(ranges.high, first)
     breaks = gap_rows(time)
     time, low, high = (
         np.insert(each, breaks + 1, filling)

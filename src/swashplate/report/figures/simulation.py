@@ -70,7 +70,7 @@ FAR = 0.3
 # --- one simulation -------------------------------------------------------------------------------
 
 
-class Trace(NamedTuple):
+class Curve(NamedTuple):
     """A signal of a panel; its name if there is more than one."""
 
     values: Array
@@ -91,7 +91,7 @@ class Panel(NamedTuple):
 
     words: str
     si: str
-    traces: tuple[Trace, ...]
+    traces: tuple[Curve, ...]
     limits: tuple[tuple[Shade, Array], ...] = ()
     """Looks of limits with the stretches in which they act."""
     marks: tuple[Mark, ...] = ()
@@ -129,8 +129,8 @@ def plot_simulation(
 
     ends = (pump.Z16_plus, -pump.Z16_minus)
     current = (
-        Trace(run.current_positive, BLUE, "positive"),
-        Trace(run.current_negative, VERMILION, "negative"),
+        Curve(run.current_positive, BLUE, "positive"),
+        Curve(run.current_negative, VERMILION, "negative"),
     )
     # without a dead zone no current is within it, although its flag stands at exactly 0 A
     dead_zone = (Mark(pump.Z17, f"dead zone {pump.Z17:.2f} A"),) if pump.Z17 else ()
@@ -141,15 +141,15 @@ def plot_simulation(
             limits=acting(Limit.ORIFICE, Limit.SPOOL)
         ),
         Panel(
-            "stroking pressure", "Pa", (Trace(run.stroker_pressure, BLUE),), acting(Limit.RELIEF)
+            "stroking pressure", "Pa", (Curve(run.stroker_pressure, BLUE),), acting(Limit.RELIEF)
         ),
         _swash(run.swash_angle, (pump.Z13_plus, -pump.Z13_minus))._replace(
             limits=acting(Limit.SWASH_STOP)
         ),
-        Panel("shaft speed", "rad/s", (Trace(run.shaft_speed, BLUE),), acting(Limit.SWASH_STOP)),
+        Panel("shaft speed", "rad/s", (Curve(run.shaft_speed, BLUE),), acting(Limit.SWASH_STOP)),
     ]
     if run.voltage is not None:
-        panels.insert(0, Panel("voltage", "V", (Trace(run.voltage, INK),)))
+        panels.insert(0, Panel("voltage", "V", (Curve(run.voltage, INK),)))
     rows = rows_within(run.time, window, run.name)
     return _chain(panels, run.time, run.name if title is None else title, rows)
 
@@ -311,7 +311,7 @@ def _panel(run: Run, signal: str, label: str, rows: slice) -> Panel:
     )
     color = INK if signal in run.records else BLUE
     words = in_lines(definition.name, LETTERS)
-    trace = Trace(values, color, label)
+    trace = Curve(values, color, label)
     return Panel(words, definition.unit, (trace,), marks=marks, from_zero=False)
 
 
@@ -349,24 +349,24 @@ def plot_full_order(found: Comparison, *, title: str | None = None) -> Figure:
         return ((SHADES[limit], stretches(found.time, held != 0)),)
 
     command = (
-        Panel("current", "A", (Trace(full.current, INK),))
+        Panel("current", "A", (Curve(full.current, INK),))
         if found.voltage is None
-        else Panel("voltage", "V", (Trace(found.voltage, INK),))
+        else Panel("voltage", "V", (Curve(found.voltage, INK),))
     )
     error = (
-        Panel("difference", "% of top", (Trace(100.0 * found.error / found.top_speed, INK),))
+        Panel("difference", "% of top", (Curve(100.0 * found.error / found.top_speed, INK),))
         if found.moves
-        else Panel("difference", "rad/s", (Trace(found.error, INK),))
+        else Panel("difference", "rad/s", (Curve(found.error, INK),))
     )
     speeds = (
         # where the two are the same, the wide line shows on both sides of the narrow one
-        Trace(full.shaft_speed, BLUE, "five states", WIDE),
-        Trace(found.reduced_speed, VERMILION, "one state", NARROW),
+        Curve(full.shaft_speed, BLUE, "five states", WIDE),
+        Curve(found.reduced_speed, VERMILION, "one state", NARROW),
     )
     openings = (machine.orifice_opening_plus, -machine.orifice_opening_minus)
     stops = (machine.swash_stop_plus, -machine.swash_stop_minus)
-    pressure = (Trace(full.stroker_pressure, BLUE),)
-    drop = (Trace(full.motor_pressure_drop, BLUE),)
+    pressure = (Curve(full.stroker_pressure, BLUE),)
+    drop = (Curve(full.motor_pressure_drop, BLUE),)
     relief = holding(Limit.RELIEF, full.relief_hold)
     panels = [
         command,
@@ -386,15 +386,15 @@ def _spool(position: Array, opening: Array, ends: Stops) -> Panel:
     unit = display_unit("m", 0.0)
     marks = (Mark(x, f"orifice {signed(unit.factor * x, 2)} {unit.name}") for x in ends)
     traces = (
-        Trace(position, BLUE, "position", WIDE),
-        Trace(opening, VERMILION, "opening", NARROW),
+        Curve(position, BLUE, "position", WIDE),
+        Curve(opening, VERMILION, "opening", NARROW),
     )
     return Panel("spool", "m", traces, marks=tuple(marks))
 
 
 def _swash(angle: Array, stops: Stops) -> Panel:
     marks = (Mark(x, f"stop {signed(float(np.degrees(x)), 1)}°") for x in stops)
-    return Panel("swash angle", "rad", (Trace(angle, BLUE),), marks=tuple(marks))
+    return Panel("swash angle", "rad", (Curve(angle, BLUE),), marks=tuple(marks))
 
 
 def _chain(panels: Sequence[Panel], time: Array, title: str, rows: slice = slice(None)) -> Figure:

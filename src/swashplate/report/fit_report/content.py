@@ -11,7 +11,7 @@ from pathlib import Path
 from markupsafe import Markup
 
 from swashplate.campaign import Campaign, Overview, examine, quality_table
-from swashplate.campaign.schema import Weight
+from swashplate.campaign.schema import WeightWindow
 from swashplate.drive import Drive
 from swashplate.errors import InputError
 from swashplate.identification import tables
@@ -29,7 +29,14 @@ from swashplate.identification.statistics.profiles import Profile
 from swashplate.identification.validation import RunQuality, at_instants, percent
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.report.fit_report import charts
-from swashplate.report.fit_report.html_page import Block, Section, listed_block, page, text, titled
+from swashplate.report.fit_report.html_page import (
+    PageBlock,
+    Section,
+    listed_block,
+    page,
+    text,
+    titled,
+)
 from swashplate.report.fit_report.live import can_run, live_page, run_of
 from swashplate.report.fit_report.runs import ShownRun, run_data, run_words, shown_runs
 from swashplate.report.fit_report.summary import light, run_error, run_lights, summary_section
@@ -233,10 +240,10 @@ def _agreement_section(
         "over the standard deviation of what was measured; fit % is 100 (1 − NRMSE). Error / range "
         "is RMSE over the largest less the smallest value measured in all runs of that role."
     )
-    measures = Block("table", joined(made), "agreement")
+    measures = PageBlock("table", joined(made), "agreement")
     blocks = [
-        Block("table", overview, "overview"),
-        Block("details", [text(words), measures], "Measures of every channel"),
+        PageBlock("table", overview, "overview"),
+        PageBlock("details", [text(words), measures], "Measures of every channel"),
     ]
     return Section("agreement", "Runs", blocks)
 
@@ -251,13 +258,13 @@ def _curves_section(runs: Sequence[ShownRun], virtual: bool) -> Section:
     for number, run in enumerate(runs):
         measures = [(each.quality.channel, run_words(each.quality)) for each in run.channels]
         content = {"number": number, "run": run, "measures": measures, "measured": measured}
-        blocks.append(Block("run", content))
+        blocks.append(PageBlock("run", content))
     return Section("runs", "Curves", blocks)
 
 
 def _live_section(fit: Fit, campaign: Campaign, runs: Sequence[ShownRun]) -> Section:
     """The drive itself beside the run that it misses most, of those held out if there are any."""
-    blocks: list[Block] = []
+    blocks: list[PageBlock] = []
     drive, nominal = fit.parameters, fit.nominal
     if isinstance(drive, ParameterSet) and isinstance(nominal, ParameterSet):
         # the statuses are those of the nominal set: what was fitted is what has moved
@@ -272,7 +279,7 @@ def _live_section(fit: Fit, campaign: Campaign, runs: Sequence[ShownRun]) -> Sec
             shown = run_of(at_instants(drive, worst))
             made = live_page(drive, [shown], campaign.title, campaign.virtual, "drive.toml")
             words = f"Sliders for every parameter beside {worst.name}"
-            blocks = [Block("live", made, words)]
+            blocks = [PageBlock("live", made, words)]
     return Section("live", "Try other values", blocks)
 
 
@@ -290,7 +297,7 @@ def _residual_section(runs: Sequence[ShownRun]) -> Section:
             drawn = charts.lags_chart(test.lags, test.correlation, test.band, said)
             run = each.experiment
             made.add(run.name, run.role, each.channel, drawn, test.verdict)
-    return Section("residuals", "Residuals", [text(words), Block("table", made, "residuals")])
+    return Section("residuals", "Residuals", [text(words), PageBlock("table", made, "residuals")])
 
 
 def _data_section(
@@ -302,7 +309,9 @@ def _data_section(
         Markup('<span id="finding-{}">{}</span>').format(number, sentence)
         for number, sentence in enumerate(findings, start=1)
     ]
-    shown = Block("details", [Block("table", quality, "data")], count(len(quality.rows), "signal"))
+    shown = PageBlock(
+        "details", [PageBlock("table", quality, "data")], count(len(quality.rows), "signal")
+    )
     used = listed_block([overview.sentence for overview in overviews])
     return Section("data", "Data quality", [*used, text(said), *listed_block(numbered), shown])
 
@@ -325,9 +334,9 @@ def _setup_section(
     for key, words in notes.items():
         if key != "campaign":
             made.add(key, words)
-    blocks = [Block("table", made, "notes")]
+    blocks = [PageBlock("table", made, "notes")]
     for each in stages:
-        blocks.append(Block("heading", f"Stage {each.stage.name}", "h3"))
+        blocks.append(PageBlock("heading", f"Stage {each.stage.name}", "h3"))
         blocks += listed_block(_stage_words(each))
     return Section("setup", "Configuration", blocks)
 
@@ -348,7 +357,7 @@ def _stage_words(fit: StageFit) -> list[str]:
     return words
 
 
-def _window(weight: Weight) -> str:
+def _window(weight: WeightWindow) -> str:
     when = "all of the run"
     if weight.start is not None or weight.stop is not None:
         first = "the start" if weight.start is None else f"{weight.start:g} s"
@@ -373,7 +382,7 @@ def _verdict_section(judged: Verdict, findings: int) -> Section:
         ("Logs", "look", [words] if findings else []),
     ]
     errors = titled(judged.table(), "errors") if judged.predictions else []
-    return Section("verdict", "Verdict in detail", [Block("terms", said, "verdict"), *errors])
+    return Section("verdict", "Verdict in detail", [PageBlock("terms", said, "verdict"), *errors])
 
 
 # --- what the data tell ---------------------------------------------------------------------------
@@ -399,7 +408,7 @@ def _parameter_section(fit: Fit, stages: Sequence[StageFit], truth: ParameterSet
         own = tables.estimates_table(each, own=True)
         if own.rows:
             summary = f"{count(len(own.rows), 'parameter')} of single runs"
-            blocks.append(Block("details", [Block("table", own, "parameters")], summary))
+            blocks.append(PageBlock("details", [PageBlock("table", own, "parameters")], summary))
     fixed = tables.fixed_table(fit.stages, truth)
     blocks += titled(fixed, "held") if fixed.rows else []
     return Section("parameters", "Parameters", blocks)
@@ -410,7 +419,7 @@ def _identifiability_section(stages: Sequence[StageFit]) -> Section:
     for each in stages:
         found = identifiability_of(each)
         general = [unknown.run is None for unknown in each.problem.unknowns]
-        blocks.append(Block("heading", f"Stage {each.stage.name}", "h3"))
+        blocks.append(PageBlock("heading", f"Stage {each.stage.name}", "h3"))
         blocks += listed_block(found.sentences())
         width = Column("half width", ".3g", "%", none="none")
         columns = (Column("direction"), width, Column("moves together"))
@@ -421,8 +430,8 @@ def _identifiability_section(stages: Sequence[StageFit]) -> Section:
             known = f"{way.fix} if known" if way.weak else way.fix
             directions.add(kind, 100.0 * way.half_width if way.weak else None, moves, known)
         if directions.rows:
-            blocks.append(Block("table", directions, "directions"))
-        blocks.append(Block("heading", "What the intervals rest on", "h4"))
+            blocks.append(PageBlock("table", directions, "directions"))
+        blocks.append(PageBlock("heading", "What the intervals rest on", "h4"))
         try:
             blocks += listed_block(uncertainty_of(each).sentences())
         except InputError as error:
@@ -432,16 +441,16 @@ def _identifiability_section(stages: Sequence[StageFit]) -> Section:
     return Section("identifiability", "Uncertainty", blocks)
 
 
-def _effects(found: Identifiability, shown: Sequence[bool]) -> list[Block]:
+def _effects(found: Identifiability, shown: Sequence[bool]) -> list[PageBlock]:
     """How much all weighted residuals change for 1 % of each parameter, the largest first."""
     made = Table("", (Column("parameter"), Column("change of the residuals for 1 %", ".3g")))
     pairs = zip(found.sensitivity, found.variables.names, shown, strict=True)
     for effect, name in sorted(((float(e), name) for e, name, own in pairs if own), reverse=True):
         made.add(name, effect)
-    return [Block("details", [Block("table", made, "effects")], "Sensitivity")]
+    return [PageBlock("details", [PageBlock("table", made, "effects")], "Sensitivity")]
 
 
-def _correlations(stage: StageFit, general: Sequence[bool]) -> list[Block]:
+def _correlations(stage: StageFit, general: Sequence[bool]) -> list[PageBlock]:
     """The estimates that move together most, if there are any."""
     try:
         quoted = uncertainty_of(stage).quoted
@@ -453,8 +462,10 @@ def _correlations(stage: StageFit, general: Sequence[bool]) -> list[Block]:
     made = Table("", (Column("parameter"), Column("with"), Column("r", "+.3f")))
     for value, name, other in sorted(pairs, key=lambda pair: -abs(pair[0]))[:MOST_PAIRS]:
         made.add(name, other, value)
-    shown = Block("table", made, "correlations")
-    return [Block("details", [shown], "Strongest correlations of the estimates")] * bool(made.rows)
+    shown = PageBlock("table", made, "correlations")
+    return [PageBlock("details", [shown], "Strongest correlations of the estimates")] * bool(
+        made.rows
+    )
 
 
 def _starts_section(several: Mapping[str, Sequence[Solution]]) -> Section:
@@ -462,14 +473,14 @@ def _starts_section(several: Mapping[str, Sequence[Solution]]) -> Section:
     for stage, results in several.items():
         failed = sum(not each.cost < 1e300 for each in results)
         more = f"; {failed} left the model's domain" if failed else ""
-        blocks += [Block("heading", f"Stage {stage}", "h3")] if stage else []
+        blocks += [PageBlock("heading", f"Stage {stage}", "h3")] if stage else []
         made = Table("", (Column("start"), Column("cost, best = 1", ".7g"), Column("ended")))
         best = min(each.cost for each in results) or 1.0
         for each in sorted(results, key=lambda each: each.cost):
             if each.cost < 1e300:
                 made.add(str(each.number), each.cost / best, each.message)
         words = f"Where each of {len(results)} starts ended, the best first{more}."
-        blocks += [text(words), Block("table", made, "starts")]
+        blocks += [text(words), PageBlock("table", made, "starts")]
     return Section("starts", "Starts", blocks)
 
 
@@ -478,13 +489,15 @@ def _profile_section(fit: Fit, profiles: Sequence[Profile]) -> Section:
     for each in profiles:
         unknown = fit.stage(each.stage).problem.unknowns.items[each.index]
         said = [text(words, "remark") for words in each.sentences()]
-        drawn = Block("figure", charts.profile_chart(each, unknown), f"{each.name} ({each.stage})")
-        tiles.append(Block("tile", [drawn, *said]))
+        drawn = PageBlock(
+            "figure", charts.profile_chart(each, unknown), f"{each.name} ({each.stage})"
+        )
+        tiles.append(PageBlock("tile", [drawn, *said]))
     words = (
         "The lowest cost with one parameter fixed, above that of the optimum; the dashed line ends "
         "the interval."
     )
-    blocks = [text(words), Block("tiles", tiles)] if tiles else []
+    blocks = [text(words), PageBlock("tiles", tiles)] if tiles else []
     return Section("profiles", "Profile likelihoods", blocks)
 
 
@@ -500,7 +513,7 @@ def _folds_section(folds: CrossValidation | None, stages: Sequence[StageFit]) ->
     blocks = [
         text(words),
         *(text(each, "remark") for each in folds.sentences()),
-        Block("table", held_out, "held-out"),
-        Block("table", parts, "folds"),
+        PageBlock("table", held_out, "held-out"),
+        PageBlock("table", parts, "folds"),
     ]
     return Section("folds", "Cross-validation", blocks)

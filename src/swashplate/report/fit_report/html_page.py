@@ -29,7 +29,7 @@ _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 @dataclass(frozen=True)
-class Block:
+class PageBlock:
     """A piece of a section: its kind, of those that `page.html` knows, and what it shows."""
 
     kind: str
@@ -44,23 +44,23 @@ class Section:
 
     id: str
     heading: str
-    blocks: Sequence[Block]
+    blocks: Sequence[PageBlock]
 
 
-def text(words: str, look: str = "") -> Block:
+def text(words: str, look: str = "") -> PageBlock:
     """A paragraph, in a look of `page.css`."""
-    return Block("text", words, look)
+    return PageBlock("text", words, look)
 
 
-def listed_block(sentences: Sequence[str]) -> list[Block]:
+def listed_block(sentences: Sequence[str]) -> list[PageBlock]:
     """A list of sentences, nothing for none."""
-    return [Block("list", sentences)] if sentences else []
+    return [PageBlock("list", sentences)] if sentences else []
 
 
-def titled(table: Table, look: str = "") -> list[Block]:
+def titled(table: Table, look: str = "") -> list[PageBlock]:
     """A table under its title, its caption a remark."""
     remark = [text(table.caption, "remark")] if table.caption else []
-    return [Block("heading", table.title, "h3"), Block("table", table, look), *remark]
+    return [PageBlock("heading", table.title, "h3"), PageBlock("table", table, look), *remark]
 
 
 def page(

@@ -36,7 +36,7 @@ Array = NDArray[np.float64]
 SPAN = 4.0
 """Factor by which a slider goes below and above the present value."""
 SHOWN = ("orifice", "pump", "supply_pressure", "rate_limits", "dead_zone", "spool_offset")
-"""Levers that have a slider of their own; each parameter has one too."""
+"""Design variables that have a slider of their own; each parameter has one too."""
 BEFORE_CURRENT = Limit.DEAD_ZONE | Limit.CURRENT_RATE
 """Limits that are shaded behind a current; the others are behind what the pump does."""
 UNMEASURED = ("current", "shaft_speed")
@@ -56,7 +56,7 @@ def write_live_page(
     """Write the live page of a drive: one HTML file, whole or not at all, that needs no network.
 
     The drive runs in the reader's browser, from the equations' C source as WebAssembly. Parameters
-    and levers have sliders; the curves, their errors and the limits follow at once.
+    and design variables have sliders; the curves, their errors and the limits follow at once.
 
     Parameters
     ----------
@@ -130,7 +130,7 @@ def live_page(
         "wasm": b64encode(packaged(WASM)).decode("ascii"),
         "values": b64encode(numbers.astype("<f8").tobytes()).decode("ascii"),
         "parameters": values,
-        "levers": _levers(values),
+        "design_variables": _design_variables(values),
         "outputs": [{"name": each, "number": k} for k, each in enumerate(exported.names)],
         "limits": [[bit, _word(limit)] for bit, limit in limits],
         "before": before,
@@ -164,7 +164,7 @@ def can_run(parameters: ParameterSet, experiment: Experiment) -> bool:
     return driven and not at_rate_of([experiment], parameters)[1]
 
 
-# --- parameters and levers ------------------------------------------------------------------------
+# --- parameters and design variables ---------------------------------------------------------------
 
 
 def _parameters(parameters: ParameterSet) -> list[dict[str, Any]]:
@@ -211,8 +211,8 @@ def slider(parameter: Parameter, value: float) -> tuple[float, float] | None:
     return max(low, definition.lower), min(high, definition.upper)
 
 
-def _levers(values: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Levers with the numbers that they move and the powers with which they do."""
+def _design_variables(values: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Design variables with the numbers that they move and the powers with which they do."""
     made = []
     for name in SHOWN:
         powers = DESIGN_VARIABLES[name]

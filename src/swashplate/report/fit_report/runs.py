@@ -34,7 +34,7 @@ LETTERS = {"input": 13, "overlay": 24, "residual": 14}
 
 
 @dataclass(frozen=True, eq=False)
-class Shown:
+class ShownChannel:
     """One channel of a run, the stage that fits it, and the units it is shown in."""
 
     quality: RunQuality
@@ -58,7 +58,7 @@ class ShownRun:
     name: str
     role: str
     """Whether it was fitted, ``"fit"``, or held out, ``"validate"``."""
-    channels: tuple[Shown, ...]
+    channels: tuple[ShownChannel, ...]
 
     @property
     def experiment(self) -> Experiment:
@@ -101,7 +101,7 @@ def shown_runs(stages: Sequence[StageFit], predicted: Sequence[RunQuality]) -> t
         for each in with_speeds(stage.runs)
     ]
     found += [(each, "") for each in with_speeds(predicted)]
-    units, runs = {}, dict[tuple[str, str], list[Shown]]()
+    units, runs = {}, dict[tuple[str, str], list[ShownChannel]]()
     for name in {each.channel for each, _ in found}:
         alike = [each for each, _ in found if each.channel == name]
         channels = [each.experiment[name] for each in alike]
@@ -111,7 +111,7 @@ def shown_runs(stages: Sequence[StageFit], predicted: Sequence[RunQuality]) -> t
         units[name] = [display_unit(unit, size) for size in (largest, residual)]
     for each, stage in found:
         of_run = runs.setdefault((each.experiment.name, each.experiment.role), [])
-        of_run.append(Shown(each, stage, *units[each.channel]))
+        of_run.append(ShownChannel(each, stage, *units[each.channel]))
     return tuple(ShownRun(*key, tuple(channels)) for key, channels in runs.items())
 
 
@@ -193,7 +193,7 @@ def run_data(run: ShownRun) -> dict[str, Any]:
     }
 
 
-def _channel(shown: Shown) -> dict[str, Any]:
+def _channel(shown: ShownChannel) -> dict[str, Any]:
     channel, factor, small = shown.channel, shown.unit.factor, shown.small.factor
     residual = small * shown.quality.residual
     rms = float(np.sqrt(np.mean(np.square(residual[channel.used])))) if channel.used.any() else 0.0

@@ -34,7 +34,7 @@ from swashplate.identification.validation import (
     range_of,
 )
 from swashplate.parameters.rules import FULL_VOLTAGE
-from swashplate.report.fit_report.html_page import Block, Section, listed_block, text
+from swashplate.report.fit_report.html_page import PageBlock, Section, listed_block, text
 from swashplate.report.fit_report.runs import ShownRun
 from swashplate.tables import NONE, UNIT, Cell, Column, Table, count, listed
 from swashplate.units import display_unit
@@ -364,30 +364,32 @@ def summary_section(
     look: Light = "good" if judged.usable else "bad"
     headline = judged.headline.replace(" %", "\N{NO-BREAK SPACE}%")
     shown = [
-        Block("verdict", (light(look, "Usable" if judged.usable else "Not usable"), headline), look)
+        PageBlock(
+            "verdict", (light(look, "Usable" if judged.usable else "Not usable"), headline), look
+        )
     ]
-    shown.append(Block("pair", list(_curves(runs, campaign.virtual))))
+    shown.append(PageBlock("pair", list(_curves(runs, campaign.virtual))))
     numbers, limits = [], []
     if drive is not None:
-        numbers.append(Block("heading", "Numbers that matter", "h3"))
+        numbers.append(PageBlock("heading", "Numbers that matter", "h3"))
         table = None
         try:
             table, said = numbers_table(drive, stages)
-            numbers.append(Block("table", table, "numbers"))
+            numbers.append(PageBlock("table", table, "numbers"))
         except SwashplateError as error:
             said = [f"This drive has none: {error}"]
         if stages:
             said = [INTERVALS, *(_meanings(table) if table else ()), *said]
         numbers.append(text(" ".join(said), "remark"))
-        limits.append(Block("heading", "What limits it", "h3"))
+        limits.append(PageBlock("heading", "What limits it", "h3"))
         limits += listed_block(_limits(drive, stages))
-    limits.append(Block("heading", "What to do next", "h3"))
+    limits.append(PageBlock("heading", "What to do next", "h3"))
     limits += listed_block(_next(judged, campaign, stages, runs, findings))
-    shown.append(Block("pair", [Block("tile", each) for each in (numbers, limits) if each]))
+    shown.append(PageBlock("pair", [PageBlock("tile", each) for each in (numbers, limits) if each]))
     return Section("summary", "Summary", shown)
 
 
-def _curves(runs: Sequence[ShownRun], virtual: bool) -> Iterable[Block]:
+def _curves(runs: Sequence[ShownRun], virtual: bool) -> Iterable[PageBlock]:
     """The runs that are predicted best and worst, of those held out if there are any."""
     held = [k for k, run in enumerate(runs) if run.role == "validate"]
     chosen = sorted(held or range(len(runs)), key=lambda k: run_error(runs[k], runs))
@@ -403,7 +405,7 @@ def _curves(runs: Sequence[ShownRun], virtual: bool) -> Iterable[Block]:
             "channel": len(runs[k].channels) - 1,
             "measured": "virtual test" if virtual else "measured",
         }
-        yield Block("curve", content)
+        yield PageBlock("curve", content)
 
 
 def _limits(drive: Drive, stages: Sequence[StageFit]) -> list[str]:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from swashplate.analysis.design_variables import FactorRange
     from swashplate.analysis.outcomes import Trial
     from swashplate.campaign import Campaign, Experiment
-    from swashplate.cli.options import Sampling, Simulating, Start
+    from swashplate.cli.options import CommandSampling, Simulating, Start
     from swashplate.drive import Drive, Simulation
     from swashplate.drive.simulation import Array
     from swashplate.identification.estimation.model_setup import ModelSetup
@@ -364,7 +364,7 @@ def simulated_as(drive: Drive, command: str, options: Simulating) -> tuple[str, 
 def simulated(
     drive: Drive,
     command: str,
-    options: Sampling,
+    options: CommandSampling,
     *,
     start: Start = "rest",
     clip: bool = False,
@@ -440,7 +440,7 @@ def window_of(time: Array, begin: float | None, end: float | None) -> tuple[floa
     return None if whole else (first if begin is None else begin, last if end is None else end)
 
 
-def trial_of(drive: Drive, command: str, options: Sampling) -> tuple[str, Trial]:
+def trial_of(drive: Drive, command: str, options: CommandSampling) -> tuple[str, Trial]:
     """Name of a command, a maneuver or a log, and the trial that it makes."""
     from swashplate.analysis.outcomes import trial_of
 
