@@ -303,7 +303,7 @@ def _march(shared: _Sets, blocks: Sequence[Block]) -> list[tuple[dict[int, float
     """
     made, record, keep = [], shared.record, shared.cost is None
     measured, weight = shared.compared
-    inputs = {name: each.values for name, each in shared.records.items()}
+    inputs = {name: record.values for name, record in shared.records.items()}
     table = {"time": record.time} if shared.to is not None else {}
     for sets, options in blocks:
         padded, size = np.resize(sets, LANES), sets.size

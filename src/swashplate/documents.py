@@ -208,7 +208,7 @@ _SHORT.maxstring = _SHORT.maxother = _SHORT.maxlong = 100
 
 def _sentence(errors: Sequence[ErrorDetails], model: type[BaseModel]) -> str:
     """The first error in words; one of a misspelt entry before those that follow from it."""
-    error = next((each for each in errors if _near(each, model)), errors[0])
+    error = next((error for error in errors if _near(error, model)), errors[0])
     parts = map(str, error["loc"])
     where = [part for part in parts if _names_entry(part)]
     # of a list the entries count from 1, as in other sentences

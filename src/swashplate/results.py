@@ -39,7 +39,7 @@ SPELT_OUT = 4
 def short(value: object) -> str:
     """What `repr` says of a result: its fields, arrays by their shape, others by their names."""
     if is_dataclass(value):
-        names = [each.name for each in fields(value) if each.repr]
+        names = [field.name for field in fields(value) if field.repr]
     else:  # a model of pydantic's, or a named tuple
         kind: Any = type(value)
         names = list(getattr(kind, "model_fields", ()) or getattr(kind, "_fields", ()))
@@ -67,7 +67,7 @@ def _brief(value: Any) -> str:
         return f"{{{keys if len(keys) <= 60 else f'{len(value)} entries'}}}"
     if isinstance(value, Sequence | Set):
         items = list(value)
-        plain = all(isinstance(each, str | int | float) for each in items)
+        plain = all(isinstance(item, str | int | float) for item in items)
         if plain and len(items) <= SPELT_OUT:
             return f"[{', '.join(map(_brief, items))}]"
         return f"<{len(items)} {type(items[0]).__name__}>"
@@ -190,8 +190,8 @@ class Tabular(Result, ABC):
         InputError
             If xarray is not installed.
         """
-        along, *others = (each for each in self.to_polars().iter_columns())
-        data = {each.name: (along.name, each.to_numpy()) for each in others}
+        along, *others = (column for column in self.to_polars().iter_columns())
+        data = {other.name: (along.name, other.to_numpy()) for other in others}
         return _library("xarray").Dataset(data, {along.name: along.to_numpy()})
 
     def _repr_html_(self) -> str | None:

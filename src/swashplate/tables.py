@@ -106,24 +106,24 @@ class Table:
         total: bool = False,
     ) -> None:
         """Add a row; see `Row`. NaN counts as no number."""
-        count = sum(each is not UNIT for each in self.columns)
+        count = sum(column is not UNIT for column in self.columns)
         assert len(cells) == count, f"{len(cells)} cells for {count} columns of {self.title}"
         given = iter(cells)
         si = "rad" if unit == SHAFT_ANGLE else unit
-        every = tuple(si if each is UNIT else next(given) for each in self.columns)
+        every = tuple(si if column is UNIT else next(given) for column in self.columns)
         self.rows.append(Row(every, unit, spec, look, section or total, total))
 
     def of(self, place: str) -> Table:
         """The table with the columns of a place: ``"t"`` terminal, ``"p"`` page, ``"f"`` file."""
-        kept = [k for k, each in enumerate(self.columns) if place in each.of]
+        kept = [k for k, column in enumerate(self.columns) if place in column.of]
         rows = [row._replace(cells=tuple(row.cells[k] for k in kept)) for row in self.rows]
         return Table(self.title, [self.columns[k] for k in kept], self.caption, rows, self.si)
 
     def heads(self) -> list[str]:
         """The columns' names with their units, for people."""
         return [
-            f"{each.name} {display_unit(each.unit).name if each.unit else ''}".strip()
-            for each in self.columns
+            f"{column.name} {display_unit(column.unit).name if column.unit else ''}".strip()
+            for column in self.columns
         ]
 
     def texts(self, row: Row) -> list[str]:
@@ -147,7 +147,7 @@ class Table:
         import polars as pl
 
         made = self.of("f")
-        names = [each.key or each.name for each in made.columns]
+        names = [column.key or column.name for column in made.columns]
         records = [
             dict(zip(names, map(_number, row.cells), strict=True))
             for row in made.rows
@@ -168,7 +168,7 @@ class Table:
         stacked = [[*[""] * (height - len(head)), *head] for head in heads]
         lines = [*zip(*stacked, strict=True), *map(shown.texts, shown.rows)]
         sizes = [max(map(len, cells)) for cells in zip(*lines, strict=True)]
-        right = [">" if each.spec else "<" for each in shown.columns]
+        right = [">" if column.spec else "<" for column in shown.columns]
         text = [
             "  ".join(f"{c:{r}{s}}" for c, r, s in zip(line, right, sizes, strict=True)).rstrip()
             for line in lines
@@ -213,13 +213,13 @@ def share_cell(share: float | None) -> Cell:
 
 def joined(tables: Sequence[Table]) -> Table:
     """One table of the rows of several that have the same columns."""
-    return Table("", tables[0].columns, rows=[row for each in tables for row in each.rows])
+    return Table("", tables[0].columns, rows=[row for table in tables for row in table.rows])
 
 
 def largest(cells: Sequence[Any]) -> float:
     """The largest magnitude of some cells' numbers, by which their unit is chosen."""
-    values = [each.value if isinstance(each, Cell) else each for each in cells]
-    sizes = [abs(each) for each in values if isinstance(each, float) and isfinite(each)]
+    values = [cell.value if isinstance(cell, Cell) else cell for cell in cells]
+    sizes = [abs(value) for value in values if isinstance(value, float) and isfinite(value)]
     return max(sizes, default=0.0) or float("inf")
 
 

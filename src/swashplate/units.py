@@ -265,9 +265,9 @@ def _chosen_by(
         radius = 0.5 * drum
         turns = ((word, rope[word] * radius), ("m", radius), ("m/s²", radius))
     if turns is not None:
-        units = {si: DisplayUnit(*each) for si, each in zip(_OF_SHAFT, turns, strict=True)}
+        units = {si: DisplayUnit(*turn) for si, turn in zip(_OF_SHAFT, turns, strict=True)}
         return {"rad/s": units.pop("rad/s")}, units
-    usual = {si: each for si, units in _USUAL.items() for _, each in units if each.name == word}
+    usual = {si: unit for si, units in _USUAL.items() for _, unit in units if unit.name == word}
     if word and usual:
         return usual, {}
     for si in ("Pa", "m", "m/s", "A", "rad"):

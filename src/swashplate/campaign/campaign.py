@@ -112,9 +112,9 @@ class Campaign(Result):
         """Its experiments: axis, role, maneuver, length and channels."""
         heads = (*map(Head, ("run", "axis", "role", "maneuver")), Head("s", ".4g"))
         made = Table(self.title, (*heads, Head("channels", wrap=True)))
-        for each in self:
-            words = each.name, each.axis, each.role, each.maneuver
-            made.add(*words, each.duration, ", ".join(each.channels))
+        for experiment in self:
+            words = experiment.name, experiment.axis, experiment.role, experiment.maneuver
+            made.add(*words, experiment.duration, ", ".join(experiment.channels))
         return made
 
     def plot(self, *, title: str | None = None) -> list[Figure]:
@@ -123,7 +123,10 @@ class Campaign(Result):
         As of `swashplate.report.figures.plot_overview` and `plot_campaign`.
         """
         words = self.title if title is None else title
-        whole = [each.plot(title=f"{words}: {each.run}, the whole log") for each in self.overviews]
+        whole = [
+            overview.plot(title=f"{words}: {overview.run}, the whole log")
+            for overview in self.overviews
+        ]
         return whole + cast("list[Figure]", figures().plot_campaign(self, title=words))
 
     def __iter__(self) -> Iterator[Experiment]:
@@ -147,7 +150,7 @@ class Campaign(Result):
         """
         if isinstance(name, int):
             return self.experiments[name]
-        by_name = {each.name: each for each in self}
+        by_name = {experiment.name: experiment for experiment in self}
         if name in by_name:
             return by_name[name]
         if any(name == run or name.startswith(f"{run} ") for run in self.ignored):
@@ -173,14 +176,16 @@ class Campaign(Result):
         roles = get_args(schema.Role)
         if role is not None and role not in roles:
             raise InputError(f"There is no role '{role}': runs have {', '.join(roles)}.")
-        ours = (each for each in self if axis in (None, each.axis))
-        return tuple(each for each in ours if role in (None, each.role))
+        of_axis = (experiment for experiment in self if axis in (None, experiment.axis))
+        return tuple(experiment for experiment in of_axis if role in (None, experiment.role))
 
     def with_interpolation(self, axis: str, between: schema.Between) -> Campaign:
         """The campaign with the input of an axis joined in one way between its samples."""
         experiments = [
-            replace(each, input=each.input.joined(between)) if each.axis == axis else each
-            for each in self
+            replace(experiment, input=experiment.input.joined(between))
+            if experiment.axis == axis
+            else experiment
+            for experiment in self
         ]
         return replace(self, experiments=tuple(experiments))
 
@@ -210,7 +215,7 @@ class Campaign(Result):
 
 def in_time(experiments: Sequence[Experiment]) -> tuple[Experiment, ...]:
     """Experiments in the order in which they were recorded; unchanged if a time is unknown."""
-    times = [each.recorded for each in experiments]
+    times = [experiment.recorded for experiment in experiments]
     known = [time for time in times if time is not None]
     if len(known) < len(times):
         return tuple(experiments)

@@ -200,14 +200,14 @@ class InputSignal(Result):
         Rounded off over `RISE`, so that a simulation is a smooth function of the instant.
         """
         found = [
-            (each, each.middle + late[each.place]) for each in self.edges if each.place in late
+            (edge, edge.middle + late[edge.place]) for edge in self.edges if edge.place in late
         ]
         steps = [instant + RISE * np.linspace(-0.5, 0.5, 9) for _, instant in found]
         time = np.unique(np.concatenate([self.time, *steps]))
         values = self.at(time)
-        for each, instant in found:
-            near = np.abs(time - each.middle) <= 0.5 * each.apart + RISE
-            earlier, later = self.time[each.place : each.place + 2]
+        for edge, instant in found:
+            near = np.abs(time - edge.middle) <= 0.5 * edge.apart + RISE
+            earlier, later = self.time[edge.place : edge.place + 2]
             before = self.at(np.minimum(time[near], earlier))
             done = np.clip((time[near] - instant) / RISE + 0.5, 0.0, 1.0)
             jump = self.at(np.maximum(time[near], later)) - before
@@ -378,7 +378,7 @@ class Experiment(Tabular):
 
     def of_kind(self, *kinds: ChannelKind) -> tuple[Channel, ...]:
         """Its channels of some kinds."""
-        return tuple(each for each in self.channels.values() if each.kind in kinds)
+        return tuple(channel for channel in self.channels.values() if channel.kind in kinds)
 
     def _signals(self) -> list[tuple[str, InputSignal | Channel]]:
         return [("input", self.input), *self.channels.items()]
@@ -392,10 +392,12 @@ class Experiment(Tabular):
         import polars as pl
 
         frames = []
-        for name, each in self._signals():
-            weight = each.weight if isinstance(each, Channel) else [None] * each.time.size
-            frame = pl.DataFrame({"time": each.time, "value": each.values})
-            signal, unit = pl.lit(name).alias("signal"), pl.lit(each.unit).alias("unit")
+        for name, recorded in self._signals():
+            weight = (
+                recorded.weight if isinstance(recorded, Channel) else [None] * recorded.time.size
+            )
+            frame = pl.DataFrame({"time": recorded.time, "value": recorded.values})
+            signal, unit = pl.lit(name).alias("signal"), pl.lit(recorded.unit).alias("unit")
             weights = pl.Series("weight", weight, pl.Float64)
             frames.append(frame.select(signal, "time", "value", unit, weights))
         return pl.concat(frames)
@@ -405,10 +407,10 @@ class Experiment(Tabular):
         numbers = Column("samples", "d", "1"), Column("lowest", ".4g"), Column("highest", ".4g")
         title = f"{self.name}, {self.maneuver}, {self.role}"
         made = Table(title, (Column("channel"), Column("kind"), *numbers, UNIT))
-        for name, each in self._signals():
-            ends = float(each.values.min()), float(each.values.max())
-            unit = shown_unit(each.kind, each.unit)
-            made.add(name, each.kind, each.values.size, *ends, unit=unit)
+        for name, signal in self._signals():
+            ends = float(signal.values.min()), float(signal.values.max())
+            unit = shown_unit(signal.kind, signal.unit)
+            made.add(name, signal.kind, signal.values.size, *ends, unit=unit)
         return made
 
     def plot(self, *, title: str | None = None) -> Figure:

@@ -84,19 +84,19 @@ class Overview(Result):
     @property
     def begin(self) -> float:
         """Its first stamp. [s]"""
-        return min(float(each.time[0]) for each in self.signals)
+        return min(float(signal.time[0]) for signal in self.signals)
 
     @property
     def end(self) -> float:
         """Its last stamp. [s]"""
-        return max(each.end for each in self.signals)
+        return max(signal.end for signal in self.signals)
 
     @property
     def sentence(self) -> str:
         """How many of its windows, and how many rows, are experiments."""
-        used = [each for each in self.windows if each.used]
-        rows = sum(each.last - each.first for each in used)
-        moving = sum(each.last - each.first for each in self.windows)
+        used = [window for window in self.windows if window.used]
+        rows = sum(window.last - window.first for window in used)
+        moving = sum(window.last - window.first for window in self.windows)
         total = len(self.windows)
         said = f"{self.run}: the log has {self.rows:,} rows, {moving:,} of them in "
         said += "one window with motion" if total == 1 else f"{total} windows with motion"
@@ -123,21 +123,21 @@ class Overview(Result):
                 Column("missing", ",d"),
             ),
         )
-        for each in self.signals:
-            known = np.isfinite(each.low)
+        for signal in self.signals:
+            known = np.isfinite(signal.low)
             words = "no number"
             if known.any():
-                low, high = float(each.low[known].min()), float(each.high[known].max())
-                shown = display_unit(each.shown_unit, max(abs(low), abs(high)))
+                low, high = float(signal.low[known].min()), float(signal.high[known].max())
+                shown = display_unit(signal.shown_unit, max(abs(low), abs(high)))
                 words = f"{shown.factor * low:z.4g} to {shown.factor * high:z.4g} {shown.name}"
             made.add(
-                each.axis,
-                each.name,
-                each.kind.replace("_", " "),
-                1.0 / each.period,
-                f"{1e3 * each.longest:.3g}" if each.longest > 1.5 * each.period else "-",
+                signal.axis,
+                signal.name,
+                signal.kind.replace("_", " "),
+                1.0 / signal.period,
+                f"{1e3 * signal.longest:.3g}" if signal.longest > 1.5 * signal.period else "-",
                 words.rstrip(),
-                each.missing,
+                signal.missing,
             )
         return made
 

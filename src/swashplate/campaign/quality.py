@@ -224,9 +224,9 @@ def has_sign(currents: Sequence[Array], share: float = 0.25) -> bool:
 
     Single samples do not count.
     """
-    finite = [each[np.isfinite(each)] for each in currents if np.isfinite(each).any()]
-    ends = np.array([[*np.quantile(each, (0.002, 0.998))] for each in finite] or [[0.0, 0.0]])
-    steps = [np.median(np.abs(np.diff(each))) for each in finite if each.size > 1]
+    finite = [current[np.isfinite(current)] for current in currents if np.isfinite(current).any()]
+    ends = np.array([[*np.quantile(current, (0.002, 0.998))] for current in finite] or [[0.0, 0.0]])
+    steps = [np.median(np.abs(np.diff(current))) for current in finite if current.size > 1]
     noise = float(max(steps, default=0.0)) / (0.6745 * 2.0**0.5)
     return bool(-ends[:, 0].min() > max(share * ends[:, 1].max(), SURE * noise))
 
@@ -238,13 +238,15 @@ def unsigned_currents(experiments: Iterable[Experiment]) -> dict[tuple[str, str]
     negative may be right.
     """
     currents, lowest = dict[tuple[str, str], list[Array]](), dict[tuple[str, str], float]()
-    for each in experiments:
+    for experiment in experiments:
         # a log that is cut out of a motion begins away from rest
-        rest = each.input.values[0] if each.input.kind == "other" else 0.0
-        driven = each.input.values - rest
+        rest = experiment.input.values[0] if experiment.input.kind == "other" else 0.0
+        driven = experiment.input.values - rest
         down = float(driven.min() / np.abs(driven).max()) if np.any(driven) else 0.0
-        for channel in (each for each in each.of_kind("signed_current") if each.used.any()):
-            key = each.axis, channel.name
+        for channel in experiment.of_kind("signed_current"):
+            if not channel.used.any():
+                continue
+            key = experiment.axis, channel.name
             currents.setdefault(key, []).append(channel.values[channel.used])
             lowest[key] = min(lowest.get(key, 0.0), down)
     return {
@@ -263,15 +265,16 @@ def wrapped_positions(experiments: Iterable[Experiment]) -> dict[tuple[str, str]
     By axis and channel.
     """
     said = dict[tuple[str, str], str]()
-    for each in experiments:
-        for name, channel in each.channels.items():
+    for experiment in experiments:
+        for name, channel in experiment.channels.items():
             turn = 2.0 * pi
             angle = channel.kind == "position" and channel.unit == "rad"
             if angle and turns_over(channel.values[channel.used], turn):
-                size, where = f"{turn / channel.stated:.9g}", f"axes.{each.axis}.channels.{name}"
-                said[each.axis, name] = (
-                    f"'{name}' of the axis '{each.axis}' jumps by about a whole turn, as an angle "
-                    f"that begins anew does; write rolls_over_at = {size} in [{where}]"
+                size = f"{turn / channel.stated:.9g}"
+                where = f"axes.{experiment.axis}.channels.{name}"
+                said[experiment.axis, name] = (
+                    f"'{name}' of the axis '{experiment.axis}' jumps by about a whole turn, as an "
+                    f"angle that begins anew does; write rolls_over_at = {size} in [{where}]"
                 )
     return said
 
@@ -296,7 +299,7 @@ def spikes(signal: Channel | InputSignal, drive: InputSignal) -> list[tuple[floa
 
     time, values = signal.time[signal.used], signal.values[signal.used]
     if isinstance(signal, Channel) and signal.counts is not None:
-        return [(each.begin, each.end, each.value) for each in lost_counts(signal) if each.returns]
+        return [(jump.begin, jump.end, jump.value) for jump in lost_counts(signal) if jump.returns]
     if signal.kind == "other" or time.size < 4 * NEIGHBOURS:
         return []
     lasting = median_filter(values, size=NEIGHBOURS, mode="nearest")
@@ -334,7 +337,7 @@ def _of_spikes(experiment: Experiment, signal: Channel | InputSignal) -> Iterato
     if found:
         largest = f"{max((value for _, _, value in found), key=abs):.4g} {signal.unit}"
         if isinstance(signal, Channel) and signal.counts is not None:
-            jumps = [each.counts for each in lost_counts(signal) if each.returns]
+            jumps = [jump.counts for jump in lost_counts(signal) if jump.returns]
             largest = f"{max(jumps, key=abs):+.0f} counts"
         spike = count(len(found), "spike")
         yield f"{spike}, up to {largest}{more}: leave out with {line} in this run"
@@ -393,12 +396,12 @@ def lost_counts(channel: Channel) -> list[LostCounts]:
 
 def _of_lost_counts(experiment: Experiment, channel: Channel) -> Iterator[str]:
     """A sentence on counts that are lost for good, with the lines that cut the run there."""
-    lasting = [each for each in lost_counts(channel) if not each.returns]
+    lasting = [jump for jump in lost_counts(channel) if not jump.returns]
     if not lasting:
         return
-    times = ", ".join(f"{each.begin:.6g} s" for each in lasting[:NAMED])
+    times = ", ".join(f"{spike.begin:.6g} s" for spike in lasting[:NAMED])
     times += f" and {len(lasting) - NAMED} times more" if len(lasting) > NAMED else ""
-    most = max((each.counts for each in lasting), key=abs)
+    most = max((spike.counts for spike in lasting), key=abs)
     cut = f"{lasting[0].begin:.6g}"
     yield (
         f"jumps by up to {most:+.0f} counts at {times} as no motion does, and stays there: lost or "
@@ -415,19 +418,22 @@ def spiked(experiments: Sequence[Experiment]) -> dict[tuple[str, str], tuple[str
     in any run, so that squared errors would be the spike's.
     """
     said, moves = dict[tuple[str, str], tuple[str, float]](), dict[str, float]()
-    for each in experiments:
-        for name, channel in each.channels.items():
+    for experiment in experiments:
+        for name, channel in experiment.channels.items():
             kept, far = channel.used, 0.0
             middle = float(np.median(channel.values[kept])) if kept.any() else 0.0
-            for begin, end, value in spikes(channel, each.input):
+            for begin, end, value in spikes(channel, experiment.input):
                 kept &= (channel.time < begin) | (channel.time > end)
                 far = max(far, abs(value - middle))
             if kept.any():
                 moves[name] = max(moves.get(name, 0.0), float(np.ptp(channel.values[kept])))
-            sentences = [f"has {sentence}" for sentence in _of_spikes(each, channel)]
-            sentences += _of_lost_counts(each, channel)
+            sentences = [f"has {sentence}" for sentence in _of_spikes(experiment, channel)]
+            sentences += _of_lost_counts(experiment, channel)
             if sentences:
-                said[each.name, name] = f"{each.name}: '{name}' {'; it '.join(sentences)}", far
+                said[experiment.name, name] = (
+                    f"{experiment.name}: '{name}' {'; it '.join(sentences)}",
+                    far,
+                )
     return {
         (run, name): (sentence, far > 2.0 * moves.get(name, 0.0))
         for (run, name), (sentence, far) in said.items()
@@ -446,7 +452,7 @@ def campaign_findings(campaign: Campaign) -> tuple[str, ...]:
         If the file, which is read once more, has changed meanwhile and cannot be read.
     """
     found, file = list[str](), read_campaign_file(campaign.path)
-    long = {each.run: (each.begin, each.end) for each in campaign.overviews}
+    long = {overview.run: (overview.begin, overview.end) for overview in campaign.overviews}
     for name, axis in file.axes.items():
         runs, where = campaign.select(axis=name), f"axes.{name}"
         found += _unused(f"{where}.ignore", axis.ignore, runs, long)
@@ -456,14 +462,18 @@ def campaign_findings(campaign: Campaign) -> tuple[str, ...]:
             found += _unused(f"{of}.weights", channel.weights, runs, long, key)
         found += [*_one_sided(name, runs), *_of_other_scale(runs)]
     for number, run in enumerate(file.runs, 1):
-        ours = [each for each in campaign if each.run == (run.name or Path(run.file).stem)]
+        ours = [
+            experiment
+            for experiment in campaign
+            if experiment.run == (run.name or Path(run.file).stem)
+        ]
         for key in ("ignore", "weights") if run.role != "ignore" else ():
             found += _unused(f"run {number} ({run.file}): {key}", getattr(run, key), ours, long)
     moving = {e.axis for e in campaign if e.of_kind("shaft_speed", "position", "encoder_counts")}
     found += [
         f"axis '{axis}': no channel measures its motion; a fit of the pump needs one of the kind "
         "shaft_speed, position or encoder_counts"
-        for axis in dict.fromkeys(each.axis for each in campaign)
+        for axis in dict.fromkeys(experiment.axis for experiment in campaign)
         if axis not in moving
     ]
     return (*found, *unsigned_currents(campaign).values(), *wrapped_positions(campaign).values())
@@ -474,15 +484,15 @@ def _one_sided(axis: str, runs: Sequence[Experiment]) -> Iterator[str]:
 
     Over 0.5 s, by more than a third of the largest such motion each way.
     """
-    commands = [each.input.values for each in runs if each.input.kind == "voltage"]
+    commands = [run.input.values for run in runs if run.input.kind == "voltage"]
     if not commands or min(c.min() for c in commands) < 0.0 < max(c.max() for c in commands):
         return
     moved, driven = list[Array](), list[Array]()
-    for each in runs:
-        for _, time, speed in _mean_speeds(each):
+    for run in runs:
+        for _, time, speed in _mean_speeds(run):
             moved.append(speed)
-            driven.append(each.input.at(time))
-    motion, command = (np.concatenate([np.zeros(0), *each]) for each in (moved, driven))
+            driven.append(run.input.at(time))
+    motion, command = (np.concatenate([np.zeros(0), *parts]) for parts in (moved, driven))
     most = float(np.abs(motion).max(initial=0.0))
     still = np.abs(motion) < 0.02 * most
     if still.any() and min(motion.max(), -motion.min()) > most / 3.0:
@@ -515,7 +525,7 @@ def _mean_speeds(experiment: Experiment) -> Iterator[tuple[Channel, Array, Array
 
 def _of_other_scale(runs: Sequence[Experiment]) -> Iterator[str]:
     """A sentence on a run that moves far more or less than others do at such commands."""
-    largest = max((float(np.abs(each.input.values).max()) for each in runs), default=0.0)
+    largest = max((float(np.abs(run.input.values).max()) for run in runs), default=0.0)
     gains = dict[str, dict[str, tuple[float, str]]]()
     for each in runs if largest > 0.0 else ():
         for channel, time, speed in _mean_speeds(each):
@@ -566,13 +576,13 @@ def _unused(
     log may lie where no experiment is.
     """
     for window in windows:
-        met = [each for each in runs if applying((window,), each.maneuver)]
+        met = [run for run in runs if applying((window,), run.maneuver)]
         times = [c.time for each in met for n, c in each.channels.items() if channel in (None, n)]
         start, stop = ends(window)
         logs = [long[run] for run in {each.run for each in met} & long.keys()]
         within_log = any(start <= last and stop >= first for first, last in logs)
         if not met:
-            names = list(dict.fromkeys(f"'{each.maneuver}'" for each in runs))
+            names = list(dict.fromkeys(f"'{run.maneuver}'" for run in runs))
             more = [f"{len(names) - NAMED} others"] if len(names) > NAMED else []
             yield (
                 f"{where}: no run has the maneuver '{window.maneuver}', so that its window does "
@@ -580,7 +590,7 @@ def _unused(
             )
         elif not within_log and not any(inside(window, time).any() for time in times):
             first, last = (
-                "its end" if each is None else f"{each:g} s" for each in (window.start, window.stop)
+                "its end" if end is None else f"{end:g} s" for end in (window.start, window.stop)
             )
             of = f"any of {len(met)} runs"
             if len(met) == 1:
@@ -601,22 +611,22 @@ def quality_table(experiment: Experiment, qualities: Sequence[Quality]) -> Table
             Column("ignored", "s", of="p"),
         ),
     )
-    for each in qualities:
-        stamps, largest = each.stamps, max(abs(each.low), abs(each.high))
-        shown = display_unit(shown_unit(each.kind, each.unit), largest)
-        low, high = shown.factor * each.low, shown.factor * each.high
+    for quality in qualities:
+        stamps, largest = quality.stamps, max(abs(quality.low), abs(quality.high))
+        shown = display_unit(shown_unit(quality.kind, quality.unit), largest)
+        low, high = shown.factor * quality.low, shown.factor * quality.high
         made.add(
             experiment.name,
-            each.signal,
-            each.kind.replace("_", " "),
+            quality.signal,
+            quality.kind.replace("_", " "),
             stamps.rows,
             stamps.rate,
             f"{round(1e3 * stamps.jitter, 4):.3g}",
             f"{round(1e3 * stamps.longest, 4):.3g}" if stamps.gaps.size else "-",
             f"{low:z.4g} to {high:z.4g} {shown.name}".rstrip(),
-            "" if isnan(each.clipped) else f"{100.0 * each.clipped:.2g}",
-            each.lost_counts,
-            f"{100.0 * each.ignored:.3g} %",
-            look=bool(each.findings),
+            "" if isnan(quality.clipped) else f"{100.0 * quality.clipped:.2g}",
+            quality.lost_counts,
+            f"{100.0 * quality.ignored:.3g} %",
+            look=bool(quality.findings),
         )
     return made

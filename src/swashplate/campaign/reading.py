@@ -381,7 +381,7 @@ def _experiments(
     for part, (begin, end) in enumerate(pairwise([-np.inf, *sorted(cuts), np.inf])):
         given = _within(drive, begin, end)
         kept = {each: _within(read, begin, end) for each, read in signals.items()}
-        kept = {each: read for each, read in kept.items() if read.time.size > 1}
+        kept = {name_: read for name_, read in kept.items() if read.time.size > 1}
         if given.time.size < 2 or not kept:
             continue
         said = list(notes) if part == 0 else []
@@ -399,12 +399,12 @@ def _experiments(
             None if part or resumes else run.start_pressure,
             given,
             {
-                each: _finished(axis.channels[each], read, given, maneuver, ignored, run)
-                for each, read in kept.items()
+                name_: _finished(axis.channels[name_], read, given, maneuver, ignored, run)
+                for name_, read in kept.items()
             },
             run.maneuver,
             recognised,
-            tuple((*ends(each), each.why) for each in ignored),
+            tuple((*ends(window), window.why) for window in ignored),
             recorded=None if zero is None else zero + float(given.time[0]),
             notes=tuple(said),
         )
@@ -421,7 +421,7 @@ def _within(signal: AnySignal, begin: float, end: float) -> AnySignal:
     if kept.all():
         return signal
     arrays: dict[str, Any] = {
-        key: each[kept] for key, each in vars(signal).items() if isinstance(each, np.ndarray)
+        key: value[kept] for key, value in vars(signal).items() if isinstance(value, np.ndarray)
     }
     return replace(signal, **arrays)
 
@@ -449,8 +449,8 @@ def _finished(
     if entry.weight_by_input:
         levels, factors = np.transpose(entry.weight_by_input)
         weight *= np.interp(np.abs(drive.at(read.time)), levels, factors)
-    for each in applying((*entry.weights, *run.weights), maneuver):
-        weight[inside(each, read.time)] *= each.factor
+    for weighted in applying((*entry.weights, *run.weights), maneuver):
+        weight[inside(weighted, read.time)] *= weighted.factor
     for window in (*ignored, *applying(entry.ignore, maneuver)):
         weight[inside(window, read.time)] = 0.0
     if weight.min() == weight.max():

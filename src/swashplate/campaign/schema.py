@@ -178,7 +178,9 @@ class TimeWindow(FileTable):
 def applying(windows: Iterable[AnyWindow], maneuver: str) -> tuple[AnyWindow, ...]:
     """The windows that hold in runs of a maneuver, such as ``"step +4 V"``."""
     return tuple(
-        each for each in windows if each.maneuver is None or fnmatchcase(maneuver, each.maneuver)
+        window
+        for window in windows
+        if window.maneuver is None or fnmatchcase(maneuver, window.maneuver)
     )
 
 
@@ -285,7 +287,7 @@ class InputEntry(SignalEntry):
 
     @model_validator(mode="after")
     def _of_all_maneuvers(self) -> InputEntry:
-        if any(each.maneuver is not None for each in self.ignore):
+        if any(window.maneuver is not None for window in self.ignore):
             raise ValueError("a window of the input holds in every maneuver: leave it out there")
         return self
 

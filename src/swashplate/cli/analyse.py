@@ -394,7 +394,7 @@ def compensate(
     with working("Inverting"):
         chosen = parsing.at_rate(drive.chosen, sampling.rate)
         found, bought = compensation.inverse_map(chosen, points), None
-        tables = found.tables([radians(each) for each in speeds_deg_s or ()])
+        tables = found.tables([radians(speed) for speed in speeds_deg_s or ()])
         if stick is not None:
             name, run = parsing.simulated(chosen, stick, sampling)
             reference = compensation.speed_of_command(found, run["voltage"])
@@ -560,8 +560,8 @@ def bode(
     drive.note(f"{drive.title}, sines about {bias:g} V: {span}")
     note(f"At {frequency:g} Hz:")
     show(made)
-    for each in response.still():
-        say(f"{each}.")
+    for output in response.still():
+        say(f"{output}.")
 
 
 @command(

@@ -165,7 +165,7 @@ def init(
             table = line.partition("    #")[0]
         if line.startswith((UNUSED, NO_ENCODER)):
             note(f"  {line.lstrip('# ')}")
-        elif any(each in line for each in open_ends):
+        elif any(end in line for end in open_ends):
             note(f"  {table} {line.lstrip('# ')}")
     note(f"Then run\n  swashplate campaign check {shlex.quote(str(target))}")
 
@@ -200,9 +200,11 @@ def check(
     with working(f"Reading {path}"):
         campaign = tests.Campaign.from_toml(path)
         unsigned = {name for _, name in tests.unsigned_currents(campaign)}
-        qualities = {each.name: tests.examine(each, unsigned) for each in campaign}
+        qualities = {
+            experiment.name: tests.examine(experiment, unsigned) for experiment in campaign
+        }
         of_file = dict.fromkeys((*tests.campaign_findings(campaign), *beside_the_drives(campaign)))
-    roles = [each.role for each in campaign]
+    roles = [experiment.role for experiment in campaign]
     counted = ", ".join(f"{roles.count(role)} to {role}" for role in dict.fromkeys(roles))
     note(f"{parsing.title_of(campaign)}: {len(campaign)} experiments ({counted})")
     for overview in campaign.overviews:
@@ -353,7 +355,7 @@ def rig(
         nominal = parsing.drive_of(drive.drive)
         tests = bench.run(
             nominal if parsing.drive_file(drive.drive) else drive.drive,
-            [parsing.maneuver_of(each, nominal) for each in maneuver or ()] or None,
+            [parsing.maneuver_of(word, nominal) for word in maneuver or ()] or None,
             seed=seed,
             severity=severity,
             instruments=replace(bench.SEVERITIES[severity], backlash=radians(backlash_deg)),
@@ -536,8 +538,10 @@ def advise(
             bench = design.bench(smooth(start), load_setup(setup or start.name))
         machine = Drive(bench.parameters)
         requested = [parsing.maneuver_of(word, machine) for word in maneuver or ()]
-        maneuvers = {each.name: each for each in requested or design.default_maneuvers()}
-        candidates = [bench.candidate(each) for each in maneuvers.values()]
+        maneuvers = {
+            candidate.name: candidate for candidate in requested or design.default_maneuvers()
+        }
+        candidates = [bench.candidate(candidate) for candidate in maneuvers.values()]
         ranked = design.advise(bench.present, candidates, bench.variables)
         in_turn = design.in_turn(bench.present, candidates, bench.variables, tests)
     determined = [look.table(made) for look in looks]

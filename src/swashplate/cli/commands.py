@@ -74,7 +74,7 @@ def command(
 
         # Typer reads arguments and options off the signature
         run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
-        run.__annotations__ = {each.name: each.annotation for each in parameters}
+        run.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
         app.command(name, epilog=_epilog(examples))(run)
         return function
 

@@ -404,7 +404,7 @@ def sweep(
     """
     more: dict[str, Any] = {}
     if points is not None:
-        more["points"] = [number_of(f"--points {points}", each) for each in points.split(",")]
+        more["points"] = [number_of(f"--points {points}", part) for part in points.split(",")]
     from swashplate.crane import sweep as swing_over
 
     found: Sweep = study.through(swing_over, study.chosen, over, **more)

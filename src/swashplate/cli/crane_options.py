@@ -256,7 +256,7 @@ class Operated(AtSea):
         setup = self.pose | _given(
             drag_area=self.drag_area, load=self.load, swing_damping=self.swing_damping
         )
-        names = [each.name for each in fields(Suspension)]
+        names = [field.name for field in fields(Suspension)]
         values = numbers_of("--suspension", self.suspension, "stiffness=6e7", names)
         if values:
             setup["suspension"] = Suspension(**values)
@@ -399,7 +399,7 @@ def control_of(words: str) -> Control | None:
     stages: list[Control] = []
     for word in filter(None, words.split("+")):
         name, _, text = word.partition("=")
-        numbers = [number_of(f"The control '{word}'", each) for each in text.split("/") if text]
+        numbers = [number_of(f"The control '{word}'", part) for part in text.split("/") if text]
         kind, most = kinds.get(name, (None, 0))
         if kind is None or len(numbers) > most:
             raise InputError(

@@ -99,7 +99,7 @@ def export(
 
         chosen = drive.chosen
     own = exporting.LONGEST_STEP if step is None else step
-    names = None if platforms is None else [each.strip() for each in platforms.split(",")]
+    names = None if platforms is None else [part.strip() for part in platforms.split(",")]
     with said():
         if fmu is not None:
             version: Literal["2.0", "3.0"] = "2.0" if fmi.startswith("2") else "3.0"

@@ -337,7 +337,9 @@ def validate(
         parameters: Parameters | None = None if model else parsing.parameters_of(drive)
         campaign, chosen = parsing.campaign_of(path, axis)
         roles = ("fit", "validate") if role == "all" else (role,)
-        runs = [each for each in campaign.select(axis=chosen) if each.role in roles]
+        runs = [
+            experiment for experiment in campaign.select(axis=chosen) if experiment.role in roles
+        ]
     if not runs:
         raise InputError(
             f"{path}: no run of the axis '{chosen}' has the role {' or '.join(map(repr, roles))}; "

@@ -85,7 +85,7 @@ def doctor() -> None:
     if kept is None:
         note(UNCACHED)
     else:
-        sizes = [each.stat().st_size for each in kept.rglob("*.nbc")]
+        sizes = [path.stat().st_size for path in kept.rglob("*.nbc")]
         note(f"Compiled kernels: {len(sizes)} files, {sum(sizes) / 1e6:.1f} MB, below {kept}")
     if not well:
         raise typer.Exit(1)

@@ -182,14 +182,14 @@ def assigned(
         definition, numbers, unit = None, list[float](), ""
         if match is not None:
             definition, unit = known(name), (match[3] or "").strip()
-            numbers = [float(each) for each in match.group(1, 2) if each]
+            numbers = [float(number) for number in match.group(1, 2) if number]
         if len(numbers) not in counts or (unit and not units):
             raise InputError(f"{option} cannot read '{word}'; write it as {example}.")
         if name in found:
             raise InputError(f"{option} gives {name} twice; give it once.")
         if unit and definition is not None:
             what = f"{name} ({definition.name})"
-            numbers = [to_si(each, unit, definition.unit, what) for each in numbers]
+            numbers = [to_si(number, unit, definition.unit, what) for number in numbers]
         found[name] = numbers[0] if len(numbers) == 1 else (numbers[0], numbers[1])
     return found
 
@@ -271,10 +271,10 @@ def pairs_of(
 ) -> list[tuple[str, str]]:
     """The text before and after each equals sign; the first is given once, or often."""
     pairs = list[tuple[str, str]]()
-    for each in given or ():
-        name, equals, value = each.partition("=")
+    for pair in given or ():
+        name, equals, value = pair.partition("=")
         if not equals:
-            raise InputError(f"{option} {each} has no equals sign: write {option} {example}.")
+            raise InputError(f"{option} {pair} has no equals sign: write {option} {example}.")
         if name in dict(pairs) and not often:
             raise InputError(f"{option} {name}=... is given twice; give it once.")
         pairs.append((name, value))
@@ -283,20 +283,22 @@ def pairs_of(
 
 def changes_between(before: ParameterSet, after: ParameterSet) -> list[str]:
     """A line for each parameter of two sets that differs, with a question where it surprises."""
-    known = {each.symbol for each in before.values()}
-    added = [each for each in after.values() if each.symbol not in known]
+    known = {parameter.symbol for parameter in before.values()}
+    added = [parameter for parameter in after.values() if parameter.symbol not in known]
     lines = [
-        f"{each.symbol} ({each.name}): {'/'.join(f'{v:g}' for v in each.values)} "
-        f"{unit_text(each.unit)}".rstrip()
-        for each in added
+        f"{parameter.symbol} ({parameter.name}): {'/'.join(f'{v:g}' for v in parameter.values)} "
+        f"{unit_text(parameter.unit)}".rstrip()
+        for parameter in added
     ]
-    if UNFELT in {each.symbol for each in added} and not set(FEELING) & set(after.refinements):
+    if UNFELT in {parameter.symbol for parameter in added} and not set(FEELING) & set(
+        after.refinements
+    ):
         lines.append(f"! {UNFELT} changes nothing without {' or '.join(FEELING)}: set one as well.")
     for old in before.values():
         new = after[old.symbol]
         if new.value == old.value:
             continue
-        words = ("/".join(f"{v:g}" for v in each.values) for each in (old, new))
+        words = ("/".join(f"{v:g}" for v in parameter.values) for parameter in (old, new))
         unit = unit_text(old.unit)
         lines.append(f"{old.symbol} ({old.name}): {' -> '.join(words)} {unit}".rstrip())
         ratios = [b / a for a, b in zip(old.values, new.values, strict=False) if a and isfinite(a)]

@@ -102,8 +102,8 @@ def compare(
     with working("Simulating"):
         from swashplate.analysis.outcomes import rms_difference, side_by_side
 
-        pair = [parsing.at_rate(parsing.drive_of(each), rate) for each in (first, second)]
-        labels = [each.name for each in pair]
+        pair = [parsing.at_rate(parsing.drive_of(word), rate) for word in (first, second)]
+        labels = [drive.name for drive in pair]
         if labels[0] == labels[1]:  # then by what was typed
             labels = [first, second if second != first else f"{second} (2)"]
         drives = dict(zip(labels, pair, strict=True))

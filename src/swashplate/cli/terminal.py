@@ -139,14 +139,14 @@ def _blocks(table: Table, line: int) -> Iterator[rich.table.Table]:
         return made
 
     numbers = [k for k in every if columns[k].spec]
-    if length(every) <= line or not numbers or any(each.wrap for each in columns):
+    if length(every) <= line or not numbers or any(column.wrap for column in columns):
         yield block(every)
         return
     for k, cells in enumerate(_widths(rows or [heads])):
         words = fill(heads[k].replace(" %", NARROW), max(cells, LEAST))
         heads[k] = words.replace(NARROW, " %")
     wide = enumerate(_widths([heads, *rows]))
-    broken = [each if k in numbers else min(each, LONGEST) for k, each in wide]
+    broken = [column if k in numbers else min(column, LONGEST) for k, column in wide]
     lead = places = list(every[: numbers[0]])
     for k in every[numbers[0] :]:
         unit = [k + 1] if k + 1 in every and columns[k + 1] is UNIT else []
@@ -160,8 +160,8 @@ def _blocks(table: Table, line: int) -> Iterator[rich.table.Table]:
 
 def show(*tables: Table) -> None:
     """Print tables, empty lines around them."""
-    for each in tables:
-        for block in _blocks(each.of("t"), output.width):
+    for table in tables:
+        for block in _blocks(table.of("t"), output.width):
             output.print()
             output.print(block)
     output.print()
@@ -189,7 +189,8 @@ def say_error(error: Exception, lead: str = "Error") -> None:
     sentence = " ".join(str(error).split()).rstrip(".")
     # the name of a file may hold what steers a terminal
     shown = "".join(
-        each if each.isprintable() else "\N{REPLACEMENT CHARACTER}" for each in sentence
+        character if character.isprintable() else "\N{REPLACEMENT CHARACTER}"
+        for character in sentence
     )
     side.print(f"{lead}: {shown}.", soft_wrap=True)
 

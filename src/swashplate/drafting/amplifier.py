@@ -129,7 +129,7 @@ def guess_amplifier(experiments: Sequence[Experiment]) -> AmplifierGuess | None:
         "G1": (plus.gain, minus.gain),
     }
     card, dynamics, delay, left = min(
-        (_followed(measured, static, *each) for each in _dynamics(static)),
+        (_followed(measured, static, *dynamic) for dynamic in _dynamics(static)),
         key=lambda each: each[3],
     )
     spread = np.concatenate([each.current for each in measured])
@@ -254,23 +254,26 @@ def _followed(
     drive = Drive(neutral.with_numbers({"Z19": 1e-3, **static, **dynamics}))
     squares, size = np.zeros(DELAYS.size), 0
     try:
-        for each in measured:
-            given = each.experiment.input
+        for measured_current in measured:
+            given = measured_current.experiment.input
             run = drive.simulate(
                 given.values,
                 RATE,
                 time=given.time,
                 interpolation="previous" if given.is_held else "linear",
-                start=each.experiment.begins,
+                start=measured_current.experiment.begins,
             )
             parts = (run.current_positive, run.current_negative)
-            simulated = np.sum([parts[way] for way in each.sides], axis=0)
-            if each.channel.kind == "signed_current":
+            simulated = np.sum([parts[way] for way in measured_current.sides], axis=0)
+            if measured_current.channel.kind == "signed_current":
                 simulated = np.abs(run.current)
             for k, delay in enumerate(DELAYS):
-                left = np.interp(each.time - delay, run.time, simulated) - each.current
+                left = (
+                    np.interp(measured_current.time - delay, run.time, simulated)
+                    - measured_current.current
+                )
                 squares[k] += float(left @ left)
-            size += each.time.size
+            size += measured_current.time.size
     except InputError:  # a command beyond what a card takes, or a filter too fast for the step
         return card, dynamics, 0.0, inf
     best = int(np.argmin(squares))

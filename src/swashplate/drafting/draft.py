@@ -167,7 +167,7 @@ def draft_campaign(
     for name in sorted(given.keys() & units.keys()):
         _check_unit(given[name], units[name], f"Column '{name}' ({given[name]})")
     numbers = [_numbers(log, [column.name for column in log.columns]) for log in opened]
-    parts = {name: [each[name] for each in numbers if name in each] for name in headers}
+    parts = {name: [number[name] for number in numbers if name in number] for name in headers}
     guesses = _guesses(headers, parts, counts_per_turn, given, units)
     # an axis is called like its drive, but no machine like the start for any of them
     axes = _axes(guesses, "drive" if drive in (None, NEUTRAL) else Path(drive or "").stem)
@@ -177,12 +177,12 @@ def draft_campaign(
     lines = [HEADER, heading, ""]
     for name, axis in axes.items():
         lines += _axis_lines(name, axis, guesses, parts, opened[0], drive, counts_per_turn)
-    used = [each for axis in axes.values() for each in (*axis.inputs, *axis.channels.values())]
-    first = {each.name for each in opened[0].columns} - {each.name for each in used}
+    used = [guess for axis in axes.values() for guess in (*axis.inputs, *axis.channels.values())]
+    first = {column.name for column in opened[0].columns} - {guess.name for guess in used}
     left = ", ".join(e.name for e in guesses if e.name in first and e.kind != "time")
     if left:
         lines += [f"{UNUSED}: {left}", ""]
-    if counts_per_turn is not None and all(each.kind != "encoder_counts" for each in used):
+    if counts_per_turn is not None and all(guess.kind != "encoder_counts" for guess in used):
         among = f" among {left}" if left else ""
         lines += [f"{NO_ENCODER}{among}; counts_per_turn = {counts_per_turn:.12g} is left out", ""]
     text, runs = "\n".join(lines), list[_Run]()
@@ -194,12 +194,12 @@ def draft_campaign(
             near = log.path.resolve().parent.name, log.path.name
             made.more.insert(0, f"name = {toml_string('/'.join(near))}")
         runs.append(made)
-    held_back = _held_back([each for each in runs if each.role == '"fit"'])
+    held_back = _held_back([run for run in runs if run.role == '"fit"'])
     runs, order = _in_time(runs)
     lines += order
-    for each in runs:
-        role = '"validate"' if each is held_back else each.role
-        lines += ["[[runs]]", f"file = {each.file}", f"role = {role}", *each.more, ""]
+    for run in runs:
+        role = '"validate"' if run is held_back else run.role
+        lines += ["[[runs]]", f"file = {run.file}", f"role = {role}", *run.more, ""]
     return "\n".join(lines).rstrip() + "\n"
 
 
@@ -386,18 +386,18 @@ def _axes(guesses: Sequence[_Guess], plain: str) -> dict[str, _Axis]:
 
     An axis needs an input and a channel; columns without a prefix belong to the only axis.
     """
-    prefixes = dict.fromkeys(each.axis for each in guesses if each.kind in INPUTS and each.axis)
+    prefixes = dict.fromkeys(guess.axis for guess in guesses if guess.kind in INPUTS and guess.axis)
     axes = {prefix: _axis([e for e in guesses if e.axis == prefix]) for prefix in prefixes}
     axes = {prefix: axis for prefix, axis in axes.items() if axis.channels}
     return axes if len(axes) > 1 else {plain: _axis(guesses)}
 
 
-def _axis(ours: Sequence[_Guess]) -> _Axis:
-    made = _Axis([each for each in ours if each.kind in INPUTS], {})
-    for each in ours:
-        if each.kind not in ("", "time", *INPUTS):
-            number = 1 + sum(each.kind == other.kind for other in made.channels.values())
-            made.channels[each.kind if number == 1 else f"{each.kind}_{number}"] = each
+def _axis(guesses: Sequence[_Guess]) -> _Axis:
+    made = _Axis([guess for guess in guesses if guess.kind in INPUTS], {})
+    for guess in guesses:
+        if guess.kind not in ("", "time", *INPUTS):
+            number = 1 + sum(guess.kind == other.kind for other in made.channels.values())
+            made.channels[guess.kind if number == 1 else f"{guess.kind}_{number}"] = guess
     return made
 
 
@@ -418,8 +418,8 @@ def _axis_lines(
     if drive is not None:
         own = f"drive = {toml_string(name if name in preset_names() else drive)}"
     clock = f"{NO_TIME}    # {FIXME}: no column of time found; samples a second"
-    clocks = {each.name: _clock(each, guesses) for each in guesses}
-    main = next((clocks[each.name] for each in (*axis.inputs, *guesses)), "") or clock
+    clocks = {guess.name: _clock(guess, guesses) for guess in guesses}
+    main = next((clocks[guess.name] for guess in (*axis.inputs, *guesses)), "") or clock
     start = 'start = "rest"    # at the first sample: rest, steady or estimated'
     which = f'column = "{FIXME}"    # which of {", ".join(repr(each.name) for each in log.columns)}'
     kind = f'kind = "voltage"    # {FIXME}: or current, or other'
@@ -427,12 +427,12 @@ def _axis_lines(
     if not axis.channels:
         kind = f'kind = "shaft_speed"    # {FIXME}: or position, encoder_counts ...'
         tables["channels.measured"] = [kind, f"{which} was measured?"]
-    signals = [("input", each) for each in axis.inputs[:1]]
-    signals += [(f"channels.{toml_key(key)}", each) for key, each in axis.channels.items()]
-    for table, each in signals:
-        tables[table] = _signal_lines(each, parts[each.name], counts_per_turn)
-        tables[table] += [clocks[each.name]] * (clocks[each.name] not in ("", main))
-    tables["input"] += [BETWEEN, *(f"# another input? '{each.name}'" for each in axis.inputs[1:])]
+    signals = [("input", guess) for guess in axis.inputs[:1]]
+    signals += [(f"channels.{toml_key(key)}", channel) for key, channel in axis.channels.items()]
+    for table, signal in signals:
+        tables[table] = _signal_lines(signal, parts[signal.name], counts_per_turn)
+        tables[table] += [clocks[signal.name]] * (clocks[signal.name] not in ("", main))
+    tables["input"] += [BETWEEN, *(f"# another input? '{guess.name}'" for guess in axis.inputs[1:])]
     lines = [f"[axes.{toml_key(name)}]", own, main, start, ""]
     for table, entries in tables.items():
         lines += [f"[axes.{toml_key(name)}.{table}]", *entries, ""]
@@ -442,10 +442,10 @@ def _axis_lines(
 def _clock(signal: _Guess, guesses: Sequence[_Guess]) -> str:
     """A signal's line of time: the first column of time in its group of the file, or of all."""
 
-    def beside(each: _Guess) -> bool:
-        return each.name.rpartition("/")[0] == signal.name.rpartition("/")[0]
+    def beside(guess: _Guess) -> bool:
+        return guess.name.rpartition("/")[0] == signal.name.rpartition("/")[0]
 
-    times = sorted((each for each in guesses if each.kind == "time"), key=beside, reverse=True)
+    times = sorted((guess for guess in guesses if guess.kind == "time"), key=beside, reverse=True)
     if not times:
         return ""
     time = times[0]
@@ -455,21 +455,26 @@ def _clock(signal: _Guess, guesses: Sequence[_Guess]) -> str:
     return f"time = {{ {column}, unit = {toml_string(time.unit or 's')} }}    # {time.why}"
 
 
-def _signal_lines(each: _Guess, parts: Sequence[Array], counts_per_turn: float | None) -> list[str]:
+def _signal_lines(
+    guess: _Guess, parts: Sequence[Array], counts_per_turn: float | None
+) -> list[str]:
     """Entries of an input or a channel."""
-    percent = each.kind in ("other", "voltage") and each.unit == "%"
-    command = percent or (each.kind in ("other", "voltage") and each.full_scale > 0)
-    kind, scale = ("voltage" if command else each.kind), 1.0
+    percent = guess.kind in ("other", "voltage") and guess.unit == "%"
+    command = percent or (guess.kind in ("other", "voltage") and guess.full_scale > 0)
+    kind, scale = ("voltage" if command else guess.kind), 1.0
     known = KINDS[kind]
-    guessed = "" if each.given and kind == each.kind else "guessed: "
-    lines = [f'kind = "{kind}"    # {guessed}{known.meaning}', f"column = {toml_string(each.name)}"]
+    guessed = "" if guess.given and kind == guess.kind else "guessed: "
+    lines = [
+        f'kind = "{kind}"    # {guessed}{known.meaning}',
+        f"column = {toml_string(guess.name)}",
+    ]
     if percent:
         scale = 0.1
         lines += ['unit = "V"', "scale = 0.1    # guessed: 100 % stand for the 10 V of a card"]
     elif command:
         # rounded down, or the largest word would be beyond the 10 V that a card takes
-        scale = floor(1e12 * 10.0 / each.full_scale) / 1e12
-        why = f"guessed: 10 V over {each.full_scale}, a PLC's word at full scale"
+        scale = floor(1e12 * 10.0 / guess.full_scale) / 1e12
+        why = f"guessed: 10 V over {guess.full_scale}, a PLC's word at full scale"
         lines += ['unit = "V"', f"scale = {scale:.9g}    # {why}"]
     elif kind == "encoder_counts":
         unknown = f"# counts_per_turn = 1000    # {FIXME}: for one turn, quadrature included"
@@ -477,19 +482,19 @@ def _signal_lines(each: _Guess, parts: Sequence[Array], counts_per_turn: float |
         lines.append(unknown if counts_per_turn is None else stated)
         lines.append("gear_ratio = 1.0    # turns of the encoder for one turn of the shaft")
     else:
-        lines += _unit_lines(each)
-    if each.full_scale and not command:
-        why = f"range of the instrument over {each.full_scale}, as of a PLC's word at full scale"
+        lines += _unit_lines(guess)
+    if guess.full_scale and not command:
+        why = f"range of the instrument over {guess.full_scale}, as of a PLC's word at full scale"
         lines.append(f"scale = 1.0    # {FIXME}: {why}")
-    if size := each.rolls_over_at:
+    if size := guess.rolls_over_at:
         lines.append(f"rolls_over_at = {size:.9g}    # guessed: begins anew there")
     if empty := sum(int(np.count_nonzero(~np.isfinite(part))) for part in parts):
         lines.append(f'missing = "drop"    # guessed: {empty} cells are empty')
     neutral = next((x for part in parts for x in part[np.isfinite(part)][:1].tolist()), 0.0)
-    if neutral and each.kind == "other":
+    if neutral and guess.kind == "other":
         why = "guessed: the first sample is neutral"
         lines.append(f"offset = {-scale * neutral:.9g}    # {why}")
-    return lines + _accuracy_lines(kind, "V" if command else each.unit)
+    return lines + _accuracy_lines(kind, "V" if command else guess.unit)
 
 
 def _accuracy_lines(kind: str, unit: str | None) -> list[str]:
@@ -581,7 +586,7 @@ def _run(
     except (FileError, InputError) as error:
         return made._replace(role=f'"ignore"    # {FIXME}: {error}')
     said, stratum, peak, seen = made.file, "", 0.0, set[str]()
-    parts = [each for each in experiments if each.axis == experiments[0].axis]
+    parts = [experiment for experiment in experiments if experiment.axis == experiments[0].axis]
     duration = float(experiments[-1].input.time[-1] - experiments[0].input.time[0])
     if overview is not None:
         duration = overview.end - overview.begin
@@ -592,7 +597,7 @@ def _run(
             said += f", {len(parts)} of {len(overview.windows)} windows with motion used"
         elif len(parts) > 1:
             said += f" in {len(parts)} parts"
-    for each in (each for each in experiments if each.axis not in seen):
+    for each in (experiment for experiment in experiments if experiment.axis not in seen):
         seen.add(each.axis)
         said += f", {each.maneuver}" if each.input.kind == "voltage" else ""
         if moves_at_first(each):
@@ -618,7 +623,7 @@ def _in_time(runs: Sequence[_Run]) -> tuple[list[_Run], list[str]]:
     A log is written to its end. If files were written so far apart that none of their runs overlap,
     these are the times of a logger; those of copies lie closer together.
     """
-    read = [each for each in runs if each.duration is not None]
+    read = [run for run in runs if run.duration is not None]
     if len(read) < 2 or all(each.recorded is not None for each in read):
         return sorted(runs, key=lambda each: each.recorded or inf), []
     last_first = sorted(read, key=lambda each: each.written)
@@ -628,7 +633,7 @@ def _in_time(runs: Sequence[_Run]) -> tuple[list[_Run], list[str]]:
     )
     if not apart:
         return [*runs], [UNORDERED, ""]
-    dated = [_dated(each) if each.duration is not None else each for each in runs]
+    dated = [_dated(run) if run.duration is not None else run for run in runs]
     return sorted(dated, key=lambda each: each.written), []
 
 

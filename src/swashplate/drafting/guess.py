@@ -153,26 +153,26 @@ def guess_drive(tests: Campaign | Sequence[Experiment]) -> Guess:
     runs, unit, spoilt = list[MovingRun](), "", spiked(experiments)
     reversed_runs = list[tuple[str, str]]()
     kinds: tuple[ChannelKind, ...] = ("shaft_speed", "encoder_counts", "position")
-    for each in experiments:
+    for experiment in experiments:
         # the channel that tells how it moves: a speed before a position
-        moving = (one for kind in kinds for one in each.of_kind(kind) if one.used.sum() > 8)
+        moving = (one for kind in kinds for one in experiment.of_kind(kind) if one.used.sum() > 8)
         channel = next(moving, None)
         if channel is None:
             continue
-        if each.input.kind != "voltage":
+        if experiment.input.kind != "voltage":
             raise InputError(
-                f"{each.input.source}: the input is of the kind '{each.input.kind}', but a guess "
-                'needs a command in V: write kind = "voltage", unit = "V", and a scale that makes '
-                "its full range ±10 V; an offset is added after scaling, in V."
+                f"{experiment.input.source}: the input is of the kind '{experiment.input.kind}', "
+                'but a guess needs a command in V: write kind = "voltage", unit = "V", and a scale '
+                "that makes its full range ±10 V; an offset is added after scaling, in V."
             )
-        for used in (channel, *each.of_kind(*CURRENTS)):
-            sentence, gross = spoilt.get((each.name, used.name), ("", False))
+        for used in (channel, *experiment.of_kind(*CURRENTS)):
+            sentence, gross = spoilt.get((experiment.name, used.name), ("", False))
             if gross:
                 raise InputError(f"{sentence}.")
         unit = f"{channel.unit}/s" if channel.is_position else channel.unit
-        runs.append(moving_run(each, channel))
+        runs.append(moving_run(experiment, channel))
         if not goes_with_command(runs[-1]):
-            reversed_runs.append((each.name, channel.name))
+            reversed_runs.append((experiment.name, channel.name))
     if 0 < len(reversed_runs) < len(runs):
         run, name = reversed_runs[0]
         raise InputError(
@@ -234,7 +234,7 @@ def steady_speed(guess: Guess, way: int) -> float:
 
 def guess_table(found: Guess) -> Table:
     """What was guessed, each way."""
-    columns = (Column(each, ".4g", none="not seen") for each in ("plus", "minus"))
+    columns = (Column(side, ".4g", none="not seen") for side in ("plus", "minus"))
     made = Table(f"Axis {found.axis}, at first sight", (Column(""), *columns, UNIT))
     rows = (
         ("dead zone", found.dead_zone, "V", ".3g"),

@@ -133,10 +133,10 @@ def guessed_set(guess: Guess, source: str) -> ParameterSet:
             f"signals: {error}"
         ) from None
     said = {
-        symbol: replace(each, source=source, status="approximate")
+        symbol: replace(parameter, source=source, status="approximate")
         if symbol in changed
-        else replace(each, source="assumed: no speed determines it")
-        for symbol, each in made.parameters.items()
+        else replace(parameter, source="assumed: no speed determines it")
+        for symbol, parameter in made.parameters.items()
     }
     if not guess.creep:
         said["Z18"] = replace(said["Z18"], source=f"assumed: {_without_creep(guess)}")

@@ -56,8 +56,8 @@ def _exported(equations: tuple[Any, ...]) -> Exported:
     columns = {
         f"{model.prefix(i)}{path}": column
         for i, part in enumerate(model.parts)
-        for each in declared_by(part.parameters)
-        for path, column in zip(each.fields, each.columns, strict=True)
+        for definition in declared_by(part.parameters)
+        for path, column in zip(definition.fields, definition.columns, strict=True)
     }
     return Exported(
         model,

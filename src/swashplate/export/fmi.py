@@ -163,10 +163,10 @@ def packed(content: Content, fmi: Version, platforms: Collection[Platform]) -> b
     members |= {f"sources/{n}": text.encode() for n, text in made.texts.items() if n not in left}
     if fmi == "3.0":
         members["sources/buildDescription.xml"] = _build_description(name)
-    for each in platforms:
-        library = packaged(each.library) if content.packaged else compiled(made, each)
-        for folder in each.fmi2 if fmi == "2.0" else each.fmi3:
-            members[f"binaries/{folder}/{name}{each.ending}"] = library
+    for platform in platforms:
+        library = packaged(platform.library) if content.packaged else compiled(made, platform)
+        for folder in platform.fmi2 if fmi == "2.0" else platform.fmi3:
+            members[f"binaries/{folder}/{name}{platform.ending}"] = library
     return _zipped(members)
 
 
@@ -190,7 +190,9 @@ def _token(fmi: Version, sources: Sources, numbers: Array, table: Sequence[Varia
     for name in sorted(sources.texts):
         made.update(sources.texts[name].encode())
     made.update(numbers.astype("<f8").tobytes())
-    made.update(repr([(each.name, each.reference, each.start) for each in table]).encode())
+    made.update(
+        repr([(variable.name, variable.reference, variable.start) for variable in table]).encode()
+    )
     h = made.hexdigest()
     return f"{{{h[:8]}-{h[8:12]}-{h[12:16]}-{h[16:20]}-{h[20:32]}}}"
 
@@ -239,14 +241,16 @@ def description(content: Content, table: Sequence[Variable], fmi: Version, token
     span = {"startTime": "0", "stopTime": "10", "stepSize": step}
     ET.SubElement(root, "DefaultExperiment", span)
     listed = ET.SubElement(root, "ModelVariables")
-    for each in table:
-        flag = isinstance(each.start, bool)
-        own = {"start": str(each.start).lower()} if flag else _number(each)
+    for variable in table:
+        flag = isinstance(variable.start, bool)
+        own = {"start": str(variable.start).lower()} if flag else _number(variable)
         if two:
-            scalar = ET.SubElement(listed, "ScalarVariable", _attributes(each))
+            scalar = ET.SubElement(listed, "ScalarVariable", _attributes(variable))
             ET.SubElement(scalar, "Boolean" if flag else "Real", own)
         else:
-            ET.SubElement(listed, "Boolean" if flag else "Float64", {**_attributes(each), **own})
+            ET.SubElement(
+                listed, "Boolean" if flag else "Float64", {**_attributes(variable), **own}
+            )
     if not two:
         clock = {"name": "time", "valueReference": str(content.references.TIME)}
         clock |= {"causality": "independent", "variability": "continuous", "unit": "s"}
@@ -257,7 +261,7 @@ def description(content: Content, table: Sequence[Variable], fmi: Version, token
 
 def _head(content: Content, table: Sequence[Variable], fmi: Version, token: str) -> dict[str, str]:
     words = f"{content.title}. Own steps of {content.step:g} s."
-    read = sorted({name for each in table for name in each.feedthrough})
+    read = sorted({name for variable in table for name in variable.feedthrough})
     if read:
         words += (
             f" Some outputs depend on {', '.join(read)} at the same instant: a master that reads "
@@ -276,47 +280,49 @@ def _head(content: Content, table: Sequence[Variable], fmi: Version, token: str)
     }
 
 
-def _attributes(each: Variable) -> dict[str, str]:
+def _attributes(variable: Variable) -> dict[str, str]:
     made = {
-        "name": each.name,
-        "valueReference": str(each.reference),
-        "description": each.description,
-        "causality": each.causality,
-        "variability": each.variability,
+        "name": variable.name,
+        "valueReference": str(variable.reference),
+        "description": variable.description,
+        "causality": variable.causality,
+        "variability": variable.variability,
     }
-    if each.causality == "parameter":
+    if variable.causality == "parameter":
         made["initial"] = "exact"
     return made
 
 
-def _number(each: Variable) -> dict[str, str]:
-    made = {"unit": each.unit} if each.unit != "1" else {}
-    if each.unit in DISPLAYED:
-        made["displayUnit"] = DISPLAYED[each.unit][0]
-    if each.lower is not None:
-        made["min"] = repr(each.lower)
-    if each.upper is not None:
-        made["max"] = repr(each.upper)
-    if each.start is not None:
-        made["start"] = repr(each.start)
-    return made
+def _number(variable: Variable) -> dict[str, str]:
+    attributes = {"unit": variable.unit} if variable.unit != "1" else {}
+    if variable.unit in DISPLAYED:
+        attributes["displayUnit"] = DISPLAYED[variable.unit][0]
+    if variable.lower is not None:
+        attributes["min"] = repr(variable.lower)
+    if variable.upper is not None:
+        attributes["max"] = repr(variable.upper)
+    if variable.start is not None:
+        attributes["start"] = repr(variable.start)
+    return attributes
 
 
 def _add_structure(structure: ET.Element, table: Sequence[Variable], two: bool) -> None:
     """Outputs with the inputs that they follow at once; in FMI 2 by their places in the table."""
-    numbers = {each.name: i if two else each.reference for i, each in enumerate(table, 1)}
+    numbers = {
+        variable.name: i if two else variable.reference for i, variable in enumerate(table, 1)
+    }
     key = "index" if two else "valueReference"
-    names = [each for each in table if each.causality == "output"]
+    names = [variable for variable in table if variable.causality == "output"]
     listed, initial = structure, structure
     if two:
         listed, initial = (ET.SubElement(structure, n) for n in ("Outputs", "InitialUnknowns"))
-    for each in names:
-        read = sorted(numbers[name] for name in each.feedthrough)
-        said = {key: str(numbers[each.name]), "dependencies": " ".join(map(str, read))}
+    for name_ in names:
+        read = sorted(numbers[name] for name in name_.feedthrough)
+        said = {key: str(numbers[name_.name]), "dependencies": " ".join(map(str, read))}
         said["dependenciesKind"] = " ".join("dependent" for _ in read)
         ET.SubElement(listed, "Unknown" if two else "Output", said)
-    for each in names:
-        own = {key: str(numbers[each.name])}
+    for name in names:
+        own = {key: str(numbers[name.name])}
         ET.SubElement(initial, "Unknown" if two else "InitialUnknown", own)
 
 
@@ -330,7 +336,7 @@ def _build_description(identifier: str) -> bytes:
 
 def _add_units(root: ET.Element, table: Sequence[Variable]) -> None:
     definitions = ET.SubElement(root, "UnitDefinitions")
-    for unit in sorted({each.unit for each in table if each.unit != "1"} | {"s"}):
+    for unit in sorted({variable.unit for variable in table if variable.unit != "1"} | {"s"}):
         made = ET.SubElement(definitions, "Unit", {"name": unit})
         exponents = si_exponents(unit)
         if exponents is not None:  # FMI cannot say fractions
@@ -416,7 +422,7 @@ def compare(path: str | Path, drive: Drive, voltage: ArrayLike) -> FmuComparison
     chosen = drive if fits else drive.at_every_rate()
     run = chosen.simulate(command, 1.0 / step, interpolation="previous")
     table = table_of(content)
-    inputs = {each.name: each.start for each in table if each.causality == "input"}
+    inputs = {variable.name: variable.start for variable in table if variable.causality == "input"}
     columns = {"time": np.arange(command.size) * step, **inputs, "voltage": command}
     signals = np.empty(command.size, [(name, np.float64) for name in columns])
     for name, values in columns.items():
@@ -436,7 +442,7 @@ def compare(path: str | Path, drive: Drive, voltage: ArrayLike) -> FmuComparison
     if len(found) != command.size:
         raise InputError(f"{path} gave {len(found)} samples for a command of {command.size}.")
     differences = {name: float(np.abs(found[name] - run[name]).max()) for name in names}
-    units = {each.name: each.unit for each in table}
+    units = {variable.name: variable.unit for variable in table}
     return FmuComparison(chosen.name, command.size, differences, units)
 
 
@@ -444,7 +450,7 @@ def _step_of(path: Path, fmpy: Any) -> float:
     """The own step that an FMU declares. [s]"""
     try:
         described = fmpy.read_model_description(str(path), validate=False)
-        (found,) = [each for each in described.modelVariables if each.name == "step"]
+        (found,) = [variable for variable in described.modelVariables if variable.name == "step"]
         return float(found.start)
     except Exception:
         raise FileError(f"{path} is no FMU of swashplate.") from None

@@ -387,10 +387,10 @@ def universal(parts: Iterable[bytes]) -> bytes:
     libraries = list(parts)
     at = 8 + 20 * len(libraries)
     header, body = [struct.pack(">II", 0xCAFEBABE, len(libraries))], b""
-    for each in libraries:
-        _, cpu, kind = struct.unpack_from("<III", each)
+    for library in libraries:
+        _, cpu, kind = struct.unpack_from("<III", library)
         power = _CPU[cpu]
         body += bytes(-(at + len(body)) % (1 << power))
-        header.append(struct.pack(">IIIII", cpu, kind, at + len(body), len(each), power))
-        body += each
+        header.append(struct.pack(">IIIII", cpu, kind, at + len(body), len(library), power))
+        body += library
     return b"".join(header) + body

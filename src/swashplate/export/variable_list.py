@@ -100,8 +100,8 @@ def words_of(exported: Exported) -> dict[str, Words]:
 
 def _declared(kind: type) -> Iterator[tuple[Definition, str]]:
     """What a named tuple declares, by the path of each value."""
-    for each in declared_by(kind):
-        yield from ((each, path) for path in each.fields)
+    for definition in declared_by(kind):
+        yield from ((definition, path) for path in definition.fields)
 
 
 def variables(
@@ -168,7 +168,7 @@ def variables(
         meaning = "start settled under the first inputs, not at rest"
         settings.append(("start_steady", r.START_STEADY, meaning, False))
     if exported.bounds:
-        bounds = ", ".join(f"{name} beyond ±{each:g}" for name, each in exported.bounds.items())
+        bounds = ", ".join(f"{name} beyond ±{bound:g}" for name, bound in exported.bounds.items())
         settings.append(("clip", r.CLIP, f"clip a {bounds} instead of failing", True))
     behind = 1 + len(parameters) + len(exported.named("given"))
     for i, option in enumerate(exported.settable):

@@ -46,8 +46,8 @@ def look(
     opened, what = FORMATS[form]
     with opened(path) as held:
         items = list(held)
-        kept = [each for each in items if not each.reason]
-        left_out = {each.name: each.reason for each in items if each.reason}
+        kept = [item for item in items if not item.reason]
+        left_out = {item.name: item.reason for item in items if item.reason}
         if not kept:
             why = "".join(f"; '{each}': {reason}" for each, reason in left_out.items())[:300]
             raise FileError(f"{path} has no {what} of numbers{printable(why)}.")
@@ -218,7 +218,7 @@ def _matlab(path: Path) -> Iterator[Iterable[_Item]]:
             yield from _signals(name, np.asarray(value), "({})")
 
     variables = loadmat(path, appendmat=False, simplify_cells=True).items()
-    named = (each for each in variables if not each[0].startswith("__"))
+    named = (variable for variable in variables if not variable[0].startswith("__"))
     yield (item for name, value in named for item in items(printable(name), value))
 
 
@@ -232,7 +232,7 @@ def _hdf5(path: Path, *, matlab: bool = False) -> Iterator[Iterable[_Item]]:
         file.visit(names.append)
         if len(names) > _OBJECTS:
             raise ValueError(f"it has {len(names)} objects, more than the {_OBJECTS} that are read")
-        found = (each for each in map(file.get, names) if isinstance(each, h5py.Dataset))
+        found = (item for item in map(file.get, names) if isinstance(item, h5py.Dataset))
         items = _matlab73_items if matlab else _hdf5_items
         yield (item for dataset in found for item in items(dataset))
 
@@ -244,7 +244,7 @@ def _hdf5_items(dataset: Any, name: str | None = None, form: str = "[{}]") -> It
         if dataset.is_virtual or dataset.external:
             reason = reason or "its numbers are in other files"
         given: Any = next((dataset.attrs[key] for key in _UNITS if key in dataset.attrs), [])
-        units = [_text(each) for each in np.ravel(given).tolist()]
+        units = [_text(number) for number in np.ravel(given).tolist()]
         found = list(_signals(name, dataset, form, units, reverse=form == "({})"))
         yield from [_Item(name, reason)] if reason else found
     except (TypeError, ValueError) as error:  # a type that NumPy does not have

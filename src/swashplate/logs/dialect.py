@@ -255,7 +255,7 @@ def find_layout(lines: Sequence[str], options: TextOptions, path: Path) -> TextL
         )
     # a tab between numbers delimits them, whatever spaces there are in names
     tabbed = max((rows for _, rows, trial in trials if trial.delimiter == "\t"), default=0)
-    trials = [each for each in trials if each[2].delimiter != " " or each[1] > tabbed]
+    trials = [trial for trial in trials if trial[2].delimiter != " " or trial[1] > tabbed]
     best = max(score for score, _, _ in trials)
     equal = [trial for score, _, trial in trials if score > best - 1e-9]
     if len({trial.delimiter for trial in equal}) > 1:
@@ -297,9 +297,9 @@ def _tried(lines: Sequence[str], layout: TextLayout) -> Iterator[tuple[float, in
     ]
     columns = zip(*kept, strict=True)
     numeric = [
-        2 * sum(one for _, one in each) >= sum(cell != "" for cell, _ in each)
-        and any(one for _, one in each)
-        for each in columns
+        2 * sum(one for _, one in column) >= sum(cell != "" for cell, _ in column)
+        and any(one for _, one in column)
+        for column in columns
     ]
     layout = layout._replace(width=width, numeric=tuple(numeric))
     begin = next((place for place, row in enumerate(rows) if layout.fits(row)), None)

@@ -153,7 +153,7 @@ MOST = 100_000_000
 
 def printable(text: str) -> str:
     """A text for a sentence: what cannot be printed is replaced."""
-    return "".join(each if each.isprintable() else "�" for each in text)
+    return "".join(character if character.isprintable() else "�" for character in text)
 
 
 def said(error: BaseException) -> str:

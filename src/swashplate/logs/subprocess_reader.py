@@ -134,7 +134,7 @@ class _ReaderProcess:
         self._started = True
         answer = json.loads(line) if line.endswith(b"\n") else {}
         arrays = [np.empty(size) for size in answer.get("sizes", [])]
-        read = [source.readinto(each.view(np.uint8).data) == each.nbytes for each in arrays]
+        read = [source.readinto(array.view(np.uint8).data) == array.nbytes for array in arrays]
         if not answer or not all(read):
             self._process.wait()
             lines = self._said.read_bytes()[-2000:].decode("utf-8", "replace").split("\n")

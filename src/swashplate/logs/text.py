@@ -116,8 +116,8 @@ class _Table:
             begin += piece.count("\n")
             if lines:
                 yield [
-                    self._numbers(cells[str(each)], lines, each, count, clocks)
-                    for each in positions
+                    self._numbers(cells[str(position)], lines, position, count, clocks)
+                    for position in positions
                 ]
             count += len(lines)
 

@@ -106,7 +106,7 @@ NEUTRAL = "neutral"
 
 def preset_names() -> tuple[str, ...]:
     """Names of the packaged sets, Kruse's axes first."""
-    names = {each.name.removesuffix(".toml") for each in SETS.iterdir() if each.is_file()}
+    names = {path.name.removesuffix(".toml") for path in SETS.iterdir() if path.is_file()}
     return (*AXES, *sorted(names - set(AXES) - {"__init__.py"}))
 
 
@@ -204,7 +204,7 @@ def read_set(text: str, origin: str) -> ParameterSet:
         "refinements": contents.refinements,
     }
     parameters: dict[str, Parameter] = {}
-    kinds = (each.parameters for each in equations)
+    kinds = (equation.parameters for equation in equations)
     try:
         definitions = definitions_of(tuple(kind for kind in kinds if kind is not None))
         for column in model.unreached:
@@ -217,7 +217,7 @@ def read_set(text: str, origin: str) -> ParameterSet:
                 parameters[symbol] = parameter_of(definition, entry)
     except ParameterError as error:
         raise ParameterError(f"{origin}: {error}") from None
-    values = {symbol: each.values[0] for symbol, each in parameters.items()}
+    values = {symbol: parameter.values[0] for symbol, parameter in parameters.items()}
     return ParameterSet(
         name=contents.name,
         title=contents.title,
@@ -258,7 +258,7 @@ def _replacements(entries: Sequence[EquationPlaces], origin: str) -> tuple[Repla
 
 def _packaged_card(name: str, origin: str) -> CardFile:
     cards = SETS.joinpath("cards")
-    names = sorted(each.name.removesuffix(".toml") for each in cards.iterdir())
+    names = sorted(path.name.removesuffix(".toml") for path in cards.iterdir())
     if name not in names:
         raise ParameterError(
             f"{origin}: there is no packaged control card '{name}'; there are "
@@ -274,7 +274,7 @@ def parameter_of(definition: Definition, entry: ParameterEntry) -> Parameter:
     given = entry.value if isinstance(entry.value, list) else [entry.value]
     try:
         numbers, bounds = (
-            tuple(to_si(each, entry.unit, definition.unit, what) for each in values)
+            tuple(to_si(value, entry.unit, definition.unit, what) for value in values)
             for values in (given, entry.bounds or ())
         )
     except InputError as error:
@@ -302,7 +302,7 @@ def dump_set(parameters: ParameterSet) -> str:
     if parameters.options != options_of(parameters.numbers):
         options["options"] = sorted(parameters.options)
     if parameters.equations:
-        options["equations"] = [each.places for each in parameters.equations]
+        options["equations"] = [equation.places for equation in parameters.equations]
     if parameters.motion != "shaft":
         options["motion"] = parameters.motion
     if parameters.unreached:
@@ -310,16 +310,19 @@ def dump_set(parameters: ParameterSet) -> str:
         unreached.update(parameters.unreached)
         options["unreached"] = unreached
     blocks: dict[str, dict[str, object]] = {"model": options}
-    for symbol, each in parameters.items():
+    for symbol, parameter in parameters.items():
         entry = inline_table()
-        entry.append("value", list(each.values) if isinstance(each.value, Pair) else each.value)
-        entry.append("unit", each.unit)
-        if each.source:
-            entry.append("source", each.source)
-        entry.append("status", each.status)
-        if each.own_bounds is not None:
-            entry.append("bounds", list(each.own_bounds))
-        blocks.setdefault(each.definition.block, {})[symbol] = entry
+        entry.append(
+            "value",
+            list(parameter.values) if isinstance(parameter.value, Pair) else parameter.value,
+        )
+        entry.append("unit", parameter.unit)
+        if parameter.source:
+            entry.append("source", parameter.source)
+        entry.append("status", parameter.status)
+        if parameter.own_bounds is not None:
+            entry.append("bounds", list(parameter.own_bounds))
+        blocks.setdefault(parameter.definition.block, {})[symbol] = entry
     text = document()
     text.add(comment("swashplate parameter set; SI units; [plus, minus] as magnitudes"))
     text.add("format", 1)

@@ -121,7 +121,7 @@ class Entries(Mapping[str, Parameter]):
 
     def _keep(self, parameters: Mapping[str, Parameter]) -> None:
         """Keep parameters as they are from now on, and all their numbers by column."""
-        numbers = {k: v for each in parameters.values() for k, v in each.numbers.items()}
+        numbers = {k: v for parameter in parameters.values() for k, v in parameter.numbers.items()}
         object.__setattr__(self, "parameters", MappingProxyType(parameters))
         object.__setattr__(self, "numbers", MappingProxyType(numbers))
 
@@ -196,15 +196,15 @@ class ParameterSet(Entries):
         if missing:
             raise ParameterError(f"{self.name}: no value for {', '.join(missing)}.")
         self._keep({name: self.parameters[name] for name in known if name in self.parameters})
-        for each in self.values():
-            if each.own_bounds is None:
+        for parameter in self.values():
+            if parameter.own_bounds is None:
                 continue
-            low, high = each.own_bounds
-            for column, value in each.numbers.items():
+            low, high = parameter.own_bounds
+            for column, value in parameter.numbers.items():
                 if not low <= value <= high:
                     raise ParameterError(
-                        f"{self.name}: {column} ({each.name}) is {value:g} {each.unit}, outside "
-                        f"its bounds {low:g} to {high:g}."
+                        f"{self.name}: {column} ({parameter.name}) is {value:g} {parameter.unit}, "
+                        f"outside its bounds {low:g} to {high:g}."
                     )
         numbers = {name: np.array([number]) for name, number in self.numbers.items()}
         refuse(self.name, broken_rules(numbers, definitions))
@@ -213,7 +213,7 @@ class ParameterSet(Entries):
     @property
     def definitions(self) -> Definitions:
         """What the set can have a value of, by symbol: the package's, then its own equations'."""
-        kinds = (each.parameters for each in self.equations)
+        kinds = (equation.parameters for equation in self.equations)
         return definitions_of(tuple(kind for kind in kinds if kind is not None))
 
     def __repr__(self) -> str:
@@ -283,7 +283,9 @@ class ParameterSet(Entries):
         for block, title in titles.items():
             columns = (Column("symbol"), Column("name", wrap=True), *numbers)
             table = Table(title, (*columns, UNIT, Column("status")), si=True)
-            members = [each for each in self.values() if each.definition.block == block]
+            members = [
+                parameter for parameter in self.values() if parameter.definition.block == block
+            ]
             for source, group in groupby(members, key=lambda each: each.source):
                 if source:
                     table.add("", f"{source}:", None, None, "", section=True)

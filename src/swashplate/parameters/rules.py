@@ -119,7 +119,7 @@ def check_options(owner: str, options: frozenset[str], numbers: Mapping[str, flo
             raise ParameterError(
                 f"{owner}: there is no option '{option}'; there are {', '.join(OPTIONS)}."
             )
-        own = [DEFINITIONS.find(name) for name, each in SWITCHES.items() if each == option]
+        own = [DEFINITIONS.find(name) for name, switch in SWITCHES.items() if switch == option]
         sized = [each for each in own if each.least is not None]
         if sized and all(numbers.get(each.symbol, 0.0) == 0.0 for each in sized):
             raise ParameterError(
@@ -218,7 +218,7 @@ def _extremes(channel: Channel, pump: Pump, side: int, voltages: Array) -> tuple
 
 
 def _plain_tuple(values: Array, length: int) -> tuple[float, ...]:
-    return tuple(float(each) for each in values)
+    return tuple(float(value) for value in values)
 
 
 # compiled code needs to know the length; Numba's function for it does not run uncompiled

@@ -215,7 +215,7 @@ def in_lines(label: str, letters: int) -> str:
     lines = wrap(label.replace("_", "_ "), max(letters, 8), break_on_hyphens=False)
     if len(lines) > 3:
         lines = [lines[0], f"{lines[1].rstrip('_')}…", lines[-1]]
-    return "\n".join(each.replace("_ ", "_") for each in lines)
+    return "\n".join(line.replace("_ ", "_") for line in lines)
 
 
 def handle(name: str, color: str, dashes: Dashes = "solid", width: float = 2.0) -> Line2D:

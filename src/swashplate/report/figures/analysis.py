@@ -225,7 +225,7 @@ def plot_limit_timeline(
     InputError
         If the reference speed has another length than the run.
     """
-    acting, unit = [each for each in Limit if run.held_back(each).any()], display_unit("rad/s")
+    acting, unit = [limit for limit in Limit if run.held_back(limit).any()], display_unit("rad/s")
     asked = None if reference is None else np.asarray(reference, dtype=np.float64)
     if asked is not None and asked.shape != run.time.shape:
         raise InputError(

@@ -92,7 +92,9 @@ class PanelColumn(NamedTuple):
 
 def _signals(experiment: Experiment) -> dict[tuple[str, str], InputSignal | Channel]:
     """The input, whose name is empty, and the channels, by name and unit."""
-    channels = {(name, each.shown_unit): each for name, each in experiment.channels.items()}
+    channels = {
+        (name, channel.shown_unit): channel for name, channel in experiment.channels.items()
+    }
     return {("", experiment.input.unit): experiment.input, **channels}
 
 
@@ -110,11 +112,14 @@ def _counted(signal: InputSignal | Channel) -> Array:
 def _column(key: tuple[str, str], signals: Sequence[InputSignal | Channel]) -> PanelColumn:
     # what is ignored may leave the panel: one spike would flatten all runs
     shown = [_counted(signal) for signal in signals]
-    low, high = min(float(each.min()) for each in shown), max(float(each.max()) for each in shown)
+    low, high = (
+        min(float(experiment.min()) for experiment in shown),
+        max(float(experiment.max()) for experiment in shown),
+    )
     kind, unit = signals[0].kind, display_unit(key[1], max(abs(low), abs(high)))
     free = kind in ("position", "encoder_counts")
     if free:
-        high = 0.5 * max(float(np.ptp(each)) for each in shown)
+        high = 0.5 * max(float(np.ptp(experiment)) for experiment in shown)
         low = -high
     words = {"encoder_counts": "encoder's angle", "other": signals[0].source.column}
     label = unit.label(words.get(kind, kind.replace("_", " ")))
@@ -153,8 +158,8 @@ def plot_campaign(experiments: Iterable[Experiment], *, title: str | None = None
     stretches of time (`lines.thinned`), and as a line also in SVG and PDF.
     """
     axes: dict[str, list[Experiment]] = {}
-    for each in experiments:
-        axes.setdefault(each.axis, []).append(each)
+    for experiment in experiments:
+        axes.setdefault(experiment.axis, []).append(experiment)
     if not axes:
         raise InputError("A page of a campaign needs at least one experiment.")
     figures = []
@@ -197,7 +202,7 @@ def _page(experiments: Sequence[Experiment], columns: Sequence[PanelColumn], tit
                 write(ax, "not measured", (0.5, 0.5), (0.0, 0.0), ha="center", va="center")
             # room for the heading, and in the first row for the columns' names
             heads = (column.key[0] or "input", 0.085), (column.words, 0.066)
-            cut = [shorten(each, room / letter) for each, letter in heads]
+            cut = [shorten(head, room / letter) for head, letter in heads]
             words, pad = ("\n".join(cut), 20.0) if number == 0 else (" ", 6.0)
             ax.set_title(words, loc="left", fontsize=SMALL, color=INK, pad=pad)
         _heading(row[0], experiment)
@@ -277,7 +282,7 @@ def _heading(ax: Axes, experiment: Experiment) -> None:
 
 def _stamps_in_words(experiment: Experiment) -> list[str]:
     """The rates, from the lowest to the highest, and the gaps of the signal that has most."""
-    stamps = [each.time for each in _signals(experiment).values()]
+    stamps = [signal.time for signal in _signals(experiment).values()]
     rates = [1.0 / float(np.median(np.diff(time))) for time in stamps]
     ends = [f"{r:.0f}" if r >= 100.0 else f"{r:.3g}" for r in (min(rates), max(rates))]
     # stamps that jitter do not have quite the same rate
@@ -315,15 +320,15 @@ def plot_overview(overview: Overview, *, title: str | None = None) -> Figure:
     title : str, optional
         By default the run's name.
     """
-    several = len({each.axis for each in overview.signals}) > 1
-    largest = [_largest(each) for each in overview.signals]
+    several = len({signal.axis for signal in overview.signals}) > 1
+    largest = [_largest(signal) for signal in overview.signals]
     units = [
-        display_unit(each.shown_unit, size)
-        for each, size in zip(overview.signals, largest, strict=True)
+        display_unit(signal.shown_unit, size)
+        for signal, size in zip(overview.signals, largest, strict=True)
     ]
     labels = [
-        in_lines(unit.label(f"{each.axis} {each.name}" if several else each.name), LABELLED)
-        for each, unit in zip(overview.signals, units, strict=True)
+        in_lines(unit.label(f"{signal.axis} {signal.name}" if several else signal.name), LABELLED)
+        for signal, unit in zip(overview.signals, units, strict=True)
     ]
     used = np.array([(w.begin, w.end) for w in overview.windows if w.used]).reshape(-1, 2)
     left_out = np.array([(w.begin, w.end) for w in overview.windows if not w.used]).reshape(-1, 2)
@@ -496,11 +501,11 @@ def plot_prediction(
     rows = rows_within(channel.time, window, str(channel.source))
     time, used = channel.time[rows], channel.used[rows]
     counted = _scale_rows(used)
-    panels = [_overlay(each, rows) for each in signals]
+    panels = [_overlay(signal, rows) for signal in signals]
     judged = signals[-1]
     residual = judged.residual[rows]
     panels.append(Overlay("residual", judged.experiment[judged.channel].unit, [(residual, INK)]))
-    largest = [max(float(np.abs(v[counted]).max()) for v, _ in each.curves) for each in panels]
+    largest = [max(float(np.abs(v[counted]).max()) for v, _ in panel.curves) for panel in panels]
     pairs = zip(panels, largest, strict=True)
     units = [display_unit(panel.unit, size or 1.0) for panel, size in pairs]
     labels = [unit.label(panel.words) for panel, unit in zip(panels, units, strict=True)]
@@ -510,8 +515,8 @@ def plot_prediction(
     figure, axes = sheet(heights, words, labels, "time (s)", legend=legend)
     for ax, panel, unit in zip(axes, panels, units, strict=True):
         shown = [unit.factor * values[counted] for values, _ in panel.curves]
-        low = min(float(each.min()) for each in shown)
-        high = max(float(each.max()) for each in shown)
+        low = min(float(experiment.min()) for experiment in shown)
+        high = max(float(experiment.max()) for experiment in shown)
         room = 0.1 * (high - low) or 1.0
         ax.set_ylim(low - room, high + room)
         zero_line(ax)

@@ -165,7 +165,7 @@ def _scale(axes: list[Axes], response: FrequencyResponse) -> None:
     gain.set_ylim(low, high)
     _number(gain, "y", high / low)
     low, high = phase.get_ylim()
-    step = next((each for each in STEPS if (high - low) / each <= MOST_STEPS), STEPS[-1])
+    step = next((step for step in STEPS if (high - low) / step <= MOST_STEPS), STEPS[-1])
     phase.yaxis.set_major_locator(MultipleLocator(step))
     for distortion in axes[2:]:
         distortion.set_ylim(0.0, max(1.05 * 100.0 * float(response.distortion.max()), 1e-3))

@@ -400,7 +400,7 @@ def _swash(angle: Array, stops: Stops) -> Panel:
 def _chain(panels: Sequence[Panel], time: Array, title: str, rows: slice = slice(None)) -> Figure:
     """The panels one under another, with a legend of the limits that act anywhere."""
     legend = _legend(panels, tuple(SHADES.values()))
-    figure, axes = sheet([each.height for each in panels], title, below="time (s)", legend=legend)
+    figure, axes = sheet([panel.height for panel in panels], title, below="time (s)", legend=legend)
     for ax, panel in zip(axes, panels, strict=True):
         _fill(ax, panel, time, rows)
     fit_time(axes[-1], time[rows])
@@ -420,20 +420,20 @@ def _fill(ax: Axes, panel: Panel, time: Array, rows: slice) -> None:
     """
     for look, spans in panel.limits:
         shade(ax, spans, look)
-    largest = max(float(np.abs(each.values[rows]).max()) for each in panel.traces)
+    largest = max(float(np.abs(trace.values[rows]).max()) for trace in panel.traces)
     unit = display_unit(panel.si, max(largest, panel.least) or inf)
     name, factor = unit
     label = f"{panel.words}\n({name})" if name else panel.words
     ax.set_ylabel(label, fontsize=NORMAL, color=INK)
     zero_line(ax)
-    shown = [factor * each.values[rows] for each in panel.traces]
+    shown = [factor * trace.values[rows] for trace in panel.traces]
     low, high = min(float(each.min()) for each in shown), max(float(each.max()) for each in shown)
     labels = []
-    for level, words in ((factor * each.level, each.words) for each in panel.marks):
+    for level, words in ((factor * mark.level, mark.words) for mark in panel.marks):
         if (high if level > 0.0 else -low) >= NEAR * abs(level):
             ax.axhline(level, color=GREY, linewidth=THIN, dashes=(5.0, 3.0), zorder=1.5)
             labels.append(MarginLabel(level, words, GREY))
-    ends = [low, high, *(each.height for each in labels)]
+    ends = [low, high, *(label.height for label in labels)]
     if panel.from_zero or not 0.0 < high - low < FAR * max(abs(low), abs(high)):
         ends.append(0.0)
     span = max(ends) - min(ends)
@@ -517,7 +517,7 @@ def plot_comparison(simulations: Mapping[str, Simulation], *, title: str | None 
     words = "Shaft speed under the same command" if title is None else title
     legend = [handle(name, *look) for name, look in looks.items()]
     heights = [1.2, 2.6, 1.6] if len(simulations) > 1 else [1.2, 2.6]
-    volts = all(each.voltage is not None for each in simulations.values())
+    volts = all(simulation.voltage is not None for simulation in simulations.values())
     labels = ["voltage (V)" if volts else "current (A)", speed.label("shaft speed")]
     labels.append(speed.label("difference"))
     figure, axes = sheet(heights, words, labels, "time (s)", legend=legend)
@@ -525,8 +525,8 @@ def plot_comparison(simulations: Mapping[str, Simulation], *, title: str | None 
         zero_line(ax)
     (reference, first), *_ = simulations.items()
     commands = [
-        each.current if each.voltage is None or not volts else each.voltage
-        for each in simulations.values()
+        simulation.current if simulation.voltage is None or not volts else simulation.voltage
+        for simulation in simulations.values()
     ]
     for (name, each), command in zip(simulations.items(), commands, strict=True):
         (color, dashes), time = looks[name], each.time
@@ -543,5 +543,5 @@ def plot_comparison(simulations: Mapping[str, Simulation], *, title: str | None 
     if len(simulations) > 1:
         said = f"speed less that of {reference}"
         write(axes[2], said, (0.0, 1.0), color=looks[reference].color)
-    fit_time(axes[-1], *(each.time for each in simulations.values()))
+    fit_time(axes[-1], *(simulation.time for simulation in simulations.values()))
     return figure

@@ -45,8 +45,8 @@ def _polyline(x: Array, y: Array) -> Markup:
 
 def profile_chart(profile: Profile, unknown: Unknown) -> Markup:
     """The least cost over one unknown, above that of the optimum, and where the interval ends."""
-    values = np.array([unknown.to_value(each.number) for each in profile.points])
-    rises = np.array([each.cost - profile.cost for each in profile.points])
+    values = np.array([unknown.to_value(point.number) for point in profile.points])
+    rises = np.array([point.cost - profile.cost for point in profile.points])
     if not values.size:
         return Markup("")
     left, right, top, bottom = 70.0, 316.0, 10.0, 182.0

@@ -169,12 +169,14 @@ def _page(
     if isinstance(nominal, ParameterSet) and nominal.title:
         named += f" ({nominal.title})"
     axes = {run.experiment.axis for run in runs}
-    examined = {each: examine(each) for each in campaign if each.axis in axes}
+    examined = {
+        experiment: examine(experiment) for experiment in campaign if experiment.axis in axes
+    }
     said = [
-        (run.name, ended(f"{run.name}, {each.signal}: {words}"))
+        (run.name, ended(f"{run.name}, {quality.signal}: {words}"))
         for run, qualities in examined.items()
-        for each in qualities
-        for words in each.findings
+        for quality in qualities
+        for words in quality.findings
     ]
     findings: dict[str, list[int]] = {}
     for number, (name, _) in enumerate(said, start=1):
@@ -206,7 +208,7 @@ def _page(
 
 def _qualities(runs: Sequence[ShownRun], role: str = "") -> list[RunQuality]:
     """Of all runs, or of those of a role."""
-    return [each.quality for run in runs if role in ("", run.role) for each in run.channels]
+    return [channel.quality for run in runs if role in ("", run.role) for channel in run.channels]
 
 
 def _agreement_section(
@@ -256,7 +258,9 @@ def _curves_section(runs: Sequence[ShownRun], virtual: bool) -> Section:
     )
     blocks = [text(words, "screen")]
     for number, run in enumerate(runs):
-        measures = [(each.quality.channel, run_words(each.quality)) for each in run.channels]
+        measures = [
+            (channel.quality.channel, run_words(channel.quality)) for channel in run.channels
+        ]
         content = {"number": number, "run": run, "measures": measures, "measured": measured}
         blocks.append(PageBlock("run", content))
     return Section("runs", "Curves", blocks)
@@ -269,9 +273,9 @@ def _live_section(fit: Fit, campaign: Campaign, runs: Sequence[ShownRun]) -> Sec
     if isinstance(drive, ParameterSet) and isinstance(nominal, ParameterSet):
         # the statuses are those of the nominal set: what was fitted is what has moved
         before, moved = nominal.parameters, {}
-        for symbol, each in drive.parameters.items():
-            same = symbol in before and before[symbol].values == each.values
-            moved[symbol] = replace(each, status="fixed" if same else "fitted")
+        for symbol, parameter in drive.parameters.items():
+            same = symbol in before and before[symbol].values == parameter.values
+            moved[symbol] = replace(parameter, status="fixed" if same else "fitted")
         drive = replace(drive, parameters=moved)
         out = [run for run in runs if run.role == "validate"] or runs
         worst = max(out, key=lambda run: run_error(run, runs)).experiment
@@ -290,13 +294,13 @@ def _residual_section(runs: Sequence[ShownRun]) -> Section:
     )
     heads = ("run", "role", "channel", "correlation with the input")
     made = Table("", tuple(map(Column, (*heads, "verdict"))))
-    for each in _qualities(runs):
-        if (test := each.test) is not None:
+    for quality in _qualities(runs):
+        if (test := quality.test) is not None:
             lag, value = test.peak
             said = f"correlation with the input, largest {value:+.2f} at {lag:.2g} s"
             drawn = charts.lags_chart(test.lags, test.correlation, test.band, said)
-            run = each.experiment
-            made.add(run.name, run.role, each.channel, drawn, test.verdict)
+            run = quality.experiment
+            made.add(run.name, run.role, quality.channel, drawn, test.verdict)
     return Section("residuals", "Residuals", [text(words), PageBlock("table", made, "residuals")])
 
 
@@ -335,9 +339,9 @@ def _setup_section(
         if key != "campaign":
             made.add(key, words)
     blocks = [PageBlock("table", made, "notes")]
-    for each in stages:
-        blocks.append(PageBlock("heading", f"Stage {each.stage.name}", "h3"))
-        blocks += listed_block(_stage_words(each))
+    for stage in stages:
+        blocks.append(PageBlock("heading", f"Stage {stage.stage.name}", "h3"))
+        blocks += listed_block(_stage_words(stage))
     return Section("setup", "Configuration", blocks)
 
 
@@ -350,8 +354,8 @@ def _stage_words(fit: StageFit) -> list[str]:
     words.append(f"Fits {listed(list(problem.channels))}.")
     words.append(tables.scales_words(fit))
     for kind, windows in stage.weights.items():
-        words += [f"Weight on {kind.replace('_', ' ')}: {_window(each)}." for each in windows]
-    own = sum(each.run is not None for each in problem.unknowns)
+        words += [f"Weight on {kind.replace('_', ' ')}: {_window(window)}." for window in windows]
+    own = sum(unknown.run is not None for unknown in problem.unknowns)
     if own:
         words.append(f"Besides there are {own} parameters of single runs, with wide bounds.")
     return words
@@ -389,7 +393,7 @@ def _verdict_section(judged: Verdict, findings: int) -> Section:
 
 
 def _parameter_section(fit: Fit, stages: Sequence[StageFit], truth: ParameterSet | None) -> Section:
-    made = [tables.estimates_table(each, truth=truth) for each in stages]
+    made = [tables.estimates_table(stage, truth=truth) for stage in stages]
     words = (
         "Change is from the nominal value. Intervals are for residuals that are correlated over "
         "time. A parameter at a bound has no symmetric interval. Parameter files have SI units."
@@ -403,9 +407,9 @@ def _parameter_section(fit: Fit, stages: Sequence[StageFit], truth: ParameterSet
                 f"estimates. {inside} of {counted} intervals contain it."
             )
         )
-    for table, each in zip(made, stages, strict=True):
+    for table, stage in zip(made, stages, strict=True):
         blocks += titled(table, "parameters")
-        own = tables.estimates_table(each, own=True)
+        own = tables.estimates_table(stage, own=True)
         if own.rows:
             summary = f"{count(len(own.rows), 'parameter')} of single runs"
             blocks.append(PageBlock("details", [PageBlock("table", own, "parameters")], summary))
@@ -416,10 +420,10 @@ def _parameter_section(fit: Fit, stages: Sequence[StageFit], truth: ParameterSet
 
 def _identifiability_section(stages: Sequence[StageFit]) -> Section:
     blocks = []
-    for each in stages:
-        found = identifiability_of(each)
-        general = [unknown.run is None for unknown in each.problem.unknowns]
-        blocks.append(PageBlock("heading", f"Stage {each.stage.name}", "h3"))
+    for stage in stages:
+        found = identifiability_of(stage)
+        general = [unknown.run is None for unknown in stage.problem.unknowns]
+        blocks.append(PageBlock("heading", f"Stage {stage.stage.name}", "h3"))
         blocks += listed_block(found.sentences())
         width = Column("half width", ".3g", "%", none="none")
         columns = (Column("direction"), width, Column("moves together"))
@@ -433,11 +437,11 @@ def _identifiability_section(stages: Sequence[StageFit]) -> Section:
             blocks.append(PageBlock("table", directions, "directions"))
         blocks.append(PageBlock("heading", "What the intervals rest on", "h4"))
         try:
-            blocks += listed_block(uncertainty_of(each).sentences())
+            blocks += listed_block(uncertainty_of(stage).sentences())
         except InputError as error:
             blocks.append(text(f"There are no intervals: {error}"))
         blocks += _effects(found, general)
-        blocks += _correlations(each, general)
+        blocks += _correlations(stage, general)
     return Section("identifiability", "Uncertainty", blocks)
 
 
@@ -471,14 +475,14 @@ def _correlations(stage: StageFit, general: Sequence[bool]) -> list[PageBlock]:
 def _starts_section(several: Mapping[str, Sequence[Solution]]) -> Section:
     blocks = []
     for stage, results in several.items():
-        failed = sum(not each.cost < 1e300 for each in results)
+        failed = sum(not result.cost < 1e300 for result in results)
         more = f"; {failed} left the model's domain" if failed else ""
         blocks += [PageBlock("heading", f"Stage {stage}", "h3")] if stage else []
         made = Table("", (Column("start"), Column("cost, best = 1", ".7g"), Column("ended")))
-        best = min(each.cost for each in results) or 1.0
-        for each in sorted(results, key=lambda each: each.cost):
-            if each.cost < 1e300:
-                made.add(str(each.number), each.cost / best, each.message)
+        best = min(result.cost for result in results) or 1.0
+        for result in sorted(results, key=lambda result: result.cost):
+            if result.cost < 1e300:
+                made.add(str(result.number), result.cost / best, result.message)
         words = f"Where each of {len(results)} starts ended, the best first{more}."
         blocks += [text(words), PageBlock("table", made, "starts")]
     return Section("starts", "Starts", blocks)
@@ -486,11 +490,11 @@ def _starts_section(several: Mapping[str, Sequence[Solution]]) -> Section:
 
 def _profile_section(fit: Fit, profiles: Sequence[Profile]) -> Section:
     tiles = []
-    for each in profiles:
-        unknown = fit.stage(each.stage).problem.unknowns.items[each.index]
-        said = [text(words, "remark") for words in each.sentences()]
+    for profile in profiles:
+        unknown = fit.stage(profile.stage).problem.unknowns.items[profile.index]
+        said = [text(words, "remark") for words in profile.sentences()]
         drawn = PageBlock(
-            "figure", charts.profile_chart(each, unknown), f"{each.name} ({each.stage})"
+            "figure", charts.profile_chart(profile, unknown), f"{profile.name} ({profile.stage})"
         )
         tiles.append(PageBlock("tile", [drawn, *said]))
     words = (
@@ -512,7 +516,7 @@ def _folds_section(folds: CrossValidation | None, stages: Sequence[StageFit]) ->
     )
     blocks = [
         text(words),
-        *(text(each, "remark") for each in folds.sentences()),
+        *(text(sentence, "remark") for sentence in folds.sentences()),
         PageBlock("table", held_out, "held-out"),
         PageBlock("table", parts, "folds"),
     ]

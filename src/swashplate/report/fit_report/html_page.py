@@ -79,7 +79,7 @@ def page(
         ("curves.js", "page.js"),
         ("page.css",),
         embedded=LIVE_SCRIPTS if "live" in kinds else (),
-        sections=[each for each in sections if each.blocks],
+        sections=[section for section in sections if section.blocks],
         what=what,
         title=title,
         facts=facts,
@@ -230,7 +230,7 @@ PATIENCE = 180.0
 
 def find_browser() -> str:
     """Path of a Chromium, which prints pages; a `FileError` where there is none."""
-    found = next((place for each in BROWSERS if (place := which(each)) is not None), None)
+    found = next((place for browser in BROWSERS if (place := which(browser)) is not None), None)
     if found is None:
         raise FileError(
             f"No browser was found that prints a PDF ({', '.join(BROWSERS)}): install Chromium, or "

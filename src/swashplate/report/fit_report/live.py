@@ -91,16 +91,16 @@ def write_live_page(
     parameters = set_of(drive)
     if campaign is not None:
         tests = campaign.select(axis=axis)
-        driven = [each for each in tests if each.input.kind == "voltage"]
+        driven = [test for test in tests if test.input.kind == "voltage"]
         if not driven:
             raise InputError(
                 f"{campaign.path.name} has no run that a voltage drives; a live page needs one."
             )
         parameters, said = at_rate_of(driven, parameters)
-        left = [each.name for each in tests if each.input.kind != "voltage"]
+        left = [test.name for test in tests if test.input.kind != "voltage"]
         if left:
             said += (f"Left out, driven by something else than a voltage: {listed(left)}.",)
-        runs = [run_of(at_instants(parameters, each)) for each in driven]
+        runs = [run_of(at_instants(parameters, experiment)) for experiment in driven]
         made = live_page(parameters, runs, campaign.title, campaign.virtual, name)
     elif command is not None:
         record, said = record_of(command.sample(rate), rate, what="voltage"), ()
@@ -125,7 +125,7 @@ def live_page(
     limits = [(1 << k, Limit[name.upper()]) for k, (_, name) in enumerate(exported.limits)]
     numbers = values_of(Drive(parameters), runs[0]["step"])
     values = _parameters(parameters)
-    before = "as fitted" if any(each["main"] for each in values) else "as it is"
+    before = "as fitted" if any(value["main"] for value in values) else "as it is"
     content = {
         "wasm": b64encode(packaged(WASM)).decode("ascii"),
         "values": b64encode(numbers.astype("<f8").tobytes()).decode("ascii"),
@@ -135,7 +135,7 @@ def live_page(
         "limits": [[bit, _word(limit)] for bit, limit in limits],
         "before": before,
         "filter": {"low": LOW_PASS, "high": DIFFERENTIATOR},
-        "unmeasured": [_shown(each) for each in UNMEASURED],
+        "unmeasured": [_shown(signal) for signal in UNMEASURED],
         "runs": runs,
     }
     colours = "".join(
@@ -164,7 +164,7 @@ def can_run(parameters: ParameterSet, experiment: Experiment) -> bool:
     return driven and not at_rate_of([experiment], parameters)[1]
 
 
-# --- parameters and design variables ---------------------------------------------------------------
+# --- parameters and design variables --------------------------------------------------------------
 
 
 def _parameters(parameters: ParameterSet) -> list[dict[str, Any]]:
@@ -217,10 +217,10 @@ def _design_variables(values: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
     for name in SHOWN:
         powers = DESIGN_VARIABLES[name]
         moves = [
-            (each["number"], powers[key])
-            for each in values
-            for key in {each["symbol"], each["column"]}  # the same without directions
-            if key in powers and each["value"] not in (0.0, 1e30)
+            (value["number"], powers[key])
+            for value in values
+            for key in {value["symbol"], value["column"]}  # the same without directions
+            if key in powers and value["value"] not in (0.0, 1e30)
         ]
         if moves:
             words = name.replace("_", " ").capitalize()
@@ -234,7 +234,7 @@ def _design_variables(values: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
 
 def run_of(experiment: Experiment) -> dict[str, Any]:
     """A run that a voltage drives, with its channels that a drive simulates."""
-    channels = [_channel(each) for each in _comparable(experiment.channels.values())]
+    channels = [_channel(channel) for channel in _comparable(experiment.channels.values())]
     return {
         **_record(voltage_record(experiment)),
         "name": experiment.name,
@@ -287,7 +287,7 @@ def _channel(channel: Channel) -> dict[str, Any]:
         "speed": channel.is_position,
         "time": packed(channel.time, interval / 2**20),
         "measured": packed(shown["factor"] * values),
-        "breaks": [int(each) for each in gap_rows(channel.time)],
+        "breaks": [int(row) for row in gap_rows(channel.time)],
         "ignored": ignored_windows(channel),
     }
 
@@ -305,7 +305,7 @@ def _shown(signal: str, name: str = "", unit: str = "", size: float = 0.0) -> di
         "factor": shown.factor,
         "label": in_lines(shown.label(words), 24),
         "residual": in_lines(shown.label("residual"), 14),
-        "shaded": [_word(each) for each in Limit if bool(each & BEFORE_CURRENT) == electric],
+        "shaded": [_word(limit) for limit in Limit if bool(limit & BEFORE_CURRENT) == electric],
     }
 
 

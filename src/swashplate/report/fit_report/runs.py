@@ -73,15 +73,15 @@ class ShownRun:
     @property
     def labels(self) -> list[Any]:
         """Labels of the panels in lines: of the input, then of each channel and its residual."""
-        names = [each.quality.channel for each in self.channels]
-        several = len({each.stage for each in self.channels}) > 1
+        names = [channel.quality.channel for channel in self.channels]
+        several = len({channel.stage for channel in self.channels}) > 1
         kind = self.experiment.input.kind
         first = self.input_unit.label("input" if kind == "other" else kind)
         made: list[Any] = [in_lines(first, LETTERS["input"])]
-        for each, name in zip(self.channels, names, strict=True):
-            words = f"{name}, {each.stage}" if names.count(name) > 1 and several else name
-            signal = in_lines(each.unit.label(words), LETTERS["overlay"])
-            made.append((signal, in_lines(each.small.label("residual"), LETTERS["residual"])))
+        for channel, name in zip(self.channels, names, strict=True):
+            words = f"{name}, {channel.stage}" if names.count(name) > 1 and several else name
+            signal = in_lines(channel.unit.label(words), LETTERS["overlay"])
+            made.append((signal, in_lines(channel.small.label("residual"), LETTERS["residual"])))
         return made
 
     @property
@@ -96,17 +96,17 @@ def shown_runs(stages: Sequence[StageFit], predicted: Sequence[RunQuality]) -> t
     A position is followed by its speed.
     """
     found = [
-        (replace(each, experiment=replace(each.experiment, role="fit")), stage.stage.name)
+        (replace(speed, experiment=replace(speed.experiment, role="fit")), stage.stage.name)
         for stage in stages
-        for each in with_speeds(stage.runs)
+        for speed in with_speeds(stage.runs)
     ]
-    found += [(each, "") for each in with_speeds(predicted)]
+    found += [(speed, "") for speed in with_speeds(predicted)]
     units, runs = {}, dict[tuple[str, str], list[ShownChannel]]()
     for name in {each.channel for each, _ in found}:
         alike = [each for each, _ in found if each.channel == name]
-        channels = [each.experiment[name] for each in alike]
-        largest = max(_largest(each.values) for each in channels)
-        residual = max(_largest(each.residual) for each in alike)
+        channels = [run.experiment[name] for run in alike]
+        largest = max(_largest(channel.values) for channel in channels)
+        residual = max(_largest(run.residual) for run in alike)
         unit = channels[0].shown_unit
         units[name] = [display_unit(unit, size) for size in (largest, residual)]
     for each, stage in found:
@@ -189,7 +189,7 @@ def run_data(run: ShownRun) -> dict[str, Any]:
     return {
         "held": drive.interpolation == "previous",
         "input": _signals(drive.time, [(run.input_unit.factor * drive.values, None)]),
-        "channels": [_channel(each) for each in run.channels],
+        "channels": [_channel(channel) for channel in run.channels],
     }
 
 
@@ -223,7 +223,7 @@ def _signals(
     interval = float(np.median(np.diff(stamps))) if stamps.size > 1 else 1.0
     return {
         "time": packed(stamps, interval / FINE),
-        "breaks": [int(each) for each in ends if 0 <= each < rows.size - 1],
+        "breaks": [int(end) for end in ends if 0 <= end < rows.size - 1],
         "signals": [packed(values[rows], step) for values, step in signals],
     }
 
@@ -243,7 +243,7 @@ def packed(values: Array, step: float | None = None) -> dict[str, Any]:
     orders = [whole]
     for _ in range(2):
         orders.append(np.diff(orders[-1], prepend=0))
-    sizes = [float(np.log2(1.0 + np.abs(each)).sum()) for each in orders]
+    sizes = [float(np.log2(1.0 + np.abs(order)).sum()) for order in orders]
     order = int(np.argmin(sizes))
     number = np.where(orders[order] < 0, -2 * orders[order] - 1, 2 * orders[order]).astype("<u4")
     planes = number.view(np.uint8).reshape(-1, 4).T.tobytes()

@@ -336,9 +336,9 @@ def run_lights(
     for run in runs:
         name = run.experiment.name
         look = [
-            f"residuals of {each.quality.channel} follow the input"
-            for each in run.channels
-            if following([each.quality], each.quality.channel)[1]
+            f"residuals of {channel.quality.channel} follow the input"
+            for channel in run.channels
+            if following([channel.quality], channel.quality.channel)[1]
         ]
         if own := findings.get(name, []):
             look.append(count(len(own), "finding"))
@@ -440,8 +440,8 @@ def _next(
     if findings:
         link = Markup('Look into the <a href="#data">{}</a> on the logs.')
         said.append(link.format(count(findings, "finding")))
-    weak = [name for each in stages for name in weak_unknowns(each)]
-    thing = "model" if any(each.stage.part == "model" for each in stages) else "drive"
+    weak = [name for stage in stages for name in weak_unknowns(stage)]
+    thing = "model" if any(stage.stage.part == "model" for stage in stages) else "drive"
     named = listed(weak[:6]) if len(weak) <= 6 else f"{', '.join(weak[:6])} and others"
     if weak and thing == "model":
         said.append(f"Not determined to within ±10 %: {named}. Add tests that move them.")
