@@ -121,10 +121,12 @@ def simulate_many(
     instance = instance_of(model, p, options=options, given=given)
     records = inputs_of(instance, inputs, rate, **sampling)
     values, count = set_columns(changes)
-    known = (*parameter_paths(model), *(f"start.{path}" for path in state_paths(model)))
+    selectable = (*parameter_paths(model), *(f"start.{path}" for path in state_paths(model)))
     for path in values:
-        if path not in known:
-            raise InputError(f"{model.name} has no parameter '{path}'; it has {', '.join(known)}.")
+        if path not in selectable:
+            raise InputError(
+                f"{model.name} has no parameter '{path}'; it has {', '.join(selectable)}."
+            )
     if cost is None and not output:
         raise InputError(f"{model.name}: say which output of the sets is wanted, or give a cost.")
     numbers = {path: np.full(count, number) for path, number in _numbers_of(instance).items()}
@@ -308,12 +310,14 @@ def _march(shared: _Sets, blocks: Sequence[Block]) -> list[tuple[dict[int, float
     for sets, options in blocks:
         padded, size = np.resize(sets, LANES), sets.size
         lanes = lanes_of(shared.model, tuple(inputs), options, shared.output)
-        own = {path: values[padded] for path, values in shared.numbers.items()}
-        found = lanes(own, inputs, record.step, measured=measured, weight=weight, keep=keep)
-        worst, values = found.worst[:size], found.cost[:size]
-        good = np.isfinite(found.end[:size]) & (worst > 0.0)
+        lane_values = {path: values[padded] for path, values in shared.numbers.items()}
+        lanes_run = lanes(
+            lane_values, inputs, record.step, measured=measured, weight=weight, keep=keep
+        )
+        worst, values = lanes_run.worst[:size], lanes_run.cost[:size]
+        good = np.isfinite(lanes_run.end[:size]) & (worst > 0.0)
         if keep:
-            values = found.outputs[:size, :: record.substeps]
+            values = lanes_run.outputs[:size, :: record.substeps]
         values[~good] = np.nan if keep else np.inf
         if keep and shared.to is not None:
             table |= {str(number): row for number, row in zip(sets, values, strict=True)}
@@ -350,8 +354,8 @@ def _run(
     elif keep:
         values = _outputs(count, samples)
     items = [blocks[k : k + several] for k in range(0, len(blocks), several)]
-    for _, made in (executor or Threads()).run(_march, shared, items):
-        for failed, sets, found in made:
+    for _, batches in (executor or Threads()).run(_march, shared, items):
+        for failed, sets, found in batches:
             for number, worst in failed.items():
                 why = f"the numbers grow beyond all bounds under this {driver}."
                 if not worst > 0.0:

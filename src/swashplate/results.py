@@ -43,9 +43,9 @@ def short(value: object) -> str:
     else:  # a model of pydantic's, or a named tuple
         kind: Any = type(value)
         names = list(getattr(kind, "model_fields", ()) or getattr(kind, "_fields", ()))
-    said = ", ".join(f"{name}={_brief(getattr(value, name))}" for name in names)
+    text = ", ".join(f"{name}={_brief(getattr(value, name))}" for name in names)
     kind = type(value).__name__
-    return f"{kind}({shorten(said, LONGEST - len(kind) - 2, placeholder=' ...')})"
+    return f"{kind}({shorten(text, LONGEST - len(kind) - 2, placeholder=' ...')})"
 
 
 def _brief(value: Any) -> str:
@@ -100,9 +100,9 @@ class Result:
         return short(self)
 
     def _tables(self) -> list[Table]:
-        made = getattr(self, "tables", None) or getattr(self, "table", None)
-        found = made() if callable(made) else []
-        return [found] if isinstance(found, Table) else list(found)
+        make_tables = getattr(self, "tables", None) or getattr(self, "table", None)
+        tables = make_tables() if callable(make_tables) else []
+        return [tables] if isinstance(tables, Table) else list(tables)
 
     def _headline(self) -> str:
         """The sentence that a reader must not miss, empty if there is none."""
@@ -125,8 +125,8 @@ class Result:
         """Text: its headline or its repr, its tables in the units that people read, sentences."""
         headline, tables = self._headline(), [str(table) for table in self._tables()]
         lines = "\n".join(f"- {sentence}" for sentence in self._sentences())
-        parts = [headline, lines, *tables] if headline else [repr(self), *tables, lines]
-        return "\n\n".join(part for part in parts if part)
+        paragraphs = [headline, lines, *tables] if headline else [repr(self), *tables, lines]
+        return "\n\n".join(part for part in paragraphs if part)
 
 
 class Drawn(Result):

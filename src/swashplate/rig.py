@@ -376,8 +376,8 @@ def _logged(
     def read(kind: ChannelKind | Literal["voltage"]) -> Array:
         chance = _stream(seed, name, kind)
         if kind == "rectified_current":
-            both = sampled("current_positive"), sampled("current_negative")
-            return _ammeter(instants, both, tools, chance)
+            currents = sampled("current_positive"), sampled("current_negative")
+            return _ammeter(instants, currents, tools, chance)
         values = sampled("voltage" if kind == "voltage" else SIGNALS[kind])
         if kind == "encoder_counts":
             return _counter(values * (counts_per_turn / (2.0 * pi)), tools, chance)
@@ -400,11 +400,11 @@ def _logged(
     for column, values in columns.items() if tools.empty_cells else ():
         gaps = lost(tools.empty_cells, tools.longest_gap, "empty", column)
         columns[column] = np.where(gaps, np.nan, values)
-    kept = ~lost(tools.lost_rows, tools.longest_loss, "rows")
-    if not kept.any():
+    is_logged = ~lost(tools.lost_rows, tools.longest_loss, "rows")
+    if not is_logged.any():
         raise InputError(f"{name}: lost_rows leaves no row; take a smaller share.")
     columns = {"time": _rounded(instants, tools.stamp_resolution), **columns}
-    return {column: values[kept] for column, values in columns.items()}
+    return {column: values[is_logged] for column, values in columns.items()}
 
 
 def _rounded(values: Array, step: float) -> Array:
@@ -429,7 +429,7 @@ def _converted(voltage: Array, bits: int) -> Array:
 
 
 def _ammeter(
-    instants: Array, both: tuple[Array, Array], tools: Instruments, chance: Generator
+    instants: Array, currents: tuple[Array, Array], tools: Instruments, chance: Generator
 ) -> Array:
     """The ammeter around both leads, from their currents (m,), magnitudes, at instants (m,). [A]
 
@@ -440,7 +440,7 @@ def _ammeter(
     """
     passed = np.mod(tools.dither_frequency * instants + float(chance.random()), 1.0)
     reading = np.zeros(instants.size)
-    for mean in both:
+    for mean in currents:
         duty = np.clip(mean / FULL_CURRENT, 0.0, 1.0)
         rising = 2.0 * passed / np.maximum(duty, 1e-9) - 1.0
         falling = 1.0 - 2.0 * (passed - duty) / np.maximum(1.0 - duty, 1e-9)
@@ -505,35 +505,35 @@ def write(tests: VirtualTests, folder: str | Path, *, overwrite: bool = False) -
     FileError
         If the folder is not empty or something cannot be written.
     """
-    place = Path(folder)
+    root = Path(folder)
     try:
-        if place.exists() and not place.is_dir():
-            raise FileError(f"{place} is a file; name a folder.")
-        if place.is_dir() and not overwrite and any(place.iterdir()):
-            raise FileError(f"{place} is not empty; name a new folder, or allow overwriting.")
-        (place / "truth").mkdir(parents=True, exist_ok=True)
+        if root.exists() and not root.is_dir():
+            raise FileError(f"{root} is a file; name a folder.")
+        if root.is_dir() and not overwrite and any(root.iterdir()):
+            raise FileError(f"{root} is not empty; name a new folder, or allow overwriting.")
+        (root / "truth").mkdir(parents=True, exist_ok=True)
     except FileError:
         raise
     except OSError as error:
-        raise FileError(f"{place} cannot be written: {error.strerror or error}.") from None
+        raise FileError(f"{root} cannot be written: {error.strerror or error}.") from None
     refinements = f"refinements {', '.join(tests.drive.parameters.refinements) or 'none'}"
     note = f"# virtual: simulated by swashplate {__version__}, no measurement; axis {tests.axis}, "
     ends = f"instruments {tests.severity}, {refinements}, seed {tests.seed}\n"
-    for each in tests.runs.values():
-        log = partial(_write_log, each.columns, f"{note}{each.name}, {ends}")
-        write_whole(place / f"{each.stem}.csv", log)
+    for run in tests.runs.values():
+        log = partial(_write_log, run.columns, f"{note}{run.name}, {ends}")
+        write_whole(root / f"{run.stem}.csv", log)
     if tests.preset is None:
-        tests.nominal.to_toml(place / DRIVE_FILE)
-    tests.drive.to_toml(place / "truth" / DRIVE_FILE)
+        tests.nominal.to_toml(root / DRIVE_FILE)
+    tests.drive.to_toml(root / "truth" / DRIVE_FILE)
     campaign, truth = _contents(tests)
     header = (
         f"# Virtual tests, simulated by swashplate {__version__}: nothing here was measured.\n"
         f"# Instruments: {tests.severity}; {refinements}; seed {tests.seed}.\n"
         "# What was simulated stands in truth/truth.toml: open it only after the fit.\n"
     )
-    write_text(f"# The truth behind the virtual tests.\n{truth}", place / "truth" / "truth.toml")
-    write_text(header + campaign, place / "campaign.toml")
-    return place / "campaign.toml"
+    write_text(f"# The truth behind the virtual tests.\n{truth}", root / "truth" / "truth.toml")
+    write_text(header + campaign, root / "campaign.toml")
+    return root / "campaign.toml"
 
 
 def _write_log(columns: Mapping[str, Array], note: str, path: Path) -> None:
@@ -553,10 +553,10 @@ def _contents(tests: VirtualTests) -> tuple[str, str]:
     from tomlkit import dumps
 
     tools, drop = tests.instruments, {"missing": "drop"} if tests.instruments.empty_cells else {}
-    given: dict[str, Any] = {"kind": "voltage", "column": "voltage", "unit": "V", **drop}
-    given["accuracy"] = _accuracy("voltage", tools)
+    entries: dict[str, Any] = {"kind": "voltage", "column": "voltage", "unit": "V", **drop}
+    entries["accuracy"] = _accuracy("voltage", tools)
     axis: dict[str, Any] = {"drive": tests.preset or DRIVE_FILE}
-    axis |= {"time": {"column": "time", "unit": "s"}, "start": "rest", "input": given}
+    axis |= {"time": {"column": "time", "unit": "s"}, "start": "rest", "input": entries}
     channels = axis["channels"] = dict[str, dict[str, object]]()
     for kind in tests.channels:
         column = COLUMNS.get(kind, kind)
@@ -568,7 +568,7 @@ def _contents(tests: VirtualTests) -> tuple[str, str]:
         entry["counts_per_turn"] = tests.counts_per_turn
         if tools.counter_bits:
             entry["rolls_over_at"] = 2**tools.counter_bits
-    runs = [{"file": f"{each.stem}.csv", "role": each.role} for each in tests.runs.values()]
+    runs = [{"file": f"{run.stem}.csv", "role": run.role} for run in tests.runs.values()]
     content = {"title": f"Virtual tests, {tests.axis}", "virtual": True}
     truth = {"virtual": True, "axis": tests.axis, "drive": DRIVE_FILE}
     truth |= {key: getattr(tests, key) for key in ("severity", "seed", "counts_per_turn")}

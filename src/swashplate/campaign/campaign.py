@@ -92,8 +92,8 @@ class Campaign(Result):
                 ignored.append(name)
                 continue
             log = open_log(folder / run.file, options=file.format)
-            place = f"{path}: run {number} ({run.file})"
-            of_run, overview = read_run(place, name, run, file.axes, log)
+            origin = f"{path}: run {number} ({run.file})"
+            of_run, overview = read_run(origin, name, run, file.axes, log)
             experiments += of_run
             if overview is not None:
                 overviews.append(overview)
@@ -111,11 +111,11 @@ class Campaign(Result):
     def table(self) -> Table:
         """Its experiments: axis, role, maneuver, length and channels."""
         heads = (*map(Head, ("run", "axis", "role", "maneuver")), Head("s", ".4g"))
-        made = Table(self.title, (*heads, Head("channels", wrap=True)))
+        table = Table(self.title, (*heads, Head("channels", wrap=True)))
         for experiment in self:
             words = experiment.name, experiment.axis, experiment.role, experiment.maneuver
-            made.add(*words, experiment.duration, ", ".join(experiment.channels))
-        return made
+            table.add(*words, experiment.duration, ", ".join(experiment.channels))
+        return table
 
     def plot(self, *, title: str | None = None) -> list[Figure]:
         """Figures of all long logs and of all runs.
@@ -123,11 +123,11 @@ class Campaign(Result):
         As of `swashplate.report.figures.plot_overview` and `plot_campaign`.
         """
         words = self.title if title is None else title
-        whole = [
+        overview_figures = [
             overview.plot(title=f"{words}: {overview.run}, the whole log")
             for overview in self.overviews
         ]
-        return whole + cast("list[Figure]", figures().plot_campaign(self, title=words))
+        return overview_figures + cast("list[Figure]", figures().plot_campaign(self, title=words))
 
     def __iter__(self) -> Iterator[Experiment]:
         return iter(self.experiments)
@@ -157,9 +157,11 @@ class Campaign(Result):
             raise UnknownNameError(f"{self.path}: the run '{name}' has the role 'ignore'.")
         near = get_close_matches(name, by_name, 1)
         meant = f" (did you mean {near[0]}?)" if near else ""
-        known = ", ".join([*by_name][:LISTED])
-        more = f" and {len(by_name) - LISTED} more" if len(by_name) > LISTED else ""
-        raise UnknownNameError(f"{self.path} has no run '{name}'{meant}; it has {known}{more}.")
+        listed_names = ", ".join([*by_name][:LISTED])
+        rest = f" and {len(by_name) - LISTED} more" if len(by_name) > LISTED else ""
+        raise UnknownNameError(
+            f"{self.path} has no run '{name}'{meant}; it has {listed_names}{rest}."
+        )
 
     def select(
         self, *, axis: str | None = None, role: schema.Role | None = None
@@ -216,18 +218,18 @@ class Campaign(Result):
 def in_time(experiments: Sequence[Experiment]) -> tuple[Experiment, ...]:
     """Experiments in the order in which they were recorded; unchanged if a time is unknown."""
     times = [experiment.recorded for experiment in experiments]
-    known = [time for time in times if time is not None]
-    if len(known) < len(times):
+    recorded = [time for time in times if time is not None]
+    if len(recorded) < len(times):
         return tuple(experiments)
-    return tuple(experiments[k] for k in np.argsort(known, kind="stable"))
+    return tuple(experiments[k] for k in np.argsort(recorded, kind="stable"))
 
 
 def json_schema() -> str:
     """JSON Schema of a campaign file, for editors that complete and check while one writes."""
-    made = schema.CampaignFile.model_json_schema(by_alias=True)
-    made["$schema"] = "https://json-schema.org/draft/2020-12/schema"
-    made["title"] = "swashplate campaign"
-    return json.dumps(made, indent=2) + "\n"
+    document = schema.CampaignFile.model_json_schema(by_alias=True)
+    document["$schema"] = "https://json-schema.org/draft/2020-12/schema"
+    document["title"] = "swashplate campaign"
+    return json.dumps(document, indent=2) + "\n"
 
 
 def read_campaign_file(path: str | Path) -> schema.CampaignFile:

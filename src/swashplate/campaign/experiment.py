@@ -56,12 +56,12 @@ class SignalOrigin(NamedTuple):
 class Edge(NamedTuple):
     """A jump of a command between two samples, at an instant that was not logged."""
 
-    place: int
-    """Of the last sample before it."""
+    row: int
+    """Row of the last sample before it."""
     middle: float
     """Between both samples. [s]"""
-    apart: float
-    """Time between them. [s]"""
+    interval: float
+    """Time between both samples. [s]"""
 
 
 class Accuracy(NamedTuple):
@@ -174,11 +174,11 @@ class InputSignal(Result):
         A straight line from sample to sample would pass a dead zone at its beginning, and the
         current's jump there come up to half a sample too early.
         """
-        places = self.jumps
-        middle = 0.5 * (self.time[places] + self.time[places + 1])
+        rows = self.jumps
+        middle = 0.5 * (self.time[rows] + self.time[rows + 1])
         beside = np.stack([np.nextafter(middle, -np.inf), middle], axis=1)
-        levels = np.stack([self.values[places], self.values[places + 1]], axis=1)
-        between = np.repeat(places + 1, 2)
+        levels = np.stack([self.values[rows], self.values[rows + 1]], axis=1)
+        between = np.repeat(rows + 1, 2)
         time = np.insert(self.time, between, beside.ravel())
         return replace(self, time=time, values=np.insert(self.values, between, levels.ravel()))
 
@@ -199,15 +199,13 @@ class InputSignal(Result):
 
         Rounded off over `RISE`, so that a simulation is a smooth function of the instant.
         """
-        found = [
-            (edge, edge.middle + late[edge.place]) for edge in self.edges if edge.place in late
-        ]
-        steps = [instant + RISE * np.linspace(-0.5, 0.5, 9) for _, instant in found]
+        moved = [(edge, edge.middle + late[edge.row]) for edge in self.edges if edge.row in late]
+        steps = [instant + RISE * np.linspace(-0.5, 0.5, 9) for _, instant in moved]
         time = np.unique(np.concatenate([self.time, *steps]))
         values = self.at(time)
-        for edge, instant in found:
-            near = np.abs(time - edge.middle) <= 0.5 * edge.apart + RISE
-            earlier, later = self.time[edge.place : edge.place + 2]
+        for edge, instant in moved:
+            near = np.abs(time - edge.middle) <= 0.5 * edge.interval + RISE
+            earlier, later = self.time[edge.row : edge.row + 2]
             before = self.at(np.minimum(time[near], earlier))
             done = np.clip((time[near] - instant) / RISE + 0.5, 0.0, 1.0)
             jump = self.at(np.maximum(time[near], later)) - before
@@ -242,7 +240,7 @@ def resolution_of_inputs(inputs: Sequence[InputSignal]) -> float:
     The smallest distance between levels that they take; 0 if they take so few that nothing is known
     of levels between them.
     """
-    levels = np.unique(np.concatenate([each.values for each in inputs]))
+    levels = np.unique(np.concatenate([signal.values for signal in inputs]))
     # rounding of a decimal number, or of a scale, sets equal levels apart
     apart = np.diff(levels)
     apart = apart[apart > ROUNDED * float(np.abs(levels).max(initial=0.0))]
@@ -304,8 +302,8 @@ class Channel(Result):
         steps = np.diff(np.zeros(0) if self.counts is None else self.counts)
         # equal steps are a constant speed
         varied = np.count_nonzero(np.diff(steps)) > VARIED
-        whole = varied and np.array_equal(steps, np.rint(steps))
-        divisor = int(np.gcd.reduce(steps.astype(np.int64))) if whole else 1
+        is_whole = varied and np.array_equal(steps, np.rint(steps))
+        divisor = int(np.gcd.reduce(steps.astype(np.int64))) if is_whole else 1
         return divisor * abs(self.encoder.angle_per_count)
 
     @property
@@ -335,8 +333,8 @@ class Channel(Result):
 def _between(signal: InputSignal | Channel, time: Array) -> Array:
     if signal.interpolation != "previous":
         return np.interp(time, signal.time, signal.values)
-    held = np.searchsorted(signal.time, time, side="right") - 1
-    return signal.values[np.maximum(held, 0)]
+    rows = np.searchsorted(signal.time, time, side="right") - 1
+    return signal.values[np.maximum(rows, 0)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -372,8 +370,8 @@ class Experiment(Tabular):
             If there is none of that name.
         """
         if channel not in self.channels:
-            known = ", ".join(self.channels)
-            raise UnknownNameError(f"{self.name} has no channel '{channel}'; it has {known}.")
+            names = ", ".join(self.channels)
+            raise UnknownNameError(f"{self.name} has no channel '{channel}'; it has {names}.")
         return self.channels[channel]
 
     def of_kind(self, *kinds: ChannelKind) -> tuple[Channel, ...]:
@@ -406,12 +404,12 @@ class Experiment(Tabular):
         """Its input and channels: kind, samples, smallest and largest value."""
         numbers = Column("samples", "d", "1"), Column("lowest", ".4g"), Column("highest", ".4g")
         title = f"{self.name}, {self.maneuver}, {self.role}"
-        made = Table(title, (Column("channel"), Column("kind"), *numbers, UNIT))
+        table = Table(title, (Column("channel"), Column("kind"), *numbers, UNIT))
         for name, signal in self._signals():
             ends = float(signal.values.min()), float(signal.values.max())
             unit = shown_unit(signal.kind, signal.unit)
-            made.add(name, signal.kind, signal.values.size, *ends, unit=unit)
-        return made
+            table.add(name, signal.kind, signal.values.size, *ends, unit=unit)
+        return table
 
     def plot(self, *, title: str | None = None) -> Figure:
         """Figure of its input and channels, as of `swashplate.report.figures.plot_campaign`."""

@@ -98,20 +98,20 @@ class Overview(Result):
         rows = sum(window.last - window.first for window in used)
         moving = sum(window.last - window.first for window in self.windows)
         total = len(self.windows)
-        said = f"{self.run}: the log has {self.rows:,} rows, {moving:,} of them in "
-        said += "one window with motion" if total == 1 else f"{total} windows with motion"
+        words = f"{self.run}: the log has {self.rows:,} rows, {moving:,} of them in "
+        words += "one window with motion" if total == 1 else f"{total} windows with motion"
         if len(used) == total:
-            said += ", which is used" if total == 1 else ", which are all used"
+            words += ", which is used" if total == 1 else ", which are all used"
         else:
-            said += f"; {len(used)} of them, {rows:,} rows, spread over the log, "
-            said += "is used" if len(used) == 1 else "are used"
+            words += f"; {len(used)} of them, {rows:,} rows, spread over the log, "
+            words += "is used" if len(used) == 1 else "are used"
         if self.read_from is not None:
-            said += f"; its rows are read from {self.read_from.name}, written beside it"
-        return f"{said}."
+            words += f"; its rows are read from {self.read_from.name}, written beside it"
+        return f"{words}."
 
     def table(self) -> Table:
         """What each signal does in the whole log: range, longest interval, missing samples."""
-        made = Table(
+        table = Table(
             f"{self.run}, the whole log: {self.end - self.begin:.4g} s, {self.rows:,} rows",
             (
                 Column("axis", of="pf"),
@@ -124,13 +124,13 @@ class Overview(Result):
             ),
         )
         for signal in self.signals:
-            known = np.isfinite(signal.low)
+            finite = np.isfinite(signal.low)
             words = "no number"
-            if known.any():
-                low, high = float(signal.low[known].min()), float(signal.high[known].max())
+            if finite.any():
+                low, high = float(signal.low[finite].min()), float(signal.high[finite].max())
                 shown = display_unit(signal.shown_unit, max(abs(low), abs(high)))
                 words = f"{shown.factor * low:z.4g} to {shown.factor * high:z.4g} {shown.name}"
-            made.add(
+            table.add(
                 signal.axis,
                 signal.name,
                 signal.kind.replace("_", " "),
@@ -139,7 +139,7 @@ class Overview(Result):
                 words.rstrip(),
                 signal.missing,
             )
-        return made
+        return table
 
     def plot(self, *, title: str | None = None) -> Figure:
         """Figure of the whole log, as of `swashplate.report.figures.plot_overview`."""

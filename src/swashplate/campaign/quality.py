@@ -85,7 +85,7 @@ def examine(experiment: Experiment, unsigned: Collection[str] = ()) -> tuple[Qua
 
     The sign of `unsigned` channels says nothing, see `unsigned_currents`.
     """
-    found, drive = list[Quality](), experiment.input
+    qualities, drive = list[Quality](), experiment.input
     moving = moves_at_first(experiment)
     signals: dict[str, InputSignal | Channel] = {"input": drive, **experiment.channels}
     for name, signal in signals.items():
@@ -96,37 +96,41 @@ def examine(experiment: Experiment, unsigned: Collection[str] = ()) -> tuple[Qua
         low, high, clipped, lost = float(values.min()), float(values.max()), nan, None
         if limits is not None and used.any():
             clipped = float(np.mean((values <= limits[0]) | (values >= limits[1])))
-        said = list[str]()
+        findings = list[str]()
         if name in moving:
-            said.append(
+            findings.append(
                 f"moves at the first sample, where the run is said to be at rest: write "
                 f"axes.{experiment.axis}.{ESTIMATED} in this run"
             )
         # the input's stamps are reported once, with the input
         if signal is drive or not np.array_equal(signal.time, drive.time):
-            said += _of_stamps(stamps)
+            findings += _of_stamps(stamps)
         if signal.dropped:
-            said.append(
+            findings.append(
                 f"{count(signal.dropped, 'missing sample is', 'missing samples are')} left out"
             )
         if isinstance(signal, Channel):
             if clipped > 0.0:
-                said.append(f"{100.0 * clipped:.2g} % of the samples are at the end of its range")
-            said += _of_channel(experiment, signal, name not in unsigned)
+                findings.append(
+                    f"{100.0 * clipped:.2g} % of the samples are at the end of its range"
+                )
+            findings += _of_channel(experiment, signal, name not in unsigned)
             if signal.counts is not None:
                 lost = int(find_lost_counts(signal.time[used], signal.counts[used]).size)
         else:
             if low == high:
-                said.append("the input never changes: nothing can be identified from this run")
+                findings.append("the input never changes: nothing can be identified from this run")
             if limits is not None and (low < limits[0] or high > limits[1]):
-                said.append(
+                findings.append(
                     f"goes from {low:g} to {high:g} {signal.unit}, beyond its range of "
                     f"{limits[0]:g} to {limits[1]:g}: check unit, scale and offset"
                 )
-            said += _of_spikes(experiment, signal)
+            findings += _of_spikes(experiment, signal)
         ignored, numbers = float(np.mean(~used)), (stamps, low, high, clipped, lost)
-        found.append(Quality(name, signal.kind, signal.unit, *numbers, ignored, tuple(said)))
-    return tuple(found)
+        qualities.append(
+            Quality(name, signal.kind, signal.unit, *numbers, ignored, tuple(findings))
+        )
+    return tuple(qualities)
 
 
 def _of_stamps(stamps: StampStatistics) -> Iterator[str]:
@@ -193,7 +197,7 @@ def moves_at_first(experiment: Experiment) -> tuple[str, ...]:
     enough for ten steps of the reading at that speed, and not from zero, as a step at the first
     sample does. At a command of 0 a reading is an instrument's zero error.
     """
-    found, drive = list[str](), experiment.input
+    moving_channels, drive = list[str](), experiment.input
     still = abs(drive.values[0]) <= 0.02 * np.abs(drive.values).max() and drive.kind != "other"
     moving = experiment.of_kind("shaft_speed", "position", "encoder_counts")
     for channel in moving if experiment.start == "rest" and not still else ():
@@ -212,8 +216,8 @@ def moves_at_first(experiment: Experiment) -> tuple[str, ...]:
         least = max(AT_FIRST * float(np.quantile(np.abs(motion), 0.998)), 3.0 * noise)
         grows = np.median(speeds[3:]) > 2.0 * speeds[0]
         if speeds.size == 6 and speeds[:3].min() > least and not grows:
-            found.append(channel.name)
-    return tuple(found)
+            moving_channels.append(channel.name)
+    return tuple(moving_channels)
 
 
 # --- currents with and without a sign -------------------------------------------------------------
@@ -264,7 +268,7 @@ def wrapped_positions(experiments: Iterable[Experiment]) -> dict[tuple[str, str]
 
     By axis and channel.
     """
-    said = dict[tuple[str, str], str]()
+    sentences = dict[tuple[str, str], str]()
     for experiment in experiments:
         for name, channel in experiment.channels.items():
             turn = 2.0 * pi
@@ -272,11 +276,11 @@ def wrapped_positions(experiments: Iterable[Experiment]) -> dict[tuple[str, str]
             if angle and turns_over(channel.values[channel.used], turn):
                 size = f"{turn / channel.stated:.9g}"
                 where = f"axes.{experiment.axis}.channels.{name}"
-                said[experiment.axis, name] = (
+                sentences[experiment.axis, name] = (
                     f"'{name}' of the axis '{experiment.axis}' jumps by about a whole turn, as an "
                     f"angle that begins anew does; write rolls_over_at = {size} in [{where}]"
                 )
-    return said
+    return sentences
 
 
 # --- spikes ---------------------------------------------------------------------------------------
@@ -307,17 +311,17 @@ def spikes(signal: Channel | InputSignal, drive: InputSignal) -> list[tuple[floa
     off = np.abs(values - lasting)
     least = 8.0 * float(np.median(off))
     room, most = max(0.1 * (high - low), least), 2
-    found = (values > high + room) | (values < low - room)
+    is_spike = (values > high + room) | (values < low - room)
     if signal is not drive:
         most = NEIGHBOURS // 2
         within = off > max(0.25 * (high - low), least)
         if within.any():
             grid = np.linspace(-0.3, 0.0, 7)[:, None] + time
             commands = drive.at(grid.ravel()).reshape(grid.shape)
-            found |= within & (np.ptp(commands, axis=0) <= 0.02 * np.ptp(drive.values))
+            is_spike |= within & (np.ptp(commands, axis=0) <= 0.02 * np.ptp(drive.values))
         if isinstance(signal, Channel) and signal.rolls_over_at is not None:
-            found |= off > 0.25 * signal.rolls_over_at
-    rows = np.flatnonzero(found & (off > least))
+            is_spike |= off > 0.25 * signal.rolls_over_at
+    rows = np.flatnonzero(is_spike & (off > least))
     half = 0.5 * float(np.median(np.diff(time)))
     groups = np.split(rows, np.flatnonzero(np.diff(rows) > NEIGHBOURS // 2) + 1)
     return [
@@ -329,18 +333,18 @@ def spikes(signal: Channel | InputSignal, drive: InputSignal) -> list[tuple[floa
 
 def _of_spikes(experiment: Experiment, signal: Channel | InputSignal) -> Iterator[str]:
     """A sentence on a signal's spikes, with the line that leaves them out."""
-    found = spikes(signal, experiment.input)
-    windows = [f'{{ from = {a:.6g}, to = {b:.6g}, why = "spike" }}' for a, b, _ in found]
-    more = f" and {len(found) - NAMED} more like these" if len(found) > NAMED else ""
-    place = f"channels.{signal.name}" if isinstance(signal, Channel) else "input"
-    line = f"axes.{experiment.axis}.{place}.ignore = [{', '.join(windows[:NAMED])}]"
-    if found:
-        largest = f"{max((value for _, _, value in found), key=abs):.4g} {signal.unit}"
+    spiked_at = spikes(signal, experiment.input)
+    windows = [f'{{ from = {a:.6g}, to = {b:.6g}, why = "spike" }}' for a, b, _ in spiked_at]
+    rest = f" and {len(spiked_at) - NAMED} more like these" if len(spiked_at) > NAMED else ""
+    table = f"channels.{signal.name}" if isinstance(signal, Channel) else "input"
+    line = f"axes.{experiment.axis}.{table}.ignore = [{', '.join(windows[:NAMED])}]"
+    if spiked_at:
+        largest = f"{max((value for _, _, value in spiked_at), key=abs):.4g} {signal.unit}"
         if isinstance(signal, Channel) and signal.counts is not None:
             jumps = [jump.counts for jump in lost_counts(signal) if jump.returns]
             largest = f"{max(jumps, key=abs):+.0f} counts"
-        spike = count(len(found), "spike")
-        yield f"{spike}, up to {largest}{more}: leave out with {line} in this run"
+        spike = count(len(spiked_at), "spike")
+        yield f"{spike}, up to {largest}{rest}: leave out with {line} in this run"
 
 
 class LostCounts(NamedTuple):
@@ -378,7 +382,7 @@ def lost_counts(channel: Channel) -> list[LostCounts]:
         before = counts[row - 1] - counts[row - 2] if row > 1 else 0.0
         return float(counts[row] - counts[row - 1] - before)
 
-    found, skip = list[LostCounts](), False
+    jumps, skip = list[LostCounts](), False
     for number, row in enumerate(rows):
         if skip:
             skip = False
@@ -390,8 +394,8 @@ def lost_counts(channel: Channel) -> list[LostCounts]:
             back = float(counts[following] - counts[row - 1])
             skip = abs(back) <= room
             end = float(time[following]) - half if skip else inf
-        found.append(LostCounts(float(time[row]) - half, end, jump, float(values[row])))
-    return found
+        jumps.append(LostCounts(float(time[row]) - half, end, jump, float(values[row])))
+    return jumps
 
 
 def _of_lost_counts(experiment: Experiment, channel: Channel) -> Iterator[str]:
@@ -417,26 +421,26 @@ def spiked(experiments: Sequence[Experiment]) -> dict[tuple[str, str], tuple[str
     Beside the sentence, whether it is gross: twice as far from the median as the channel moves
     in any run, so that squared errors would be the spike's.
     """
-    said, moves = dict[tuple[str, str], tuple[str, float]](), dict[str, float]()
+    sentences_by_channel, moves = dict[tuple[str, str], tuple[str, float]](), dict[str, float]()
     for experiment in experiments:
         for name, channel in experiment.channels.items():
-            kept, far = channel.used, 0.0
-            middle = float(np.median(channel.values[kept])) if kept.any() else 0.0
+            used, far = channel.used, 0.0
+            middle = float(np.median(channel.values[used])) if used.any() else 0.0
             for begin, end, value in spikes(channel, experiment.input):
-                kept &= (channel.time < begin) | (channel.time > end)
+                used &= (channel.time < begin) | (channel.time > end)
                 far = max(far, abs(value - middle))
-            if kept.any():
-                moves[name] = max(moves.get(name, 0.0), float(np.ptp(channel.values[kept])))
+            if used.any():
+                moves[name] = max(moves.get(name, 0.0), float(np.ptp(channel.values[used])))
             sentences = [f"has {sentence}" for sentence in _of_spikes(experiment, channel)]
             sentences += _of_lost_counts(experiment, channel)
             if sentences:
-                said[experiment.name, name] = (
+                sentences_by_channel[experiment.name, name] = (
                     f"{experiment.name}: '{name}' {'; it '.join(sentences)}",
                     far,
                 )
     return {
         (run, name): (sentence, far > 2.0 * moves.get(name, 0.0))
-        for (run, name), (sentence, far) in said.items()
+        for (run, name), (sentence, far) in sentences_by_channel.items()
     }
 
 
@@ -451,32 +455,34 @@ def campaign_findings(campaign: Campaign) -> tuple[str, ...]:
     FileError, ParameterError
         If the file, which is read once more, has changed meanwhile and cannot be read.
     """
-    found, file = list[str](), read_campaign_file(campaign.path)
+    findings, file = list[str](), read_campaign_file(campaign.path)
     long = {overview.run: (overview.begin, overview.end) for overview in campaign.overviews}
     for name, axis in file.axes.items():
         runs, where = campaign.select(axis=name), f"axes.{name}"
-        found += _unused(f"{where}.ignore", axis.ignore, runs, long)
+        findings += _unused(f"{where}.ignore", axis.ignore, runs, long)
         for key, channel in axis.channels.items():
             of = f"{where}.channels.{key}"
-            found += _unused(f"{of}.ignore", channel.ignore, runs, long, key)
-            found += _unused(f"{of}.weights", channel.weights, runs, long, key)
-        found += [*_one_sided(name, runs), *_of_other_scale(runs)]
+            findings += _unused(f"{of}.ignore", channel.ignore, runs, long, key)
+            findings += _unused(f"{of}.weights", channel.weights, runs, long, key)
+        findings += [*_one_sided(name, runs), *_of_other_scale(runs)]
     for number, run in enumerate(file.runs, 1):
-        ours = [
+        of_run = [
             experiment
             for experiment in campaign
             if experiment.run == (run.name or Path(run.file).stem)
         ]
         for key in ("ignore", "weights") if run.role != "ignore" else ():
-            found += _unused(f"run {number} ({run.file}): {key}", getattr(run, key), ours, long)
+            findings += _unused(
+                f"run {number} ({run.file}): {key}", getattr(run, key), of_run, long
+            )
     moving = {e.axis for e in campaign if e.of_kind("shaft_speed", "position", "encoder_counts")}
-    found += [
+    findings += [
         f"axis '{axis}': no channel measures its motion; a fit of the pump needs one of the kind "
         "shaft_speed, position or encoder_counts"
         for axis in dict.fromkeys(experiment.axis for experiment in campaign)
         if axis not in moving
     ]
-    return (*found, *unsigned_currents(campaign).values(), *wrapped_positions(campaign).values())
+    return (*findings, *unsigned_currents(campaign).values(), *wrapped_positions(campaign).values())
 
 
 def _one_sided(axis: str, runs: Sequence[Experiment]) -> Iterator[str]:
@@ -576,32 +582,34 @@ def _unused(
     log may lie where no experiment is.
     """
     for window in windows:
-        met = [run for run in runs if applying((window,), run.maneuver)]
-        times = [c.time for each in met for n, c in each.channels.items() if channel in (None, n)]
+        matching = [run for run in runs if applying((window,), run.maneuver)]
+        times = [
+            c.time for each in matching for n, c in each.channels.items() if channel in (None, n)
+        ]
         start, stop = ends(window)
-        logs = [long[run] for run in {each.run for each in met} & long.keys()]
+        logs = [long[run] for run in {each.run for each in matching} & long.keys()]
         within_log = any(start <= last and stop >= first for first, last in logs)
-        if not met:
+        if not matching:
             names = list(dict.fromkeys(f"'{run.maneuver}'" for run in runs))
-            more = [f"{len(names) - NAMED} others"] if len(names) > NAMED else []
+            rest = [f"{len(names) - NAMED} others"] if len(names) > NAMED else []
             yield (
                 f"{where}: no run has the maneuver '{window.maneuver}', so that its window does "
-                f"nothing; there are {', '.join([*names[:NAMED], *more])}"
+                f"nothing; there are {', '.join([*names[:NAMED], *rest])}"
             )
         elif not within_log and not any(inside(window, time).any() for time in times):
             first, last = (
                 "its end" if end is None else f"{end:g} s" for end in (window.start, window.stop)
             )
-            of = f"any of {len(met)} runs"
-            if len(met) == 1:
-                time = met[0].input.time
-                of = f"{met[0].name}, which goes from {time[0]:.4g} to {time[-1]:.4g} s"
+            of = f"any of {len(matching)} runs"
+            if len(matching) == 1:
+                time = matching[0].input.time
+                of = f"{matching[0].name}, which goes from {time[0]:.4g} to {time[-1]:.4g} s"
             yield f"{where}: the window from {first} to {last} holds no sample of {of}"
 
 
 def quality_table(experiment: Experiment, qualities: Sequence[Quality]) -> Table:
     """The signals of one experiment: rate, jitter, gaps, range, clipping and lost counts."""
-    made = Table(
+    table = Table(
         f"{experiment.name}: {experiment.maneuver}, to {experiment.role}, "
         f"{experiment.duration:.4g} s, {qualities[0].stamps.rows} samples",
         (
@@ -615,7 +623,7 @@ def quality_table(experiment: Experiment, qualities: Sequence[Quality]) -> Table
         stamps, largest = quality.stamps, max(abs(quality.low), abs(quality.high))
         shown = display_unit(shown_unit(quality.kind, quality.unit), largest)
         low, high = shown.factor * quality.low, shown.factor * quality.high
-        made.add(
+        table.add(
             experiment.name,
             quality.signal,
             quality.kind.replace("_", " "),
@@ -629,4 +637,4 @@ def quality_table(experiment: Experiment, qualities: Sequence[Quality]) -> Table
             f"{100.0 * quality.ignored:.3g} %",
             look=bool(quality.findings),
         )
-    return made
+    return table

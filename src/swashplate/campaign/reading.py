@@ -44,7 +44,7 @@ LARGEST = 1e30
 
 
 def read_run(
-    place: str, name: str, run: schema.RunEntry, axes: Axes, log: Log
+    origin: str, name: str, run: schema.RunEntry, axes: Axes, log: Log
 ) -> tuple[list[Experiment], Overview | None]:
     """Experiments of a run: one for each axis that it tests, window of a long log, and split.
 
@@ -65,7 +65,7 @@ def read_run(
     FileError, InputError, ParameterError
         For the first thing that is wrong; the sentence names file, column and row.
     """
-    tested = _axes_of(place, run, axes)
+    tested = _axes_of(origin, run, axes)
     names = list(_found(log, tested))
     log = in_parts(log, names)
     rows = log.rows_of(names)
@@ -83,7 +83,7 @@ def read_run(
         columns = _Columns(part, tested)
         for key, axis in tested.items():
             full = f"{name} {key}" if len(axes) > 1 else name
-            others = ", ".join(toml_string(each) for each in tested if each != key)
+            others = ", ".join(toml_string(axis_name) for axis_name in tested if axis_name != key)
             without = f"only = [{others}]" if others else 'role = "ignore"'
             experiments += _experiments(
                 full,
@@ -99,16 +99,16 @@ def read_run(
     return experiments, overview
 
 
-def _axes_of(place: str, run: schema.RunEntry, axes: Axes) -> dict[str, schema.AxisEntry]:
+def _axes_of(run_origin: str, run: schema.RunEntry, axes: Axes) -> dict[str, schema.AxisEntry]:
     """The axes that a run tests, with what differs in it."""
     for name in (*run.only, *run.axes):
         if name not in axes:
             raise InputError(
-                f"{place} names the axis '{name}', but the axes are {', '.join(axes)}."
+                f"{run_origin} names the axis '{name}', but the axes are {', '.join(axes)}."
             )
     tested = {name: axes[name] for name in run.only or axes}
     for name, changes in ((name, run.axes[name]) for name in tested if run.axes.get(name)):
-        axis, origin, given = axes[name], f"{place}: axes.{name}", changes.get("channels")
+        axis, origin, given = axes[name], f"{run_origin}: axes.{name}", changes.get("channels")
         for key, change in given.items() if isinstance(given, Mapping) else ():
             if key not in axis.channels and not (isinstance(change, Mapping) and "kind" in change):
                 raise InputError(
@@ -151,17 +151,17 @@ def _signals(axis: schema.AxisEntry) -> dict[str, schema.InputEntry | schema.Cha
 
 def _found(log: Log, axes: Axes) -> dict[str, LogColumn]:
     """Columns that some axes need, by the names that they are wanted by."""
-    found = dict[str, LogColumn]()
+    column_of = dict[str, LogColumn]()
     for axis in axes.values():
         for what, signal in _signals(axis).items():
             clocks = [clock.column for clock in (signal.time, axis.time) if clock is not None]
-            wanted = [(signal.column, what), *((name, f"the time of {what}") for name in clocks)]
-            for name, why in wanted:
+            requested = [(signal.column, what), *((name, f"the time of {what}") for name in clocks)]
+            for name, why in requested:
                 try:
-                    found |= {name: log.find(name)} if name is not None else {}
+                    column_of |= {name: log.find(name)} if name is not None else {}
                 except InputError as error:
                     raise InputError(f"For {why}: {error}") from None
-    return found
+    return column_of
 
 
 class _Columns:
@@ -255,40 +255,42 @@ class _Columns:
     ) -> tuple[dict[str, Any], float]:
         """What a signal is made of, in SI, and the size of its unit; empty where all is missing."""
         log, column, numbers = self.log, self.found[signal.column], self.values[signal.column]
-        said = self._called(what, signal)
+        described = self._called(what, signal)
         time, is_input = self.stamps(signal, axis), isinstance(signal, schema.InputEntry)
         if time.size != numbers.size:
-            raise FileError(f"{said} has {numbers.size} samples, but its time {time.size}.")
-        kept = np.ones(numbers.size, np.bool_) if run.span is None else inside(run.span, time)
+            raise FileError(f"{described} has {numbers.size} samples, but its time {time.size}.")
+        used = np.ones(numbers.size, np.bool_) if run.span is None else inside(run.span, time)
         for window in signal.ignore if is_input else ():
-            kept &= ~inside(window, time)
-        missing = kept & ~np.isfinite(numbers)
+            used &= ~inside(window, time)
+        missing = used & ~np.isfinite(numbers)
         rows = np.flatnonzero(missing) + 1 + log.first
-        if not is_input and rows.size and rows.size == kept.sum():
+        if not is_input and rows.size and rows.size == used.sum():
             return {}, 1.0
         if rows.size and signal.missing == "refuse":
             others = f" and {rows.size - 1} others" if rows.size > 1 else ""
             raise FileError(
-                f"{said} has no finite number in data row {rows[0]}{others}; mend the log, or say "
-                "missing = 'drop' to leave such samples out."
+                f"{described} has no finite number in data row {rows[0]}{others}; mend the log, or "
+                "say missing = 'drop' to leave such samples out."
             )
-        kept &= ~missing
-        if (left := np.count_nonzero(kept)) < 2:
-            raise FileError(f"{said} has {left} samples that can be used, but needs two at least.")
+        used &= ~missing
+        if (left := np.count_nonzero(used)) < 2:
+            raise FileError(
+                f"{described} has {left} samples that can be used, but needs two at least."
+            )
         si, factor, zero = self._conversion(what, signal)
         # an encoder's sign belongs to the scale of its counts, see `Encoder`
         sign = 1 if signal.kind == "encoder_counts" else signal.sign
         with np.errstate(over="ignore"):
-            values = factor * sign * (signal.scale * numbers[kept] + signal.offset) + zero
+            values = factor * sign * (signal.scale * numbers[used] + signal.offset) + zero
             largest = float(np.max(np.abs(values)))
         if not largest < LARGEST:
             raise InputError(
-                f"{said} reaches {largest:.3g} {si}; check its unit, scale and offset."
+                f"{described} reaches {largest:.3g} {si}; check its unit, scale and offset."
             )
         return {
             "kind": signal.kind,
             "unit": si,
-            "time": time if kept.all() else np.ascontiguousarray(time[kept]),
+            "time": time if used.all() else np.ascontiguousarray(time[used]),
             "values": values,
             "source": SignalOrigin(log.path, column.name),
             "limits": signal.limits and tuple(factor * end + zero for end in signal.limits),
@@ -302,8 +304,8 @@ def _accuracy(signal: schema.InputEntry | schema.ChannelEntry, factor: float) ->
 
     A command that is said to be held is logged by what gives it: it changes at its samples.
     """
-    held = isinstance(signal, schema.InputEntry) and signal.interpolation == "previous"
-    if signal.accuracy is None and not held:
+    is_held = isinstance(signal, schema.InputEntry) and signal.interpolation == "previous"
+    if signal.accuracy is None and not is_held:
         return None
     stated = signal.accuracy or schema.AccuracyEntry()
     assumed = assumed_accuracy(signal.kind, is_input=isinstance(signal, schema.InputEntry))
@@ -311,7 +313,7 @@ def _accuracy(signal: schema.InputEntry | schema.ChannelEntry, factor: float) ->
     zero = assumed.zero if stated.zero is None else factor * stated.zero
     time = stated.time
     if time is None:
-        time = 0.0 if held else assumed.time
+        time = 0.0 if is_held else assumed.time
     return Accuracy(gain, zero, time, rounded=stated.zero is None)
 
 
@@ -344,10 +346,10 @@ def _experiments(
     for channel, entry in axis.channels.items():
         parts, factor = columns.samples(f"channel '{channel}'", entry, axis, run)
         if not parts and entry.missing == "refuse":
-            left = f"axes.{key}.channels.{channel} = false" if len(axis.channels) > 1 else without
+            remedy = f"axes.{key}.channels.{channel} = false" if len(axis.channels) > 1 else without
             raise FileError(
                 f"{columns.log.path}: column '{entry.column}' (channel '{channel}' of the axis "
-                f"'{key}') has no number at all; leave it out with {left} in this run."
+                f"'{key}') has no number at all; leave it out with {remedy} in this run."
             )
         if not parts:
             notes.append(f"'{channel}' has no sample here and is left out of this run")
@@ -379,34 +381,40 @@ def _experiments(
         )
     unit = {"voltage": "V", "current": "A"}.get(drive.kind, drive.unit)
     for part, (begin, end) in enumerate(pairwise([-np.inf, *sorted(cuts), np.inf])):
-        given = _within(drive, begin, end)
-        kept = {each: _within(read, begin, end) for each, read in signals.items()}
-        kept = {name_: read for name_, read in kept.items() if read.time.size > 1}
-        if given.time.size < 2 or not kept:
+        command = _within(drive, begin, end)
+        measured = {each: _within(read, begin, end) for each, read in signals.items()}
+        measured = {
+            channel_name: read for channel_name, read in measured.items() if read.time.size > 1
+        }
+        if command.time.size < 2 or not measured:
             continue
-        said = list(notes) if part == 0 else []
+        part_notes = list(notes) if part == 0 else []
         if np.isfinite(end):
-            said.append(f"split at {end:.4g} s, from where it is a run of its own: {cuts[end]}")
-        recognised = recognise(given.time, given.values, unit=unit)
+            part_notes.append(
+                f"split at {end:.4g} s, from where it is a run of its own: {cuts[end]}"
+            )
+        recognised = recognise(command.time, command.values, unit=unit)
         maneuver = run.maneuver or recognised.name
         ignored = applying((*axis.ignore, *run.ignore), maneuver)
         yield Experiment(
-            f"{name} from {given.time[0]:.6g} s" if part or windowed else name,
+            f"{name} from {command.time[0]:.6g} s" if part or windowed else name,
             key,
             run_name,
             run.role,
             "estimated" if part or resumes else run.start or axis.start,
             None if part or resumes else run.start_pressure,
-            given,
+            command,
             {
-                name_: _finished(axis.channels[name_], read, given, maneuver, ignored, run)
-                for name_, read in kept.items()
+                channel_name: _finished(
+                    axis.channels[channel_name], read, command, maneuver, ignored, run
+                )
+                for channel_name, read in measured.items()
             },
             run.maneuver,
             recognised,
             tuple((*ends(window), window.why) for window in ignored),
-            recorded=None if zero is None else zero + float(given.time[0]),
-            notes=tuple(said),
+            recorded=None if zero is None else zero + float(command.time[0]),
+            notes=tuple(part_notes),
         )
 
 
@@ -417,11 +425,13 @@ def _seconds(moment: datetime) -> float:
 
 def _within(signal: AnySignal, begin: float, end: float) -> AnySignal:
     """The part of a signal from one instant to before another [s]."""
-    kept = (signal.time >= begin) & (signal.time < end)
-    if kept.all():
+    is_within = (signal.time >= begin) & (signal.time < end)
+    if is_within.all():
         return signal
     arrays: dict[str, Any] = {
-        key: value[kept] for key, value in vars(signal).items() if isinstance(value, np.ndarray)
+        key: value[is_within]
+        for key, value in vars(signal).items()
+        if isinstance(value, np.ndarray)
     }
     return replace(signal, **arrays)
 
@@ -625,11 +635,11 @@ def _windows(
 def _moves(extremes: Array) -> NDArray[np.bool_]:
     """Whether an input leaves its rest, where it is most often, by its extremes in each grain."""
     middle = extremes.mean(axis=1)
-    known = middle[np.isfinite(middle)]
-    if not known.size or known.min() == known.max():
+    finite = middle[np.isfinite(middle)]
+    if not finite.size or finite.min() == finite.max():
         return np.zeros(middle.size, dtype=np.bool_)
-    counts, edges = np.histogram(known, 64)
+    counts, edges = np.histogram(finite, 64)
     most = int(counts.argmax())
-    rest = np.median(known[(known >= edges[most]) & (known <= edges[most + 1])])
+    rest = np.median(finite[(finite >= edges[most]) & (finite <= edges[most + 1])])
     away = np.max(np.abs(extremes - rest), axis=1)
     return np.asarray(np.nan_to_num(away) > MOVES * np.nanmax(away))

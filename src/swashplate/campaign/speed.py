@@ -101,7 +101,7 @@ def march_low_passes(speeds: Array, first: Array, second: Array, filtered: Array
     state = 0.0
     for n in range(speeds.size):
         # what the first low pass has at the start of an interval leaves in the second at its end
-        left = DIFFERENTIATOR / (DIFFERENTIATOR - LOW_PASS) * (first[n] - second[n])
-        fresh = 1.0 - second[n] - left
-        filtered[n + 1] = second[n] * filtered[n] + left * state + fresh * speeds[n]
+        difference = DIFFERENTIATOR / (DIFFERENTIATOR - LOW_PASS) * (first[n] - second[n])
+        fresh = 1.0 - second[n] - difference
+        filtered[n + 1] = second[n] * filtered[n] + difference * state + fresh * speeds[n]
         state = first[n] * state + (1.0 - first[n]) * speeds[n]

@@ -139,8 +139,10 @@ def init(
     check_output(target, CAMPAIGN_FILE, force=force)
     file = None if drive is None else parsing.drive_file(drive)
     if file is not None:  # a drive as a campaign file names it
-        place, root = file.resolve(), target.parent.resolve()
-        drive = (place.relative_to(root) if place.is_relative_to(root) else place).as_posix()
+        resolved, root = file.resolve(), target.parent.resolve()
+        drive = (
+            resolved.relative_to(root) if resolved.is_relative_to(root) else resolved
+        ).as_posix()
     kinds = {
         name: kind for kind, name in parsing.pairs_of("--column", column, "voltage=u", often=True)
     }
@@ -211,16 +213,20 @@ def check(
         show(overview.table())
         bullets([overview.sentence])
     for experiment in campaign:
-        found = qualities[experiment.name]
-        show(tests.quality_table(experiment, found))
+        qualities_of_run = qualities[experiment.name]
+        show(tests.quality_table(experiment, qualities_of_run))
         bullets(f"{text}." for text in experiment.notes)
-        for each in found:
-            for text in each.findings:  # unbroken: a line to paste may be in it
-                note(ended(f"! {each.signal}: {text}"))
+        for quality in qualities_of_run:
+            for text in quality.findings:  # unbroken: a line to paste may be in it
+                note(ended(f"! {quality.signal}: {text}"))
     note(LEGEND)
     for text in of_file:
         say(ended(f"! {text}"))
-    findings = sum(len(each.findings) for found in qualities.values() for each in found)
+    findings = sum(
+        len(quality.findings)
+        for qualities_of_run in qualities.values()
+        for quality in qualities_of_run
+    )
     findings += len(of_file)
     if campaign.ignored:
         note(f"Ignored, and not opened: {', '.join(campaign.ignored)}.")
@@ -277,19 +283,27 @@ def plot(
         campaign = Campaign.from_toml(path)
     channels = () if run is None else campaign[run].channels
     if (run is None) != (channel is None):
-        known = f"; {run} has {', '.join(channels)}" if channels else ""
+        channels_listed = f"; {run} has {', '.join(channels)}" if channels else ""
         raise InputError(
-            f"--run and --channel go together: give both, or none for the overview{known}."
+            "--run and --channel go together: give both, or none for the overview"
+            f"{channels_listed}."
         )
     if run is not None and channel is not None:
         experiment, shown, simulated = campaign[run], campaign[run][channel], None
         drive = campaign.axes[experiment.axis].drive
         if shown.kind in SIGNALS and drive is not None and not shown.is_position:
-            found = predict(campaign.drive(experiment.axis), [experiment])
-            simulated = next((each.simulated for each in found if each.channel == channel), None)
+            predictions = predict(campaign.drive(experiment.axis), [experiment])
+            simulated = next(
+                (
+                    prediction.simulated
+                    for prediction in predictions
+                    if prediction.channel == channel
+                ),
+                None,
+            )
         window = parsing.window_of(shown.time, begin, end)
-        how = {"window": window, "title": f"{run}, {channel}"}
-        draw(out, "plot_channel", shown, simulated, **how)
+        labels = {"window": window, "title": f"{run}, {channel}"}
+        draw(out, "plot_channel", shown, simulated, **labels)
     else:
         figures = campaign.plot(title=parsing.title_of(campaign))
         several = [out.with_stem(f"{out.stem}-{k}") for k in range(1, len(figures) + 1)]
@@ -365,11 +379,11 @@ def rig(
     with working("Writing"):
         path = bench.write(tests, out, overwrite=force)
     text = (Column("log"), Column("maneuver", wrap=True), Column("role"))
-    made = Table("", (*text, Column("rows", "d"), Column("s", ".4g")))
+    table = Table("", (*text, Column("rows", "d"), Column("s", ".4g")))
     for run in tests.runs.values():
         time = run.columns["time"]
-        made.add(f"{run.stem}.csv", run.name, run.role, time.size, float(time[-1] - time[0]))
-    show(made)
+        table.add(f"{run.stem}.csv", run.name, run.role, time.size, float(time[-1] - time[0]))
+    show(table)
     note(f"Campaign: {path}")
     note(f"Truth:    {path.parent / 'truth'} (to be opened after the fit)")
 
@@ -415,26 +429,28 @@ def guess(
     start, setup = folder / "start.toml", folder / "setup.toml"
     with working(f"Reading {path}"):
         check_free(start, setup, force=force)
-        campaign, chosen = parsing.campaign_of(path, axis)
+        campaign, axis_name = parsing.campaign_of(path, axis)
         check_folder(folder)
-        runs = runs_to_fit(campaign, chosen)
-        found = drafting.guess_drive(runs)
-        parameters = drafting.guessed_set(found, path.name)
+        runs = runs_to_fit(campaign, axis_name)
+        guessed = drafting.guess_drive(runs)
+        parameters = drafting.guessed_set(guessed, path.name)
         made_folder(folder)
         Drive(parameters).to_toml(start)
-        write_text(drafting.fit_configuration(found, parameters), setup)
-    show(drafting.guess_table(found))
-    if found.amplifier is not None:
-        show(drafting.amplifier_table(found.amplifier))
-        card = found.amplifier.card
+        write_text(drafting.fit_configuration(guessed, parameters), setup)
+    show(drafting.guess_table(guessed))
+    if guessed.amplifier is not None:
+        show(drafting.amplifier_table(guessed.amplifier))
+        card = guessed.amplifier.card
         like = f"like that of the packaged card {card}" if card else "a plain one"
         say(
-            f"Its filter is {like}; fit {found.amplifier.fit_percent:.1f} % of the currents. The "
+            f"Its filter is {like}; fit {guessed.amplifier.fit_percent:.1f} % of the currents. The "
             "first stage fits the amplifier to the current, the second one the machine."
         )
     for sentence, _ in spiked(runs).values():
         note(f"! {sentence}.")
-    note(f"These numbers alone: fit {found.fit_percent:.1f} % of the mean speeds (100 % is best).")
+    note(
+        f"These numbers alone: fit {guessed.fit_percent:.1f} % of the mean speeds (100 % is best)."
+    )
     note(f"Start:             {start}")
     note(f"Fit configuration: {setup}")
     then = ["swashplate", "fit", str(path), "--from", str(start), "--setup", str(setup)]
@@ -511,8 +527,8 @@ def advise(
     from swashplate.identification.statistics import experiment_design as design
 
     tested = parsing.file_kind(Path(subject)) == "campaign"
-    given = {"--axis": axis, "--from": begin, "--drive": drive, "--runs": runs}
-    for option, value in given.items():
+    options = {"--axis": axis, "--from": begin, "--drive": drive, "--runs": runs}
+    for option, value in options.items():
         if value is not None and not tested:
             raise InputError(f"{option} needs a campaign: {subject} is a drive without tests.")
     if begin is not None and drive is not None:
@@ -525,13 +541,13 @@ def advise(
         # a fit writes what it estimated next to the drive that it found
         estimated = source.parent / parsing.CONFIGURATION
         setup = str(estimated) if estimated.is_file() else None
-    looks, doubts, made = list[design.Outlook](), tuple[str, ...](), list[str]()
+    looks, doubts, saved = list[design.Outlook](), tuple[str, ...](), list[str]()
     with working("Evaluating the tests"):
         if tested:
             _, experiments, plan, start = parsing.fit_of(Path(subject), axis, setup, drive or begin)
             doubts = refuse_unsound(check_runs(experiments, smooth(start)))
             looks = [design.outlook(stage, smooth(start), experiments) for stage in plan.stages]
-            made = [experiment.name for experiment in experiments]
+            saved = [experiment.name for experiment in experiments]
             bench = design.bench(smooth(start), plan, experiments, fitted=drive is not None)
         else:
             start = parsing.parameters_of(subject)
@@ -544,7 +560,7 @@ def advise(
         candidates = [bench.candidate(candidate) for candidate in maneuvers.values()]
         ranked = design.advise(bench.present, candidates, bench.variables)
         in_turn = design.in_turn(bench.present, candidates, bench.variables, tests)
-    determined = [look.table(made) for look in looks]
+    determined = [look.table(saved) for look in looks]
     if determined:
         save(runs, "Shares of the information", joined(determined).write)
     save(out, "Tests", design.advice_table("", ranked).write)
@@ -556,7 +572,7 @@ def advise(
         bullets(replace(look.identifiability, unexcited=()).sentences(), look.sentences())
     if looks:
         note("")
-        for number, name in enumerate(made, start=1):
+        for number, name in enumerate(saved, start=1):
             note(f"run {number}: {name}")
         say(INFORMATION)
         if all(look.identifiability.complete for look in looks):

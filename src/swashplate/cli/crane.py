@@ -77,11 +77,11 @@ def show_crane(
         read = read_text if crane.endswith(".toml") else preset_text
         typer.echo(read(crane), nl=False)
         return
-    chosen = crane_of(crane)
-    show(chosen.table(), *([chosen.limit_table()] if chosen.limits else []))
+    shown_crane = crane_of(crane)
+    show(shown_crane.table(), *([shown_crane.limit_table()] if shown_crane.limits else []))
     for axis in AXES:
-        note(f"{axis}: {getattr(chosen, axis).parameters.title}")
-    for sentence in chosen.provenance():
+        note(f"{axis}: {getattr(shown_crane, axis).parameters.title}")
+    for sentence in shown_crane.provenance():
         say(sentence)
 
 
@@ -165,9 +165,9 @@ def run(
         ship = seaway or operated.motion(round(stick.length * RATE) + 1)
         for first in variant or ["inverse"]:
             drives, _, law = first.partition(":")
-            how: dict[str, Any] = {"control": control_of(law)}
-            how["actuation"] = "inverse" if drives == "identified" else drives
-            runs[first] = simulate(crane, stick, sea=ship, brake=brake, **how, **operated.setup)
+            options: dict[str, Any] = {"control": control_of(law)}
+            options["actuation"] = "inverse" if drives == "identified" else drives
+            runs[first] = simulate(crane, stick, sea=ship, brake=brake, **options, **operated.setup)
         tables = run_tables(runs)
     save(out, "All signals, in SI", runs[first].write)
     draw(plot, "plot_crane", runs)
@@ -247,32 +247,32 @@ def judge(
             f"--allowed is in percent, and {allowed:g} % of the seaways would ask for thousands of "
             f"them: did you mean --allowed {100.0 * allowed:g}?"
         )
-    more: dict[str, Any] = {"allowed": allowed / 100.0, "remedies": remedies, "turns": turns}
+    options: dict[str, Any] = {"allowed": allowed / 100.0, "remedies": remedies, "turns": turns}
     if ask is not None:
-        more["asked"] = [question.strip() for question in ask.split(",")]
+        options["asked"] = [question.strip() for question in ask.split(",")]
     if dask is not None:
         from swashplate.executors import Dask
 
-        more["executor"] = Dask(dask)
+        options["executor"] = Dask(dask)
     from swashplate.crane import judge as judge_control
     from swashplate.crane.studies.judging import SEAWAYS, seaways_needed
 
     crane = study.chosen
     side.print(seaways_needed(study.seeds or SEAWAYS, allowed / 100.0))
-    found: Judgment = study.through(judge_control, crane, **more)
-    what, write = "Numbers of every seaway, in SI", found.write
+    judgment: Judgment = study.through(judge_control, crane, **options)
+    what, write = "Numbers of every seaway, in SI", judgment.write
     if out is not None and out.suffix.lower() == ".html":
         from swashplate.report.scene import write_judgment
 
-        what, write = "Verdict", partial(write_judgment, found)
+        what, write = "Verdict", partial(write_judgment, judgment)
     save(out, what, write)
-    draw(plot, "plot_judgment", found)
-    _end(study.chosen, found.tables(), *found.sentences()[1:])
+    draw(plot, "plot_judgment", judgment)
+    _end(study.chosen, judgment.tables(), *judgment.sentences()[1:])
     say_saved()
-    if not found.passed:
-        side.print(found.headline)
+    if not judgment.passed:
+        side.print(judgment.headline)
         raise typer.Exit(1)
-    say(found.headline)
+    say(judgment.headline)
 
 
 @command(
@@ -330,19 +330,19 @@ def operability(
         raise InputError("--heading belongs to one sea: for operability give --headings.")
     if study.sea:
         note("Only the peak factor and the spreading of --sea are used.")
-    more: dict[str, Any] = {}
+    options: dict[str, Any] = {}
     if headings is not None:
         words = headings.split(",")
-        more["headings"] = [number_of(f"--headings {headings}", word) for word in words]
-    found: Operability = study.through(operable, study.chosen, scatter=diagram, **more)
-    what, write = "Cells of the year, in SI", found.write
+        options["headings"] = [number_of(f"--headings {headings}", word) for word in words]
+    result: Operability = study.through(operable, study.chosen, scatter=diagram, **options)
+    what, write = "Cells of the year, in SI", result.write
     if out is not None and out.suffix.lower() == ".html":
         from swashplate.report.scene import write_operability
 
-        what, write = "Operability", partial(write_operability, found)
+        what, write = "Operability", partial(write_operability, result)
     save(out, what, write)
-    draw(plot, "plot_operability", found)
-    _end(study.chosen, found.tables(), *found.sentences(), *study.chosen.provenance())
+    draw(plot, "plot_operability", result)
+    _end(study.chosen, result.tables(), *result.sentences(), *study.chosen.provenance())
 
 
 @command(
@@ -364,14 +364,14 @@ def follow(at_sea: AtSea, *, out: TableFile = None, plot: FigureFile = None) -> 
         from swashplate.crane import follow as largest_sines
 
         seaway = at_sea.seaway(default="ss3")
-        more: dict[str, Any] = {}
+        options: dict[str, Any] = {}
         if at_sea.sea and seaway is not None:
-            more["seas"] = (seaway.sea,)
-        found = largest_sines(at_sea.chosen, seaway=seaway, **more, **at_sea.pose)
-    save(out, "Amplitudes, in SI", found.tables()[0].write)
-    draw(plot, "plot_follow", found)
+            options["seas"] = (seaway.sea,)
+        sines = largest_sines(at_sea.chosen, seaway=seaway, **options, **at_sea.pose)
+    save(out, "Amplitudes, in SI", sines.tables()[0].write)
+    draw(plot, "plot_follow", sines)
     about_sea = sea_sentences(seaway) if at_sea.sea else ()
-    _end(at_sea.chosen, found.tables(), *about_sea, *at_sea.chosen.provenance())
+    _end(at_sea.chosen, sines.tables(), *about_sea, *at_sea.chosen.provenance())
 
 
 @command(
@@ -402,15 +402,15 @@ def sweep(
     orifice: factors on the luff drive's in-line orifice.
     Each point is simulated in 6 seaways of 10 min.
     """
-    more: dict[str, Any] = {}
+    options: dict[str, Any] = {}
     if points is not None:
-        more["points"] = [number_of(f"--points {points}", part) for part in points.split(",")]
+        options["points"] = [number_of(f"--points {points}", part) for part in points.split(",")]
     from swashplate.crane import sweep as swing_over
 
-    found: Sweep = study.through(swing_over, study.chosen, over, **more)
-    save(out, "Swing, in SI", found.tables()[0].write)
-    draw(plot, "plot_sweep", found)
-    _end(study.chosen, found.tables(), *sea_sentences(study.waters), *study.chosen.provenance())
+    result: Sweep = study.through(swing_over, study.chosen, over, **options)
+    save(out, "Swing, in SI", result.tables()[0].write)
+    draw(plot, "plot_sweep", result)
+    _end(study.chosen, result.tables(), *sea_sentences(study.waters), *study.chosen.provenance())
 
 
 @command(
@@ -463,21 +463,21 @@ def damping(
         )
     within = (begins <= series.time) & (series.time <= ends)
     try:
-        found = swing_damping(series.time[within], series.values[within], rope=rope)
+        estimate = swing_damping(series.time[within], series.values[within], rope=rope)
     except InputError as error:
         raise InputError(f"{log}, {column}: {error}") from None
     ratio = Column("damping ratio", ".3%")
     interval = [Column(name, ".3%") for name in ("from", "to")]
     table = Table("Free swing, 95 % interval", (ratio, *interval, Column("period", ".2f", "s")))
-    table.add(*found)
+    table.add(*estimate)
     show(table)
 
 
-def _end(crane: Crane, tables: Iterable[Table], *said: str) -> None:
+def _end(crane: Crane, tables: Iterable[Table], *sentences: str) -> None:
     """Print title, tables and sentences."""
     note(crane.title)
     show(*tables)
-    for sentence in said:
+    for sentence in sentences:
         say(sentence)
 
 
@@ -491,9 +491,10 @@ def _stationary_words(operated: Operated, seaway: Seaway, damping: float) -> str
     names = ("slew_deg", "boom_deg", "rope_m", "swing_damping", "load", "suspension")
     start = {"slew_deg": 0.0, "boom_deg": 45.0, "rope_m": 20.0}
     hung = start | {name: setup[name] for name in names if name in setup}
-    found = linear_response(operated.chosen, seaway, **hung)
+    response = linear_response(operated.chosen, seaway, **hung)
+    swing = degrees(response.values["swing"].rms)
     return (
-        f"Without control the load swings by {degrees(found.values['swing'].rms):.2f} deg RMS in "
+        f"Without control the load swings by {swing:.2f} deg RMS in "
         f"the long run, by the sea's spectrum and a damping of {100.0 * damping:g} %; a run begins "
         "at rest."
     )

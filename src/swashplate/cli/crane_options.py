@@ -324,21 +324,21 @@ class Studied(Operated):
         ),
     ] = None
 
-    def through(self, study: Callable[..., Any], *first: Any, **more: Any) -> Any:
+    def through(self, study: Callable[..., Any], *first: Any, **keywords: Any) -> Any:
         """A study of the controller, whose progress is shown."""
         law = control_of(self.control)
         if law is None:
             raise InputError("--control is empty: there is nothing to assess.")
-        how = self.setup | _given(length=self.length, run_in=self.run_in) | more
+        options = self.setup | _given(length=self.length, run_in=self.run_in) | keywords
         if self.waters is not None:
-            how["sea"] = self.waters
+            options["sea"] = self.waters
         if self.seeds is not None:
-            how["seeds"] = range(self.seeds)
+            options["seeds"] = range(self.seeds)
         if self.drives is not None or self.scale:
-            how["drives"] = self.sets()
+            options["drives"] = self.sets()
         with long_work("Seaways") as shown:
-            how["progress"] = lambda done, of: shown(f"{done} of {of} seaways", done / of)
-            return study(*first, law, **how)
+            options["progress"] = lambda done, of: shown(f"{done} of {of} seaways", done / of)
+            return study(*first, law, **options)
 
     @cached_property
     def waters(self) -> Seaway | None:
@@ -347,8 +347,8 @@ class Studied(Operated):
 
         counted = LENGTH if self.length is None else self.length
         before = RUN_IN if self.run_in is None else self.run_in
-        given = self._at_sea or self._lean or self.length or self.run_in
-        return self.seaway(default="ss3" if given else None, length=counted + before)
+        is_stated = self._at_sea or self._lean or self.length or self.run_in
+        return self.seaway(default="ss3" if is_stated else None, length=counted + before)
 
     def sets(self) -> dict[str, Any]:
         """Sets of drives by name."""
@@ -363,8 +363,8 @@ class Studied(Operated):
             if not drawn:
                 raise InputError("--drives drawn needs the folder of a fit: --drive luff=FOLDER.")
             sets["drawn"] = drawn_cranes(self.chosen)
-            kept = [axis for axis in AXES if axis not in drawn]
-            as_given = f"; not drawn, without a fit: {', '.join(kept)}" if kept else ""
+            fixed = [axis for axis in AXES if axis not in drawn]
+            as_given = f"; not drawn, without a fit: {', '.join(fixed)}" if fixed else ""
             side.print(f"Drawn: {', '.join(drawn)}{as_given}")
         crane, changed = self.chosen, []
         for name, text in pairs_of("--scale", self.scale, "luff.orifice=1.5"):
@@ -460,13 +460,13 @@ def _vector(option: str, text: str, example: str) -> tuple[float, ...]:
 
 
 def numbers_of(
-    what: str, given: list[str] | None, example: str, known: Sequence[str] = ()
+    what: str, assignments: list[str] | None, example: str, names: Sequence[str] = ()
 ) -> dict[str, Any]:
     """Numbers by name of an option's pairs; refuses a name that is not known."""
-    pairs = pairs_of(what, given, example)
-    strange = [name for name, _ in pairs if known and name not in known]
+    pairs = pairs_of(what, assignments, example)
+    strange = [name for name, _ in pairs if names and name not in names]
     if strange:
-        raise InputError(f"{what} has no {strange[0]}; it has {', '.join(known)}.")
+        raise InputError(f"{what} has no {strange[0]}; it has {', '.join(names)}.")
     return {name: number_of(f"{what} {name}={text}", text) for name, text in pairs}
 
 

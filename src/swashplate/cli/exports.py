@@ -97,8 +97,8 @@ def export(
     with working("Exporting"):
         from swashplate import export as exporting
 
-        chosen = drive.chosen
-    own = exporting.LONGEST_STEP if step is None else step
+        exported = drive.chosen
+    longest_step = exporting.LONGEST_STEP if step is None else step
     names = None if platforms is None else [part.strip() for part in platforms.split(",")]
     with said():
         if fmu is not None:
@@ -106,18 +106,22 @@ def export(
             save(
                 fmu,
                 f"FMU {version}",
-                lambda path: exporting.fmu(chosen, path, fmi=version, step=own, platforms=names),
+                lambda path: exporting.fmu(
+                    exported, path, fmi=version, step=longest_step, platforms=names
+                ),
             )
         if c is not None:
             with working(f"Writing {c}"):
-                written = exporting.c(chosen, c, own)
+                written = exporting.c(exported, c, longest_step)
                 if compile:
                     (header,) = (each.name for each in written if each.name.endswith("drive.h"))
                     written.append(exporting.compiled_c(c, header))
-            for made in written:
-                note(f"C: {made}")
+            for written_file in written:
+                note(f"C: {written_file}")
         if wasm is not None:
-            save(wasm, "WebAssembly", lambda path: exporting.wasm(chosen, path, step=own))
+            save(
+                wasm, "WebAssembly", lambda path: exporting.wasm(exported, path, step=longest_step)
+            )
     drive.warn()
     for line in drive.changes:
         note(line)
@@ -126,10 +130,10 @@ def export(
 @contextmanager
 def said() -> Iterator[None]:
     """Print what the export warns of, each once."""
-    with warnings.catch_warnings(record=True) as found:
+    with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         yield
-    for text in dict.fromkeys(str(each.message) for each in found):
+    for text in dict.fromkeys(str(warning.message) for warning in caught):
         note(f"Note: {text}")
 
 
@@ -170,15 +174,21 @@ def live(
     with working("Writing the page"):
         from swashplate.report.fit_report import write_live_page
 
-        place = drive_file(drive.drive)
-        name = str(place) if place is not None else "your copy of it, --toml of 'swashplate show'"
+        parameter_file = drive_file(drive.drive)
+        name = (
+            str(parameter_file)
+            if parameter_file is not None
+            else "your copy of it, --toml of 'swashplate show'"
+        )
         if path is not None:
-            campaign, chosen = campaign_of(path, axis)
-            said = write_live_page(drive.chosen, out, campaign=campaign, axis=chosen, name=name)
+            campaign, axis_name = campaign_of(path, axis)
+            sentences = write_live_page(
+                drive.chosen, out, campaign=campaign, axis=axis_name, name=name
+            )
         else:
             command = maneuver_of(maneuver or "", drive.chosen)
-            said = write_live_page(drive.chosen, out, command=command, name=name)
+            sentences = write_live_page(drive.chosen, out, command=command, name=name)
     drive.warn()
-    for sentence in (*drive.changes, *said):
+    for sentence in (*drive.changes, *sentences):
         note(sentence)
     note(f"Page: {out} ({out.stat().st_size / 1e3:.0f} kB)")

@@ -187,10 +187,10 @@ class DriveChoice:
         """The drive."""
         from swashplate.cli.parsing import drive_of
 
-        made = drive_of(self.drive, self.values or (), self.factors or ())
-        if made.parameters.motion == "rod":
+        drive = drive_of(self.drive, self.values or (), self.factors or ())
+        if drive.parameters.motion == "rod":
             show_rod()
-        return made
+        return drive
 
     @property
     def title(self) -> str:
@@ -207,9 +207,9 @@ class DriveChoice:
 
     def warn(self) -> None:
         """Say it if the drive's fit calls it not usable, as its title does, or left limits open."""
-        _, found, why = self.chosen.parameters.title.partition("Not usable")
-        if found:
-            note(f"! The fit of this drive says: {found}{why}.")
+        _, marked, why = self.chosen.parameters.title.partition("Not usable")
+        if marked:
+            note(f"! The fit of this drive says: {marked}{why}.")
         self._warn_unreached()
 
     def _warn_unreached(self) -> None:

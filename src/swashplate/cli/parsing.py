@@ -62,10 +62,10 @@ def file_kind(path: Path) -> str:
     if path.name.lower().endswith((*SUFFIXES, ".xlsx", ".xls")):
         return "log"
     try:
-        found = parse_toml(read_text(path), str(path))
+        tables = parse_toml(read_text(path), str(path))
     except FileError:
         return ""
-    return next((kind for mark, kind in _MARKS.items() if mark in found), "")
+    return next((kind for mark, kind in _MARKS.items() if mark in tables), "")
 
 
 def check_kind(path: Path, expected: str) -> None:
@@ -108,9 +108,14 @@ def fit_of(
     from swashplate.identification.estimation.stages import setup_of
     from swashplate.identification.identifying import runs_to_fit
 
-    campaign, chosen = campaign_of(path, axis)
-    start = campaign.drive(chosen).parameters if begin is None else parameters_of(begin)
-    return campaign, runs_to_fit(campaign, chosen), setup_of(campaign, chosen, start, setup), start
+    campaign, axis_name = campaign_of(path, axis)
+    start = campaign.drive(axis_name).parameters if begin is None else parameters_of(begin)
+    return (
+        campaign,
+        runs_to_fit(campaign, axis_name),
+        setup_of(campaign, axis_name, start, setup),
+        start,
+    )
 
 
 def drive_file(word: str) -> Path | None:
@@ -140,18 +145,19 @@ def model_parameters_of(folder: str, file: Path, runs: Sequence[Experiment]) -> 
     from swashplate.identification.estimation.model_setup import ModelSetup
 
     setup = ModelSetup.from_file(file)
-    place = Path(folder) / NUMBERS if Path(folder).is_dir() else Path(folder)
-    table = parse_toml(read_text(place), str(place)).get(setup.name)
+    numbers_file = Path(folder) / NUMBERS if Path(folder).is_dir() else Path(folder)
+    table = parse_toml(read_text(numbers_file), str(numbers_file)).get(setup.name)
     nominal = setup.nominal(runs)
     if not isinstance(table, dict) or table.keys() != nominal.numbers.keys():
         raise InputError(
-            f"{place} has no table [{setup.name}] with {', '.join(nominal.numbers)}: give the "
-            f"folder that 'swashplate fit --model {file}' wrote."
+            f"{numbers_file} has no table [{setup.name}] with {', '.join(nominal.numbers)}: give "
+            f"the folder that 'swashplate fit --model {file}' wrote."
         )
     for name, value in table.items():
         if isinstance(value, bool) or not is_real(value):
             raise InputError(
-                f"{place}: {name} under [{setup.name}] is {value!r:.60}, which is not a number."
+                f"{numbers_file}: {name} under [{setup.name}] is {value!r:.60}, which is not a "
+                "number."
             )
     return replace(nominal, numbers={name: float(value) for name, value in table.items()})
 
@@ -175,23 +181,23 @@ def assigned(
     """
     from swashplate.units import to_si
 
-    found: dict[str, Any] = {}
+    values: dict[str, Any] = {}
     for word in words:
-        name, _, given = (part.strip() for part in word.partition("="))
-        match = _VALUE.fullmatch(given)
+        name, _, value = (part.strip() for part in word.partition("="))
+        match = _VALUE.fullmatch(value)
         definition, numbers, unit = None, list[float](), ""
         if match is not None:
             definition, unit = known(name), (match[3] or "").strip()
             numbers = [float(number) for number in match.group(1, 2) if number]
         if len(numbers) not in counts or (unit and not units):
             raise InputError(f"{option} cannot read '{word}'; write it as {example}.")
-        if name in found:
+        if name in values:
             raise InputError(f"{option} gives {name} twice; give it once.")
         if unit and definition is not None:
             what = f"{name} ({definition.name})"
             numbers = [to_si(number, unit, definition.unit, what) for number in numbers]
-        found[name] = numbers[0] if len(numbers) == 1 else (numbers[0], numbers[1])
-    return found
+        values[name] = numbers[0] if len(numbers) == 1 else (numbers[0], numbers[1])
+    return values
 
 
 def drive_of(word: str, values: Sequence[str] = (), factors: Sequence[str] = ()) -> Drive:
@@ -262,16 +268,16 @@ def ranges_of(words: Sequence[str], usual: FactorRange) -> dict[str, FactorRange
     """Ranges of factors by design variable from words such as ``pump`` or ``pump=0.8/1.5``."""
     from swashplate.analysis.design_variables import powers_of
 
-    whole = [word if "=" in word else f"{word}={usual[0]}/{usual[1]}" for word in words]
-    return assigned("--variable", whole, "pump or pump=0.8/1.5", powers_of, (2,))
+    completed = [word if "=" in word else f"{word}={usual[0]}/{usual[1]}" for word in words]
+    return assigned("--variable", completed, "pump or pump=0.8/1.5", powers_of, (2,))
 
 
 def pairs_of(
-    option: str, given: Sequence[str] | None, example: str, *, often: bool = False
+    option: str, texts: Sequence[str] | None, example: str, *, often: bool = False
 ) -> list[tuple[str, str]]:
     """The text before and after each equals sign; the first is given once, or often."""
     pairs = list[tuple[str, str]]()
-    for pair in given or ():
+    for pair in texts or ():
         name, equals, value = pair.partition("=")
         if not equals:
             raise InputError(f"{option} {pair} has no equals sign: write {option} {example}.")
@@ -283,8 +289,8 @@ def pairs_of(
 
 def changes_between(before: ParameterSet, after: ParameterSet) -> list[str]:
     """A line for each parameter of two sets that differs, with a question where it surprises."""
-    known = {parameter.symbol for parameter in before.values()}
-    added = [parameter for parameter in after.values() if parameter.symbol not in known]
+    symbols = {parameter.symbol for parameter in before.values()}
+    added = [parameter for parameter in after.values() if parameter.symbol not in symbols]
     lines = [
         f"{parameter.symbol} ({parameter.name}): {'/'.join(f'{v:g}' for v in parameter.values)} "
         f"{unit_text(parameter.unit)}".rstrip()
@@ -328,10 +334,10 @@ def maneuver_of(word: str, *drives: Drive) -> Maneuver:
     except InputError as error:
         if ":" in word or not tests:
             raise
-        said = str(error).rstrip(".")
+        sentence = str(error).rstrip(".")
         near = get_close_matches(word, tests, 1) or [*tests]
         raise InputError(
-            f'{said}; or name one of the tests of {" or ".join(axes)}, such as "{near[0]}".'
+            f'{sentence}; or name one of the tests of {" or ".join(axes)}, such as "{near[0]}".'
         ) from None
 
 
@@ -340,13 +346,13 @@ def at_rate(drive: Drive, rate: float) -> Drive:
     from swashplate.cli.terminal import note
     from swashplate.equations.marching.record import least_substeps
 
-    own, marched = drive.parameters.rate, rate * least_substeps(rate)
-    if own is None or abs(marched / own - 1.0) < 1e-9:
+    filter_rate, marched = drive.parameters.rate, rate * least_substeps(rate)
+    if filter_rate is None or abs(marched / filter_rate - 1.0) < 1e-9:
         return drive
     steps = "" if marched == rate else f", computed in steps of 1/{marched:g} s,"
     note(
-        f"{drive.name}: the card's filter is a recursion for {own:g} Hz; at {rate:g} Hz{steps} the "
-        "differential equation with the same poles replaces it."
+        f"{drive.name}: the card's filter is a recursion for {filter_rate:g} Hz; at {rate:g} "
+        f"Hz{steps} the differential equation with the same poles replaces it."
     )
     return drive.at_every_rate()
 
@@ -420,18 +426,18 @@ def _measured(measured: Sequence[str], log: str, time_column: str) -> dict[str, 
 
     found = dict[str, Any]()
     for word in measured:
-        name, _, said = (part.strip() for part in word.partition("="))
-        if name not in MEASURED or not said or name in found:
-            known = ", ".join(MEASURED)
-            raise InputError(f"--measured {word}: write NAME=COLUMN, once for each of {known}.")
+        name, _, text = (part.strip() for part in word.partition("="))
+        if name not in MEASURED or not text or name in found:
+            names = ", ".join(MEASURED)
+            raise InputError(f"--measured {word}: write NAME=COLUMN, once for each of {names}.")
         try:
-            found[name] = float(said)
+            found[name] = float(text)
         except ValueError:
             if not log:
                 must = "a maneuver has no columns, so give a number in SI"
                 raise InputError(f"--measured {word}: {must}.") from None
             unit = MEASURED[name][0]
-            found[name] = read_series(log, said, unit, time_column=time_column).values
+            found[name] = read_series(log, text, unit, time_column=time_column).values
     return found
 
 

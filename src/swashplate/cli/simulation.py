@@ -61,8 +61,8 @@ def simulate(
     maneuvers.
     """
     with working("Simulating"):
-        chosen = parsing.at_rate(drive.chosen, sampling.rate)
-        name, run = parsing.simulated_as(chosen, maneuver, sampling)
+        marched = parsing.at_rate(drive.chosen, sampling.rate)
+        name, run = parsing.simulated_as(marched, maneuver, sampling)
         tables, title = run.tables(), f"{drive.title}, {name}"
     save(out, "All signals, in SI", run.write)
     window = parsing.window_of(run.time, begin, end)
@@ -107,12 +107,12 @@ def compare(
         if labels[0] == labels[1]:  # then by what was typed
             labels = [first, second if second != first else f"{second} (2)"]
         drives = dict(zip(labels, pair, strict=True))
-        chosen = parsing.maneuver_of(maneuver, *pair)
-        voltage = chosen.sample(rate)
+        test = parsing.maneuver_of(maneuver, *pair)
+        voltage = test.sample(rate)
         runs = {label: drive.simulate(voltage, rate) for label, drive in drives.items()}
-        made = side_by_side(runs)
+        table = side_by_side(runs)
         rms = rms_difference(*(run.shaft_speed for run in runs.values()))
-    title = f"{' and '.join(runs)}, {chosen.name}"
+    title = f"{' and '.join(runs)}, {test.name}"
 
     def write(path: Path) -> None:
         import polars as pl
@@ -123,7 +123,7 @@ def compare(
     save(out, "Voltage and both speeds, in SI", write)
     draw(plot, "plot_comparison", runs, title=title)
     note(title)
-    show(made)
+    show(table)
     note(f"rms difference of the speeds: {quantity(rms, 'rad/s', spec='.2f')}")
 
 
@@ -187,10 +187,10 @@ def show_parameters(
 def packaged_drives() -> Table:
     """The packaged drives and their control cards."""
     # their files as they stand: nothing is checked or compiled for a list of names
-    made = Table("", (Column("name"), Column("drive", wrap=True), Column("control card")))
+    table = Table("", (Column("name"), Column("drive", wrap=True), Column("control card")))
     sets = (resources.files("swashplate.parameters") / "sets").iterdir()
-    for path in sorted((each for each in sets if each.name.endswith(".toml")), key=str):
-        found = parse_toml(path.read_text("utf-8"), path.name)
-        card = found["control_card"]
-        made.add(found["name"], found["title"], card if isinstance(card, str) else "its own")
-    return made
+    for path in sorted((entry for entry in sets if entry.name.endswith(".toml")), key=str):
+        contents = parse_toml(path.read_text("utf-8"), path.name)
+        card = contents["control_card"]
+        table.add(contents["name"], contents["title"], card if isinstance(card, str) else "its own")
+    return table

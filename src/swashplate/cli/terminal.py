@@ -106,11 +106,11 @@ def _blocks(table: Table, line: int) -> Iterator[rich.table.Table]:
     rows = [table.texts(row) for row in table.rows]
     whole, broken = _widths([heads, *rows]), list[int]()
 
-    def length(places: Sequence[int]) -> int:
-        return sum((broken or whole)[k] for k in places) + BETWEEN * (len(places) - 1)
+    def length(columns: Sequence[int]) -> int:
+        return sum((broken or whole)[k] for k in columns) + BETWEEN * (len(columns) - 1)
 
-    def block(places: Sequence[int]) -> rich.table.Table:
-        made = rich.table.Table(
+    def block(columns_shown: Sequence[int]) -> rich.table.Table:
+        shown = rich.table.Table(
             title=table.title or None,
             title_justify="left",
             title_style="bold",
@@ -122,8 +122,8 @@ def _blocks(table: Table, line: int) -> Iterator[rich.table.Table]:
             collapse_padding=True,
         )
         least = _widths([heads, *rows])
-        for k in places:
-            made.add_column(
+        for k in columns_shown:
+            shown.add_column(
                 heads[k],
                 justify="right" if columns[k].spec else "left",
                 no_wrap=bool(columns[k].spec) or not (columns[k].wrap or broken),
@@ -134,9 +134,9 @@ def _blocks(table: Table, line: int) -> Iterator[rich.table.Table]:
             )
         for row, cells in zip(table.rows, rows, strict=True):
             if row.section:
-                made.add_section()
-            made.add_row(*(cells[k] for k in places))
-        return made
+                shown.add_section()
+            shown.add_row(*(cells[k] for k in columns_shown))
+        return shown
 
     numbers = [k for k in every if columns[k].spec]
     if length(every) <= line or not numbers or any(column.wrap for column in columns):
@@ -231,15 +231,15 @@ def long_work(text: str, steps: int = 0) -> Iterator[Callable[..., None]]:
     """
     from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeRemainingColumn
 
-    said = TextColumn("{task.description}", markup=False)
-    columns = (SpinnerColumn(), BarColumn(bar_width=12), said, TimeRemainingColumn())
+    words = TextColumn("{task.description}", markup=False)
+    columns = (SpinnerColumn(), BarColumn(bar_width=12), words, TimeRemainingColumn())
     with Progress(*columns, console=side, transient=True, disable=not side.is_terminal) as bar:
-        task, begun = bar.add_task(text, total=None), 0
+        task, steps_begun = bar.add_task(text, total=None), 0
 
         def show(what: str, share: float | None = None) -> None:
-            nonlocal begun
+            nonlocal steps_begun
             if steps:
-                share, begun = begun / steps, begun + 1
+                share, steps_begun = steps_begun / steps, steps_begun + 1
             total = None if share is None else 1.0
             bar.update(task, description=what, total=total, completed=share or 0.0)
 
@@ -280,14 +280,14 @@ def save(path: Path | None, what: str, write: Callable[[Path], object]) -> None:
         SAVED.get().append(f"{what}: {path}")
 
 
-def draw(path: Path | None, figure: Any, *shown: Any, **how: Any) -> None:
+def draw(path: Path | None, figure: Any, *shown: Any, **options: Any) -> None:
     """Save a figure, or one of `swashplate.report.figures` by its name, if it was asked for."""
     if path is not None:
         with working(f"Drawing {path}"):
             from swashplate.report import figures
 
-            made = getattr(figures, figure)(*shown, **how) if shown else figure
-            figures.save_figure(made, path)
+            drawing = getattr(figures, figure)(*shown, **options) if shown else figure
+            figures.save_figure(drawing, path)
         SAVED.get().append(f"Figure: {path}")
 
 

@@ -133,8 +133,8 @@ class Content:
     @property
     def identifier(self) -> str:
         """Its name as one of C's, of which C99 looks at 63 characters."""
-        made = re.sub(r"\W", "_", self.name, flags=re.ASCII).strip("_").lower() or "model"
-        return (f"_{made}" if made[0].isdigit() else made)[:LONGEST_IDENTIFIER]
+        name = re.sub(r"\W", "_", self.name, flags=re.ASCII).strip("_").lower() or "model"
+        return (f"_{name}" if name[0].isdigit() else name)[:LONGEST_IDENTIFIER]
 
 
 def content_of(
@@ -248,9 +248,9 @@ def c(
     UserWarning
         Where the recursion of the card's filter was converted to another step.
     """
-    own = c_name(what.name) if isinstance(what, Model) else "swp"
+    prefix = c_name(what.name) if isinstance(what, Model) else "swp"
     content = content_of(
-        what, step, parameters=parameters, options=options, given=given, prefix=own
+        what, step, parameters=parameters, options=options, given=given, prefix=prefix
     )
     exported, values, name = content.exported, content.values, content.identifier
     texts = interface(exported)
@@ -284,7 +284,7 @@ _SPEED = Sample._fields[1:].index("shaft_speed")
 def _initialiser(exported: Exported, values: Array, name: str, title: str) -> str:
     """Values as an array of C, each with its name."""
     writer = exported.writer
-    names = ["step [s]", *(each for each, _ in writer.values()), *writer.constant_names()]
+    names = ["step [s]", *(written for written, _ in writer.values()), *writer.constant_names()]
     guard = f"{name.upper()}_VALUES_H"
     head = f"Values of {name} for {exported.prefix}_init, as swashplate computed them."
     lines = [f"/* {comment_line(f'{head} {title}'.strip())} */",

@@ -151,20 +151,24 @@ def exportable(what: Drive | Model, step: float, **numbers: Any) -> Content:
 
 def packed(content: Content, fmi: Version, platforms: Collection[Platform]) -> bytes:
     """The file's content: the same bytes for the same drive and options."""
-    made, table, name = sources(content), table_of(content), content.identifier
+    source_files, table, name = sources(content), table_of(content), content.identifier
     numbers = np.where(np.isinf(content.values), np.copysign(NONE, content.values), content.values)
-    token = _token(fmi, made, numbers, table)
+    token = _token(fmi, source_files, numbers, table)
     members = {
         "modelDescription.xml": description(content, table, fmi, token),
-        "resources/drive.bin": resource(numbers, made.layout, token),
-        f"sources/{WHOLE}": one_unit(made, fmi, name).encode(),
+        "resources/drive.bin": resource(numbers, source_files.layout, token),
+        f"sources/{WHOLE}": one_unit(source_files, fmi, name).encode(),
     }
-    left = ("wasm.c", "fmi3.c" if fmi == "2.0" else "fmi2.c")
-    members |= {f"sources/{n}": text.encode() for n, text in made.texts.items() if n not in left}
+    unused = ("wasm.c", "fmi3.c" if fmi == "2.0" else "fmi2.c")
+    members |= {
+        f"sources/{n}": text.encode() for n, text in source_files.texts.items() if n not in unused
+    }
     if fmi == "3.0":
         members["sources/buildDescription.xml"] = _build_description(name)
     for platform in platforms:
-        library = packaged(platform.library) if content.packaged else compiled(made, platform)
+        library = (
+            packaged(platform.library) if content.packaged else compiled(source_files, platform)
+        )
         for folder in platform.fmi2 if fmi == "2.0" else platform.fmi3:
             members[f"binaries/{folder}/{name}{platform.ending}"] = library
     return _zipped(members)
@@ -186,27 +190,27 @@ def resource(numbers: Array, layout: int, token: str) -> bytes:
 
 def _token(fmi: Version, sources: Sources, numbers: Array, table: Sequence[Variable]) -> str:
     """GUID made of the sources, the numbers and the variables."""
-    made = sha256(f"{fmi} {__version__}".encode())
+    digest = sha256(f"{fmi} {__version__}".encode())
     for name in sorted(sources.texts):
-        made.update(sources.texts[name].encode())
-    made.update(numbers.astype("<f8").tobytes())
-    made.update(
+        digest.update(sources.texts[name].encode())
+    digest.update(numbers.astype("<f8").tobytes())
+    digest.update(
         repr([(variable.name, variable.reference, variable.start) for variable in table]).encode()
     )
-    h = made.hexdigest()
+    h = digest.hexdigest()
     return f"{{{h[:8]}-{h[8:12]}-{h[12:16]}-{h[16:20]}-{h[20:32]}}}"
 
 
 def _zipped(members: Mapping[str, bytes]) -> bytes:
     """A zip whose bytes depend on its content alone, the description first."""
     target = BytesIO()
-    with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as made:
-        for name in sorted(members, key=lambda each: (each != "modelDescription.xml", each)):
+    with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as archive:
+        for name in sorted(members, key=lambda member: (member != "modelDescription.xml", member)):
             entry = zipfile.ZipInfo(name, _EARLIEST)
             entry.compress_type = zipfile.ZIP_DEFLATED
             entry.create_system = 3
             entry.external_attr = (0o755 if name.startswith("binaries/") else 0o644) << 16
-            made.writestr(entry, members[name])
+            archive.writestr(entry, members[name])
     return target.getvalue()
 
 
@@ -228,9 +232,9 @@ def description(content: Content, table: Sequence[Variable], fmi: Version, token
     root = ET.Element("fmiModelDescription", _head(content, table, fmi, token))
     step, two = repr(content.step), fmi == "2.0"
     abilities = ["canHandleVariableCommunicationStepSize", *(ABILITIES_2 if two else ABILITIES_3)]
-    said = {"modelIdentifier": content.identifier, **dict.fromkeys(abilities, "true")}
+    interface = {"modelIdentifier": content.identifier, **dict.fromkeys(abilities, "true")}
     slave = ET.SubElement(
-        root, "CoSimulation", said if two else {**said, "fixedInternalStepSize": step}
+        root, "CoSimulation", interface if two else {**interface, "fixedInternalStepSize": step}
     )
     if two:
         ET.SubElement(ET.SubElement(slave, "SourceFiles"), "File", {"name": WHOLE})
@@ -243,13 +247,13 @@ def description(content: Content, table: Sequence[Variable], fmi: Version, token
     listed = ET.SubElement(root, "ModelVariables")
     for variable in table:
         flag = isinstance(variable.start, bool)
-        own = {"start": str(variable.start).lower()} if flag else _number(variable)
+        initial = {"start": str(variable.start).lower()} if flag else _number(variable)
         if two:
             scalar = ET.SubElement(listed, "ScalarVariable", _attributes(variable))
-            ET.SubElement(scalar, "Boolean" if flag else "Real", own)
+            ET.SubElement(scalar, "Boolean" if flag else "Real", initial)
         else:
             ET.SubElement(
-                listed, "Boolean" if flag else "Float64", {**_attributes(variable), **own}
+                listed, "Boolean" if flag else "Float64", {**_attributes(variable), **initial}
             )
     if not two:
         clock = {"name": "time", "valueReference": str(content.references.TIME)}
@@ -316,34 +320,34 @@ def _add_structure(structure: ET.Element, table: Sequence[Variable], two: bool) 
     listed, initial = structure, structure
     if two:
         listed, initial = (ET.SubElement(structure, n) for n in ("Outputs", "InitialUnknowns"))
-    for name_ in names:
-        read = sorted(numbers[name] for name in name_.feedthrough)
-        said = {key: str(numbers[name_.name]), "dependencies": " ".join(map(str, read))}
-        said["dependenciesKind"] = " ".join("dependent" for _ in read)
-        ET.SubElement(listed, "Unknown" if two else "Output", said)
+    for output in names:
+        read = sorted(numbers[name] for name in output.feedthrough)
+        dependency = {key: str(numbers[output.name]), "dependencies": " ".join(map(str, read))}
+        dependency["dependenciesKind"] = " ".join("dependent" for _ in read)
+        ET.SubElement(listed, "Unknown" if two else "Output", dependency)
     for name in names:
-        own = {key: str(numbers[name.name])}
-        ET.SubElement(initial, "Unknown" if two else "InitialUnknown", own)
+        entry = {key: str(numbers[name.name])}
+        ET.SubElement(initial, "Unknown" if two else "InitialUnknown", entry)
 
 
 def _build_description(identifier: str) -> bytes:
     root = ET.Element("fmiBuildDescription", {"fmiVersion": "3.0"})
-    made = ET.SubElement(root, "BuildConfiguration", {"modelIdentifier": identifier})
-    said = {"language": "C11", "compilerOptions": "-ffp-contract=off"}
-    ET.SubElement(ET.SubElement(made, "SourceFileSet", said), "SourceFile", {"name": WHOLE})
+    build = ET.SubElement(root, "BuildConfiguration", {"modelIdentifier": identifier})
+    settings = {"language": "C11", "compilerOptions": "-ffp-contract=off"}
+    ET.SubElement(ET.SubElement(build, "SourceFileSet", settings), "SourceFile", {"name": WHOLE})
     return _xml(root)
 
 
 def _add_units(root: ET.Element, table: Sequence[Variable]) -> None:
     definitions = ET.SubElement(root, "UnitDefinitions")
     for unit in sorted({variable.unit for variable in table if variable.unit != "1"} | {"s"}):
-        made = ET.SubElement(definitions, "Unit", {"name": unit})
+        element = ET.SubElement(definitions, "Unit", {"name": unit})
         exponents = si_exponents(unit)
         if exponents is not None:  # FMI cannot say fractions
-            ET.SubElement(made, "BaseUnit", {name: str(n) for name, n in exponents.items()})
+            ET.SubElement(element, "BaseUnit", {name: str(n) for name, n in exponents.items()})
         for shown in DISPLAYED.get(unit, ()):
             factor = 1.0 / to_si(1.0, shown, unit, "a display unit")
-            ET.SubElement(made, "DisplayUnit", {"name": shown, "factor": repr(factor)})
+            ET.SubElement(element, "DisplayUnit", {"name": shown, "factor": repr(factor)})
 
 
 # --- comparison -----------------------------------------------------------------------------------
@@ -369,10 +373,10 @@ class FmuComparison(Result):
     def tables(self) -> list[Table]:
         """Largest difference of each output."""
         columns = (Column("output"), Column("largest difference", ".3g"), UNIT)
-        made = Table(f"FMU of {self.name} against the drive, {self.samples} samples", columns)
+        table = Table(f"FMU of {self.name} against the drive, {self.samples} samples", columns)
         for name, difference in self.differences.items():
-            made.add(name, difference, unit=self.units[name], look=difference != 0.0)
-        return [made]
+            table.add(name, difference, unit=self.units[name], look=difference != 0.0)
+        return [table]
 
 
 def compare(path: str | Path, drive: Drive, voltage: ArrayLike) -> FmuComparison:
@@ -419,8 +423,8 @@ def compare(path: str | Path, drive: Drive, voltage: ArrayLike) -> FmuComparison
         warnings.simplefilter("ignore")  # said when it was exported
         content = exportable(drive, step)
     fits = content.instance.parts[0].options.exact is None  # a recursion for this step
-    chosen = drive if fits else drive.at_every_rate()
-    run = chosen.simulate(command, 1.0 / step, interpolation="previous")
+    marched = drive if fits else drive.at_every_rate()
+    run = marched.simulate(command, 1.0 / step, interpolation="previous")
     table = table_of(content)
     inputs = {variable.name: variable.start for variable in table if variable.causality == "input"}
     columns = {"time": np.arange(command.size) * step, **inputs, "voltage": command}
@@ -429,7 +433,7 @@ def compare(path: str | Path, drive: Drive, voltage: ArrayLike) -> FmuComparison
         signals[name] = values
     names = [name for name in run.names if name not in ("time", "voltage")]
     try:
-        found = fmpy.simulate_fmu(
+        outputs = fmpy.simulate_fmu(
             str(path),
             start_time=0.0,
             stop_time=float(signals["time"][-1]),
@@ -439,18 +443,18 @@ def compare(path: str | Path, drive: Drive, voltage: ArrayLike) -> FmuComparison
         )
     except Exception as error:
         raise InputError(f"{path} fails: {error}") from None
-    if len(found) != command.size:
-        raise InputError(f"{path} gave {len(found)} samples for a command of {command.size}.")
-    differences = {name: float(np.abs(found[name] - run[name]).max()) for name in names}
+    if len(outputs) != command.size:
+        raise InputError(f"{path} gave {len(outputs)} samples for a command of {command.size}.")
+    differences = {name: float(np.abs(outputs[name] - run[name]).max()) for name in names}
     units = {variable.name: variable.unit for variable in table}
-    return FmuComparison(chosen.name, command.size, differences, units)
+    return FmuComparison(marched.name, command.size, differences, units)
 
 
 def _step_of(path: Path, fmpy: Any) -> float:
     """The own step that an FMU declares. [s]"""
     try:
         described = fmpy.read_model_description(str(path), validate=False)
-        (found,) = [variable for variable in described.modelVariables if variable.name == "step"]
-        return float(found.start)
+        (step,) = [variable for variable in described.modelVariables if variable.name == "step"]
+        return float(step.start)
     except Exception:
         raise FileError(f"{path} is no FMU of swashplate.") from None

@@ -109,8 +109,8 @@ FMI_SOURCES = ("fmi.h", "fmi.c", "fmi2.c", "fmi3.c")
 def chosen_platforms(names: Sequence[str] | None, compiling: bool = False) -> tuple[Platform, ...]:
     """Platforms by name; by default all, or those that can be compiled for."""
     if names is None:
-        own = this_machine() if compiling and not has_zig() else None
-        return (own,) if own else tuple(PLATFORMS.values())
+        this_platform = this_machine() if compiling and not has_zig() else None
+        return (this_platform,) if this_platform else tuple(PLATFORMS.values())
     for name in names:
         if name not in PLATFORMS:
             raise InputError(f"There is no platform '{name}'; there are {', '.join(PLATFORMS)}.")
@@ -124,10 +124,10 @@ def chosen_platforms(names: Sequence[str] | None, compiling: bool = False) -> tu
 
 def digest(texts: Mapping[str, str]) -> str:
     """SHA-256 of named texts, in the order of their names."""
-    made = sha256()
+    hasher = sha256()
     for name in sorted(texts):
-        made.update(f"{name}\0{texts[name]}\0".encode())
-    return made.hexdigest()
+        hasher.update(f"{name}\0{texts[name]}\0".encode())
+    return hasher.hexdigest()
 
 
 class Sources(NamedTuple):
@@ -156,17 +156,17 @@ def _made(exported: Exported, references: References) -> Sources:
     texts = interface(exported)
     layout = int(digest(texts)[:16], 16)
     header = c_header(exported, layout, references)
-    own = {name: source_text(name) for name in (*FMI_SOURCES, "wasm.c")}
-    return Sources({**texts, "variables.h": header, **own}, f"{exported.file}.c", layout)
+    file_texts = {name: source_text(name) for name in (*FMI_SOURCES, "wasm.c")}
+    return Sources({**texts, "variables.h": header, **file_texts}, f"{exported.file}.c", layout)
 
 
-def one_unit(made: Sources, fmi: str, identifier: str) -> str:
+def one_unit(sources: Sources, fmi: str, identifier: str) -> str:
     """Text of ``fmu.c``, which an importer compiles: all of a library in one unit.
 
     Whatever is not of the standard's is static, and the standard's functions begin with the model's
     identifier unless the importer says otherwise, so that several can be linked into one program.
     """
-    words = {"n": fmi[0], "identifier": identifier, "model": made.model}
+    words = {"n": fmi[0], "identifier": identifier, "model": sources.model}
     return filled(source_text("fmu.c"), words)
 
 
@@ -240,18 +240,18 @@ def wasm(
     code = packaged(WASM) if content.packaged else compiled_wasm(sources(content))
     name = VALUES_SECTION.encode()
     section = bytes([len(name)]) + name + numbers
-    made = code + b"\0" + _leb128(len(section)) + section
-    write_bytes(made, path)
+    module = code + b"\0" + _leb128(len(section)) + section
+    write_bytes(module, path)
     return Path(path)
 
 
 def _leb128(number: int) -> bytes:
     """An unsigned number as WebAssembly has it: seven bits a byte, the lowest first."""
-    made = bytearray()
+    encoded = bytearray()
     while number > 127:
-        made.append(number & 127 | 128)
+        encoded.append(number & 127 | 128)
         number >>= 7
-    return bytes([*made, number])
+    return bytes([*encoded, number])
 
 
 # --- compiling ------------------------------------------------------------------------------------
@@ -262,13 +262,13 @@ def has_zig() -> bool:
     return find_spec("ziglang") is not None
 
 
-def compiled(made: Sources, platform: Platform) -> bytes:
+def compiled(sources: Sources, platform: Platform) -> bytes:
     """A library for a platform, of C texts, by Zig's compiler or this machine's ``cc``."""
-    with TemporaryDirectory(prefix="swashplate-") as place:
-        folder = Path(place)
-        written(made.texts, folder)
+    with TemporaryDirectory(prefix="swashplate-") as temporary:
+        folder = Path(temporary)
+        written(sources.texts, folder)
         written(fmi_headers(), folder)
-        units = sorted(name for name in made.texts if name.endswith(".c") and name != "wasm.c")
+        units = sorted(name for name in sources.texts if name.endswith(".c") and name != "wasm.c")
         compilers = [[*_zig(target), "-s"] for target in platform.targets]
         if not has_zig():
             if platform is not this_machine() or not shutil.which("cc"):
@@ -280,12 +280,14 @@ def compiled(made: Sources, platform: Platform) -> bytes:
             compilers = [["cc"]]
         # the libraries name themselves: one name for all, and the same bytes each time
         out = f"{NAME}{platform.ending}"
-        more = ["-Wl,-install_name,@rpath/" + out] if platform.ending == ".dylib" else ["-lm"]
-        parts = []
+        linker_options = (
+            ["-Wl,-install_name,@rpath/" + out] if platform.ending == ".dylib" else ["-lm"]
+        )
+        objects = []
         for compiler in compilers:
-            _run([*compiler, *_options(platform), "-o", out, *units, *more], folder)
-            parts.append((folder / out).read_bytes())
-    return parts[0] if len(parts) == 1 else universal(parts)
+            _run([*compiler, *_options(platform), "-o", out, *units, *linker_options], folder)
+            objects.append((folder / out).read_bytes())
+    return objects[0] if len(objects) == 1 else universal(objects)
 
 
 def compiled_c(folder: Path, header: str) -> Path:
@@ -310,16 +312,16 @@ def compiled_c(folder: Path, header: str) -> Path:
     return folder / f"{stem}{ending}"
 
 
-def compiled_wasm(made: Sources) -> bytes:
+def compiled_wasm(sources: Sources) -> bytes:
     """WebAssembly, made of C texts by Zig's compiler."""
     if not has_zig():
         raise InputError("WebAssembly needs a compiler: pip install 'swashplate[binaries]'.")
-    with TemporaryDirectory(prefix="swashplate-") as place:
-        folder = Path(place)
-        written(made.texts, folder)
+    with TemporaryDirectory(prefix="swashplate-") as temporary:
+        folder = Path(temporary)
+        written(sources.texts, folder)
         link = ["-mexec-model=reactor", "-Wl,--no-entry", "-Wl,--export-dynamic", "-s"]
         command = [*_zig("wasm32-wasi"), *WASM_FLAGS, "-fvisibility=hidden", *link]
-        _run([*command, "-o", WASM, made.model, "wasm.c"], folder)
+        _run([*command, "-o", WASM, sources.model, "wasm.c"], folder)
         return (folder / WASM).read_bytes()
 
 

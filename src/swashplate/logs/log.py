@@ -60,7 +60,7 @@ class Log:
         object.__setattr__(self, "columns", tuple(columns))
         object.__setattr__(self, "left_out", left_out)
 
-    def find(self, wanted: str) -> LogColumn:
+    def find(self, requested: str) -> LogColumn:
         """The column of a name.
 
         Parameters
@@ -77,27 +77,29 @@ class Log:
             If it is there, but holds no numbers.
         """
         names = {column.name: _without_unit(column) for column in self.columns}
-        suffixed = re.compile(rf"{re.escape(wanted)}_\w+")
+        suffixed = re.compile(rf"{re.escape(requested)}_\w+")
         matches: list[str] = []
-        for found in (
-            [name for name in names if name == wanted],
-            [name for name in names if name.lstrip("/") == wanted.lstrip("/")],
-            [name for name, bare in names.items() if bare == wanted],
+        for candidates in (
+            [name for name in names if name == requested],
+            [name for name in names if name.lstrip("/") == requested.lstrip("/")],
+            [name for name, bare in names.items() if bare == requested],
             [name for name in names if suffixed.fullmatch(name)],
-            [name for name, bare in names.items() if wanted in (_last(name), _last(bare))],
+            [name for name, bare in names.items() if requested in (_last(name), _last(bare))],
         ):
-            matches = matches or found
+            matches = matches or candidates
         for name, reason in self.left_out.items():
-            if not matches and wanted in (name, _last(name)):
+            if not matches and requested in (name, _last(name)):
                 raise FileError(f"{self.path}: '{name}' cannot be read as numbers: {reason}.")
         listed = ", ".join(map(repr, (matches or list(names))[:_LISTED]))
         listed += f" and {len(names) - _LISTED} more" if len(matches or names) > _LISTED else ""
         if not matches:
             raise InputError(
-                f"{self.path} has no column '{wanted}'; it has {listed}: name the one to take."
+                f"{self.path} has no column '{requested}'; it has {listed}: name the one to take."
             )
         if len(matches) > 1:
-            raise InputError(f"{self.path} has more than one '{wanted}': {listed}; name the one.")
+            raise InputError(
+                f"{self.path} has more than one '{requested}': {listed}; name the one."
+            )
         return next(column for column in self.columns if column.name == matches[0])
 
     def read(self, names: Sequence[str]) -> dict[str, Array]:
@@ -139,8 +141,8 @@ class Log:
 
     def rows_of(self, names: Iterable[str]) -> int | None:
         """Rows of some columns, None where they differ in length or it is not known."""
-        places = [self.columns.index(self.find(name)) for name in names if self.lengths]
-        counts = {self.lengths[place] for place in places}
+        positions = [self.columns.index(self.find(name)) for name in names if self.lengths]
+        counts = {self.lengths[position] for position in positions}
         return counts.pop() if len(counts) == 1 else None
 
 
@@ -206,7 +208,7 @@ def split_unit(name: str) -> tuple[str, str | None]:
     return match[1], (match[2] if match[2] is not None else match[3]).strip()
 
 
-def unit_of(column: LogColumn, wanted: str, si: str) -> str:
+def unit_of(column: LogColumn, requested: str, si: str) -> str:
     """Unit of a column that `Log.find` returned: its own, the ending of its name, or else `si`.
 
     A name like ``time_ms`` means milliseconds where that is a unit of the same quantity, or where
@@ -214,7 +216,7 @@ def unit_of(column: LogColumn, wanted: str, si: str) -> str:
     """
     if column.unit is not None:
         return "1" if column.unit in _NO_UNIT else column.unit
-    suffixed = re.fullmatch(rf"{re.escape(wanted)}_(\w+)", column.name)
+    suffixed = re.fullmatch(rf"{re.escape(requested)}_(\w+)", column.name)
     if suffixed:
         return suffixed[1]
     _, underscore, ending = column.name.rpartition("_")

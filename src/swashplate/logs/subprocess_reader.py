@@ -52,9 +52,9 @@ def open_in_subprocess(reader: str, path: Path) -> Log:
     def load(positions: Sequence[int], first: int = 0, last: int | None = None) -> list[Array]:
         return ask([*positions], first, last)[1]
 
-    found = ask()[0]
-    columns = tuple(LogColumn(*column) for column in found["columns"])
-    return Log(path, found["format"], columns, load, found["left_out"], tuple(found["lengths"]))
+    shown = ask()[0]
+    columns = tuple(LogColumn(*column) for column in shown["columns"])
+    return Log(path, shown["format"], columns, load, shown["left_out"], tuple(shown["lengths"]))
 
 
 class _ReaderProcess:
@@ -92,18 +92,18 @@ class _ReaderProcess:
         """What the other process has to say of a file, and the columns asked for."""
         with cls.lock:
             try:
-                cls.running = other = cls.running or cls()
+                cls.running = process = cls.running or cls()
             except OSError as error:
                 raise FileError(
                     f"{path} is read in a process of its own, which cannot be started: "
                     f"{error.strerror}."
                 ) from None
             try:
-                answer, arrays = other._answer(path, question)
+                answer, arrays = process._answer(path, question)
             except BaseException:
                 # also at Ctrl-C: what is half said must not meet the next question
                 cls.running = None
-                other._end()
+                process._end()
                 raise
         if "error" in answer:
             raise (InputError if answer["kind"] == "InputError" else FileError)(answer["error"])
@@ -173,11 +173,11 @@ def serve() -> None:
     os.dup2(2, 1)  # what libraries print must not get between the answers
     warnings.simplefilter("ignore")
     for line in sys.stdin.buffer:
-        reader, name, shown, *wanted = json.loads(line)
+        reader, name, shown, *requested = json.loads(line)
         answer, arrays = dict[str, Any](), list[Array]()
         try:
             _limit_memory(Path(name))
-            answer, arrays = look(reader, Path(name), *wanted)
+            answer, arrays = look(reader, Path(name), *requested)
         except (KeyboardInterrupt, SystemExit):
             raise
         except BaseException as error:

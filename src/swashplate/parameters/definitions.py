@@ -168,21 +168,21 @@ def definitions_of(kinds: tuple[type, ...]) -> Definitions:
     """
     if not kinds:
         return DEFINITIONS
-    known = dict(DEFINITIONS.by_symbol)
+    by_symbol = dict(DEFINITIONS.by_symbol)
     for kind in kinds:
-        for each in declared_by(kind):
-            default = kind._field_defaults.get(each.symbol)  # type: ignore[attr-defined]
-            if each.directional or default is None or not each.unit:
+        for declared in declared_by(kind):
+            default = kind._field_defaults.get(declared.symbol)  # type: ignore[attr-defined]
+            if declared.directional or default is None or not declared.unit:
                 raise ParameterError(
-                    f"{kind.__name__}.{each.symbol} needs a Definition with a unit, one value and "
-                    "a default."
+                    f"{kind.__name__}.{declared.symbol} needs a Definition with a unit, one value "
+                    "and a default."
                 )
-            definition = replace(each, block="refinements", default=default)
-            other = known.setdefault(each.symbol, definition)
-            if other != definition:
+            definition = replace(declared, block="refinements", default=default)
+            earlier = by_symbol.setdefault(declared.symbol, definition)
+            if earlier != definition:
                 raise ParameterError(
-                    f"{kind.__name__}.{each.symbol}: there is another parameter {each.symbol}, "
-                    f"{other.name}; give yours a name of its own."
+                    f"{kind.__name__}.{declared.symbol}: there is another parameter "
+                    f"{declared.symbol}, {earlier.name}; give yours a name of its own."
                 )
-    own = known.keys() - DEFINITIONS.by_symbol.keys()
-    return Definitions(known, {**DEFINITIONS.paths, **{name: f"pump.{name}" for name in own}})
+    added = by_symbol.keys() - DEFINITIONS.by_symbol.keys()
+    return Definitions(by_symbol, {**DEFINITIONS.paths, **{name: f"pump.{name}" for name in added}})

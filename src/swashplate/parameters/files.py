@@ -271,11 +271,11 @@ def _packaged_card(name: str, origin: str) -> CardFile:
 def parameter_of(definition: Definition, entry: ParameterEntry) -> Parameter:
     """A parameter from its entry, in SI; what does not fit the definition is a `ParameterError`."""
     what = f"{definition.symbol} ({definition.name})"
-    given = entry.value if isinstance(entry.value, list) else [entry.value]
+    stated = entry.value if isinstance(entry.value, list) else [entry.value]
     try:
         numbers, bounds = (
             tuple(to_si(value, entry.unit, definition.unit, what) for value in values)
-            for values in (given, entry.bounds or ())
+            for values in (stated, entry.bounds or ())
         )
     except InputError as error:
         raise ParameterError(str(error)) from None

@@ -119,11 +119,12 @@ def check_options(owner: str, options: frozenset[str], numbers: Mapping[str, flo
             raise ParameterError(
                 f"{owner}: there is no option '{option}'; there are {', '.join(OPTIONS)}."
             )
-        own = [DEFINITIONS.find(name) for name, switch in SWITCHES.items() if switch == option]
-        sized = [each for each in own if each.least is not None]
-        if sized and all(numbers.get(each.symbol, 0.0) == 0.0 for each in sized):
+        switched = [DEFINITIONS.find(name) for name, switch in SWITCHES.items() if switch == option]
+        sized = [definition for definition in switched if definition.least is not None]
+        if sized and all(numbers.get(definition.symbol, 0.0) == 0.0 for definition in sized):
+            symbols = " and ".join(definition.symbol for definition in sized)
             raise ParameterError(
-                f"{owner}: {option} is on, but {' and '.join(each.symbol for each in sized)} "
+                f"{owner}: {option} is on, but {symbols} "
                 f"{'are' if len(sized) > 1 else 'is'} 0; give at least {sized[0].least:g} "
                 f"{sized[0].unit}, or take {option} out of the options."
             )
@@ -154,11 +155,11 @@ def broken_rules(
         yield applied(rule, n)
     lowest, moment = _static(n, size)
     for k, side in enumerate(SIDES):
-        own = {name: n[f"{name}_{side}"] for name in ("I_t1", "I_t2", "Z13")}
-        own |= {"side": side, "lowest": lowest[:, k], "moment": moment[:, k]}
-        own["arm_sine"] = n["Z3"] * np.tan(own["Z13"])
+        side_values = {name: n[f"{name}_{side}"] for name in ("I_t1", "I_t2", "Z13")}
+        side_values |= {"side": side, "lowest": lowest[:, k], "moment": moment[:, k]}
+        side_values["arm_sine"] = n["Z3"] * np.tan(side_values["Z13"])
         for rule in OF_A_SIDE:
-            yield applied(rule, own)
+            yield applied(rule, side_values)
 
 
 def applied(rule: Rule, n: Values) -> Broken:

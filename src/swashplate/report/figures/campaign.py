@@ -164,11 +164,14 @@ def plot_campaign(experiments: Iterable[Experiment], *, title: str | None = None
         raise InputError("A page of a campaign needs at least one experiment.")
     figures = []
     for axis, of_axis in axes.items():
-        met: dict[tuple[str, str], list[InputSignal | Channel]] = {}
-        for each in of_axis:
-            for key, signal in _signals(each).items():
-                met.setdefault(key, []).append(signal)
-        columns = [_column(key, met[key]) for key in sorted(met, key=lambda key: key[0] != "")]
+        signals_of: dict[tuple[str, str], list[InputSignal | Channel]] = {}
+        for run in of_axis:
+            for key, signal in _signals(run).items():
+                signals_of.setdefault(key, []).append(signal)
+        columns = [
+            _column(key, signals_of[key])
+            for key in sorted(signals_of, key=lambda key: key[0] != "")
+        ]
         pages = [of_axis[first : first + RUNS] for first in range(0, len(of_axis), RUNS)]
         for number, page in enumerate(pages, start=1):
             words = f"{title or 'Measured tests'}: {axis}"
@@ -215,11 +218,11 @@ def _page(experiments: Sequence[Experiment], columns: Sequence[PanelColumn], tit
         "clipped": Patch(facecolor=ORANGE, label="at the end of the instrument's range"),
         GAP_MARK["label"]: Line2D([], [], **GAP_MARK),
     }
-    met = {a.get_label() for ax in grid.flat for a in (*ax.collections, *ax.lines, *ax.patches)}
+    labels = {a.get_label() for ax in grid.flat for a in (*ax.collections, *ax.lines, *ax.patches)}
     write_title(figure, title)
-    if shown := [handle for key, handle in handles.items() if key in met]:
-        how = {"frameon": False, "fontsize": SMALL, "ncols": 2}
-        figure.legend(handles=shown, loc="outside lower left", **how)
+    if shown := [handle for key, handle in handles.items() if key in labels]:
+        style = {"frameon": False, "fontsize": SMALL, "ncols": 2}
+        figure.legend(handles=shown, loc="outside lower left", **style)
     return figure
 
 
@@ -240,9 +243,9 @@ def _fill(
     ax.set_ylim(middle + column.low - margin, middle + column.high + margin)
     # the input has no weights, and a channel nothing that is held between its samples
     weight = getattr(signal, "weight", None)
-    held = getattr(signal, "interpolation", "") == "previous"
+    is_held = getattr(signal, "interpolation", "") == "previous"
     if weight is None:
-        windows = np.array(sorted(each[:2] for each in experiment.ignored)).reshape(-1, 2)
+        windows = np.array(sorted(window[:2] for window in experiment.ignored)).reshape(-1, 2)
         inside = np.clip(windows, time[0], time[-1])
         shade(ax, inside[inside[:, 0] < inside[:, 1]], IGNORED)
     else:
@@ -267,17 +270,19 @@ def _fill(
                 ax.hlines(level, first, last, zorder=1.9, capstyle="projecting", **bar)
     mark_gaps(ax, time)
     color = INK if weight is None else BLUE
-    draw(ax, time, values, color, held=held, width=THIN, columns=COARSE)
+    draw(ax, time, values, color, held=is_held, width=THIN, columns=COARSE)
 
 
 def _heading(ax: Axes, experiment: Experiment) -> None:
     """Name of a run in bold, and what else there is to say of it, above its first panel."""
     words = [experiment.maneuver, _ROLES[experiment.role], *_stamps_in_words(experiment)]
-    how: dict[str, Any] = {"fontsize": SMALL, "color": INK, "textcoords": "offset points"}
+    style: dict[str, Any] = {"fontsize": SMALL, "color": INK, "textcoords": "offset points"}
     # they may reach over the panels on their right
-    how |= {"annotation_clip": False, "in_layout": False}
-    run = ax.annotate(experiment.run, (0.0, 1.0), (0.0, 6.0), "axes fraction", weight="bold", **how)
-    ax.annotate("  ·  ".join(words), (1.0, 1.0), (7.0, 6.0), (run, "axes fraction"), **how)
+    style |= {"annotation_clip": False, "in_layout": False}
+    run = ax.annotate(
+        experiment.run, (0.0, 1.0), (0.0, 6.0), "axes fraction", weight="bold", **style
+    )
+    ax.annotate("  ·  ".join(words), (1.0, 1.0), (7.0, 6.0), (run, "axes fraction"), **style)
 
 
 def _stamps_in_words(experiment: Experiment) -> list[str]:
@@ -350,8 +355,8 @@ def plot_overview(overview: Overview, *, title: str | None = None) -> Figure:
 
 def _largest(ranges: BlockRanges) -> float:
     """Largest size of a signal, 0 if it has no number. [unit]"""
-    known = np.isfinite(ranges.low)
-    ends = np.concatenate((ranges.low[known], ranges.high[known]))
+    finite = np.isfinite(ranges.low)
+    ends = np.concatenate((ranges.low[finite], ranges.high[finite]))
     return float(np.abs(ends).max(initial=0.0))
 
 
@@ -363,8 +368,8 @@ def _draw_ranges(ax: Axes, ranges: BlockRanges, factor: float, color: str) -> No
     high = np.fmax.reduceat(ranges.high, first)
     breaks = gap_rows(time)
     time, low, high = (
-        np.insert(each, breaks + 1, filling)
-        for each, filling in ((time, time[breaks]), (low, np.nan), (high, np.nan))
+        np.insert(values, breaks + 1, filling)
+        for values, filling in ((time, time[breaks]), (low, np.nan), (high, np.nan))
     )
     # its edge shows a signal that stays as it is, whose area is nothing
     ax.fill_between(
@@ -437,11 +442,11 @@ def plot_channel(
         labels.append(small.label(below))
     heights, words = [2.4, 2.2] if lower else [3.2], channel.name if title is None else title
     figure, axes = sheet(heights, words, labels, "time (s)", legend=legend)
-    how: dict[str, Any] = {"held": channel.is_position, "width": THIN, "zorder": 2.5}
+    style: dict[str, Any] = {"held": channel.is_position, "width": THIN, "zorder": 2.5}
     counted = values[_scale_rows(used)]
     room = 0.12 * float(np.ptp(counted)) or 1.0 / unit.factor
     axes[0].set_ylim(unit.factor * (counted.min() - room), unit.factor * (counted.max() + room))
-    draw(axes[0], time, unit.factor * values, INK if channel.is_position else BLUE, **how)
+    draw(axes[0], time, unit.factor * values, INK if channel.is_position else BLUE, **style)
     if simulated is not None:
         draw(axes[0], time, unit.factor * simulated[rows], VERMILION, zorder=3.0)
     if channel.encoder is not None:

@@ -129,9 +129,9 @@ def plot_bode(
     marker = "o" if response.frequencies.size == 1 else None
     for panel, rows in zip(axes, swept, strict=False):
         for row, moves, look in zip(rows, response.moves, looks.values(), strict=True):
-            how: dict[str, Any] = {"color": look.color, "ls": look.dashes, "lw": LINE}
+            style: dict[str, Any] = {"color": look.color, "ls": look.dashes, "lw": LINE}
             shown_row = np.where(moves, row, np.nan)
-            panel.plot(response.frequencies, shown_row, marker=marker, ms=4.0, **how)
+            panel.plot(response.frequencies, shown_row, marker=marker, ms=4.0, **style)
     if linear is not None:
         highest = np.inf if linear.rate is None else 0.5 * linear.rate
         low, high = response.frequencies[0], response.frequencies[-1]
@@ -146,8 +146,8 @@ def plot_bode(
     if mark is not None and response.frequencies[0] <= mark <= response.frequencies[-1]:
         for panel in axes:
             panel.axvline(mark, color=FAINT, linewidth=1.0, zorder=1.3)
-        place: dict[str, Any] = {"coords": ("data", "axes fraction"), "va": "bottom"}
-        write(axes[0], f"{mark:g} Hz", (mark, 0.0), (3.0, 3.0), color=GREY, **place)
+        position: dict[str, Any] = {"coords": ("data", "axes fraction"), "va": "bottom"}
+        write(axes[0], f"{mark:g} Hz", (mark, 0.0), (3.0, 3.0), color=GREY, **position)
     return figure if ax is None else ax
 
 

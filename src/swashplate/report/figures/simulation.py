@@ -250,16 +250,16 @@ def plot_signals(
         columns=len(columns),
     )
     for number, (heading, column) in enumerate(columns.items()):
-        places = axes[number * longest : (number + 1) * longest]
-        for place, panel in zip(places, column, strict=False):
-            _fill(place, panel._replace(height=height), run.time, rows)
+        column_axes = axes[number * longest : (number + 1) * longest]
+        for panel_axes, panel in zip(column_axes, column, strict=False):
+            _fill(panel_axes, panel._replace(height=height), run.time, rows)
         above = 4.0 + POINTS_PER_INCH * ROW * (legend_rows(legend) if legend else 0)
         if heading:
-            write(places[0], heading, (0.0, 1.0), (0.0, above), color=GREY)
-        last = places[len(column) - 1]
+            write(column_axes[0], heading, (0.0, 1.0), (0.0, above), color=GREY)
+        last = column_axes[len(column) - 1]
         last.tick_params(labelbottom=True)
         label_below(last, "time (s)")
-        for unused in places[len(column) :]:
+        for unused in column_axes[len(column) :]:
             unused.remove()
     fit_time(axes[0], run.time[rows])
     return figure
@@ -427,7 +427,10 @@ def _fill(ax: Axes, panel: Panel, time: Array, rows: slice) -> None:
     ax.set_ylabel(label, fontsize=NORMAL, color=INK)
     zero_line(ax)
     shown = [factor * trace.values[rows] for trace in panel.traces]
-    low, high = min(float(each.min()) for each in shown), max(float(each.max()) for each in shown)
+    low, high = (
+        min(float(curve.min()) for curve in shown),
+        max(float(curve.max()) for curve in shown),
+    )
     labels = []
     for level, words in ((factor * mark.level, mark.words) for mark in panel.marks):
         if (high if level > 0.0 else -low) >= NEAR * abs(level):
@@ -528,20 +531,20 @@ def plot_comparison(simulations: Mapping[str, Simulation], *, title: str | None 
         simulation.current if simulation.voltage is None or not volts else simulation.voltage
         for simulation in simulations.values()
     ]
-    for (name, each), command in zip(simulations.items(), commands, strict=True):
-        (color, dashes), time = looks[name], each.time
-        if each is first:
+    for (name, run), command in zip(simulations.items(), commands, strict=True):
+        (color, dashes), time = looks[name], run.time
+        if run is first:
             draw(axes[0], time, command, INK, zorder=3.0)
         elif not np.array_equal(commands[0], command):
             draw(axes[0], time, command, color, dashes=dashes)
-        draw(axes[1], time, speed.factor * each.shaft_speed, color, dashes=dashes)
-        both = (first.time >= time[0]) & (first.time <= time[-1])
-        if each is not first and both.any():
-            at = first.time[both]
-            difference = np.interp(at, each.time, each.shaft_speed) - first.shaft_speed[both]
+        draw(axes[1], time, speed.factor * run.shaft_speed, color, dashes=dashes)
+        common = (first.time >= time[0]) & (first.time <= time[-1])
+        if run is not first and common.any():
+            at = first.time[common]
+            difference = np.interp(at, run.time, run.shaft_speed) - first.shaft_speed[common]
             draw(axes[2], at, speed.factor * difference, color, dashes=dashes)
     if len(simulations) > 1:
-        said = f"speed less that of {reference}"
-        write(axes[2], said, (0.0, 1.0), color=looks[reference].color)
+        label = f"speed less that of {reference}"
+        write(axes[2], label, (0.0, 1.0), color=looks[reference].color)
     fit_time(axes[-1], *(simulation.time for simulation in simulations.values()))
     return figure

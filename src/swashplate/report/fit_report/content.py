@@ -55,7 +55,7 @@ _PARTS = {
 
 
 def write_fit_report(
-    found: Identification, path: str | Path, *, truth: ParameterSet | None = None
+    result: Identification, path: str | Path, *, truth: ParameterSet | None = None
 ) -> None:
     """Write the report of a fit: one HTML file, whole or not at all, that needs no network.
 
@@ -80,28 +80,28 @@ def write_fit_report(
     The page holds what the eye can tell of every run, a few bytes a sample (`runs.run_data`): it
     grows with the number of runs, not with their length.
     """
-    fit, stages = found.fit, found.fit.stages
-    runs = shown_runs(stages, found.predicted)
+    fit, stages = result.fit, result.fit.stages
+    runs = shown_runs(stages, result.predicted)
     held_out = sum(run.role == "validate" for run in runs)
     facts = (
-        f"{count(len(stages), 'stage')}: {', '.join(each.stage.name for each in stages)} · "
+        f"{count(len(stages), 'stage')}: {', '.join(stage.stage.name for stage in stages)} · "
         f"{count(len(runs) - held_out, 'run')} fitted, {held_out} held out · "
-        f"{count(sum(each.problem.samples for each in stages), 'sample')} that count"
+        f"{count(sum(stage.problem.samples for stage in stages), 'sample')} that count"
     )
     with _units_of_people():
         if motion_of(run.experiment for run in runs) == "rod":
             show_rod()
-        own = [
-            _live_section(fit, found.campaign, runs),
+        sections = [
+            _live_section(fit, result.campaign, runs),
             _parameter_section(fit, stages, truth),
             _identifiability_section(stages),
-            _profile_section(fit, found.profiles),
+            _profile_section(fit, result.profiles),
             _starts_section(starts_of(stages)),
-            _folds_section(found.folds, stages),
+            _folds_section(result.folds, stages),
         ]
-        setup = _setup_section(found.campaign, fit.nominal, fit.setup.title, found.notes, stages)
-        made = _page("Fit", facts, found.campaign, fit, runs, found.verdict, setup, own)
-    write_text(made, path)
+        setup = _setup_section(result.campaign, fit.nominal, fit.setup.title, result.notes, stages)
+        page = _page("Fit", facts, result.campaign, fit, runs, result.verdict, setup, sections)
+    write_text(page, path)
 
 
 def write_validation_report(
@@ -136,14 +136,14 @@ def write_validation_report(
         If the file cannot be written.
     """
     runs = shown_runs((), predicted)
-    samples = sum(each.measures.samples for each in predicted)
+    samples = sum(prediction.measures.samples for prediction in predicted)
     facts = (
         f"{count(len(runs), 'run')} predicted from the command alone · "
         f"{count(samples, 'sample')} that count"
     )
-    found = judged if judged is not None else verdict((), predicted)
+    assessed = judged if judged is not None else verdict((), predicted)
     setup = _setup_section(campaign, drive, "", notes or {}, ())
-    write_text(_page("Validation", facts, campaign, drive, runs, found, setup), path)
+    write_text(_page("Validation", facts, campaign, drive, runs, assessed, setup), path)
 
 
 def _units_of_people() -> AbstractContextManager[None]:
@@ -156,15 +156,17 @@ def _page(
     what: str,
     facts: str,
     campaign: Campaign,
-    found: Fit | Parameters,
+    fitted: Fit | Parameters,
     runs: Sequence[ShownRun],
     judged: Verdict,
     setup: Section,
-    own: Sequence[Section] = (),
+    more_sections: Sequence[Section] = (),
 ) -> str:
     """A page of a fit, which has sections of its own, or of a drive held against runs."""
-    stages = found.stages if isinstance(found, Fit) else ()
-    drive, nominal = (found.parameters, found.nominal) if isinstance(found, Fit) else (found, found)
+    stages = fitted.stages if isinstance(fitted, Fit) else ()
+    drive, nominal = (
+        (fitted.parameters, fitted.nominal) if isinstance(fitted, Fit) else (fitted, fitted)
+    )
     named = f"{'Model' if isinstance(nominal, ModelSetup) else 'Drive'} {nominal.name}"
     if isinstance(nominal, ParameterSet) and nominal.title:
         named += f" ({nominal.title})"
@@ -172,25 +174,27 @@ def _page(
     examined = {
         experiment: examine(experiment) for experiment in campaign if experiment.axis in axes
     }
-    said = [
+    listed_findings = [
         (run.name, ended(f"{run.name}, {quality.signal}: {words}"))
         for run, qualities in examined.items()
         for quality in qualities
         for words in quality.findings
     ]
     findings: dict[str, list[int]] = {}
-    for number, (name, _) in enumerate(said, start=1):
+    for number, (name, _) in enumerate(listed_findings, start=1):
         findings.setdefault(name, []).append(number)
-    quality = joined([quality_table(each, of_run) for each, of_run in examined.items()])
-    known = Drive(drive) if isinstance(drive, ParameterSet) else None
+    quality = joined(
+        [quality_table(run_qualities, of_run) for run_qualities, of_run in examined.items()]
+    )
+    known_drive = Drive(drive) if isinstance(drive, ParameterSet) else None
     sections = [
-        summary_section(judged, campaign, known, stages, runs, len(said)),
+        summary_section(judged, campaign, known_drive, stages, runs, len(listed_findings)),
         _agreement_section(runs, findings, judged),
         _curves_section(runs, campaign.virtual),
-        *own,
+        *more_sections,
         _residual_section(runs),
-        _verdict_section(judged, len(said)),
-        _data_section([sentence for _, sentence in said], quality, campaign.overviews),
+        _verdict_section(judged, len(listed_findings)),
+        _data_section([sentence for _, sentence in listed_findings], quality, campaign.overviews),
         setup,
     ]
     return page(
@@ -222,8 +226,8 @@ def _agreement_section(
         part = run_error(run, runs)
         to_curves = Markup('<a href="#run-{}">{}</a>').format(number, run.name)
         links = Markup(" ").join(
-            Markup('<a href="#finding-{0}">{0}</a>').format(each)
-            for each in findings.get(run.experiment.name, [])
+            Markup('<a href="#finding-{0}">{0}</a>').format(finding_number)
+            for finding_number in findings.get(run.experiment.name, [])
         )
         overview.add(
             light(look, why),
@@ -236,13 +240,15 @@ def _agreement_section(
             links,
             look=look != "good",
         )
-    made = [t for role in ("fit", "validate") for t in tables.runs_tables(_qualities(runs, role))]
+    agreement = [
+        t for role in ("fit", "validate") for t in tables.runs_tables(_qualities(runs, role))
+    ]
     words = (
         "RMSE is the root of the mean squared difference of the samples that count; NRMSE is RMSE "
         "over the standard deviation of what was measured; fit % is 100 (1 − NRMSE). Error / range "
         "is RMSE over the largest less the smallest value measured in all runs of that role."
     )
-    measures = PageBlock("table", joined(made), "agreement")
+    measures = PageBlock("table", joined(agreement), "agreement")
     blocks = [
         PageBlock("table", overview, "overview"),
         PageBlock("details", [text(words), measures], "Measures of every channel"),
@@ -281,9 +287,9 @@ def _live_section(fit: Fit, campaign: Campaign, runs: Sequence[ShownRun]) -> Sec
         worst = max(out, key=lambda run: run_error(run, runs)).experiment
         if can_run(drive, worst):
             shown = run_of(at_instants(drive, worst))
-            made = live_page(drive, [shown], campaign.title, campaign.virtual, "drive.toml")
+            page = live_page(drive, [shown], campaign.title, campaign.virtual, "drive.toml")
             words = f"Sliders for every parameter beside {worst.name}"
-            blocks = [PageBlock("live", made, words)]
+            blocks = [PageBlock("live", page, words)]
     return Section("live", "Try other values", blocks)
 
 
@@ -293,22 +299,22 @@ def _residual_section(runs: Sequence[ShownRun]) -> Section:
         "it, and the 95 % band of residuals, coloured as these are, that have no relation to it."
     )
     heads = ("run", "role", "channel", "correlation with the input")
-    made = Table("", tuple(map(Column, (*heads, "verdict"))))
+    table = Table("", tuple(map(Column, (*heads, "verdict"))))
     for quality in _qualities(runs):
         if (test := quality.test) is not None:
             lag, value = test.peak
-            said = f"correlation with the input, largest {value:+.2f} at {lag:.2g} s"
-            drawn = charts.lags_chart(test.lags, test.correlation, test.band, said)
+            correlation = f"correlation with the input, largest {value:+.2f} at {lag:.2g} s"
+            drawn = charts.lags_chart(test.lags, test.correlation, test.band, correlation)
             run = quality.experiment
-            made.add(run.name, run.role, quality.channel, drawn, test.verdict)
-    return Section("residuals", "Residuals", [text(words), PageBlock("table", made, "residuals")])
+            table.add(run.name, run.role, quality.channel, drawn, test.verdict)
+    return Section("residuals", "Residuals", [text(words), PageBlock("table", table, "residuals")])
 
 
 def _data_section(
     findings: Sequence[str], quality: Table, overviews: Sequence[Overview]
 ) -> Section:
     """What is used of long logs, what the check of the logs finds, and the quality of signals."""
-    said = f"{count(len(findings), 'finding')}:" if findings else NO_FINDINGS
+    heading = f"{count(len(findings), 'finding')}:" if findings else NO_FINDINGS
     numbered = [
         Markup('<span id="finding-{}">{}</span>').format(number, sentence)
         for number, sentence in enumerate(findings, start=1)
@@ -317,7 +323,7 @@ def _data_section(
         "details", [PageBlock("table", quality, "data")], count(len(quality.rows), "signal")
     )
     used = listed_block([overview.sentence for overview in overviews])
-    return Section("data", "Data quality", [*used, text(said), *listed_block(numbered), shown])
+    return Section("data", "Data quality", [*used, text(heading), *listed_block(numbered), shown])
 
 
 def _setup_section(
@@ -327,18 +333,18 @@ def _setup_section(
     notes: Mapping[str, str],
     stages: Sequence[StageFit],
 ) -> Section:
-    made = Table("", (Column(""), Column("")))
-    made.add("campaign", str(campaign.path))
+    table = Table("", (Column(""), Column("")))
+    table.add("campaign", str(campaign.path))
     if isinstance(drive, ModelSetup):
-        made.add("model", drive.name)
+        table.add("model", drive.name)
     else:
-        made.add("drive", f"{drive.name}, card {drive.card}" if drive.card else drive.name)
+        table.add("drive", f"{drive.name}, card {drive.card}" if drive.card else drive.name)
     if title:
-        made.add("fit configuration", title)
+        table.add("fit configuration", title)
     for key, words in notes.items():
         if key != "campaign":
-            made.add(key, words)
-    blocks = [PageBlock("table", made, "notes")]
+            table.add(key, words)
+    blocks = [PageBlock("table", table, "notes")]
     for stage in stages:
         blocks.append(PageBlock("heading", f"Stage {stage.stage.name}", "h3"))
         blocks += listed_block(_stage_words(stage))
@@ -355,9 +361,9 @@ def _stage_words(fit: StageFit) -> list[str]:
     words.append(tables.scales_words(fit))
     for kind, windows in stage.weights.items():
         words += [f"Weight on {kind.replace('_', ' ')}: {_window(window)}." for window in windows]
-    own = sum(unknown.run is not None for unknown in problem.unknowns)
-    if own:
-        words.append(f"Besides there are {own} parameters of single runs, with wide bounds.")
+    of_runs = sum(unknown.run is not None for unknown in problem.unknowns)
+    if of_runs:
+        words.append(f"Besides there are {of_runs} parameters of single runs, with wide bounds.")
     return words
 
 
@@ -378,7 +384,7 @@ def _verdict_section(judged: Verdict, findings: int) -> Section:
     """The three answers, what they rest on, and the stated errors."""
     words = f"{count(findings, 'finding')} on the campaign's data: see the section on them."
     answers = [(name, "look", [text]) for name, text in judged.answers().items()]
-    said = [
+    answers_and_remarks = [
         *answers,
         ("Range of validity", "plain", [judged.validity] if judged.validity else []),
         ("Remarks", "look", judged.remarks),
@@ -386,33 +392,39 @@ def _verdict_section(judged: Verdict, findings: int) -> Section:
         ("Logs", "look", [words] if findings else []),
     ]
     errors = titled(judged.table(), "errors") if judged.predictions else []
-    return Section("verdict", "Verdict in detail", [PageBlock("terms", said, "verdict"), *errors])
+    return Section(
+        "verdict",
+        "Verdict in detail",
+        [PageBlock("terms", answers_and_remarks, "verdict"), *errors],
+    )
 
 
 # --- what the data tell ---------------------------------------------------------------------------
 
 
 def _parameter_section(fit: Fit, stages: Sequence[StageFit], truth: ParameterSet | None) -> Section:
-    made = [tables.estimates_table(stage, truth=truth) for stage in stages]
+    estimates = [tables.estimates_table(stage, truth=truth) for stage in stages]
     words = (
         "Change is from the nominal value. Intervals are for residuals that are correlated over "
         "time. A parameter at a bound has no symmetric interval. Parameter files have SI units."
     )
     blocks = [text(words)]
     if truth is not None:
-        inside, counted = tables.truth_count(made)
+        inside, counted = tables.truth_count(estimates)
         blocks.append(
             text(
                 "Truth is what was simulated. Fixed parameters that are not true shift the "
                 f"estimates. {inside} of {counted} intervals contain it."
             )
         )
-    for table, stage in zip(made, stages, strict=True):
+    for table, stage in zip(estimates, stages, strict=True):
         blocks += titled(table, "parameters")
-        own = tables.estimates_table(stage, own=True)
-        if own.rows:
-            summary = f"{count(len(own.rows), 'parameter')} of single runs"
-            blocks.append(PageBlock("details", [PageBlock("table", own, "parameters")], summary))
+        of_runs = tables.estimates_table(stage, own=True)
+        if of_runs.rows:
+            summary = f"{count(len(of_runs.rows), 'parameter')} of single runs"
+            blocks.append(
+                PageBlock("details", [PageBlock("table", of_runs, "parameters")], summary)
+            )
     fixed = tables.fixed_table(fit.stages, truth)
     blocks += titled(fixed, "held") if fixed.rows else []
     return Section("parameters", "Parameters", blocks)
@@ -421,18 +433,22 @@ def _parameter_section(fit: Fit, stages: Sequence[StageFit], truth: ParameterSet
 def _identifiability_section(stages: Sequence[StageFit]) -> Section:
     blocks = []
     for stage in stages:
-        found = identifiability_of(stage)
+        identifiability = identifiability_of(stage)
         general = [unknown.run is None for unknown in stage.problem.unknowns]
         blocks.append(PageBlock("heading", f"Stage {stage.stage.name}", "h3"))
-        blocks += listed_block(found.sentences())
+        blocks += listed_block(identifiability.sentences())
         width = Column("half width", ".3g", "%", none="none")
         columns = (Column("direction"), width, Column("moves together"))
         directions = Table("", (*columns, Column("fix")))
-        for way in found.null + found.weak:
-            kind = way.gauge.name if way.gauge else "weak" if way.weak else "null"
-            moves = ", ".join(f"{name} {change:+.2g} %" for name, change in way.changes.items())
-            known = f"{way.fix} if known" if way.weak else way.fix
-            directions.add(kind, 100.0 * way.half_width if way.weak else None, moves, known)
+        for direction in identifiability.null + identifiability.weak:
+            kind = direction.gauge.name if direction.gauge else "weak" if direction.weak else "null"
+            moves = ", ".join(
+                f"{name} {change:+.2g} %" for name, change in direction.changes.items()
+            )
+            condition = f"{direction.fix} if known" if direction.weak else direction.fix
+            directions.add(
+                kind, 100.0 * direction.half_width if direction.weak else None, moves, condition
+            )
         if directions.rows:
             blocks.append(PageBlock("table", directions, "directions"))
         blocks.append(PageBlock("heading", "What the intervals rest on", "h4"))
@@ -440,18 +456,20 @@ def _identifiability_section(stages: Sequence[StageFit]) -> Section:
             blocks += listed_block(uncertainty_of(stage).sentences())
         except InputError as error:
             blocks.append(text(f"There are no intervals: {error}"))
-        blocks += _effects(found, general)
+        blocks += _effects(identifiability, general)
         blocks += _correlations(stage, general)
     return Section("identifiability", "Uncertainty", blocks)
 
 
-def _effects(found: Identifiability, shown: Sequence[bool]) -> list[PageBlock]:
+def _effects(identifiability: Identifiability, shown: Sequence[bool]) -> list[PageBlock]:
     """How much all weighted residuals change for 1 % of each parameter, the largest first."""
-    made = Table("", (Column("parameter"), Column("change of the residuals for 1 %", ".3g")))
-    pairs = zip(found.sensitivity, found.variables.names, shown, strict=True)
-    for effect, name in sorted(((float(e), name) for e, name, own in pairs if own), reverse=True):
-        made.add(name, effect)
-    return [PageBlock("details", [PageBlock("table", made, "effects")], "Sensitivity")]
+    table = Table("", (Column("parameter"), Column("change of the residuals for 1 %", ".3g")))
+    pairs = zip(identifiability.sensitivity, identifiability.variables.names, shown, strict=True)
+    for effect, name in sorted(
+        ((float(e), name) for e, name, is_shown in pairs if is_shown), reverse=True
+    ):
+        table.add(name, effect)
+    return [PageBlock("details", [PageBlock("table", table, "effects")], "Sensitivity")]
 
 
 def _correlations(stage: StageFit, general: Sequence[bool]) -> list[PageBlock]:
@@ -460,15 +478,17 @@ def _correlations(stage: StageFit, general: Sequence[bool]) -> list[PageBlock]:
         quoted = uncertainty_of(stage).quoted
     except InputError:  # the sentences above say why there are none
         return []
-    kept = [k for k, own in enumerate(general) if own and quoted.determined[k]]
+    determined = [k for k, is_general in enumerate(general) if is_general and quoted.determined[k]]
     names, values = quoted.variables.names, quoted.correlation
-    pairs = [(float(values[i, j]), names[i], names[j]) for i in kept for j in kept if i < j]
-    made = Table("", (Column("parameter"), Column("with"), Column("r", "+.3f")))
-    for value, name, other in sorted(pairs, key=lambda pair: -abs(pair[0]))[:MOST_PAIRS]:
-        made.add(name, other, value)
-    shown = PageBlock("table", made, "correlations")
+    pairs = [
+        (float(values[i, j]), names[i], names[j]) for i in determined for j in determined if i < j
+    ]
+    table = Table("", (Column("parameter"), Column("with"), Column("r", "+.3f")))
+    for value, name, second in sorted(pairs, key=lambda pair: -abs(pair[0]))[:MOST_PAIRS]:
+        table.add(name, second, value)
+    shown = PageBlock("table", table, "correlations")
     return [PageBlock("details", [shown], "Strongest correlations of the estimates")] * bool(
-        made.rows
+        table.rows
     )
 
 
@@ -476,15 +496,15 @@ def _starts_section(several: Mapping[str, Sequence[Solution]]) -> Section:
     blocks = []
     for stage, results in several.items():
         failed = sum(not result.cost < 1e300 for result in results)
-        more = f"; {failed} left the model's domain" if failed else ""
+        failures = f"; {failed} left the model's domain" if failed else ""
         blocks += [PageBlock("heading", f"Stage {stage}", "h3")] if stage else []
-        made = Table("", (Column("start"), Column("cost, best = 1", ".7g"), Column("ended")))
+        table = Table("", (Column("start"), Column("cost, best = 1", ".7g"), Column("ended")))
         best = min(result.cost for result in results) or 1.0
         for result in sorted(results, key=lambda result: result.cost):
             if result.cost < 1e300:
-                made.add(str(result.number), result.cost / best, result.message)
-        words = f"Where each of {len(results)} starts ended, the best first{more}."
-        blocks += [text(words), PageBlock("table", made, "starts")]
+                table.add(str(result.number), result.cost / best, result.message)
+        words = f"Where each of {len(results)} starts ended, the best first{failures}."
+        blocks += [text(words), PageBlock("table", table, "starts")]
     return Section("starts", "Starts", blocks)
 
 
@@ -492,11 +512,11 @@ def _profile_section(fit: Fit, profiles: Sequence[Profile]) -> Section:
     tiles = []
     for profile in profiles:
         unknown = fit.stage(profile.stage).problem.unknowns.items[profile.index]
-        said = [text(words, "remark") for words in profile.sentences()]
+        remarks = [text(words, "remark") for words in profile.sentences()]
         drawn = PageBlock(
             "figure", charts.profile_chart(profile, unknown), f"{profile.name} ({profile.stage})"
         )
-        tiles.append(PageBlock("tile", [drawn, *said]))
+        tiles.append(PageBlock("tile", [drawn, *remarks]))
     words = (
         "The lowest cost with one parameter fixed, above that of the optimum; the dashed line ends "
         "the interval."
@@ -508,7 +528,7 @@ def _profile_section(fit: Fit, profiles: Sequence[Profile]) -> Section:
 def _folds_section(folds: CrossValidation | None, stages: Sequence[StageFit]) -> Section:
     if folds is None:
         return Section("folds", "Cross-validation", [])
-    held_out, parts = folds_tables(folds, stages)
+    held_out, fold_tables = folds_tables(folds, stages)
     words = (
         f"The runs were dealt into {folds.planned} folds, kinds of test and directions apart (seed "
         f"{folds.seed}). Each fold was predicted from the command alone by a fit to the others "
@@ -518,6 +538,6 @@ def _folds_section(folds: CrossValidation | None, stages: Sequence[StageFit]) ->
         text(words),
         *(text(sentence, "remark") for sentence in folds.sentences()),
         PageBlock("table", held_out, "held-out"),
-        PageBlock("table", parts, "folds"),
+        PageBlock("table", fold_tables, "folds"),
     ]
     return Section("folds", "Cross-validation", blocks)

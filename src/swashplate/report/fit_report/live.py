@@ -96,20 +96,22 @@ def write_live_page(
             raise InputError(
                 f"{campaign.path.name} has no run that a voltage drives; a live page needs one."
             )
-        parameters, said = at_rate_of(driven, parameters)
-        left = [test.name for test in tests if test.input.kind != "voltage"]
-        if left:
-            said += (f"Left out, driven by something else than a voltage: {listed(left)}.",)
+        parameters, sentences = at_rate_of(driven, parameters)
+        left_out = [test.name for test in tests if test.input.kind != "voltage"]
+        if left_out:
+            sentences += (
+                f"Left out, driven by something else than a voltage: {listed(left_out)}.",
+            )
         runs = [run_of(at_instants(parameters, experiment)) for experiment in driven]
-        made = live_page(parameters, runs, campaign.title, campaign.virtual, name)
+        page = live_page(parameters, runs, campaign.title, campaign.virtual, name)
     elif command is not None:
-        record, said = record_of(command.sample(rate), rate, what="voltage"), ()
+        record, sentences = record_of(command.sample(rate), rate, what="voltage"), ()
         run = {**_record(record), "name": command.name, "role": "", "channels": []}
-        made = live_page(parameters, [run], parameters.title or parameters.name, False, name)
+        page = live_page(parameters, [run], parameters.title or parameters.name, False, name)
     else:
         raise InputError("A live page needs the runs of a campaign, or a command to simulate.")
-    write_text(made, path)
-    return said
+    write_text(page, path)
+    return sentences
 
 
 def live_page(
@@ -131,7 +133,7 @@ def live_page(
         "values": b64encode(numbers.astype("<f8").tobytes()).decode("ascii"),
         "parameters": values,
         "design_variables": _design_variables(values),
-        "outputs": [{"name": each, "number": k} for k, each in enumerate(exported.names)],
+        "outputs": [{"name": output, "number": k} for k, output in enumerate(exported.names)],
         "limits": [[bit, _word(limit)] for bit, limit in limits],
         "before": before,
         "filter": {"low": LOW_PASS, "high": DIFFERENTIATOR},
@@ -170,25 +172,25 @@ def can_run(parameters: ParameterSet, experiment: Experiment) -> bool:
 def _parameters(parameters: ParameterSet) -> list[dict[str, Any]]:
     """Every value of a set: its number in C, its words, and the ends of its slider."""
     names = [name for _, _, name in exported_drive().named("parameters")]
-    made = []
+    entries = []
     for parameter in parameters.values():
-        known = parameter.definition
+        definition = parameter.definition
         # mm, bar and degrees; SI for the others
-        unit = DisplayUnit(unit_text(known.unit), 1.0)
-        if known.unit in ("m", "Pa", "rad"):
-            unit = display_unit(known.unit, 1e5 if known.unit == "Pa" else 0.0)
-        sides = ("",) if len(known.columns) == 1 else (", positive", ", negative")
-        for column, side, value in zip(known.columns, sides, parameter.values, strict=False):
+        unit = DisplayUnit(unit_text(definition.unit), 1.0)
+        if definition.unit in ("m", "Pa", "rad"):
+            unit = display_unit(definition.unit, 1e5 if definition.unit == "Pa" else 0.0)
+        sides = ("",) if len(definition.columns) == 1 else (", positive", ", negative")
+        for column, side, value in zip(definition.columns, sides, parameter.values, strict=False):
             if column not in names:
                 continue  # of an equation of one's own
-            made.append(
+            entries.append(
                 {
                     "number": names.index(column),
                     "symbol": parameter.symbol,
                     "column": column,
-                    "block": known.block,
-                    "words": f"{known.name}{side}",
-                    "si": known.unit,
+                    "block": definition.block,
+                    "words": f"{definition.name}{side}",
+                    "si": definition.unit,
                     "unit": unit.name,
                     "factor": unit.factor,
                     "value": value if isfinite(value) else 1e30,
@@ -196,7 +198,7 @@ def _parameters(parameters: ParameterSet) -> list[dict[str, Any]]:
                     "main": parameter.status == "fitted",
                 }
             )
-    return made
+    return entries
 
 
 def slider(parameter: Parameter, value: float) -> tuple[float, float] | None:
@@ -213,7 +215,7 @@ def slider(parameter: Parameter, value: float) -> tuple[float, float] | None:
 
 def _design_variables(values: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
     """Design variables with the numbers that they move and the powers with which they do."""
-    made = []
+    variables = []
     for name in SHOWN:
         powers = DESIGN_VARIABLES[name]
         moves = [
@@ -225,8 +227,8 @@ def _design_variables(values: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
         if moves:
             words = name.replace("_", " ").capitalize()
             ends = (1.0 / SPAN, SPAN)
-            made.append({"name": name, "words": words, "moves": moves, "range": ends})
-    return made
+            variables.append({"name": name, "words": words, "moves": moves, "range": ends})
+    return variables
 
 
 # --- runs -----------------------------------------------------------------------------------------
@@ -256,7 +258,7 @@ def _record(record: Record) -> dict[str, Any]:
 
 def _comparable(channels: Iterable[Channel]) -> list[Channel]:
     """Channels that a drive simulates; of a position its speed, if the filters take its stamps."""
-    made = []
+    comparable = []
     for channel in channels:
         if channel.kind not in SIGNALS or not channel.used.any():
             continue
@@ -265,8 +267,8 @@ def _comparable(channels: Iterable[Channel]) -> list[Channel]:
                 speed_of(channel, "exact")
             except InputError:
                 continue
-        made.append(channel)
-    return made
+        comparable.append(channel)
+    return comparable
 
 
 def _channel(channel: Channel) -> dict[str, Any]:
