@@ -360,28 +360,30 @@ def _logged(
     name: str,
 ) -> dict[str, Array]:
     """What the instruments make of a run; each has its own stream of chance."""
-    grid = truth.time
-    # the stamps are those of the instants sampled, which stay in order however large the jitter is
-    strayed = tools.jitter * _stream(seed, name, "time").standard_normal(grid.size)
-    bound = 0.4 * (grid[1] - grid[0] if grid.size > 1 else 0.0)
-    instants = np.clip(grid + np.clip(strayed, -bound, bound), grid[0], grid[-1])
+    simulated_at = truth.time
+    # a log has the stamps of its jittered instants, which stay in order whatever the jitter
+    strayed = tools.jitter * _stream(seed, name, "time").standard_normal(simulated_at.size)
+    step = simulated_at[1] - simulated_at[0] if simulated_at.size > 1 else 0.0
+    bound = 0.4 * step
+    jittered = simulated_at + np.clip(strayed, -bound, bound)
+    sampled_at = np.clip(jittered, simulated_at[0], simulated_at[-1])
 
     def sampled(signal: str) -> Array:
-        # the drive is marched on the grid: what lies between is not known better than by lines
+        # the simulation has values at its own instants alone: between them lines are taken
         values: Array = getattr(truth, signal)
         if signal == "shaft_position" and tools.backlash:
             values = _play(values, tools.backlash)
-        return values if not tools.jitter else np.interp(instants, grid, values)
+        return values if not tools.jitter else np.interp(sampled_at, simulated_at, values)
 
     def read(kind: ChannelKind | Literal["voltage"]) -> Array:
         chance = _stream(seed, name, kind)
         if kind == "rectified_current":
             currents = sampled("current_positive"), sampled("current_negative")
-            return _ammeter(instants, currents, tools, chance)
+            return _ammeter(sampled_at, currents, tools, chance)
         values = sampled("voltage" if kind == "voltage" else SIGNALS[kind])
         if kind == "encoder_counts":
             return _counter(values * (counts_per_turn / (2.0 * pi)), tools, chance)
-        noise = chance.standard_normal(grid.size)
+        noise = chance.standard_normal(simulated_at.size)
         if kind == "voltage":
             values = values + tools.voltage_offset + tools.voltage_noise * noise
             return _converted(values, tools.voltage_bits)
@@ -389,8 +391,8 @@ def _logged(
 
     def lost(share: float, longest: int, *names: str) -> NDArray[np.bool_]:
         """In runs of 1 to `longest`, together about a share of all."""
-        mask, chance = np.zeros(grid.size, dtype=np.bool_), _stream(seed, name, *names)
-        begins = np.flatnonzero(chance.random(grid.size) < share / (0.5 * (1 + longest)))
+        mask, chance = np.zeros(simulated_at.size, dtype=np.bool_), _stream(seed, name, *names)
+        begins = np.flatnonzero(chance.random(simulated_at.size) < share / (0.5 * (1 + longest)))
         lengths = chance.integers(1, longest, size=begins.size, endpoint=True)
         for begin, length in zip(begins.tolist(), lengths.tolist(), strict=True):
             mask[begin : begin + length] = True
@@ -403,7 +405,7 @@ def _logged(
     is_logged = ~lost(tools.lost_rows, tools.longest_loss, "rows")
     if not is_logged.any():
         raise InputError(f"{name}: lost_rows leaves no row; take a smaller share.")
-    columns = {"time": _rounded(instants, tools.stamp_resolution), **columns}
+    columns = {"time": _rounded(sampled_at, tools.stamp_resolution), **columns}
     return {column: values[is_logged] for column, values in columns.items()}
 
 

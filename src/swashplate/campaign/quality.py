@@ -85,52 +85,81 @@ def examine(experiment: Experiment, unsigned: Collection[str] = ()) -> tuple[Qua
 
     The sign of `unsigned` channels says nothing, see `unsigned_currents`.
     """
-    qualities, drive = list[Quality](), experiment.input
     moving = moves_at_first(experiment)
-    signals: dict[str, InputSignal | Channel] = {"input": drive, **experiment.channels}
-    for name, signal in signals.items():
-        stamps, used, limits = stamp_statistics(signal.time), signal.used, signal.limits
-        if signal is drive and drive.kind == "voltage":
-            limits = limits or (-FULL_VOLTAGE, FULL_VOLTAGE)
-        values = signal.values[used] if used.any() else signal.values
-        low, high, clipped, lost = float(values.min()), float(values.max()), nan, None
-        if limits is not None and used.any():
-            clipped = float(np.mean((values <= limits[0]) | (values >= limits[1])))
-        findings = list[str]()
-        if name in moving:
-            findings.append(
-                f"moves at the first sample, where the run is said to be at rest: write "
-                f"axes.{experiment.axis}.{ESTIMATED} in this run"
-            )
-        # the input's stamps are reported once, with the input
-        if signal is drive or not np.array_equal(signal.time, drive.time):
-            findings += _of_stamps(stamps)
-        if signal.dropped:
-            findings.append(
-                f"{count(signal.dropped, 'missing sample is', 'missing samples are')} left out"
-            )
-        if isinstance(signal, Channel):
-            if clipped > 0.0:
-                findings.append(
-                    f"{100.0 * clipped:.2g} % of the samples are at the end of its range"
-                )
-            findings += _of_channel(experiment, signal, name not in unsigned)
-            if signal.counts is not None:
-                lost = int(find_lost_counts(signal.time[used], signal.counts[used]).size)
-        else:
-            if low == high:
-                findings.append("the input never changes: nothing can be identified from this run")
-            if limits is not None and (low < limits[0] or high > limits[1]):
-                findings.append(
-                    f"goes from {low:g} to {high:g} {signal.unit}, beyond its range of "
-                    f"{limits[0]:g} to {limits[1]:g}: check unit, scale and offset"
-                )
-            findings += _of_spikes(experiment, signal)
-        ignored, numbers = float(np.mean(~used)), (stamps, low, high, clipped, lost)
-        qualities.append(
-            Quality(name, signal.kind, signal.unit, *numbers, ignored, tuple(findings))
+    signals: dict[str, InputSignal | Channel] = {"input": experiment.input, **experiment.channels}
+    return tuple(
+        _quality(experiment, name, signal, moves=name in moving, signed=name not in unsigned)
+        for name, signal in signals.items()
+    )
+
+
+def _quality(
+    experiment: Experiment,
+    name: str,
+    signal: InputSignal | Channel,
+    *,
+    moves: bool,
+    signed: bool,
+) -> Quality:
+    """Quality of one signal, which moves at the first sample or not, and has a sign or not."""
+    drive = experiment.input
+    used = signal.used
+    stamps = stamp_statistics(signal.time)
+    values = signal.values[used] if used.any() else signal.values
+    low, high = float(values.min()), float(values.max())
+    limits = signal.limits
+    if limits is None and signal is drive and drive.kind == "voltage":
+        limits = (-FULL_VOLTAGE, FULL_VOLTAGE)
+    clipped = nan
+    if limits is not None and used.any():
+        clipped = float(np.mean((values <= limits[0]) | (values >= limits[1])))
+    lost = None
+    findings = list[str]()
+    if moves:
+        findings.append(
+            f"moves at the first sample, where the run is said to be at rest: write "
+            f"axes.{experiment.axis}.{ESTIMATED} in this run"
         )
-    return tuple(qualities)
+    # the input's stamps are reported once, with the input
+    if signal is drive or not np.array_equal(signal.time, drive.time):
+        findings += _of_stamps(stamps)
+    if signal.dropped:
+        findings.append(
+            f"{count(signal.dropped, 'missing sample is', 'missing samples are')} left out"
+        )
+    if isinstance(signal, Channel):
+        if clipped > 0.0:
+            findings.append(f"{100.0 * clipped:.2g} % of the samples are at the end of its range")
+        findings += _of_channel(experiment, signal, signed)
+        if signal.counts is not None:
+            lost = int(find_lost_counts(signal.time[used], signal.counts[used]).size)
+    else:
+        findings += _of_input(signal, low, high, limits)
+        findings += _of_spikes(experiment, signal)
+    return Quality(
+        signal=name,
+        kind=signal.kind,
+        unit=signal.unit,
+        stamps=stamps,
+        low=low,
+        high=high,
+        clipped=clipped,
+        lost_counts=lost,
+        ignored=float(np.mean(~used)),
+        findings=tuple(findings),
+    )
+
+
+def _of_input(
+    drive: InputSignal, low: float, high: float, limits: tuple[float, float] | None
+) -> Iterator[str]:
+    if low == high:
+        yield "the input never changes: nothing can be identified from this run"
+    if limits is not None and (low < limits[0] or high > limits[1]):
+        yield (
+            f"goes from {low:g} to {high:g} {drive.unit}, beyond its range of "
+            f"{limits[0]:g} to {limits[1]:g}: check unit, scale and offset"
+        )
 
 
 def _of_stamps(stamps: StampStatistics) -> Iterator[str]:
@@ -486,7 +515,7 @@ def campaign_findings(campaign: Campaign) -> tuple[str, ...]:
 
 
 def _one_sided(axis: str, runs: Sequence[Experiment]) -> Iterator[str]:
-    """A sentence if a machine moves both ways under a command that has one sign, as its rest has.
+    """A sentence if a machine moves both ways though its command, also at rest, keeps its sign.
 
     Over 0.5 s, by more than a third of the largest such motion each way.
     """

@@ -50,7 +50,7 @@ def read_run(
 
     Parameters
     ----------
-    place : str
+    origin : str
         The run, for sentences about the campaign file.
     name : str
         Its own.
@@ -66,32 +66,31 @@ def read_run(
         For the first thing that is wrong; the sentence names file, column and row.
     """
     tested = _axes_of(origin, run, axes)
-    names = list(_found(log, tested))
+    names = list(_columns_of(log, tested))
     log = in_parts(log, names)
     rows = log.rows_of(names)
     overview = None
-    parts = [(log, False)]
+    windows = [(log, False)]
     if rows is not None and rows > LONG:
         overview = _overview(name, tested, log, rows, run.span)
-        parts = [
+        windows = [
             (replace(log, first=window.first, last=window.last), window.resumes)
             for window in overview.windows
             if window.used
         ]
     experiments = list[Experiment]()
-    for part, resumes in parts:
-        columns = _Columns(part, tested)
+    for window_log, resumes in windows:
+        columns = _Columns(window_log, tested)
         for key, axis in tested.items():
-            full = f"{name} {key}" if len(axes) > 1 else name
             others = ", ".join(toml_string(axis_name) for axis_name in tested if axis_name != key)
             without = f"only = [{others}]" if others else 'role = "ignore"'
             experiments += _experiments(
-                full,
-                name,
-                key,
-                run,
-                axis,
-                columns,
+                name=f"{name} {key}" if len(axes) > 1 else name,
+                run_name=name,
+                key=key,
+                run=run,
+                axis=axis,
+                columns=columns,
                 windowed=overview is not None,
                 resumes=resumes,
                 without=without,
@@ -149,7 +148,7 @@ def _signals(axis: schema.AxisEntry) -> dict[str, schema.InputEntry | schema.Cha
     return {"the input": axis.input} | {f"channel '{n}'": c for n, c in axis.channels.items()}
 
 
-def _found(log: Log, axes: Axes) -> dict[str, LogColumn]:
+def _columns_of(log: Log, axes: Axes) -> dict[str, LogColumn]:
     """Columns that some axes need, by the names that they are wanted by."""
     column_of = dict[str, LogColumn]()
     for axis in axes.values():
@@ -168,9 +167,9 @@ class _Columns:
     """The columns of a log that some axes need, read together."""
 
     def __init__(self, log: Log, axes: Axes) -> None:
-        self.log, self.found = log, _found(log, axes)
-        self.values = log.read(list(self.found))
-        first = replace(log, first=0, last=1).read(list(self.found)) if log.first else self.values
+        self.log, self.columns = log, _columns_of(log, axes)
+        self.values = log.read(list(self.columns))
+        first = replace(log, first=0, last=1).read(list(self.columns)) if log.first else self.values
         self._begins = {name: values[:1] for name, values in first.items()}
         self._stamps: dict[tuple[schema.ClockEntry, int], Array] = {}
 
@@ -186,8 +185,8 @@ class _Columns:
                 time = clock.offset + (self.log.first + np.arange(size)) / rate
             else:
                 numbers, factor = self.values[clock.column], self._second(clock)
-                source = f"column '{self.found[clock.column].name}'"
-                check_stamps(self.log, self.found[clock.column].name, numbers)
+                source = f"column '{self.columns[clock.column].name}'"
+                check_stamps(self.log, self.columns[clock.column].name, numbers)
                 of_main = main if main.column is not None else clock
                 begin = self._second(of_main) * float(self._begins[of_main.column or ""][0])
                 # the difference first: a float64 keeps a microsecond of a calendar's stamp
@@ -212,20 +211,20 @@ class _Columns:
 
     def _second(self, clock: schema.ClockEntry) -> float:
         """Size of the unit of a column of stamps [s]."""
-        column = self.found[clock.column or ""]
+        column = self.columns[clock.column or ""]
         unit = clock.unit or unit_of(column, clock.column or "", "s")
         return to_si(1.0, unit, "s", f"{self.log.path}: column '{column.name}' (the time)")
 
     def _called(self, what: str, signal: schema.SignalEntry) -> str:
         """A signal, for the sentence of an error."""
-        return f"{self.log.path}: column '{self.found[signal.column].name}' ({what})"
+        return f"{self.log.path}: column '{self.columns[signal.column].name}' ({what})"
 
     def _conversion(
         self, what: str, signal: schema.InputEntry | schema.ChannelEntry
     ) -> tuple[str, float, float]:
         """The SI unit of a signal, with factor and zero, as of `schema.conversion`."""
         usual = (*schema.KINDS[signal.kind].units, "1")[0]
-        unit = signal.unit or unit_of(self.found[signal.column], signal.column, usual)
+        unit = signal.unit or unit_of(self.columns[signal.column], signal.column, usual)
         return conversion(signal.kind, unit, self._called(what, signal))
 
     def as_recorded(
@@ -253,17 +252,19 @@ class _Columns:
         axis: schema.AxisEntry,
         run: schema.RunEntry,
     ) -> tuple[dict[str, Any], float]:
-        """What a signal is made of, in SI, and the size of its unit; empty where all is missing."""
-        log, column, numbers = self.log, self.found[signal.column], self.values[signal.column]
+        """What a signal is made of, in SI, and the size of its unit; empty if all is missing."""
+        column = self.columns[signal.column]
+        numbers = self.values[signal.column]
         described = self._called(what, signal)
-        time, is_input = self.stamps(signal, axis), isinstance(signal, schema.InputEntry)
+        time = self.stamps(signal, axis)
+        is_input = isinstance(signal, schema.InputEntry)
         if time.size != numbers.size:
             raise FileError(f"{described} has {numbers.size} samples, but its time {time.size}.")
         used = np.ones(numbers.size, np.bool_) if run.span is None else inside(run.span, time)
         for window in signal.ignore if is_input else ():
             used &= ~inside(window, time)
         missing = used & ~np.isfinite(numbers)
-        rows = np.flatnonzero(missing) + 1 + log.first
+        rows = np.flatnonzero(missing) + 1 + self.log.first
         if not is_input and rows.size and rows.size == used.sum():
             return {}, 1.0
         if rows.size and signal.missing == "refuse":
@@ -273,9 +274,10 @@ class _Columns:
                 "say missing = 'drop' to leave such samples out."
             )
         used &= ~missing
-        if (left := np.count_nonzero(used)) < 2:
+        usable = np.count_nonzero(used)
+        if usable < 2:
             raise FileError(
-                f"{described} has {left} samples that can be used, but needs two at least."
+                f"{described} has {usable} samples that can be used, but needs two at least."
             )
         si, factor, zero = self._conversion(what, signal)
         # an encoder's sign belongs to the scale of its counts, see `Encoder`
@@ -292,7 +294,7 @@ class _Columns:
             "unit": si,
             "time": time if used.all() else np.ascontiguousarray(time[used]),
             "values": values,
-            "source": SignalOrigin(log.path, column.name),
+            "source": SignalOrigin(self.log.path, column.name),
             "limits": signal.limits and tuple(factor * end + zero for end in signal.limits),
             "accuracy": _accuracy(signal, factor),
             "dropped": rows.size,
@@ -321,22 +323,22 @@ def _accuracy(signal: schema.InputEntry | schema.ChannelEntry, factor: float) ->
 
 
 def _experiments(
+    *,
     name: str,
     run_name: str,
     key: str,
     run: schema.RunEntry,
     axis: schema.AxisEntry,
     columns: _Columns,
-    *,
     windowed: bool,
     resumes: bool,
     without: str,
 ) -> Iterator[Experiment]:
-    """One experiment, or several where a counter's position across a gap is not known.
+    """One experiment, or several if a counter's position across a gap is not known.
 
-    A window of a long log is named by its first instant; one that resumes begins in the midst of a
-    motion.
-    `without` is the entry by which the run leaves the axis out.
+    `windowed` names them by their first instant, as windows of a long log. With `resumes` the first
+    one begins in the midst of a motion. `without` is the entry by which the run leaves the axis
+    out.
     """
     parts, _ = columns.samples("the input", axis.input, axis, run)
     between = axis.input.interpolation
@@ -382,10 +384,8 @@ def _experiments(
     unit = {"voltage": "V", "current": "A"}.get(drive.kind, drive.unit)
     for part, (begin, end) in enumerate(pairwise([-np.inf, *sorted(cuts), np.inf])):
         command = _within(drive, begin, end)
-        measured = {each: _within(read, begin, end) for each, read in signals.items()}
-        measured = {
-            channel_name: read for channel_name, read in measured.items() if read.time.size > 1
-        }
+        within = {channel: _within(read, begin, end) for channel, read in signals.items()}
+        measured = {channel: read for channel, read in within.items() if read.time.size > 1}
         if command.time.size < 2 or not measured:
             continue
         part_notes = list(notes) if part == 0 else []
@@ -397,22 +397,20 @@ def _experiments(
         maneuver = run.maneuver or recognised.name
         ignored = applying((*axis.ignore, *run.ignore), maneuver)
         yield Experiment(
-            f"{name} from {command.time[0]:.6g} s" if part or windowed else name,
-            key,
-            run_name,
-            run.role,
-            "estimated" if part or resumes else run.start or axis.start,
-            None if part or resumes else run.start_pressure,
-            command,
-            {
-                channel_name: _finished(
-                    axis.channels[channel_name], read, command, maneuver, ignored, run
-                )
-                for channel_name, read in measured.items()
+            name=f"{name} from {command.time[0]:.6g} s" if part or windowed else name,
+            axis=key,
+            run=run_name,
+            role=run.role,
+            start="estimated" if part or resumes else run.start or axis.start,
+            start_pressure=None if part or resumes else run.start_pressure,
+            input=command,
+            channels={
+                channel: _finished(axis.channels[channel], read, command, maneuver, ignored, run)
+                for channel, read in measured.items()
             },
-            run.maneuver,
-            recognised,
-            tuple((*ends(window), window.why) for window in ignored),
+            stated_maneuver=run.maneuver,
+            recognised=recognised,
+            ignored=tuple((*ends(window), window.why) for window in ignored),
             recorded=None if zero is None else zero + float(command.time[0]),
             notes=tuple(part_notes),
         )

@@ -226,8 +226,8 @@ def working(text: str) -> Iterator[Status]:
 def long_work(text: str, steps: int = 0) -> Iterator[Callable[..., None]]:
     """A bar with what is done now and the time left; nothing in a pipe.
 
-    What it gives is called with words and, where it is known, the share that is done; of so many
-    steps, if there are any, each call begins the next one.
+    What it gives is called with words and, if it is known, the share that is done. With `steps`,
+    each call begins the next step, and the share is counted.
     """
     from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeRemainingColumn
 

@@ -65,7 +65,7 @@ class Log:
 
         Parameters
         ----------
-        wanted : str
+        requested : str
             As in the file; or without its unit (``time`` for ``time [ms]``, ``time (ms)`` and
             ``time_ms``); or without its group, where no other column has the same last part.
 

@@ -198,8 +198,9 @@ class _Table:
         elif is_number(text[row], other_mark):
             kind += f" with a decimal {'comma' if other_mark == '.' else 'point'}"
         raise FileError(
-            f"{self.path}: column '{self.columns[position].name}' holds '{shown(text[row])}', which "
-            f"is no {kind}, in data row {count + row + 1} (line {lines[row]})."
+            f"{self.path}: column '{self.columns[position].name}' holds "
+            f"'{shown(text[row])}', which is no {kind}, in data row {count + row + 1} "
+            f"(line {lines[row]})."
         )
 
 

@@ -61,7 +61,7 @@ def write_fit_report(
 
     Parameters
     ----------
-    found : Identification
+    result : Identification
         The fit, its campaign, and what was found out about it.
     path : path
         The file, which replaces an older one.

@@ -257,7 +257,7 @@ def _record(record: Record) -> dict[str, Any]:
 
 
 def _comparable(channels: Iterable[Channel]) -> list[Channel]:
-    """Channels that a drive simulates; of a position its speed, if the filters take its stamps."""
+    """Channels that a drive simulates; a position only if its speed can be computed."""
     comparable = []
     for channel in channels:
         if channel.kind not in SIGNALS or not channel.used.any():
