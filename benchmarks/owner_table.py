@@ -191,7 +191,7 @@ def write_logs(seed, folder):
 def fitted(seed, folder):
     """The fit of a winch, from its folder or made now."""
     from swashplate import Campaign
-    from swashplate.drafting import fit_configuration, guess_drive, guessed_set
+    from swashplate.drafting import guess_drive, guessed_set, guessed_setup
     from swashplate.identification import Identification, identify
 
     folder.mkdir(parents=True, exist_ok=True)
@@ -203,7 +203,7 @@ def fitted(seed, folder):
         begun = time.process_time()
         guess = guess_drive(campaign)
         start = guessed_set(guess, "campaign.toml")
-        (folder / "setup.toml").write_text(fit_configuration(guess, start), "utf-8")
+        (folder / "setup.toml").write_text(guessed_setup(guess, start), "utf-8")
         identify(campaign, start, folder / "setup.toml").save(place)
         seconds = time.process_time() - begun
         (folder / "seconds.txt").write_text(f"{seconds:.1f}\n", "utf-8")

@@ -116,9 +116,9 @@ class Maneuver(Drawn):
     pieces : tuple of (float, callable)
         Starts [s], the first at 0, and curves in their order. At a jump the later piece holds.
     amplitude : float
-        What the maneuver states and its voltage never exceeds, inf where it states none. [V]
+        What the maneuver states and its voltage never exceeds, inf if it states none. [V]
     highest : float
-        Frequency of its fastest sine, 0 where it has none. [Hz]
+        Frequency of its fastest sine, 0 if it has none. [Hz]
     """
 
     drawn_by: ClassVar[str] = "plot_maneuver"

@@ -410,7 +410,7 @@ def _logged(
 
 
 def _rounded(values: Array, step: float) -> Array:
-    """Values rounded to whole steps, as the nearest decimals where the step is one; 0 is none."""
+    """Values rounded to whole steps, as the nearest decimals if the step is one; 0 is none."""
     if not step:
         return values
     per_unit = 1.0 / step

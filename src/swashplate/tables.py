@@ -54,7 +54,7 @@ class Column:
     none: str = ""
     """What stands for no number."""
     wrap: bool = False
-    """Whether it is the one broken into lines where the terminal is narrow."""
+    """Whether it is the one broken into lines if the terminal is narrow."""
     of: str = "tpf"
     """Where it is shown: ``t`` terminal, ``p`` page, ``f`` file."""
     key: str = ""
@@ -75,7 +75,7 @@ class Row(NamedTuple):
 
     cells: tuple[Any, ...]
     unit: str
-    """Unit of all its numbers as of `display_unit`, where they have one of their own."""
+    """Unit of all its numbers as of `display_unit`, if they have one of their own."""
     spec: str
     look: bool
     """Whether someone should look at it."""
@@ -342,7 +342,7 @@ def check_place(path: str | Path) -> None:
 
 
 def made_folder(folder: Path) -> Path:
-    """A folder, made where it is missing."""
+    """A folder, made if it is missing."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:

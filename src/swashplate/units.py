@@ -156,7 +156,7 @@ _BASE = {
 def si_exponents(unit: str) -> dict[str, int] | None:
     """Exponents of the base units that an SI unit is made of, ``"N m"`` → kg 1, m 2, s -2.
 
-    None where one is a fraction, as of √Pa, or where Pint does not know the unit or its base.
+    None if one is a fraction, as of √Pa, or where Pint does not know the unit or its base.
     """
     try:
         base = _registry().parse_units(_written_out(unit).replace("^", "**"))

@@ -13,10 +13,10 @@ from swashplate import Drive, InputError
 from swashplate.campaign import Experiment
 from swashplate.drafting import (
     amplifier_table,
-    fit_configuration,
     guess_amplifier,
     guess_drive,
     guessed_set,
+    guessed_setup,
 )
 from swashplate.identification.estimation.setup import Free, Setup, Stage, load_setup
 from swashplate.identification.fitting import fit
@@ -141,7 +141,7 @@ def test_a_measured_current_gives_a_stage_of_its_own(winch) -> None:
     _, tests = winch
     found = guess_drive(tests)
     start = guessed_set(found, "campaign.toml")
-    setup = Setup(**tomllib.loads(fit_configuration(found, start)))
+    setup = Setup(**tomllib.loads(guessed_setup(found, start)))
     amplifier, pump = setup.stages
     assert (amplifier.part, pump.part) == ("card", "pump")
     assert {"V_dz_plus", "J_minus", "G1_plus", "omega", "lim1", "tau"} <= amplifier.free.keys()
@@ -160,7 +160,7 @@ def test_current_and_speed_are_fitted_from_nothing(winch) -> None:
     drive, tests = winch
     found = guess_drive(tests)
     start = guessed_set(found, "campaign.toml")
-    result = fit(start, tests, Setup(**tomllib.loads(fit_configuration(found, start))))
+    result = fit(start, tests, Setup(**tomllib.loads(guessed_setup(found, start))))
     truth = drive.parameters.numbers
     for name in ("V_dz_plus", "V_dz_minus", "J_plus", "J_minus", "tau", "omega_plus", "lim2_plus"):
         assert result.parameters.numbers[name] == pytest.approx(truth[name], rel=0.05), name
@@ -175,7 +175,7 @@ def test_a_current_that_no_stage_fits_is_named_with_what_does(winch) -> None:
     found = guess_drive([each for each in tests if each.name != "sine"])
     found = found._replace(amplifier=None)
     start = guessed_set(found, "campaign.toml")
-    chain = Setup(**tomllib.loads(fit_configuration(found, start)))
+    chain = Setup(**tomllib.loads(guessed_setup(found, start)))
     doubts = fit(start, tests, chain, max_evaluations=1).doubts
     (said,) = [each for each in doubts if "no stage fits" in each]
     assert "'rectified_current'" in said

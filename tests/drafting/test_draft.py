@@ -12,7 +12,7 @@ from tests.identification.given import run_of
 from swashplate import Campaign, Drive, Experiment, InputError, ParameterError, maneuvers, rig
 from swashplate.campaign import Encoder
 from swashplate.drafting import draft_campaign as draft
-from swashplate.drafting import fit_configuration, guess_drive, guess_table, guessed_set
+from swashplate.drafting import guess_drive, guess_table, guessed_set, guessed_setup
 from swashplate.identification.estimation.setup import Setup
 
 HEADERS = {
@@ -201,10 +201,10 @@ def test_a_jump_at_the_edge_of_the_dead_zone_is_found() -> None:
     steady = Drive(parameters).steady_speed([-1.1 * DEAD[1], 1.1 * DEAD[0]])
     expected = [-0.3 - 0.1 * GAIN[1] * DEAD[1], 0.3 + 0.1 * GAIN[0] * DEAD[0]]
     assert steady == pytest.approx(expected, rel=0.2)
-    assert "J_plus" in fit_configuration(found, parameters)
+    assert "J_plus" in guessed_setup(found, parameters)
     none = guess_drive(runs())
     assert none.jump == (0.0, 0.0)
-    assert "J_plus" not in fit_configuration(none, guessed_set(none, "x"))
+    assert "J_plus" not in guessed_setup(none, guessed_set(none, "x"))
 
 
 def encoder_runs(pulses: float, **numbers: float) -> list[Experiment]:
@@ -259,7 +259,7 @@ def test_a_run_without_a_count_widens_the_dead_zone() -> None:
 
 def test_a_lag_that_is_not_seen_stays_fixed() -> None:
     found = guess_drive(runs(lag=1e-4, pull=4.0))
-    text = fit_configuration(found, guessed_set(found, "x"))
+    text = guessed_setup(found, guessed_set(found, "x"))
     assert "Z16_plus" in text
     assert "Z8 =" not in text
 
@@ -278,7 +278,7 @@ def test_a_guess_becomes_a_drive_and_a_fit_configuration() -> None:
     # the card's two milliseconds twice
     assert reached == pytest.approx(DELAY + LAG + 2.0 / 512.0, rel=0.1)
     assert {parameters[name].status for name in ("V_dz", "G1", "Z8", "tau")} == {"approximate"}
-    setup = Setup(**tomllib.loads(fit_configuration(found, parameters)))
+    setup = Setup(**tomllib.loads(guessed_setup(found, parameters)))
     (stage,) = setup.stages
     assert {"V_dz_plus", "G1_minus", "Z8", "tau", "Z13_plus", "Z16_minus"} <= stage.free.keys()
     faster = found._replace(gain=(4e9, 6e9), top_speed=(2e10, 2e10))
@@ -290,7 +290,7 @@ def test_a_way_that_was_not_tried_is_the_other_s_and_fixed() -> None:
     found = guess_drive([each for each in runs() if each.name == "up"])
     assert found.command == (8.0, 0.0)
     assert found.gain[0] == found.gain[1]
-    text = fit_configuration(found, guessed_set(found, "x"))
+    text = guessed_setup(found, guessed_set(found, "x"))
     assert "G1_plus" in text
     assert "G1_minus" not in text
 
@@ -323,7 +323,7 @@ def test_a_creep_at_rest_is_found(
     start = guessed_set(found, "campaign.toml")
     assert float(Drive(start).steady_speed(0.0)) == pytest.approx(found.creep, rel=1e-6)
     assert start["Z18"].status == "approximate"
-    (stage,) = Setup(**tomllib.loads(fit_configuration(found, start))).stages
+    (stage,) = Setup(**tomllib.loads(guessed_setup(found, start))).stages
     low, high = stage.free["Z18"].bounds
     assert low < start.numbers["Z18"] < high
     (row,) = (line for line in str(guess_table(found)).splitlines() if line.startswith("creep"))
@@ -346,7 +346,7 @@ def test_no_creep_is_made_of_noise_or_counts(
     assert found.creep == 0.0
     start = guessed_set(found, "campaign.toml")
     assert start.numbers["Z18"] == 0.0
-    text = fit_configuration(found, start)
+    text = guessed_setup(found, start)
     assert "no creep" in text
     assert "Z18" not in tomllib.loads(text)["stages"][0]["free"]
 
@@ -355,7 +355,7 @@ def test_without_a_rest_no_creep_is_told() -> None:
     """Sines cross the dead zone too fast for the motion to end there."""
     found = guess_drive([each for each in runs() if each.name in ("sine", "small")])
     assert found.creep is None
-    text = fit_configuration(found, guessed_set(found, "campaign.toml"))
+    text = guessed_setup(found, guessed_set(found, "campaign.toml"))
     assert "rest" in text
     assert "Z18" not in tomllib.loads(text)["stages"][0]["free"]
 

@@ -12,7 +12,7 @@ from tests.identification.given import run_of
 
 from swashplate import Drive, Experiment, maneuvers
 from swashplate.analysis import envelope, standard_errors, variances_from_bounds
-from swashplate.drafting import fit_configuration, guess_drive, guess_table, guessed_set
+from swashplate.drafting import guess_drive, guess_table, guessed_set, guessed_setup
 from swashplate.identification import verdict
 from swashplate.identification.estimation.setup import Free, Setup
 from swashplate.identification.fitting import Fit, fit
@@ -56,7 +56,7 @@ def fitted(
     """The fit of a guess, by its configuration without some parameters or with other bounds."""
     guess = guess_drive(runs)
     start = guessed_set(guess, "campaign.toml")
-    setup = Setup(**tomllib.loads(fit_configuration(guess, start)))
+    setup = Setup(**tomllib.loads(guessed_setup(guess, start)))
     (stage,) = setup.stages
     free = {name: entry for name, entry in stage.free.items() if name not in without}
     free |= {name: Free(bounds=pair) for name, pair in bounds.items()}
@@ -179,7 +179,7 @@ def test_what_a_guess_did_not_see_is_looked_for(runs: list[Experiment], tmp_path
     guess = guess_drive(runs)._replace(top_speed=(inf, 6.4), acceleration=(inf, 20.0))
     start = guessed_set(guess, "campaign.toml")
     assert start.unreached.keys() == {"Z13_plus", "Z16_plus"}
-    setup = Setup(**tomllib.loads(fit_configuration(guess, start)))
+    setup = Setup(**tomllib.loads(guessed_setup(guess, start)))
     assert {"Z13_plus", "Z16_plus"} <= setup.stages[0].free.keys()
     # where it starts the limits act under the largest command
     run = Drive(start).simulate(maneuvers.step(8.0))

@@ -107,7 +107,7 @@ class Encoder(NamedTuple):
     gear_ratio: float
     """Turns of the encoder for one turn of the axis's shaft."""
     sign: Literal[1, -1]
-    """-1 where it counts down at positive speed."""
+    """-1 if it counts down at positive speed."""
     rolls_over_at: int | None
     """Counts after which the counter begins anew."""
 
@@ -276,7 +276,7 @@ class Channel(Result):
     rolls_over_at: float | None = None
     """Reading after which a position begins anew, in `unit`; it is unwrapped."""
     interpolation: Interpolation = "linear"
-    """What it is between two stamps, where a model takes it as an input."""
+    """What it is between two stamps, if a model takes it as an input."""
     accuracy: Accuracy | None = None
     """As the campaign file states it."""
 
@@ -342,13 +342,13 @@ class Experiment(Tabular):
     """One run of one axis."""
 
     name: str
-    """The run's name, with the axis where a campaign has several: ``"trial1 boom"``."""
+    """The run's name, with the axis if a campaign has several: ``"trial1 boom"``."""
     axis: str
     run: str
     role: Role
     start: InitialState
     start_pressure: float | None
-    """Stroking pressure at the first sample, where it is given. [Pa]"""
+    """Stroking pressure at the first sample, if it is given. [Pa]"""
     input: InputSignal
     channels: Mapping[str, Channel]
     stated_maneuver: str | None = None
@@ -384,7 +384,7 @@ class Experiment(Tabular):
     def to_polars(self) -> polars.DataFrame:
         """The input and every channel on its own stamps, a row a sample.
 
-        Columns ``signal``, ``time`` [s], ``value``, ``unit``, and ``weight``: 0 where a sample is
+        Columns ``signal``, ``time`` [s], ``value``, ``unit``, and ``weight``: 0 if a sample is
         ignored, null for the input.
         """
         import polars as pl

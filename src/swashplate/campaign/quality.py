@@ -71,9 +71,9 @@ class Quality(Result):
     low: float
     high: float
     clipped: float
-    """Share of the samples at the ends of the instrument's range; NaN where no range is known."""
+    """Share of the samples at the ends of the instrument's range; NaN if no range is known."""
     lost_counts: int | None
-    """Jumps that no motion explains, None where it is not an encoder."""
+    """Jumps that no motion explains, None if it is not an encoder."""
     ignored: float
     """Share of the samples whose weight is 0."""
     findings: tuple[str, ...]

@@ -37,7 +37,7 @@ class Kind(NamedTuple):
     """What a kind of signal is, and what shows that a column of a log is of it."""
 
     units: tuple[str, ...]
-    """SI units that it may have; the first is meant where none is given. None: as written."""
+    """SI units that it may have; the first is meant if none is given. None: as written."""
     signal: str
     """Simulated signal that it is compared with; none of an input or of anything else."""
     meaning: str
@@ -185,7 +185,7 @@ def applying(windows: Iterable[AnyWindow], maneuver: str) -> tuple[AnyWindow, ..
 
 
 def ends(window: TimeWindow) -> tuple[float, float]:
-    """First and last instant of a window, infinite where it has none. [s]"""
+    """First and last instant of a window, infinite if it has none. [s]"""
     return (
         -np.inf if window.start is None else window.start,
         np.inf if window.stop is None else window.stop,
@@ -206,7 +206,7 @@ class WeightWindow(TimeWindow):
 
 
 class ClockEntry(FileTable):
-    """The time stamps of a signal: a column, or a rate where the log has none."""
+    """The time stamps of a signal: a column, or a rate if the log has none."""
 
     column: str | None = Field(None, description="Column of the stamps.")
     unit: str | None = Field(None, description="Its unit; the header's, or s.")
@@ -311,7 +311,8 @@ class ChannelEntry(SignalEntry):
         None, description="Standard deviation of its noise in `unit`: the weight among channels."
     )
     interpolation: Literal["previous", "linear"] = Field(
-        "linear", description="Between two samples, where a model of your own takes it as an input."
+        "linear",
+        description="Between two samples, if a user-defined model takes it as an input.",
     )
     weight: NotNegative = Field(1.0, description="Factor on its squared errors.")
     weights: tuple[WeightWindow, ...] = Field((), description="Windows that count more or less.")
@@ -380,7 +381,7 @@ class RunEntry(FileTable):
     axes: dict[str, dict[str, Any]] = Field(
         {},
         description="Entries of an axis that differ in this run, as in [axes.NAME]; "
-        "channels.NAME = false where the run has no such channel; ignored windows are added.",
+        "channels.NAME = false if the run has no such channel; ignored windows are added.",
     )
 
     @model_validator(mode="after")
@@ -396,7 +397,7 @@ class CampaignFile(FileTable):
     title: str = Field("", description="For the report.")
     virtual: Flag = Field(False, description="Whether the tests are simulated.")
     format: TextOptions = Field(
-        TextOptions(), description="How text logs are written, where that cannot be recognised."
+        TextOptions(), description="How text logs are written, if that cannot be recognised."
     )
     axes: dict[str, AxisEntry] = Field(min_length=1, description="The drives, by name.")
     runs: tuple[RunEntry, ...] = Field(min_length=1, description="Their tests, a log each.")

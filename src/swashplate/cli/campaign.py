@@ -436,7 +436,7 @@ def guess(
         parameters = drafting.guessed_set(guessed, path.name)
         made_folder(folder)
         Drive(parameters).to_toml(start)
-        write_text(drafting.fit_configuration(guessed, parameters), setup)
+        write_text(drafting.guessed_setup(guessed, parameters), setup)
     show(drafting.guess_table(guessed))
     if guessed.amplifier is not None:
         show(drafting.amplifier_table(guessed.amplifier))
@@ -452,7 +452,7 @@ def guess(
         f"These numbers alone: fit {guessed.fit_percent:.1f} % of the mean speeds (100 % is best)."
     )
     note(f"Start:             {start}")
-    note(f"Fit configuration: {setup}")
+    note(f"Fit setup: {setup}")
     then = ["swashplate", "fit", str(path), "--from", str(start), "--setup", str(setup)]
     note(f"Then run\n  {shlex.join(then)}")
 
@@ -539,7 +539,7 @@ def advise(
     source = None if named is None else parsing.drive_file(named)
     if setup is None and source is not None:
         # a fit writes what it estimated next to the drive that it found
-        estimated = source.parent / parsing.CONFIGURATION
+        estimated = source.parent / parsing.SETUP
         setup = str(estimated) if estimated.is_file() else None
     looks, doubts, saved = list[design.Outlook](), tuple[str, ...](), list[str]()
     with working("Evaluating the tests"):
@@ -576,7 +576,7 @@ def advise(
             note(f"run {number}: {name}")
         say(INFORMATION)
         if all(look.identifiability.complete for look in looks):
-            note("The fit configuration can stay as it is.")
+            note("The fit setup can stay as it is.")
     show(design.advice_table("Tests", ranked[:top]))
     if in_turn:
         show(design.advice_table("Plan, each test in addition to those before it", in_turn))

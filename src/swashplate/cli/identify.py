@@ -183,7 +183,7 @@ def fit(
 
     Fits the runs with the role 'fit', stage by stage, predicts those with the
     role 'validate', and shows which parameters the data determine. Writes the
-    fitted drive as a parameter file, the fit configuration, the estimates with
+    fitted drive as a parameter file, the fit setup, the estimates with
     their intervals, and the data that 'report' needs. Exit code 1: the result is
     not usable. Ctrl-C or SIGTERM keeps the best result so far (of several
     starts: those that ended) and exits with code 130.

@@ -128,7 +128,7 @@ SetupOption = Annotated[
     typer.Option(
         metavar="NAME|FILE",
         help=(
-            "Parameters to estimate: a packaged configuration (hoist, slew, luff, neutral ...) or "
+            "Parameters to estimate: a packaged fit setup (hoist, slew, luff, neutral ...) or "
             "a TOML file (default: that of the axis's drive)."
         ),
     ),

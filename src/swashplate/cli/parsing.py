@@ -29,8 +29,8 @@ if TYPE_CHECKING:
 _NUMBER = r"[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|inf\b|nan\b)"
 _VALUE = re.compile(rf"\s*({_NUMBER})(?:/({_NUMBER}))?\s*((?:1/)?[^\W\d_].*|°.*)?")
 _ENDING = re.compile(r"\.[A-Za-z]\w*$")
-CONFIGURATION, NUMBERS = "setup.toml", "parameters.toml"
-"""In a folder that a fit wrote: its fit configuration, or the numbers of a user-defined model."""
+SETUP, NUMBERS = "setup.toml", "parameters.toml"
+"""In a folder that a fit wrote: its fit setup, or the numbers of a user-defined model."""
 UNFELT, FEELING = "load_torque", ("motor_leakage", "motor_constant")
 """A load, and what makes the speed depend on it."""
 SURPRISING = 1000.0
@@ -42,7 +42,7 @@ _NAMES = {
     "log": "a log",
     "campaign": "a campaign",
     "drive": "a drive",
-    "setup": "a fit configuration",
+    "setup": "a fit setup",
 }
 _MARKS = {"runs": "campaign", "stages": "setup", "control_card": "drive", "pump_motor": "drive"}
 _INSTEAD = {
@@ -288,7 +288,7 @@ def pairs_of(
 
 
 def changes_between(before: ParameterSet, after: ParameterSet) -> list[str]:
-    """A line for each parameter of two sets that differs, with a question where it surprises."""
+    """A line for each parameter of two sets that differs, with a question if it surprises."""
     symbols = {parameter.symbol for parameter in before.values()}
     added = [parameter for parameter in after.values() if parameter.symbol not in symbols]
     lines = [

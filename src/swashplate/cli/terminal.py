@@ -168,7 +168,7 @@ def show(*tables: Table) -> None:
 
 
 def say(text: str) -> None:
-    """Print text, broken into lines where the terminal is narrow."""
+    """Print text, broken into lines if the terminal is narrow."""
     output.print(text)
 
 
@@ -292,7 +292,7 @@ def draw(path: Path | None, figure: Any, *shown: Any, **options: Any) -> None:
 
 
 def say_saved() -> None:
-    """Name the files that were written; a command's end does it, where it was not done before."""
+    """Name the files that were written; a command's end does it, if it was not done before."""
     for line in SAVED.get():
         note(line)
     SAVED.set([])

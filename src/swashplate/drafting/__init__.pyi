@@ -5,5 +5,5 @@ from .draft import draft_campaign as draft_campaign
 from .guess import Guess as Guess
 from .guess import guess_drive as guess_drive
 from .guess import guess_table as guess_table
-from .starting_point import fit_configuration as fit_configuration
 from .starting_point import guessed_set as guessed_set
+from .starting_point import guessed_setup as guessed_setup

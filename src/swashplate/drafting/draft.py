@@ -517,7 +517,7 @@ def _accuracy_lines(kind: str, unit: str | None) -> list[str]:
 
 
 def _unit_lines(signal: _Guess) -> list[str]:
-    """The entry of a signal's unit, none where the header has it."""
+    """The entry of a signal's unit, none if the header has it."""
     units = KINDS[signal.kind].units
     usual = (*units, "1")[0]
     if signal.unit is not None and units and not _measures(signal.kind, signal.unit):

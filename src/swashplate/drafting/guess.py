@@ -64,17 +64,17 @@ class Guess(NamedTuple):
     gain: tuple[float, float]
     """Speed for a volt beyond the dead zone. [unit/V]"""
     jump: tuple[float, float]
-    """Speed right beyond the dead zone, 0 where none was seen. [unit]"""
+    """Speed right beyond the dead zone, 0 if none was seen. [unit]"""
     top_speed: tuple[float, float]
-    """Infinite where none was reached. [unit]"""
+    """Infinite if none was reached. [unit]"""
     acceleration: tuple[float, float]
-    """Infinite where it limits nothing. [unit/s]"""
+    """Infinite if it limits nothing. [unit/s]"""
     lag: float
     """[s]"""
     delay: float
     """[s]"""
     creep: float | None
-    """Speed at rest, with its sign; 0 where the logs show none, None where their rests are too
+    """Speed at rest, with its sign; 0 if the logs show none, None where their rests are too
     short or too few to show one. [unit]"""
     command: tuple[float, float]
     """Largest command; 0 for a way that was not tried, whose numbers are the other's. [V]"""

@@ -1,4 +1,4 @@
-"""What a fit starts from: a guess as a parameter set, and a configuration that frees it."""
+"""What a fit starts from: a guess as a parameter set, and a fit setup that frees it."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ bends the gain, and a search can end with both. [1]"""
 STEEPEST = 30.0
 """Volts that a radian takes at least, so that at 10 V and at the upper bounds of all gains the
 solenoids do not overpower the feedback spring. [V/rad]"""
-CONFIGURATION = """\
+SETUP = """\
 # Read off the logs of the axis '{0}' by `swashplate guess`: what they show is
 # free, within bounds about the first guess. A limit that the guess did not see is
 # free as well, within wide ones: a fit tells it from a lag.
@@ -181,13 +181,13 @@ def _with_current(
     }
 
 
-def fit_configuration(guess: Guess, start: ParameterSet | Drive) -> str:
-    """Text of a fit configuration that frees what was guessed, with bounds about it.
+def guessed_setup(guess: Guess, start: ParameterSet | Drive) -> str:
+    """Text of a fit setup that frees what was guessed, with bounds about it.
 
     One stage from the command to the motion, or, if a current was measured, one of the amplifier
     and one of the pump.
     """
-    numbers, text = set_of(start).numbers, CONFIGURATION.format(guess.axis)
+    numbers, text = set_of(start).numbers, SETUP.format(guess.axis)
     longest = max(2.0 * guess.delay, guess.delay + 0.1)
     delay = f"tau = {{ bounds = [0.0, {longest:.4g}] }}    # delay"
     if guess.amplifier is None:

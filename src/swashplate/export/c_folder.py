@@ -1,4 +1,4 @@
-"""C source of a drive or a model of one's own, with its numbers, in a folder of its own."""
+"""C source of a drive or a user-defined model, with its numbers, in a folder of its own."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ FURTHER = ("main.c", "CMakeLists.txt", "README.md")
 
 
 def exported_drive(drive: Drive | None = None) -> Exported:
-    """The drive as it is in C; with equations of one's own if the drive has some."""
+    """The drive as it is in C; with user-defined equations if the drive has some."""
     return _exported(() if drive is None else drive.parameters.equations)
 
 
@@ -108,7 +108,7 @@ def values_of(drive: Drive, step: float = LONGEST_STEP) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Content:
-    """A drive, or a model of one's own, with its numbers, as it is exported."""
+    """A drive, or a user-defined model, with its numbers, as it is exported."""
 
     exported: Exported
     instance: Instance
@@ -146,7 +146,7 @@ def content_of(
     given: Any = None,
     prefix: str = "swp",
 ) -> Content:
-    """What is exported of a drive, or of a model of one's own with its numbers.
+    """What is exported of a drive, or of a user-defined model with its numbers.
 
     Functions of the latter begin with `prefix`; the other arguments are those of `c`. A drive's
     recursion for another rate becomes its equation, with a warning.
@@ -216,7 +216,7 @@ def c(
     options: Any = None,
     given: Any = None,
 ) -> list[Path]:
-    """Write C source of a drive, or of a model of one's own, with its numbers.
+    """Write C source of a drive, or of a user-defined model, with its numbers.
 
     Parameters
     ----------
@@ -227,7 +227,7 @@ def c(
     step : float
         Step of its grid; of a drive at most 1/512. [s]
     parameters, options, given : named tuple
-        Numbers of a model of one's own, as `swashplate.equations.simulate` takes them.
+        Numbers of a user-defined model, as `swashplate.equations.simulate` takes them.
 
     Returns
     -------

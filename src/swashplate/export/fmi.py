@@ -74,12 +74,12 @@ def fmu(
     options: Any = None,
     given: Any = None,
 ) -> Path:
-    """Write a drive, or a model of one's own, as an FMU for co-simulation.
+    """Write a drive, or a user-defined model, as an FMU for co-simulation.
 
     Parameters
     ----------
     what : Drive or Model
-        Whose numbers and forms are the start values. A drive with an equation of its own, or a
+        Whose numbers and forms are the start values. A drive with a user-defined equation, or a
         model, is compiled, which needs a compiler (extra ``binaries``).
     path : path
         The file, ``.fmu``; an older one is replaced.
@@ -91,7 +91,7 @@ def fmu(
         Of ``"linux64"``, ``"aarch64-linux"``, ``"win64"`` and ``"darwin64"``; by default all, or
         this machine where a C compiler is all that there is.
     parameters, options, given : named tuple
-        Numbers of a model of one's own, as `swashplate.equations.simulate` takes them.
+        Numbers of a user-defined model, as `swashplate.equations.simulate` takes them.
 
     Returns
     -------
@@ -394,12 +394,12 @@ def compare(path: str | Path, drive: Drive, voltage: ArrayLike) -> FmuComparison
     Returns
     -------
     FmuComparison
-        Largest differences, 0 where the FMU's numbers are the drive's.
+        Largest differences, 0 if the FMU's numbers are the drive's.
 
     Raises
     ------
     InputError
-        For a model of one's own, or if FMPy is not installed, the command is none, or the FMU
+        For a user-defined model, or if FMPy is not installed, the command is none, or the FMU
         fails.
     FileError
         If the file is no FMU.

@@ -1,8 +1,8 @@
 """Compiled libraries: for which machines, made from which sources, and how.
 
 The package carries one library for each platform, made once from the generated C and the same for
-every drive: its numbers travel beside it (`swashplate.export.fmu`). A model of one's own, or a
-drive with an equation of one's own, has other C, which is compiled when it is exported.
+every drive: its numbers travel beside it (`swashplate.export.fmu`). A user-defined model, or a
+drive with a user-defined equation, has other C, which is compiled when it is exported.
 """
 
 from __future__ import annotations
@@ -209,19 +209,19 @@ def wasm(
     options: Any = None,
     given: Any = None,
 ) -> Path:
-    """Write a drive, or a model of one's own, as WebAssembly, with a section of its numbers.
+    """Write a drive, or a user-defined model, as WebAssembly, with a section of its numbers.
 
     Parameters
     ----------
     what : Drive or Model
-        What is exported. A drive with an equation of its own, or a model, is compiled, which needs
+        What is exported. A drive with a user-defined equation, or a model, is compiled, which needs
         the extra ``binaries``.
     path : path
         The file; an older one is replaced.
     step : float
         Step of its grid; of a drive at most 1/512. [s]
     parameters, options, given : named tuple
-        Numbers of a model of one's own.
+        Numbers of a user-defined model.
 
     Returns
     -------

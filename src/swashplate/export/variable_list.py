@@ -41,7 +41,7 @@ class References(NamedTuple):
 DRIVE = References(0, 10, 100, 300, 310, 311, 400, 1000)
 """Those of a drive; tests/export/value_references.csv is the stored list."""
 OWN = References(0, 10_000, 20_000, 30_000, 30_001, 30_002, 40_000, 50_000)
-"""Those of a model of one's own, which may have any number of each."""
+"""Those of a user-defined model, which may have any number of each."""
 
 
 class Words(NamedTuple):
@@ -81,7 +81,7 @@ class Variable:
     unit: str = "1"
     """SI unit; ``"1"`` for none."""
     start: float | bool | None = None
-    """Value at the start; None where it is computed."""
+    """Value at the start; None if it is computed."""
     lower: float | None = None
     upper: float | None = None
     feedthrough: frozenset[str] = frozenset()
@@ -89,7 +89,7 @@ class Variable:
 
 
 def words_of(exported: Exported) -> dict[str, Words]:
-    """Meaning and unit of the signals of a model of one's own, as far as its types declare them."""
+    """Meaning and unit of the signals of a user-defined model, as far as its types declare them."""
     words = {}
     for part in exported.model.parts:
         for kind in (part.state, part.signals):

@@ -449,7 +449,7 @@ _BRACKETS = re.compile(r"\[.*\]|\(.*\)")
 
 
 def _units_of(cells: Sequence[str]) -> _Units | None:
-    """Units of a row of them, None where a cell is empty; or None if it is no such row."""
+    """Units of a row of them, None if a cell is empty; or None if it is no such row."""
     filled = [cell for cell in cells if cell]
     # a short word of another language may stand among units, such as Imp for pulses
     others = [cell for cell in filled if not _is_unit(cell)]

@@ -23,7 +23,7 @@ class LogColumn(NamedTuple):
     name: str
     """As the file has it, a unit in brackets included."""
     unit: str | None = None
-    """As written in the header, in a row of units or in an attribute; None where there is none."""
+    """As written in the header, in a row of units or in an attribute; None if there is none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +67,7 @@ class Log:
         ----------
         requested : str
             As in the file; or without its unit (``time`` for ``time [ms]``, ``time (ms)`` and
-            ``time_ms``); or without its group, where no other column has the same last part.
+            ``time_ms``); or without its group, if no other column has the same last part.
 
         Raises
         ------
@@ -140,7 +140,7 @@ class Log:
         return {name: arrays[position] for name, position in positions.items()}
 
     def rows_of(self, names: Iterable[str]) -> int | None:
-        """Rows of some columns, None where they differ in length or it is not known."""
+        """Rows of some columns, None if they differ in length or it is not known."""
         positions = [self.columns.index(self.find(name)) for name in names if self.lengths]
         counts = {self.lengths[position] for position in positions}
         return counts.pop() if len(counts) == 1 else None

@@ -42,7 +42,7 @@ def open_log(path: str | Path, *, options: TextOptions | None = None) -> Log:
         Its ending says what it is: text (CSV and its kin), Parquet, MATLAB (all versions), HDF5,
         TDMS or MDF 4.
     options : TextOptions, optional
-        How a text file is written, where that cannot be recognised from it.
+        How a text file is written, if that cannot be recognised from it.
 
     Returns
     -------

@@ -197,7 +197,7 @@ def serve() -> None:
 
 
 def _limit_memory(path: Path) -> None:
-    """Let a file take no more than could be in it, where the system has such limits (Linux)."""
+    """Let a file take no more than could be in it, if the system has such limits (Linux)."""
     if not _USED.exists():
         return
     import resource

@@ -236,7 +236,7 @@ _DAY = 86_400_000_000
 class _Clock:
     """A column of dates of one form, read piece after piece.
 
-    Stamps count from 1970 in universal time where a zone is written; a clock without a date begins
+    Stamps count from 1970 in universal time if a zone is written; a clock without a date begins
     anew at midnight.
     """
 

@@ -60,9 +60,9 @@ class ModelOptions(FileTable):
     """Samples a second that the recursion of the card's filter belongs to; none is the filter's
     differential equation, for any rate."""
     options: list[str] | None = None
-    """Terms of the pump that count; where they are not given, those whose parameters are not 0."""
+    """Terms of the pump that count; if they are not given, those whose parameters are not 0."""
     equations: list[EquationPlaces] = Field([])
-    """One's own equations in place of the package's, each as ``module:name``."""
+    """User-defined equations in place of the package's, each as ``module:name``."""
     motion: Motion = "shaft"
     unreached: dict[str, NotNegative] = Field({})
     """Limits that the tests never reached, by column, and how far they went. [SI]"""
@@ -91,7 +91,7 @@ class SetFile(FileTable):
     pump_motor: dict[str, ParameterEntry]
     model: ModelOptions = ModelOptions()
     refinements: dict[str, ParameterEntry] = Field({})
-    """What goes beyond Kruse's equations; all of it is off where it is not given."""
+    """What goes beyond Kruse's equations; all of it is off if it is not given."""
 
 
 # --- reading --------------------------------------------------------------------------------------
@@ -143,7 +143,7 @@ def fitted_drive(folder: str | Path) -> Path:
         return file
     if (Path(folder) / FITTED_NUMBERS).is_file():
         raise MissingFileError(
-            f"{folder} is the fit of a model of your own: give its file by --model where the "
+            f"{folder} is the fit of a user-defined model: give its file by --model where the "
             "command has that option. In Python swashplate.equations.simulate(model, ...) runs it, "
             'and swashplate.export.fmu(model, "model.fmu", parameters=..., step=...) writes an FMU '
             f"of it, with the numbers in {Path(folder) / FITTED_NUMBERS}."

@@ -112,7 +112,7 @@ def check_options(owner: str, options: frozenset[str], numbers: Mapping[str, flo
     Raises
     ------
     ParameterError
-        For an unknown option, or one whose parameters are all 0 where that has no meaning.
+        For an unknown option, or one whose parameters are all 0 if that has no meaning.
     """
     for option in sorted(options):
         if option not in OPTIONS:

@@ -95,7 +95,7 @@ def thinned(time: Array, values: Array, breaks: Rows, columns: int = COLUMNS) ->
 def broken(
     time: Array, values: Array, breaks: Rows | None = None, columns: int = COLUMNS
 ) -> tuple[Array, Array]:
-    """Points of a signal's line, thinned out, with a NaN where it is broken.
+    """Points of a signal's line, thinned out, with a NaN if it is broken.
 
     Without `breaks`, rows after which the line is broken, it is broken at the gaps of the stamps.
     The NaN has the stamp of the sample before it, so that a staircase ends there too.
@@ -147,7 +147,7 @@ def draw(
 # --- stretches of time ----------------------------------------------------------------------------
 
 MOST_SPANS = 1000
-"""More stretches than this on one panel are merged where none could see the gap between them."""
+"""More stretches than this on one panel are merged if none could see the gap between them."""
 
 
 class Shade(NamedTuple):

@@ -386,7 +386,7 @@ def _draw_ranges(ax: Axes, ranges: BlockRanges, factor: float, color: str) -> No
 # --- one channel closely --------------------------------------------------------------------------
 
 ROUGH = "#d2d2d2"
-"""Colour of the difference of neighbours, which fills its panel where the count changes often."""
+"""Colour of the difference of neighbours, which fills its panel if the count changes often."""
 
 
 def plot_channel(

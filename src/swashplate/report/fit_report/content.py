@@ -50,7 +50,7 @@ _PARTS = {
     "card": "the control card alone, from the command to the currents",
     "pump": "pump and motor, driven by the current",
     "chain": "card, pump and motor, from the command to the speed",
-    "model": "a model of one's own, from its inputs to its channels",
+    "model": "a user-defined model, from its inputs to its channels",
 }
 
 
@@ -147,7 +147,7 @@ def write_validation_report(
 
 
 def _units_of_people() -> AbstractContextManager[None]:
-    """Parameters in mm, bar and degrees rather than SI, where no units were chosen."""
+    """Parameters in mm, bar and degrees rather than SI, if no units were chosen."""
     usual = {"m": "mm", "Pa": "bar", "rad": "deg"}
     return shown_in([unit for si, unit in usual.items() if chosen_unit(si).name == unit_text(si)])
 
@@ -340,7 +340,7 @@ def _setup_section(
     else:
         table.add("drive", f"{drive.name}, card {drive.card}" if drive.card else drive.name)
     if title:
-        table.add("fit configuration", title)
+        table.add("fit setup", title)
     for key, words in notes.items():
         if key != "campaign":
             table.add(key, words)

@@ -67,9 +67,9 @@ def write_live_page(
     campaign : Campaign, optional
         Its runs with a voltage as their input are shown beside what the drive makes of them.
     axis : str, optional
-        The axis, where the campaign has several.
+        The axis, if the campaign has several.
     command : Maneuver, optional
-        A voltage that the drive is simulated under where there is no campaign.
+        A voltage that the drive is simulated under if there is no campaign.
     rate : float
         At which the command is sampled. [Hz]
     name : str
@@ -84,7 +84,7 @@ def write_live_page(
     ------
     InputError
         If there is nothing to simulate: no run is driven by a voltage, or neither a campaign nor a
-        command is given; or the drive has an equation of its own.
+        command is given; or the drive has a user-defined equation.
     FileError
         If the file cannot be written.
     """
@@ -120,7 +120,7 @@ def live_page(
     """HTML of a live page beside runs of `run_of`; see `write_live_page`."""
     if parameters.equations:
         raise InputError(
-            f"{parameters.name} has an equation of its own, which the WebAssembly of the package "
+            f"{parameters.name} has a user-defined equation, which the WebAssembly of the package "
             "does not have: export its C source with swashplate.export.c."
         )
     exported = exported_drive()
@@ -182,7 +182,7 @@ def _parameters(parameters: ParameterSet) -> list[dict[str, Any]]:
         sides = ("",) if len(definition.columns) == 1 else (", positive", ", negative")
         for column, side, value in zip(definition.columns, sides, parameter.values, strict=False):
             if column not in names:
-                continue  # of an equation of one's own
+                continue  # of a user-defined equation
             entries.append(
                 {
                     "number": names.index(column),
@@ -202,7 +202,7 @@ def _parameters(parameters: ParameterSet) -> list[dict[str, Any]]:
 
 
 def slider(parameter: Parameter, value: float) -> tuple[float, float] | None:
-    """Ends of a value's slider; None where no factor moves it. SI"""
+    """Ends of a value's slider; None if no factor moves it. SI"""
     if parameter.own_bounds is not None and all(map(isfinite, parameter.own_bounds)):
         low, high = parameter.own_bounds
         return (low, high) if low < high else None

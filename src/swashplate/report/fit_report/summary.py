@@ -130,7 +130,7 @@ class _Range(NamedTuple):
     """How far numbers (6, 2) can be off."""
 
     half: Array
-    """Half widths of 95 % intervals, NaN where there is none."""
+    """Half widths of 95 % intervals, NaN if there is none."""
     doubt: NDArray[np.object_]
     """Why a number has no interval, in words; empty if it has one."""
     near: Array
@@ -318,7 +318,7 @@ def light(look: Light, words: str) -> Markup:
 def run_error(run: ShownRun, runs: Sequence[ShownRun]) -> float:
     """RMSE of a run's judged channel over its range in all runs of its role, as the verdict has it.
 
-    Infinite where nothing moves.
+    Infinite if nothing moves.
     """
     judged_channel = run.judged
     judged = [other_run.judged for other_run in runs if other_run.role == run.role]
@@ -368,7 +368,7 @@ def summary_section(
     runs: Sequence[ShownRun],
     findings: int,
 ) -> Section:
-    """The first screen: `drive` is None for a model of one's own, which has no such numbers."""
+    """The first screen: `drive` is None for a user-defined model, which has no such numbers."""
     look: Light = "good" if judged.usable else "bad"
     headline = judged.headline.replace(" %", "\N{NO-BREAK SPACE}%")
     shown = [
