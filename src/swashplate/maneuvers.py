@@ -519,7 +519,7 @@ def _band(band: Sequence[float], period: float) -> Array:
     periods = np.unique(np.floor(np.linspace(low, high, count if apart else 1) * period + 0.5))
     if periods[0] < 1.0 or periods.size < count:
         raise InputError(
-            f"{band[2]} frequencies from {low:g} to {high:g} Hz cannot be told apart in "
+            f"{band[2]} frequencies from {low:g} to {high:g} Hz cannot be distinguished in "
             f"{period:g} s: take fewer, a wider band or a longer time."
         )
     return np.asarray(periods / period)

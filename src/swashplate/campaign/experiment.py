@@ -169,7 +169,7 @@ class InputSignal(Result):
         return np.flatnonzero((changes > SUDDEN * np.ptp(self.values)) & alone)
 
     def with_jumps(self) -> InputSignal:
-        """The signal with its jumps at once, in the middle of the samples beside them.
+        """The signal with instantaneous jumps, in the middle of the samples beside them.
 
         A straight line from sample to sample would pass a dead zone at its beginning, and the
         current's jump there come up to half a sample too early.

@@ -49,7 +49,7 @@ than so many seconds tell nothing of it. [s]"""
 NEIGHBOURS = 11
 """Samples of the running median: up to five in a row may be a spike."""
 COARSE = 0.03
-"""Step of a reading over its range from which slow motions cannot be told."""
+"""Step of a reading over its range from which slow motions cannot be resolved."""
 AVERAGED, HELD, LARGE, OFF_SCALE = 0.5, 1.0, 0.4, 3.0
 """Time over which motions are averaged, and for which a command has been larger than this part of
 the largest one, so that the machine has about its steady speed [s]; and the factor by which a run's
@@ -193,7 +193,7 @@ def _of_channel(experiment: Experiment, channel: Channel, signed: bool) -> Itera
             yield (
                 f"reads in steps of {size.factor * step:.3g} {size.name}, "
                 f"{100.0 * step / extent:.2g} % of its range: smaller motions and dead zones "
-                "cannot be told"
+                "cannot be resolved"
             )
     motion, at = values, time
     if channel.is_position:

@@ -30,7 +30,7 @@ SMALLEST_VOLTS = 0.1
 LARGEST_ZERO = 0.5
 """Reading at rest beyond which it is no zero error of an instrument. [V]"""
 SHORTEST = 16
-"""Samples below which nothing is told apart."""
+"""Samples below which nothing can be distinguished."""
 HELD = 5
 """Samples for which a level is held at least, or that a rise has between 10 % and 80 % of it."""
 
@@ -180,7 +180,7 @@ def _noise(time: Array, values: Array) -> float:
 def _fits(record: _Record, shape: _Found) -> bool:
     """Whether a record goes back to rest, and the RMS of its rest less the model is small.
 
-    It falls to rest at once or returns to it on a curve of its own.
+    The command either falls to rest from one sample to the next or returns to it on a curve.
     """
     time, values, first = record.time, record.values, shape.leaves
     moving = np.flatnonzero(np.abs(values[first:]) > record.tolerance)

@@ -254,7 +254,7 @@ class SignalEntry(FileTable):
         "in the check; a channel without any sample is left out of the run).",
     )
     limits: tuple[Finite, Finite] | None = Field(
-        None, description="Range of the instrument in `unit`, to tell clipping."
+        None, description="Range of the instrument in `unit`, to detect clipping."
     )
     accuracy: AccuracyEntry | None = Field(
         None,

@@ -119,7 +119,7 @@ def fit(
         typer.Option(
             "--joint",
             metavar=NO_VALUE,
-            help="Finally estimate all parameters at once, through the whole drive.",
+            help="Finally estimate all parameters at the same time, through the whole drive.",
         ),
     ] = False,
     begin: InitialDrive = None,

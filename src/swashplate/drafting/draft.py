@@ -1,8 +1,8 @@
 """First drafts of a campaign file: what each column of some logs may be, and a file that says so.
 
 A column is what the table of kinds, `swashplate.campaign.schema.KINDS`, says of its name and unit,
-and what its numbers show. What is not known for sure is marked "guessed"; what cannot be told stays
-open in a line "FIXME".
+and what its numbers show. What is not known for sure is marked "guessed"; what cannot be known
+stays open in a line "FIXME".
 """
 
 from __future__ import annotations

@@ -311,7 +311,7 @@ def _number(variable: Variable) -> dict[str, str]:
 
 
 def _add_structure(structure: ET.Element, table: Sequence[Variable], two: bool) -> None:
-    """Outputs with the inputs that they follow at once; in FMI 2 by their places in the table."""
+    """Outputs with the inputs that they follow instantaneously; in FMI 2 by number in the table."""
     numbers = {
         variable.name: i if two else variable.reference for i, variable in enumerate(table, 1)
     }

@@ -491,7 +491,7 @@ def plot_prediction(
     quality : RunQuality
         The channel. Below a position stands the speed, by which it is judged: measured and
         simulated positions go through the same filters. The lowest panel is the residual, simulated
-        less measured, of that speed; of a position from which no speed can be told, and of any
+        less measured, of that speed; of a position from which no speed can be computed, and of any
         other channel, its own.
     window : (float, float), optional
         First and last instant to show [s]. Everything is computed from the whole record.

@@ -56,7 +56,7 @@ def write_live_page(
     """Write the live page of a drive: one HTML file, whole or not at all, that needs no network.
 
     The drive runs in the reader's browser, from the equations' C source as WebAssembly. Parameters
-    and design variables have sliders; the curves, their errors and the limits follow at once.
+    and design variables have sliders; the curves, their errors and the limits follow immediately.
 
     Parameters
     ----------
