@@ -37,7 +37,7 @@ from swashplate.report.fit_report import (
     write_validation_report,
 )
 from swashplate.report.fit_report.runs import (
-    packed,
+    packed_samples,
     run_data,
     shown_runs,
     write_samples,
@@ -255,7 +255,7 @@ def unpacked(found: dict) -> np.ndarray:
     ],
 )
 def test_numbers_are_packed_to_half_a_step(values: np.ndarray, step: float | None) -> None:
-    found = packed(values, step)
+    found = packed_samples(values, step)
     np.testing.assert_allclose(unpacked(found), values, rtol=1e-12, atol=0.5001 * found["step"])
 
 

@@ -27,7 +27,16 @@ from swashplate.cli.options import (
     TableFile,
     VariablesOption,
 )
-from swashplate.cli.terminal import bullets, check_output, draw, note, save, say, show, working
+from swashplate.cli.terminal import (
+    bullets,
+    check_writable,
+    draw_figure,
+    note,
+    save,
+    say,
+    show,
+    spinner,
+)
 from swashplate.errors import InputError
 from swashplate.tables import joined, quantity
 
@@ -80,20 +89,20 @@ def limits(
     from swashplate.analysis.limits import shares_of
 
     if maneuver is None:
-        with working("Measuring"):
+        with spinner("Measuring"):
             limits_found = envelope(drive.chosen)
         save(out, "Envelope, in SI", limits_found.write)
-        draw(plot, "plot_envelope", limits_found)
+        draw_figure(plot, "plot_envelope", limits_found)
         drive.note(f"{drive.title}: performance envelope")
         show(limits_found.table())
         return
-    with working("Simulating"):
+    with spinner("Simulating"):
         marched = parsing.at_rate(drive.chosen, sampling.rate)
         name, run = parsing.simulated_as(marched, maneuver, sampling)
         shares = shares_of(marched, run)
     title = f"{drive.title}, {name}"
     save(out, "Shares of each limit, in SI", shares.write)
-    draw(plot, "plot_limit_timeline", run, reference=shares.reference, title=title)
+    draw_figure(plot, "plot_limit_timeline", run, reference=shares.reference, title=title)
     error = quantity(shares.error, "rad/s", spec=".3f")
     # which of the limits that act here no test reached is said below, by the result itself
     drive.note(f"{title}: {error} rms from a drive without limits", unreached=False)
@@ -177,12 +186,12 @@ def whatif(
 
     moved = parsing.factors_of(factors)
     choice = DriveChoice(drive)
-    with working("Simulating"):
-        name, trial = parsing.trial_of(choice.chosen, maneuver, sampling)
+    with spinner("Simulating"):
+        name, trial = parsing.named_trial(choice.chosen, maneuver, sampling)
         result = what_if(choice.chosen, moved, trial, outcomes=(*OUTCOMES, "travel"))
     bands, sentences = dict[str, monte_carlo.Bands](), list[str]()
     if uncertainty is not None:
-        with working("Drawing drives"):
+        with spinner("Drawing drives"):
             draws = monte_carlo.stored_draws(uncertainty, drive=choice.chosen, campaign=campaign)
             drawn = {AS_IS: draws, CHANGED: draws.with_factors(moved)}
             sentences.append(
@@ -199,7 +208,7 @@ def whatif(
     save(out, "Changed drive", result.after.drive.to_toml)
     title = f"{choice.title}, {name}"
     changes = ", ".join(f"{name} x {factor:g}" for name, factor in moved.items())
-    draw(plot, "plot_whatif", result, bands=bands, title=f"{title}: {changes}")
+    draw_figure(plot, "plot_whatif", result, bands=bands, title=f"{title}: {changes}")
     choice.note(title)
     before, after = (variant.drive.parameters for variant in (result.before, result.after))
     for line in parsing.changes_between(before, after):
@@ -268,10 +277,10 @@ def size(
         None if degrees is None else radians(degrees) for degrees in requested
     )
     required = sizing.Requirements(speed, acceleration, error, direction)
-    with working("Sizing"):
-        follow, ranges = None, parsing.ranges_of(variables or SIZED, sizing.DEFAULT_RANGE)
+    with spinner("Sizing"):
+        follow, ranges = None, parsing.factor_ranges_of(variables or SIZED, sizing.DEFAULT_RANGE)
         if maneuver is not None:
-            voltage = parsing.maneuver_of(maneuver, drive.chosen).sample()
+            voltage = parsing.named_maneuver(maneuver, drive.chosen).sample()
             # a larger drive may well be what it takes to reach it
             reference = proportional_speed(drive.chosen, voltage, limited=False)
             follow = trial_of(drive.chosen, voltage, reference=reference)
@@ -321,13 +330,13 @@ def sensitivity(
     """Show the effect of each design variable, changed down and up by itself."""
     from swashplate.analysis import one_at_a_time
 
-    with working("Simulating"):
-        name, trial = parsing.trial_of(drive.chosen, maneuver, sampling)
-        ranges = parsing.ranges_of(variables or (*VARIED, "spool_offset"), SPAN)
+    with spinner("Simulating"):
+        name, trial = parsing.named_trial(drive.chosen, maneuver, sampling)
+        ranges = parsing.factor_ranges_of(variables or (*VARIED, "spool_offset"), SPAN)
         result = one_at_a_time(drive.chosen, ranges, trial, outcomes=tuple(outcomes or OUTCOMES))
     title = f"{drive.title}, {name}"
     save(out, "All numbers, in SI", joined(result.tables(every=True)).write)
-    draw(plot, "plot_tornado", result, title=f"{title}: each design variable by itself")
+    draw_figure(plot, "plot_tornado", result, title=f"{title}: each design variable by itself")
     drive.note(title)
     show(*result.tables())
     bullets(dict.fromkeys(result.sentences))
@@ -387,25 +396,25 @@ def compensate(
     """
     from swashplate.analysis import compensation
 
-    check_output(out, compensation.INVERSE_MAP, force=force)
+    check_writable(out, compensation.INVERSE_MAP, force=force)
     if stick is not None and stick.lstrip("+-").replace(".", "", 1).isdecimal():
         raise InputError(
             f"{stick} is a number, not a maneuver or a log: for the voltage of a speed, write "
             f"--speed-deg-s {stick}."
         )
-    with working("Inverting"):
+    with spinner("Inverting"):
         marched = parsing.at_rate(drive.chosen, sampling.rate)
         inverse, improvement = compensation.inverse_map(marched, points), None
         tables = inverse.tables([radians(speed) for speed in speeds_deg_s or ()])
         if stick is not None:
-            name, run = parsing.simulated(marched, stick, sampling)
+            name, run = parsing.simulated_run(marched, stick, sampling)
             reference = compensation.speed_of_command(inverse, run["voltage"])
             improvement = compensation.improvement(
                 marched, reference, run.record.rate, inverse=inverse
             )
             tables.append(replace(improvement.table(), title=f"Error of the speed under {name}"))
     save(out, "Inverse map, in SI", inverse.write)
-    draw(plot, "plot_compensation", inverse, improvement)
+    draw_figure(plot, "plot_compensation", inverse, improvement)
     drive.note(f"{drive.title}: voltage for a required speed")
     show(*tables)
 
@@ -471,14 +480,14 @@ def linearize(
     from swashplate.drive import model_tables
     from swashplate.linear import LINEAR_MODEL
 
-    check_output(out, LINEAR_MODEL, force=force)
+    check_writable(out, LINEAR_MODEL, force=force)
     if (at is None) == (current is None):
         raise InputError(
             "A drive is linearised at a voltage or a current: give one of --at and --current."
         )
     if current is not None and input == "voltage":
         raise InputError("--input voltage needs --at, not --current.")
-    with working("Linearising"):
+    with spinner("Linearising"):
         model = drive.chosen.linearize(at, current=current, input=input)
         if sample_time is not None:
             if not sample_time > 0.0:
@@ -553,13 +562,13 @@ def bode(
         raise InputError(
             f"--from and --to must rise from above 0 Hz, not {lowest:g} to {highest:g}."
         )
-    with working("Sweeping"):
+    with spinner("Sweeping"):
         linear = None if linear_at is None else drive.chosen.linearize(linear_at)
         grid = np.union1d(np.geomspace(lowest, highest, points), [frequency])
         response = drive.chosen.frequency_response(grid, amplitudes or AMPLITUDES, bias=bias)
         table = response_table(response, frequency)
     save(out, "Gain, phase and distortion, in SI", response.write)
-    draw(plot, "plot_bode", response, linear=linear, mark=frequency)
+    draw_figure(plot, "plot_bode", response, linear=linear, mark=frequency)
     span = f"{grid.size} frequencies from {grid[0]:g} to {grid[-1]:g} Hz"
     drive.note(f"{drive.title}, sines about {bias:g} V: {span}")
     note(f"At {frequency:g} Hz:")
@@ -621,12 +630,12 @@ def full_order(
     if maneuver is None and plot is not None:
         raise InputError("--plot draws one run; name a maneuver or a log, such as step:9.")
     physical_values = parsing.physical_values(physical or ())
-    with working("Completing the physical values"):
+    with spinner("Completing the physical values"):
         marched = parsing.at_rate(drive.chosen, sampling.rate)
         axis = physical_set.nearest_set(marched.name) if like is None else like
         full_drive = full.FullOrderDrive.from_drive(marched.plain, axis, **physical_values)
         tables = [physical_set.choices_table(axis, physical_values), full_drive.modes().table()]
-    with working("Simulating"):
+    with spinner("Simulating"):
         if maneuver is None:
             domain = full.validity(full_drive, sampling.rate)
             title, heading = drive.title, f"{len(domain.rows)} maneuvers"
@@ -640,7 +649,7 @@ def full_order(
         save(out, "Table", domain.write)
     else:
         save(out, "All signals, in SI", comparison.write)
-        draw(plot, "plot_full_order", comparison, title=f"{title}, five states versus one")
+        draw_figure(plot, "plot_full_order", comparison, title=f"{title}, five states versus one")
     drive.note(f"{title}, five states versus one: {heading}")
     if marched.parameters.refinements:
         listed = ", ".join(marched.parameters.refinements)

@@ -27,13 +27,13 @@ from swashplate.cli.options import (
 from swashplate.cli.terminal import (
     bullets,
     check_free,
-    check_output,
-    draw,
+    check_writable,
+    draw_figure,
     note,
     save,
     say,
     show,
-    working,
+    spinner,
 )
 from swashplate.errors import InputError
 from swashplate.tables import (
@@ -136,7 +136,7 @@ def init(
     from swashplate.drafting.draft import FIXME, NO_ENCODER, UNUSED, draft_campaign
 
     target = out or logs[0].parent / "campaign.toml"
-    check_output(target, CAMPAIGN_FILE, force=force)
+    check_writable(target, CAMPAIGN_FILE, force=force)
     file = None if drive is None else parsing.drive_file(drive)
     if file is not None:  # a drive as a campaign file names it
         resolved, root = file.resolve(), target.parent.resolve()
@@ -147,7 +147,7 @@ def init(
         name: kind for kind, name in parsing.pairs_of("--column", column, "voltage=u", often=True)
     }
     units = dict(parsing.pairs_of("--unit", unit, "u=mV"))
-    with working("Reading"):
+    with spinner("Reading"):
         text = draft_campaign(
             logs,
             target.parent,
@@ -198,8 +198,8 @@ def check(
     from swashplate import campaign as tests
     from swashplate.identification.diagnostics.data_checks import beside_the_drives
 
-    parsing.check_kind(path, "campaign")
-    with working(f"Reading {path}"):
+    parsing.check_file_kind(path, "campaign")
+    with spinner(f"Reading {path}"):
         campaign = tests.Campaign.from_toml(path)
         unsigned = {name for _, name in tests.unsigned_currents(campaign)}
         qualities = {
@@ -279,7 +279,7 @@ def plot(
     from swashplate.identification import predict
     from swashplate.identification.estimation.drive_model import SIGNALS
 
-    with working(f"Reading {path}"):
+    with spinner(f"Reading {path}"):
         campaign = Campaign.from_toml(path)
     channels = () if run is None else campaign[run].channels
     if (run is None) != (channel is None):
@@ -303,13 +303,13 @@ def plot(
             )
         window = parsing.window_of(shown.time, begin, end)
         labels = {"window": window, "title": f"{run}, {channel}"}
-        draw(out, "plot_channel", shown, simulated, **labels)
+        draw_figure(out, "plot_channel", shown, simulated, **labels)
     else:
         figures = campaign.plot(title=parsing.title_of(campaign))
         several = [out.with_stem(f"{out.stem}-{k}") for k in range(1, len(figures) + 1)]
         check_free(*several, force=force)
         for path, figure in zip([out] if len(figures) == 1 else several, figures, strict=True):
-            draw(path, figure)
+            draw_figure(path, figure)
 
 
 # --- virtual tests --------------------------------------------------------------------------------
@@ -365,18 +365,18 @@ def rig(
     from swashplate import rig as bench
 
     check_free(out, force=force)
-    with working("Simulating"):
+    with spinner("Simulating"):
         nominal = parsing.drive_of(drive.drive)
         tests = bench.run(
             nominal if parsing.drive_file(drive.drive) else drive.drive,
-            [parsing.maneuver_of(word, nominal) for word in maneuver or ()] or None,
+            [parsing.named_maneuver(word, nominal) for word in maneuver or ()] or None,
             seed=seed,
             severity=severity,
             instruments=replace(bench.SEVERITIES[severity], backlash=radians(backlash_deg)),
             truth=drive.chosen if drive.values or drive.factors else None,
             perturb=perturb,
         )
-    with working("Writing"):
+    with spinner("Writing"):
         path = bench.write(tests, out, overwrite=force)
     text = (Column("log"), Column("maneuver", wrap=True), Column("role"))
     table = Table("", (*text, Column("rows", "d"), Column("s", ".4g")))
@@ -427,7 +427,7 @@ def guess(
 
     folder = path.parent if out is None else out
     start, setup = folder / "start.toml", folder / "setup.toml"
-    with working(f"Reading {path}"):
+    with spinner(f"Reading {path}"):
         check_free(start, setup, force=force)
         campaign, axis_name = parsing.campaign_of(path, axis)
         check_folder(folder)
@@ -542,7 +542,7 @@ def advise(
         estimated = source.parent / parsing.SETUP
         setup = str(estimated) if estimated.is_file() else None
     looks, doubts, saved = list[design.Outlook](), tuple[str, ...](), list[str]()
-    with working("Evaluating the tests"):
+    with spinner("Evaluating the tests"):
         if tested:
             _, experiments, plan, start = parsing.fit_of(Path(subject), axis, setup, drive or begin)
             doubts = refuse_unsound(check_runs(experiments, smooth(start)))
@@ -553,7 +553,7 @@ def advise(
             start = parsing.parameters_of(subject)
             bench = design.bench(smooth(start), load_setup(setup or start.name))
         machine = Drive(bench.parameters)
-        requested = [parsing.maneuver_of(word, machine) for word in maneuver or ()]
+        requested = [parsing.named_maneuver(word, machine) for word in maneuver or ()]
         maneuvers = {
             candidate.name: candidate for candidate in requested or design.default_maneuvers()
         }

@@ -18,8 +18,8 @@ from swashplate.cli.crane_options import (
     Studied,
     control_of,
     crane_of,
+    named_numbers,
     number_of,
-    numbers_of,
     sea_sentences,
 )
 from swashplate.cli.options import (
@@ -30,7 +30,7 @@ from swashplate.cli.options import (
     TableFile,
     new_file,
 )
-from swashplate.cli.terminal import draw, note, save, say, say_saved, show, side, working
+from swashplate.cli.terminal import draw_figure, note, save, say, say_saved, show, side, spinner
 from swashplate.errors import InputError
 from swashplate.tables import PAGE, Column, Form, Table
 
@@ -153,12 +153,12 @@ def run(
     runs, first = {}, ""
     if out is not None and len(variant or ()) > 1:
         raise InputError("--out writes one run's signals: take one --variant.")
-    with working("Simulating"):
+    with spinner("Simulating"):
         from swashplate.crane import Stick, run_tables, simulate
         from swashplate.crane.axes import RATE
 
         crane, seaway = operated.chosen, operated.seaway(seed=seed, length=length)
-        targets = numbers_of("--until", until, "slew_deg=45")
+        targets = named_numbers("--until", until, "slew_deg=45")
         stick = Stick.trapezoid(
             hoist=hoist, slew=slew, luff=luff, until=targets, duration=duration, length=length
         )
@@ -170,7 +170,7 @@ def run(
             runs[first] = simulate(crane, stick, sea=ship, brake=brake, **options, **operated.setup)
         tables = run_tables(runs)
     save(out, "All signals, in SI", runs[first].write)
-    draw(plot, "plot_crane", runs)
+    draw_figure(plot, "plot_crane", runs)
     if scene is not None:
         from swashplate.report.scene import write_scene
 
@@ -266,7 +266,7 @@ def judge(
 
         what, write = "Verdict", partial(write_judgment, judgment)
     save(out, what, write)
-    draw(plot, "plot_judgment", judgment)
+    draw_figure(plot, "plot_judgment", judgment)
     _end(study.chosen, judgment.tables(), *judgment.sentences()[1:])
     say_saved()
     if not judgment.passed:
@@ -341,7 +341,7 @@ def operability(
 
         what, write = "Operability", partial(write_operability, result)
     save(out, what, write)
-    draw(plot, "plot_operability", result)
+    draw_figure(plot, "plot_operability", result)
     _end(study.chosen, result.tables(), *result.sentences(), *study.chosen.provenance())
 
 
@@ -360,7 +360,7 @@ def follow(at_sea: AtSea, *, out: TableFile = None, plot: FigureFile = None) -> 
     These are compared with the motion that the sea demands: all packaged seas, or
     that of --sea.
     """
-    with working("Simulating"):
+    with spinner("Simulating"):
         from swashplate.crane import follow as largest_sines
 
         seaway = at_sea.seaway(default="ss3")
@@ -369,7 +369,7 @@ def follow(at_sea: AtSea, *, out: TableFile = None, plot: FigureFile = None) -> 
             options["seas"] = (seaway.sea,)
         sines = largest_sines(at_sea.chosen, seaway=seaway, **options, **at_sea.pose)
     save(out, "Amplitudes, in SI", sines.tables()[0].write)
-    draw(plot, "plot_follow", sines)
+    draw_figure(plot, "plot_follow", sines)
     about_sea = sea_sentences(seaway) if at_sea.sea else ()
     _end(at_sea.chosen, sines.tables(), *about_sea, *at_sea.chosen.provenance())
 
@@ -409,7 +409,7 @@ def sweep(
 
     result: Sweep = study.through(swing_over, study.chosen, over, **options)
     save(out, "Swing, in SI", result.tables()[0].write)
-    draw(plot, "plot_sweep", result)
+    draw_figure(plot, "plot_sweep", result)
     _end(study.chosen, result.tables(), *sea_sentences(study.waters), *study.chosen.provenance())
 
 

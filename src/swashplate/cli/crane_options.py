@@ -68,7 +68,7 @@ class Placed:
     @property
     def pose(self) -> dict[str, Any]:
         """The initial position, as far as it is given."""
-        return numbers_of("--at", self.at, "rope_m=25", START)
+        return named_numbers("--at", self.at, "rope_m=25", START)
 
 
 @dataclass(frozen=True)
@@ -257,7 +257,7 @@ class Operated(AtSea):
             drag_area=self.drag_area, load=self.load, swing_damping=self.swing_damping
         )
         names = [field.name for field in fields(Suspension)]
-        values = numbers_of("--suspension", self.suspension, "stiffness=6e7", names)
+        values = named_numbers("--suspension", self.suspension, "stiffness=6e7", names)
         if values:
             setup["suspension"] = Suspension(**values)
         if self.wind is not None:
@@ -459,7 +459,7 @@ def _vector(option: str, text: str, example: str) -> tuple[float, ...]:
     return numbers
 
 
-def numbers_of(
+def named_numbers(
     what: str, assignments: list[str] | None, example: str, names: Sequence[str] = ()
 ) -> dict[str, Any]:
     """Numbers by name of an option's pairs; refuses a name that is not known."""

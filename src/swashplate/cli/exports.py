@@ -18,8 +18,8 @@ from swashplate.cli.options import (
     Force,
     new_file,
 )
-from swashplate.cli.parsing import campaign_of, drive_file, maneuver_of
-from swashplate.cli.terminal import check_free, note, save, working
+from swashplate.cli.parsing import campaign_of, drive_file, named_maneuver
+from swashplate.cli.terminal import check_free, note, save, spinner
 from swashplate.errors import InputError
 from swashplate.tables import PAGE, Form, check_folder
 
@@ -94,13 +94,13 @@ def export(
     if c is not None:
         check_folder(c)
         check_free(c, force=force)
-    with working("Exporting"):
+    with spinner("Exporting"):
         from swashplate import export as exporting
 
         exported = drive.chosen
     longest_step = exporting.LONGEST_STEP if step is None else step
     names = None if platforms is None else [part.strip() for part in platforms.split(",")]
-    with said():
+    with texts_of_warnings():
         if fmu is not None:
             version: Literal["2.0", "3.0"] = "2.0" if fmi.startswith("2") else "3.0"
             save(
@@ -111,7 +111,7 @@ def export(
                 ),
             )
         if c is not None:
-            with working(f"Writing {c}"):
+            with spinner(f"Writing {c}"):
                 written = exporting.c(exported, c, longest_step)
                 if compile:
                     (header,) = (each.name for each in written if each.name.endswith("drive.h"))
@@ -128,7 +128,7 @@ def export(
 
 
 @contextmanager
-def said() -> Iterator[None]:
+def texts_of_warnings() -> Iterator[None]:
     """Print what the export warns of, each once."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
@@ -171,7 +171,7 @@ def live(
     """
     if (path is None) == (maneuver is None):
         raise InputError("Name either a campaign, or a maneuver with --maneuver.")
-    with working("Writing the page"):
+    with spinner("Writing the page"):
         from swashplate.report.fit_report import write_live_page
 
         parameter_file = drive_file(drive.drive)
@@ -186,7 +186,7 @@ def live(
                 drive.chosen, out, campaign=campaign, axis=axis_name, name=name
             )
         else:
-            command = maneuver_of(maneuver or "", drive.chosen)
+            command = named_maneuver(maneuver or "", drive.chosen)
             sentences = write_live_page(drive.chosen, out, command=command, name=name)
     drive.warn()
     for sentence in (*drive.changes, *sentences):

@@ -38,7 +38,7 @@ from swashplate.cli.terminal import (
     say_saved,
     show,
     side,
-    working,
+    spinner,
 )
 from swashplate.errors import InputError
 from swashplate.tables import PRINTED, TABLE, check_folder, joined, made_folder
@@ -200,15 +200,15 @@ def fit(
             f"{model} defines its free parameters and their initial values: leave out --setup, "
             "--from and --joint."
         )
-    with working("Starting"), clock.part("start and kernels"):
+    with spinner("Starting"), clock.part("start and kernels"):
         from swashplate.executors import Dask, Processes
         from swashplate.identification.identifying import identify
-    with working(f"Reading {path}"), clock.part("reading"):
+    with spinner(f"Reading {path}"), clock.part("reading"):
         campaign, axis_name = parsing.campaign_of(path, axis)
         start: Path | ParameterSet | None = model
         if begin is not None:
             start = parsing.parameters_of(begin)
-    with working("Fitting"), clock.part("search"):
+    with spinner("Fitting"), clock.part("search"):
         result = identify(
             campaign,
             start,
@@ -233,7 +233,7 @@ def fit(
             "starts are written; the same command with --resume continues."
         )
         raise typer.Exit(INTERRUPTED)
-    with working("Assessing"), clock.part("assessment"):
+    with spinner("Assessing"), clock.part("assessment"):
         verdict = result.verdict
     with clock.part("report"):
         lines = _written(result, out)
@@ -271,7 +271,7 @@ def _written(result: Identification, out: Path) -> list[str]:
 
 def _reported(result: Identification, out: Path, truth: ParameterSet | None = None) -> str:
     """Write the report; a line that says so."""
-    with working("Writing the report"):
+    with spinner("Writing the report"):
         result.report(out / "report.html", truth=truth)
     return f"Report:    {out / 'report.html'}"
 
@@ -333,7 +333,7 @@ def validate(
     if out is not None:
         check_folder(out)
         check_free(out / "measures.csv", out / "report.html", force=force)
-    with working(f"Reading {path}"):
+    with spinner(f"Reading {path}"):
         parameters: Parameters | None = None if model else parsing.parameters_of(drive)
         campaign, axis_name = parsing.campaign_of(path, axis)
         roles = ("fit", "validate") if role == "all" else (role,)
@@ -345,7 +345,7 @@ def validate(
             f"{path}: no run of the axis '{axis_name}' has the role "
             f"{' or '.join(map(repr, roles))}; select another with --role."
         )
-    with working("Predicting"):
+    with spinner("Predicting"):
         refuse_unsound(spike_findings(runs, "linear"))
         if model is not None:
             parameters = parsing.model_parameters_of(drive, model, runs)
@@ -359,7 +359,7 @@ def validate(
     if out is not None:
         from swashplate.report.fit_report import write_validation_report
 
-        with working("Writing the report"):
+        with spinner("Writing the report"):
             joined(measures).write(made_folder(out) / "measures.csv")
             page, notes = out / "report.html", {**versions(), "drive from": drive}
             write_validation_report(
@@ -427,7 +427,7 @@ def report(
     if pdf is not None:
         find_browser()
     folder = fitted if fitted.is_dir() else fitted.parent
-    with working(f"Reading {folder / 'fit.json'}"):
+    with spinner(f"Reading {folder / 'fit.json'}"):
         true = None if truth is None else parsing.parameters_of(truth)
         result = Identification.load(fitted, path, model=model)
         if true is not None and not result.campaign.virtual:
@@ -448,7 +448,7 @@ def report(
                     f"{fitted} is not the drive that {folder / 'fit.json'} found "
                     f"({', '.join(differing[:3])} differ): assess it with 'swashplate validate'."
                 )
-    with working("Assessing"):
+    with spinner("Assessing"):
         verdict = result.verdict
     note(_reported(result, folder, true))
     save(pdf, "Printed", lambda to: print_report(folder / "report.html", to))

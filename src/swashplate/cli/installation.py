@@ -14,7 +14,7 @@ import typer
 
 from swashplate.__about__ import __version__
 from swashplate.cli.commands import command
-from swashplate.cli.terminal import note, say, show, working
+from swashplate.cli.terminal import note, say, show, spinner
 from swashplate.executors import available_cores
 from swashplate.tables import Column, Table
 
@@ -70,7 +70,7 @@ def doctor() -> None:
         except metadata.PackageNotFoundError:
             table.add(what, "-", enables)
     show(table)
-    with working("Simulating the hoist"):
+    with spinner("Simulating the hoist"):
         from swashplate.drive import Drive
         from swashplate.equations.cache import UNCACHED, cache_folder
         from swashplate.maneuvers import step

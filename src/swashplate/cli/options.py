@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from swashplate.cli.terminal import check_output, note
+from swashplate.cli.terminal import check_writable, note
 from swashplate.tables import FIGURE, TABLE, Form
 from swashplate.units import show_rod
 
@@ -37,7 +37,7 @@ def new_file(form: Form, help: str, *, metavar: str = "FILE") -> Any:
     """
 
     def check(context: typer.Context, path: Path | None) -> Path | None:
-        check_output(path, form, force=context.params["force"])
+        check_writable(path, form, force=context.params["force"])
         return path
 
     return typer.Option(metavar=metavar, help=help, callback=check)

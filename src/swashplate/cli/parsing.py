@@ -68,7 +68,7 @@ def file_kind(path: Path) -> str:
     return next((kind for mark, kind in _MARKS.items() if mark in tables), "")
 
 
-def check_kind(path: Path, expected: str) -> None:
+def check_file_kind(path: Path, expected: str) -> None:
     """Refuse a file that is plainly of another kind than expected; say where such a file goes."""
     kind = file_kind(path)
     instead = _INSTEAD.get((kind, expected))
@@ -92,7 +92,7 @@ def campaign_of(path: Path, axis: str | None = None) -> tuple[Campaign, str]:
             f"There is no file {path}: name a campaign, or make one of your logs with 'swashplate "
             "campaign init LOGS'."
         )
-    check_kind(path, "campaign")
+    check_file_kind(path, "campaign")
     campaign = Campaign.from_toml(path)
     if axis is None and len(campaign.axes) > 1:
         raise InputError(f"{path} has the axes {', '.join(campaign.axes)}; name one with --axis.")
@@ -127,7 +127,7 @@ def drive_file(word: str) -> Path | None:
 
     file = set_file(word)
     if file is not None:
-        check_kind(file, "drive")
+        check_file_kind(file, "drive")
     return file
 
 
@@ -165,7 +165,7 @@ def model_parameters_of(folder: str, file: Path, runs: Sequence[Experiment]) -> 
 # --- changes and design variables -----------------------------------------------------------------
 
 
-def assigned(
+def assignments_of(
     option: str,
     words: Iterable[str],
     example: str,
@@ -228,10 +228,10 @@ def drive_of(word: str, values: Sequence[str] = (), factors: Sequence[str] = ())
 
             return powers_of(name)  # refuses it, and lists design variables as well
 
-    chosen = assigned("--set", values, set_as, valued, units=True)
-    changes = assigned("--scale", scaled_variables, scaled_as, str, (1,))
+    chosen = assignments_of("--set", values, set_as, valued, units=True)
+    changes = assignments_of("--scale", scaled_variables, scaled_as, str, (1,))
     drive = drive.replace(**chosen)
-    drive = drive.scale(**assigned("--scale", scaling, scaled_as, scalable))
+    drive = drive.scale(**assignments_of("--scale", scaling, scaled_as, scalable))
     if changes:
         from swashplate.analysis.design_variables import with_factors
 
@@ -254,22 +254,22 @@ def physical_values(words: Sequence[str]) -> dict[str, Change]:
     from swashplate.full_order.physical_set import chosen_quantity
 
     example = "oil_volume=1e-4 or oil_volume=100cm^3"
-    return assigned("--physical", words, example, chosen_quantity, units=True)
+    return assignments_of("--physical", words, example, chosen_quantity, units=True)
 
 
 def factors_of(words: Sequence[str]) -> dict[str, float]:
     """Factors by design variable or parameter from words such as ``orifice=1.5``."""
     from swashplate.analysis.design_variables import powers_of
 
-    return assigned("--scale", words, "orifice=1.5", powers_of, (1,))
+    return assignments_of("--scale", words, "orifice=1.5", powers_of, (1,))
 
 
-def ranges_of(words: Sequence[str], usual: FactorRange) -> dict[str, FactorRange]:
+def factor_ranges_of(words: Sequence[str], usual: FactorRange) -> dict[str, FactorRange]:
     """Ranges of factors by design variable from words such as ``pump`` or ``pump=0.8/1.5``."""
     from swashplate.analysis.design_variables import powers_of
 
     completed = [word if "=" in word else f"{word}={usual[0]}/{usual[1]}" for word in words]
-    return assigned("--variable", completed, "pump or pump=0.8/1.5", powers_of, (2,))
+    return assignments_of("--variable", completed, "pump or pump=0.8/1.5", powers_of, (2,))
 
 
 def pairs_of(
@@ -320,7 +320,7 @@ def changes_between(before: ParameterSet, after: ParameterSet) -> list[str]:
 # --- commands -------------------------------------------------------------------------------------
 
 
-def maneuver_of(word: str, *drives: Drive) -> Maneuver:
+def named_maneuver(word: str, *drives: Drive) -> Maneuver:
     """A maneuver such as ``step:9``, or the thesis's test of that name for these drives."""
     from swashplate.maneuvers import parse, source_tests
     from swashplate.parameters.files import AXES
@@ -358,8 +358,8 @@ def at_rate(drive: Drive, rate: float) -> Drive:
 
 
 def simulated_as(drive: Drive, command: str, options: Simulating) -> tuple[str, Simulation]:
-    """As `simulated`, from the start and with the inputs that the options name."""
-    return simulated(
+    """As `simulated_run`, from the start and with the inputs that the options name."""
+    return simulated_run(
         drive,
         command,
         options,
@@ -369,7 +369,7 @@ def simulated_as(drive: Drive, command: str, options: Simulating) -> tuple[str, 
     )
 
 
-def simulated(
+def simulated_run(
     drive: Drive,
     command: str,
     options: CommandSampling,
@@ -383,7 +383,7 @@ def simulated(
 
     head = command.partition(":")[0]  # stairs:2/4/0 is not a path
     if not ("/" in head or _ENDING.search(head) or Path(command).is_file()):
-        maneuver = maneuver_of(command, drive)
+        maneuver = named_maneuver(command, drive)
         name, where, values, time = maneuver.name, "", maneuver.sample(options.rate), None
     else:
         kind = file_kind(Path(command))
@@ -448,10 +448,10 @@ def window_of(time: Array, begin: float | None, end: float | None) -> tuple[floa
     return None if whole else (first if begin is None else begin, last if end is None else end)
 
 
-def trial_of(drive: Drive, command: str, options: CommandSampling) -> tuple[str, Trial]:
+def named_trial(drive: Drive, command: str, options: CommandSampling) -> tuple[str, Trial]:
     """Name of a command, a maneuver or a log, and the trial that it makes."""
     from swashplate.analysis.outcomes import trial_of
 
     drive = at_rate(drive, options.rate)
-    name, run = simulated(drive, command, options)
+    name, run = simulated_run(drive, command, options)
     return name, trial_of(drive, run["voltage"], options.rate)

@@ -22,7 +22,7 @@ from swashplate.cli.options import (
     Simulating,
     TableFile,
 )
-from swashplate.cli.terminal import draw, note, save, say, show, working
+from swashplate.cli.terminal import draw_figure, note, save, say, show, spinner
 from swashplate.documents import parse_toml
 from swashplate.errors import InputError
 from swashplate.tables import Column, Table, quantity, write_table
@@ -60,13 +60,13 @@ def simulate(
     writes all signals, --plot draws them. 'swashplate --help' lists the
     maneuvers.
     """
-    with working("Simulating"):
+    with spinner("Simulating"):
         marched = parsing.at_rate(drive.chosen, sampling.rate)
         name, run = parsing.simulated_as(marched, maneuver, sampling)
         tables, title = run.tables(), f"{drive.title}, {name}"
     save(out, "All signals, in SI", run.write)
     window = parsing.window_of(run.time, begin, end)
-    draw(plot, "plot_simulation", run, window=window, title=title)
+    draw_figure(plot, "plot_simulation", run, window=window, title=title)
     duration = f"{run.time[-1] - run.time[0]:.6g} s"
     drive.note(f"{title}: {run.time.size} samples at {sampling.rate:g} Hz, {duration}")
     show(*tables)
@@ -99,7 +99,7 @@ def compare(
     last moment at which the voltage is at its largest. --out writes the voltage
     and both speeds.
     """
-    with working("Simulating"):
+    with spinner("Simulating"):
         from swashplate.analysis.outcomes import rms_difference, side_by_side
 
         pair = [parsing.at_rate(parsing.drive_of(word), rate) for word in (first, second)]
@@ -107,7 +107,7 @@ def compare(
         if labels[0] == labels[1]:  # then by what was typed
             labels = [first, second if second != first else f"{second} (2)"]
         drives = dict(zip(labels, pair, strict=True))
-        test = parsing.maneuver_of(maneuver, *pair)
+        test = parsing.named_maneuver(maneuver, *pair)
         voltage = test.sample(rate)
         runs = {label: drive.simulate(voltage, rate) for label, drive in drives.items()}
         table = side_by_side(runs)
@@ -121,7 +121,7 @@ def compare(
         write_table(pl.DataFrame({"time": run.time, "voltage": run.voltage, **speeds}), path)
 
     save(out, "Voltage and both speeds, in SI", write)
-    draw(plot, "plot_comparison", runs, title=title)
+    draw_figure(plot, "plot_comparison", runs, title=title)
     note(title)
     show(table)
     note(f"rms difference of the speeds: {quantity(rms, 'rad/s', spec='.2f')}")

@@ -210,7 +210,7 @@ class TerminalProgress:
 
 
 @contextmanager
-def working(text: str) -> Iterator[Status]:
+def spinner(text: str) -> Iterator[Status]:
     """A spinner while something may take longer than a second; nothing in a pipe.
 
     Not inside another one, nor inside `long_work`: rich before 14.1 refuses a second.
@@ -264,7 +264,7 @@ def lock(folder: Path) -> None:
     RESOURCES.get().enter_context(locked(folder))
 
 
-def check_output(path: Path | None, form: Form, *, force: bool) -> None:
+def check_writable(path: Path | None, form: Form, *, force: bool) -> None:
     """Refuse a file that cannot or must not be written, before anything is computed."""
     if path is not None:
         ending(path, form)
@@ -275,15 +275,15 @@ def check_output(path: Path | None, form: Form, *, force: bool) -> None:
 def save(path: Path | None, what: str, write: Callable[[Path], object]) -> None:
     """Write a file, if it was asked for; `say_saved` names it."""
     if path is not None:
-        with working(f"Writing {path}"):
+        with spinner(f"Writing {path}"):
             write(path)
         SAVED.get().append(f"{what}: {path}")
 
 
-def draw(path: Path | None, figure: Any, *shown: Any, **options: Any) -> None:
+def draw_figure(path: Path | None, figure: Any, *shown: Any, **options: Any) -> None:
     """Save a figure, or one of `swashplate.report.figures` by its name, if it was asked for."""
     if path is not None:
-        with working(f"Drawing {path}"):
+        with spinner(f"Drawing {path}"):
             from swashplate.report import figures
 
             drawing = getattr(figures, figure)(*shown, **options) if shown else figure

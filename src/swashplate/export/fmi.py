@@ -31,7 +31,7 @@ from swashplate.export.libraries import (
     Platform,
     Sources,
     chosen_platforms,
-    compiled,
+    compiled_library,
     one_unit,
     packaged,
     sources,
@@ -167,7 +167,9 @@ def packed(content: Content, fmi: Version, platforms: Collection[Platform]) -> b
         members["sources/buildDescription.xml"] = _build_description(name)
     for platform in platforms:
         library = (
-            packaged(platform.library) if content.packaged else compiled(source_files, platform)
+            packaged(platform.library)
+            if content.packaged
+            else compiled_library(source_files, platform)
         )
         for folder in platform.fmi2 if fmi == "2.0" else platform.fmi3:
             members[f"binaries/{folder}/{name}{platform.ending}"] = library

@@ -262,7 +262,7 @@ def has_zig() -> bool:
     return find_spec("ziglang") is not None
 
 
-def compiled(sources: Sources, platform: Platform) -> bytes:
+def compiled_library(sources: Sources, platform: Platform) -> bytes:
     """A library for a platform, of C texts, by Zig's compiler or this machine's ``cc``."""
     with TemporaryDirectory(prefix="swashplate-") as temporary:
         folder = Path(temporary)

@@ -147,7 +147,7 @@ _CLOCK = re.compile(
 )
 
 
-def is_number(cell: str, decimal: str) -> bool:
+def is_number_text(cell: str, decimal: str) -> bool:
     """Whether a cell, stripped, is a number or a text for a missing one."""
     if _NUMBER[decimal].fullmatch(cell):
         return True
@@ -218,7 +218,7 @@ class TextLayout(NamedTuple):
         filled = [
             cell for cell, numeric in zip(cells, self.numeric, strict=False) if numeric and cell
         ]
-        return [is_number(cell, self.decimal) for cell in filled]
+        return [is_number_text(cell, self.decimal) for cell in filled]
 
     def fits(self, cells: Sequence[str]) -> bool:
         """Whether there are numbers wherever the sample has, and as many cells."""
@@ -271,7 +271,7 @@ def find_layout(lines: Sequence[str], options: TextOptions, path: Path) -> TextL
     if options.decimal is None and layout.delimiter != "," and layout.decimal == ",":
         rows = (zip(layout.cells(line), layout.numeric, strict=False) for line in lines)
         cells = [cell for row in rows for cell, numeric in row if numeric and "," in cell]
-        cells = [cell for cell in cells if is_number(cell, ",")]
+        cells = [cell for cell in cells if is_number_text(cell, ",")]
         if cells and all(_THREE.fullmatch(cell) for cell in cells):
             raise FileError(
                 f"{path} has numbers like '{cells[0]}', where the comma may be a decimal sign or "
@@ -287,7 +287,7 @@ def _tried(lines: Sequence[str], layout: TextLayout) -> Iterator[tuple[float, in
     of as many fields adds a half. A log of one column has no time and gives nothing.
     """
     rows = [layout.cells(line) for line in lines]
-    marks = [[is_number(cell, layout.decimal) for cell in row] for row in rows]
+    marks = [[is_number_text(cell, layout.decimal) for cell in row] for row in rows]
     counts = Counter(len(row) for row, mark in zip(rows, marks, strict=True) if any(mark))
     texts = {len(row) for row, mark in zip(rows, marks, strict=True) if not any(mark)}
     # as many fields as most rows have; among equals, as many as a header has, then as the first

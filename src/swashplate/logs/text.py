@@ -25,7 +25,7 @@ from swashplate.logs.dialect import (
     date_form,
     encoding_of,
     find_layout,
-    is_number,
+    is_number_text,
     read_heading,
     shown,
 )
@@ -195,7 +195,7 @@ class _Table:
         other_mark = "," if decimal == "." else "."
         if position in clocks:
             kind = "date like the first one"
-        elif is_number(text[row], other_mark):
+        elif is_number_text(text[row], other_mark):
             kind += f" with a decimal {'comma' if other_mark == '.' else 'point'}"
         raise FileError(
             f"{self.path}: column '{self.columns[position].name}' holds "

@@ -184,7 +184,7 @@ def stretches(time: Array, active: Mask) -> Array:
     return np.stack((time[turns[::2]] - half, time[turns[1::2] - 1] + half), axis=1)
 
 
-def merged(spans: Array, most: int = MOST_SPANS) -> Array:
+def merged_spans(spans: Array, most: int = MOST_SPANS) -> Array:
     """Join neighbours closer than 1 / `most` of all if there are more than `most` spans."""
     if spans.shape[0] <= most:
         return spans
@@ -200,7 +200,7 @@ def shade(ax: Axes, spans: Array, look: Shade) -> None:
         return
     from matplotlib.collections import PolyCollection
 
-    begin, end = merged(spans).T
+    begin, end = merged_spans(spans).T
     x, y = np.stack((begin, end, end, begin), axis=1), np.array([0.0, 0.0, 1.0, 1.0])
     ax.add_collection(
         PolyCollection(

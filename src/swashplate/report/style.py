@@ -266,7 +266,7 @@ def zero_line(ax: Axes, *, upright: bool = False) -> None:
         ax.axvline(0.0, color=FAINT, linewidth=0.8, zorder=1.2)
 
 
-def write(
+def write_words(
     ax: Axes,
     words: str,
     place: tuple[float, float],
@@ -317,13 +317,13 @@ def label_margin(ax: Axes, labels: Sequence[MarginLabel], inches: float) -> None
     # of two at the same height, hair's breadths apart, the first is above
     heights = [round((label.height - low) / (high - low), 2) for label in labels]
     order = sorted(range(len(labels)), key=lambda index: (heights[index], -index))
-    for position, index in zip(spread([heights[i] for i in order], gap), order, strict=True):
+    for position, index in zip(spread_out([heights[i] for i in order], gap), order, strict=True):
         label = labels[index]
         style: dict[str, Any] = {"va": "center", "annotation_clip": False}
-        write(ax, label.words, (1.0, position), (5.0, 0.0), color=label.color, **style)
+        write_words(ax, label.words, (1.0, position), (5.0, 0.0), color=label.color, **style)
 
 
-def spread(positions: Sequence[float], gap: float) -> list[float]:
+def spread_out(positions: Sequence[float], gap: float) -> list[float]:
     """Places as near to the wanted ones, in rising order, as a gap between neighbours allows.
 
     Neighbours that come too near form a group, which is centred on what its members want.
@@ -363,9 +363,9 @@ def save_figure(figure: Figure, path: str | Path) -> None:
 
     kind = ending(path, FIGURE).removeprefix(".")
 
-    def write(beside: Path) -> None:
+    def write_words(beside: Path) -> None:
         # without a salt of its own, an SVG's clip paths get random names
         with matplotlib.rc_context({"svg.hashsalt": "swashplate"}):
             figure.savefig(beside, format=kind, metadata=_METADATA[kind])
 
-    write_whole(path, write)
+    write_whole(path, write_words)

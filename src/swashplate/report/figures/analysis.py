@@ -35,7 +35,7 @@ from swashplate.report.lines import (
     Array,
     draw,
     fit_time,
-    merged,
+    merged_spans,
     stretches,
 )
 from swashplate.report.style import (
@@ -66,8 +66,8 @@ from swashplate.report.style import (
     put_legend,
     sheet,
     signed,
-    write,
     write_title,
+    write_words,
     zero_line,
 )
 from swashplate.results import GivenAxes
@@ -178,7 +178,7 @@ def _mark_way(ax: Axes, limits: DirectionLimits, color: str, height: float) -> N
     up, stopped = limits.acceleration > 0.0, limits.top_speed == limits.speed_limit
     ax.axvline(speed, color=color, linewidth=1.0, linestyle="solid" if stopped else "dotted")
     what = "swash stop" if stopped else f"at {'+' if up else '−'}{FULL_VOLTAGE:g} V"
-    write(
+    write_words(
         ax,
         f"{what}\n{signed(speed, 3 if abs(speed) < 10.0 else 1)} {units[0].name}",
         (speed, -0.96 * height if up else 0.96 * height),
@@ -190,7 +190,7 @@ def _mark_way(ax: Axes, limits: DirectionLimits, color: str, height: float) -> N
     )
     ax.plot([0.0], [acceleration], "o", color=color, markersize=4.5)
     number = signed(acceleration, 2 if abs(acceleration) < 10.0 else 1)
-    write(
+    write_words(
         ax,
         f"{limits.accelerated_by}, at rest\n{number} {units[1].name}",
         (0.0, acceleration),
@@ -257,7 +257,7 @@ def _bars(ax: Axes, run: Simulation, acting: list[Limit]) -> None:
     ax.set_yticks(range(count), [SHADES[limit].name for limit in acting])
     ax.grid(False, axis="y")
     for row, limit in enumerate(acting):
-        spans = merged(stretches(run.time, run.held_back(limit)))
+        spans = merged_spans(stretches(run.time, run.held_back(limit)))
         ax.broken_barh(
             [(begin, end - begin) for begin, end in spans.tolist()],
             (row - 0.5 * BAR, BAR),
@@ -265,7 +265,7 @@ def _bars(ax: Axes, run: Simulation, acting: list[Limit]) -> None:
             edgecolor=GREY,
             linewidth=0.4,
         )
-        write(
+        write_words(
             ax,
             share_cell(run.time_share(limit)).text,
             (1.0, row),
@@ -556,12 +556,12 @@ def _draw_map(inverse: InverseMap, full_range: Axes, close_up: Axes | None = Non
         point = (unit.factor * end, height)
         full_range.plot(*([edge] for edge in point), "o", color=INK, markersize=4.5)
         words = f"{point[0]:.4g} {unit.name}, {height:.3g} V".replace("-", "−")
-        write(full_range, words, point, (0.0, shift), coords="data", ha=side, va="center")
+        write_words(full_range, words, point, (0.0, shift), coords="data", ha=side, va="center")
     if close_up is None:
         return
     below, above = (unit.factor * edge for edge in inverse.gap)
     close_up.axvspan(below, above, color="#ededed", linewidth=0.0, zorder=0.5)
-    write(
+    write_words(
         close_up,
         "cannot be held",
         (0.5 * (below + above), 0.0),
@@ -570,7 +570,7 @@ def _draw_map(inverse: InverseMap, full_range: Axes, close_up: Axes | None = Non
         color=GREY,
         ha="center",
     )
-    write(close_up, "close-up around standstill", (0.0, 1.0), (4.0, -10.0), color=GREY)
+    write_words(close_up, "close-up around standstill", (0.0, 1.0), (4.0, -10.0), color=GREY)
 
 
 def _draw_improvement(speed: Axes, error: Axes, improvement: Improvement) -> None:

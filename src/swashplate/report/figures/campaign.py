@@ -24,7 +24,7 @@ from swashplate.report.lines import (
     draw,
     gap_rows,
     mark_gaps,
-    merged,
+    merged_spans,
     rows_within,
     shade,
     shade_handle,
@@ -49,8 +49,8 @@ from swashplate.report.style import (
     new_figure,
     right_axis,
     sheet,
-    write,
     write_title,
+    write_words,
     zero_line,
 )
 from swashplate.units import DisplayUnit, display_unit
@@ -202,7 +202,7 @@ def _page(experiments: Sequence[Experiment], columns: Sequence[PanelColumn], tit
                 _fill(ax, column, signals[column.key], experiment)
             else:
                 ax.set_yticks([])
-                write(ax, "not measured", (0.5, 0.5), (0.0, 0.0), ha="center", va="center")
+                write_words(ax, "not measured", (0.5, 0.5), (0.0, 0.0), ha="center", va="center")
             # room for the heading, and in the first row for the columns' names
             heads = (column.key[0] or "input", 0.085), (column.words, 0.066)
             cut = [shorten(head, room / letter) for head, letter in heads]
@@ -263,7 +263,7 @@ def _fill(
         near = np.abs(signal.values - ends[:, None]) <= 1e-9 * (ends[1] - ends[0])
         beyond = np.stack((signal.values < ends[0], signal.values > ends[1]))
         for level, side in zip(factor * ends, near | beyond, strict=True):
-            first, last = merged(stretches(time, side)).T
+            first, last = merged_spans(stretches(time, side)).T
             if first.size:
                 bar: dict[str, Any] = {"color": ORANGE, "linewidth": 4.0, "label": "clipped"}
                 level = np.full(first.size, level)

@@ -140,7 +140,7 @@ def _swings(ax: Axes, result: Judgment) -> None:
         left = sum(result.left(name).values())
         if left:
             ax.plot(LEFT * edge, row, "x", color=style.INK, ms=6.0)
-            style.write(ax, f"{left}", (LEFT * edge, row), (7.0, -3.0), coords="data")
+            style.write_words(ax, f"{left}", (LEFT * edge, row), (7.0, -3.0), coords="data")
         label = style.in_lines(name, NAME)
         if name != NONE:
             worse = round(result.worse(name).value * swing.size)

@@ -23,7 +23,7 @@ from swashplate.report.style import (
     handle,
     sheet,
     strokes,
-    write,
+    write_words,
 )
 from swashplate.results import GivenAxes
 from swashplate.units import display_unit
@@ -142,12 +142,14 @@ def plot_bode(
             panel.plot(fine, row, color=GREY, linestyle="dashed", linewidth=LINE, zorder=1.8)
     _scale(axes, response)
     # the lines are at the top there
-    write(axes[0], "\n".join(response.still()), (0.0, 0.0), (4.0, 4.0), color=GREY, va="bottom")
+    write_words(
+        axes[0], "\n".join(response.still()), (0.0, 0.0), (4.0, 4.0), color=GREY, va="bottom"
+    )
     if mark is not None and response.frequencies[0] <= mark <= response.frequencies[-1]:
         for panel in axes:
             panel.axvline(mark, color=FAINT, linewidth=1.0, zorder=1.3)
         position: dict[str, Any] = {"coords": ("data", "axes fraction"), "va": "bottom"}
-        write(axes[0], f"{mark:g} Hz", (mark, 0.0), (3.0, 3.0), color=GREY, **position)
+        write_words(axes[0], f"{mark:g} Hz", (mark, 0.0), (3.0, 3.0), color=GREY, **position)
     return figure if ax is None else ax
 
 

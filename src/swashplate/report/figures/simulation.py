@@ -51,7 +51,7 @@ from swashplate.report.style import (
     sheet,
     signed,
     strokes,
-    write,
+    write_words,
     zero_line,
 )
 from swashplate.results import GivenAxes
@@ -255,7 +255,7 @@ def plot_signals(
             _fill(panel_axes, panel._replace(height=height), run.time, rows)
         above = 4.0 + POINTS_PER_INCH * ROW * (legend_rows(legend) if legend else 0)
         if heading:
-            write(column_axes[0], heading, (0.0, 1.0), (0.0, above), color=GREY)
+            write_words(column_axes[0], heading, (0.0, 1.0), (0.0, above), color=GREY)
         last = column_axes[len(column) - 1]
         last.tick_params(labelbottom=True)
         label_below(last, "time (s)")
@@ -545,6 +545,6 @@ def plot_comparison(simulations: Mapping[str, Simulation], *, title: str | None 
             draw(axes[2], at, speed.factor * difference, color, dashes=dashes)
     if len(simulations) > 1:
         label = f"speed less that of {reference}"
-        write(axes[2], label, (0.0, 1.0), color=looks[reference].color)
+        write_words(axes[2], label, (0.0, 1.0), color=looks[reference].color)
     fit_time(axes[-1], *(simulation.time for simulation in simulations.values()))
     return figure

@@ -25,7 +25,7 @@ from swashplate.identification.validation import at_instants, ignored_windows
 from swashplate.maneuvers import Maneuver
 from swashplate.parameters.parameter_set import HasParameters, Parameter, ParameterSet, set_of
 from swashplate.report.fit_report.html_page import LIVE_SCRIPTS, rendered, script_json
-from swashplate.report.fit_report.runs import packed
+from swashplate.report.fit_report.runs import packed_samples
 from swashplate.report.lines import SHADES, gap_rows
 from swashplate.report.style import in_lines
 from swashplate.tables import listed, write_text
@@ -287,8 +287,8 @@ def _channel(channel: Channel) -> dict[str, Any]:
         **shown,
         "also": also,
         "speed": channel.is_position,
-        "time": packed(channel.time, interval / 2**20),
-        "measured": packed(shown["factor"] * values),
+        "time": packed_samples(channel.time, interval / 2**20),
+        "measured": packed_samples(shown["factor"] * values),
         "breaks": [int(row) for row in gap_rows(channel.time)],
         "ignored": ignored_windows(channel),
     }

@@ -224,13 +224,13 @@ def _signals(
     stamps = time[rows]
     interval = float(np.median(np.diff(stamps))) if stamps.size > 1 else 1.0
     return {
-        "time": packed(stamps, interval / FINE),
+        "time": packed_samples(stamps, interval / FINE),
         "breaks": [int(end) for end in ends if 0 <= end < rows.size - 1],
-        "signals": [packed(values[rows], step) for values, step in signals],
+        "signals": [packed_samples(values[rows], step) for values, step in signals],
     }
 
 
-def packed(values: Array, step: float | None = None) -> dict[str, Any]:
+def packed_samples(values: Array, step: float | None = None) -> dict[str, Any]:
     """Finite numbers as whole multiples of a step, differenced, deflated and in base64.
 
     ``size``, ``zero`` and ``step``: value = zero + step · number; the step is at least 2⁻²⁸ of

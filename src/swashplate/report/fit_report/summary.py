@@ -70,7 +70,7 @@ ACCELERATION, DELAY, LAG, CREEP = 2, 3, 4, 5
 FULL: Commands = (FULL_VOLTAGE, FULL_VOLTAGE)
 
 
-def numbers_of(drive: Drive, largest: Commands = FULL) -> Array:
+def machine_numbers_of(drive: Drive, largest: Commands = FULL) -> Array:
     """What matters about a drive, (6, 2): each way, positive and negative. SI
 
     Dead zone [V]; top speed [rad/s], steady under ±10 V; largest acceleration [rad/s²], delay and
@@ -146,7 +146,7 @@ def numbers_table(drive: Drive, stages: Sequence[StageFit]) -> tuple[Table, list
     Without stages of a fit there are no intervals.
     """
     largest = largest_commands(stages)
-    values, sentences = numbers_of(drive, largest), list[str]()
+    values, sentences = machine_numbers_of(drive, largest), list[str]()
     range_ = _Range(np.full((6, 2), np.nan), np.full((6, 2), "", dtype=object), values, values)
     if stages:
         try:
@@ -190,13 +190,13 @@ def _range_of(drive: Drive, stages: Sequence[StageFit], values: Array, largest: 
     """Errors of the numbers: of what the tests determine, and of unseen limits by both ends."""
 
     def numbers(drive: Drive) -> Array:
-        return numbers_of(drive, largest)
+        return machine_numbers_of(drive, largest)
 
     unseen, assumed = unseen_limits(stages), assumed_parameters(stages)
     errors = standard_errors(stages, numbers, assumed)
     half = QUANTILE * errors
     nearest, farthest = _at_limits(drive, unseen), without_limits(drive, unseen)
-    near, far = numbers_of(nearest, largest), numbers_of(farthest, largest)
+    near, far = machine_numbers_of(nearest, largest), machine_numbers_of(farthest, largest)
     moved = np.maximum(np.abs(near - values), np.abs(far - values))
     left_open = np.abs(far - near) > OPEN * np.abs(near)
     doubt = np.full((6, 2), "", dtype=object)
@@ -213,7 +213,7 @@ def _range_of(drive: Drive, stages: Sequence[StageFit], values: Array, largest: 
             doubt[ACCELERATION, side] = doubt[DELAY : LAG + 1] = f"{column} fixed"
     if left_open.any():
         at_ends = standard_errors(
-            stages, lambda varied: numbers_of(_at_limits(varied, unseen), largest)
+            stages, lambda varied: machine_numbers_of(_at_limits(varied, unseen), largest)
         )
         cautious = QUANTILE * at_ends * np.sign(near)
         near = np.where(np.abs(far) > np.abs(near), near - cautious, near + cautious)
