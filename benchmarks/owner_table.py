@@ -212,7 +212,11 @@ def fitted(seed, folder):
 
 def rows_of(folder, seed):
     """Rows of a winch's table: a quantity one way, with the truth and what is printed."""
-    from swashplate.report.fit_report.summary import largest_commands, numbers_of, numbers_table
+    from swashplate.report.fit_report.summary import (
+        largest_commands,
+        machine_numbers_of,
+        numbers_table,
+    )
     from swashplate.units import display_unit
 
     drive, _, sensor, orifice = draw(seed)
@@ -220,7 +224,7 @@ def rows_of(folder, seed):
     judged = fitted(seed, place)
     result = judged.fit
     largest = largest_commands(result.stages)
-    truth, values = numbers_of(drive, largest), numbers_of(result.drive, largest)
+    truth, values = machine_numbers_of(drive, largest), machine_numbers_of(result.drive, largest)
     table, _ = numbers_table(result.drive, result.stages)
     seconds = (place / "seconds.txt").read_text("utf-8").strip()
     rows = []

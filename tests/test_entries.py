@@ -7,7 +7,7 @@ import pytest
 
 from swashplate import Drive, InputError, ParameterError
 from swashplate.campaign import Campaign
-from swashplate.cli.words import model_parameters_of
+from swashplate.cli.parsing import model_parameters_of
 from swashplate.identification import ModelSetup, load_setup
 
 CAMPAIGN = """

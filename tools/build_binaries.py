@@ -50,7 +50,7 @@ def main() -> None:
     contents, optimisation = {}, {libraries.WASM: libraries.WASM_FLAGS[1]}
     for each in libraries.PLATFORMS.values():
         print(f"{each.library} ...", flush=True)
-        contents[each.library] = libraries.compiled(sources, each)
+        contents[each.library] = libraries.compiled_library(sources, each)
         optimisation[each.library] = " ".join(each.optimize)
     print(f"{libraries.WASM} ...", flush=True)
     contents[libraries.WASM] = libraries.compiled_wasm(sources)

@@ -121,10 +121,12 @@ def simulate_many(
     instance = instance_of(model, p, options=options, given=given)
     records = inputs_of(instance, inputs, rate, **sampling)
     values, count = set_columns(changes)
-    known = (*parameter_paths(model), *(f"start.{path}" for path in state_paths(model)))
+    selectable = (*parameter_paths(model), *(f"start.{path}" for path in state_paths(model)))
     for path in values:
-        if path not in known:
-            raise InputError(f"{model.name} has no parameter '{path}'; it has {', '.join(known)}.")
+        if path not in selectable:
+            raise InputError(
+                f"{model.name} has no parameter '{path}'; it has {', '.join(selectable)}."
+            )
     if cost is None and not output:
         raise InputError(f"{model.name}: say which output of the sets is wanted, or give a cost.")
     numbers = {path: np.full(count, number) for path, number in _numbers_of(instance).items()}
@@ -310,7 +312,7 @@ def _march(shared: _Sets, blocks: Sequence[Block]) -> list[_Marched]:
     """March blocks of sets; their outputs go into one file if into any."""
     record, keep = shared.record, shared.cost is None
     measured, weight = shared.compared
-    inputs = {name: each.values for name, each in shared.records.items()}
+    inputs = {name: record.values for name, record in shared.records.items()}
     table = {"time": record.time} if shared.to is not None else {}
     marched = []
     for sets, options in blocks:

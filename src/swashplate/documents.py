@@ -59,16 +59,16 @@ def read_text(path: str | Path) -> str:
 
     A `FileError` if there is none, it cannot be read, or is no ordinary file of up to 64 MB.
     """
-    place = Path(path)
+    file = Path(path)
     try:
-        found = place.stat()
-        if S_ISDIR(found.st_mode):
+        status = file.stat()
+        if S_ISDIR(status.st_mode):
             raise FileError(f"{path} is a folder, not a file.")
-        if not S_ISREG(found.st_mode):
+        if not S_ISREG(status.st_mode):
             raise FileError(f"{path} is no ordinary file.")
-        if found.st_size > LARGEST:
+        if status.st_size > LARGEST:
             raise FileError(f"{path} has more than {LARGEST // 2**20} MB: it is not such a text.")
-        return place.read_text("utf-8-sig")
+        return file.read_text("utf-8-sig")
     except FileError:
         raise
     except FileNotFoundError:
@@ -114,19 +114,19 @@ def parse_toml(text: str, origin: str) -> dict[str, Any]:
 
 def _has_deep_key(text: str) -> bool:
     """Whether a key has more than `DEEPEST` parts, bare or in quotes, anywhere in a TOML text."""
-    parts = 0
+    depth = 0
     after_dot = False
     for token in _TOKEN.finditer(text):
         kind = token.lastgroup
         if kind == "part":
-            parts = parts + 1 if after_dot else 1
+            depth = depth + 1 if after_dot else 1
             after_dot = False
-            if parts > DEEPEST:
+            if depth > DEEPEST:
                 return True
         elif kind == "dot":
-            after_dot = parts > 0
+            after_dot = depth > 0
         elif kind != "blank":
-            parts = 0
+            depth = 0
             after_dot = False
     return False
 
@@ -195,11 +195,11 @@ def read_json(path: str | Path, model: type[Model], *, strict: bool = True) -> M
     except (RecursionError, OverflowError):
         raise FileError(f"{path} nests too deeply or has a number beyond any use.") from None
     except ValidationError as error:
-        found = error.errors()
-        if found[0]["type"] == "json_invalid":
-            reason = found[0]["msg"].removeprefix("Invalid JSON: ")
+        errors = error.errors()
+        if errors[0]["type"] == "json_invalid":
+            reason = errors[0]["msg"].removeprefix("Invalid JSON: ")
             raise FileError(f"{path} is not JSON: {reason}.") from None
-        raise ParameterError(f"{path}: {_sentence(found, model)}.") from None
+        raise ParameterError(f"{path}: {_sentence(errors, model)}.") from None
 
 
 _SHORT = Repr()
@@ -208,9 +208,9 @@ _SHORT.maxstring = _SHORT.maxother = _SHORT.maxlong = 100
 
 def _sentence(errors: Sequence[ErrorDetails], model: type[BaseModel]) -> str:
     """The first error in words; one of a misspelt entry before those that follow from it."""
-    error = next((each for each in errors if _near(each, model)), errors[0])
-    parts = map(str, error["loc"])
-    where = [part for part in parts if _names_entry(part)]
+    error = next((error for error in errors if _near(error, model)), errors[0])
+    location = map(str, error["loc"])
+    where = [part for part in location if _names_entry(part)]
     # of a list the entries count from 1, as in other sentences
     named = [f" {int(part) + 1}" if part.isdecimal() else f".{part}" for part in where]
     path, kind = "".join(named).removeprefix("."), error["type"]
@@ -219,10 +219,14 @@ def _sentence(errors: Sequence[ErrorDetails], model: type[BaseModel]) -> str:
     if kind == "missing":
         return f"{table} needs an entry '{key}'"
     if kind == "extra_forbidden":
-        known = _known_keys(model, where[:-1])
+        valid_keys = _known_keys(model, where[:-1])
         close = _near(error, model)
-        hint = f"perhaps '{close[0]}' is meant" if close else f"it has {', '.join(known)}"
-        return f"{table} has no entry '{key}': {hint}" if known else f"{table} has no entry '{key}'"
+        hint = f"perhaps '{close[0]}' is meant" if close else f"it has {', '.join(valid_keys)}"
+        return (
+            f"{table} has no entry '{key}': {hint}"
+            if valid_keys
+            else f"{table} has no entry '{key}'"
+        )
     message = error["msg"].removeprefix("Value error, ").rstrip(".")
     if kind == "value_error":
         return f"{path}: {message}" if path else message
@@ -268,8 +272,8 @@ def _known_keys(model: type[BaseModel], where: list[str]) -> list[str]:
         options: list[dict[str, Any]] = [node, *node.get("anyOf", ())]
         for option in options:
             if "$ref" in option:
-                found: dict[str, Any] = definitions[option["$ref"].rpartition("/")[2]]
-                return found
+                definition: dict[str, Any] = definitions[option["$ref"].rpartition("/")[2]]
+                return definition
             if "properties" in option or "items" in option or "additionalProperties" in option:
                 return option
         return node

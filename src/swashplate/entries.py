@@ -1,12 +1,15 @@
-"""Types of entries in files: a number is a number, and neither ``true`` nor ``"36"``.
+"""Tables and entries of files.
 
-Pydantic alone takes both for numbers, and 1 for true.
+A number in a file is a number: pydantic alone would accept ``true`` and ``"36"`` as well, and 1 as
+a truth value.
 """
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 from pydantic_core import PydanticKnownError
+
+from swashplate.results import short
 
 
 def _check_number(value: Any) -> Any:
@@ -26,3 +29,14 @@ Version = Annotated[Literal[1], BeforeValidator(_check_number)]
 Flag = Annotated[bool, Field(strict=True)]
 Name = Annotated[str, Field(max_length=100)]
 """A name that other programs use: of a file, a column or a unit of simulation."""
+
+
+class FileTable(BaseModel):
+    """A table of a file; a key that it does not know is refused."""
+
+    model_config = ConfigDict(
+        extra="forbid", frozen=True, populate_by_name=True, ser_json_inf_nan="strings"
+    )
+
+    def __repr__(self) -> str:
+        return short(self)

@@ -43,20 +43,20 @@ def locked(folder: Path) -> Iterator[None]:
     RuntimeWarning
         If the file system has no locks; then nobody is kept out.
     """
-    whole = folder.resolve()
-    if _owners.get(whole) == get_ident():
+    resolved = folder.resolve()
+    if _owners.get(resolved) == get_ident():
         yield
         return
-    created = [place for place in (folder, *folder.parents) if not place.exists()]
+    created = [parent for parent in (folder, *folder.parents) if not parent.exists()]
     path = made_folder(folder) / NAME
     handle = _open_locked(path, folder)
     try:
-        _owners[whole] = get_ident()
+        _owners[resolved] = get_ident()
         os.truncate(handle, 0)
         os.write(handle, _description().encode())
         yield
     finally:
-        del _owners[whole]
+        del _owners[resolved]
         if sys.platform == "win32":  # an open file cannot be removed there
             os.close(handle)
         with suppress(OSError):
@@ -64,8 +64,8 @@ def locked(folder: Path) -> Iterator[None]:
         if sys.platform != "win32":
             os.close(handle)
         with suppress(OSError):  # the first folder that is not empty, and those above it, stay
-            for place in created:
-                place.rmdir()
+            for parent in created:
+                parent.rmdir()
 
 
 def _open_locked(path: Path, folder: Path) -> int:

@@ -116,9 +116,9 @@ class Maneuver(Drawn):
     pieces : tuple of (float, callable)
         Starts [s], the first at 0, and curves in their order. At a jump the later piece holds.
     amplitude : float
-        What the maneuver states and its voltage never exceeds, inf where it states none. [V]
+        What the maneuver states and its voltage never exceeds, inf if it states none. [V]
     highest : float
-        Frequency of its fastest sine, 0 where it has none. [Hz]
+        Frequency of its fastest sine, 0 if it has none. [Hz]
     """
 
     drawn_by: ClassVar[str] = "plot_maneuver"
@@ -476,8 +476,8 @@ def multisine(
     time, spacing = np.linspace(0.0, end - start, points, retstep=True)
     # between two points it rises above the peak found by half its curvature at most
     curvature = float(((2.0 * np.pi * lines) ** 2).sum())
-    found = float(np.abs(_tones(time, 1.0, lines.tolist(), phases)).max())
-    peak = found + 0.5 * curvature * (0.5 * float(spacing)) ** 2
+    largest = float(np.abs(_tones(time, 1.0, lines.tolist(), phases)).max())
+    peak = largest + 0.5 * curvature * (0.5 * float(spacing)) ** 2
     name = f"multisine {amplitude:g} V {low:.3g} to {high:.3g} Hz seed {seed}"
     return _oscillation(name, amplitude, window, lines.tolist(), phases, peak=peak)
 
@@ -502,8 +502,8 @@ def _oscillation(
     )
     last = float(curve(np.array(end - start), slope=True))
     highest = max(max(frequencies), frequencies[0] + growth * (end - start))
-    made = _settled(name, amplitude, [(start, curve)], end, length, last)
-    return replace(made, highest=highest)
+    maneuver = _settled(name, amplitude, [(start, curve)], end, length, last)
+    return replace(maneuver, highest=highest)
 
 
 def _band(band: Sequence[float], period: float) -> Array:
@@ -519,7 +519,7 @@ def _band(band: Sequence[float], period: float) -> Array:
     periods = np.unique(np.floor(np.linspace(low, high, count if apart else 1) * period + 0.5))
     if periods[0] < 1.0 or periods.size < count:
         raise InputError(
-            f"{band[2]} frequencies from {low:g} to {high:g} Hz cannot be told apart in "
+            f"{band[2]} frequencies from {low:g} to {high:g} Hz cannot be distinguished in "
             f"{period:g} s: take fewer, a wider band or a longer time."
         )
     return np.asarray(periods / period)
@@ -558,9 +558,9 @@ def parse(text: str) -> Maneuver:
     try:
         signature.bind(*positional, **keywords)
     except TypeError as error:
-        known = ", ".join(signature.parameters)
+        parameters = ", ".join(signature.parameters)
         hint = ": separate levels by /, as in stairs:2/4/0" if name == "stairs" else ""
-        raise InputError(f"{text!r}: {error}; {name} takes {known}{hint}.") from None
+        raise InputError(f"{text!r}: {error}; {name} takes {parameters}{hint}.") from None
     return _COMMANDS[name](*positional, **keywords)
 
 

@@ -39,13 +39,13 @@ SPELT_OUT = 4
 def short(value: object) -> str:
     """What `repr` says of a result: its fields, arrays by their shape, others by their names."""
     if is_dataclass(value):
-        names = [each.name for each in fields(value) if each.repr]
+        names = [field.name for field in fields(value) if field.repr]
     else:  # a model of pydantic's, or a named tuple
         kind: Any = type(value)
         names = list(getattr(kind, "model_fields", ()) or getattr(kind, "_fields", ()))
-    said = ", ".join(f"{name}={_brief(getattr(value, name))}" for name in names)
+    text = ", ".join(f"{name}={_brief(getattr(value, name))}" for name in names)
     kind = type(value).__name__
-    return f"{kind}({shorten(said, LONGEST - len(kind) - 2, placeholder=' ...')})"
+    return f"{kind}({shorten(text, LONGEST - len(kind) - 2, placeholder=' ...')})"
 
 
 def _brief(value: Any) -> str:
@@ -67,7 +67,7 @@ def _brief(value: Any) -> str:
         return f"{{{keys if len(keys) <= 60 else f'{len(value)} entries'}}}"
     if isinstance(value, Sequence | Set):
         items = list(value)
-        plain = all(isinstance(each, str | int | float) for each in items)
+        plain = all(isinstance(item, str | int | float) for item in items)
         if plain and len(items) <= SPELT_OUT:
             return f"[{', '.join(map(_brief, items))}]"
         return f"<{len(items)} {type(items[0]).__name__}>"
@@ -100,9 +100,9 @@ class Result:
         return short(self)
 
     def _tables(self) -> list[Table]:
-        made = getattr(self, "tables", None) or getattr(self, "table", None)
-        found = made() if callable(made) else []
-        return [found] if isinstance(found, Table) else list(found)
+        make_tables = getattr(self, "tables", None) or getattr(self, "table", None)
+        tables = make_tables() if callable(make_tables) else []
+        return [tables] if isinstance(tables, Table) else list(tables)
 
     def _headline(self) -> str:
         """The sentence that a reader must not miss, empty if there is none."""
@@ -125,8 +125,8 @@ class Result:
         """Text: its headline or its repr, its tables in the units that people read, sentences."""
         headline, tables = self._headline(), [str(table) for table in self._tables()]
         lines = "\n".join(f"- {sentence}" for sentence in self._sentences())
-        parts = [headline, lines, *tables] if headline else [repr(self), *tables, lines]
-        return "\n\n".join(part for part in parts if part)
+        paragraphs = [headline, lines, *tables] if headline else [repr(self), *tables, lines]
+        return "\n\n".join(part for part in paragraphs if part)
 
 
 class Drawn(Result):
@@ -190,8 +190,8 @@ class Tabular(Result, ABC):
         InputError
             If xarray is not installed.
         """
-        along, *others = (each for each in self.to_polars().iter_columns())
-        data = {each.name: (along.name, each.to_numpy()) for each in others}
+        along, *others = (column for column in self.to_polars().iter_columns())
+        data = {other.name: (along.name, other.to_numpy()) for other in others}
         return _library("xarray").Dataset(data, {along.name: along.to_numpy()})
 
     def _repr_html_(self) -> str | None:

@@ -360,28 +360,30 @@ def _logged(
     name: str,
 ) -> dict[str, Array]:
     """What the instruments make of a run; each has its own stream of chance."""
-    grid = truth.time
-    # the stamps are those of the instants sampled, which stay in order however large the jitter is
-    strayed = tools.jitter * _stream(seed, name, "time").standard_normal(grid.size)
-    bound = 0.4 * (grid[1] - grid[0] if grid.size > 1 else 0.0)
-    instants = np.clip(grid + np.clip(strayed, -bound, bound), grid[0], grid[-1])
+    simulated_at = truth.time
+    # a log has the stamps of its jittered instants, which stay in order whatever the jitter
+    strayed = tools.jitter * _stream(seed, name, "time").standard_normal(simulated_at.size)
+    step = simulated_at[1] - simulated_at[0] if simulated_at.size > 1 else 0.0
+    bound = 0.4 * step
+    jittered = simulated_at + np.clip(strayed, -bound, bound)
+    sampled_at = np.clip(jittered, simulated_at[0], simulated_at[-1])
 
     def sampled(signal: str) -> Array:
-        # the drive is marched on the grid: what lies between is not known better than by lines
+        # the simulation has values at its own instants alone: between them lines are taken
         values: Array = getattr(truth, signal)
         if signal == "shaft_position" and tools.backlash:
             values = _play(values, tools.backlash)
-        return values if not tools.jitter else np.interp(instants, grid, values)
+        return values if not tools.jitter else np.interp(sampled_at, simulated_at, values)
 
     def read(kind: ChannelKind | Literal["voltage"]) -> Array:
         chance = _stream(seed, name, kind)
         if kind == "rectified_current":
-            both = sampled("current_positive"), sampled("current_negative")
-            return _ammeter(instants, both, tools, chance)
+            currents = sampled("current_positive"), sampled("current_negative")
+            return _ammeter(sampled_at, currents, tools, chance)
         values = sampled("voltage" if kind == "voltage" else SIGNALS[kind])
         if kind == "encoder_counts":
             return _counter(values * (counts_per_turn / (2.0 * pi)), tools, chance)
-        noise = chance.standard_normal(grid.size)
+        noise = chance.standard_normal(simulated_at.size)
         if kind == "voltage":
             values = values + tools.voltage_offset + tools.voltage_noise * noise
             return _converted(values, tools.voltage_bits)
@@ -389,8 +391,8 @@ def _logged(
 
     def lost(share: float, longest: int, *names: str) -> NDArray[np.bool_]:
         """In runs of 1 to `longest`, together about a share of all."""
-        mask, chance = np.zeros(grid.size, dtype=np.bool_), _stream(seed, name, *names)
-        begins = np.flatnonzero(chance.random(grid.size) < share / (0.5 * (1 + longest)))
+        mask, chance = np.zeros(simulated_at.size, dtype=np.bool_), _stream(seed, name, *names)
+        begins = np.flatnonzero(chance.random(simulated_at.size) < share / (0.5 * (1 + longest)))
         lengths = chance.integers(1, longest, size=begins.size, endpoint=True)
         for begin, length in zip(begins.tolist(), lengths.tolist(), strict=True):
             mask[begin : begin + length] = True
@@ -400,15 +402,15 @@ def _logged(
     for column, values in columns.items() if tools.empty_cells else ():
         gaps = lost(tools.empty_cells, tools.longest_gap, "empty", column)
         columns[column] = np.where(gaps, np.nan, values)
-    kept = ~lost(tools.lost_rows, tools.longest_loss, "rows")
-    if not kept.any():
+    is_logged = ~lost(tools.lost_rows, tools.longest_loss, "rows")
+    if not is_logged.any():
         raise InputError(f"{name}: lost_rows leaves no row; take a smaller share.")
-    columns = {"time": _rounded(instants, tools.stamp_resolution), **columns}
-    return {column: values[kept] for column, values in columns.items()}
+    columns = {"time": _rounded(sampled_at, tools.stamp_resolution), **columns}
+    return {column: values[is_logged] for column, values in columns.items()}
 
 
 def _rounded(values: Array, step: float) -> Array:
-    """Values rounded to whole steps, as the nearest decimals where the step is one; 0 is none."""
+    """Values rounded to whole steps, as the nearest decimals if the step is one; 0 is none."""
     if not step:
         return values
     per_unit = 1.0 / step
@@ -429,7 +431,7 @@ def _converted(voltage: Array, bits: int) -> Array:
 
 
 def _ammeter(
-    instants: Array, both: tuple[Array, Array], tools: Instruments, chance: Generator
+    instants: Array, currents: tuple[Array, Array], tools: Instruments, chance: Generator
 ) -> Array:
     """The ammeter around both leads, from their currents (m,), magnitudes, at instants (m,). [A]
 
@@ -440,7 +442,7 @@ def _ammeter(
     """
     passed = np.mod(tools.dither_frequency * instants + float(chance.random()), 1.0)
     reading = np.zeros(instants.size)
-    for mean in both:
+    for mean in currents:
         duty = np.clip(mean / FULL_CURRENT, 0.0, 1.0)
         rising = 2.0 * passed / np.maximum(duty, 1e-9) - 1.0
         falling = 1.0 - 2.0 * (passed - duty) / np.maximum(1.0 - duty, 1e-9)
@@ -505,35 +507,35 @@ def write(tests: VirtualTests, folder: str | Path, *, overwrite: bool = False) -
     FileError
         If the folder is not empty or something cannot be written.
     """
-    place = Path(folder)
+    root = Path(folder)
     try:
-        if place.exists() and not place.is_dir():
-            raise FileError(f"{place} is a file; name a folder.")
-        if place.is_dir() and not overwrite and any(place.iterdir()):
-            raise FileError(f"{place} is not empty; name a new folder, or allow overwriting.")
-        (place / "truth").mkdir(parents=True, exist_ok=True)
+        if root.exists() and not root.is_dir():
+            raise FileError(f"{root} is a file; name a folder.")
+        if root.is_dir() and not overwrite and any(root.iterdir()):
+            raise FileError(f"{root} is not empty; name a new folder, or allow overwriting.")
+        (root / "truth").mkdir(parents=True, exist_ok=True)
     except FileError:
         raise
     except OSError as error:
-        raise FileError(f"{place} cannot be written: {error.strerror or error}.") from None
+        raise FileError(f"{root} cannot be written: {error.strerror or error}.") from None
     refinements = f"refinements {', '.join(tests.drive.parameters.refinements) or 'none'}"
     note = f"# virtual: simulated by swashplate {__version__}, no measurement; axis {tests.axis}, "
     ends = f"instruments {tests.severity}, {refinements}, seed {tests.seed}\n"
-    for each in tests.runs.values():
-        log = partial(_write_log, each.columns, f"{note}{each.name}, {ends}")
-        write_whole(place / f"{each.stem}.csv", log)
+    for run in tests.runs.values():
+        log = partial(_write_log, run.columns, f"{note}{run.name}, {ends}")
+        write_whole(root / f"{run.stem}.csv", log)
     if tests.preset is None:
-        tests.nominal.to_toml(place / DRIVE_FILE)
-    tests.drive.to_toml(place / "truth" / DRIVE_FILE)
+        tests.nominal.to_toml(root / DRIVE_FILE)
+    tests.drive.to_toml(root / "truth" / DRIVE_FILE)
     campaign, truth = _contents(tests)
     header = (
         f"# Virtual tests, simulated by swashplate {__version__}: nothing here was measured.\n"
         f"# Instruments: {tests.severity}; {refinements}; seed {tests.seed}.\n"
         "# What was simulated stands in truth/truth.toml: open it only after the fit.\n"
     )
-    write_text(f"# The truth behind the virtual tests.\n{truth}", place / "truth" / "truth.toml")
-    write_text(header + campaign, place / "campaign.toml")
-    return place / "campaign.toml"
+    write_text(f"# The truth behind the virtual tests.\n{truth}", root / "truth" / "truth.toml")
+    write_text(header + campaign, root / "campaign.toml")
+    return root / "campaign.toml"
 
 
 def _write_log(columns: Mapping[str, Array], note: str, path: Path) -> None:
@@ -553,10 +555,10 @@ def _contents(tests: VirtualTests) -> tuple[str, str]:
     from tomlkit import dumps
 
     tools, drop = tests.instruments, {"missing": "drop"} if tests.instruments.empty_cells else {}
-    given: dict[str, Any] = {"kind": "voltage", "column": "voltage", "unit": "V", **drop}
-    given["accuracy"] = _accuracy("voltage", tools)
+    entries: dict[str, Any] = {"kind": "voltage", "column": "voltage", "unit": "V", **drop}
+    entries["accuracy"] = _accuracy("voltage", tools)
     axis: dict[str, Any] = {"drive": tests.preset or DRIVE_FILE}
-    axis |= {"time": {"column": "time", "unit": "s"}, "start": "rest", "input": given}
+    axis |= {"time": {"column": "time", "unit": "s"}, "start": "rest", "input": entries}
     channels = axis["channels"] = dict[str, dict[str, object]]()
     for kind in tests.channels:
         column = COLUMNS.get(kind, kind)
@@ -568,12 +570,12 @@ def _contents(tests: VirtualTests) -> tuple[str, str]:
         entry["counts_per_turn"] = tests.counts_per_turn
         if tools.counter_bits:
             entry["rolls_over_at"] = 2**tools.counter_bits
-    runs = [{"file": f"{each.stem}.csv", "role": each.role} for each in tests.runs.values()]
+    runs = [{"file": f"{run.stem}.csv", "role": run.role} for run in tests.runs.values()]
     content = {"title": f"Virtual tests, {tests.axis}", "virtual": True}
     truth = {"virtual": True, "axis": tests.axis, "drive": DRIVE_FILE}
     truth |= {key: getattr(tests, key) for key in ("severity", "seed", "counts_per_turn")}
     truth |= {"runs": list(tests.runs), "instruments": asdict(tools)}
-    versions = {each: version(each) for each in ("numpy", "numba")}
+    versions = {package: version(package) for package in ("numpy", "numba")}
     truth["versions"] = {"swashplate": __version__, "python": python_version(), **versions}
     return dumps(content | {"axes": {tests.axis: axis}, "runs": runs}), dumps(truth)
 

@@ -54,7 +54,7 @@ class Column:
     none: str = ""
     """What stands for no number."""
     wrap: bool = False
-    """Whether it is the one broken into lines where the terminal is narrow."""
+    """Whether it is the one broken into lines if the terminal is narrow."""
     of: str = "tpf"
     """Where it is shown: ``t`` terminal, ``p`` page, ``f`` file."""
     key: str = ""
@@ -75,7 +75,7 @@ class Row(NamedTuple):
 
     cells: tuple[Any, ...]
     unit: str
-    """Unit of all its numbers as of `display_unit`, where they have one of their own."""
+    """Unit of all its numbers as of `display_unit`, if they have one of their own."""
     spec: str
     look: bool
     """Whether someone should look at it."""
@@ -106,24 +106,24 @@ class Table:
         total: bool = False,
     ) -> None:
         """Add a row; see `Row`. NaN counts as no number."""
-        count = sum(each is not UNIT for each in self.columns)
+        count = sum(column is not UNIT for column in self.columns)
         assert len(cells) == count, f"{len(cells)} cells for {count} columns of {self.title}"
-        given = iter(cells)
+        values = iter(cells)
         si = "rad" if unit == SHAFT_ANGLE else unit
-        every = tuple(si if each is UNIT else next(given) for each in self.columns)
+        every = tuple(si if column is UNIT else next(values) for column in self.columns)
         self.rows.append(Row(every, unit, spec, look, section or total, total))
 
     def of(self, place: str) -> Table:
         """The table with the columns of a place: ``"t"`` terminal, ``"p"`` page, ``"f"`` file."""
-        kept = [k for k, each in enumerate(self.columns) if place in each.of]
-        rows = [row._replace(cells=tuple(row.cells[k] for k in kept)) for row in self.rows]
-        return Table(self.title, [self.columns[k] for k in kept], self.caption, rows, self.si)
+        shown = [k for k, column in enumerate(self.columns) if place in column.of]
+        rows = [row._replace(cells=tuple(row.cells[k] for k in shown)) for row in self.rows]
+        return Table(self.title, [self.columns[k] for k in shown], self.caption, rows, self.si)
 
     def heads(self) -> list[str]:
         """The columns' names with their units, for people."""
         return [
-            f"{each.name} {display_unit(each.unit).name if each.unit else ''}".strip()
-            for each in self.columns
+            f"{column.name} {display_unit(column.unit).name if column.unit else ''}".strip()
+            for column in self.columns
         ]
 
     def texts(self, row: Row) -> list[str]:
@@ -146,11 +146,11 @@ class Table:
         """The numbers of the file's columns, SI, each row's own unit in the column ``unit``."""
         import polars as pl
 
-        made = self.of("f")
-        names = [each.key or each.name for each in made.columns]
+        table = self.of("f")
+        names = [column.key or column.name for column in table.columns]
         records = [
             dict(zip(names, map(_number, row.cells), strict=True))
-            for row in made.rows
+            for row in table.rows
             if not row.total
         ]
         return pl.DataFrame(records, infer_schema_length=None)
@@ -168,7 +168,7 @@ class Table:
         stacked = [[*[""] * (height - len(head)), *head] for head in heads]
         lines = [*zip(*stacked, strict=True), *map(shown.texts, shown.rows)]
         sizes = [max(map(len, cells)) for cells in zip(*lines, strict=True)]
-        right = [">" if each.spec else "<" for each in shown.columns]
+        right = [">" if column.spec else "<" for column in shown.columns]
         text = [
             "  ".join(f"{c:{r}{s}}" for c, r, s in zip(line, right, sizes, strict=True)).rstrip()
             for line in lines
@@ -178,18 +178,18 @@ class Table:
     def _repr_html_(self) -> str:
         shown = self.of("t")
         sides = ["right" if column.spec else "left" for column in shown.columns]
-        parts = ["<table>"]
+        pieces = ["<table>"]
         if self.title:
-            parts.append(f'<caption style="{_CAPTION}">{escape(self.title)}</caption>')
-        parts += ["<thead>", _html_row("th", shown.heads(), sides), "</thead>", "<tbody>"]
+            pieces.append(f'<caption style="{_CAPTION}">{escape(self.title)}</caption>')
+        pieces += ["<thead>", _html_row("th", shown.heads(), sides), "</thead>", "<tbody>"]
         for row in shown.rows:
             # between sections a line that is seen on light and on dark pages
             line = "border-top: 1px solid #888; " if row.section else ""
-            parts.append(_html_row("td", shown.texts(row), sides, line))
-        parts += ["</tbody>", "</table>"]
+            pieces.append(_html_row("td", shown.texts(row), sides, line))
+        pieces += ["</tbody>", "</table>"]
         if self.caption:
-            parts.append(f"<p>{escape(self.caption)}</p>")
-        return "".join(parts)
+            pieces.append(f"<p>{escape(self.caption)}</p>")
+        return "".join(pieces)
 
 
 _CAPTION = "caption-side: top; text-align: left; font-weight: bold; white-space: nowrap"
@@ -197,11 +197,11 @@ _CAPTION = "caption-side: top; text-align: left; font-weight: bold; white-space:
 
 def _html_row(tag: str, cells: Sequence[str], sides: Sequence[str], style: str = "") -> str:
     """A row of a table in HTML, each cell at its column's side; Jupyter's own is the right one."""
-    made = [
+    cells_html = [
         f'<{tag} style="{style}text-align: {side}">{escape(cell)}</{tag}>'
         for cell, side in zip(cells, sides, strict=True)
     ]
-    return f"<tr>{''.join(made)}</tr>"
+    return f"<tr>{''.join(cells_html)}</tr>"
 
 
 def share_cell(share: float | None) -> Cell:
@@ -213,13 +213,13 @@ def share_cell(share: float | None) -> Cell:
 
 def joined(tables: Sequence[Table]) -> Table:
     """One table of the rows of several that have the same columns."""
-    return Table("", tables[0].columns, rows=[row for each in tables for row in each.rows])
+    return Table("", tables[0].columns, rows=[row for table in tables for row in table.rows])
 
 
 def largest(cells: Sequence[Any]) -> float:
     """The largest magnitude of some cells' numbers, by which their unit is chosen."""
-    values = [each.value if isinstance(each, Cell) else each for each in cells]
-    sizes = [abs(each) for each in values if isinstance(each, float) and isfinite(each)]
+    values = [cell.value if isinstance(cell, Cell) else cell for cell in cells]
+    sizes = [abs(value) for value in values if isinstance(value, float) and isfinite(value)]
     return max(sizes, default=0.0) or float("inf")
 
 
@@ -267,7 +267,7 @@ def spread(value: float, lower: float, upper: float) -> tuple[str, str, str]:
     decimals = min(max(1 - floor(log10(half / 10.0**power)), 0), 12)
     tail = f"e{power:+03d}" if power else ""
     middle, low, high = (
-        f"{each / 10.0**power:.{decimals}f}{tail}" for each in (value, lower, upper)
+        f"{number / 10.0**power:.{decimals}f}{tail}" for number in (value, lower, upper)
     )
     return middle, low, high
 
@@ -317,8 +317,8 @@ def ending(path: str | Path, form: Form) -> str:
     """Ending of a path in small letters, with its dot; a `FileError` if the form has it not."""
     suffix = Path(path).suffix
     if form.endings and suffix.lower() not in form.endings:
-        known = " or ".join(filter(None, (", ".join(form.endings[:-1]), form.endings[-1])))
-        raise FileError(f"{path} ends in '{suffix}'; {form.what} is written as {known}.")
+        endings = " or ".join(filter(None, (", ".join(form.endings[:-1]), form.endings[-1])))
+        raise FileError(f"{path} ends in '{suffix}'; {form.what} is written as {endings}.")
     return suffix.lower()
 
 
@@ -342,7 +342,7 @@ def check_place(path: str | Path) -> None:
 
 
 def made_folder(folder: Path) -> Path:
-    """A folder, made where it is missing."""
+    """A folder, made if it is missing."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -352,7 +352,9 @@ def made_folder(folder: Path) -> Path:
 
 def check_folder(folder: Path) -> None:
     """See to it, before long work, that a folder can be made and written to; none is made yet."""
-    there = next(each for each in (folder.absolute(), *folder.absolute().parents) if each.exists())
+    there = next(
+        parent for parent in (folder.absolute(), *folder.absolute().parents) if parent.exists()
+    )
     if not there.is_dir():
         raise FileError(f"{folder} cannot be made: {there} is no folder.")
     if not os.access(there, os.W_OK | os.X_OK):

@@ -67,7 +67,7 @@ def to_si(value: float, unit: str, si: str, what: str) -> float:
         return value
     shown = unit if len(unit) <= LONGEST else f"{unit[:LONGEST]}..."
     powers = _POWER.sub(" ", unit)
-    if len(unit) > LONGEST or any(each in powers for each in ("**", "^", "<", ">")):
+    if len(unit) > LONGEST or any(sign in powers for sign in ("**", "^", "<", ">")):
         # a unit is evaluated, and some would take for ever
         raise InputError(
             f"{what} has the unreadable unit '{shown}'; give it in {si}, or in a unit whose "
@@ -80,21 +80,21 @@ def to_si(value: float, unit: str, si: str, what: str) -> float:
         return 2.0 * pi * to_si(value, unit, "Hz", what)
     from pint import DimensionalityError, UndefinedUnitError
 
-    registry, wanted = _registry(), "rad/s or rpm" if si == "rad/s" else si
+    registry, examples = _registry(), "rad/s or rpm" if si == "rad/s" else si
     try:
         # offsets (degC) are handled by Quantity, not by a factor
         quantity = registry.Quantity(value, _written_out(unit) if unit != "1" else "")
         number = float(quantity.to(_written_out(si) if si != "1" else "").magnitude)
     except UndefinedUnitError:
-        raise InputError(f"{what} has the unknown unit '{unit}'; give it in {wanted}.") from None
+        raise InputError(f"{what} has the unknown unit '{unit}'; give it in {examples}.") from None
     except DimensionalityError:
         raise InputError(
             f"{what} is given in '{unit}', which does not measure the same as {si}; "
-            f"give it in {wanted}."
+            f"give it in {examples}."
         ) from None
     except Exception:  # Pint evaluates the text, and raises whatever the evaluation does
         raise InputError(
-            f"{what} has the unreadable unit '{shown}'; give it in {wanted}."
+            f"{what} has the unreadable unit '{shown}'; give it in {examples}."
         ) from None
     if isfinite(value) and not isfinite(number):
         raise InputError(f"{what} is {value:g} {unit}, too large a number in {si}; check it.")
@@ -156,7 +156,7 @@ _BASE = {
 def si_exponents(unit: str) -> dict[str, int] | None:
     """Exponents of the base units that an SI unit is made of, ``"N m"`` → kg 1, m 2, s -2.
 
-    None where one is a fraction, as of √Pa, or where Pint does not know the unit or its base.
+    None if one is a fraction, as of √Pa, or where Pint does not know the unit or its base.
     """
     try:
         base = _registry().parse_units(_written_out(unit).replace("^", "**"))
@@ -166,8 +166,8 @@ def si_exponents(unit: str) -> dict[str, int] | None:
     powers = {str(name): float(power) for name, power in root._units.items()}
     if factor != 1.0 or not all(n.is_integer() and k in _BASE for k, n in powers.items()):
         return None
-    found = {_BASE[name]: int(power) for name, power in powers.items()}
-    return {name: found[name] for name in _BASE.values() if name in found}
+    exponents = {_BASE[name]: int(power) for name, power in powers.items()}
+    return {name: exponents[name] for name in _BASE.values() if name in exponents}
 
 
 # --- units that people read -----------------------------------------------------------------------
@@ -238,7 +238,7 @@ def units_of_choice(words: Sequence[str], drum: float | None = None) -> dict[str
     if drum is not None and not drum > 0.0:
         raise InputError(f"A drum's diameter must be above 0 m, not {drum:g}: --drum 0.4.")
     named: dict[str, str] = {}
-    chosen: dict[str, DisplayUnit] = {}
+    units: dict[str, DisplayUnit] = {}
     beside: dict[str, DisplayUnit] = {}
     for word in words:
         shown, turns = _chosen_by(word, drum)
@@ -247,11 +247,11 @@ def units_of_choice(words: Sequence[str], drum: float | None = None) -> dict[str
                 raise InputError(
                     f"--units names two units of one quantity, {named[si]} and {word}: give one."
                 )
-        chosen |= shown
+        units |= shown
         beside |= turns
-    if "rad" in chosen and beside:
-        beside[SHAFT_ANGLE] = chosen["rad"]
-    return {**beside, **chosen}
+    if "rad" in units and beside:
+        beside[SHAFT_ANGLE] = units["rad"]
+    return {**beside, **units}
 
 
 def _chosen_by(
@@ -265,9 +265,9 @@ def _chosen_by(
         radius = 0.5 * drum
         turns = ((word, rope[word] * radius), ("m", radius), ("m/s²", radius))
     if turns is not None:
-        units = {si: DisplayUnit(*each) for si, each in zip(_OF_SHAFT, turns, strict=True)}
+        units = {si: DisplayUnit(*turn) for si, turn in zip(_OF_SHAFT, turns, strict=True)}
         return {"rad/s": units.pop("rad/s")}, units
-    usual = {si: each for si, units in _USUAL.items() for _, each in units if each.name == word}
+    usual = {si: unit for si, units in _USUAL.items() for _, unit in units if unit.name == word}
     if word and usual:
         return usual, {}
     for si in ("Pa", "m", "m/s", "A", "rad"):
@@ -293,10 +293,10 @@ def shown_in(words: Sequence[str], drum: float | None = None) -> Iterator[None]:
 
 def show_rod() -> None:
     """Show what is called a shaft's motion as a rod's, in mm or what was chosen, for that while."""
-    chosen = _chosen.get()
+    choice = _chosen.get()
     for turning, moving in zip(_OF_SHAFT, ("m/s", "m", "m/s^2"), strict=True):
         usual = _USUAL[moving][1][1]
-        _chosen.set({turning: chosen.get(moving, usual), **_chosen.get()})
+        _chosen.set({turning: choice.get(moving, usual), **_chosen.get()})
 
 
 def of_shaft(si: str) -> str:

@@ -193,7 +193,7 @@ def test_a_coarse_reading_is_named(drafted: Drafted) -> None:
     (found,) = (each for each in examine(coarse["a"]) if each.signal == "shaft_speed")
     assert found.findings == (
         "reads in steps of 30 deg/s, 6.2 % of its range: smaller motions and dead zones cannot be "
-        "told",
+        "resolved",
     )
     fine = tacho(drafted, {"a": 1.0}, resolution=1.0)
     assert all(each.findings == () for each in examine(fine["a"]))

@@ -250,7 +250,7 @@ def test_a_packaged_name_goes_before_a_folder(done, refused, tmp_path):
     assert done("show", "hoist/drive.TOML") == done("show", "slew") != done("show", "hoist")
     assert "There is no drive.toml in hoist: give a folder" in refused("limits", "./hoist")
     Path("hoist/parameters.toml").touch()
-    assert "hoist is the fit of a model of your own" in refused("limits", "./hoist")
+    assert "hoist is the fit of a user-defined model" in refused("limits", "./hoist")
     said = refused("export", "./hoist", "--fmu", "hoist.fmu")
     assert 'swashplate.export.fmu(model, "model.fmu", parameters=..., step=...)' in said
     assert "hoist/parameters.toml" in said

@@ -19,7 +19,7 @@ def screen(monkeypatch: pytest.MonkeyPatch) -> io.StringIO:
 
 
 def test_a_spinner_says_what_the_package_is_doing(screen: io.StringIO) -> None:
-    with terminal.working("Judging") as status:
+    with terminal.spinner("Judging") as status:
         assert status.status == "Judging ..."
         with progress.working("Fitting hoist"):
             work = progress.begin("Compiling equations, once on this machine", "drive_march")
@@ -43,7 +43,7 @@ def test_a_bar_says_it_too(screen: io.StringIO) -> None:
 def test_a_pipe_gets_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     file = io.StringIO()
     monkeypatch.setattr(terminal, "side", Console(file=file, force_terminal=False))
-    with terminal.working("Judging"), progress.working("Fitting hoist"):
+    with terminal.spinner("Judging"), progress.working("Fitting hoist"):
         pass
     with terminal.long_work("Fitting"), progress.working("Fitting hoist"):
         pass

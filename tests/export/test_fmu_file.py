@@ -330,7 +330,7 @@ def test_clang_finds_nothing_to_warn_of(tmp_path):
 @pytest.mark.parametrize("name", ["linux64", "aarch64-linux"])
 def test_building_again_gives_equal_bytes(name):
     platform = libraries.PLATFORMS[name]
-    made = libraries.compiled(libraries.sources(), platform)
+    made = libraries.compiled_library(libraries.sources(), platform)
     assert sha256(made).hexdigest() == libraries.manifest()["libraries"][platform.library]["sha256"]
 
 

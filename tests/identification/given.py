@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from scipy.signal import lfilter
 
 from swashplate import Campaign, Channel, Experiment, rig
-from swashplate.campaign.experiment import InputSignal, Source
+from swashplate.campaign.experiment import InputSignal, SignalOrigin
 from swashplate.executors import Serial
 from swashplate.identification.estimation.arrow import RunRows
 from swashplate.identification.estimation.problem import (
@@ -47,7 +47,7 @@ def run_of(
 ) -> Experiment:
     """A run without a file, at 512 Hz or given stamps; channels have the names of their kinds."""
     time = np.arange(values.size) / 512.0 if time is None else time
-    source, made = Source(Path("log.csv"), "column"), {}
+    source, made = SignalOrigin(Path("log.csv"), "column"), {}
     for key, each in channels.items():
         own, size = key if key in UNITS and kind != "other" else "other", np.size(each)
         at, weights = time[:size], np.full(size, weight)

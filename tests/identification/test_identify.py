@@ -546,5 +546,5 @@ def test_a_user_defined_model_has_the_same_interface(turning: Campaign, tmp_path
     assert [file.name for file in files] == ["parameters.toml", "estimates.csv", "fit.json"]
     back = Identification.load(tmp_path, model=setup)
     assert back["gain"] == found["gain"]
-    with pytest.raises(FileNotFoundError, match="fit of a model of your own"):
+    with pytest.raises(FileNotFoundError, match="fit of a user-defined model"):
         Drive.from_toml(tmp_path)

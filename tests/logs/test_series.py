@@ -8,15 +8,15 @@ import scipy.io
 
 from swashplate import FileError, InputError
 from swashplate.logs import (
-    Column,
     Log,
+    LogColumn,
     TextOptions,
     check_stamps,
     read_series,
 )
 
 
-def log_of(*columns: Column, **left_out: str) -> Log:
+def log_of(*columns: LogColumn, **left_out: str) -> Log:
     def load(positions, first, last):
         return [np.full(3, float(position)) for position in positions]
 
@@ -24,15 +24,15 @@ def log_of(*columns: Column, **left_out: str) -> Log:
 
 
 COLUMNS = [
-    Column("time [ms]", "ms"),
-    Column("speed (1/min)", "1/min"),
-    Column("voltage_mV"),
-    Column("x(1,:)"),
-    Column("fast/pressure [bar]", "bar"),
-    Column("fast/count"),
-    Column("slow/count"),
-    Column("u #1"),
-    Column("u #2"),
+    LogColumn("time [ms]", "ms"),
+    LogColumn("speed (1/min)", "1/min"),
+    LogColumn("voltage_mV"),
+    LogColumn("x(1,:)"),
+    LogColumn("fast/pressure [bar]", "bar"),
+    LogColumn("fast/count"),
+    LogColumn("slow/count"),
+    LogColumn("u #1"),
+    LogColumn("u #2"),
 ]
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from swashplate import FileError, InputError
-from swashplate.logs import Column, TextOptions, open_log
+from swashplate.logs import LogColumn, TextOptions, open_log
 
 ROWS = {"time": [0.0, 0.5], "voltage": [1.5, 2.5]}
 
@@ -57,7 +57,7 @@ def test_layout_is_told_from_the_rows(text, all_of, content, form):
 )
 def test_encodings(text, all_of, encoding, said):
     log = text("time [µs];α\n0;1,5\n0,5;2,5\n".replace("α", "é"), encoding=encoding)
-    assert log.columns == (Column("time [µs]", "µs"), Column("é"))
+    assert log.columns == (LogColumn("time [µs]", "µs"), LogColumn("é"))
     assert log.format == f"CSV, semicolons, decimal comma{said}"
     assert all_of(log) == {"time [µs]": [0.0, 0.5], "é": [1.5, 2.5]}
 

@@ -11,11 +11,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from swashplate import InputError
-from swashplate.campaign import Channel, Encoder, Experiment, InputSignal, Source
+from swashplate.campaign import Channel, Encoder, Experiment, InputSignal, SignalOrigin
 from swashplate.identification.assessment import motion_of
 from swashplate.report.figures import plot_campaign, plot_channel
 
-SOURCE = Source(Path("run.csv"), "a column")
+SOURCE = SignalOrigin(Path("run.csv"), "a column")
 TIME = np.arange(513) / 64.0
 
 

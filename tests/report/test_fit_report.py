@@ -37,7 +37,7 @@ from swashplate.report.fit_report import (
     write_validation_report,
 )
 from swashplate.report.fit_report.runs import (
-    packed,
+    packed_samples,
     run_data,
     shown_runs,
     write_samples,
@@ -255,7 +255,7 @@ def unpacked(found: dict) -> np.ndarray:
     ],
 )
 def test_numbers_are_packed_to_half_a_step(values: np.ndarray, step: float | None) -> None:
-    found = packed(values, step)
+    found = packed_samples(values, step)
     np.testing.assert_allclose(unpacked(found), values, rtol=1e-12, atol=0.5001 * found["step"])
 
 
@@ -658,8 +658,9 @@ def test_the_page_is_small_and_asks_for_nothing(tests: Campaign, tmp_path: Path)
     content = json.loads(re.search(r'id="live">(.*?)</script>', text)[1])
     # of which 14,000 say what the scripts' functions do and take
     assert len(text) - len(content["wasm"]) < 80_000
-    # each lever moves each of its numbers once
-    for lever in content["levers"]:
-        assert len({number for number, _ in lever["moves"]}) == len(lever["moves"]), lever["name"]
+    # each design variable moves each of its numbers once
+    for variable in content["design_variables"]:
+        numbers = [number for number, _ in variable["moves"]]
+        assert len(set(numbers)) == len(numbers), variable["name"]
     for asks in (r"""(src|href)=["'](?!data:|#)""", r"url\(", r"fetch\(", "XMLHttp", r"import\("):
         assert not re.search(asks, text), asks

@@ -18,7 +18,7 @@ from swashplate.identification.estimation.setup import FitSetup, Free
 from swashplate.identification.fitting import Fit, fit
 from swashplate.identification.statistics.determination import identifiability_of
 from swashplate.identification.validation import predict
-from swashplate.report.fit_report.summary import largest_commands, numbers_of, numbers_table
+from swashplate.report.fit_report.summary import largest_commands, machine_numbers_of, numbers_table
 from swashplate.tables import Cell
 
 NEUTRAL = Drive.preset("neutral")
@@ -94,7 +94,7 @@ def found(runs: list[Experiment]) -> Fit:
 def test_numbers_of_what_was_tested_hold(found: Fit) -> None:
     shown, largest = cells(found), largest_commands(found.stages)
     assert largest == (8.0, 7.0)
-    truth = numbers_of(WINCH, largest)
+    truth = machine_numbers_of(WINCH, largest)
     degrees = {"acceleration": 180.0 / np.pi}
     for name in ("dead zone", "acceleration", "delay", "lag"):
         row = ROWS[name]
@@ -149,8 +149,10 @@ def test_an_estimate_at_its_bound_gives_no_interval(
     assert "±" in shown[ROWS["dead zone"]][0]
     assert "±" in shown[ROWS["acceleration"]][0]
     # by how much the others follow it is the covariance's: all of its own variance
-    variances = variances_from_bounds(result.stages, lambda one: numbers_of(one, (8.0, 7.0)))
-    whole = standard_errors(result.stages, lambda one: numbers_of(one, (8.0, 7.0))) ** 2
+    variances = variances_from_bounds(
+        result.stages, lambda one: machine_numbers_of(one, (8.0, 7.0))
+    )
+    whole = standard_errors(result.stages, lambda one: machine_numbers_of(one, (8.0, 7.0))) ** 2
     share = variances["V_dz_minus"] / np.where(whole > 0.0, whole, inf)
     assert share[ROWS["dead zone"], 1] == pytest.approx(1.0, rel=0.02)
     assert share[ROWS["dead zone"], 0] < 0.1

@@ -4,8 +4,8 @@ from .experiment import Channel as Channel
 from .experiment import Encoder as Encoder
 from .experiment import Experiment as Experiment
 from .experiment import InputSignal as InputSignal
-from .experiment import Source as Source
-from .overview import Envelope as Envelope
+from .experiment import SignalOrigin as SignalOrigin
+from .overview import BlockRanges as BlockRanges
 from .overview import LogWindow as LogWindow
 from .overview import Overview as Overview
 from .quality import Quality as Quality

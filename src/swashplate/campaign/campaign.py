@@ -51,7 +51,7 @@ class Campaign(Result):
     title: str
     virtual: bool
     """Whether the tests are simulated."""
-    axes: Mapping[str, schema.Axis]
+    axes: Mapping[str, schema.AxisEntry]
     experiments: tuple[Experiment, ...]
     ignored: tuple[str, ...] = ()
     """Runs with the role ``"ignore"``, whose logs were not opened."""
@@ -92,8 +92,8 @@ class Campaign(Result):
                 ignored.append(name)
                 continue
             log = open_log(folder / run.file, options=file.format)
-            place = f"{path}: run {number} ({run.file})"
-            of_run, overview = read_run(place, name, run, file.axes, log)
+            origin = f"{path}: run {number} ({run.file})"
+            of_run, overview = read_run(origin, name, run, file.axes, log)
             experiments += of_run
             if overview is not None:
                 overviews.append(overview)
@@ -111,11 +111,11 @@ class Campaign(Result):
     def table(self) -> Table:
         """Its experiments: axis, role, maneuver, length and channels."""
         heads = (*map(Head, ("run", "axis", "role", "maneuver")), Head("s", ".4g"))
-        made = Table(self.title, (*heads, Head("channels", wrap=True)))
-        for each in self:
-            words = each.name, each.axis, each.role, each.maneuver
-            made.add(*words, each.duration, ", ".join(each.channels))
-        return made
+        table = Table(self.title, (*heads, Head("channels", wrap=True)))
+        for experiment in self:
+            words = experiment.name, experiment.axis, experiment.role, experiment.maneuver
+            table.add(*words, experiment.duration, ", ".join(experiment.channels))
+        return table
 
     def plot(self, *, title: str | None = None) -> list[Figure]:
         """Figures of all long logs and of all runs.
@@ -123,8 +123,11 @@ class Campaign(Result):
         As of `swashplate.report.figures.plot_overview` and `plot_campaign`.
         """
         words = self.title if title is None else title
-        whole = [each.plot(title=f"{words}: {each.run}, the whole log") for each in self.overviews]
-        return whole + cast("list[Figure]", figures().plot_campaign(self, title=words))
+        overview_figures = [
+            overview.plot(title=f"{words}: {overview.run}, the whole log")
+            for overview in self.overviews
+        ]
+        return overview_figures + cast("list[Figure]", figures().plot_campaign(self, title=words))
 
     def __iter__(self) -> Iterator[Experiment]:
         return iter(self.experiments)
@@ -147,16 +150,18 @@ class Campaign(Result):
         """
         if isinstance(name, int):
             return self.experiments[name]
-        by_name = {each.name: each for each in self}
+        by_name = {experiment.name: experiment for experiment in self}
         if name in by_name:
             return by_name[name]
         if any(name == run or name.startswith(f"{run} ") for run in self.ignored):
             raise UnknownNameError(f"{self.path}: the run '{name}' has the role 'ignore'.")
         near = get_close_matches(name, by_name, 1)
         meant = f" (did you mean {near[0]}?)" if near else ""
-        known = ", ".join([*by_name][:LISTED])
-        more = f" and {len(by_name) - LISTED} more" if len(by_name) > LISTED else ""
-        raise UnknownNameError(f"{self.path} has no run '{name}'{meant}; it has {known}{more}.")
+        listed_names = ", ".join([*by_name][:LISTED])
+        rest = f" and {len(by_name) - LISTED} more" if len(by_name) > LISTED else ""
+        raise UnknownNameError(
+            f"{self.path} has no run '{name}'{meant}; it has {listed_names}{rest}."
+        )
 
     def select(
         self, *, axis: str | None = None, role: schema.Role | None = None
@@ -173,14 +178,16 @@ class Campaign(Result):
         roles = get_args(schema.Role)
         if role is not None and role not in roles:
             raise InputError(f"There is no role '{role}': runs have {', '.join(roles)}.")
-        ours = (each for each in self if axis in (None, each.axis))
-        return tuple(each for each in ours if role in (None, each.role))
+        of_axis = (experiment for experiment in self if axis in (None, experiment.axis))
+        return tuple(experiment for experiment in of_axis if role in (None, experiment.role))
 
     def with_interpolation(self, axis: str, between: schema.Between) -> Campaign:
         """The campaign with the input of an axis joined in one way between its samples."""
         experiments = [
-            replace(each, input=each.input.joined(between)) if each.axis == axis else each
-            for each in self
+            replace(experiment, input=experiment.input.joined(between))
+            if experiment.axis == axis
+            else experiment
+            for experiment in self
         ]
         return replace(self, experiments=tuple(experiments))
 
@@ -210,19 +217,19 @@ class Campaign(Result):
 
 def in_time(experiments: Sequence[Experiment]) -> tuple[Experiment, ...]:
     """Experiments in the order in which they were recorded; unchanged if a time is unknown."""
-    times = [each.recorded for each in experiments]
-    known = [time for time in times if time is not None]
-    if len(known) < len(times):
+    times = [experiment.recorded for experiment in experiments]
+    recorded = [time for time in times if time is not None]
+    if len(recorded) < len(times):
         return tuple(experiments)
-    return tuple(experiments[k] for k in np.argsort(known, kind="stable"))
+    return tuple(experiments[k] for k in np.argsort(recorded, kind="stable"))
 
 
 def json_schema() -> str:
     """JSON Schema of a campaign file, for editors that complete and check while one writes."""
-    made = schema.CampaignFile.model_json_schema(by_alias=True)
-    made["$schema"] = "https://json-schema.org/draft/2020-12/schema"
-    made["title"] = "swashplate campaign"
-    return json.dumps(made, indent=2) + "\n"
+    document = schema.CampaignFile.model_json_schema(by_alias=True)
+    document["$schema"] = "https://json-schema.org/draft/2020-12/schema"
+    document["title"] = "swashplate campaign"
+    return json.dumps(document, indent=2) + "\n"
 
 
 def read_campaign_file(path: str | Path) -> schema.CampaignFile:

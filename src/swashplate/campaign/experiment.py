@@ -43,7 +43,7 @@ VARIED = 8
 """Changes of an encoder's steps from which their common divisor is the decoder's."""
 
 
-class Source(NamedTuple):
+class SignalOrigin(NamedTuple):
     """Where a signal comes from."""
 
     file: Path
@@ -56,12 +56,12 @@ class Source(NamedTuple):
 class Edge(NamedTuple):
     """A jump of a command between two samples, at an instant that was not logged."""
 
-    place: int
-    """Of the last sample before it."""
+    row: int
+    """Row of the last sample before it."""
     middle: float
     """Between both samples. [s]"""
-    apart: float
-    """Time between them. [s]"""
+    interval: float
+    """Time between both samples. [s]"""
 
 
 class Accuracy(NamedTuple):
@@ -107,7 +107,7 @@ class Encoder(NamedTuple):
     gear_ratio: float
     """Turns of the encoder for one turn of the axis's shaft."""
     sign: Literal[1, -1]
-    """-1 where it counts down at positive speed."""
+    """-1 if it counts down at positive speed."""
     rolls_over_at: int | None
     """Counts after which the counter begins anew."""
 
@@ -131,7 +131,7 @@ class InputSignal(Result):
     interpolation: Between
     """What it is between two stamps: ``"jumps"`` is straight but for sudden changes, which come at
     once in the middle of both."""
-    source: Source
+    source: SignalOrigin
     limits: tuple[float, float] | None = None
     """Range of the instrument, in `unit`."""
     dropped: int = 0
@@ -169,16 +169,16 @@ class InputSignal(Result):
         return np.flatnonzero((changes > SUDDEN * np.ptp(self.values)) & alone)
 
     def with_jumps(self) -> InputSignal:
-        """The signal with its jumps at once, in the middle of the samples beside them.
+        """The signal with instantaneous jumps, in the middle of the samples beside them.
 
         A straight line from sample to sample would pass a dead zone at its beginning, and the
         current's jump there come up to half a sample too early.
         """
-        places = self.jumps
-        middle = 0.5 * (self.time[places] + self.time[places + 1])
+        rows = self.jumps
+        middle = 0.5 * (self.time[rows] + self.time[rows + 1])
         beside = np.stack([np.nextafter(middle, -np.inf), middle], axis=1)
-        levels = np.stack([self.values[places], self.values[places + 1]], axis=1)
-        between = np.repeat(places + 1, 2)
+        levels = np.stack([self.values[rows], self.values[rows + 1]], axis=1)
+        between = np.repeat(rows + 1, 2)
         time = np.insert(self.time, between, beside.ravel())
         return replace(self, time=time, values=np.insert(self.values, between, levels.ravel()))
 
@@ -199,15 +199,13 @@ class InputSignal(Result):
 
         Rounded off over `RISE`, so that a simulation is a smooth function of the instant.
         """
-        found = [
-            (each, each.middle + late[each.place]) for each in self.edges if each.place in late
-        ]
-        steps = [instant + RISE * np.linspace(-0.5, 0.5, 9) for _, instant in found]
+        moved = [(edge, edge.middle + late[edge.row]) for edge in self.edges if edge.row in late]
+        steps = [instant + RISE * np.linspace(-0.5, 0.5, 9) for _, instant in moved]
         time = np.unique(np.concatenate([self.time, *steps]))
         values = self.at(time)
-        for each, instant in found:
-            near = np.abs(time - each.middle) <= 0.5 * each.apart + RISE
-            earlier, later = self.time[each.place : each.place + 2]
+        for edge, instant in moved:
+            near = np.abs(time - edge.middle) <= 0.5 * edge.interval + RISE
+            earlier, later = self.time[edge.row : edge.row + 2]
             before = self.at(np.minimum(time[near], earlier))
             done = np.clip((time[near] - instant) / RISE + 0.5, 0.0, 1.0)
             jump = self.at(np.maximum(time[near], later)) - before
@@ -242,7 +240,7 @@ def resolution_of_inputs(inputs: Sequence[InputSignal]) -> float:
     The smallest distance between levels that they take; 0 if they take so few that nothing is known
     of levels between them.
     """
-    levels = np.unique(np.concatenate([each.values for each in inputs]))
+    levels = np.unique(np.concatenate([signal.values for signal in inputs]))
     # rounding of a decimal number, or of a scale, sets equal levels apart
     apart = np.diff(levels)
     apart = apart[apart > ROUNDED * float(np.abs(levels).max(initial=0.0))]
@@ -263,7 +261,7 @@ class Channel(Result):
     """(m,) samples, in `unit`; of an encoder the angle of the shaft."""
     weight: Array
     """(m,) factors on the squared error; 0 is ignored."""
-    source: Source
+    source: SignalOrigin
     noise: float | None = None
     """Standard deviation of the noise, in `unit`."""
     limits: tuple[float, float] | None = None
@@ -278,7 +276,7 @@ class Channel(Result):
     rolls_over_at: float | None = None
     """Reading after which a position begins anew, in `unit`; it is unwrapped."""
     interpolation: Interpolation = "linear"
-    """What it is between two stamps, where a model takes it as an input."""
+    """What it is between two stamps, if a model takes it as an input."""
     accuracy: Accuracy | None = None
     """As the campaign file states it."""
 
@@ -304,8 +302,8 @@ class Channel(Result):
         steps = np.diff(np.zeros(0) if self.counts is None else self.counts)
         # equal steps are a constant speed
         varied = np.count_nonzero(np.diff(steps)) > VARIED
-        whole = varied and np.array_equal(steps, np.rint(steps))
-        divisor = int(np.gcd.reduce(steps.astype(np.int64))) if whole else 1
+        is_whole = varied and np.array_equal(steps, np.rint(steps))
+        divisor = int(np.gcd.reduce(steps.astype(np.int64))) if is_whole else 1
         return divisor * abs(self.encoder.angle_per_count)
 
     @property
@@ -335,8 +333,8 @@ class Channel(Result):
 def _between(signal: InputSignal | Channel, time: Array) -> Array:
     if signal.interpolation != "previous":
         return np.interp(time, signal.time, signal.values)
-    held = np.searchsorted(signal.time, time, side="right") - 1
-    return signal.values[np.maximum(held, 0)]
+    rows = np.searchsorted(signal.time, time, side="right") - 1
+    return signal.values[np.maximum(rows, 0)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -344,13 +342,13 @@ class Experiment(Tabular):
     """One run of one axis."""
 
     name: str
-    """The run's name, with the axis where a campaign has several: ``"trial1 boom"``."""
+    """The run's name, with the axis if a campaign has several: ``"trial1 boom"``."""
     axis: str
     run: str
     role: Role
     start: InitialState
     start_pressure: float | None
-    """Stroking pressure at the first sample, where it is given. [Pa]"""
+    """Stroking pressure at the first sample, if it is given. [Pa]"""
     input: InputSignal
     channels: Mapping[str, Channel]
     stated_maneuver: str | None = None
@@ -372,13 +370,13 @@ class Experiment(Tabular):
             If there is none of that name.
         """
         if channel not in self.channels:
-            known = ", ".join(self.channels)
-            raise UnknownNameError(f"{self.name} has no channel '{channel}'; it has {known}.")
+            names = ", ".join(self.channels)
+            raise UnknownNameError(f"{self.name} has no channel '{channel}'; it has {names}.")
         return self.channels[channel]
 
     def of_kind(self, *kinds: ChannelKind) -> tuple[Channel, ...]:
         """Its channels of some kinds."""
-        return tuple(each for each in self.channels.values() if each.kind in kinds)
+        return tuple(channel for channel in self.channels.values() if channel.kind in kinds)
 
     def _signals(self) -> list[tuple[str, InputSignal | Channel]]:
         return [("input", self.input), *self.channels.items()]
@@ -386,16 +384,18 @@ class Experiment(Tabular):
     def to_polars(self) -> polars.DataFrame:
         """The input and every channel on its own stamps, a row a sample.
 
-        Columns ``signal``, ``time`` [s], ``value``, ``unit``, and ``weight``: 0 where a sample is
+        Columns ``signal``, ``time`` [s], ``value``, ``unit``, and ``weight``: 0 if a sample is
         ignored, null for the input.
         """
         import polars as pl
 
         frames = []
-        for name, each in self._signals():
-            weight = each.weight if isinstance(each, Channel) else [None] * each.time.size
-            frame = pl.DataFrame({"time": each.time, "value": each.values})
-            signal, unit = pl.lit(name).alias("signal"), pl.lit(each.unit).alias("unit")
+        for name, recorded in self._signals():
+            weight = (
+                recorded.weight if isinstance(recorded, Channel) else [None] * recorded.time.size
+            )
+            frame = pl.DataFrame({"time": recorded.time, "value": recorded.values})
+            signal, unit = pl.lit(name).alias("signal"), pl.lit(recorded.unit).alias("unit")
             weights = pl.Series("weight", weight, pl.Float64)
             frames.append(frame.select(signal, "time", "value", unit, weights))
         return pl.concat(frames)
@@ -404,12 +404,12 @@ class Experiment(Tabular):
         """Its input and channels: kind, samples, smallest and largest value."""
         numbers = Column("samples", "d", "1"), Column("lowest", ".4g"), Column("highest", ".4g")
         title = f"{self.name}, {self.maneuver}, {self.role}"
-        made = Table(title, (Column("channel"), Column("kind"), *numbers, UNIT))
-        for name, each in self._signals():
-            ends = float(each.values.min()), float(each.values.max())
-            unit = shown_unit(each.kind, each.unit)
-            made.add(name, each.kind, each.values.size, *ends, unit=unit)
-        return made
+        table = Table(title, (Column("channel"), Column("kind"), *numbers, UNIT))
+        for name, signal in self._signals():
+            ends = float(signal.values.min()), float(signal.values.max())
+            unit = shown_unit(signal.kind, signal.unit)
+            table.add(name, signal.kind, signal.values.size, *ends, unit=unit)
+        return table
 
     def plot(self, *, title: str | None = None) -> Figure:
         """Figure of its input and channels, as of `swashplate.report.figures.plot_campaign`."""

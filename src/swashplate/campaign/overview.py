@@ -38,7 +38,7 @@ class LogWindow(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Envelope(Result):
+class BlockRanges(Result):
     """Lowest and highest samples of a signal in each of the blocks of a long log."""
 
     name: str
@@ -74,7 +74,7 @@ class Overview(Result):
 
     run: str
     rows: int
-    signals: tuple[Envelope, ...]
+    signals: tuple[BlockRanges, ...]
     """The input and the channels of each axis."""
     windows: tuple[LogWindow, ...]
     """Those with motion, in the order of time."""
@@ -84,34 +84,34 @@ class Overview(Result):
     @property
     def begin(self) -> float:
         """Its first stamp. [s]"""
-        return min(float(each.time[0]) for each in self.signals)
+        return min(float(signal.time[0]) for signal in self.signals)
 
     @property
     def end(self) -> float:
         """Its last stamp. [s]"""
-        return max(each.end for each in self.signals)
+        return max(signal.end for signal in self.signals)
 
     @property
     def sentence(self) -> str:
         """How many of its windows, and how many rows, are experiments."""
-        used = [each for each in self.windows if each.used]
-        rows = sum(each.last - each.first for each in used)
-        moving = sum(each.last - each.first for each in self.windows)
+        used = [window for window in self.windows if window.used]
+        rows = sum(window.last - window.first for window in used)
+        moving = sum(window.last - window.first for window in self.windows)
         total = len(self.windows)
-        said = f"{self.run}: the log has {self.rows:,} rows, {moving:,} of them in "
-        said += "one window with motion" if total == 1 else f"{total} windows with motion"
+        words = f"{self.run}: the log has {self.rows:,} rows, {moving:,} of them in "
+        words += "one window with motion" if total == 1 else f"{total} windows with motion"
         if len(used) == total:
-            said += ", which is used" if total == 1 else ", which are all used"
+            words += ", which is used" if total == 1 else ", which are all used"
         else:
-            said += f"; {len(used)} of them, {rows:,} rows, spread over the log, "
-            said += "is used" if len(used) == 1 else "are used"
+            words += f"; {len(used)} of them, {rows:,} rows, spread over the log, "
+            words += "is used" if len(used) == 1 else "are used"
         if self.read_from is not None:
-            said += f"; its rows are read from {self.read_from.name}, written beside it"
-        return f"{said}."
+            words += f"; its rows are read from {self.read_from.name}, written beside it"
+        return f"{words}."
 
     def table(self) -> Table:
         """What each signal does in the whole log: range, longest interval, missing samples."""
-        made = Table(
+        table = Table(
             f"{self.run}, the whole log: {self.end - self.begin:.4g} s, {self.rows:,} rows",
             (
                 Column("axis", of="pf"),
@@ -123,23 +123,23 @@ class Overview(Result):
                 Column("missing", ",d"),
             ),
         )
-        for each in self.signals:
-            known = np.isfinite(each.low)
+        for signal in self.signals:
+            finite = np.isfinite(signal.low)
             words = "no number"
-            if known.any():
-                low, high = float(each.low[known].min()), float(each.high[known].max())
-                shown = display_unit(each.shown_unit, max(abs(low), abs(high)))
+            if finite.any():
+                low, high = float(signal.low[finite].min()), float(signal.high[finite].max())
+                shown = display_unit(signal.shown_unit, max(abs(low), abs(high)))
                 words = f"{shown.factor * low:z.4g} to {shown.factor * high:z.4g} {shown.name}"
-            made.add(
-                each.axis,
-                each.name,
-                each.kind.replace("_", " "),
-                1.0 / each.period,
-                f"{1e3 * each.longest:.3g}" if each.longest > 1.5 * each.period else "-",
+            table.add(
+                signal.axis,
+                signal.name,
+                signal.kind.replace("_", " "),
+                1.0 / signal.period,
+                f"{1e3 * signal.longest:.3g}" if signal.longest > 1.5 * signal.period else "-",
                 words.rstrip(),
-                each.missing,
+                signal.missing,
             )
-        return made
+        return table
 
     def plot(self, *, title: str | None = None) -> Figure:
         """Figure of the whole log, as of `swashplate.report.figures.plot_overview`."""

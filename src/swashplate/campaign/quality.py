@@ -49,7 +49,7 @@ than so many seconds tell nothing of it. [s]"""
 NEIGHBOURS = 11
 """Samples of the running median: up to five in a row may be a spike."""
 COARSE = 0.03
-"""Step of a reading over its range from which slow motions cannot be told."""
+"""Step of a reading over its range from which slow motions cannot be resolved."""
 AVERAGED, HELD, LARGE, OFF_SCALE = 0.5, 1.0, 0.4, 3.0
 """Time over which motions are averaged, and for which a command has been larger than this part of
 the largest one, so that the machine has about its steady speed [s]; and the factor by which a run's
@@ -71,9 +71,9 @@ class Quality(Result):
     low: float
     high: float
     clipped: float
-    """Share of the samples at the ends of the instrument's range; NaN where no range is known."""
+    """Share of the samples at the ends of the instrument's range; NaN if no range is known."""
     lost_counts: int | None
-    """Jumps that no motion explains, None where it is not an encoder."""
+    """Jumps that no motion explains, None if it is not an encoder."""
     ignored: float
     """Share of the samples whose weight is 0."""
     findings: tuple[str, ...]
@@ -85,48 +85,81 @@ def examine(experiment: Experiment, unsigned: Collection[str] = ()) -> tuple[Qua
 
     The sign of `unsigned` channels says nothing, see `unsigned_currents`.
     """
-    found, drive = list[Quality](), experiment.input
     moving = moves_at_first(experiment)
-    signals: dict[str, InputSignal | Channel] = {"input": drive, **experiment.channels}
-    for name, signal in signals.items():
-        stamps, used, limits = stamp_statistics(signal.time), signal.used, signal.limits
-        if signal is drive and drive.kind == "voltage":
-            limits = limits or (-FULL_VOLTAGE, FULL_VOLTAGE)
-        values = signal.values[used] if used.any() else signal.values
-        low, high, clipped, lost = float(values.min()), float(values.max()), nan, None
-        if limits is not None and used.any():
-            clipped = float(np.mean((values <= limits[0]) | (values >= limits[1])))
-        said = list[str]()
-        if name in moving:
-            said.append(
-                f"moves at the first sample, where the run is said to be at rest: write "
-                f"axes.{experiment.axis}.{ESTIMATED} in this run"
-            )
-        # the input's stamps are reported once, with the input
-        if signal is drive or not np.array_equal(signal.time, drive.time):
-            said += _of_stamps(stamps)
-        if signal.dropped:
-            said.append(
-                f"{count(signal.dropped, 'missing sample is', 'missing samples are')} left out"
-            )
-        if isinstance(signal, Channel):
-            if clipped > 0.0:
-                said.append(f"{100.0 * clipped:.2g} % of the samples are at the end of its range")
-            said += _of_channel(experiment, signal, name not in unsigned)
-            if signal.counts is not None:
-                lost = int(find_lost_counts(signal.time[used], signal.counts[used]).size)
-        else:
-            if low == high:
-                said.append("the input never changes: nothing can be identified from this run")
-            if limits is not None and (low < limits[0] or high > limits[1]):
-                said.append(
-                    f"goes from {low:g} to {high:g} {signal.unit}, beyond its range of "
-                    f"{limits[0]:g} to {limits[1]:g}: check unit, scale and offset"
-                )
-            said += _of_spikes(experiment, signal)
-        ignored, numbers = float(np.mean(~used)), (stamps, low, high, clipped, lost)
-        found.append(Quality(name, signal.kind, signal.unit, *numbers, ignored, tuple(said)))
-    return tuple(found)
+    signals: dict[str, InputSignal | Channel] = {"input": experiment.input, **experiment.channels}
+    return tuple(
+        _quality(experiment, name, signal, moves=name in moving, signed=name not in unsigned)
+        for name, signal in signals.items()
+    )
+
+
+def _quality(
+    experiment: Experiment,
+    name: str,
+    signal: InputSignal | Channel,
+    *,
+    moves: bool,
+    signed: bool,
+) -> Quality:
+    """Quality of one signal, which moves at the first sample or not, and has a sign or not."""
+    drive = experiment.input
+    used = signal.used
+    stamps = stamp_statistics(signal.time)
+    values = signal.values[used] if used.any() else signal.values
+    low, high = float(values.min()), float(values.max())
+    limits = signal.limits
+    if limits is None and signal is drive and drive.kind == "voltage":
+        limits = (-FULL_VOLTAGE, FULL_VOLTAGE)
+    clipped = nan
+    if limits is not None and used.any():
+        clipped = float(np.mean((values <= limits[0]) | (values >= limits[1])))
+    lost = None
+    findings = list[str]()
+    if moves:
+        findings.append(
+            f"moves at the first sample, where the run is said to be at rest: write "
+            f"axes.{experiment.axis}.{ESTIMATED} in this run"
+        )
+    # the input's stamps are reported once, with the input
+    if signal is drive or not np.array_equal(signal.time, drive.time):
+        findings += _of_stamps(stamps)
+    if signal.dropped:
+        findings.append(
+            f"{count(signal.dropped, 'missing sample is', 'missing samples are')} left out"
+        )
+    if isinstance(signal, Channel):
+        if clipped > 0.0:
+            findings.append(f"{100.0 * clipped:.2g} % of the samples are at the end of its range")
+        findings += _of_channel(experiment, signal, signed)
+        if signal.counts is not None:
+            lost = int(find_lost_counts(signal.time[used], signal.counts[used]).size)
+    else:
+        findings += _of_input(signal, low, high, limits)
+        findings += _of_spikes(experiment, signal)
+    return Quality(
+        signal=name,
+        kind=signal.kind,
+        unit=signal.unit,
+        stamps=stamps,
+        low=low,
+        high=high,
+        clipped=clipped,
+        lost_counts=lost,
+        ignored=float(np.mean(~used)),
+        findings=tuple(findings),
+    )
+
+
+def _of_input(
+    drive: InputSignal, low: float, high: float, limits: tuple[float, float] | None
+) -> Iterator[str]:
+    if low == high:
+        yield "the input never changes: nothing can be identified from this run"
+    if limits is not None and (low < limits[0] or high > limits[1]):
+        yield (
+            f"goes from {low:g} to {high:g} {drive.unit}, beyond its range of "
+            f"{limits[0]:g} to {limits[1]:g}: check unit, scale and offset"
+        )
 
 
 def _of_stamps(stamps: StampStatistics) -> Iterator[str]:
@@ -160,7 +193,7 @@ def _of_channel(experiment: Experiment, channel: Channel, signed: bool) -> Itera
             yield (
                 f"reads in steps of {size.factor * step:.3g} {size.name}, "
                 f"{100.0 * step / extent:.2g} % of its range: smaller motions and dead zones "
-                "cannot be told"
+                "cannot be resolved"
             )
     motion, at = values, time
     if channel.is_position:
@@ -193,7 +226,7 @@ def moves_at_first(experiment: Experiment) -> tuple[str, ...]:
     enough for ten steps of the reading at that speed, and not from zero, as a step at the first
     sample does. At a command of 0 a reading is an instrument's zero error.
     """
-    found, drive = list[str](), experiment.input
+    moving_channels, drive = list[str](), experiment.input
     still = abs(drive.values[0]) <= 0.02 * np.abs(drive.values).max() and drive.kind != "other"
     moving = experiment.of_kind("shaft_speed", "position", "encoder_counts")
     for channel in moving if experiment.start == "rest" and not still else ():
@@ -212,8 +245,8 @@ def moves_at_first(experiment: Experiment) -> tuple[str, ...]:
         least = max(AT_FIRST * float(np.quantile(np.abs(motion), 0.998)), 3.0 * noise)
         grows = np.median(speeds[3:]) > 2.0 * speeds[0]
         if speeds.size == 6 and speeds[:3].min() > least and not grows:
-            found.append(channel.name)
-    return tuple(found)
+            moving_channels.append(channel.name)
+    return tuple(moving_channels)
 
 
 # --- currents with and without a sign -------------------------------------------------------------
@@ -224,9 +257,9 @@ def has_sign(currents: Sequence[Array], share: float = 0.25) -> bool:
 
     Single samples do not count.
     """
-    finite = [each[np.isfinite(each)] for each in currents if np.isfinite(each).any()]
-    ends = np.array([[*np.quantile(each, (0.002, 0.998))] for each in finite] or [[0.0, 0.0]])
-    steps = [np.median(np.abs(np.diff(each))) for each in finite if each.size > 1]
+    finite = [current[np.isfinite(current)] for current in currents if np.isfinite(current).any()]
+    ends = np.array([[*np.quantile(current, (0.002, 0.998))] for current in finite] or [[0.0, 0.0]])
+    steps = [np.median(np.abs(np.diff(current))) for current in finite if current.size > 1]
     noise = float(max(steps, default=0.0)) / (0.6745 * 2.0**0.5)
     return bool(-ends[:, 0].min() > max(share * ends[:, 1].max(), SURE * noise))
 
@@ -238,13 +271,15 @@ def unsigned_currents(experiments: Iterable[Experiment]) -> dict[tuple[str, str]
     negative may be right.
     """
     currents, lowest = dict[tuple[str, str], list[Array]](), dict[tuple[str, str], float]()
-    for each in experiments:
+    for experiment in experiments:
         # a log that is cut out of a motion begins away from rest
-        rest = each.input.values[0] if each.input.kind == "other" else 0.0
-        driven = each.input.values - rest
+        rest = experiment.input.values[0] if experiment.input.kind == "other" else 0.0
+        driven = experiment.input.values - rest
         down = float(driven.min() / np.abs(driven).max()) if np.any(driven) else 0.0
-        for channel in (each for each in each.of_kind("signed_current") if each.used.any()):
-            key = each.axis, channel.name
+        for channel in experiment.of_kind("signed_current"):
+            if not channel.used.any():
+                continue
+            key = experiment.axis, channel.name
             currents.setdefault(key, []).append(channel.values[channel.used])
             lowest[key] = min(lowest.get(key, 0.0), down)
     return {
@@ -262,18 +297,19 @@ def wrapped_positions(experiments: Iterable[Experiment]) -> dict[tuple[str, str]
 
     By axis and channel.
     """
-    said = dict[tuple[str, str], str]()
-    for each in experiments:
-        for name, channel in each.channels.items():
+    sentences = dict[tuple[str, str], str]()
+    for experiment in experiments:
+        for name, channel in experiment.channels.items():
             turn = 2.0 * pi
             angle = channel.kind == "position" and channel.unit == "rad"
             if angle and turns_over(channel.values[channel.used], turn):
-                size, where = f"{turn / channel.stated:.9g}", f"axes.{each.axis}.channels.{name}"
-                said[each.axis, name] = (
-                    f"'{name}' of the axis '{each.axis}' jumps by about a whole turn, as an angle "
-                    f"that begins anew does; write rolls_over_at = {size} in [{where}]"
+                size = f"{turn / channel.stated:.9g}"
+                where = f"axes.{experiment.axis}.channels.{name}"
+                sentences[experiment.axis, name] = (
+                    f"'{name}' of the axis '{experiment.axis}' jumps by about a whole turn, as an "
+                    f"angle that begins anew does; write rolls_over_at = {size} in [{where}]"
                 )
-    return said
+    return sentences
 
 
 # --- spikes ---------------------------------------------------------------------------------------
@@ -296,7 +332,7 @@ def spikes(signal: Channel | InputSignal, drive: InputSignal) -> list[tuple[floa
 
     time, values = signal.time[signal.used], signal.values[signal.used]
     if isinstance(signal, Channel) and signal.counts is not None:
-        return [(each.begin, each.end, each.value) for each in lost_counts(signal) if each.returns]
+        return [(jump.begin, jump.end, jump.value) for jump in lost_counts(signal) if jump.returns]
     if signal.kind == "other" or time.size < 4 * NEIGHBOURS:
         return []
     lasting = median_filter(values, size=NEIGHBOURS, mode="nearest")
@@ -304,17 +340,17 @@ def spikes(signal: Channel | InputSignal, drive: InputSignal) -> list[tuple[floa
     off = np.abs(values - lasting)
     least = 8.0 * float(np.median(off))
     room, most = max(0.1 * (high - low), least), 2
-    found = (values > high + room) | (values < low - room)
+    is_spike = (values > high + room) | (values < low - room)
     if signal is not drive:
         most = NEIGHBOURS // 2
         within = off > max(0.25 * (high - low), least)
         if within.any():
             grid = np.linspace(-0.3, 0.0, 7)[:, None] + time
             commands = drive.at(grid.ravel()).reshape(grid.shape)
-            found |= within & (np.ptp(commands, axis=0) <= 0.02 * np.ptp(drive.values))
+            is_spike |= within & (np.ptp(commands, axis=0) <= 0.02 * np.ptp(drive.values))
         if isinstance(signal, Channel) and signal.rolls_over_at is not None:
-            found |= off > 0.25 * signal.rolls_over_at
-    rows = np.flatnonzero(found & (off > least))
+            is_spike |= off > 0.25 * signal.rolls_over_at
+    rows = np.flatnonzero(is_spike & (off > least))
     half = 0.5 * float(np.median(np.diff(time)))
     groups = np.split(rows, np.flatnonzero(np.diff(rows) > NEIGHBOURS // 2) + 1)
     return [
@@ -326,18 +362,18 @@ def spikes(signal: Channel | InputSignal, drive: InputSignal) -> list[tuple[floa
 
 def _of_spikes(experiment: Experiment, signal: Channel | InputSignal) -> Iterator[str]:
     """A sentence on a signal's spikes, with the line that leaves them out."""
-    found = spikes(signal, experiment.input)
-    windows = [f'{{ from = {a:.6g}, to = {b:.6g}, why = "spike" }}' for a, b, _ in found]
-    more = f" and {len(found) - NAMED} more like these" if len(found) > NAMED else ""
-    place = f"channels.{signal.name}" if isinstance(signal, Channel) else "input"
-    line = f"axes.{experiment.axis}.{place}.ignore = [{', '.join(windows[:NAMED])}]"
-    if found:
-        largest = f"{max((value for _, _, value in found), key=abs):.4g} {signal.unit}"
+    spiked_at = spikes(signal, experiment.input)
+    windows = [f'{{ from = {a:.6g}, to = {b:.6g}, why = "spike" }}' for a, b, _ in spiked_at]
+    rest = f" and {len(spiked_at) - NAMED} more like these" if len(spiked_at) > NAMED else ""
+    table = f"channels.{signal.name}" if isinstance(signal, Channel) else "input"
+    line = f"axes.{experiment.axis}.{table}.ignore = [{', '.join(windows[:NAMED])}]"
+    if spiked_at:
+        largest = f"{max((value for _, _, value in spiked_at), key=abs):.4g} {signal.unit}"
         if isinstance(signal, Channel) and signal.counts is not None:
-            jumps = [each.counts for each in lost_counts(signal) if each.returns]
+            jumps = [jump.counts for jump in lost_counts(signal) if jump.returns]
             largest = f"{max(jumps, key=abs):+.0f} counts"
-        spike = count(len(found), "spike")
-        yield f"{spike}, up to {largest}{more}: leave out with {line} in this run"
+        spike = count(len(spiked_at), "spike")
+        yield f"{spike}, up to {largest}{rest}: leave out with {line} in this run"
 
 
 class LostCounts(NamedTuple):
@@ -375,7 +411,7 @@ def lost_counts(channel: Channel) -> list[LostCounts]:
         before = counts[row - 1] - counts[row - 2] if row > 1 else 0.0
         return float(counts[row] - counts[row - 1] - before)
 
-    found, skip = list[LostCounts](), False
+    jumps, skip = list[LostCounts](), False
     for number, row in enumerate(rows):
         if skip:
             skip = False
@@ -387,18 +423,18 @@ def lost_counts(channel: Channel) -> list[LostCounts]:
             back = float(counts[following] - counts[row - 1])
             skip = abs(back) <= room
             end = float(time[following]) - half if skip else inf
-        found.append(LostCounts(float(time[row]) - half, end, jump, float(values[row])))
-    return found
+        jumps.append(LostCounts(float(time[row]) - half, end, jump, float(values[row])))
+    return jumps
 
 
 def _of_lost_counts(experiment: Experiment, channel: Channel) -> Iterator[str]:
     """A sentence on counts that are lost for good, with the lines that cut the run there."""
-    lasting = [each for each in lost_counts(channel) if not each.returns]
+    lasting = [jump for jump in lost_counts(channel) if not jump.returns]
     if not lasting:
         return
-    times = ", ".join(f"{each.begin:.6g} s" for each in lasting[:NAMED])
+    times = ", ".join(f"{spike.begin:.6g} s" for spike in lasting[:NAMED])
     times += f" and {len(lasting) - NAMED} times more" if len(lasting) > NAMED else ""
-    most = max((each.counts for each in lasting), key=abs)
+    most = max((spike.counts for spike in lasting), key=abs)
     cut = f"{lasting[0].begin:.6g}"
     yield (
         f"jumps by up to {most:+.0f} counts at {times} as no motion does, and stays there: lost or "
@@ -414,23 +450,26 @@ def spiked(experiments: Sequence[Experiment]) -> dict[tuple[str, str], tuple[str
     Beside the sentence, whether it is gross: twice as far from the median as the channel moves
     in any run, so that squared errors would be the spike's.
     """
-    said, moves = dict[tuple[str, str], tuple[str, float]](), dict[str, float]()
-    for each in experiments:
-        for name, channel in each.channels.items():
-            kept, far = channel.used, 0.0
-            middle = float(np.median(channel.values[kept])) if kept.any() else 0.0
-            for begin, end, value in spikes(channel, each.input):
-                kept &= (channel.time < begin) | (channel.time > end)
+    sentences_by_channel, moves = dict[tuple[str, str], tuple[str, float]](), dict[str, float]()
+    for experiment in experiments:
+        for name, channel in experiment.channels.items():
+            used, far = channel.used, 0.0
+            middle = float(np.median(channel.values[used])) if used.any() else 0.0
+            for begin, end, value in spikes(channel, experiment.input):
+                used &= (channel.time < begin) | (channel.time > end)
                 far = max(far, abs(value - middle))
-            if kept.any():
-                moves[name] = max(moves.get(name, 0.0), float(np.ptp(channel.values[kept])))
-            sentences = [f"has {sentence}" for sentence in _of_spikes(each, channel)]
-            sentences += _of_lost_counts(each, channel)
+            if used.any():
+                moves[name] = max(moves.get(name, 0.0), float(np.ptp(channel.values[used])))
+            sentences = [f"has {sentence}" for sentence in _of_spikes(experiment, channel)]
+            sentences += _of_lost_counts(experiment, channel)
             if sentences:
-                said[each.name, name] = f"{each.name}: '{name}' {'; it '.join(sentences)}", far
+                sentences_by_channel[experiment.name, name] = (
+                    f"{experiment.name}: '{name}' {'; it '.join(sentences)}",
+                    far,
+                )
     return {
         (run, name): (sentence, far > 2.0 * moves.get(name, 0.0))
-        for (run, name), (sentence, far) in said.items()
+        for (run, name), (sentence, far) in sentences_by_channel.items()
     }
 
 
@@ -445,44 +484,50 @@ def campaign_findings(campaign: Campaign) -> tuple[str, ...]:
     FileError, ParameterError
         If the file, which is read once more, has changed meanwhile and cannot be read.
     """
-    found, file = list[str](), read_campaign_file(campaign.path)
-    long = {each.run: (each.begin, each.end) for each in campaign.overviews}
+    findings, file = list[str](), read_campaign_file(campaign.path)
+    long = {overview.run: (overview.begin, overview.end) for overview in campaign.overviews}
     for name, axis in file.axes.items():
         runs, where = campaign.select(axis=name), f"axes.{name}"
-        found += _unused(f"{where}.ignore", axis.ignore, runs, long)
+        findings += _unused(f"{where}.ignore", axis.ignore, runs, long)
         for key, channel in axis.channels.items():
             of = f"{where}.channels.{key}"
-            found += _unused(f"{of}.ignore", channel.ignore, runs, long, key)
-            found += _unused(f"{of}.weights", channel.weights, runs, long, key)
-        found += [*_one_sided(name, runs), *_of_other_scale(runs)]
+            findings += _unused(f"{of}.ignore", channel.ignore, runs, long, key)
+            findings += _unused(f"{of}.weights", channel.weights, runs, long, key)
+        findings += [*_one_sided(name, runs), *_of_other_scale(runs)]
     for number, run in enumerate(file.runs, 1):
-        ours = [each for each in campaign if each.run == (run.name or Path(run.file).stem)]
+        of_run = [
+            experiment
+            for experiment in campaign
+            if experiment.run == (run.name or Path(run.file).stem)
+        ]
         for key in ("ignore", "weights") if run.role != "ignore" else ():
-            found += _unused(f"run {number} ({run.file}): {key}", getattr(run, key), ours, long)
+            findings += _unused(
+                f"run {number} ({run.file}): {key}", getattr(run, key), of_run, long
+            )
     moving = {e.axis for e in campaign if e.of_kind("shaft_speed", "position", "encoder_counts")}
-    found += [
+    findings += [
         f"axis '{axis}': no channel measures its motion; a fit of the pump needs one of the kind "
         "shaft_speed, position or encoder_counts"
-        for axis in dict.fromkeys(each.axis for each in campaign)
+        for axis in dict.fromkeys(experiment.axis for experiment in campaign)
         if axis not in moving
     ]
-    return (*found, *unsigned_currents(campaign).values(), *wrapped_positions(campaign).values())
+    return (*findings, *unsigned_currents(campaign).values(), *wrapped_positions(campaign).values())
 
 
 def _one_sided(axis: str, runs: Sequence[Experiment]) -> Iterator[str]:
-    """A sentence if a machine moves both ways under a command that has one sign, as its rest has.
+    """A sentence if a machine moves both ways though its command, also at rest, keeps its sign.
 
     Over 0.5 s, by more than a third of the largest such motion each way.
     """
-    commands = [each.input.values for each in runs if each.input.kind == "voltage"]
+    commands = [run.input.values for run in runs if run.input.kind == "voltage"]
     if not commands or min(c.min() for c in commands) < 0.0 < max(c.max() for c in commands):
         return
     moved, driven = list[Array](), list[Array]()
-    for each in runs:
-        for _, time, speed in _mean_speeds(each):
+    for run in runs:
+        for _, time, speed in _mean_speeds(run):
             moved.append(speed)
-            driven.append(each.input.at(time))
-    motion, command = (np.concatenate([np.zeros(0), *each]) for each in (moved, driven))
+            driven.append(run.input.at(time))
+    motion, command = (np.concatenate([np.zeros(0), *parts]) for parts in (moved, driven))
     most = float(np.abs(motion).max(initial=0.0))
     still = np.abs(motion) < 0.02 * most
     if still.any() and min(motion.max(), -motion.min()) > most / 3.0:
@@ -515,7 +560,7 @@ def _mean_speeds(experiment: Experiment) -> Iterator[tuple[Channel, Array, Array
 
 def _of_other_scale(runs: Sequence[Experiment]) -> Iterator[str]:
     """A sentence on a run that moves far more or less than others do at such commands."""
-    largest = max((float(np.abs(each.input.values).max()) for each in runs), default=0.0)
+    largest = max((float(np.abs(run.input.values).max()) for run in runs), default=0.0)
     gains = dict[str, dict[str, tuple[float, str]]]()
     for each in runs if largest > 0.0 else ():
         for channel, time, speed in _mean_speeds(each):
@@ -555,7 +600,7 @@ def beyond_the_card(experiment: Experiment) -> tuple[str, ...]:
 
 def _unused(
     where: str,
-    windows: Iterable[schema.Window],
+    windows: Iterable[schema.TimeWindow],
     runs: Sequence[Experiment],
     long: Mapping[str, tuple[float, float]],
     channel: str | None = None,
@@ -566,32 +611,34 @@ def _unused(
     log may lie where no experiment is.
     """
     for window in windows:
-        met = [each for each in runs if applying((window,), each.maneuver)]
-        times = [c.time for each in met for n, c in each.channels.items() if channel in (None, n)]
+        matching = [run for run in runs if applying((window,), run.maneuver)]
+        times = [
+            c.time for each in matching for n, c in each.channels.items() if channel in (None, n)
+        ]
         start, stop = ends(window)
-        logs = [long[run] for run in {each.run for each in met} & long.keys()]
+        logs = [long[run] for run in {each.run for each in matching} & long.keys()]
         within_log = any(start <= last and stop >= first for first, last in logs)
-        if not met:
-            names = list(dict.fromkeys(f"'{each.maneuver}'" for each in runs))
-            more = [f"{len(names) - NAMED} others"] if len(names) > NAMED else []
+        if not matching:
+            names = list(dict.fromkeys(f"'{run.maneuver}'" for run in runs))
+            rest = [f"{len(names) - NAMED} others"] if len(names) > NAMED else []
             yield (
                 f"{where}: no run has the maneuver '{window.maneuver}', so that its window does "
-                f"nothing; there are {', '.join([*names[:NAMED], *more])}"
+                f"nothing; there are {', '.join([*names[:NAMED], *rest])}"
             )
         elif not within_log and not any(inside(window, time).any() for time in times):
             first, last = (
-                "its end" if each is None else f"{each:g} s" for each in (window.start, window.stop)
+                "its end" if end is None else f"{end:g} s" for end in (window.start, window.stop)
             )
-            of = f"any of {len(met)} runs"
-            if len(met) == 1:
-                time = met[0].input.time
-                of = f"{met[0].name}, which goes from {time[0]:.4g} to {time[-1]:.4g} s"
+            of = f"any of {len(matching)} runs"
+            if len(matching) == 1:
+                time = matching[0].input.time
+                of = f"{matching[0].name}, which goes from {time[0]:.4g} to {time[-1]:.4g} s"
             yield f"{where}: the window from {first} to {last} holds no sample of {of}"
 
 
 def quality_table(experiment: Experiment, qualities: Sequence[Quality]) -> Table:
     """The signals of one experiment: rate, jitter, gaps, range, clipping and lost counts."""
-    made = Table(
+    table = Table(
         f"{experiment.name}: {experiment.maneuver}, to {experiment.role}, "
         f"{experiment.duration:.4g} s, {qualities[0].stamps.rows} samples",
         (
@@ -601,22 +648,22 @@ def quality_table(experiment: Experiment, qualities: Sequence[Quality]) -> Table
             Column("ignored", "s", of="p"),
         ),
     )
-    for each in qualities:
-        stamps, largest = each.stamps, max(abs(each.low), abs(each.high))
-        shown = display_unit(shown_unit(each.kind, each.unit), largest)
-        low, high = shown.factor * each.low, shown.factor * each.high
-        made.add(
+    for quality in qualities:
+        stamps, largest = quality.stamps, max(abs(quality.low), abs(quality.high))
+        shown = display_unit(shown_unit(quality.kind, quality.unit), largest)
+        low, high = shown.factor * quality.low, shown.factor * quality.high
+        table.add(
             experiment.name,
-            each.signal,
-            each.kind.replace("_", " "),
+            quality.signal,
+            quality.kind.replace("_", " "),
             stamps.rows,
             stamps.rate,
             f"{round(1e3 * stamps.jitter, 4):.3g}",
             f"{round(1e3 * stamps.longest, 4):.3g}" if stamps.gaps.size else "-",
             f"{low:z.4g} to {high:z.4g} {shown.name}".rstrip(),
-            "" if isnan(each.clipped) else f"{100.0 * each.clipped:.2g}",
-            each.lost_counts,
-            f"{100.0 * each.ignored:.3g} %",
-            look=bool(each.findings),
+            "" if isnan(quality.clipped) else f"{100.0 * quality.clipped:.2g}",
+            quality.lost_counts,
+            f"{100.0 * quality.ignored:.3g} %",
+            look=bool(quality.findings),
         )
-    return made
+    return table

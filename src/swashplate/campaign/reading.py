@@ -21,20 +21,20 @@ from swashplate.campaign.experiment import (
     Encoder,
     Experiment,
     InputSignal,
-    Source,
+    SignalOrigin,
     assumed_accuracy,
 )
-from swashplate.campaign.overview import Envelope, LogWindow, Overview
+from swashplate.campaign.overview import BlockRanges, LogWindow, Overview
 from swashplate.campaign.recognition import recognise
 from swashplate.campaign.samples import ambiguous_gaps, unwrap_counts, unwrap_position
 from swashplate.campaign.schema import applying, conversion, ends, inside
 from swashplate.documents import toml_string, validated
 from swashplate.errors import FileError, InputError
-from swashplate.logs import Column, Log, check_duration, check_stamps, in_parts, unit_of
+from swashplate.logs import Log, LogColumn, check_duration, check_stamps, in_parts, unit_of
 from swashplate.units import to_si
 
 Array = NDArray[np.float64]
-Axes = Mapping[str, schema.Axis]
+Axes = Mapping[str, schema.AxisEntry]
 AnySignal = TypeVar("AnySignal", InputSignal, Channel)
 
 SINCE_1970 = 1e8
@@ -44,13 +44,13 @@ LARGEST = 1e30
 
 
 def read_run(
-    place: str, name: str, run: schema.Run, axes: Axes, log: Log
+    origin: str, name: str, run: schema.RunEntry, axes: Axes, log: Log
 ) -> tuple[list[Experiment], Overview | None]:
     """Experiments of a run: one for each axis that it tests, window of a long log, and split.
 
     Parameters
     ----------
-    place : str
+    origin : str
         The run, for sentences about the campaign file.
     name : str
         Its own.
@@ -65,33 +65,32 @@ def read_run(
     FileError, InputError, ParameterError
         For the first thing that is wrong; the sentence names file, column and row.
     """
-    tested = _axes_of(place, run, axes)
-    names = list(_found(log, tested))
+    tested = _axes_of(origin, run, axes)
+    names = list(_columns_of(log, tested))
     log = in_parts(log, names)
     rows = log.rows_of(names)
     overview = None
-    parts = [(log, False)]
+    windows = [(log, False)]
     if rows is not None and rows > LONG:
         overview = _overview(name, tested, log, rows, run.span)
-        parts = [
+        windows = [
             (replace(log, first=window.first, last=window.last), window.resumes)
             for window in overview.windows
             if window.used
         ]
     experiments = list[Experiment]()
-    for part, resumes in parts:
-        columns = _Columns(part, tested)
+    for window_log, resumes in windows:
+        columns = _Columns(window_log, tested)
         for key, axis in tested.items():
-            full = f"{name} {key}" if len(axes) > 1 else name
-            others = ", ".join(toml_string(each) for each in tested if each != key)
+            others = ", ".join(toml_string(axis_name) for axis_name in tested if axis_name != key)
             without = f"only = [{others}]" if others else 'role = "ignore"'
             experiments += _experiments(
-                full,
-                name,
-                key,
-                run,
-                axis,
-                columns,
+                name=f"{name} {key}" if len(axes) > 1 else name,
+                run_name=name,
+                key=key,
+                run=run,
+                axis=axis,
+                columns=columns,
                 windowed=overview is not None,
                 resumes=resumes,
                 without=without,
@@ -99,16 +98,16 @@ def read_run(
     return experiments, overview
 
 
-def _axes_of(place: str, run: schema.Run, axes: Axes) -> dict[str, schema.Axis]:
+def _axes_of(run_origin: str, run: schema.RunEntry, axes: Axes) -> dict[str, schema.AxisEntry]:
     """The axes that a run tests, with what differs in it."""
     for name in (*run.only, *run.axes):
         if name not in axes:
             raise InputError(
-                f"{place} names the axis '{name}', but the axes are {', '.join(axes)}."
+                f"{run_origin} names the axis '{name}', but the axes are {', '.join(axes)}."
             )
     tested = {name: axes[name] for name in run.only or axes}
     for name, changes in ((name, run.axes[name]) for name in tested if run.axes.get(name)):
-        axis, origin, given = axes[name], f"{place}: axes.{name}", changes.get("channels")
+        axis, origin, given = axes[name], f"{run_origin}: axes.{name}", changes.get("channels")
         for key, change in given.items() if isinstance(given, Mapping) else ():
             if key not in axis.channels and not (isinstance(change, Mapping) and "kind" in change):
                 raise InputError(
@@ -118,7 +117,7 @@ def _axes_of(place: str, run: schema.Run, axes: Axes) -> dict[str, schema.Axis]:
         content = _merged(axis.model_dump(by_alias=True, exclude_unset=True), changes)
         if not content["channels"]:
             raise InputError(f'{origin} has no channel left; say role = "ignore" instead.')
-        tested[name] = validated(content, schema.Axis, origin)
+        tested[name] = validated(content, schema.AxisEntry, origin)
     return tested
 
 
@@ -144,37 +143,37 @@ def _merged(content: dict[str, Any], changes: Mapping[str, Any]) -> dict[str, An
 # --- signals in SI --------------------------------------------------------------------------------
 
 
-def _signals(axis: schema.Axis) -> dict[str, schema.Input | schema.Channel]:
+def _signals(axis: schema.AxisEntry) -> dict[str, schema.InputEntry | schema.ChannelEntry]:
     """An axis's signals, by how sentences call them."""
     return {"the input": axis.input} | {f"channel '{n}'": c for n, c in axis.channels.items()}
 
 
-def _found(log: Log, axes: Axes) -> dict[str, Column]:
+def _columns_of(log: Log, axes: Axes) -> dict[str, LogColumn]:
     """Columns that some axes need, by the names that they are wanted by."""
-    found = dict[str, Column]()
+    column_of = dict[str, LogColumn]()
     for axis in axes.values():
         for what, signal in _signals(axis).items():
             clocks = [clock.column for clock in (signal.time, axis.time) if clock is not None]
-            wanted = [(signal.column, what), *((name, f"the time of {what}") for name in clocks)]
-            for name, why in wanted:
+            requested = [(signal.column, what), *((name, f"the time of {what}") for name in clocks)]
+            for name, why in requested:
                 try:
-                    found |= {name: log.find(name)} if name is not None else {}
+                    column_of |= {name: log.find(name)} if name is not None else {}
                 except InputError as error:
                     raise InputError(f"For {why}: {error}") from None
-    return found
+    return column_of
 
 
 class _Columns:
     """The columns of a log that some axes need, read together."""
 
     def __init__(self, log: Log, axes: Axes) -> None:
-        self.log, self.found = log, _found(log, axes)
-        self.values = log.read(list(self.found))
-        first = replace(log, first=0, last=1).read(list(self.found)) if log.first else self.values
+        self.log, self.columns = log, _columns_of(log, axes)
+        self.values = log.read(list(self.columns))
+        first = replace(log, first=0, last=1).read(list(self.columns)) if log.first else self.values
         self._begins = {name: values[:1] for name, values in first.items()}
-        self._stamps: dict[tuple[schema.Clock, int], Array] = {}
+        self._stamps: dict[tuple[schema.ClockEntry, int], Array] = {}
 
-    def stamps(self, signal: schema.Signal, axis: schema.Axis) -> Array:
+    def stamps(self, signal: schema.SignalEntry, axis: schema.AxisEntry) -> Array:
         """Increasing stamps of a signal; those of a calendar from the axis's first one on. [s]"""
         clock, main, size = signal.time or axis.time, axis.time, self.values[signal.column].size
         # signals share an array: whoever compares stamps sees at once that they are the same
@@ -186,8 +185,8 @@ class _Columns:
                 time = clock.offset + (self.log.first + np.arange(size)) / rate
             else:
                 numbers, factor = self.values[clock.column], self._second(clock)
-                source = f"column '{self.found[clock.column].name}'"
-                check_stamps(self.log, self.found[clock.column].name, numbers)
+                source = f"column '{self.columns[clock.column].name}'"
+                check_stamps(self.log, self.columns[clock.column].name, numbers)
                 of_main = main if main.column is not None else clock
                 begin = self._second(of_main) * float(self._begins[of_main.column or ""][0])
                 # the difference first: a float64 keeps a microsecond of a calendar's stamp
@@ -196,7 +195,7 @@ class _Columns:
             time = self._stamps[clock, size] = check_duration(self.log, source, time)
         return time
 
-    def zero(self, axis: schema.Axis, recorded: datetime | None) -> float | None:
+    def zero(self, axis: schema.AxisEntry, recorded: datetime | None) -> float | None:
         """Calendar time at which an axis's stamps are 0, in seconds since 1970; None if unknown.
 
         `recorded` is when the log begins, if the campaign file says so.
@@ -210,26 +209,26 @@ class _Columns:
             return _seconds(recorded) - first
         return begin - clock.offset if of_calendar else None
 
-    def _second(self, clock: schema.Clock) -> float:
+    def _second(self, clock: schema.ClockEntry) -> float:
         """Size of the unit of a column of stamps [s]."""
-        column = self.found[clock.column or ""]
+        column = self.columns[clock.column or ""]
         unit = clock.unit or unit_of(column, clock.column or "", "s")
         return to_si(1.0, unit, "s", f"{self.log.path}: column '{column.name}' (the time)")
 
-    def _called(self, what: str, signal: schema.Signal) -> str:
+    def _called(self, what: str, signal: schema.SignalEntry) -> str:
         """A signal, for the sentence of an error."""
-        return f"{self.log.path}: column '{self.found[signal.column].name}' ({what})"
+        return f"{self.log.path}: column '{self.columns[signal.column].name}' ({what})"
 
     def _conversion(
-        self, what: str, signal: schema.Input | schema.Channel
+        self, what: str, signal: schema.InputEntry | schema.ChannelEntry
     ) -> tuple[str, float, float]:
         """The SI unit of a signal, with factor and zero, as of `schema.conversion`."""
         usual = (*schema.KINDS[signal.kind].units, "1")[0]
-        unit = signal.unit or unit_of(self.found[signal.column], signal.column, usual)
+        unit = signal.unit or unit_of(self.columns[signal.column], signal.column, usual)
         return conversion(signal.kind, unit, self._called(what, signal))
 
     def as_recorded(
-        self, what: str, signal: schema.Input | schema.Channel
+        self, what: str, signal: schema.InputEntry | schema.ChannelEntry
     ) -> tuple[str, NDArray[np.float64]]:
         """The SI unit of a signal, and all its samples (n,) in it; NaN if one is not finite.
 
@@ -237,7 +236,7 @@ class _Columns:
         """
         si, factor, zero = self._conversion(what, signal)
         numbers = signal.scale * self.values[signal.column] + signal.offset
-        if isinstance(signal, schema.Channel) and signal.counts_per_turn is not None:
+        if isinstance(signal, schema.ChannelEntry) and signal.counts_per_turn is not None:
             encoder = Encoder(signal.counts_per_turn, signal.gear_ratio, signal.sign, None)
             factor *= encoder.angle_per_count
         else:
@@ -247,67 +246,76 @@ class _Columns:
         return si, values
 
     def samples(
-        self, what: str, signal: schema.Input | schema.Channel, axis: schema.Axis, run: schema.Run
+        self,
+        what: str,
+        signal: schema.InputEntry | schema.ChannelEntry,
+        axis: schema.AxisEntry,
+        run: schema.RunEntry,
     ) -> tuple[dict[str, Any], float]:
-        """What a signal is made of, in SI, and the size of its unit; empty where all is missing."""
-        log, column, numbers = self.log, self.found[signal.column], self.values[signal.column]
-        said = self._called(what, signal)
-        time, is_input = self.stamps(signal, axis), isinstance(signal, schema.Input)
+        """What a signal is made of, in SI, and the size of its unit; empty if all is missing."""
+        column = self.columns[signal.column]
+        numbers = self.values[signal.column]
+        described = self._called(what, signal)
+        time = self.stamps(signal, axis)
+        is_input = isinstance(signal, schema.InputEntry)
         if time.size != numbers.size:
-            raise FileError(f"{said} has {numbers.size} samples, but its time {time.size}.")
-        kept = np.ones(numbers.size, np.bool_) if run.span is None else inside(run.span, time)
+            raise FileError(f"{described} has {numbers.size} samples, but its time {time.size}.")
+        used = np.ones(numbers.size, np.bool_) if run.span is None else inside(run.span, time)
         for window in signal.ignore if is_input else ():
-            kept &= ~inside(window, time)
-        missing = kept & ~np.isfinite(numbers)
-        rows = np.flatnonzero(missing) + 1 + log.first
-        if not is_input and rows.size and rows.size == kept.sum():
+            used &= ~inside(window, time)
+        missing = used & ~np.isfinite(numbers)
+        rows = np.flatnonzero(missing) + 1 + self.log.first
+        if not is_input and rows.size and rows.size == used.sum():
             return {}, 1.0
         if rows.size and signal.missing == "refuse":
             others = f" and {rows.size - 1} others" if rows.size > 1 else ""
             raise FileError(
-                f"{said} has no finite number in data row {rows[0]}{others}; mend the log, or say "
-                "missing = 'drop' to leave such samples out."
+                f"{described} has no finite number in data row {rows[0]}{others}; mend the log, or "
+                "say missing = 'drop' to leave such samples out."
             )
-        kept &= ~missing
-        if (left := np.count_nonzero(kept)) < 2:
-            raise FileError(f"{said} has {left} samples that can be used, but needs two at least.")
+        used &= ~missing
+        usable = np.count_nonzero(used)
+        if usable < 2:
+            raise FileError(
+                f"{described} has {usable} samples that can be used, but needs two at least."
+            )
         si, factor, zero = self._conversion(what, signal)
         # an encoder's sign belongs to the scale of its counts, see `Encoder`
         sign = 1 if signal.kind == "encoder_counts" else signal.sign
         with np.errstate(over="ignore"):
-            values = factor * sign * (signal.scale * numbers[kept] + signal.offset) + zero
+            values = factor * sign * (signal.scale * numbers[used] + signal.offset) + zero
             largest = float(np.max(np.abs(values)))
         if not largest < LARGEST:
             raise InputError(
-                f"{said} reaches {largest:.3g} {si}; check its unit, scale and offset."
+                f"{described} reaches {largest:.3g} {si}; check its unit, scale and offset."
             )
         return {
             "kind": signal.kind,
             "unit": si,
-            "time": time if kept.all() else np.ascontiguousarray(time[kept]),
+            "time": time if used.all() else np.ascontiguousarray(time[used]),
             "values": values,
-            "source": Source(log.path, column.name),
+            "source": SignalOrigin(self.log.path, column.name),
             "limits": signal.limits and tuple(factor * end + zero for end in signal.limits),
             "accuracy": _accuracy(signal, factor),
             "dropped": rows.size,
         }, factor
 
 
-def _accuracy(signal: schema.Input | schema.Channel, factor: float) -> Accuracy | None:
+def _accuracy(signal: schema.InputEntry | schema.ChannelEntry, factor: float) -> Accuracy | None:
     """What a campaign file states of an instrument, SI; the rest as assumed of its kind.
 
     A command that is said to be held is logged by what gives it: it changes at its samples.
     """
-    held = isinstance(signal, schema.Input) and signal.interpolation == "previous"
-    if signal.accuracy is None and not held:
+    is_held = isinstance(signal, schema.InputEntry) and signal.interpolation == "previous"
+    if signal.accuracy is None and not is_held:
         return None
-    stated = signal.accuracy or schema.Accuracy()
-    assumed = assumed_accuracy(signal.kind, is_input=isinstance(signal, schema.Input))
+    stated = signal.accuracy or schema.AccuracyEntry()
+    assumed = assumed_accuracy(signal.kind, is_input=isinstance(signal, schema.InputEntry))
     gain = assumed.gain if stated.gain is None else stated.gain
     zero = assumed.zero if stated.zero is None else factor * stated.zero
     time = stated.time
     if time is None:
-        time = 0.0 if held else assumed.time
+        time = 0.0 if is_held else assumed.time
     return Accuracy(gain, zero, time, rounded=stated.zero is None)
 
 
@@ -315,22 +323,22 @@ def _accuracy(signal: schema.Input | schema.Channel, factor: float) -> Accuracy 
 
 
 def _experiments(
+    *,
     name: str,
     run_name: str,
     key: str,
-    run: schema.Run,
-    axis: schema.Axis,
+    run: schema.RunEntry,
+    axis: schema.AxisEntry,
     columns: _Columns,
-    *,
     windowed: bool,
     resumes: bool,
     without: str,
 ) -> Iterator[Experiment]:
-    """One experiment, or several where a counter's position across a gap is not known.
+    """One experiment, or several if a counter's position across a gap is not known.
 
-    A window of a long log is named by its first instant; one that resumes begins in the midst of a
-    motion.
-    `without` is the entry by which the run leaves the axis out.
+    `windowed` names them by their first instant, as windows of a long log. With `resumes` the first
+    one begins in the midst of a motion. `without` is the entry by which the run leaves the axis
+    out.
     """
     parts, _ = columns.samples("the input", axis.input, axis, run)
     between = axis.input.interpolation
@@ -340,10 +348,10 @@ def _experiments(
     for channel, entry in axis.channels.items():
         parts, factor = columns.samples(f"channel '{channel}'", entry, axis, run)
         if not parts and entry.missing == "refuse":
-            left = f"axes.{key}.channels.{channel} = false" if len(axis.channels) > 1 else without
+            remedy = f"axes.{key}.channels.{channel} = false" if len(axis.channels) > 1 else without
             raise FileError(
                 f"{columns.log.path}: column '{entry.column}' (channel '{channel}' of the axis "
-                f"'{key}') has no number at all; leave it out with {left} in this run."
+                f"'{key}') has no number at all; leave it out with {remedy} in this run."
             )
         if not parts:
             notes.append(f"'{channel}' has no sample here and is left out of this run")
@@ -375,34 +383,36 @@ def _experiments(
         )
     unit = {"voltage": "V", "current": "A"}.get(drive.kind, drive.unit)
     for part, (begin, end) in enumerate(pairwise([-np.inf, *sorted(cuts), np.inf])):
-        given = _within(drive, begin, end)
-        kept = {each: _within(read, begin, end) for each, read in signals.items()}
-        kept = {each: read for each, read in kept.items() if read.time.size > 1}
-        if given.time.size < 2 or not kept:
+        command = _within(drive, begin, end)
+        within = {channel: _within(read, begin, end) for channel, read in signals.items()}
+        measured = {channel: read for channel, read in within.items() if read.time.size > 1}
+        if command.time.size < 2 or not measured:
             continue
-        said = list(notes) if part == 0 else []
+        part_notes = list(notes) if part == 0 else []
         if np.isfinite(end):
-            said.append(f"split at {end:.4g} s, from where it is a run of its own: {cuts[end]}")
-        recognised = recognise(given.time, given.values, unit=unit)
+            part_notes.append(
+                f"split at {end:.4g} s, from where it is a run of its own: {cuts[end]}"
+            )
+        recognised = recognise(command.time, command.values, unit=unit)
         maneuver = run.maneuver or recognised.name
         ignored = applying((*axis.ignore, *run.ignore), maneuver)
         yield Experiment(
-            f"{name} from {given.time[0]:.6g} s" if part or windowed else name,
-            key,
-            run_name,
-            run.role,
-            "estimated" if part or resumes else run.start or axis.start,
-            None if part or resumes else run.start_pressure,
-            given,
-            {
-                each: _finished(axis.channels[each], read, given, maneuver, ignored, run)
-                for each, read in kept.items()
+            name=f"{name} from {command.time[0]:.6g} s" if part or windowed else name,
+            axis=key,
+            run=run_name,
+            role=run.role,
+            start="estimated" if part or resumes else run.start or axis.start,
+            start_pressure=None if part or resumes else run.start_pressure,
+            input=command,
+            channels={
+                channel: _finished(axis.channels[channel], read, command, maneuver, ignored, run)
+                for channel, read in measured.items()
             },
-            run.maneuver,
-            recognised,
-            tuple((*ends(each), each.why) for each in ignored),
-            recorded=None if zero is None else zero + float(given.time[0]),
-            notes=tuple(said),
+            stated_maneuver=run.maneuver,
+            recognised=recognised,
+            ignored=tuple((*ends(window), window.why) for window in ignored),
+            recorded=None if zero is None else zero + float(command.time[0]),
+            notes=tuple(part_notes),
         )
 
 
@@ -413,22 +423,24 @@ def _seconds(moment: datetime) -> float:
 
 def _within(signal: AnySignal, begin: float, end: float) -> AnySignal:
     """The part of a signal from one instant to before another [s]."""
-    kept = (signal.time >= begin) & (signal.time < end)
-    if kept.all():
+    is_within = (signal.time >= begin) & (signal.time < end)
+    if is_within.all():
         return signal
     arrays: dict[str, Any] = {
-        key: each[kept] for key, each in vars(signal).items() if isinstance(each, np.ndarray)
+        key: value[is_within]
+        for key, value in vars(signal).items()
+        if isinstance(value, np.ndarray)
     }
     return replace(signal, **arrays)
 
 
 def _finished(
-    entry: schema.Channel,
+    entry: schema.ChannelEntry,
     read: Channel,
     drive: InputSignal,
     maneuver: str,
-    ignored: Sequence[schema.Window],
-    run: schema.Run,
+    ignored: Sequence[schema.TimeWindow],
+    run: schema.RunEntry,
 ) -> Channel:
     """A channel whose counts are unwrapped, with the product of all factors that apply."""
     encoder, counts, values = read.encoder, read.counts, read.values
@@ -445,8 +457,8 @@ def _finished(
     if entry.weight_by_input:
         levels, factors = np.transpose(entry.weight_by_input)
         weight *= np.interp(np.abs(drive.at(read.time)), levels, factors)
-    for each in applying((*entry.weights, *run.weights), maneuver):
-        weight[inside(each, read.time)] *= each.factor
+    for weighted in applying((*entry.weights, *run.weights), maneuver):
+        weight[inside(weighted, read.time)] *= weighted.factor
     for window in (*ignored, *applying(entry.ignore, maneuver)):
         weight[inside(window, read.time)] = 0.0
     if weight.min() == weight.max():
@@ -486,10 +498,10 @@ class _Trace:
     def __init__(
         self,
         key: str,
-        axis: schema.Axis,
+        axis: schema.AxisEntry,
         what: str,
         name: str,
-        signal: schema.Input | schema.Channel,
+        signal: schema.InputEntry | schema.ChannelEntry,
         grains: int,
     ) -> None:
         self.key, self.axis, self.what, self.name, self.signal = key, axis, what, name, signal
@@ -520,9 +532,9 @@ class _Trace:
         self.low[here] = np.fmin.reduceat(values, edges)
         self.high[here] = np.fmax.reduceat(values, edges)
 
-    def envelope(self) -> Envelope:
+    def ranges(self) -> BlockRanges:
         """What was kept of it."""
-        return Envelope(
+        return BlockRanges(
             name=self.name,
             axis=self.key,
             kind=self.signal.kind,
@@ -537,7 +549,9 @@ class _Trace:
         )
 
 
-def _overview(name: str, axes: Axes, log: Log, rows: int, span: schema.Window | None) -> Overview:
+def _overview(
+    name: str, axes: Axes, log: Log, rows: int, span: schema.TimeWindow | None
+) -> Overview:
     """A log of more rows than `LONG` as a whole, and its windows in which an input moves.
 
     The windows are within the span of the run, if it has one. The log is looked through once, block
@@ -560,7 +574,7 @@ def _overview(name: str, axes: Axes, log: Log, rows: int, span: schema.Window | 
         columns = _Columns(part, axes)
         for trace in traces:
             trace.take(columns, first)
-    inputs = [trace for trace in traces if isinstance(trace.signal, schema.Input)]
+    inputs = [trace for trace in traces if isinstance(trace.signal, schema.InputEntry)]
     moving = np.zeros(grains, dtype=np.bool_)
     for trace in inputs:
         extremes = np.stack((trace.low, trace.high), axis=1)
@@ -575,7 +589,7 @@ def _overview(name: str, axes: Axes, log: Log, rows: int, span: schema.Window | 
     return Overview(
         run=name,
         rows=rows,
-        signals=tuple(trace.envelope() for trace in traces),
+        signals=tuple(trace.ranges() for trace in traces),
         windows=_windows(moving, rows, min(trace.period for trace in inputs), inputs[0].time),
         read_from=log.table,
     )
@@ -619,11 +633,11 @@ def _windows(
 def _moves(extremes: Array) -> NDArray[np.bool_]:
     """Whether an input leaves its rest, where it is most often, by its extremes in each grain."""
     middle = extremes.mean(axis=1)
-    known = middle[np.isfinite(middle)]
-    if not known.size or known.min() == known.max():
+    finite = middle[np.isfinite(middle)]
+    if not finite.size or finite.min() == finite.max():
         return np.zeros(middle.size, dtype=np.bool_)
-    counts, edges = np.histogram(known, 64)
+    counts, edges = np.histogram(finite, 64)
     most = int(counts.argmax())
-    rest = np.median(known[(known >= edges[most]) & (known <= edges[most + 1])])
+    rest = np.median(finite[(finite >= edges[most]) & (finite <= edges[most + 1])])
     away = np.max(np.abs(extremes - rest), axis=1)
     return np.asarray(np.nan_to_num(away) > MOVES * np.nanmax(away))

@@ -30,7 +30,7 @@ SMALLEST_VOLTS = 0.1
 LARGEST_ZERO = 0.5
 """Reading at rest beyond which it is no zero error of an instrument. [V]"""
 SHORTEST = 16
-"""Samples below which nothing is told apart."""
+"""Samples below which nothing can be distinguished."""
 HELD = 5
 """Samples for which a level is held at least, or that a rise has between 10 % and 80 % of it."""
 
@@ -140,9 +140,9 @@ def recognise(time: ArrayLike, voltage: ArrayLike, *, unit: str = "V") -> Recogn
         tolerance = max(SURE * noise, 0.01 * peak)
         record = _Record(stamps, values - zero, unit, noise, tolerance, peak, jump)
         for find in (_stairs, _ramp, _sine):
-            found = find(record)
-            if found is not None and _fits(record, found):
-                return Recognised(found.name, found.frequency)
+            shape = find(record)
+            if shape is not None and _fits(record, shape):
+                return Recognised(shape.name, shape.frequency)
     return Recognised(UNNAMED)
 
 
@@ -155,7 +155,7 @@ def _rounded(value: float, uncertainty: float) -> float:
         return 0.0
     exponent = floor(log10(abs(value)))
     tried = (round(value, digits) for digits in range(-exponent, 17 - exponent))
-    return next((each for each in tried if abs(each - value) <= uncertainty), value)
+    return next((candidate for candidate in tried if abs(candidate - value) <= uncertainty), value)
 
 
 def _noise(time: Array, values: Array) -> float:
@@ -177,15 +177,15 @@ def _noise(time: Array, values: Array) -> float:
     return max(float(np.median(np.abs(deviation))) / 0.6745, quantum)
 
 
-def _fits(record: _Record, found: _Found) -> bool:
+def _fits(record: _Record, shape: _Found) -> bool:
     """Whether a record goes back to rest, and the RMS of its rest less the model is small.
 
-    It falls to rest at once or returns to it on a curve of its own.
+    The command either falls to rest from one sample to the next or returns to it on a curve.
     """
-    time, values, first = record.time, record.values, found.leaves
+    time, values, first = record.time, record.values, shape.leaves
     moving = np.flatnonzero(np.abs(values[first:]) > record.tolerance)
     last = first + (int(moving[-1]) + 1 if moving.size else 0)
-    kept = np.ones(values.size, np.bool_) if found.jumps is None else ~found.jumps
+    away_from_jumps = np.ones(values.size, np.bool_) if shape.jumps is None else ~shape.jumps
     if first < values.size:
         if last - first >= record.jump or last == values.size:
             start, stop = float(time[first]), float(time[min(last, values.size - 1)])
@@ -193,17 +193,17 @@ def _fits(record: _Record, found: _Found) -> bool:
             signs = np.sign(tail[np.abs(tail) > record.tolerance])
             if (
                 abs(values[-1]) > max(record.tolerance, 0.05 * record.peak)
-                or stop - start > 0.75 * (start - found.began)
+                or stop - start > 0.75 * (start - shape.began)
                 or np.count_nonzero(np.abs(np.diff(signs)) > 1) > 1
             ):
                 return False
-        found.model[last:] = 0.0
-        kept[max(first - 1, 0) : last] = False
-    squares = (values - found.model)[kept] ** 2
+        shape.model[last:] = 0.0
+        away_from_jumps[max(first - 1, 0) : last] = False
+    squares = (values - shape.model)[away_from_jumps] ** 2
     # one percent of the peak, and noise with a margin for its estimate
     quality = float(np.hypot(0.01 * record.peak, 1.5 * record.noise))
-    parts = np.array_split(squares, max(min(50, squares.size // 8), 1))
-    worst = max(float(part.mean()) for part in parts)
+    stretches = np.array_split(squares, max(min(50, squares.size // 8), 1))
+    worst = max(float(part.mean()) for part in stretches)
     return bool(squares.mean() <= quality**2 and worst <= (3.0 * quality) ** 2)
 
 
@@ -223,12 +223,12 @@ def _stairs(record: _Record) -> _Found | None:
         # without the samples beside its jumps, which may be taken while they last
         beside = min(2, (last - first) // 4)
         first, last = first + beside * (first > 0), last - beside * (last < size)
-        held = values[first:last]
-        usual = np.median(held[: max(HELD, held.size // 10)])
-        held = held[np.abs(held - usual) <= record.tolerance]
-        if held.size < (HELD if last < size else 1):
+        level_samples = values[first:last]
+        usual = np.median(level_samples[: max(HELD, level_samples.size // 10)])
+        level_samples = level_samples[np.abs(level_samples - usual) <= record.tolerance]
+        if level_samples.size < (HELD if last < size else 1):
             return None
-        level, within[first:last] = float(held.mean()), False
+        level, within[first:last] = float(level_samples.mean()), False
         resting = abs(level) <= record.tolerance
         if resting and not shown:
             # of the jump to the first level it is known when it is complete
@@ -236,7 +236,7 @@ def _stairs(record: _Record) -> _Found | None:
             continue
         began = began if shown else float(record.time[first])
         model[first:last] = 0.0 if resting else level
-        error = record.noise * (1.0 / held.size + 2.0 / firsts[1]) ** 0.5
+        error = record.noise * (1.0 / level_samples.size + 2.0 / firsts[1]) ** 0.5
         shown.append(_rounded(level, max(3.0 * error, 0.002 * record.peak)))
     if not shown:
         return None
@@ -330,8 +330,8 @@ def _sine(record: _Record) -> _Found | None:
     hidden = np.arcsin(min(record.tolerance / size, 1.0)) / omega if first else 0.0
     start = float(time[first]) - hidden
     model[:first] = 0.0
-    whole = float(time[min(leaves, time.size - 1)]) - start > 0.99 * 2.0 * np.pi / omega
-    if not whole or (first and abs(mean) > max(0.02 * size, record.noise)):
+    goes_on = float(time[min(leaves, time.size - 1)]) - start > 0.99 * 2.0 * np.pi / omega
+    if not goes_on or (first and abs(mean) > max(0.02 * size, record.noise)):
         return None
     hertz, error = omega / (2.0 * np.pi), float(np.sqrt(covariance[3, 3])) / (2.0 * np.pi)
     frequency = _rounded(hertz, max(3.0 * error, 0.001 * hertz))

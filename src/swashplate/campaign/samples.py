@@ -243,7 +243,7 @@ def find_lost_counts(time: Array, counts: Array) -> Rows:
 
 
 def rolls_over_at(values: Array, counts_per_turn: float | None = None) -> int:
-    """Counts after which a counter begins anew, 0 where the numbers are not such a counter's.
+    """Counts after which a counter begins anew, 0 if the numbers are not such a counter's.
 
     The numbers are whole and many, and some steps go over more than half of their range, which
     become as small as the others when they are taken the other way round. Numbers that only go up

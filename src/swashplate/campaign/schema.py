@@ -9,12 +9,11 @@ from typing import Any, Literal, NamedTuple, TypeVar, get_args
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
 
-from swashplate.entries import Finite, Flag, NotNegative, Positive, Sign
+from swashplate.entries import FileTable, Finite, Flag, NotNegative, Positive, Sign
 from swashplate.errors import InputError
 from swashplate.logs import TextOptions
-from swashplate.results import short
 from swashplate.units import of_shaft, scaling, speed_unit
 
 InputKind = Literal["voltage", "current", "other"]
@@ -38,7 +37,7 @@ class Kind(NamedTuple):
     """What a kind of signal is, and what shows that a column of a log is of it."""
 
     units: tuple[str, ...]
-    """SI units that it may have; the first is meant where none is given. None: as written."""
+    """SI units that it may have; the first is meant if none is given. None: as written."""
     signal: str
     """Simulated signal that it is compared with; none of an input or of anything else."""
     meaning: str
@@ -154,19 +153,10 @@ Between = Literal["previous", "linear", "jumps"]
 """What an input is between two samples: the earlier one, a straight line, or a line that jumps."""
 Role = Literal["fit", "validate", "ignore"]
 InitialState = Literal["rest", "steady", "given", "estimated"]
-AnyWindow = TypeVar("AnyWindow", bound="Window")
+AnyWindow = TypeVar("AnyWindow", bound="TimeWindow")
 
 
-class Entry(BaseModel):
-    """A table of the file; a key that it does not know is refused."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True)
-
-    def __repr__(self) -> str:
-        return short(self)
-
-
-class Window(Entry):
+class TimeWindow(FileTable):
     """A part of a run, on the log's clock after `time.offset`."""
 
     start: Finite | None = Field(None, alias="from", description="First instant [s].")
@@ -179,7 +169,7 @@ class Window(Entry):
     why: str = Field("", description="The reason; it stands in the report.")
 
     @model_validator(mode="after")
-    def _ordered(self) -> Window:
+    def _ordered(self) -> TimeWindow:
         if self.start is not None and self.stop is not None and self.stop <= self.start:
             raise ValueError(f"a window goes from {self.start} s to {self.stop} s; swap them")
         return self
@@ -188,33 +178,35 @@ class Window(Entry):
 def applying(windows: Iterable[AnyWindow], maneuver: str) -> tuple[AnyWindow, ...]:
     """The windows that hold in runs of a maneuver, such as ``"step +4 V"``."""
     return tuple(
-        each for each in windows if each.maneuver is None or fnmatchcase(maneuver, each.maneuver)
+        window
+        for window in windows
+        if window.maneuver is None or fnmatchcase(maneuver, window.maneuver)
     )
 
 
-def ends(window: Window) -> tuple[float, float]:
-    """First and last instant of a window, infinite where it has none. [s]"""
+def ends(window: TimeWindow) -> tuple[float, float]:
+    """First and last instant of a window, infinite if it has none. [s]"""
     return (
         -np.inf if window.start is None else window.start,
         np.inf if window.stop is None else window.stop,
     )
 
 
-def inside(window: Window, time: NDArray[np.float64]) -> NDArray[np.bool_]:
+def inside(window: TimeWindow, time: NDArray[np.float64]) -> NDArray[np.bool_]:
     """(m,) whether stamps [s] lie in a window, its ends included."""
     low, high = ends(window)
     within: NDArray[np.bool_] = (time >= low) & (time <= high)
     return within
 
 
-class Weight(Window):
+class WeightWindow(TimeWindow):
     """A part of a run that counts more or less."""
 
     factor: NotNegative = Field(description="Factor on the squared error; windows multiply.")
 
 
-class Clock(Entry):
-    """The time stamps of a signal: a column, or a rate where the log has none."""
+class ClockEntry(FileTable):
+    """The time stamps of a signal: a column, or a rate if the log has none."""
 
     column: str | None = Field(None, description="Column of the stamps.")
     unit: str | None = Field(None, description="Its unit; the header's, or s.")
@@ -222,7 +214,7 @@ class Clock(Entry):
     offset: Finite = Field(0.0, description="Added to the stamps [s].")
 
     @model_validator(mode="after")
-    def _one_source(self) -> Clock:
+    def _one_source(self) -> ClockEntry:
         if (self.column is None) == (self.rate is None):
             raise ValueError("give either the column of the time or a rate in Hz")
         if self.rate is not None and self.unit is not None:
@@ -230,7 +222,7 @@ class Clock(Entry):
         return self
 
 
-class Accuracy(Entry):
+class AccuracyEntry(FileTable):
     """Limits of an instrument's error, as its data sheet gives them."""
 
     gain: NotNegative | None = Field(
@@ -247,7 +239,7 @@ class Accuracy(Entry):
     )
 
 
-class Signal(Entry):
+class SignalEntry(FileTable):
     """Where a signal is and how its numbers become physical: sign * (scale * number + offset)."""
 
     column: str = Field(description="Column of the log, with or without the unit in its header.")
@@ -255,23 +247,23 @@ class Signal(Entry):
     scale: Finite = Field(1.0, description="Factor on the log's numbers.")
     offset: Finite = Field(0.0, description="Added after scaling, in `unit`.")
     sign: Sign = Field(1, description="-1 turns the signal round.")
-    time: Clock | None = Field(None, description="Its own clock, instead of the axis's.")
+    time: ClockEntry | None = Field(None, description="Its own clock, instead of the axis's.")
     missing: Literal["refuse", "drop"] = Field(
         "refuse",
         description="An empty or NaN cell: refuse the log, or leave those samples out (counted "
         "in the check; a channel without any sample is left out of the run).",
     )
     limits: tuple[Finite, Finite] | None = Field(
-        None, description="Range of the instrument in `unit`, to tell clipping."
+        None, description="Range of the instrument in `unit`, to detect clipping."
     )
-    accuracy: Accuracy | None = Field(
+    accuracy: AccuracyEntry | None = Field(
         None,
         description="Limits of the instrument's error, which intervals take in; those assumed of "
         "its kind are in the documentation of campaign files.",
     )
 
     @model_validator(mode="after")
-    def _sensible(self) -> Signal:
+    def _sensible(self) -> SignalEntry:
         if self.scale == 0.0:
             raise ValueError("a scale of 0 leaves nothing of the signal")
         if self.limits is not None and self.limits[0] >= self.limits[1]:
@@ -279,7 +271,7 @@ class Signal(Entry):
         return self
 
 
-class Input(Signal):
+class InputEntry(SignalEntry):
     """The signal that drives the axis."""
 
     kind: InputKind = Field("voltage", description="voltage, current (signed, no card) or other.")
@@ -289,18 +281,18 @@ class Input(Signal):
         "with sudden changes in the middle of both. Left out, a fit takes what fits best, "
         "everything else the straight line.",
     )
-    ignore: tuple[Window, ...] = Field(
+    ignore: tuple[TimeWindow, ...] = Field(
         (), description="Windows whose samples are left out: the input goes on across them."
     )
 
     @model_validator(mode="after")
-    def _of_all_maneuvers(self) -> Input:
-        if any(each.maneuver is not None for each in self.ignore):
+    def _of_all_maneuvers(self) -> InputEntry:
+        if any(window.maneuver is not None for window in self.ignore):
             raise ValueError("a window of the input holds in every maneuver: leave it out there")
         return self
 
 
-class Channel(Signal):
+class ChannelEntry(SignalEntry):
     """A signal that was measured."""
 
     kind: ChannelKind = Field(description="What it measures.")
@@ -319,17 +311,18 @@ class Channel(Signal):
         None, description="Standard deviation of its noise in `unit`: the weight among channels."
     )
     interpolation: Literal["previous", "linear"] = Field(
-        "linear", description="Between two samples, where a model of your own takes it as an input."
+        "linear",
+        description="Between two samples, if a user-defined model takes it as an input.",
     )
     weight: NotNegative = Field(1.0, description="Factor on its squared errors.")
-    weights: tuple[Weight, ...] = Field((), description="Windows that count more or less.")
+    weights: tuple[WeightWindow, ...] = Field((), description="Windows that count more or less.")
     weight_by_input: tuple[tuple[NotNegative, NotNegative], ...] = Field(
         (), description="[|input|, factor] pairs, a polyline: [[3, 1], [10, 0.5]]."
     )
-    ignore: tuple[Window, ...] = Field((), description="Windows that are left out.")
+    ignore: tuple[TimeWindow, ...] = Field((), description="Windows that are left out.")
 
     @model_validator(mode="after")
-    def _encoder(self) -> Channel:
+    def _encoder(self) -> ChannelEntry:
         if self.kind == "encoder_counts" and self.counts_per_turn is None:
             raise ValueError("encoder_counts need counts_per_turn, quadrature included")
         if self.kind != "encoder_counts" and self.counts_per_turn:
@@ -344,22 +337,22 @@ class Channel(Signal):
         return self
 
 
-class Axis(Entry):
+class AxisEntry(FileTable):
     """One drive of the machine: its model, its input and what is measured of it."""
 
     drive: str | None = Field(
         None, description="A packaged drive, or a parameter file beside this one."
     )
-    time: Clock = Field(description="Clock of all its signals that have none of their own.")
-    input: Input = Field(description="What commands it.")
-    channels: dict[str, Channel] = Field(
+    time: ClockEntry = Field(description="Clock of all its signals that have none of their own.")
+    input: InputEntry = Field(description="What commands it.")
+    channels: dict[str, ChannelEntry] = Field(
         min_length=1, description="What was measured, by a name of your choice."
     )
     start: InitialState = Field("rest", description="State at the first sample.")
-    ignore: tuple[Window, ...] = Field((), description="Windows left out of every channel.")
+    ignore: tuple[TimeWindow, ...] = Field((), description="Windows left out of every channel.")
 
 
-class Run(Entry):
+class RunEntry(FileTable):
     """One log: a run of the machine."""
 
     file: str = Field(description="The log, beside this file.")
@@ -379,35 +372,35 @@ class Run(Entry):
         description="When its log begins, 2026-05-04T13:20:00; by default as its stamps say, if "
         "they are of a calendar. Runs stand in this order.",
     )
-    span: Window | None = Field(None, description="The part of the log to take.")
+    span: TimeWindow | None = Field(None, description="The part of the log to take.")
     only: tuple[str, ...] = Field((), description="The axes that this run tests; all if empty.")
-    ignore: tuple[Window, ...] = Field((), description="Windows left out of every channel.")
-    weights: tuple[Weight, ...] = Field((), description="Windows that count more or less.")
+    ignore: tuple[TimeWindow, ...] = Field((), description="Windows left out of every channel.")
+    weights: tuple[WeightWindow, ...] = Field((), description="Windows that count more or less.")
     weight: NotNegative = Field(1.0, description="Factor on the run's squared errors.")
     maneuver: str | None = Field(None, description="Name of the maneuver, if not recognised.")
     axes: dict[str, dict[str, Any]] = Field(
         {},
         description="Entries of an axis that differ in this run, as in [axes.NAME]; "
-        "channels.NAME = false where the run has no such channel; ignored windows are added.",
+        "channels.NAME = false if the run has no such channel; ignored windows are added.",
     )
 
     @model_validator(mode="after")
-    def _given(self) -> Run:
+    def _given(self) -> RunEntry:
         if (self.start == "given") != (self.start_pressure is not None):
             raise ValueError("start = 'given' and start_pressure belong together")
         return self
 
 
-class CampaignFile(Entry):
+class CampaignFile(FileTable):
     """A campaign: the tests of a machine, beside their logs."""
 
     title: str = Field("", description="For the report.")
     virtual: Flag = Field(False, description="Whether the tests are simulated.")
     format: TextOptions = Field(
-        TextOptions(), description="How text logs are written, where that cannot be recognised."
+        TextOptions(), description="How text logs are written, if that cannot be recognised."
     )
-    axes: dict[str, Axis] = Field(min_length=1, description="The drives, by name.")
-    runs: tuple[Run, ...] = Field(min_length=1, description="Their tests, a log each.")
+    axes: dict[str, AxisEntry] = Field(min_length=1, description="The drives, by name.")
+    runs: tuple[RunEntry, ...] = Field(min_length=1, description="Their tests, a log each.")
 
     @field_validator("format", mode="before")
     @classmethod

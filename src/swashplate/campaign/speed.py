@@ -24,7 +24,7 @@ Method = Literal["exact", "difference"]
 """How a position becomes a speed: by the filters, or by the change between neighbours."""
 
 
-class Speed(NamedTuple):
+class DerivedSpeed(NamedTuple):
     """A speed and how it came about."""
 
     time: Array
@@ -35,7 +35,7 @@ class Speed(NamedTuple):
     """How late it is at low frequencies. [s]"""
 
 
-def speed_of(channel: Channel, method: Method = "exact") -> Speed:
+def speed_of(channel: Channel, method: Method = "exact") -> DerivedSpeed:
     """Speed of a channel that measures a position; a measured speed is given as it is.
 
     Parameters
@@ -53,7 +53,7 @@ def speed_of(channel: Channel, method: Method = "exact") -> Speed:
     """
     time, values, encoder = channel.time, channel.values, channel.encoder
     if channel.kind == "shaft_speed":
-        return Speed(time, values, 0.0)
+        return DerivedSpeed(time, values, 0.0)
     if not channel.is_position or method not in get_args(Method):
         raise InputError(
             f"{channel.source} is a {channel.kind}: only positions, encoders and speeds have a "
@@ -61,12 +61,12 @@ def speed_of(channel: Channel, method: Method = "exact") -> Speed:
         )
     if method == "difference":
         half = 0.5 * float(np.median(np.diff(time)))
-        return Speed(time[1:], np.diff(values) / np.diff(time), half)
+        return DerivedSpeed(time[1:], np.diff(values) / np.diff(time), half)
     if encoder is not None and channel.counts is not None:
         # on a grid where the stamps are even, so that their rounding stays out of the speed
         even, _ = stamps_of(time)
         values = interpolate_counts(even, channel.counts) * encoder.angle_per_count
-    return Speed(time, speed_from_angle(time, values), 1.0 / LOW_PASS + 1.0 / DIFFERENTIATOR)
+    return DerivedSpeed(time, speed_from_angle(time, values), 1.0 / LOW_PASS + 1.0 / DIFFERENTIATOR)
 
 
 def speed_from_angle(time: ArrayLike, angle: ArrayLike) -> Array:
@@ -101,7 +101,7 @@ def march_low_passes(speeds: Array, first: Array, second: Array, filtered: Array
     state = 0.0
     for n in range(speeds.size):
         # what the first low pass has at the start of an interval leaves in the second at its end
-        left = DIFFERENTIATOR / (DIFFERENTIATOR - LOW_PASS) * (first[n] - second[n])
-        fresh = 1.0 - second[n] - left
-        filtered[n + 1] = second[n] * filtered[n] + left * state + fresh * speeds[n]
+        difference = DIFFERENTIATOR / (DIFFERENTIATOR - LOW_PASS) * (first[n] - second[n])
+        fresh = 1.0 - second[n] - difference
+        filtered[n + 1] = second[n] * filtered[n] + difference * state + fresh * speeds[n]
         state = first[n] * state + (1.0 - first[n]) * speeds[n]

@@ -105,9 +105,9 @@ def _group(module: str) -> Any:
 def _loaded(name: str) -> Any:
     """A command of the root, imported now."""
     panel = PANELS[name]
-    found = _group(COMMANDS[panel][name]).commands[name]
-    found.rich_help_panel = panel
-    return found
+    loaded_command = _group(COMMANDS[panel][name]).commands[name]
+    loaded_command.rich_help_panel = panel
+    return loaded_command
 
 
 class _Commands(Mapping[str, Any]):

@@ -10,10 +10,11 @@ from typing import Annotated, Literal
 
 import typer
 
-from swashplate.cli import words
+from swashplate.cli import parsing
 from swashplate.cli.commands import command
 from swashplate.cli.options import (
     NO_VALUE,
+    CommandSampling,
     DriveArgument,
     DriveChoice,
     FigureFile,
@@ -21,13 +22,21 @@ from swashplate.cli.options import (
     Interpolation,
     ManeuverOrLog,
     OptionalCommand,
-    Sampling,
     SetFile,
     Simulating,
     TableFile,
     VariablesOption,
 )
-from swashplate.cli.terminal import bullets, check_output, draw, note, save, say, show, working
+from swashplate.cli.terminal import (
+    bullets,
+    check_writable,
+    draw_figure,
+    note,
+    save,
+    say,
+    show,
+    spinner,
+)
 from swashplate.errors import InputError
 from swashplate.tables import joined, quantity
 
@@ -80,20 +89,20 @@ def limits(
     from swashplate.analysis.limits import shares_of
 
     if maneuver is None:
-        with working("Measuring"):
-            found = envelope(drive.chosen)
-        save(out, "Envelope, in SI", found.write)
-        draw(plot, "plot_envelope", found)
+        with spinner("Measuring"):
+            limits_found = envelope(drive.chosen)
+        save(out, "Envelope, in SI", limits_found.write)
+        draw_figure(plot, "plot_envelope", limits_found)
         drive.note(f"{drive.title}: performance envelope")
-        show(found.table())
+        show(limits_found.table())
         return
-    with working("Simulating"):
-        chosen = words.at_rate(drive.chosen, sampling.rate)
-        name, run = words.simulated_as(chosen, maneuver, sampling)
-        shares = shares_of(chosen, run)
+    with spinner("Simulating"):
+        marched = parsing.at_rate(drive.chosen, sampling.rate)
+        name, run = parsing.simulated_as(marched, maneuver, sampling)
+        shares = shares_of(marched, run)
     title = f"{drive.title}, {name}"
     save(out, "Shares of each limit, in SI", shares.write)
-    draw(plot, "plot_limit_timeline", run, reference=shares.reference, title=title)
+    draw_figure(plot, "plot_limit_timeline", run, reference=shares.reference, title=title)
     error = quantity(shares.error, "rad/s", spec=".3f")
     # which of the limits that act here no test reached is said below, by the result itself
     drive.note(f"{title}: {error} rms from a drive without limits", unreached=False)
@@ -162,7 +171,7 @@ def whatif(
             is_eager=True,
         ),
     ] = False,
-    sampling: Sampling,
+    sampling: CommandSampling,
     force: Force = False,
 ) -> None:
     """Predict the effect of a change to the machine.
@@ -175,37 +184,37 @@ def whatif(
     from swashplate.analysis import monte_carlo
     from swashplate.analysis.whatif import AS_IS, CHANGED, what_if
 
-    moved = words.factors_of(factors)
+    moved = parsing.factors_of(factors)
     choice = DriveChoice(drive)
-    with working("Simulating"):
-        name, trial = words.trial_of(choice.chosen, maneuver, sampling)
+    with spinner("Simulating"):
+        name, trial = parsing.named_trial(choice.chosen, maneuver, sampling)
         result = what_if(choice.chosen, moved, trial, outcomes=(*OUTCOMES, "travel"))
-    bands, said = dict[str, monte_carlo.Bands](), list[str]()
+    bands, sentences = dict[str, monte_carlo.Bands](), list[str]()
     if uncertainty is not None:
-        with working("Drawing drives"):
+        with spinner("Drawing drives"):
             draws = monte_carlo.stored_draws(uncertainty, drive=choice.chosen, campaign=campaign)
             drawn = {AS_IS: draws, CHANGED: draws.with_factors(moved)}
-            said.append(
+            sentences.append(
                 f"± is half of the interval that contains {100.0 * LEVEL:g} % of the drives."
             )
-            for which, each in drawn.items():
-                band = monte_carlo.bands(each, trial, result.outcomes, level=LEVEL)
+            for which, variant in drawn.items():
+                band = monte_carlo.bands(variant, trial, result.outcomes, level=LEVEL)
                 bands[which], (width, when) = band, band.widest
-                said.append(
+                sentences.append(
                     f"Band of {band.draws} drives, {which}: at most "
                     f"{quantity(width, 'rad/s', spec='.3g')} wide, at {when:.3g} s."
                 )
-            said += draws.sentences()
+            sentences += draws.sentences()
     save(out, "Changed drive", result.after.drive.to_toml)
     title = f"{choice.title}, {name}"
     changes = ", ".join(f"{name} x {factor:g}" for name, factor in moved.items())
-    draw(plot, "plot_whatif", result, bands=bands, title=f"{title}: {changes}")
+    draw_figure(plot, "plot_whatif", result, bands=bands, title=f"{title}: {changes}")
     choice.note(title)
-    before, after = (each.drive.parameters for each in (result.before, result.after))
-    for line in words.changes_between(before, after):
+    before, after = (variant.drive.parameters for variant in (result.before, result.after))
+    for line in parsing.changes_between(before, after):
         note(line)
     show(result.table(bands))
-    bullets(result.sentences(), said)
+    bullets(result.sentences(), sentences)
 
 
 @command(
@@ -263,27 +272,29 @@ def size(
 
     if (tracking_deg_s is None) != (maneuver is None):
         raise InputError("--tracking-deg-s and --maneuver belong together: give both or neither.")
-    given = (speed_deg_s, acceleration_deg_s2, tracking_deg_s)
-    speed, acceleration, error = (None if each is None else radians(each) for each in given)
+    requested = (speed_deg_s, acceleration_deg_s2, tracking_deg_s)
+    speed, acceleration, error = (
+        None if degrees is None else radians(degrees) for degrees in requested
+    )
     required = sizing.Requirements(speed, acceleration, error, direction)
-    with working("Sizing"):
-        follow, ranges = None, words.ranges_of(variables or SIZED, sizing.DEFAULT_RANGE)
+    with spinner("Sizing"):
+        follow, ranges = None, parsing.factor_ranges_of(variables or SIZED, sizing.DEFAULT_RANGE)
         if maneuver is not None:
-            voltage = words.maneuver_of(maneuver, drive.chosen).sample()
+            voltage = parsing.named_maneuver(maneuver, drive.chosen).sample()
             # a larger drive may well be what it takes to reach it
             reference = proportional_speed(drive.chosen, voltage, limited=False)
             follow = trial_of(drive.chosen, voltage, reference=reference)
-        found = sizing.size(drive.chosen, required, ranges, follow=follow)
-    save(out, "Changed drive", found.drive.to_toml)
+        result = sizing.size(drive.chosen, required, ranges, follow=follow)
+    save(out, "Changed drive", result.drive.to_toml)
     drive.note(drive.title)
-    show(*found.tables())
-    if found.change == 0.0:
+    show(*result.tables())
+    if result.change == 0.0:
         say("The drive meets the requirements as it is.")
     elif not drive.changes:  # whatif begins at a drive as its file has it
-        moved = [f"{name}={factor!r}" for name, factor in found.factors.items() if factor != 1.0]
-        scales = [word for each in moved for word in ("--scale", each)]
-        said = shlex.join(["swashplate", "whatif", drive.drive, *scales])
-        note(f"To simulate the change: {said}")
+        moved = [f"{name}={factor!r}" for name, factor in result.factors.items() if factor != 1.0]
+        scales = [word for factor in moved for word in ("--scale", factor)]
+        command_line = shlex.join(["swashplate", "whatif", drive.drive, *scales])
+        note(f"To simulate the change: {command_line}")
 
 
 @command(
@@ -313,22 +324,22 @@ def sensitivity(
     maneuver: ManeuverOrLog = "step:9",
     plot: FigureFile = None,
     out: TableFile = None,
-    sampling: Sampling,
+    sampling: CommandSampling,
     force: Force = False,
 ) -> None:
     """Show the effect of each design variable, changed down and up by itself."""
     from swashplate.analysis import one_at_a_time
 
-    with working("Simulating"):
-        name, trial = words.trial_of(drive.chosen, maneuver, sampling)
-        ranges = words.ranges_of(variables or (*VARIED, "spool_offset"), SPAN)
-        found = one_at_a_time(drive.chosen, ranges, trial, outcomes=tuple(outcomes or OUTCOMES))
+    with spinner("Simulating"):
+        name, trial = parsing.named_trial(drive.chosen, maneuver, sampling)
+        ranges = parsing.factor_ranges_of(variables or (*VARIED, "spool_offset"), SPAN)
+        result = one_at_a_time(drive.chosen, ranges, trial, outcomes=tuple(outcomes or OUTCOMES))
     title = f"{drive.title}, {name}"
-    save(out, "All numbers, in SI", joined(found.tables(every=True)).write)
-    draw(plot, "plot_tornado", found, title=f"{title}: each design variable by itself")
+    save(out, "All numbers, in SI", joined(result.tables(every=True)).write)
+    draw_figure(plot, "plot_tornado", result, title=f"{title}: each design variable by itself")
     drive.note(title)
-    show(*found.tables())
-    bullets(dict.fromkeys(found.sentences))
+    show(*result.tables())
+    bullets(dict.fromkeys(result.sentences))
 
 
 @command(
@@ -373,7 +384,7 @@ def compensate(
         ),
     ] = None,
     plot: FigureFile = None,
-    sampling: Sampling,
+    sampling: CommandSampling,
     force: Force = False,
 ) -> None:
     """Invert a drive's steady-state map: find the voltage for a required speed.
@@ -385,23 +396,25 @@ def compensate(
     """
     from swashplate.analysis import compensation
 
-    check_output(out, compensation.INVERSE_MAP, force=force)
+    check_writable(out, compensation.INVERSE_MAP, force=force)
     if stick is not None and stick.lstrip("+-").replace(".", "", 1).isdecimal():
         raise InputError(
             f"{stick} is a number, not a maneuver or a log: for the voltage of a speed, write "
             f"--speed-deg-s {stick}."
         )
-    with working("Inverting"):
-        chosen = words.at_rate(drive.chosen, sampling.rate)
-        found, bought = compensation.inverse_map(chosen, points), None
-        tables = found.tables([radians(each) for each in speeds_deg_s or ()])
+    with spinner("Inverting"):
+        marched = parsing.at_rate(drive.chosen, sampling.rate)
+        inverse, improvement = compensation.inverse_map(marched, points), None
+        tables = inverse.tables([radians(speed) for speed in speeds_deg_s or ()])
         if stick is not None:
-            name, run = words.simulated(chosen, stick, sampling)
-            reference = compensation.speed_of_command(found, run["voltage"])
-            bought = compensation.improvement(chosen, reference, run.record.rate, inverse=found)
-            tables.append(replace(bought.table(), title=f"Error of the speed under {name}"))
-    save(out, "Inverse map, in SI", found.write)
-    draw(plot, "plot_compensation", found, bought)
+            name, run = parsing.simulated_run(marched, stick, sampling)
+            reference = compensation.speed_of_command(inverse, run["voltage"])
+            improvement = compensation.improvement(
+                marched, reference, run.record.rate, inverse=inverse
+            )
+            tables.append(replace(improvement.table(), title=f"Error of the speed under {name}"))
+    save(out, "Inverse map, in SI", inverse.write)
+    draw_figure(plot, "plot_compensation", inverse, improvement)
     drive.note(f"{drive.title}: voltage for a required speed")
     show(*tables)
 
@@ -467,14 +480,14 @@ def linearize(
     from swashplate.drive import model_tables
     from swashplate.linear import LINEAR_MODEL
 
-    check_output(out, LINEAR_MODEL, force=force)
+    check_writable(out, LINEAR_MODEL, force=force)
     if (at is None) == (current is None):
         raise InputError(
             "A drive is linearised at a voltage or a current: give one of --at and --current."
         )
     if current is not None and input == "voltage":
         raise InputError("--input voltage needs --at, not --current.")
-    with working("Linearising"):
+    with spinner("Linearising"):
         model = drive.chosen.linearize(at, current=current, input=input)
         if sample_time is not None:
             if not sample_time > 0.0:
@@ -549,19 +562,19 @@ def bode(
         raise InputError(
             f"--from and --to must rise from above 0 Hz, not {lowest:g} to {highest:g}."
         )
-    with working("Sweeping"):
+    with spinner("Sweeping"):
         linear = None if linear_at is None else drive.chosen.linearize(linear_at)
         grid = np.union1d(np.geomspace(lowest, highest, points), [frequency])
         response = drive.chosen.frequency_response(grid, amplitudes or AMPLITUDES, bias=bias)
-        made = response_table(response, frequency)
+        table = response_table(response, frequency)
     save(out, "Gain, phase and distortion, in SI", response.write)
-    draw(plot, "plot_bode", response, linear=linear, mark=frequency)
+    draw_figure(plot, "plot_bode", response, linear=linear, mark=frequency)
     span = f"{grid.size} frequencies from {grid[0]:g} to {grid[-1]:g} Hz"
     drive.note(f"{drive.title}, sines about {bias:g} V: {span}")
     note(f"At {frequency:g} Hz:")
-    show(made)
-    for each in response.still():
-        say(f"{each}.")
+    show(table)
+    for output in response.still():
+        say(f"{output}.")
 
 
 @command(
@@ -616,30 +629,30 @@ def full_order(
 
     if maneuver is None and plot is not None:
         raise InputError("--plot draws one run; name a maneuver or a log, such as step:9.")
-    given = words.physical_values(physical or ())
-    with working("Completing the physical values"):
-        chosen = words.at_rate(drive.chosen, sampling.rate)
-        axis = physical_set.nearest_set(chosen.name) if like is None else like
-        whole = full.FullOrderDrive.from_drive(chosen.plain, axis, **given)
-        tables = [physical_set.choices_table(axis, given), whole.modes().table()]
-    with working("Simulating"):
+    physical_values = parsing.physical_values(physical or ())
+    with spinner("Completing the physical values"):
+        marched = parsing.at_rate(drive.chosen, sampling.rate)
+        axis = physical_set.nearest_set(marched.name) if like is None else like
+        full_drive = full.FullOrderDrive.from_drive(marched.plain, axis, **physical_values)
+        tables = [physical_set.choices_table(axis, physical_values), full_drive.modes().table()]
+    with spinner("Simulating"):
         if maneuver is None:
-            found = full.validity(whole, sampling.rate)
-            title, said = drive.title, f"{len(found.rows)} maneuvers"
+            domain = full.validity(full_drive, sampling.rate)
+            title, heading = drive.title, f"{len(domain.rows)} maneuvers"
         else:
-            name, run = words.simulated_as(whole.drive, maneuver, sampling)
-            both = full.compare(whole, run, start=sampling.start)
-            found = full.validity_table(whole.physical.name, [(name, both)])
+            name, run = parsing.simulated_as(full_drive.drive, maneuver, sampling)
+            comparison = full.compare(full_drive, run, start=sampling.start)
+            domain = full.validity_table(full_drive.physical.name, [(name, comparison)])
             title = f"{drive.title}, {name}"
-            said = f"{both.time.size} samples at {sampling.rate:g} Hz"
+            heading = f"{comparison.time.size} samples at {sampling.rate:g} Hz"
     if maneuver is None:
-        save(out, "Table", found.write)
+        save(out, "Table", domain.write)
     else:
-        save(out, "All signals, in SI", both.write)
-        draw(plot, "plot_full_order", both, title=f"{title}, five states versus one")
-    drive.note(f"{title}, five states versus one: {said}")
-    if chosen.parameters.refinements:
-        listed = ", ".join(chosen.parameters.refinements)
+        save(out, "All signals, in SI", comparison.write)
+        draw_figure(plot, "plot_full_order", comparison, title=f"{title}, five states versus one")
+    drive.note(f"{title}, five states versus one: {heading}")
+    if marched.parameters.refinements:
+        listed = ", ".join(marched.parameters.refinements)
         note(f"Neither model has refinements; these are left out: {listed}.")
-    show(*tables, found)
-    say(full.validity_verdict(found))
+    show(*tables, domain)
+    say(full.validity_verdict(domain))

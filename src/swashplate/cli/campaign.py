@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from swashplate.cli import words
+from swashplate.cli import parsing
 from swashplate.cli.commands import command
 from swashplate.cli.options import (
     CAMPAIGN,
@@ -27,13 +27,13 @@ from swashplate.cli.options import (
 from swashplate.cli.terminal import (
     bullets,
     check_free,
-    check_output,
-    draw,
+    check_writable,
+    draw_figure,
     note,
     save,
     say,
     show,
-    working,
+    spinner,
 )
 from swashplate.errors import InputError
 from swashplate.tables import (
@@ -136,16 +136,18 @@ def init(
     from swashplate.drafting.draft import FIXME, NO_ENCODER, UNUSED, draft_campaign
 
     target = out or logs[0].parent / "campaign.toml"
-    check_output(target, CAMPAIGN_FILE, force=force)
-    file = None if drive is None else words.drive_file(drive)
+    check_writable(target, CAMPAIGN_FILE, force=force)
+    file = None if drive is None else parsing.drive_file(drive)
     if file is not None:  # a drive as a campaign file names it
-        place, root = file.resolve(), target.parent.resolve()
-        drive = (place.relative_to(root) if place.is_relative_to(root) else place).as_posix()
+        resolved, root = file.resolve(), target.parent.resolve()
+        drive = (
+            resolved.relative_to(root) if resolved.is_relative_to(root) else resolved
+        ).as_posix()
     kinds = {
-        name: kind for kind, name in words.pairs_of("--column", column, "voltage=u", often=True)
+        name: kind for kind, name in parsing.pairs_of("--column", column, "voltage=u", often=True)
     }
-    units = dict(words.pairs_of("--unit", unit, "u=mV"))
-    with working("Reading"):
+    units = dict(parsing.pairs_of("--unit", unit, "u=mV"))
+    with spinner("Reading"):
         text = draft_campaign(
             logs,
             target.parent,
@@ -165,7 +167,7 @@ def init(
             table = line.partition("    #")[0]
         if line.startswith((UNUSED, NO_ENCODER)):
             note(f"  {line.lstrip('# ')}")
-        elif any(each in line for each in open_ends):
+        elif any(end in line for end in open_ends):
             note(f"  {table} {line.lstrip('# ')}")
     note(f"Then run\n  swashplate campaign check {shlex.quote(str(target))}")
 
@@ -196,29 +198,35 @@ def check(
     from swashplate import campaign as tests
     from swashplate.identification.diagnostics.data_checks import beside_the_drives
 
-    words.check_kind(path, "campaign")
-    with working(f"Reading {path}"):
+    parsing.check_file_kind(path, "campaign")
+    with spinner(f"Reading {path}"):
         campaign = tests.Campaign.from_toml(path)
         unsigned = {name for _, name in tests.unsigned_currents(campaign)}
-        qualities = {each.name: tests.examine(each, unsigned) for each in campaign}
+        qualities = {
+            experiment.name: tests.examine(experiment, unsigned) for experiment in campaign
+        }
         of_file = dict.fromkeys((*tests.campaign_findings(campaign), *beside_the_drives(campaign)))
-    roles = [each.role for each in campaign]
+    roles = [experiment.role for experiment in campaign]
     counted = ", ".join(f"{roles.count(role)} to {role}" for role in dict.fromkeys(roles))
-    note(f"{words.title_of(campaign)}: {len(campaign)} experiments ({counted})")
+    note(f"{parsing.title_of(campaign)}: {len(campaign)} experiments ({counted})")
     for overview in campaign.overviews:
         show(overview.table())
         bullets([overview.sentence])
     for experiment in campaign:
-        found = qualities[experiment.name]
-        show(tests.quality_table(experiment, found))
+        qualities_of_run = qualities[experiment.name]
+        show(tests.quality_table(experiment, qualities_of_run))
         bullets(f"{text}." for text in experiment.notes)
-        for each in found:
-            for text in each.findings:  # unbroken: a line to paste may be in it
-                note(ended(f"! {each.signal}: {text}"))
+        for quality in qualities_of_run:
+            for text in quality.findings:  # unbroken: a line to paste may be in it
+                note(ended(f"! {quality.signal}: {text}"))
     note(LEGEND)
     for text in of_file:
         say(ended(f"! {text}"))
-    findings = sum(len(each.findings) for found in qualities.values() for each in found)
+    findings = sum(
+        len(quality.findings)
+        for qualities_of_run in qualities.values()
+        for quality in qualities_of_run
+    )
     findings += len(of_file)
     if campaign.ignored:
         note(f"Ignored, and not opened: {', '.join(campaign.ignored)}.")
@@ -271,29 +279,37 @@ def plot(
     from swashplate.identification import predict
     from swashplate.identification.estimation.drive_model import SIGNALS
 
-    with working(f"Reading {path}"):
+    with spinner(f"Reading {path}"):
         campaign = Campaign.from_toml(path)
     channels = () if run is None else campaign[run].channels
     if (run is None) != (channel is None):
-        known = f"; {run} has {', '.join(channels)}" if channels else ""
+        channels_listed = f"; {run} has {', '.join(channels)}" if channels else ""
         raise InputError(
-            f"--run and --channel go together: give both, or none for the overview{known}."
+            "--run and --channel go together: give both, or none for the overview"
+            f"{channels_listed}."
         )
     if run is not None and channel is not None:
         experiment, shown, simulated = campaign[run], campaign[run][channel], None
         drive = campaign.axes[experiment.axis].drive
         if shown.kind in SIGNALS and drive is not None and not shown.is_position:
-            found = predict(campaign.drive(experiment.axis), [experiment])
-            simulated = next((each.simulated for each in found if each.channel == channel), None)
-        window = words.window_of(shown.time, begin, end)
-        how = {"window": window, "title": f"{run}, {channel}"}
-        draw(out, "plot_channel", shown, simulated, **how)
+            predictions = predict(campaign.drive(experiment.axis), [experiment])
+            simulated = next(
+                (
+                    prediction.simulated
+                    for prediction in predictions
+                    if prediction.channel == channel
+                ),
+                None,
+            )
+        window = parsing.window_of(shown.time, begin, end)
+        labels = {"window": window, "title": f"{run}, {channel}"}
+        draw_figure(out, "plot_channel", shown, simulated, **labels)
     else:
-        figures = campaign.plot(title=words.title_of(campaign))
+        figures = campaign.plot(title=parsing.title_of(campaign))
         several = [out.with_stem(f"{out.stem}-{k}") for k in range(1, len(figures) + 1)]
         check_free(*several, force=force)
         for path, figure in zip([out] if len(figures) == 1 else several, figures, strict=True):
-            draw(path, figure)
+            draw_figure(path, figure)
 
 
 # --- virtual tests --------------------------------------------------------------------------------
@@ -349,25 +365,25 @@ def rig(
     from swashplate import rig as bench
 
     check_free(out, force=force)
-    with working("Simulating"):
-        nominal = words.drive_of(drive.drive)
+    with spinner("Simulating"):
+        nominal = parsing.drive_of(drive.drive)
         tests = bench.run(
-            nominal if words.drive_file(drive.drive) else drive.drive,
-            [words.maneuver_of(each, nominal) for each in maneuver or ()] or None,
+            nominal if parsing.drive_file(drive.drive) else drive.drive,
+            [parsing.named_maneuver(word, nominal) for word in maneuver or ()] or None,
             seed=seed,
             severity=severity,
             instruments=replace(bench.SEVERITIES[severity], backlash=radians(backlash_deg)),
             truth=drive.chosen if drive.values or drive.factors else None,
             perturb=perturb,
         )
-    with working("Writing"):
+    with spinner("Writing"):
         path = bench.write(tests, out, overwrite=force)
     text = (Column("log"), Column("maneuver", wrap=True), Column("role"))
-    made = Table("", (*text, Column("rows", "d"), Column("s", ".4g")))
+    table = Table("", (*text, Column("rows", "d"), Column("s", ".4g")))
     for run in tests.runs.values():
         time = run.columns["time"]
-        made.add(f"{run.stem}.csv", run.name, run.role, time.size, float(time[-1] - time[0]))
-    show(made)
+        table.add(f"{run.stem}.csv", run.name, run.role, time.size, float(time[-1] - time[0]))
+    show(table)
     note(f"Campaign: {path}")
     note(f"Truth:    {path.parent / 'truth'} (to be opened after the fit)")
 
@@ -411,28 +427,30 @@ def guess(
 
     folder = path.parent if out is None else out
     start, setup = folder / "start.toml", folder / "setup.toml"
-    with working(f"Reading {path}"):
+    with spinner(f"Reading {path}"):
         check_free(start, setup, force=force)
-        campaign, chosen = words.campaign_of(path, axis)
+        campaign, axis_name = parsing.campaign_of(path, axis)
         check_folder(folder)
-        runs = runs_to_fit(campaign, chosen)
-        found = drafting.guess_drive(runs)
-        parameters = drafting.guessed_set(found, path.name)
+        runs = runs_to_fit(campaign, axis_name)
+        guessed = drafting.guess_drive(runs)
+        parameters = drafting.guessed_set(guessed, path.name)
         made_folder(folder)
         Drive(parameters).to_toml(start)
-        write_text(drafting.guessed_fit_setup(found, parameters), setup)
-    show(drafting.guess_table(found))
-    if found.amplifier is not None:
-        show(drafting.amplifier_table(found.amplifier))
-        card = found.amplifier.card
+        write_text(drafting.guessed_fit_setup(guessed, parameters), setup)
+    show(drafting.guess_table(guessed))
+    if guessed.amplifier is not None:
+        show(drafting.amplifier_table(guessed.amplifier))
+        card = guessed.amplifier.card
         like = f"like that of the packaged card {card}" if card else "a plain one"
         say(
-            f"Its filter is {like}; fit {found.amplifier.fit_percent:.1f} % of the currents. The "
+            f"Its filter is {like}; fit {guessed.amplifier.fit_percent:.1f} % of the currents. The "
             "first stage fits the amplifier to the current, the second one the machine."
         )
     for sentence, _ in spiked(runs).values():
         note(f"! {sentence}.")
-    note(f"These numbers alone: fit {found.fit_percent:.1f} % of the mean speeds (100 % is best).")
+    note(
+        f"These numbers alone: fit {guessed.fit_percent:.1f} % of the mean speeds (100 % is best)."
+    )
     note(f"Start:             {start}")
     note(f"Fit setup: {setup}")
     then = ["swashplate", "fit", str(path), "--from", str(start), "--setup", str(setup)]
@@ -508,9 +526,9 @@ def advise(
     from swashplate.identification.estimation.stages import smooth
     from swashplate.identification.statistics import experiment_design as design
 
-    tested = words.file_kind(Path(subject)) == "campaign"
-    given = {"--axis": axis, "--from": begin, "--drive": drive, "--runs": runs}
-    for option, value in given.items():
+    tested = parsing.file_kind(Path(subject)) == "campaign"
+    options = {"--axis": axis, "--from": begin, "--drive": drive, "--runs": runs}
+    for option, value in options.items():
         if value is not None and not tested:
             raise InputError(f"{option} needs a campaign: {subject} is a drive without tests.")
     if begin is not None and drive is not None:
@@ -518,17 +536,17 @@ def advise(
             "--from is the initial drive before a fit, --drive the fitted one: give one of them."
         )
     named = drive if tested else subject
-    source = None if named is None else words.drive_file(named)
+    source = None if named is None else parsing.drive_file(named)
     if setup is None and source is not None:
         # a fit writes what it estimated next to the drive that it found
-        estimated = source.parent / words.SETUP_FILE
+        estimated = source.parent / parsing.SETUP_FILE
         setup = str(estimated) if estimated.is_file() else None
     run_informations = list[design.RunInformation]()
     doubts = tuple[str, ...]()
     run_names = list[str]()
-    with working("Evaluating the tests"):
+    with spinner("Evaluating the tests"):
         if tested:
-            _, experiments, plan, start = words.fit_of(Path(subject), axis, setup, drive or begin)
+            _, experiments, plan, start = parsing.fit_of(Path(subject), axis, setup, drive or begin)
             doubts = refuse_unsound(check_runs(experiments, smooth(start)))
             run_informations = [
                 design.run_information(stage, smooth(start), experiments) for stage in plan.stages
@@ -538,10 +556,10 @@ def advise(
                 smooth(start), plan, experiments, fitted=drive is not None
             )
         else:
-            start = words.parameters_of(subject)
+            start = parsing.parameters_of(subject)
             prior = design.prior_information(smooth(start), load_setup(setup or start.name))
         machine = Drive(prior.parameters)
-        requested = [words.maneuver_of(word, machine) for word in maneuver or ()]
+        requested = [parsing.named_maneuver(word, machine) for word in maneuver or ()]
         maneuvers = {each.name: each for each in requested or design.default_maneuvers()}
         candidates = [prior.candidate(each) for each in maneuvers.values()]
         ranked = design.advise(prior.present, candidates, prior.variables)

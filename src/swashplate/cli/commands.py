@@ -18,7 +18,7 @@ Function = Callable[..., None]
 
 
 @dataclass(frozen=True)
-class Display:
+class DisplayUnits:
     """Units that tables and figures are shown in."""
 
     units: Annotated[
@@ -58,11 +58,11 @@ def command(
                     parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY, annotation=annotation)
                 )
         if units:
-            parameters += _spread(Display)
+            parameters += _spread(DisplayUnits)
 
         @wraps(function)
         def run(**arguments: Any) -> None:
-            display = _gathered(Display, arguments) if units else Display()
+            display = _gathered(DisplayUnits, arguments) if units else DisplayUnits()
             for parameter, group in groups.items():
                 arguments[parameter] = _gathered(group, arguments)
             shown = [unit.strip() for unit in display.units.split(",") if unit.strip()]
@@ -74,7 +74,7 @@ def command(
 
         # Typer reads arguments and options off the signature
         run.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
-        run.__annotations__ = {each.name: each.annotation for each in parameters}
+        run.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
         app.command(name, epilog=_epilog(examples))(run)
         return function
 

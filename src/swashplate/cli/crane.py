@@ -18,8 +18,8 @@ from swashplate.cli.crane_options import (
     Studied,
     control_of,
     crane_of,
+    named_numbers,
     number_of,
-    numbers_by_name,
     sea_sentences,
 )
 from swashplate.cli.options import (
@@ -30,7 +30,7 @@ from swashplate.cli.options import (
     TableFile,
     new_file,
 )
-from swashplate.cli.terminal import draw, note, save, say, say_saved, show, side, working
+from swashplate.cli.terminal import draw_figure, note, save, say, say_saved, show, side, spinner
 from swashplate.errors import InputError
 from swashplate.tables import PAGE, Column, Form, Table
 
@@ -159,13 +159,13 @@ def run(
     last = ""
     if out is not None and len(variant or ()) > 1:
         raise InputError("--out writes one run's signals: take one --variant.")
-    with working("Simulating"):
+    with spinner("Simulating"):
         from swashplate.crane import OperatorCommand, run_tables, simulate
         from swashplate.crane.axes import RATE
 
         crane = operated.chosen
         seaway = operated.seaway(seed=seed, length=length)
-        targets = numbers_by_name("--until", until, "slew_deg=45")
+        targets = named_numbers("--until", until, "slew_deg=45")
         stick = OperatorCommand.trapezoid(
             hoist=hoist, slew=slew, luff=luff, until=targets, duration=duration, length=length
         )
@@ -179,7 +179,7 @@ def run(
             )
         tables = run_tables(runs)
     save(out, "All signals, in SI", runs[last].write)
-    draw(plot, "plot_crane", runs)
+    draw_figure(plot, "plot_crane", runs)
     if scene is not None:
         from swashplate.report.scene import write_scene
 
@@ -281,7 +281,7 @@ def assess(
         what = "Verdict"
         write = partial(write_assessment, assessment)
     save(out, what, write)
-    draw(plot, "plot_assessment", assessment)
+    draw_figure(plot, "plot_assessment", assessment)
     _end(study.chosen, assessment.tables(), *assessment.sentences()[1:])
     say_saved()
     if not assessment.passed:
@@ -358,7 +358,7 @@ def operability(
         what = "Operability"
         write = partial(write_operability, year)
     save(out, what, write)
-    draw(plot, "plot_operability", year)
+    draw_figure(plot, "plot_operability", year)
     _end(study.chosen, year.tables(), *year.sentences(), *study.chosen.provenance())
 
 
@@ -377,7 +377,7 @@ def follow(at_sea: AtSea, *, out: TableFile = None, plot: FigureFile = None) -> 
     These are compared with the motion that the sea demands: all packaged seas, or
     that of --sea.
     """
-    with working("Simulating"):
+    with spinner("Simulating"):
         from swashplate.crane import follow as largest_sines
 
         seaway = at_sea.seaway(default="ss3")
@@ -386,7 +386,7 @@ def follow(at_sea: AtSea, *, out: TableFile = None, plot: FigureFile = None) -> 
             keywords["seas"] = (seaway.sea,)
         followable = largest_sines(at_sea.chosen, seaway=seaway, **keywords, **at_sea.pose)
     save(out, "Amplitudes, in SI", followable.tables()[0].write)
-    draw(plot, "plot_follow", followable)
+    draw_figure(plot, "plot_follow", followable)
     about_sea = sea_sentences(seaway) if at_sea.sea else ()
     _end(at_sea.chosen, followable.tables(), *about_sea, *at_sea.chosen.provenance())
 
@@ -426,7 +426,7 @@ def sweep(
 
     swept: Sweep = study.through(swing_over, study.chosen, over, **keywords)
     save(out, "Swing, in SI", swept.tables()[0].write)
-    draw(plot, "plot_sweep", swept)
+    draw_figure(plot, "plot_sweep", swept)
     _end(study.chosen, swept.tables(), *sea_sentences(study.waters), *study.chosen.provenance())
 
 

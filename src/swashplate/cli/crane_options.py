@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from swashplate.cli.options import force_option
+from swashplate.cli.parsing import pairs_of
 from swashplate.cli.terminal import long_work, side
-from swashplate.cli.words import pairs_of
 from swashplate.errors import InputError
 
 if TYPE_CHECKING:
@@ -69,7 +69,7 @@ class Placed:
     @property
     def pose(self) -> dict[str, Any]:
         """The initial position, as far as it is given."""
-        return numbers_by_name("--at", self.at, "rope_m=25", START)
+        return named_numbers("--at", self.at, "rope_m=25", START)
 
 
 @dataclass(frozen=True)
@@ -258,7 +258,7 @@ class Operated(AtSea):
             drag_area=self.drag_area, load=self.load, swing_damping=self.swing_damping
         )
         names = [field.name for field in fields(Suspension)]
-        values = numbers_by_name("--suspension", self.suspension, "stiffness=6e7", names)
+        values = named_numbers("--suspension", self.suspension, "stiffness=6e7", names)
         if values:
             options["suspension"] = Suspension(**values)
         if self.wind is not None:
@@ -330,16 +330,16 @@ class Studied(Operated):
         controller = control_of(self.control)
         if controller is None:
             raise InputError("--control is empty: there is nothing to assess.")
-        how = self.run_options | _given(length=self.length, run_in=self.run_in) | keywords
+        options = self.run_options | _given(length=self.length, run_in=self.run_in) | keywords
         if self.waters is not None:
-            how["sea"] = self.waters
+            options["sea"] = self.waters
         if self.seeds is not None:
-            how["seeds"] = range(self.seeds)
+            options["seeds"] = range(self.seeds)
         if self.drives is not None or self.scale:
-            how["drives"] = self.sets()
+            options["drives"] = self.sets()
         with long_work("Seaways") as shown:
-            how["progress"] = lambda done, of: shown(f"{done} of {of} seaways", done / of)
-            return study(*arguments, controller, **how)
+            options["progress"] = lambda done, of: shown(f"{done} of {of} seaways", done / of)
+            return study(*arguments, controller, **options)
 
     @cached_property
     def waters(self) -> Seaway | None:
@@ -348,8 +348,8 @@ class Studied(Operated):
 
         counted = LENGTH if self.length is None else self.length
         before = RUN_IN if self.run_in is None else self.run_in
-        given = self._at_sea or self._lean or self.length or self.run_in
-        return self.seaway(default="ss3" if given else None, length=counted + before)
+        is_stated = self._at_sea or self._lean or self.length or self.run_in
+        return self.seaway(default="ss3" if is_stated else None, length=counted + before)
 
     def sets(self) -> dict[str, Any]:
         """Sets of drives by name."""
@@ -462,7 +462,7 @@ def _vector(option: str, text: str, example: str) -> tuple[float, ...]:
     return numbers
 
 
-def numbers_by_name(
+def named_numbers(
     what: str, words: list[str] | None, example: str, allowed: Sequence[str] = ()
 ) -> dict[str, Any]:
     """Numbers by name of an option's pairs; refuses a name that is not allowed."""

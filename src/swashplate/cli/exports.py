@@ -18,8 +18,8 @@ from swashplate.cli.options import (
     Force,
     new_file,
 )
-from swashplate.cli.terminal import check_free, note, save, working
-from swashplate.cli.words import campaign_of, drive_file, maneuver_of
+from swashplate.cli.parsing import campaign_of, drive_file, named_maneuver
+from swashplate.cli.terminal import check_free, note, save, spinner
 from swashplate.errors import InputError
 from swashplate.tables import PAGE, Form, check_folder
 
@@ -94,42 +94,46 @@ def export(
     if c is not None:
         check_folder(c)
         check_free(c, force=force)
-    with working("Exporting"):
+    with spinner("Exporting"):
         from swashplate import export as exporting
 
-        chosen = drive.chosen
-    own = exporting.LONGEST_STEP if step is None else step
-    names = None if platforms is None else [each.strip() for each in platforms.split(",")]
-    with said():
+        exported = drive.chosen
+    longest_step = exporting.LONGEST_STEP if step is None else step
+    names = None if platforms is None else [part.strip() for part in platforms.split(",")]
+    with texts_of_warnings():
         if fmu is not None:
             version: Literal["2.0", "3.0"] = "2.0" if fmi.startswith("2") else "3.0"
             save(
                 fmu,
                 f"FMU {version}",
-                lambda path: exporting.fmu(chosen, path, fmi=version, step=own, platforms=names),
+                lambda path: exporting.fmu(
+                    exported, path, fmi=version, step=longest_step, platforms=names
+                ),
             )
         if c is not None:
-            with working(f"Writing {c}"):
-                written = exporting.c(chosen, c, own)
+            with spinner(f"Writing {c}"):
+                written = exporting.c(exported, c, longest_step)
                 if compile:
                     (header,) = (each.name for each in written if each.name.endswith("drive.h"))
                     written.append(exporting.compiled_c(c, header))
-            for made in written:
-                note(f"C: {made}")
+            for written_file in written:
+                note(f"C: {written_file}")
         if wasm is not None:
-            save(wasm, "WebAssembly", lambda path: exporting.wasm(chosen, path, step=own))
+            save(
+                wasm, "WebAssembly", lambda path: exporting.wasm(exported, path, step=longest_step)
+            )
     drive.warn()
     for line in drive.changes:
         note(line)
 
 
 @contextmanager
-def said() -> Iterator[None]:
+def texts_of_warnings() -> Iterator[None]:
     """Print what the export warns of, each once."""
-    with warnings.catch_warnings(record=True) as found:
+    with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         yield
-    for text in dict.fromkeys(str(each.message) for each in found):
+    for text in dict.fromkeys(str(warning.message) for warning in caught):
         note(f"Note: {text}")
 
 
@@ -167,18 +171,24 @@ def live(
     """
     if (path is None) == (maneuver is None):
         raise InputError("Name either a campaign, or a maneuver with --maneuver.")
-    with working("Writing the page"):
+    with spinner("Writing the page"):
         from swashplate.report.fit_report import write_live_page
 
-        place = drive_file(drive.drive)
-        name = str(place) if place is not None else "your copy of it, --toml of 'swashplate show'"
+        parameter_file = drive_file(drive.drive)
+        name = (
+            str(parameter_file)
+            if parameter_file is not None
+            else "your copy of it, --toml of 'swashplate show'"
+        )
         if path is not None:
-            campaign, chosen = campaign_of(path, axis)
-            said = write_live_page(drive.chosen, out, campaign=campaign, axis=chosen, name=name)
+            campaign, axis_name = campaign_of(path, axis)
+            sentences = write_live_page(
+                drive.chosen, out, campaign=campaign, axis=axis_name, name=name
+            )
         else:
-            command = maneuver_of(maneuver or "", drive.chosen)
-            said = write_live_page(drive.chosen, out, command=command, name=name)
+            command = named_maneuver(maneuver or "", drive.chosen)
+            sentences = write_live_page(drive.chosen, out, command=command, name=name)
     drive.warn()
-    for sentence in (*drive.changes, *said):
+    for sentence in (*drive.changes, *sentences):
         note(sentence)
     note(f"Page: {out} ({out.stat().st_size / 1e3:.0f} kB)")

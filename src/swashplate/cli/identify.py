@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from swashplate.cli import words
+from swashplate.cli import parsing
 from swashplate.cli.commands import command
 from swashplate.cli.options import (
     CAMPAIGN,
@@ -38,7 +38,7 @@ from swashplate.cli.terminal import (
     say_saved,
     show,
     side,
-    working,
+    spinner,
 )
 from swashplate.errors import InputError
 from swashplate.tables import PRINTED, TABLE, check_folder, joined, made_folder
@@ -71,7 +71,7 @@ Role = Literal["validate", "fit", "all"]
 app = typer.Typer(rich_markup_mode="rich")
 
 
-class Clock:
+class StageClock:
     """Time spent in each part; loading kernels, which happens in any of them, counts separately."""
 
     def __init__(self) -> None:
@@ -80,14 +80,14 @@ class Clock:
     @contextmanager
     def part(self, name: str) -> Iterator[None]:
         """Count what is done to a part."""
-        begun = perf_counter()
+        begin = perf_counter()
         from swashplate.equations.code_generation.functions import generating_time
 
         before = generating_time()
         yield
         kernels = generating_time() - before
         self.parts["start and kernels"] += kernels
-        self.parts[name] = self.parts.get(name, 0.0) + perf_counter() - begun - kernels
+        self.parts[name] = self.parts.get(name, 0.0) + perf_counter() - begin - kernels
 
     def __str__(self) -> str:
         return ", ".join(f"{name} {seconds:.2f} s" for name, seconds in self.parts.items())
@@ -119,7 +119,7 @@ def fit(
         typer.Option(
             "--joint",
             metavar=NO_VALUE,
-            help="Finally estimate all parameters at once, through the whole drive.",
+            help="Finally estimate all parameters at the same time, through the whole drive.",
         ),
     ] = False,
     begin: InitialDrive = None,
@@ -188,7 +188,7 @@ def fit(
     not usable. Ctrl-C or SIGTERM keeps the best result so far (of several
     starts: those that ended) and exits with code 130.
     """
-    clock = Clock()
+    clock = StageClock()
     check_folder(out)
     lock(out)
     if not resume:
@@ -200,20 +200,20 @@ def fit(
             f"{model} defines its free parameters and their initial values: leave out --setup, "
             "--from and --joint."
         )
-    with working("Starting"), clock.part("start and kernels"):
+    with spinner("Starting"), clock.part("start and kernels"):
         from swashplate.executors import Dask, Processes
         from swashplate.identification.identifying import identify
-    with working(f"Reading {path}"), clock.part("reading"):
-        campaign, chosen = words.campaign_of(path, axis)
+    with spinner(f"Reading {path}"), clock.part("reading"):
+        campaign, axis_name = parsing.campaign_of(path, axis)
         start: Path | ParameterSet | None = model
         if begin is not None:
-            start = words.parameters_of(begin)
-    with working("Fitting"), clock.part("search"):
+            start = parsing.parameters_of(begin)
+    with spinner("Fitting"), clock.part("search"):
         result = identify(
             campaign,
             start,
             setup,
-            axis=chosen,
+            axis=axis_name,
             joint=joint,
             starts=starts,
             folds=folds,
@@ -233,12 +233,12 @@ def fit(
             "starts are written; the same command with --resume continues."
         )
         raise typer.Exit(INTERRUPTED)
-    with working("Assessing"), clock.part("assessment"):
+    with spinner("Assessing"), clock.part("assessment"):
         verdict = result.verdict
     with clock.part("report"):
         lines = _written(result, out)
         lines += [_reported(result, out)] if report else []
-    note(words.title_of(campaign))
+    note(parsing.title_of(campaign))
     _say_fit(result)
     for line in [*lines, f"Time:      {clock}"] if timing else lines:
         note(line)
@@ -248,12 +248,12 @@ def fit(
     _say_verdict(verdict)
 
 
-def _say_fit(found: Identification) -> None:
+def _say_fit(result: Identification) -> None:
     """What was found, stage by stage, and how well each run is followed."""
     from swashplate.identification.assessment import parts_of
 
     text_above = False
-    for part in parts_of(found):
+    for part in parts_of(result):
         if part.heading:
             note(f"\n{part.heading}" if text_above else part.heading)
         if part.tables:
@@ -264,15 +264,15 @@ def _say_fit(found: Identification) -> None:
         text_above = bool(part.remarks or part.sentences)
 
 
-def _written(found: Identification, out: Path) -> list[str]:
+def _written(result: Identification, out: Path) -> list[str]:
     """Write the folder of a fit; lines that name its files."""
-    return [f"{FILES[file.name] + ':':10} {file}" for file in found.save(out)]
+    return [f"{FILES[file.name] + ':':10} {file}" for file in result.save(out)]
 
 
-def _reported(found: Identification, out: Path, truth: ParameterSet | None = None) -> str:
+def _reported(result: Identification, out: Path, truth: ParameterSet | None = None) -> str:
     """Write the report; a line that says so."""
-    with working("Writing the report"):
-        found.report(out / "report.html", truth=truth)
+    with spinner("Writing the report"):
+        result.report(out / "report.html", truth=truth)
     return f"Report:    {out / 'report.html'}"
 
 
@@ -333,20 +333,22 @@ def validate(
     if out is not None:
         check_folder(out)
         check_free(out / "measures.csv", out / "report.html", force=force)
-    with working(f"Reading {path}"):
-        parameters: Parameters | None = None if model else words.parameters_of(drive)
-        campaign, chosen = words.campaign_of(path, axis)
+    with spinner(f"Reading {path}"):
+        parameters: Parameters | None = None if model else parsing.parameters_of(drive)
+        campaign, axis_name = parsing.campaign_of(path, axis)
         roles = ("fit", "validate") if role == "all" else (role,)
-        runs = [each for each in campaign.select(axis=chosen) if each.role in roles]
+        runs = [
+            experiment for experiment in campaign.select(axis=axis_name) if experiment.role in roles
+        ]
     if not runs:
         raise InputError(
-            f"{path}: no run of the axis '{chosen}' has the role {' or '.join(map(repr, roles))}; "
-            "select another with --role."
+            f"{path}: no run of the axis '{axis_name}' has the role "
+            f"{' or '.join(map(repr, roles))}; select another with --role."
         )
-    with working("Predicting"):
+    with spinner("Predicting"):
         refuse_unsound(spike_findings(runs, "linear"))
         if model is not None:
-            parameters = words.model_parameters_of(drive, model, runs)
+            parameters = parsing.model_parameters_of(drive, model, runs)
         assert parameters is not None
         predicted = predict(parameters, runs)
         if not predicted:
@@ -357,14 +359,14 @@ def validate(
     if out is not None:
         from swashplate.report.fit_report import write_validation_report
 
-        with working("Writing the report"):
+        with spinner("Writing the report"):
             joined(measures).write(made_folder(out) / "measures.csv")
             page, notes = out / "report.html", {**versions(), "drive from": drive}
             write_validation_report(
                 parameters, campaign, page, predicted, judged=judged, notes=notes
             )
         lines = [f"Measures:  {out / 'measures.csv'}", f"Report:    {page}"]
-    note(f"{words.title_of(campaign)}, {chosen}: {parameters.name} from {drive}")
+    note(f"{parsing.title_of(campaign)}, {axis_name}: {parameters.name} from {drive}")
     show(*measures)
     say(MEASURES)
     for line in lines:
@@ -425,27 +427,32 @@ def report(
     if pdf is not None:
         find_browser()
     folder = fitted if fitted.is_dir() else fitted.parent
-    with working(f"Reading {folder / 'fit.json'}"):
-        true = None if truth is None else words.parameters_of(truth)
-        found = Identification.load(fitted, path, model=model)
-        if true is not None and not found.campaign.virtual:
+    with spinner(f"Reading {folder / 'fit.json'}"):
+        true = None if truth is None else parsing.parameters_of(truth)
+        result = Identification.load(fitted, path, model=model)
+        if true is not None and not result.campaign.virtual:
             raise InputError(
-                f"{found.campaign.path} is not virtual, so that its true parameters are unknown: "
+                f"{result.campaign.path} is not virtual, so that its true parameters are unknown: "
                 "leave out --truth."
             )
         if fitted.suffix.lower() == ".toml":
-            given, numbers = words.parameters_of(str(fitted)).numbers, found.fit.parameters
-            other = [name for name, value in numbers.numbers.items() if given[name] != value]
-            if other:
+            fitted_numbers, numbers = (
+                parsing.parameters_of(str(fitted)).numbers,
+                result.fit.parameters,
+            )
+            differing = [
+                name for name, value in numbers.numbers.items() if fitted_numbers[name] != value
+            ]
+            if differing:
                 raise InputError(
                     f"{fitted} is not the drive that {folder / 'fit.json'} found "
-                    f"({', '.join(other[:3])} differ): assess it with 'swashplate validate'."
+                    f"({', '.join(differing[:3])} differ): assess it with 'swashplate validate'."
                 )
-    with working("Assessing"):
-        verdict = found.verdict
-    note(_reported(found, folder, true))
+    with spinner("Assessing"):
+        verdict = result.verdict
+    note(_reported(result, folder, true))
     save(pdf, "Printed", lambda to: print_report(folder / "report.html", to))
-    runs = shown_runs(found.fit.stages, found.predicted)
+    runs = shown_runs(result.fit.stages, result.predicted)
     save(data, "Samples, in SI", lambda to: write_samples(runs, to))
     say_saved()
     say(verdict.headline)
@@ -495,12 +502,12 @@ def demo(
         begin("reading its logs")
         campaign = Campaign.from_toml(path)
         begin("fitting the card, then pump and motor")
-        found = identify(campaign, seed=seed)
+        result = identify(campaign, seed=seed)
         begin("computing intervals and verdict")
-        verdict = found.verdict
+        verdict = result.verdict
         begin("writing the report")
-        lines = [*_written(found, out), _reported(found, out, truth.parameters)]
-        runs = with_speeds(found.predicted)
+        lines = [*_written(result, out), _reported(result, out, truth.parameters)]
+        runs = with_speeds(result.predicted)
         run = [e for e in runs if e.experiment[e.channel].kind == "shaft_speed"][-1]
         title = f"{run.experiment.run}: held out, predicted from the voltage"
         if run.measures.fit_percent is not None:
@@ -508,12 +515,12 @@ def demo(
         figure = plot_channel(run.experiment[run.channel], run.simulated, title=title)
         save_figure(figure, out / "result.png")
     note(f"Campaign:  {path}")
-    made = [tables.estimates_table(e, truth=truth.parameters) for e in found.fit.stages]
-    show(*made)
-    inside, counted = tables.truth_count(made)
+    estimates = [tables.estimates_table(e, truth=truth.parameters) for e in result.fit.stages]
+    show(*estimates)
+    inside, counted = tables.truth_count(estimates)
     say(f"The truth lies within the 95 % interval for {inside} of {counted} parameters.")
     note("\nHeld out of the fit, and predicted")
-    show(*tables.runs_tables(found.predicted))
+    show(*tables.runs_tables(result.predicted))
     say(verdict.headline)
     for line in [*lines, f"Figure:    {out / 'result.png'}"]:
         note(line)

@@ -14,7 +14,7 @@ import typer
 
 from swashplate.__about__ import __version__
 from swashplate.cli.commands import command
-from swashplate.cli.terminal import note, say, show, working
+from swashplate.cli.terminal import note, say, show, spinner
 from swashplate.executors import available_cores
 from swashplate.tables import Column, Table
 
@@ -50,27 +50,27 @@ def doctor() -> None:
     Paste the output into a question or a problem report. Exit code 1: the
     simulation does not give the published speed.
     """
-    made = Table("", (Column("component"), Column("value"), Column("enables", wrap=True)))
-    made.add("swashplate", __version__, "")
-    made.add("Python", platform.python_version(), "")
-    made.add("system", f"{platform.system()} {platform.machine()}", "")
-    made.add("cores", str(available_cores()), "")
+    table = Table("", (Column("component"), Column("value"), Column("enables", wrap=True)))
+    table.add("swashplate", __version__, "")
+    table.add("Python", platform.python_version(), "")
+    table.add("system", f"{platform.system()} {platform.machine()}", "")
+    table.add("cores", str(available_cores()), "")
     if os.environ.get("NUMBA_DISABLE_JIT", "0") != "0":
-        made.add(
+        table.add(
             "NUMBA_DISABLE_JIT",
             "set",
             "nothing is compiled; everything is about a hundred times slower",
         )
     if sys.dont_write_bytecode and (names := _without_byte_code()):
-        made.add("byte code", "-", WITHOUT_BYTE_CODE.format(names=", ".join(names)))
+        table.add("byte code", "-", WITHOUT_BYTE_CODE.format(names=", ".join(names)))
     extras = {f"extra {name}": entry for name, entry in EXTRAS.items()}
     for what, (library, enables) in {**{e: (e, "") for e in LIBRARIES}, **extras}.items():
         try:
-            made.add(what, metadata.version(library), enables)
+            table.add(what, metadata.version(library), enables)
         except metadata.PackageNotFoundError:
-            made.add(what, "-", enables)
-    show(made)
-    with working("Simulating the hoist"):
+            table.add(what, "-", enables)
+    show(table)
+    with spinner("Simulating the hoist"):
         from swashplate.drive import Drive
         from swashplate.equations.cache import UNCACHED, cache_folder
         from swashplate.maneuvers import step
@@ -78,15 +78,15 @@ def doctor() -> None:
         run = Drive.preset("hoist").simulate(step(9.0, start=0.0, stop=10.0, length=10.0))
     speed = degrees(float(run.shaft_speed[-1]))
     well = abs(speed - FULL_SPEED_DEG_S) < DIGITS
-    found = "as published." if well else f"but {FULL_SPEED_DEG_S} deg/s is published."
-    say(f"A step of 9 V takes the hoist to {speed:.1f} deg/s, {found}")
+    outcome = "as published." if well else f"but {FULL_SPEED_DEG_S} deg/s is published."
+    say(f"A step of 9 V takes the hoist to {speed:.1f} deg/s, {outcome}")
     note(f"Installed in {sys.prefix}")
-    kept = cache_folder()
-    if kept is None:
+    cache = cache_folder()
+    if cache is None:
         note(UNCACHED)
     else:
-        sizes = [each.stat().st_size for each in kept.rglob("*.nbc")]
-        note(f"Compiled kernels: {len(sizes)} files, {sum(sizes) / 1e6:.1f} MB, below {kept}")
+        sizes = [path.stat().st_size for path in cache.rglob("*.nbc")]
+        note(f"Compiled kernels: {len(sizes)} files, {sum(sizes) / 1e6:.1f} MB, below {cache}")
     if not well:
         raise typer.Exit(1)
 

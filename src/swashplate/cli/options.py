@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from swashplate.cli.terminal import check_output, note
+from swashplate.cli.terminal import check_writable, note
 from swashplate.tables import FIGURE, TABLE, Form
 from swashplate.units import show_rod
 
@@ -37,7 +37,7 @@ def new_file(form: Form, help: str, *, metavar: str = "FILE") -> Any:
     """
 
     def check(context: typer.Context, path: Path | None) -> Path | None:
-        check_output(path, form, force=context.params["force"])
+        check_writable(path, form, force=context.params["force"])
         return path
 
     return typer.Option(metavar=metavar, help=help, callback=check)
@@ -185,12 +185,12 @@ class DriveChoice:
     @cached_property
     def chosen(self) -> Drive:
         """The drive."""
-        from swashplate.cli.words import drive_of
+        from swashplate.cli.parsing import drive_of
 
-        made = drive_of(self.drive, self.values or (), self.factors or ())
-        if made.parameters.motion == "rod":
+        drive = drive_of(self.drive, self.values or (), self.factors or ())
+        if drive.parameters.motion == "rod":
             show_rod()
-        return made
+        return drive
 
     @property
     def title(self) -> str:
@@ -201,15 +201,15 @@ class DriveChoice:
     @property
     def changes(self) -> list[str]:
         """A line for each parameter that is not as its file has it."""
-        from swashplate.cli.words import changes_between, parameters_of
+        from swashplate.cli.parsing import changes_between, parameters_of
 
         return changes_between(parameters_of(self.drive), self.chosen.parameters)
 
     def warn(self) -> None:
         """Say it if the drive's fit calls it not usable, as its title does, or left limits open."""
-        _, found, why = self.chosen.parameters.title.partition("Not usable")
-        if found:
-            note(f"! The fit of this drive says: {found}{why}.")
+        _, marked, why = self.chosen.parameters.title.partition("Not usable")
+        if marked:
+            note(f"! The fit of this drive says: {marked}{why}.")
         self._warn_unreached()
 
     def _warn_unreached(self) -> None:
@@ -226,7 +226,7 @@ class DriveChoice:
 
 
 @dataclass(frozen=True)
-class Sampling:
+class CommandSampling:
     """How a command is sampled, and read if it is a file."""
 
     rate: RateOption = 512.0
@@ -251,7 +251,7 @@ class Sampling:
 
 
 @dataclass(frozen=True)
-class Simulating(Sampling):
+class Simulating(CommandSampling):
     """How a command is sampled, and simulated."""
 
     start: Annotated[

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from swashplate.cli import words
+from swashplate.cli import parsing
 from swashplate.cli.commands import command
 from swashplate.cli.options import (
     NO_VALUE,
@@ -22,7 +22,7 @@ from swashplate.cli.options import (
     Simulating,
     TableFile,
 )
-from swashplate.cli.terminal import draw, note, save, say, show, working
+from swashplate.cli.terminal import draw_figure, note, save, say, show, spinner
 from swashplate.documents import parse_toml
 from swashplate.errors import InputError
 from swashplate.tables import Column, Table, quantity, write_table
@@ -60,13 +60,13 @@ def simulate(
     writes all signals, --plot draws them. 'swashplate --help' lists the
     maneuvers.
     """
-    with working("Simulating"):
-        chosen = words.at_rate(drive.chosen, sampling.rate)
-        name, run = words.simulated_as(chosen, maneuver, sampling)
+    with spinner("Simulating"):
+        marched = parsing.at_rate(drive.chosen, sampling.rate)
+        name, run = parsing.simulated_as(marched, maneuver, sampling)
         tables, title = run.tables(), f"{drive.title}, {name}"
     save(out, "All signals, in SI", run.write)
-    window = words.window_of(run.time, begin, end)
-    draw(plot, "plot_simulation", run, window=window, title=title)
+    window = parsing.window_of(run.time, begin, end)
+    draw_figure(plot, "plot_simulation", run, window=window, title=title)
     duration = f"{run.time[-1] - run.time[0]:.6g} s"
     drive.note(f"{title}: {run.time.size} samples at {sampling.rate:g} Hz, {duration}")
     show(*tables)
@@ -99,20 +99,20 @@ def compare(
     last moment at which the voltage is at its largest. --out writes the voltage
     and both speeds.
     """
-    with working("Simulating"):
+    with spinner("Simulating"):
         from swashplate.analysis.outcomes import rms_difference, side_by_side
 
-        pair = [words.at_rate(words.drive_of(each), rate) for each in (first, second)]
-        labels = [each.name for each in pair]
+        pair = [parsing.at_rate(parsing.drive_of(word), rate) for word in (first, second)]
+        labels = [drive.name for drive in pair]
         if labels[0] == labels[1]:  # then by what was typed
             labels = [first, second if second != first else f"{second} (2)"]
         drives = dict(zip(labels, pair, strict=True))
-        chosen = words.maneuver_of(maneuver, *pair)
-        voltage = chosen.sample(rate)
+        test = parsing.named_maneuver(maneuver, *pair)
+        voltage = test.sample(rate)
         runs = {label: drive.simulate(voltage, rate) for label, drive in drives.items()}
-        made = side_by_side(runs)
+        table = side_by_side(runs)
         rms = rms_difference(*(run.shaft_speed for run in runs.values()))
-    title = f"{' and '.join(runs)}, {chosen.name}"
+    title = f"{' and '.join(runs)}, {test.name}"
 
     def write(path: Path) -> None:
         import polars as pl
@@ -121,9 +121,9 @@ def compare(
         write_table(pl.DataFrame({"time": run.time, "voltage": run.voltage, **speeds}), path)
 
     save(out, "Voltage and both speeds, in SI", write)
-    draw(plot, "plot_comparison", runs, title=title)
+    draw_figure(plot, "plot_comparison", runs, title=title)
     note(title)
-    show(made)
+    show(table)
     note(f"rms difference of the speeds: {quantity(rms, 'rad/s', spec='.2f')}")
 
 
@@ -166,14 +166,14 @@ def show_parameters(
         show(packaged_drives())
         return
     # in SI: a rod's drive has angles inside, which chosen units of its motion would change
-    parameters = words.drive_of(drive, values or (), factors or ()).parameters
+    parameters = parsing.drive_of(drive, values or (), factors or ()).parameters
     if toml:
         from swashplate.parameters.files import dump_set
 
         typer.echo(dump_set(parameters), nl=False)
         return
     say(f"{parameters.name}: {parameters.title}")
-    for line in words.changes_between(words.parameters_of(drive), parameters):
+    for line in parsing.changes_between(parsing.parameters_of(drive), parameters):
         note(line)
     show(*parameters.tables())
     rate = "any rate" if parameters.rate is None else f"{parameters.rate:g} Hz"
@@ -187,10 +187,10 @@ def show_parameters(
 def packaged_drives() -> Table:
     """The packaged drives and their control cards."""
     # their files as they stand: nothing is checked or compiled for a list of names
-    made = Table("", (Column("name"), Column("drive", wrap=True), Column("control card")))
+    table = Table("", (Column("name"), Column("drive", wrap=True), Column("control card")))
     sets = (resources.files("swashplate.parameters") / "sets").iterdir()
-    for path in sorted((each for each in sets if each.name.endswith(".toml")), key=str):
-        found = parse_toml(path.read_text("utf-8"), path.name)
-        card = found["control_card"]
-        made.add(found["name"], found["title"], card if isinstance(card, str) else "its own")
-    return made
+    for path in sorted((entry for entry in sets if entry.name.endswith(".toml")), key=str):
+        contents = parse_toml(path.read_text("utf-8"), path.name)
+        card = contents["control_card"]
+        table.add(contents["name"], contents["title"], card if isinstance(card, str) else "its own")
+    return table

@@ -106,11 +106,11 @@ def _blocks(table: Table, line: int) -> Iterator[rich.table.Table]:
     rows = [table.texts(row) for row in table.rows]
     whole, broken = _widths([heads, *rows]), list[int]()
 
-    def length(places: Sequence[int]) -> int:
-        return sum((broken or whole)[k] for k in places) + BETWEEN * (len(places) - 1)
+    def length(columns: Sequence[int]) -> int:
+        return sum((broken or whole)[k] for k in columns) + BETWEEN * (len(columns) - 1)
 
-    def block(places: Sequence[int]) -> rich.table.Table:
-        made = rich.table.Table(
+    def block(columns_shown: Sequence[int]) -> rich.table.Table:
+        shown = rich.table.Table(
             title=table.title or None,
             title_justify="left",
             title_style="bold",
@@ -122,8 +122,8 @@ def _blocks(table: Table, line: int) -> Iterator[rich.table.Table]:
             collapse_padding=True,
         )
         least = _widths([heads, *rows])
-        for k in places:
-            made.add_column(
+        for k in columns_shown:
+            shown.add_column(
                 heads[k],
                 justify="right" if columns[k].spec else "left",
                 no_wrap=bool(columns[k].spec) or not (columns[k].wrap or broken),
@@ -134,19 +134,19 @@ def _blocks(table: Table, line: int) -> Iterator[rich.table.Table]:
             )
         for row, cells in zip(table.rows, rows, strict=True):
             if row.section:
-                made.add_section()
-            made.add_row(*(cells[k] for k in places))
-        return made
+                shown.add_section()
+            shown.add_row(*(cells[k] for k in columns_shown))
+        return shown
 
     numbers = [k for k in every if columns[k].spec]
-    if length(every) <= line or not numbers or any(each.wrap for each in columns):
+    if length(every) <= line or not numbers or any(column.wrap for column in columns):
         yield block(every)
         return
     for k, cells in enumerate(_widths(rows or [heads])):
         words = fill(heads[k].replace(" %", NARROW), max(cells, LEAST))
         heads[k] = words.replace(NARROW, " %")
     wide = enumerate(_widths([heads, *rows]))
-    broken = [each if k in numbers else min(each, LONGEST) for k, each in wide]
+    broken = [column if k in numbers else min(column, LONGEST) for k, column in wide]
     lead = places = list(every[: numbers[0]])
     for k in every[numbers[0] :]:
         unit = [k + 1] if k + 1 in every and columns[k + 1] is UNIT else []
@@ -160,15 +160,15 @@ def _blocks(table: Table, line: int) -> Iterator[rich.table.Table]:
 
 def show(*tables: Table) -> None:
     """Print tables, empty lines around them."""
-    for each in tables:
-        for block in _blocks(each.of("t"), output.width):
+    for table in tables:
+        for block in _blocks(table.of("t"), output.width):
             output.print()
             output.print(block)
     output.print()
 
 
 def say(text: str) -> None:
-    """Print text, broken into lines where the terminal is narrow."""
+    """Print text, broken into lines if the terminal is narrow."""
     output.print(text)
 
 
@@ -189,12 +189,13 @@ def say_error(error: Exception, lead: str = "Error") -> None:
     sentence = " ".join(str(error).split()).rstrip(".")
     # the name of a file may hold what steers a terminal
     shown = "".join(
-        each if each.isprintable() else "\N{REPLACEMENT CHARACTER}" for each in sentence
+        character if character.isprintable() else "\N{REPLACEMENT CHARACTER}"
+        for character in sentence
     )
     side.print(f"{lead}: {shown}.", soft_wrap=True)
 
 
-class Shown:
+class TerminalProgress:
     """Progress of the package's functions, in the words of a spinner or a bar."""
 
     def __init__(self, update: Callable[[str], object]) -> None:
@@ -209,14 +210,14 @@ class Shown:
 
 
 @contextmanager
-def working(text: str) -> Iterator[Status]:
+def spinner(text: str) -> Iterator[Status]:
     """A spinner while something may take longer than a second; nothing in a pipe.
 
     Not inside another one, nor inside `long_work`: rich before 14.1 refuses a second.
     """
     with (
         side.status(f"{text} ...") as status,
-        shown_by(Shown(lambda line: status.update(f"{line} ..."))),
+        shown_by(TerminalProgress(lambda line: status.update(f"{line} ..."))),
     ):
         yield status
 
@@ -225,24 +226,24 @@ def working(text: str) -> Iterator[Status]:
 def long_work(text: str, steps: int = 0) -> Iterator[Callable[..., None]]:
     """A bar with what is done now and the time left; nothing in a pipe.
 
-    What it gives is called with words and, where it is known, the share that is done; of so many
-    steps, if there are any, each call begins the next one.
+    What it gives is called with words and, if it is known, the share that is done. With `steps`,
+    each call begins the next step, and the share is counted.
     """
     from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeRemainingColumn
 
-    said = TextColumn("{task.description}", markup=False)
-    columns = (SpinnerColumn(), BarColumn(bar_width=12), said, TimeRemainingColumn())
+    words = TextColumn("{task.description}", markup=False)
+    columns = (SpinnerColumn(), BarColumn(bar_width=12), words, TimeRemainingColumn())
     with Progress(*columns, console=side, transient=True, disable=not side.is_terminal) as bar:
-        task, begun = bar.add_task(text, total=None), 0
+        task, steps_begun = bar.add_task(text, total=None), 0
 
         def show(what: str, share: float | None = None) -> None:
-            nonlocal begun
+            nonlocal steps_begun
             if steps:
-                share, begun = begun / steps, begun + 1
+                share, steps_begun = steps_begun / steps, steps_begun + 1
             total = None if share is None else 1.0
             bar.update(task, description=what, total=total, completed=share or 0.0)
 
-        with shown_by(Shown(lambda line: bar.update(task, description=line))):
+        with shown_by(TerminalProgress(lambda line: bar.update(task, description=line))):
             yield show
 
 
@@ -263,7 +264,7 @@ def lock(folder: Path) -> None:
     RESOURCES.get().enter_context(locked(folder))
 
 
-def check_output(path: Path | None, form: Form, *, force: bool) -> None:
+def check_writable(path: Path | None, form: Form, *, force: bool) -> None:
     """Refuse a file that cannot or must not be written, before anything is computed."""
     if path is not None:
         ending(path, form)
@@ -274,24 +275,24 @@ def check_output(path: Path | None, form: Form, *, force: bool) -> None:
 def save(path: Path | None, what: str, write: Callable[[Path], object]) -> None:
     """Write a file, if it was asked for; `say_saved` names it."""
     if path is not None:
-        with working(f"Writing {path}"):
+        with spinner(f"Writing {path}"):
             write(path)
         SAVED.get().append(f"{what}: {path}")
 
 
-def draw(path: Path | None, figure: Any, *shown: Any, **how: Any) -> None:
+def draw_figure(path: Path | None, figure: Any, *shown: Any, **options: Any) -> None:
     """Save a figure, or one of `swashplate.report.figures` by its name, if it was asked for."""
     if path is not None:
-        with working(f"Drawing {path}"):
+        with spinner(f"Drawing {path}"):
             from swashplate.report import figures
 
-            made = getattr(figures, figure)(*shown, **how) if shown else figure
-            figures.save_figure(made, path)
+            drawing = getattr(figures, figure)(*shown, **options) if shown else figure
+            figures.save_figure(drawing, path)
         SAVED.get().append(f"Figure: {path}")
 
 
 def say_saved() -> None:
-    """Name the files that were written; a command's end does it, where it was not done before."""
+    """Name the files that were written; a command's end does it, if it was not done before."""
     for line in SAVED.get():
         note(line)
     SAVED.set([])

@@ -74,10 +74,10 @@ class AmplifierGuess(NamedTuple):
     fit_percent: float
     """100 (1 - error's RMS over the currents' standard deviation). [%]"""
 
-    def settled(self, way: int, volts: float) -> float:
+    def settled(self, side: int, volts: float) -> float:
         """Settled current of a way, 0 plus and 1 minus, at a command of that sign [V]. [A]"""
-        beyond = volts - self.dead_zone[way]
-        return self.jump[way] + self.gain[way] * beyond if beyond > 0.0 else 0.0
+        beyond = volts - self.dead_zone[side]
+        return self.jump[side] + self.gain[side] * beyond if beyond > 0.0 else 0.0
 
 
 class _Currents(NamedTuple):
@@ -117,10 +117,10 @@ def guess_amplifier(experiments: Sequence[Experiment]) -> AmplifierGuess | None:
     Runs need a voltage as input and a channel of a current; what is ignored does not count.
     """
     measured = list(_currents(experiments))
-    lines = [_static(measured, way) for way in range(2)]
+    lines = [_static(measured, side) for side in range(2)]
     if lines[0] is None and lines[1] is None:
         return None
-    plus, minus = (mine or other for mine, other in (lines, lines[::-1]))
+    plus, minus = (line or opposite for line, opposite in (lines, lines[::-1]))
     assert plus is not None
     assert minus is not None
     static: dict[str, Pair] = {
@@ -128,11 +128,11 @@ def guess_amplifier(experiments: Sequence[Experiment]) -> AmplifierGuess | None:
         "J": (plus.jump, minus.jump),
         "G1": (plus.gain, minus.gain),
     }
-    card, dynamics, delay, left = min(
-        (_followed(measured, static, *each) for each in _dynamics(static)),
-        key=lambda each: each[3],
+    card, dynamics, delay, error = min(
+        (_followed(measured, static, *dynamic) for dynamic in _dynamics(static)),
+        key=lambda trial: trial[3],
     )
-    spread = np.concatenate([each.current for each in measured])
+    spread = np.concatenate([currents.current for currents in measured])
     return AmplifierGuess(
         dead_zone=static["V_dz"],
         jump=static["J"],
@@ -141,7 +141,7 @@ def guess_amplifier(experiments: Sequence[Experiment]) -> AmplifierGuess | None:
         card=card,
         delay=delay,
         command=(lines[0].command if lines[0] else 0.0, lines[1].command if lines[1] else 0.0),
-        fit_percent=100.0 * (1.0 - left / float(np.std(spread))),
+        fit_percent=100.0 * (1.0 - error / float(np.std(spread))),
     )
 
 
@@ -157,30 +157,30 @@ class _Line(NamedTuple):
     """Mean square. [A²]"""
 
 
-def _static(measured: Sequence[_Currents], way: int) -> _Line | None:
+def _static(measured: Sequence[_Currents], side: int) -> _Line | None:
     """Dead zone, jump and gain of a way at the delay of the least error; None if it tells none."""
-    lines = (_line(*_settled(measured, way, late)) for late in LATE)
-    return min(filter(None, lines), key=lambda each: each.left, default=None)
+    lines = (_line(*_settled(measured, side, late)) for late in LATE)
+    return min(filter(None, lines), key=lambda line: line.left, default=None)
 
 
-def _settled(measured: Sequence[_Currents], way: int, late: float) -> tuple[Array, Array]:
+def _settled(measured: Sequence[_Currents], side: int, late: float) -> tuple[Array, Array]:
     """Commands of a sign, so much earlier [V], and currents that have settled [A].
 
     All of them if the command is nowhere slow, as under a joystick.
     """
-    sign, slow, every = 1.0 - 2.0 * way, list[Array](), list[Array]()
-    largest = max((float(np.abs(each.command).max()) for each in measured), default=0.0)
-    for each in measured:
-        if way not in each.sides:
+    sign, slow, every = 1.0 - 2.0 * side, list[Array](), list[Array]()
+    largest = max((float(np.abs(currents.command).max()) for currents in measured), default=0.0)
+    for currents in measured:
+        if side not in currents.sides:
             continue
-        given = each.experiment.input
-        grid = np.linspace(-SETTLED - late, 0.0, 9)[:, None] + each.time
-        before = given.at(grid.ravel()).reshape(grid.shape)
-        command = sign * given.at(each.time - late)
+        drive = currents.experiment.input
+        grid = np.linspace(-SETTLED - late, 0.0, 9)[:, None] + currents.time
+        before = drive.at(grid.ravel()).reshape(grid.shape)
+        command = sign * drive.at(currents.time - late)
         one_way = command > 0.0
-        both = np.stack([command, each.current])
-        slow.append(both[:, one_way & (np.ptp(before, axis=0) <= SLOW * largest)])
-        every.append(both[:, one_way])
+        readings = np.stack([command, currents.current])
+        slow.append(readings[:, one_way & (np.ptp(before, axis=0) <= SLOW * largest)])
+        every.append(readings[:, one_way])
     volts, amperes = np.concatenate([np.zeros((2, 0)), *slow], axis=1)
     if volts.size < FEWEST or np.ptp(volts) < 0.1 * largest:
         volts, amperes = np.concatenate([np.zeros((2, 0)), *every], axis=1)
@@ -190,7 +190,7 @@ def _settled(measured: Sequence[_Currents], way: int, late: float) -> tuple[Arra
 
 def _line(volts: Array, amperes: Array) -> _Line | None:
     """Dead zone, jump and gain of least squares; None if no current rises with the command."""
-    found: _Line | None = None
+    best: _Line | None = None
     if volts.size < FEWEST:
         return None
     most = float(volts.max())
@@ -203,11 +203,11 @@ def _line(volts: Array, amperes: Array) -> _Line | None:
         jump, gain = np.linalg.lstsq(terms, amperes[beyond], rcond=None)[0].tolist()
         if jump < 0.0:
             jump, gain = 0.0, float(over @ amperes[beyond] / (over @ over))
-        left = amperes - np.where(beyond, jump + gain * (volts - zone), 0.0)
-        line = _Line(zone, jump, gain, most, float(np.mean(left**2)))
-        if gain > 0.0 and (found is None or line.left < found.left):
-            found = line
-    return found
+        residual = amperes - np.where(beyond, jump + gain * (volts - zone), 0.0)
+        line = _Line(zone, jump, gain, most, float(np.mean(residual**2)))
+        if gain > 0.0 and (best is None or line.left < best.left):
+            best = line
+    return best
 
 
 def _dynamics(static: Mapping[str, Pair]) -> Iterator[tuple[str, dict[str, Pair]]]:
@@ -254,23 +254,26 @@ def _followed(
     drive = Drive(neutral.with_numbers({"Z19": 1e-3, **static, **dynamics}))
     squares, size = np.zeros(DELAYS.size), 0
     try:
-        for each in measured:
-            given = each.experiment.input
+        for measured_current in measured:
+            command = measured_current.experiment.input
             run = drive.simulate(
-                given.values,
+                command.values,
                 RATE,
-                time=given.time,
-                interpolation="previous" if given.is_held else "linear",
-                start=each.experiment.begins,
+                time=command.time,
+                interpolation="previous" if command.is_held else "linear",
+                start=measured_current.experiment.begins,
             )
-            parts = (run.current_positive, run.current_negative)
-            simulated = np.sum([parts[way] for way in each.sides], axis=0)
-            if each.channel.kind == "signed_current":
+            solenoids = (run.current_positive, run.current_negative)
+            simulated = np.sum([solenoids[side] for side in measured_current.sides], axis=0)
+            if measured_current.channel.kind == "signed_current":
                 simulated = np.abs(run.current)
             for k, delay in enumerate(DELAYS):
-                left = np.interp(each.time - delay, run.time, simulated) - each.current
-                squares[k] += float(left @ left)
-            size += each.time.size
+                residual = (
+                    np.interp(measured_current.time - delay, run.time, simulated)
+                    - measured_current.current
+                )
+                squares[k] += float(residual @ residual)
+            size += measured_current.time.size
     except InputError:  # a command beyond what a card takes, or a filter too fast for the step
         return card, dynamics, 0.0, inf
     best = int(np.argmin(squares))
@@ -280,7 +283,7 @@ def _followed(
 def amplifier_table(guess: AmplifierGuess) -> Table:
     """What was guessed of the amplifier, each way."""
     columns = (Column(side, ".4g") for side in ("plus", "minus"))
-    made = Table("Its amplifier, from the current", (Column(""), *columns, UNIT))
+    table = Table("Its amplifier, from the current", (Column(""), *columns, UNIT))
     omega = guess.dynamics["omega"]
     rows = (
         ("dead zone", guess.dead_zone, "V", ".3g"),
@@ -293,6 +296,6 @@ def amplifier_table(guess: AmplifierGuess) -> Table:
             Cell(None, "not tried") if not tried else value
             for value, tried in zip(values, guess.command, strict=True)
         )
-        made.add(name, *cells, unit=unit, spec=spec)
-    made.add("delay", 1e3 * guess.delay, "", unit="ms", spec=".3g")
-    return made
+        table.add(name, *cells, unit=unit, spec=spec)
+    table.add("delay", 1e3 * guess.delay, "", unit="ms", spec=".3g")
+    return table

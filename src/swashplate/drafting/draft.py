@@ -1,8 +1,8 @@
 """First drafts of a campaign file: what each column of some logs may be, and a file that says so.
 
 A column is what the table of kinds, `swashplate.campaign.schema.KINDS`, says of its name and unit,
-and what its numbers show. What is not known for sure is marked "guessed"; what cannot be told stays
-open in a line "FIXME".
+and what its numbers show. What is not known for sure is marked "guessed"; what cannot be known
+stays open in a line "FIXME".
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from swashplate.campaign.samples import rolls_over_at, turns_over
 from swashplate.campaign.schema import KINDS, ROD, TURNS, CampaignFile, InputKind, conversion
 from swashplate.documents import parse_toml, toml_key, toml_string, validated
 from swashplate.errors import FileError, InputError
-from swashplate.logs import Column, Log, open_log
+from swashplate.logs import Log, LogColumn, open_log
 from swashplate.parameters.files import NEUTRAL, preset_names
 from swashplate.units import speed_unit, to_si
 
@@ -151,24 +151,24 @@ def draft_campaign(
         If there is no log, none has a column that is named, or a unit that is given measures
         something else than the column's kind.
     """
-    given, units, folder = dict(columns or {}), dict(units or {}), Path(folder).resolve()
+    kinds, units, folder = dict(columns or {}), dict(units or {}), Path(folder).resolve()
     opened = [open_log(path) for path in logs]
-    headers = dict[str, Column]()
+    headers = dict[str, LogColumn]()
     for column in (column for log in opened for column in log.columns):
         headers.setdefault(column.name, column)
     why = "" if logs else "A draft needs at least one log"
-    for name in sorted({*given, *units} - {*headers}):
+    for name in sorted({*kinds, *units} - {*headers}):
         why = why or f"No log has a column '{name}'; there are {', '.join(sorted(headers))}"
-    for name, what in given.items():
+    for name, what in kinds.items():
         if what not in ("time", *KINDS):
             why = f"'{name}' cannot be a '{what}': it is time, {', '.join(KINDS)}"
     if why:
         raise InputError(f"{why}.")
-    for name in sorted(given.keys() & units.keys()):
-        _check_unit(given[name], units[name], f"Column '{name}' ({given[name]})")
+    for name in sorted(kinds.keys() & units.keys()):
+        _check_unit(kinds[name], units[name], f"Column '{name}' ({kinds[name]})")
     numbers = [_numbers(log, [column.name for column in log.columns]) for log in opened]
-    parts = {name: [each[name] for each in numbers if name in each] for name in headers}
-    guesses = _guesses(headers, parts, counts_per_turn, given, units)
+    blocks = {name: [number[name] for number in numbers if name in number] for name in headers}
+    guesses = _guesses(headers, blocks, counts_per_turn, kinds, units)
     # an axis is called like its drive, but no machine like the start for any of them
     axes = _axes(guesses, "drive" if drive in (None, NEUTRAL) else Path(drive or "").stem)
     heading = f"title = {toml_string(title or folder.name)}"
@@ -176,30 +176,30 @@ def draft_campaign(
         heading += "    # guessed, the folder's name: the report's heading; machine, place, author"
     lines = [HEADER, heading, ""]
     for name, axis in axes.items():
-        lines += _axis_lines(name, axis, guesses, parts, opened[0], drive, counts_per_turn)
-    used = [each for axis in axes.values() for each in (*axis.inputs, *axis.channels.values())]
-    first = {each.name for each in opened[0].columns} - {each.name for each in used}
-    left = ", ".join(e.name for e in guesses if e.name in first and e.kind != "time")
-    if left:
-        lines += [f"{UNUSED}: {left}", ""]
-    if counts_per_turn is not None and all(each.kind != "encoder_counts" for each in used):
-        among = f" among {left}" if left else ""
+        lines += _axis_lines(name, axis, guesses, blocks, opened[0], drive, counts_per_turn)
+    used = [guess for axis in axes.values() for guess in (*axis.inputs, *axis.channels.values())]
+    first = {column.name for column in opened[0].columns} - {guess.name for guess in used}
+    unused = ", ".join(e.name for e in guesses if e.name in first and e.kind != "time")
+    if unused:
+        lines += [f"{UNUSED}: {unused}", ""]
+    if counts_per_turn is not None and all(guess.kind != "encoder_counts" for guess in used):
+        among = f" among {unused}" if unused else ""
         lines += [f"{NO_ENCODER}{among}; counts_per_turn = {counts_per_turn:.12g} is left out", ""]
     text, runs = "\n".join(lines), list[_Run]()
     stems = [log.path.stem for log in opened]
     for log, read in zip(opened, numbers, strict=True):
-        made = _run(log, read, axes, folder, text)
+        drafted = _run(log, read, axes, folder, text)
         if stems.count(log.path.stem) > 1:
             # logs of one name in several folders, or formats
             near = log.path.resolve().parent.name, log.path.name
-            made.more.insert(0, f"name = {toml_string('/'.join(near))}")
-        runs.append(made)
-    held_back = _held_back([each for each in runs if each.role == '"fit"'])
+            drafted.more.insert(0, f"name = {toml_string('/'.join(near))}")
+        runs.append(drafted)
+    held_back = _held_back([run for run in runs if run.role == '"fit"'])
     runs, order = _in_time(runs)
     lines += order
-    for each in runs:
-        role = '"validate"' if each is held_back else each.role
-        lines += ["[[runs]]", f"file = {each.file}", f"role = {role}", *each.more, ""]
+    for run in runs:
+        role = '"validate"' if run is held_back else run.role
+        lines += ["[[runs]]", f"file = {run.file}", f"role = {role}", *run.more, ""]
     return "\n".join(lines).rstrip() + "\n"
 
 
@@ -220,42 +220,42 @@ def _words(name: str) -> str:
     return re.sub(r"(?<=[a-z])(?=[A-Z])|[_./\-\s]+", " ", name).strip().lower()
 
 
-def _by_words(column: Column, name: str, unit: str | None) -> _Guess:
+def _by_words(column: LogColumn, name: str, unit: str | None) -> _Guess:
     """What a name and a unit say: the first kind in the table that has either."""
     words = _words(name)
     if re.fullmatch(TIME, _words(name.rpartition("/")[2])):
         return _Guess(column.name, "time", "", column.unit)
     matches = {
         kind: match
-        for kind, each in KINDS.items()
-        if each.words and (match := re.fullmatch(rf"(?:(.*) )?(?:{each.words}){OF}", words))
+        for kind, meant in KINDS.items()
+        if meant.words and (match := re.fullmatch(rf"(?:(.*) )?(?:{meant.words}){OF}", words))
     }
     marked = speed_unit(unit or "")
-    kinds = (kind for kind, each in KINDS.items() if kind in matches or marked in each.marks)
+    kinds = (kind for kind, meant in KINDS.items() if kind in matches or marked in meant.marks)
     axis = next((match[1] for match in matches.values()), "")
     return _Guess(column.name, next(kinds, ""), axis or "", column.unit)
 
 
-def _by_header(column: Column, kind: str | None) -> _Guess:
+def _by_header(column: LogColumn, kind: str | None) -> _Guess:
     """What a header says, of a kind if one is given; the unit may be the end of its name."""
     name = re.sub(r"[\[(].*[\])]", "", column.name).strip()
     word = PLC.fullmatch(name) if column.unit is None else None
     if word is not None:
         name = word["after"] or word["before"]
     unit = column.unit or ("rpm" if re.search(TURNS, name.lower()) else None)
-    whole = _by_words(column, name, unit)
+    by_name = _by_words(column, name, unit)
     split = re.fullmatch(r"(.*)[_\s]+([^_\s]+)", name)
     stem, ending = split.groups() if split else ("", name)
-    short = _by_words(column, stem, None)
-    if short.kind == "other" and ending in ("V", "mV"):
-        short = short._replace(kind="voltage")
+    by_last_word = _by_words(column, stem, None)
+    if by_last_word.kind == "other" and ending in ("V", "mV"):
+        by_last_word = by_last_word._replace(kind="voltage")
     if kind is not None:
-        whole, short = (each._replace(kind=kind) for each in (whole, short))
-    if column.unit is None and whole.kind not in HALVES and _measures(short.kind, ending):
-        return short._replace(unit=ending, in_header=False)
-    unit = unit if whole.kind == "shaft_speed" else column.unit
+        by_name, by_last_word = (guess._replace(kind=kind) for guess in (by_name, by_last_word))
+    if column.unit is None and by_name.kind not in HALVES and _measures(by_last_word.kind, ending):
+        return by_last_word._replace(unit=ending, in_header=False)
+    unit = unit if by_name.kind == "shaft_speed" else column.unit
     in_header = column.unit is not None
-    return whole._replace(unit=unit, in_header=in_header, of_plc=word is not None)
+    return by_name._replace(unit=unit, in_header=in_header, of_plc=word is not None)
 
 
 def _check_unit(kind: str, unit: str, what: str) -> None:
@@ -279,10 +279,10 @@ def _measures(kind: str, unit: str) -> bool:
 
 
 def _guesses(
-    headers: Mapping[str, Column],
-    parts: Mapping[str, list[Array]],
+    headers: Mapping[str, LogColumn],
+    blocks: Mapping[str, list[Array]],
     counts_per_turn: float | None,
-    given: Mapping[str, str],
+    kind_of: Mapping[str, str],
     units: Mapping[str, str],
 ) -> list[_Guess]:
     """Guesses by headers, and by the numbers of all logs.
@@ -291,37 +291,37 @@ def _guesses(
     has a sign if it goes to minus its peak in any log; half a current without the other half is a
     whole one; whole numbers that begin anew at their end are an encoder's, whatever their name.
     """
-    taken = {"time"} & {*given.values()}
-    taken |= {*INPUTS} if {"voltage", "current"} & {*given.values()} else set()
-    met = list[_Guess]()
+    taken = {"time"} & {*kind_of.values()}
+    taken |= {*INPUTS} if {"voltage", "current"} & {*kind_of.values()} else set()
+    guesses = list[_Guess]()
     for name, column in headers.items():
-        values = [part for part in parts[name] if part.size]
-        each = _by_header(column, given.get(name))
-        kind = given.get(name, "" if each.kind in taken else each.kind)
-        each = each._replace(kind=kind, given=name in given)
+        values = [part for part in blocks[name] if part.size]
+        guess = _by_header(column, kind_of.get(name))
+        kind = kind_of.get(name, "" if guess.kind in taken else guess.kind)
+        guess = guess._replace(kind=kind, given=name in kind_of)
         if name in units:
-            each = each._replace(unit=units[name], in_header=False, why="given")
-        elif each.unit is None:
-            each = _with_unit_of_numbers(each, values)
-        if kind == "encoder_counts" or not (kind or each.unit):
+            guess = guess._replace(unit=units[name], in_header=False, why="given")
+        elif guess.unit is None:
+            guess = _with_unit_of_numbers(guess, values)
+        if kind == "encoder_counts" or not (kind or guess.unit):
             size = max((rolls_over_at(part, counts_per_turn) for part in values), default=0)
-            each = each._replace(kind="encoder_counts" if size else kind, rolls_over_at=size)
+            guess = guess._replace(kind="encoder_counts" if size else kind, rolls_over_at=size)
         if kind == "position":
-            each = each._replace(rolls_over_at=_turn(values, each.unit or "deg"))
-        if kind == "rectified_current" and name not in given and has_sign(values):
-            each = each._replace(kind="signed_current")
-        met.append(each)
-    kinds = {(each.axis, each.kind) for each in met}
-    for n, each in enumerate(met):
-        alone = each.kind in HALVES and any((each.axis, half) not in kinds for half in HALVES)
-        if alone and each.name not in given:
-            met[n] = each._replace(kind="rectified_current")
-    return met
+            guess = guess._replace(rolls_over_at=_turn(values, guess.unit or "deg"))
+        if kind == "rectified_current" and name not in kind_of and has_sign(values):
+            guess = guess._replace(kind="signed_current")
+        guesses.append(guess)
+    kinds = {(guess.axis, guess.kind) for guess in guesses}
+    for n, guess in enumerate(guesses):
+        alone = guess.kind in HALVES and any((guess.axis, half) not in kinds for half in HALVES)
+        if alone and guess.name not in kind_of:
+            guesses[n] = guess._replace(kind="rectified_current")
+    return guesses
 
 
-def _with_unit_of_numbers(signal: _Guess, parts: Sequence[Array]) -> _Guess:
+def _with_unit_of_numbers(signal: _Guess, blocks: Sequence[Array]) -> _Guess:
     """A column whose header gives no unit, with what its numbers say of one."""
-    finite = [part[np.isfinite(part)] for part in parts]
+    finite = [part[np.isfinite(part)] for part in blocks]
     if signal.kind == "time":
         unit, why = _time_unit(finite)
         return signal._replace(unit=unit, why=why)
@@ -336,20 +336,20 @@ def _with_unit_of_numbers(signal: _Guess, parts: Sequence[Array]) -> _Guess:
     return signal
 
 
-def _whole(parts: Sequence[Array]) -> bool:
+def _whole(blocks: Sequence[Array]) -> bool:
     """Whether all numbers are whole."""
-    return all(bool(np.all(part == np.floor(part))) for part in parts)
+    return all(bool(np.all(part == np.floor(part))) for part in blocks)
 
 
-def _time_unit(parts: Sequence[Array]) -> tuple[str, str]:
+def _time_unit(blocks: Sequence[Array]) -> tuple[str, str]:
     """Unit of stamps without one, and why.
 
     Seconds, unless they are whole numbers of which a step of one second or more would make a log
     too slow for any motion: then the largest unit in which it is fast enough.
     """
-    steps = [float(np.median(np.diff(part))) for part in parts if part.size > 1]
+    steps = [float(np.median(np.diff(part))) for part in blocks if part.size > 1]
     step = float(np.median(steps)) if steps else 0.0
-    if step < 1.0 / SLOWEST_LOG or not _whole(parts):
+    if step < 1.0 / SLOWEST_LOG or not _whole(blocks):
         return "s", "guessed: the header gives none"
     fast = (unit for unit, size in TICKS.items() if step * size <= 1.0 / SLOWEST_LOG)
     unit = next(fast, "ns")
@@ -357,15 +357,15 @@ def _time_unit(parts: Sequence[Array]) -> tuple[str, str]:
     return unit, f"guessed: whole numbers that step by {step:.9g}, {rate:.4g} Hz in {unit}"
 
 
-def _full_scale(parts: Sequence[Array], *, named: bool) -> int:
+def _full_scale(blocks: Sequence[Array], *, named: bool) -> int:
     """Reading at full scale of what may be a PLC's word of 16 bits, or 0.
 
     A word is a whole number too large to be of a physical unit, or called so by its column. 27648
     is that of SIMATIC, 16384 and 32767 of others, whose words end there.
     """
-    largest = max(float(np.abs(part).max(initial=0.0)) for part in parts)
+    largest = max(float(np.abs(part).max(initial=0.0)) for part in blocks)
     least = SMALLEST_WORD if named else MILLIVOLTS
-    if not _whole(parts) or not least < largest <= 1 << 15:
+    if not _whole(blocks) or not least < largest <= 1 << 15:
         return 0
     if largest in (16383.0, 16384.0):
         return 16384
@@ -386,19 +386,19 @@ def _axes(guesses: Sequence[_Guess], plain: str) -> dict[str, _Axis]:
 
     An axis needs an input and a channel; columns without a prefix belong to the only axis.
     """
-    prefixes = dict.fromkeys(each.axis for each in guesses if each.kind in INPUTS and each.axis)
+    prefixes = dict.fromkeys(guess.axis for guess in guesses if guess.kind in INPUTS and guess.axis)
     axes = {prefix: _axis([e for e in guesses if e.axis == prefix]) for prefix in prefixes}
     axes = {prefix: axis for prefix, axis in axes.items() if axis.channels}
     return axes if len(axes) > 1 else {plain: _axis(guesses)}
 
 
-def _axis(ours: Sequence[_Guess]) -> _Axis:
-    made = _Axis([each for each in ours if each.kind in INPUTS], {})
-    for each in ours:
-        if each.kind not in ("", "time", *INPUTS):
-            number = 1 + sum(each.kind == other.kind for other in made.channels.values())
-            made.channels[each.kind if number == 1 else f"{each.kind}_{number}"] = each
-    return made
+def _axis(guesses: Sequence[_Guess]) -> _Axis:
+    axis = _Axis([guess for guess in guesses if guess.kind in INPUTS], {})
+    for guess in guesses:
+        if guess.kind not in ("", "time", *INPUTS):
+            number = 1 + sum(guess.kind == channel.kind for channel in axis.channels.values())
+            axis.channels[guess.kind if number == 1 else f"{guess.kind}_{number}"] = guess
+    return axis
 
 
 # --- what the file says ---------------------------------------------------------------------------
@@ -408,32 +408,34 @@ def _axis_lines(
     name: str,
     axis: _Axis,
     guesses: Sequence[_Guess],
-    parts: Mapping[str, list[Array]],
+    blocks: Mapping[str, list[Array]],
     log: Log,
     drive: str | None,
     counts_per_turn: float | None,
 ) -> list[str]:
     """Tables of an axis; what the first log does not show stays open."""
-    own = '# drive = "hoist"    # a packaged drive or a parameter file, to be fitted'
+    drive_line = '# drive = "hoist"    # a packaged drive or a parameter file, to be fitted'
     if drive is not None:
-        own = f"drive = {toml_string(name if name in preset_names() else drive)}"
+        drive_line = f"drive = {toml_string(name if name in preset_names() else drive)}"
     clock = f"{NO_TIME}    # {FIXME}: no column of time found; samples a second"
-    clocks = {each.name: _clock(each, guesses) for each in guesses}
-    main = next((clocks[each.name] for each in (*axis.inputs, *guesses)), "") or clock
+    clocks = {guess.name: _clock(guess, guesses) for guess in guesses}
+    main = next((clocks[guess.name] for guess in (*axis.inputs, *guesses)), "") or clock
     start = 'start = "rest"    # at the first sample: rest, steady or estimated'
-    which = f'column = "{FIXME}"    # which of {", ".join(repr(each.name) for each in log.columns)}'
+    which = (
+        f'column = "{FIXME}"    # which of {", ".join(repr(column.name) for column in log.columns)}'
+    )
     kind = f'kind = "voltage"    # {FIXME}: or current, or other'
     tables = {"input": [kind, f"{which} commands?"]}
     if not axis.channels:
         kind = f'kind = "shaft_speed"    # {FIXME}: or position, encoder_counts ...'
         tables["channels.measured"] = [kind, f"{which} was measured?"]
-    signals = [("input", each) for each in axis.inputs[:1]]
-    signals += [(f"channels.{toml_key(key)}", each) for key, each in axis.channels.items()]
-    for table, each in signals:
-        tables[table] = _signal_lines(each, parts[each.name], counts_per_turn)
-        tables[table] += [clocks[each.name]] * (clocks[each.name] not in ("", main))
-    tables["input"] += [BETWEEN, *(f"# another input? '{each.name}'" for each in axis.inputs[1:])]
-    lines = [f"[axes.{toml_key(name)}]", own, main, start, ""]
+    signals = [("input", guess) for guess in axis.inputs[:1]]
+    signals += [(f"channels.{toml_key(key)}", channel) for key, channel in axis.channels.items()]
+    for table, signal in signals:
+        tables[table] = _signal_lines(signal, blocks[signal.name], counts_per_turn)
+        tables[table] += [clocks[signal.name]] * (clocks[signal.name] not in ("", main))
+    tables["input"] += [BETWEEN, *(f"# another input? '{guess.name}'" for guess in axis.inputs[1:])]
+    lines = [f"[axes.{toml_key(name)}]", drive_line, main, start, ""]
     for table, entries in tables.items():
         lines += [f"[axes.{toml_key(name)}.{table}]", *entries, ""]
     return lines
@@ -442,10 +444,10 @@ def _axis_lines(
 def _clock(signal: _Guess, guesses: Sequence[_Guess]) -> str:
     """A signal's line of time: the first column of time in its group of the file, or of all."""
 
-    def beside(each: _Guess) -> bool:
-        return each.name.rpartition("/")[0] == signal.name.rpartition("/")[0]
+    def beside(guess: _Guess) -> bool:
+        return guess.name.rpartition("/")[0] == signal.name.rpartition("/")[0]
 
-    times = sorted((each for each in guesses if each.kind == "time"), key=beside, reverse=True)
+    times = sorted((guess for guess in guesses if guess.kind == "time"), key=beside, reverse=True)
     if not times:
         return ""
     time = times[0]
@@ -455,21 +457,26 @@ def _clock(signal: _Guess, guesses: Sequence[_Guess]) -> str:
     return f"time = {{ {column}, unit = {toml_string(time.unit or 's')} }}    # {time.why}"
 
 
-def _signal_lines(each: _Guess, parts: Sequence[Array], counts_per_turn: float | None) -> list[str]:
+def _signal_lines(
+    guess: _Guess, blocks: Sequence[Array], counts_per_turn: float | None
+) -> list[str]:
     """Entries of an input or a channel."""
-    percent = each.kind in ("other", "voltage") and each.unit == "%"
-    command = percent or (each.kind in ("other", "voltage") and each.full_scale > 0)
-    kind, scale = ("voltage" if command else each.kind), 1.0
-    known = KINDS[kind]
-    guessed = "" if each.given and kind == each.kind else "guessed: "
-    lines = [f'kind = "{kind}"    # {guessed}{known.meaning}', f"column = {toml_string(each.name)}"]
+    percent = guess.kind in ("other", "voltage") and guess.unit == "%"
+    command = percent or (guess.kind in ("other", "voltage") and guess.full_scale > 0)
+    kind, scale = ("voltage" if command else guess.kind), 1.0
+    kind_meant = KINDS[kind]
+    guessed = "" if guess.given and kind == guess.kind else "guessed: "
+    lines = [
+        f'kind = "{kind}"    # {guessed}{kind_meant.meaning}',
+        f"column = {toml_string(guess.name)}",
+    ]
     if percent:
         scale = 0.1
         lines += ['unit = "V"', "scale = 0.1    # guessed: 100 % stand for the 10 V of a card"]
     elif command:
         # rounded down, or the largest word would be beyond the 10 V that a card takes
-        scale = floor(1e12 * 10.0 / each.full_scale) / 1e12
-        why = f"guessed: 10 V over {each.full_scale}, a PLC's word at full scale"
+        scale = floor(1e12 * 10.0 / guess.full_scale) / 1e12
+        why = f"guessed: 10 V over {guess.full_scale}, a PLC's word at full scale"
         lines += ['unit = "V"', f"scale = {scale:.9g}    # {why}"]
     elif kind == "encoder_counts":
         unknown = f"# counts_per_turn = 1000    # {FIXME}: for one turn, quadrature included"
@@ -477,19 +484,19 @@ def _signal_lines(each: _Guess, parts: Sequence[Array], counts_per_turn: float |
         lines.append(unknown if counts_per_turn is None else stated)
         lines.append("gear_ratio = 1.0    # turns of the encoder for one turn of the shaft")
     else:
-        lines += _unit_lines(each)
-    if each.full_scale and not command:
-        why = f"range of the instrument over {each.full_scale}, as of a PLC's word at full scale"
+        lines += _unit_lines(guess)
+    if guess.full_scale and not command:
+        why = f"range of the instrument over {guess.full_scale}, as of a PLC's word at full scale"
         lines.append(f"scale = 1.0    # {FIXME}: {why}")
-    if size := each.rolls_over_at:
+    if size := guess.rolls_over_at:
         lines.append(f"rolls_over_at = {size:.9g}    # guessed: begins anew there")
-    if empty := sum(int(np.count_nonzero(~np.isfinite(part))) for part in parts):
+    if empty := sum(int(np.count_nonzero(~np.isfinite(part))) for part in blocks):
         lines.append(f'missing = "drop"    # guessed: {empty} cells are empty')
-    neutral = next((x for part in parts for x in part[np.isfinite(part)][:1].tolist()), 0.0)
-    if neutral and each.kind == "other":
+    neutral = next((x for part in blocks for x in part[np.isfinite(part)][:1].tolist()), 0.0)
+    if neutral and guess.kind == "other":
         why = "guessed: the first sample is neutral"
         lines.append(f"offset = {-scale * neutral:.9g}    # {why}")
-    return lines + _accuracy_lines(kind, "V" if command else each.unit)
+    return lines + _accuracy_lines(kind, "V" if command else guess.unit)
 
 
 def _accuracy_lines(kind: str, unit: str | None) -> list[str]:
@@ -510,7 +517,7 @@ def _accuracy_lines(kind: str, unit: str | None) -> list[str]:
 
 
 def _unit_lines(signal: _Guess) -> list[str]:
-    """The entry of a signal's unit, none where the header has it."""
+    """The entry of a signal's unit, none if the header has it."""
     units = KINDS[signal.kind].units
     usual = (*units, "1")[0]
     if signal.unit is not None and units and not _measures(signal.kind, signal.unit):
@@ -555,7 +562,7 @@ def _run(
     rows = max((column.size for column in read.values()), default=0)
     empty = {name for name, values in read.items() if not np.isfinite(values).any()}
     file = (path.relative_to(folder) if path.is_relative_to(folder) else path).as_posix()
-    tested, more = dict[str, _Axis](), list[str]()
+    tested, entries = dict[str, _Axis](), list[str]()
     for name, axis in axes.items():
         lacking = {key: e.name for key, e in axis.channels.items() if e.name not in names}
         if all(e.name in names for e in axis.inputs[:1]) and (
@@ -563,47 +570,49 @@ def _run(
         ):
             tested[name] = axis
             false = f"axes.{toml_key(name)}.channels.{{}} = false    # no column {{}}"
-            more += [false.format(toml_key(k), toml_string(n)) for k, n in lacking.items()]
+            entries += [false.format(toml_key(k), toml_string(n)) for k, n in lacking.items()]
     if tested and len(tested) < len(axes):
-        more.insert(0, f"only = [{', '.join(map(toml_string, tested))}]")
+        entries.insert(0, f"only = [{', '.join(map(toml_string, tested))}]")
     written = path.stat().st_mtime
-    made = _Run(f"{toml_string(file)}    # {rows} samples", '"fit"', more, written=written)
+    run = _Run(f"{toml_string(file)}    # {rows} samples", '"fit"', entries, written=written)
     if not tested:
-        return made._replace(role='"ignore"    # it has no input')
+        return run._replace(role='"ignore"    # it has no input')
     if f'column = "{FIXME}"' in text:
-        return made
-    whole = text.replace("# counts_per_turn = 1000", "counts_per_turn = 1000")
-    whole = whole.replace(NO_TIME, NO_TIME.lstrip("# "))
-    whole = "\n".join([whole, "[[runs]]", f"file = {made.file}", *more])
+        return run
+    with_counts = text.replace("# counts_per_turn = 1000", "counts_per_turn = 1000")
+    with_counts = with_counts.replace(NO_TIME, NO_TIME.lstrip("# "))
+    with_counts = "\n".join([with_counts, "[[runs]]", f"file = {run.file}", *entries])
     try:
-        content = validated(parse_toml(whole, "the draft"), CampaignFile, "the draft")
+        content = validated(parse_toml(with_counts, "the draft"), CampaignFile, "the draft")
         experiments, overview = read_run("the draft", "run", content.runs[0], content.axes, log)
     except (FileError, InputError) as error:
-        return made._replace(role=f'"ignore"    # {FIXME}: {error}')
-    said, stratum, peak, seen = made.file, "", 0.0, set[str]()
-    parts = [each for each in experiments if each.axis == experiments[0].axis]
+        return run._replace(role=f'"ignore"    # {FIXME}: {error}')
+    said, stratum, peak, seen = run.file, "", 0.0, set[str]()
+    of_axis = [experiment for experiment in experiments if experiment.axis == experiments[0].axis]
     duration = float(experiments[-1].input.time[-1] - experiments[0].input.time[0])
     if overview is not None:
         duration = overview.end - overview.begin
     if NO_TIME not in text:
-        rate = 1.0 / float(np.median(np.diff(parts[0].input.time)))
+        rate = 1.0 / float(np.median(np.diff(of_axis[0].input.time)))
         said += f", {duration:.4g} s at {rate:.4g} Hz"
         if overview is not None:
-            said += f", {len(parts)} of {len(overview.windows)} windows with motion used"
-        elif len(parts) > 1:
-            said += f" in {len(parts)} parts"
-    for each in (each for each in experiments if each.axis not in seen):
-        seen.add(each.axis)
-        said += f", {each.maneuver}" if each.input.kind == "voltage" else ""
-        if moves_at_first(each):
-            more.append(f"axes.{toml_key(each.axis)}.{ESTIMATED}    # guessed: it begins in motion")
-        away = each.input.values - each.input.values[0]
+            said += f", {len(of_axis)} of {len(overview.windows)} windows with motion used"
+        elif len(of_axis) > 1:
+            said += f" in {len(of_axis)} parts"
+    for unseen in (experiment for experiment in experiments if experiment.axis not in seen):
+        seen.add(unseen.axis)
+        said += f", {unseen.maneuver}" if unseen.input.kind == "voltage" else ""
+        if moves_at_first(unseen):
+            entries.append(
+                f"axes.{toml_key(unseen.axis)}.{ESTIMATED}    # guessed: it begins in motion"
+            )
+        away = unseen.input.values - unseen.input.values[0]
         low, high = -float(away.min()), float(away.max())
-        both = min(low, high) > 0.25 * max(low, high)
-        kind = each.recognised.kind if each.recognised else ""
-        stratum += f"{kind} {'both' if both else 'up' if high > low else 'down'}, "
+        two_sided = min(low, high) > 0.25 * max(low, high)
+        kind = unseen.recognised.kind if unseen.recognised else ""
+        stratum += f"{kind} {'two_sided' if two_sided else 'up' if high > low else 'down'}, "
         peak = max(peak, low, high)
-    return made._replace(
+    return run._replace(
         file=said,
         stratum=stratum,
         peak=peak,
@@ -618,18 +627,18 @@ def _in_time(runs: Sequence[_Run]) -> tuple[list[_Run], list[str]]:
     A log is written to its end. If files were written so far apart that none of their runs overlap,
     these are the times of a logger; those of copies lie closer together.
     """
-    read = [each for each in runs if each.duration is not None]
-    if len(read) < 2 or all(each.recorded is not None for each in read):
-        return sorted(runs, key=lambda each: each.recorded or inf), []
-    last_first = sorted(read, key=lambda each: each.written)
+    read = [run for run in runs if run.duration is not None]
+    if len(read) < 2 or all(run.recorded is not None for run in read):
+        return sorted(runs, key=lambda run: run.recorded or inf), []
+    last_first = sorted(read, key=lambda run: run.written)
     apart = all(
         later.written - (1.0 - OVERLAP) * (later.duration or 0.0) >= earlier.written
         for earlier, later in pairwise(last_first)
     )
     if not apart:
         return [*runs], [UNORDERED, ""]
-    dated = [_dated(each) if each.duration is not None else each for each in runs]
-    return sorted(dated, key=lambda each: each.written), []
+    dated = [_dated(run) if run.duration is not None else run for run in runs]
+    return sorted(dated, key=lambda run: run.written), []
 
 
 def _dated(run: _Run) -> _Run:
@@ -643,8 +652,8 @@ def _dated(run: _Run) -> _Run:
 def _held_back(fitted: Sequence[_Run]) -> _Run | None:
     """The run to validate with: the others have its kind, its direction and more than its size."""
     largest = dict[str, _Run]()
-    for each in fitted:
-        if each.peak > largest.setdefault(each.stratum, each).peak:
-            largest[each.stratum] = each
-    others = [each for each in fitted if each is not largest[each.stratum]]
+    for run in fitted:
+        if run.peak > largest.setdefault(run.stratum, run).peak:
+            largest[run.stratum] = run
+    others = [run for run in fitted if run is not largest[run.stratum]]
     return others[-1] if others and len(fitted) >= MANY else None

@@ -64,17 +64,17 @@ class Guess(NamedTuple):
     gain: tuple[float, float]
     """Speed for a volt beyond the dead zone. [unit/V]"""
     jump: tuple[float, float]
-    """Speed right beyond the dead zone, 0 where none was seen. [unit]"""
+    """Speed right beyond the dead zone, 0 if none was seen. [unit]"""
     top_speed: tuple[float, float]
-    """Infinite where none was reached. [unit]"""
+    """Infinite if none was reached. [unit]"""
     acceleration: tuple[float, float]
-    """Infinite where it limits nothing. [unit/s]"""
+    """Infinite if it limits nothing. [unit/s]"""
     lag: float
     """[s]"""
     delay: float
     """[s]"""
     creep: float | None
-    """Speed at rest, with its sign; 0 where the logs show none, None where their rests are too
+    """Speed at rest, with its sign; 0 if the logs show none, None where their rests are too
     short or too few to show one. [unit]"""
     command: tuple[float, float]
     """Largest command; 0 for a way that was not tried, whose numbers are the other's. [V]"""
@@ -123,7 +123,7 @@ def _rests(run: MovingRun, still: float, settling: float) -> Iterable[tuple[floa
     """Begin and end [s] of stretches at rest that were measured without a gap, settled ones."""
     resting = np.abs(run.command) <= still
     # a command that is held stays up to the next stamp
-    until = np.append(run.stamps[1:], run.stamps[-1]) if run.held else run.stamps
+    until = np.append(run.stamps[1:], run.stamps[-1]) if run.is_held else run.stamps
     changes = np.flatnonzero(np.diff(np.concatenate([[0], resting.astype(np.int8), [0]])))
     gaps = np.flatnonzero(np.diff(run.sampled) > 3.0 * float(np.median(np.diff(run.sampled))))
     pieces = np.split(run.sampled, gaps + 1)
@@ -153,26 +153,31 @@ def guess_drive(tests: Campaign | Sequence[Experiment]) -> Guess:
     runs, unit, spoilt = list[MovingRun](), "", spiked(experiments)
     reversed_runs = list[tuple[str, str]]()
     kinds: tuple[ChannelKind, ...] = ("shaft_speed", "encoder_counts", "position")
-    for each in experiments:
+    for experiment in experiments:
         # the channel that tells how it moves: a speed before a position
-        moving = (one for kind in kinds for one in each.of_kind(kind) if one.used.sum() > 8)
+        moving = (
+            candidate
+            for kind in kinds
+            for candidate in experiment.of_kind(kind)
+            if candidate.used.sum() > 8
+        )
         channel = next(moving, None)
         if channel is None:
             continue
-        if each.input.kind != "voltage":
+        if experiment.input.kind != "voltage":
             raise InputError(
-                f"{each.input.source}: the input is of the kind '{each.input.kind}', but a guess "
-                'needs a command in V: write kind = "voltage", unit = "V", and a scale that makes '
-                "its full range ±10 V; an offset is added after scaling, in V."
+                f"{experiment.input.source}: the input is of the kind '{experiment.input.kind}', "
+                'but a guess needs a command in V: write kind = "voltage", unit = "V", and a scale '
+                "that makes its full range ±10 V; an offset is added after scaling, in V."
             )
-        for used in (channel, *each.of_kind(*CURRENTS)):
-            sentence, gross = spoilt.get((each.name, used.name), ("", False))
+        for used in (channel, *experiment.of_kind(*CURRENTS)):
+            sentence, gross = spoilt.get((experiment.name, used.name), ("", False))
             if gross:
                 raise InputError(f"{sentence}.")
         unit = f"{channel.unit}/s" if channel.is_position else channel.unit
-        runs.append(moving_run(each, channel))
+        runs.append(moving_run(experiment, channel))
         if not goes_with_command(runs[-1]):
-            reversed_runs.append((each.name, channel.name))
+            reversed_runs.append((experiment.name, channel.name))
     if 0 < len(reversed_runs) < len(runs):
         run, name = reversed_runs[0]
         raise InputError(
@@ -199,22 +204,24 @@ def guess_drive(tests: Campaign | Sequence[Experiment]) -> Guess:
     scale = float(np.quantile(np.abs(speeds), 0.99))
     if not size.max() > 0.0 or scale == 0.0:
         raise InputError("The command or the speed never leaves rest: there is nothing to guess.")
-    found = searched_numbers(runs, weights * speeds, size, scale, 0.0)
-    creep = _creep(runs, found, scale)
+    searched = searched_numbers(runs, weights * speeds, size, scale, 0.0)
+    creep = _creep(runs, searched, scale)
     if creep:
         # without it one dead zone was too wide, the other too narrow, and the gains made up for it
-        found = searched_numbers(runs, weights * speeds, size, scale, creep)
+        searched = searched_numbers(runs, weights * speeds, size, scale, creep)
     mean = np.average(speeds, weights=weights**2)
-    unexplained = np.sum(speed_errors(runs, found) ** 2) / np.sum(weights**2 * (speeds - mean) ** 2)
+    unexplained = np.sum(speed_errors(runs, searched) ** 2) / np.sum(
+        weights**2 * (speeds - mean) ** 2
+    )
     # numbers of a way that was not tried are the other's
-    pairs = found[:10].reshape(5, 2)
+    pairs = searched[:10].reshape(5, 2)
     pairs[:, size == 0.0] = pairs[:, size > 0.0][:, :1]
     numbers = [(plus, minus) for plus, minus in [*pairs.tolist(), size.tolist()]]
     dead_zone, gain, top_speed, acceleration, jump, command = numbers
     return Guess(
         *(experiments[0].axis, unit, dead_zone, gain, jump, top_speed, acceleration),
-        lag=float(found[10]),
-        delay=round(float(found[12]), 6),
+        lag=float(searched[10]),
+        delay=round(float(searched[12]), 6),
         creep=creep,
         command=command,
         speed=scale,
@@ -223,44 +230,44 @@ def guess_drive(tests: Campaign | Sequence[Experiment]) -> Guess:
     )
 
 
-def steady_speed(guess: Guess, way: int) -> float:
+def steady_speed(guess: Guess, side: int) -> float:
     """Speed that settles under the largest command one way, as a magnitude. [unit]"""
-    volts = guess.command[way] or max(guess.command)
-    beyond = max(volts - guess.dead_zone[way], 0.0)
-    along = (1.0 - 2.0 * way) * (guess.creep or 0.0)
-    speed = guess.gain[way] * beyond + guess.jump[way] + along
-    return min(speed, guess.top_speed[way]) or guess.speed
+    volts = guess.command[side] or max(guess.command)
+    beyond = max(volts - guess.dead_zone[side], 0.0)
+    along = (1.0 - 2.0 * side) * (guess.creep or 0.0)
+    speed = guess.gain[side] * beyond + guess.jump[side] + along
+    return min(speed, guess.top_speed[side]) or guess.speed
 
 
-def guess_table(found: Guess) -> Table:
+def guess_table(guess: Guess) -> Table:
     """What was guessed, each way."""
-    columns = (Column(each, ".4g", none="not seen") for each in ("plus", "minus"))
-    made = Table(f"Axis {found.axis}, at first sight", (Column(""), *columns, UNIT))
+    columns = (Column(side, ".4g", none="not seen") for side in ("plus", "minus"))
+    table = Table(f"Axis {guess.axis}, at first sight", (Column(""), *columns, UNIT))
     rows = (
-        ("dead zone", found.dead_zone, "V", ".3g"),
-        ("gain beyond it", found.gain, f"{found.unit}/V", ""),
-        ("jump at its edge", tuple(each or inf for each in found.jump), found.unit, ""),
-        ("top speed", found.top_speed, found.unit, ""),
-        ("acceleration", found.acceleration, f"{found.unit}^2", ""),
+        ("dead zone", guess.dead_zone, "V", ".3g"),
+        ("gain beyond it", guess.gain, f"{guess.unit}/V", ""),
+        ("jump at its edge", tuple(jump or inf for jump in guess.jump), guess.unit, ""),
+        ("top speed", guess.top_speed, guess.unit, ""),
+        ("acceleration", guess.acceleration, f"{guess.unit}^2", ""),
     )
     for name, values, unit, spec in rows:
         cells = list[Cell | float | None]()
-        for way, (value, tried) in enumerate(zip(values, found.command, strict=True)):
+        for column, (value, tried) in enumerate(zip(values, guess.command, strict=True)):
             if not tried:
                 cells.append(Cell(None, "not tried"))
             elif isfinite(value):
                 cells.append(value)
             elif name == "top speed":
-                factor = display_unit(unit, steady_speed(found, way)).factor
-                speed = f"{factor * steady_speed(found, way):.3g}"
+                factor = display_unit(unit, steady_speed(guess, column)).factor
+                speed = f"{factor * steady_speed(guess, column):.3g}"
                 cells.append(Cell(None, f"at least {speed}, not seen"))
             else:
                 cells.append(None)
-        made.add(name, *cells, unit=unit, spec=spec)
-    made.add("delay", 1e3 * found.delay, "", unit="ms", spec=".3g")
-    made.add("lag", 1e3 * found.lag, "", unit="ms", spec=".3g")
-    creep: Cell | float = found.creep or Cell(None, "not seen")
-    if found.creep is None:
+        table.add(name, *cells, unit=unit, spec=spec)
+    table.add("delay", 1e3 * guess.delay, "", unit="ms", spec=".3g")
+    table.add("lag", 1e3 * guess.lag, "", unit="ms", spec=".3g")
+    creep: Cell | float = guess.creep or Cell(None, "not seen")
+    if guess.creep is None:
         creep = Cell(None, "no long rest")
-    made.add("creep at rest", creep, "", unit=found.unit, spec=".3g")
-    return made
+    table.add("creep at rest", creep, "", unit=guess.unit, spec=".3g")
+    return table

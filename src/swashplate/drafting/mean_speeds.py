@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.campaign.experiment import Channel, Experiment, InputSignal
-from swashplate.drafting.plain_drive import MODEL, Edge, PlainDrive
+from swashplate.drafting.plain_drive import MODEL, JumpWidth, PlainDrive
 from swashplate.equations.marching.derivatives import jacobian, residuals
 from swashplate.equations.marching.observation import ObservedRecord, RunValues, every_sample
 from swashplate.equations.marching.record import Record
@@ -126,7 +126,7 @@ class MovingRun(NamedTuple):
     """Those of the command, of a straight line the grid's as well. [s]"""
     command: Array
     """[V]"""
-    held: bool
+    is_held: bool
     """Whether the command is held between stamps, or a straight line."""
     start: float
     windows: Windows
@@ -142,7 +142,7 @@ class MovingRun(NamedTuple):
 def _model(run: MovingRun, numbers: Array) -> tuple[Instance, RunValues]:
     """The plain drive with numbers, and the speed that it begins with."""
     finite = PlainDrive(*np.minimum(numbers[:12], UNLIMITED).tolist())
-    instance = instance_of(MODEL, finite, given=Edge(run.edge))
+    instance = instance_of(MODEL, finite, given=JumpWidth(run.edge))
     return instance, RunValues({"speed": run.start})
 
 
@@ -160,8 +160,8 @@ def _delayed(run: MovingRun, positions: Array, start: Array | float, delay: floa
 
 def simulated_course(run: MovingRun, numbers: Array) -> Course:
     """Position of a run; numbers (13,) are those of `PlainDrive`, and the delay."""
-    instance, own = _model(run, numbers)
-    positions = residuals(instance, run.observed, own)
+    instance, run_values = _model(run, numbers)
+    positions = residuals(instance, run.observed, run_values)
     return _delayed(run, positions, run.start, numbers[12])
 
 
@@ -178,9 +178,9 @@ def linearised_errors(runs: Sequence[MovingRun], numbers: Array) -> tuple[Array,
     """The errors (m,), and their derivatives (m, 13) by the numbers."""
     errors, slopes = list[Array](), list[Array]()
     for run in runs:
-        instance, own = _model(run, numbers)
-        found = jacobian(instance, run.observed, PlainDrive._fields, own)
-        course = _delayed(run, found.rows, run.start * FROM_START, numbers[12])
+        instance, run_values = _model(run, numbers)
+        derivatives = jacobian(instance, run.observed, PlainDrive._fields, run_values)
+        course = _delayed(run, derivatives.rows, run.start * FROM_START, numbers[12])
         speeds = run.windows.mean_speeds(course)
         speeds[-1] -= run.speeds
         by_delay = -run.windows.mean_accelerations(course._replace(values=course.values[-1]))
@@ -222,18 +222,18 @@ def moving_run(experiment: Experiment, channel: Channel) -> MovingRun:
     windows = windows.of(inside)
     speeds = windows.mean_speeds(course)
     grid = drive.time[0] + STEP * np.arange(np.ceil((drive.time[-1] - drive.time[0]) / STEP) + 1.0)
-    held = drive.interpolation == "previous"
+    is_held = drive.interpolation == "previous"
     # a straight line may cross a dead zone between two stamps
-    stamps = np.append(drive.time, grid[-1]) if held else np.union1d(drive.time, grid)
+    stamps = np.append(drive.time, grid[-1]) if is_held else np.union1d(drive.time, grid)
     start = 0.0 if experiment.start == "rest" or not speeds.size else float(speeds[0])
     command = drive.at(stamps)
     return MovingRun(
-        observed=_observed(drive, grid, held),
+        observed=_observed(drive, grid, is_held),
         time=np.append(grid[0] - BEFORE, grid),
         edge=EDGE * float(np.abs(command).max()) or 1.0,
         stamps=stamps,
         command=command,
-        held=held,
+        is_held=is_held,
         start=start,
         windows=windows,
         speeds=speeds,
@@ -243,17 +243,17 @@ def moving_run(experiment: Experiment, channel: Channel) -> MovingRun:
     )
 
 
-def _observed(drive: InputSignal, grid: Array, held: bool) -> ObservedRecord:
+def _observed(drive: InputSignal, grid: Array, is_held: bool) -> ObservedRecord:
     """The command on the march's grid, of each step its mean."""
     stamps, values = drive.time, drive.values
     middles = 0.5 * (values[1:] + values[:-1])
-    pieces = (values[:-1] if held else middles) * np.diff(stamps)
+    pieces = (values[:-1] if is_held else middles) * np.diff(stamps)
     area = np.concatenate([[0.0], np.cumsum(pieces)])
 
     def area_at(instants: Array) -> Array:
         before = np.clip(np.searchsorted(stamps, instants, "right") - 1, 0, stamps.size - 1)
         first = values[before]
-        last = first if held else np.interp(instants, stamps, values)
+        last = first if is_held else np.interp(instants, stamps, values)
         return np.asarray(area[before] + 0.5 * (instants - stamps[before]) * (first + last))
 
     means = np.diff(area_at(np.append(grid, grid[-1] + STEP))) / STEP

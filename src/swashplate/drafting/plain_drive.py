@@ -33,13 +33,13 @@ class PlainDrive(NamedTuple):
     """Speed at rest, with its sign."""
 
 
-class Speed(NamedTuple):
+class SpeedState(NamedTuple):
     """State."""
 
     speed: float
 
 
-class Edge(NamedTuple):
+class JumpWidth(NamedTuple):
     """What a run gives."""
 
     edge: float
@@ -47,7 +47,7 @@ class Edge(NamedTuple):
 
 
 @equation
-def speed_at(command: float, p: PlainDrive, given: Edge) -> float:
+def speed_at(command: float, p: PlainDrive, given: JumpWidth) -> float:
     """Speed that settles at a command."""
     plus = max(command - p.dead_zone_plus, 0.0)
     minus = max(-command - p.dead_zone_minus, 0.0)
@@ -57,18 +57,22 @@ def speed_at(command: float, p: PlainDrive, given: Edge) -> float:
 
 
 @equation
-def step(state: Speed, command: float, p: PlainDrive, given: Edge, h: float) -> Speed:
+def step(
+    state: SpeedState, command: float, p: PlainDrive, given: JumpWidth, h: float
+) -> SpeedState:
     """Speed after a step with a command."""
     share = 1.0 - exp(-h / max(p.lag, SHORTEST_LAG))
     change = share * (speed_at(command, p, given) - state.speed)
-    return Speed(state.speed + min(max(change, -h * p.acceleration_minus), h * p.acceleration_plus))
+    return SpeedState(
+        state.speed + min(max(change, -h * p.acceleration_minus), h * p.acceleration_plus)
+    )
 
 
 MODEL = Model(
     "plain_drive",
     parameters=PlainDrive,
-    state=Speed,
+    state=SpeedState,
     step=step,
-    given=Edge,
+    given=JumpWidth,
     integrals={"position": "speed"},
 )

@@ -88,14 +88,14 @@ def searched_numbers(
         rough = errors_of(vector) / ROUGH
         return ROUGH**2 * float(np.sum(np.sqrt(1.0 + rough**2) - 1.0))
 
-    def descended(start: Array, free: Mask, **how: Any) -> tuple[float, Array]:
+    def descended(start: Array, free: Mask, **options: Any) -> tuple[float, Array]:
         """Loss and numbers after a descent in those that are free (12,)."""
         latest: dict[bytes, Array] = {}
 
         def errors_at(part: Array) -> Array:
-            whole = start.copy()
-            whole[free] = part
-            errors, slopes = linearised(whole)
+            searched = start.copy()
+            searched[free] = part
+            errors, slopes = linearised(searched)
             # nearly every step is taken: what is asked for next are the slopes there
             latest.clear()
             latest[part.tobytes()] = slopes[:, free]
@@ -114,7 +114,7 @@ def searched_numbers(
             loss="soft_l1",
             f_scale=ROUGH,
             jac=slopes_at,
-            **how,
+            **options,
         )
         end = start.copy()
         end[free] = solution.x
@@ -122,10 +122,10 @@ def searched_numbers(
 
     def best(starts: Iterable[Array], free: Mask) -> tuple[float, Array]:
         """Of many starts a few steps each, and only the best of them farther."""
-        begun = [descended(start, free, max_nfev=12) for start in starts]
-        begun.sort(key=lambda pair: pair[0])
+        first_legs = [descended(start, free, max_nfev=12) for start in starts]
+        first_legs.sort(key=lambda pair: pair[0])
         return min(
-            (descended(vector, free, max_nfev=30) for _, vector in begun[:3]),
+            (descended(vector, free, max_nfev=30) for _, vector in first_legs[:3]),
             key=lambda pair: pair[0],
         )
 
@@ -156,7 +156,7 @@ def searched_numbers(
         *product((0.0,), (0.0, 0.7), (0.0, -1.5, -3.0)),
         *product((0.2,), (0.0, 0.7), (-1.5,)),
     ]
-    cost, whole = best(
+    cost, searched = best(
         (
             limited + np.repeat([wider, steeper, quicker, 0.0], [2, 2, 1, 7])
             for wider, steeper, quicker in moves
@@ -164,19 +164,20 @@ def searched_numbers(
         free & (np.arange(12) < 10),
     )
     # the same line behind a larger dead zone
-    back = tried * size.max() / np.maximum(size, size.max() * ONE_WAY) / np.exp(whole[2:4])
+    back = tried * size.max() / np.maximum(size, size.max() * ONE_WAY) / np.exp(searched[2:4])
     smaller, jumping = best(
-        (whole + np.concatenate([jump * back, np.zeros(8), jump * tried]) for jump in JUMPS), free
+        (searched + np.concatenate([jump * back, np.zeros(8), jump * tried]) for jump in JUMPS),
+        free,
     )
     if SEEN * smaller < cost:
-        cost, whole = smaller, jumping
+        cost, searched = smaller, jumping
     # a limit or a jump that makes no difference was not met
     seen = free.copy()
     for index in range(6, 12):
-        without = whole.copy()
+        without = searched.copy()
         without[index] = NONE if index < 10 else 0.0
         nothing = NEXT_TO_NOTHING * float(np.sum((weighted / scale) ** 2))
         if loss_of(without) < SEEN * cost + nothing:
-            whole, seen[index] = without, False
-    _, whole = descended(whole, seen, xtol=1e-10, ftol=1e-12, gtol=1e-12)
-    return numbers_of(whole)
+            searched, seen[index] = without, False
+    _, searched = descended(searched, seen, xtol=1e-10, ftol=1e-12, gtol=1e-12)
+    return numbers_of(searched)

@@ -94,9 +94,9 @@ def guessed_set(guess: Guess, source: str) -> ParameterSet:
     speed_of_flow = 1.0 / (max(guess.lag, SHORTEST) * flow * n["Z3"] * n["Z5"])
     per_opening = per_angle * flow * speed_of_flow
     stops, openings, unreached = list[float](), list[float](), dict[str, float]()
-    for way, side in enumerate(SIDES):
-        fastest = steady_speed(guess, way)
-        top, pull = guess.top_speed[way], guess.acceleration[way]
+    for column, side in enumerate(SIDES):
+        fastest = steady_speed(guess, column)
+        top, pull = guess.top_speed[column], guess.acceleration[column]
         if not isfinite(top):
             unreached[f"Z13_{side}"] = fastest / per_angle
             top = STOP_FIRST * fastest
@@ -126,30 +126,30 @@ def guessed_set(guess: Guess, source: str) -> ParameterSet:
         changed["Z18"] = n["Z5"] * tan(asin(n["Z3"] * tan(guess.creep / per_angle)))
     try:
         # what is written here is read again as what somebody wrote
-        made = base.replace(changed)
+        drive = base.replace(changed)
     except ParameterError as error:
         raise ParameterError(
             f"The guess of {guess.axis} from {source} fails; look at units and scales of its "
             f"signals: {error}"
         ) from None
-    said = {
-        symbol: replace(each, source=source, status="approximate")
+    parameters = {
+        symbol: replace(parameter, source=source, status="approximate")
         if symbol in changed
-        else replace(each, source="assumed: no speed determines it")
-        for symbol, each in made.parameters.items()
+        else replace(parameter, source="assumed: no speed determines it")
+        for symbol, parameter in drive.parameters.items()
     }
     if not guess.creep:
-        said["Z18"] = replace(said["Z18"], source=f"assumed: {_without_creep(guess)}")
+        parameters["Z18"] = replace(parameters["Z18"], source=f"assumed: {_without_creep(guess)}")
     title = f"{guess.axis}: guessed from {source}"
     # of a current that was measured the filter has a meaning of its own, whatever the logs' rate
-    rate = made.rate if guess.amplifier is None else None
+    rate = drive.rate if guess.amplifier is None else None
     card = f"{guess.axis} card"
     return replace(
-        made,
+        drive,
         name=guess.axis,
         title=title,
         card=card,
-        parameters=said,
+        parameters=parameters,
         rate=rate,
         unreached=unreached,
     )
@@ -164,10 +164,10 @@ def _with_current(
     jump of the speed is then one of the current beyond the solenoids' dead zone.
     """
     begins, forces = list[float](), list[float]()
-    for way in range(2):
-        per_ampere = guess.gain[way] / amplifier.gain[way]
-        edge = max(guess.dead_zone[way], amplifier.dead_zone[way] + 1e-6)
-        begins.append(max(amplifier.settled(way, edge) - guess.jump[way] / per_ampere, 0.0))
+    for column in range(2):
+        per_ampere = guess.gain[column] / amplifier.gain[column]
+        edge = max(guess.dead_zone[column], amplifier.dead_zone[column] + 1e-6)
+        begins.append(max(amplifier.settled(column, edge) - guess.jump[column] / per_ampere, 0.0))
         forces.append(per_ampere / per_newton)
     tried = [current for current, command in zip(begins, guess.command, strict=True) if command]
     return {
@@ -191,7 +191,7 @@ def guessed_fit_setup(guess: Guess, start: ParameterSet | Drive) -> str:
     longest = max(2.0 * guess.delay, guess.delay + 0.1)
     delay = f"tau = {{ bounds = [0.0, {longest:.4g}] }}    # delay"
     if guess.amplifier is None:
-        lines = _command_lines(numbers, guess.command, [each > 0.0 for each in guess.jump])
+        lines = _command_lines(numbers, guess.command, [volts > 0.0 for volts in guess.jump])
         creep = (
             _offset_line(guess, numbers) if guess.creep else NO_CREEP.format(_without_creep(guess))
         )
@@ -247,18 +247,18 @@ def _dynamics_lines(numbers: Mapping[str, float]) -> list[str]:
 def _solenoid_lines(guess: Guess, numbers: Mapping[str, float]) -> list[str]:
     """Dead zone and force of the solenoids."""
     assert guess.amplifier is not None
-    currents = [guess.amplifier.settled(way, guess.command[way]) for way in range(2)]
+    currents = [guess.amplifier.settled(column, guess.command[column]) for column in range(2)]
     begins = numbers["Z17"]
     smallest = min(current for current, volts in zip(currents, guess.command, strict=True) if volts)
     # below the largest current of either way, or nothing would move
     most = min(2.0 * begins if begins else 0.5 * smallest, 0.95 * smallest)
     lines = [f"Z17 = {{ bounds = [0.0, {max(most, 1.05 * begins):.4g}] }}    # dead zone"]
     lines.append(_offset_line(guess, numbers))
-    for way, side in enumerate(SIDES):
-        if not guess.command[way]:
+    for column, side in enumerate(SIDES):
+        if not guess.command[column]:
             lines.append(NOT_TRIED.format(side))
             continue
-        bends = 0.5 * numbers[f"Z19_{side}"] / max(currents[way] - begins, 1e-3)
+        bends = 0.5 * numbers[f"Z19_{side}"] / max(currents[column] - begins, 1e-3)
         lines += [
             f"Z19_{side} = {{ relative = [0.5, 2.0], log = true }}    # force for a current",
             f"Z20_{side} = {{ bounds = [{-bends:.4g}, {bends:.4g}] }}    # how it bends",
@@ -283,12 +283,12 @@ def _without_creep(guess: Guess) -> str:
 def _limit_lines(guess: Guess) -> list[str]:
     """Top speed and acceleration of each way that was tried, within wide bounds if not seen."""
     lines = list[str]()
-    for way, side in enumerate(SIDES):
-        if not guess.command[way]:
+    for column, side in enumerate(SIDES):
+        if not guess.command[column]:
             continue
-        reach = (0.7, 1.4) if isfinite(guess.top_speed[way]) else (0.7, 3.0)
+        reach = (0.7, 1.4) if isfinite(guess.top_speed[column]) else (0.7, 3.0)
         lines.append(_limit_line(f"Z13_{side}", reach, "top speed"))
-        reach = (0.3, 3.0) if isfinite(guess.acceleration[way]) else (0.1, 10.0)
+        reach = (0.3, 3.0) if isfinite(guess.acceleration[column]) else (0.1, 10.0)
         lines.append(_limit_line(f"Z16_{side}", reach, "acceleration"))
     return lines
 

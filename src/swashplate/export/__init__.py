@@ -1,4 +1,4 @@
-"""Export: a drive, or a model of one's own, where there is no Python."""
+"""Export: a drive, or a user-defined model, where there is no Python."""
 
 import lazy_loader
 

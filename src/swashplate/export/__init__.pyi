@@ -5,7 +5,7 @@ from .c_folder import content_of as content_of
 from .c_folder import drive_sources as drive_sources
 from .c_folder import exported_drive as exported_drive
 from .c_folder import values_of as values_of
-from .fmi import Comparison as Comparison
+from .fmi import FmuComparison as FmuComparison
 from .fmi import compare as compare
 from .fmi import fmu as fmu
 from .libraries import PLATFORMS as PLATFORMS

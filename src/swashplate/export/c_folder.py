@@ -1,4 +1,4 @@
-"""C source of a drive or a model of one's own, with its numbers, in a folder of its own."""
+"""C source of a drive or a user-defined model, with its numbers, in a folder of its own."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ FURTHER = ("main.c", "CMakeLists.txt", "README.md")
 
 
 def exported_drive(drive: Drive | None = None) -> Exported:
-    """The drive as it is in C; with equations of one's own if the drive has some."""
+    """The drive as it is in C; with user-defined equations if the drive has some."""
     return _exported(() if drive is None else drive.parameters.equations)
 
 
@@ -56,8 +56,8 @@ def _exported(equations: tuple[Any, ...]) -> Exported:
     columns = {
         f"{model.prefix(i)}{path}": column
         for i, part in enumerate(model.parts)
-        for each in declared_by(part.parameters)
-        for path, column in zip(each.fields, each.columns, strict=True)
+        for definition in declared_by(part.parameters)
+        for path, column in zip(definition.fields, definition.columns, strict=True)
     }
     return Exported(
         model,
@@ -108,7 +108,7 @@ def values_of(drive: Drive, step: float = LONGEST_STEP) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Content:
-    """A drive, or a model of one's own, with its numbers, as it is exported."""
+    """A drive, or a user-defined model, with its numbers, as it is exported."""
 
     exported: Exported
     instance: Instance
@@ -133,8 +133,8 @@ class Content:
     @property
     def identifier(self) -> str:
         """Its name as one of C's, of which C99 looks at 63 characters."""
-        made = re.sub(r"\W", "_", self.name, flags=re.ASCII).strip("_").lower() or "model"
-        return (f"_{made}" if made[0].isdigit() else made)[:LONGEST_IDENTIFIER]
+        name = re.sub(r"\W", "_", self.name, flags=re.ASCII).strip("_").lower() or "model"
+        return (f"_{name}" if name[0].isdigit() else name)[:LONGEST_IDENTIFIER]
 
 
 def content_of(
@@ -146,7 +146,7 @@ def content_of(
     given: Any = None,
     prefix: str = "swp",
 ) -> Content:
-    """What is exported of a drive, or of a model of one's own with its numbers.
+    """What is exported of a drive, or of a user-defined model with its numbers.
 
     Functions of the latter begin with `prefix`; the other arguments are those of `c`. A drive's
     recursion for another rate becomes its equation, with a warning.
@@ -216,7 +216,7 @@ def c(
     options: Any = None,
     given: Any = None,
 ) -> list[Path]:
-    """Write C source of a drive, or of a model of one's own, with its numbers.
+    """Write C source of a drive, or of a user-defined model, with its numbers.
 
     Parameters
     ----------
@@ -227,7 +227,7 @@ def c(
     step : float
         Step of its grid; of a drive at most 1/512. [s]
     parameters, options, given : named tuple
-        Numbers of a model of one's own, as `swashplate.equations.simulate` takes them.
+        Numbers of a user-defined model, as `swashplate.equations.simulate` takes them.
 
     Returns
     -------
@@ -248,9 +248,9 @@ def c(
     UserWarning
         Where the recursion of the card's filter was converted to another step.
     """
-    own = c_name(what.name) if isinstance(what, Model) else "swp"
+    prefix = c_name(what.name) if isinstance(what, Model) else "swp"
     content = content_of(
-        what, step, parameters=parameters, options=options, given=given, prefix=own
+        what, step, parameters=parameters, options=options, given=given, prefix=prefix
     )
     exported, values, name = content.exported, content.values, content.identifier
     texts = interface(exported)
@@ -284,7 +284,7 @@ _SPEED = Sample._fields[1:].index("shaft_speed")
 def _initialiser(exported: Exported, values: Array, name: str, title: str) -> str:
     """Values as an array of C, each with its name."""
     writer = exported.writer
-    names = ["step [s]", *(each for each, _ in writer.values()), *writer.constant_names()]
+    names = ["step [s]", *(written for written, _ in writer.values()), *writer.constant_names()]
     guard = f"{name.upper()}_VALUES_H"
     head = f"Values of {name} for {exported.prefix}_init, as swashplate computed them."
     lines = [f"/* {comment_line(f'{head} {title}'.strip())} */",

@@ -31,7 +31,7 @@ from swashplate.export.libraries import (
     Platform,
     Sources,
     chosen_platforms,
-    compiled,
+    compiled_library,
     one_unit,
     packaged,
     sources,
@@ -74,12 +74,12 @@ def fmu(
     options: Any = None,
     given: Any = None,
 ) -> Path:
-    """Write a drive, or a model of one's own, as an FMU for co-simulation.
+    """Write a drive, or a user-defined model, as an FMU for co-simulation.
 
     Parameters
     ----------
     what : Drive or Model
-        Whose numbers and forms are the start values. A drive with an equation of its own, or a
+        Whose numbers and forms are the start values. A drive with a user-defined equation, or a
         model, is compiled, which needs a compiler (extra ``binaries``).
     path : path
         The file, ``.fmu``; an older one is replaced.
@@ -91,7 +91,7 @@ def fmu(
         Of ``"linux64"``, ``"aarch64-linux"``, ``"win64"`` and ``"darwin64"``; by default all, or
         this machine where a C compiler is all that there is.
     parameters, options, given : named tuple
-        Numbers of a model of one's own, as `swashplate.equations.simulate` takes them.
+        Numbers of a user-defined model, as `swashplate.equations.simulate` takes them.
 
     Returns
     -------
@@ -151,22 +151,28 @@ def exportable(what: Drive | Model, step: float, **numbers: Any) -> Content:
 
 def packed(content: Content, fmi: Version, platforms: Collection[Platform]) -> bytes:
     """The file's content: the same bytes for the same drive and options."""
-    made, table, name = sources(content), table_of(content), content.identifier
+    source_files, table, name = sources(content), table_of(content), content.identifier
     numbers = np.where(np.isinf(content.values), np.copysign(NONE, content.values), content.values)
-    token = _token(fmi, made, numbers, table)
+    token = _token(fmi, source_files, numbers, table)
     members = {
         "modelDescription.xml": description(content, table, fmi, token),
-        "resources/drive.bin": resource(numbers, made.layout, token),
-        f"sources/{WHOLE}": one_unit(made, fmi, name).encode(),
+        "resources/drive.bin": resource(numbers, source_files.layout, token),
+        f"sources/{WHOLE}": one_unit(source_files, fmi, name).encode(),
     }
-    left = ("wasm.c", "fmi3.c" if fmi == "2.0" else "fmi2.c")
-    members |= {f"sources/{n}": text.encode() for n, text in made.texts.items() if n not in left}
+    unused = ("wasm.c", "fmi3.c" if fmi == "2.0" else "fmi2.c")
+    members |= {
+        f"sources/{n}": text.encode() for n, text in source_files.texts.items() if n not in unused
+    }
     if fmi == "3.0":
         members["sources/buildDescription.xml"] = _build_description(name)
-    for each in platforms:
-        library = packaged(each.library) if content.packaged else compiled(made, each)
-        for folder in each.fmi2 if fmi == "2.0" else each.fmi3:
-            members[f"binaries/{folder}/{name}{each.ending}"] = library
+    for platform in platforms:
+        library = (
+            packaged(platform.library)
+            if content.packaged
+            else compiled_library(source_files, platform)
+        )
+        for folder in platform.fmi2 if fmi == "2.0" else platform.fmi3:
+            members[f"binaries/{folder}/{name}{platform.ending}"] = library
     return _zipped(members)
 
 
@@ -186,25 +192,27 @@ def resource(numbers: Array, layout: int, token: str) -> bytes:
 
 def _token(fmi: Version, sources: Sources, numbers: Array, table: Sequence[Variable]) -> str:
     """GUID made of the sources, the numbers and the variables."""
-    made = sha256(f"{fmi} {__version__}".encode())
+    digest = sha256(f"{fmi} {__version__}".encode())
     for name in sorted(sources.texts):
-        made.update(sources.texts[name].encode())
-    made.update(numbers.astype("<f8").tobytes())
-    made.update(repr([(each.name, each.reference, each.start) for each in table]).encode())
-    h = made.hexdigest()
+        digest.update(sources.texts[name].encode())
+    digest.update(numbers.astype("<f8").tobytes())
+    digest.update(
+        repr([(variable.name, variable.reference, variable.start) for variable in table]).encode()
+    )
+    h = digest.hexdigest()
     return f"{{{h[:8]}-{h[8:12]}-{h[12:16]}-{h[16:20]}-{h[20:32]}}}"
 
 
 def _zipped(members: Mapping[str, bytes]) -> bytes:
     """A zip whose bytes depend on its content alone, the description first."""
     target = BytesIO()
-    with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as made:
-        for name in sorted(members, key=lambda each: (each != "modelDescription.xml", each)):
+    with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as archive:
+        for name in sorted(members, key=lambda member: (member != "modelDescription.xml", member)):
             entry = zipfile.ZipInfo(name, _EARLIEST)
             entry.compress_type = zipfile.ZIP_DEFLATED
             entry.create_system = 3
             entry.external_attr = (0o755 if name.startswith("binaries/") else 0o644) << 16
-            made.writestr(entry, members[name])
+            archive.writestr(entry, members[name])
     return target.getvalue()
 
 
@@ -226,9 +234,9 @@ def description(content: Content, table: Sequence[Variable], fmi: Version, token
     root = ET.Element("fmiModelDescription", _head(content, table, fmi, token))
     step, two = repr(content.step), fmi == "2.0"
     abilities = ["canHandleVariableCommunicationStepSize", *(ABILITIES_2 if two else ABILITIES_3)]
-    said = {"modelIdentifier": content.identifier, **dict.fromkeys(abilities, "true")}
+    interface = {"modelIdentifier": content.identifier, **dict.fromkeys(abilities, "true")}
     slave = ET.SubElement(
-        root, "CoSimulation", said if two else {**said, "fixedInternalStepSize": step}
+        root, "CoSimulation", interface if two else {**interface, "fixedInternalStepSize": step}
     )
     if two:
         ET.SubElement(ET.SubElement(slave, "SourceFiles"), "File", {"name": WHOLE})
@@ -239,14 +247,16 @@ def description(content: Content, table: Sequence[Variable], fmi: Version, token
     span = {"startTime": "0", "stopTime": "10", "stepSize": step}
     ET.SubElement(root, "DefaultExperiment", span)
     listed = ET.SubElement(root, "ModelVariables")
-    for each in table:
-        flag = isinstance(each.start, bool)
-        own = {"start": str(each.start).lower()} if flag else _number(each)
+    for variable in table:
+        flag = isinstance(variable.start, bool)
+        initial = {"start": str(variable.start).lower()} if flag else _number(variable)
         if two:
-            scalar = ET.SubElement(listed, "ScalarVariable", _attributes(each))
-            ET.SubElement(scalar, "Boolean" if flag else "Real", own)
+            scalar = ET.SubElement(listed, "ScalarVariable", _attributes(variable))
+            ET.SubElement(scalar, "Boolean" if flag else "Real", initial)
         else:
-            ET.SubElement(listed, "Boolean" if flag else "Float64", {**_attributes(each), **own})
+            ET.SubElement(
+                listed, "Boolean" if flag else "Float64", {**_attributes(variable), **initial}
+            )
     if not two:
         clock = {"name": "time", "valueReference": str(content.references.TIME)}
         clock |= {"causality": "independent", "variability": "continuous", "unit": "s"}
@@ -257,7 +267,7 @@ def description(content: Content, table: Sequence[Variable], fmi: Version, token
 
 def _head(content: Content, table: Sequence[Variable], fmi: Version, token: str) -> dict[str, str]:
     words = f"{content.title}. Own steps of {content.step:g} s."
-    read = sorted({name for each in table for name in each.feedthrough})
+    read = sorted({name for variable in table for name in variable.feedthrough})
     if read:
         words += (
             f" Some outputs depend on {', '.join(read)} at the same instant: a master that reads "
@@ -276,75 +286,77 @@ def _head(content: Content, table: Sequence[Variable], fmi: Version, token: str)
     }
 
 
-def _attributes(each: Variable) -> dict[str, str]:
+def _attributes(variable: Variable) -> dict[str, str]:
     made = {
-        "name": each.name,
-        "valueReference": str(each.reference),
-        "description": each.description,
-        "causality": each.causality,
-        "variability": each.variability,
+        "name": variable.name,
+        "valueReference": str(variable.reference),
+        "description": variable.description,
+        "causality": variable.causality,
+        "variability": variable.variability,
     }
-    if each.causality == "parameter":
+    if variable.causality == "parameter":
         made["initial"] = "exact"
     return made
 
 
-def _number(each: Variable) -> dict[str, str]:
-    made = {"unit": each.unit} if each.unit != "1" else {}
-    if each.unit in DISPLAYED:
-        made["displayUnit"] = DISPLAYED[each.unit][0]
-    if each.lower is not None:
-        made["min"] = repr(each.lower)
-    if each.upper is not None:
-        made["max"] = repr(each.upper)
-    if each.start is not None:
-        made["start"] = repr(each.start)
-    return made
+def _number(variable: Variable) -> dict[str, str]:
+    attributes = {"unit": variable.unit} if variable.unit != "1" else {}
+    if variable.unit in DISPLAYED:
+        attributes["displayUnit"] = DISPLAYED[variable.unit][0]
+    if variable.lower is not None:
+        attributes["min"] = repr(variable.lower)
+    if variable.upper is not None:
+        attributes["max"] = repr(variable.upper)
+    if variable.start is not None:
+        attributes["start"] = repr(variable.start)
+    return attributes
 
 
 def _add_structure(structure: ET.Element, table: Sequence[Variable], two: bool) -> None:
-    """Outputs with the inputs that they follow at once; in FMI 2 by their places in the table."""
-    numbers = {each.name: i if two else each.reference for i, each in enumerate(table, 1)}
+    """Outputs with the inputs that they follow instantaneously; in FMI 2 by number in the table."""
+    numbers = {
+        variable.name: i if two else variable.reference for i, variable in enumerate(table, 1)
+    }
     key = "index" if two else "valueReference"
-    names = [each for each in table if each.causality == "output"]
+    names = [variable for variable in table if variable.causality == "output"]
     listed, initial = structure, structure
     if two:
         listed, initial = (ET.SubElement(structure, n) for n in ("Outputs", "InitialUnknowns"))
-    for each in names:
-        read = sorted(numbers[name] for name in each.feedthrough)
-        said = {key: str(numbers[each.name]), "dependencies": " ".join(map(str, read))}
-        said["dependenciesKind"] = " ".join("dependent" for _ in read)
-        ET.SubElement(listed, "Unknown" if two else "Output", said)
-    for each in names:
-        own = {key: str(numbers[each.name])}
-        ET.SubElement(initial, "Unknown" if two else "InitialUnknown", own)
+    for output in names:
+        read = sorted(numbers[name] for name in output.feedthrough)
+        dependency = {key: str(numbers[output.name]), "dependencies": " ".join(map(str, read))}
+        dependency["dependenciesKind"] = " ".join("dependent" for _ in read)
+        ET.SubElement(listed, "Unknown" if two else "Output", dependency)
+    for name in names:
+        entry = {key: str(numbers[name.name])}
+        ET.SubElement(initial, "Unknown" if two else "InitialUnknown", entry)
 
 
 def _build_description(identifier: str) -> bytes:
     root = ET.Element("fmiBuildDescription", {"fmiVersion": "3.0"})
-    made = ET.SubElement(root, "BuildConfiguration", {"modelIdentifier": identifier})
-    said = {"language": "C11", "compilerOptions": "-ffp-contract=off"}
-    ET.SubElement(ET.SubElement(made, "SourceFileSet", said), "SourceFile", {"name": WHOLE})
+    build = ET.SubElement(root, "BuildConfiguration", {"modelIdentifier": identifier})
+    settings = {"language": "C11", "compilerOptions": "-ffp-contract=off"}
+    ET.SubElement(ET.SubElement(build, "SourceFileSet", settings), "SourceFile", {"name": WHOLE})
     return _xml(root)
 
 
 def _add_units(root: ET.Element, table: Sequence[Variable]) -> None:
     definitions = ET.SubElement(root, "UnitDefinitions")
-    for unit in sorted({each.unit for each in table if each.unit != "1"} | {"s"}):
-        made = ET.SubElement(definitions, "Unit", {"name": unit})
+    for unit in sorted({variable.unit for variable in table if variable.unit != "1"} | {"s"}):
+        element = ET.SubElement(definitions, "Unit", {"name": unit})
         exponents = si_exponents(unit)
         if exponents is not None:  # FMI cannot say fractions
-            ET.SubElement(made, "BaseUnit", {name: str(n) for name, n in exponents.items()})
+            ET.SubElement(element, "BaseUnit", {name: str(n) for name, n in exponents.items()})
         for shown in DISPLAYED.get(unit, ()):
             factor = 1.0 / to_si(1.0, shown, unit, "a display unit")
-            ET.SubElement(made, "DisplayUnit", {"name": shown, "factor": repr(factor)})
+            ET.SubElement(element, "DisplayUnit", {"name": shown, "factor": repr(factor)})
 
 
 # --- comparison -----------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
-class Comparison(Result):
+class FmuComparison(Result):
     """An FMU's outputs beside those of the drive, sample by sample."""
 
     name: str
@@ -363,13 +375,13 @@ class Comparison(Result):
     def tables(self) -> list[Table]:
         """Largest difference of each output."""
         columns = (Column("output"), Column("largest difference", ".3g"), UNIT)
-        made = Table(f"FMU of {self.name} against the drive, {self.samples} samples", columns)
+        table = Table(f"FMU of {self.name} against the drive, {self.samples} samples", columns)
         for name, difference in self.differences.items():
-            made.add(name, difference, unit=self.units[name], look=difference != 0.0)
-        return [made]
+            table.add(name, difference, unit=self.units[name], look=difference != 0.0)
+        return [table]
 
 
-def compare(path: str | Path, drive: Drive, voltage: ArrayLike) -> Comparison:
+def compare(path: str | Path, drive: Drive, voltage: ArrayLike) -> FmuComparison:
     """Run an FMU with FMPy and compare it with the drive, at the FMU's own step.
 
     Parameters
@@ -383,13 +395,13 @@ def compare(path: str | Path, drive: Drive, voltage: ArrayLike) -> Comparison:
 
     Returns
     -------
-    Comparison
-        Largest differences, 0 where the FMU's numbers are the drive's.
+    FmuComparison
+        Largest differences, 0 if the FMU's numbers are the drive's.
 
     Raises
     ------
     InputError
-        For a model of one's own, or if FMPy is not installed, the command is none, or the FMU
+        For a user-defined model, or if FMPy is not installed, the command is none, or the FMU
         fails.
     FileError
         If the file is no FMU.
@@ -413,17 +425,17 @@ def compare(path: str | Path, drive: Drive, voltage: ArrayLike) -> Comparison:
         warnings.simplefilter("ignore")  # said when it was exported
         content = exportable(drive, step)
     fits = content.instance.parts[0].options.exact is None  # a recursion for this step
-    chosen = drive if fits else drive.at_every_rate()
-    run = chosen.simulate(command, 1.0 / step, interpolation="previous")
+    marched = drive if fits else drive.at_every_rate()
+    run = marched.simulate(command, 1.0 / step, interpolation="previous")
     table = table_of(content)
-    inputs = {each.name: each.start for each in table if each.causality == "input"}
+    inputs = {variable.name: variable.start for variable in table if variable.causality == "input"}
     columns = {"time": np.arange(command.size) * step, **inputs, "voltage": command}
     signals = np.empty(command.size, [(name, np.float64) for name in columns])
     for name, values in columns.items():
         signals[name] = values
     names = [name for name in run.names if name not in ("time", "voltage")]
     try:
-        found = fmpy.simulate_fmu(
+        outputs = fmpy.simulate_fmu(
             str(path),
             start_time=0.0,
             stop_time=float(signals["time"][-1]),
@@ -433,18 +445,18 @@ def compare(path: str | Path, drive: Drive, voltage: ArrayLike) -> Comparison:
         )
     except Exception as error:
         raise InputError(f"{path} fails: {error}") from None
-    if len(found) != command.size:
-        raise InputError(f"{path} gave {len(found)} samples for a command of {command.size}.")
-    differences = {name: float(np.abs(found[name] - run[name]).max()) for name in names}
-    units = {each.name: each.unit for each in table}
-    return Comparison(chosen.name, command.size, differences, units)
+    if len(outputs) != command.size:
+        raise InputError(f"{path} gave {len(outputs)} samples for a command of {command.size}.")
+    differences = {name: float(np.abs(outputs[name] - run[name]).max()) for name in names}
+    units = {variable.name: variable.unit for variable in table}
+    return FmuComparison(marched.name, command.size, differences, units)
 
 
 def _step_of(path: Path, fmpy: Any) -> float:
     """The own step that an FMU declares. [s]"""
     try:
         described = fmpy.read_model_description(str(path), validate=False)
-        (found,) = [each for each in described.modelVariables if each.name == "step"]
-        return float(found.start)
+        (step,) = [variable for variable in described.modelVariables if variable.name == "step"]
+        return float(step.start)
     except Exception:
         raise FileError(f"{path} is no FMU of swashplate.") from None

@@ -1,8 +1,8 @@
 """Compiled libraries: for which machines, made from which sources, and how.
 
 The package carries one library for each platform, made once from the generated C and the same for
-every drive: its numbers travel beside it (`swashplate.export.fmu`). A model of one's own, or a
-drive with an equation of one's own, has other C, which is compiled when it is exported.
+every drive: its numbers travel beside it (`swashplate.export.fmu`). A user-defined model, or a
+drive with a user-defined equation, has other C, which is compiled when it is exported.
 """
 
 from __future__ import annotations
@@ -109,8 +109,8 @@ FMI_SOURCES = ("fmi.h", "fmi.c", "fmi2.c", "fmi3.c")
 def chosen_platforms(names: Sequence[str] | None, compiling: bool = False) -> tuple[Platform, ...]:
     """Platforms by name; by default all, or those that can be compiled for."""
     if names is None:
-        own = this_machine() if compiling and not has_zig() else None
-        return (own,) if own else tuple(PLATFORMS.values())
+        this_platform = this_machine() if compiling and not has_zig() else None
+        return (this_platform,) if this_platform else tuple(PLATFORMS.values())
     for name in names:
         if name not in PLATFORMS:
             raise InputError(f"There is no platform '{name}'; there are {', '.join(PLATFORMS)}.")
@@ -124,10 +124,10 @@ def chosen_platforms(names: Sequence[str] | None, compiling: bool = False) -> tu
 
 def digest(texts: Mapping[str, str]) -> str:
     """SHA-256 of named texts, in the order of their names."""
-    made = sha256()
+    hasher = sha256()
     for name in sorted(texts):
-        made.update(f"{name}\0{texts[name]}\0".encode())
-    return made.hexdigest()
+        hasher.update(f"{name}\0{texts[name]}\0".encode())
+    return hasher.hexdigest()
 
 
 class Sources(NamedTuple):
@@ -156,17 +156,17 @@ def _made(exported: Exported, references: References) -> Sources:
     texts = interface(exported)
     layout = int(digest(texts)[:16], 16)
     header = c_header(exported, layout, references)
-    own = {name: source_text(name) for name in (*FMI_SOURCES, "wasm.c")}
-    return Sources({**texts, "variables.h": header, **own}, f"{exported.file}.c", layout)
+    file_texts = {name: source_text(name) for name in (*FMI_SOURCES, "wasm.c")}
+    return Sources({**texts, "variables.h": header, **file_texts}, f"{exported.file}.c", layout)
 
 
-def one_unit(made: Sources, fmi: str, identifier: str) -> str:
+def one_unit(sources: Sources, fmi: str, identifier: str) -> str:
     """Text of ``fmu.c``, which an importer compiles: all of a library in one unit.
 
     Whatever is not of the standard's is static, and the standard's functions begin with the model's
     identifier unless the importer says otherwise, so that several can be linked into one program.
     """
-    words = {"n": fmi[0], "identifier": identifier, "model": made.model}
+    words = {"n": fmi[0], "identifier": identifier, "model": sources.model}
     return filled(source_text("fmu.c"), words)
 
 
@@ -209,19 +209,19 @@ def wasm(
     options: Any = None,
     given: Any = None,
 ) -> Path:
-    """Write a drive, or a model of one's own, as WebAssembly, with a section of its numbers.
+    """Write a drive, or a user-defined model, as WebAssembly, with a section of its numbers.
 
     Parameters
     ----------
     what : Drive or Model
-        What is exported. A drive with an equation of its own, or a model, is compiled, which needs
+        What is exported. A drive with a user-defined equation, or a model, is compiled, which needs
         the extra ``binaries``.
     path : path
         The file; an older one is replaced.
     step : float
         Step of its grid; of a drive at most 1/512. [s]
     parameters, options, given : named tuple
-        Numbers of a model of one's own.
+        Numbers of a user-defined model.
 
     Returns
     -------
@@ -240,18 +240,18 @@ def wasm(
     code = packaged(WASM) if content.packaged else compiled_wasm(sources(content))
     name = VALUES_SECTION.encode()
     section = bytes([len(name)]) + name + numbers
-    made = code + b"\0" + _leb128(len(section)) + section
-    write_bytes(made, path)
+    module = code + b"\0" + _leb128(len(section)) + section
+    write_bytes(module, path)
     return Path(path)
 
 
 def _leb128(number: int) -> bytes:
     """An unsigned number as WebAssembly has it: seven bits a byte, the lowest first."""
-    made = bytearray()
+    encoded = bytearray()
     while number > 127:
-        made.append(number & 127 | 128)
+        encoded.append(number & 127 | 128)
         number >>= 7
-    return bytes([*made, number])
+    return bytes([*encoded, number])
 
 
 # --- compiling ------------------------------------------------------------------------------------
@@ -262,13 +262,13 @@ def has_zig() -> bool:
     return find_spec("ziglang") is not None
 
 
-def compiled(made: Sources, platform: Platform) -> bytes:
+def compiled_library(sources: Sources, platform: Platform) -> bytes:
     """A library for a platform, of C texts, by Zig's compiler or this machine's ``cc``."""
-    with TemporaryDirectory(prefix="swashplate-") as place:
-        folder = Path(place)
-        written(made.texts, folder)
+    with TemporaryDirectory(prefix="swashplate-") as temporary:
+        folder = Path(temporary)
+        written(sources.texts, folder)
         written(fmi_headers(), folder)
-        units = sorted(name for name in made.texts if name.endswith(".c") and name != "wasm.c")
+        units = sorted(name for name in sources.texts if name.endswith(".c") and name != "wasm.c")
         compilers = [[*_zig(target), "-s"] for target in platform.targets]
         if not has_zig():
             if platform is not this_machine() or not shutil.which("cc"):
@@ -280,12 +280,14 @@ def compiled(made: Sources, platform: Platform) -> bytes:
             compilers = [["cc"]]
         # the libraries name themselves: one name for all, and the same bytes each time
         out = f"{NAME}{platform.ending}"
-        more = ["-Wl,-install_name,@rpath/" + out] if platform.ending == ".dylib" else ["-lm"]
-        parts = []
+        linker_options = (
+            ["-Wl,-install_name,@rpath/" + out] if platform.ending == ".dylib" else ["-lm"]
+        )
+        objects = []
         for compiler in compilers:
-            _run([*compiler, *_options(platform), "-o", out, *units, *more], folder)
-            parts.append((folder / out).read_bytes())
-    return parts[0] if len(parts) == 1 else universal(parts)
+            _run([*compiler, *_options(platform), "-o", out, *units, *linker_options], folder)
+            objects.append((folder / out).read_bytes())
+    return objects[0] if len(objects) == 1 else universal(objects)
 
 
 def compiled_c(folder: Path, header: str) -> Path:
@@ -310,16 +312,16 @@ def compiled_c(folder: Path, header: str) -> Path:
     return folder / f"{stem}{ending}"
 
 
-def compiled_wasm(made: Sources) -> bytes:
+def compiled_wasm(sources: Sources) -> bytes:
     """WebAssembly, made of C texts by Zig's compiler."""
     if not has_zig():
         raise InputError("WebAssembly needs a compiler: pip install 'swashplate[binaries]'.")
-    with TemporaryDirectory(prefix="swashplate-") as place:
-        folder = Path(place)
-        written(made.texts, folder)
+    with TemporaryDirectory(prefix="swashplate-") as temporary:
+        folder = Path(temporary)
+        written(sources.texts, folder)
         link = ["-mexec-model=reactor", "-Wl,--no-entry", "-Wl,--export-dynamic", "-s"]
         command = [*_zig("wasm32-wasi"), *WASM_FLAGS, "-fvisibility=hidden", *link]
-        _run([*command, "-o", WASM, made.model, "wasm.c"], folder)
+        _run([*command, "-o", WASM, sources.model, "wasm.c"], folder)
         return (folder / WASM).read_bytes()
 
 
@@ -387,10 +389,10 @@ def universal(parts: Iterable[bytes]) -> bytes:
     libraries = list(parts)
     at = 8 + 20 * len(libraries)
     header, body = [struct.pack(">II", 0xCAFEBABE, len(libraries))], b""
-    for each in libraries:
-        _, cpu, kind = struct.unpack_from("<III", each)
+    for library in libraries:
+        _, cpu, kind = struct.unpack_from("<III", library)
         power = _CPU[cpu]
         body += bytes(-(at + len(body)) % (1 << power))
-        header.append(struct.pack(">IIIII", cpu, kind, at + len(body), len(each), power))
-        body += each
+        header.append(struct.pack(">IIIII", cpu, kind, at + len(body), len(library), power))
+        body += library
     return b"".join(header) + body

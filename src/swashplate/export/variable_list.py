@@ -41,7 +41,7 @@ class References(NamedTuple):
 DRIVE = References(0, 10, 100, 300, 310, 311, 400, 1000)
 """Those of a drive; tests/export/value_references.csv is the stored list."""
 OWN = References(0, 10_000, 20_000, 30_000, 30_001, 30_002, 40_000, 50_000)
-"""Those of a model of one's own, which may have any number of each."""
+"""Those of a user-defined model, which may have any number of each."""
 
 
 class Words(NamedTuple):
@@ -81,7 +81,7 @@ class Variable:
     unit: str = "1"
     """SI unit; ``"1"`` for none."""
     start: float | bool | None = None
-    """Value at the start; None where it is computed."""
+    """Value at the start; None if it is computed."""
     lower: float | None = None
     upper: float | None = None
     feedthrough: frozenset[str] = frozenset()
@@ -89,19 +89,19 @@ class Variable:
 
 
 def words_of(exported: Exported) -> dict[str, Words]:
-    """Meaning and unit of the signals of a model of one's own, as far as its types declare them."""
-    found = {}
+    """Meaning and unit of the signals of a user-defined model, as far as its types declare them."""
+    words = {}
     for part in exported.model.parts:
         for kind in (part.state, part.signals):
-            for each, path in _declared(kind) if kind is not None else ():
-                found[path] = Words(each.name, each.unit or "1")
-    return found
+            for definition, path in _declared(kind) if kind is not None else ():
+                words[path] = Words(definition.name, definition.unit or "1")
+    return words
 
 
 def _declared(kind: type) -> Iterator[tuple[Definition, str]]:
     """What a named tuple declares, by the path of each value."""
-    for each in declared_by(kind):
-        yield from ((each, path) for path in each.fields)
+    for definition in declared_by(kind):
+        yield from ((definition, path) for path in definition.fields)
 
 
 def variables(
@@ -122,11 +122,15 @@ def variables(
     starts = {name: min(values[1 + k], NONE) for k, (_, _, name) in enumerate(parameters)}
     defaults, ranges = defaults_of(exported), exported.ranges
 
-    def signal(name: str, number: int, kind: Literal["input", "output"], **more: Any) -> Variable:
-        said = words.get(name, Words(f"{kind} {name}"))
-        return Variable(name, number, kind, "continuous", said.meaning, said.unit, **more)
+    def signal(
+        name: str, number: int, kind: Literal["input", "output"], **attributes: Any
+    ) -> Variable:
+        option_words = words.get(name, Words(f"{kind} {name}"))
+        return Variable(
+            name, number, kind, "continuous", option_words.meaning, option_words.unit, **attributes
+        )
 
-    found = [
+    listed = [
         signal(
             name,
             number,
@@ -137,30 +141,30 @@ def variables(
         )
         for number, name in enumerate((*exported.signals, *exported.measured), r.INPUT)
     ]
-    found += [
+    listed += [
         signal(name, number, "output", feedthrough=feedthrough[name])
         for number, name in enumerate(exported.names, r.OUTPUT)
     ]
-    taken = {each.name for each in found}
+    taken = {entry.name for entry in listed}
     declared = {
-        (i, path): each
+        (i, path): entry
         for i, part in enumerate(exported.model.parts)
-        for each, path in _declared(part.parameters)
+        for entry, path in _declared(part.parameters)
     }
     delays = {(part, tap.delay) for part, _, _, tap in exported.taps}
     for i, (part_number, path, name) in enumerate(parameters):
         if defaults.get(name) == name:  # an input of that name has its value
             continue
-        known = f"{name}_parameter" if name in taken else name
-        made = declared[part_number, path]
-        variable = _parameter(known, r.PARAMETER + i, made, path, starts[name])
+        unique_name = f"{name}_parameter" if name in taken else name
+        definition = declared[part_number, path]
+        variable = _parameter(unique_name, r.PARAMETER + i, definition, path, starts[name])
         if (part_number, path) in delays:
             most = LONGEST_LINE * values[0]
             variable = replace(variable, upper=min(variable.upper or most, most))
-        found.append(variable)
+        listed.append(variable)
     longest = exported.longest if isfinite(exported.longest) else None
     meaning = "step of the model's own grid, whatever the master's steps are"
-    found.append(
+    listed.append(
         Variable("step", r.STEP, "parameter", "fixed", meaning, "s", values[0], 0.0, longest)
     )
     settings = []
@@ -168,17 +172,19 @@ def variables(
         meaning = "start settled under the first inputs, not at rest"
         settings.append(("start_steady", r.START_STEADY, meaning, False))
     if exported.bounds:
-        bounds = ", ".join(f"{name} beyond ±{each:g}" for name, each in exported.bounds.items())
+        bounds = ", ".join(f"{name} beyond ±{bound:g}" for name, bound in exported.bounds.items())
         settings.append(("clip", r.CLIP, f"clip a {bounds} instead of failing", True))
     behind = 1 + len(parameters) + len(exported.named("given"))
     for i, option in enumerate(exported.settable):
-        said = words.get(option[1], Words(f"option {option[1]}"))
+        option_words = words.get(option[1], Words(f"option {option[1]}"))
         if option[1] != exported.free_step:
             on = values[behind + exported.options.index(option)] != 0.0
-            settings.append((said.name or option[1], r.OPTION + i, said.meaning, on))
+            settings.append(
+                (option_words.name or option[1], r.OPTION + i, option_words.meaning, on)
+            )
     for name, reference, meaning, on in settings:
-        found.append(Variable(name, reference, "parameter", "fixed", meaning, start=on))
-    return tuple(found)
+        listed.append(Variable(name, reference, "parameter", "fixed", meaning, start=on))
+    return tuple(listed)
 
 
 def defaults_of(exported: Exported) -> dict[str, str]:

@@ -17,12 +17,13 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from swashplate.documents import parse_toml, validated
+from swashplate.entries import FileTable
 from swashplate.equations.declaration import interpreted
 from swashplate.equations.fields import Definition, Flag, declared_by
 from swashplate.errors import ParameterError, UnknownParameterError
 from swashplate.models import machine as equations
 from swashplate.models.machine import Machine
-from swashplate.parameters.files import AXES, Entry, FilePart, parameter_of
+from swashplate.parameters.files import AXES, ParameterEntry, parameter_of
 from swashplate.parameters.files import load_preset as load_parameters
 from swashplate.parameters.parameter_set import (
     Change,
@@ -422,13 +423,13 @@ def _motor_leakage(owner: str, Z: Mapping[str, float], n: Mapping[str, float]) -
 # --- packaged sets --------------------------------------------------------------------------------
 
 
-class PhysicalFile(FilePart):
+class PhysicalFile(FileTable):
     """What a packaged set assumes; the rest follows from the parameter set of its name."""
 
     format: Literal[1]
     name: str
     title: str
-    physical: dict[str, Entry]
+    physical: dict[str, ParameterEntry]
 
 
 @cache

@@ -13,7 +13,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import Field
 from tomlkit import dumps
 
 from swashplate.__about__ import __version__
@@ -22,6 +22,7 @@ from swashplate.campaign.experiment import Experiment
 from swashplate.campaign.schema import Between
 from swashplate.documents import read_json
 from swashplate.drive import Drive
+from swashplate.entries import FileTable
 from swashplate.errors import DomainError, FileError, InputError, MissingFileError
 from swashplate.identification import tables
 from swashplate.identification.diagnostics.verdict import REQUIRED, Verdict, assess_fit
@@ -432,13 +433,7 @@ def versions() -> dict[str, str]:
 # --- files ----------------------------------------------------------------------------------------
 
 
-class Entry(BaseModel):
-    """A table of the file; a key that it does not know is refused."""
-
-    model_config = ConfigDict(extra="forbid", ser_json_inf_nan="strings")
-
-
-class StoredStage(Entry):
+class StoredStage(FileTable):
     """How a stage ended, and its starts."""
 
     name: str
@@ -450,7 +445,7 @@ class StoredStage(Entry):
     """Of the unknowns; None in a file of a version that did not store them."""
 
 
-class StoredVerdict(Entry):
+class StoredVerdict(FileTable):
     """The verdict on the fit when it was stored, and what it rests on."""
 
     verdict: Verdict
@@ -458,7 +453,7 @@ class StoredVerdict(Entry):
     """Of the drive or model that it is about."""
     required: float = REQUIRED
     """See `Identification`."""
-    held_out: dict[str, str] = {}
+    held_out: dict[str, str] = Field({})
     """Name to fingerprint of each run that was held out."""
 
     def holds_for(self, result: Identification) -> bool:
@@ -470,7 +465,7 @@ class StoredVerdict(Entry):
         )
 
 
-class FitFile(Entry):
+class FitFile(FileTable):
     """The whole file."""
 
     swashplate: str

@@ -1,6 +1,6 @@
 from .dialect import TextOptions as TextOptions
-from .log import Column as Column
 from .log import Log as Log
+from .log import LogColumn as LogColumn
 from .log import check_duration as check_duration
 from .log import check_stamps as check_stamps
 from .log import unit_of as unit_of

@@ -35,7 +35,7 @@ class _Item(NamedTuple):
 
 
 def look(
-    reader: str, path: Path, wanted: Sequence[int] = (), first: int = 0, last: int | None = None
+    reader: str, path: Path, requested: Sequence[int] = (), first: int = 0, last: int | None = None
 ) -> tuple[dict[str, Any], list[Array]]:
     """What a file holds, as `Log` has it, and the columns at some places, from a row to a last one.
 
@@ -44,15 +44,15 @@ def look(
     """
     form = _form_of(reader, path)
     opened, what = FORMATS[form]
-    with opened(path) as held:
-        items = list(held)
-        kept = [each for each in items if not each.reason]
-        left_out = {each.name: each.reason for each in items if each.reason}
-        if not kept:
-            why = "".join(f"; '{each}': {reason}" for each, reason in left_out.items())[:300]
+    with opened(path) as log:
+        items = list(log)
+        readable = [item for item in items if not item.reason]
+        left_out = {item.name: item.reason for item in items if item.reason}
+        if not readable:
+            why = "".join(f"; '{signal}': {reason}" for signal, reason in left_out.items())[:300]
             raise FileError(f"{path} has no {what} of numbers{printable(why)}.")
         arrays = []
-        for item in (kept[place] for place in wanted):
+        for item in (readable[position] for position in requested):
             numbers = np.asarray(item.read(first, last), np.float64).ravel()
             claimed = len(range(item.rows)[first:last])
             if numbers.size != claimed:
@@ -61,10 +61,10 @@ def look(
                     "the file was cut off or is damaged."
                 )
             arrays.append(numbers)
-    lengths = [each.rows for each in kept]
-    columns = [(each.name, each.unit) for each in kept]
-    found = {"format": form, "columns": columns, "left_out": left_out, "lengths": lengths}
-    return found, arrays
+    lengths = [signal.rows for signal in readable]
+    columns = [(signal.name, signal.unit) for signal in readable]
+    shown = {"format": form, "columns": columns, "left_out": left_out, "lengths": lengths}
+    return shown, arrays
 
 
 _LARGEST = 256 << 20
@@ -89,7 +89,7 @@ def _form_of(reader: str, path: Path) -> str:
     if reader != "MATLAB":
         return reader
     # HDF5 begins at 0 or, behind MATLAB's own header, at a power of two
-    if any(head[place:].startswith(b"\x89HDF\r\n\x1a\n") for place in (0, 512, 1024, 2048)):
+    if any(head[offset:].startswith(b"\x89HDF\r\n\x1a\n") for offset in (0, 512, 1024, 2048)):
         return "MATLAB 7.3"
     if size > _LARGEST:
         raise FileError(
@@ -184,14 +184,16 @@ def _signals(
     if reason:
         yield _Item(name, reason)
         return
-    given = list(units) if len(units) == count else [*units[:1], split_unit(name)[1]][:1] * count
+    unit_texts = (
+        list(units) if len(units) == count else [*units[:1], split_unit(name)[1]][:1] * count
+    )
     for i in range(count):
-        place, along = "", None
+        suffix, along = "", None
         if axis is not None:
-            place = form.format(("{},:", ":,{}")[axis].format(i + (form[0] == "(")))
+            suffix = form.format(("{},:", ":,{}")[axis].format(i + (form[0] == "(")))
             along = 1 - axis if reverse else axis
         rows = max(shape, default=1)
-        yield _Item(name + place, "", given[i], rows, partial(_vector, array, along, i))
+        yield _Item(name + suffix, "", unit_texts[i], rows, partial(_vector, array, along, i))
 
 
 def _vector(array: Any, axis: int | None, number: int, first: int, last: int | None) -> Any:
@@ -218,7 +220,7 @@ def _matlab(path: Path) -> Iterator[Iterable[_Item]]:
             yield from _signals(name, np.asarray(value), "({})")
 
     variables = loadmat(path, appendmat=False, simplify_cells=True).items()
-    named = (each for each in variables if not each[0].startswith("__"))
+    named = (variable for variable in variables if not variable[0].startswith("__"))
     yield (item for name, value in named for item in items(printable(name), value))
 
 
@@ -232,9 +234,9 @@ def _hdf5(path: Path, *, matlab: bool = False) -> Iterator[Iterable[_Item]]:
         file.visit(names.append)
         if len(names) > _OBJECTS:
             raise ValueError(f"it has {len(names)} objects, more than the {_OBJECTS} that are read")
-        found = (each for each in map(file.get, names) if isinstance(each, h5py.Dataset))
+        datasets = (item for item in map(file.get, names) if isinstance(item, h5py.Dataset))
         items = _matlab73_items if matlab else _hdf5_items
-        yield (item for dataset in found for item in items(dataset))
+        yield (item for dataset in datasets for item in items(dataset))
 
 
 def _hdf5_items(dataset: Any, name: str | None = None, form: str = "[{}]") -> Iterator[_Item]:
@@ -243,10 +245,10 @@ def _hdf5_items(dataset: Any, name: str | None = None, form: str = "[{}]") -> It
     try:
         if dataset.is_virtual or dataset.external:
             reason = reason or "its numbers are in other files"
-        given: Any = next((dataset.attrs[key] for key in _UNITS if key in dataset.attrs), [])
-        units = [_text(each) for each in np.ravel(given).tolist()]
-        found = list(_signals(name, dataset, form, units, reverse=form == "({})"))
-        yield from [_Item(name, reason)] if reason else found
+        stated: Any = next((dataset.attrs[key] for key in _UNITS if key in dataset.attrs), [])
+        units = [_text(number) for number in np.ravel(stated).tolist()]
+        signals = list(_signals(name, dataset, form, units, reverse=form == "({})"))
+        yield from [_Item(name, reason)] if reason else signals
     except (TypeError, ValueError) as error:  # a type that NumPy does not have
         yield _Item(name, said(error))
 
@@ -317,7 +319,7 @@ def _wave_rows(array: Any) -> dict[str, Array]:
     for stored in (array, *labels.values()):
         _check_stored(stored)
     table = np.transpose(array[...], [names.index(name) for name in ("complex", *_AXES)])
-    parts, freedoms = (
+    components, freedoms = (
         [str(word).lower() for word in labels[name].asstr()[...]]
         for name in ("complex", "radiating_dof")
     )
@@ -327,7 +329,7 @@ def _wave_rows(array: Any) -> dict[str, Array]:
     grids = np.meshgrid(directions, frequencies, motions, indexing="ij")
     columns = dict(zip(("wave_direction", "omega", "motion"), grids, strict=True))
     for part in ("re", "im"):
-        columns[part] = np.asarray(table[parts.index(part)][..., moved], np.float64)
+        columns[part] = np.asarray(table[components.index(part)][..., moved], np.float64)
     return {name: values.ravel() for name, values in columns.items()}
 
 
@@ -368,15 +370,17 @@ def _tdms_items(file: Any) -> Iterator[_Item]:
         prefix = f"{group.name}/" if len(file.groups()) > 1 else ""
         clocks, names = dict[tuple[float, float, int], str](), set[str]()
         for channel in group.channels():
-            kind, rows, given = channel.dtype.kind, len(channel), channel.properties
+            kind, rows, properties = channel.dtype.kind, len(channel), channel.properties
             name = prefix + channel.name
             names.add(channel.name)
             if rows == 0 or kind not in "iufbM":
                 yield _Item(name, _KINDS.get(kind, _KINDS["S"]) if rows else "it is empty")
                 continue
-            unit = "s" if kind == "M" else given.get("unit_string") or split_unit(channel.name)[1]
+            unit = (
+                "s" if kind == "M" else properties.get("unit_string") or split_unit(channel.name)[1]
+            )
             yield _Item(name, "", str(unit) if unit else None, rows, partial(_tdms_rows, channel))
-            step, begin = given.get("wf_increment"), given.get("wf_start_offset", 0.0)
+            step, begin = properties.get("wf_increment"), properties.get("wf_start_offset", 0.0)
             if isinstance(step, float) and step > 0.0 and isinstance(begin, float):
                 clocks.setdefault((begin, step, rows), channel.name)
         for clock, channel_name in clocks.items():
@@ -423,23 +427,23 @@ def _mdf_items(mdf: Any) -> Iterator[_Item]:
         called, rows = named[number], group.channel_group.cycles_nr
         prefix = f"{called}/" if called and counts[called] == 1 else f"group {number}/"
         prefix = "" if len(named) == 1 else prefix
-        for place, channel in enumerate(group.channels):
+        for position, channel in enumerate(group.channels):
             conversion, name = channel.conversion, channel.name
             texts = conversion is not None and conversion.conversion_type in _TEXTS
             numeric = channel.data_type in _NUMBERS and channel.channel_type not in _VARIABLE
             reason = _LEFT_OUT if texts or not numeric else "" if rows else "it is empty"
             unit = channel.unit or getattr(conversion, "unit", "") or split_unit(name)[1]
-            read = partial(_mdf_rows, mdf, number, place)
+            read = partial(_mdf_rows, mdf, number, position)
             yield _Item(prefix + name, reason, unit or None, rows, read)
 
 
-def _mdf_rows(mdf: Any, group: int, place: int, first: int, last: int | None) -> Any:
+def _mdf_rows(mdf: Any, group: int, channel: int, first: int, last: int | None) -> Any:
     """Numbers; samples that the file marks as invalid are NaN."""
     rows = range(mdf.groups[group].channel_group.cycles_nr)[first:last]
     # invalid samples would be cut out otherwise
     samples, invalid = mdf.get(
         group=group,
-        index=place,
+        index=channel,
         samples_only=True,
         ignore_invalidation_bits=True,
         record_offset=first,

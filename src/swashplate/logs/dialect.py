@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any, ClassVar, Literal, NamedTuple
 
 from swashplate.errors import FileError, InputError
-from swashplate.logs.log import Column, check_kind, printable, split_unit
+from swashplate.logs.log import LogColumn, check_kind, printable, split_unit
 from swashplate.units import speed_unit
 
 _NAMED = {"comma": ",", "semicolon": ";", "tab": "\t", "space": " ", "spaces": " ", "bar": "|"}
@@ -90,7 +90,7 @@ _BYTE_ORDER = {
 _CONTROL = re.compile(r"[\x00-\x08\x0e-\x19\x1b-\x1f\x7f]")
 
 
-def encoding_of(path: Path, given: str | None) -> tuple[str, int]:
+def encoding_of(path: Path, stated: str | None) -> tuple[str, int]:
     """Name of a text file's encoding, and the bytes of its byte-order mark.
 
     By default it is what a byte-order mark says, or UTF-8, or else Latin-1.
@@ -99,8 +99,8 @@ def encoding_of(path: Path, given: str | None) -> tuple[str, int]:
         head = file.read(1 << 16)
     mark = next((mark for mark in _BYTE_ORDER if head.startswith(mark)), b"")
     names = [_BYTE_ORDER[mark]] if mark else ["utf-8", "iso8859-1"]
-    if given is not None:
-        name = codecs.lookup(given).name.removesuffix("-sig")
+    if stated is not None:
+        name = codecs.lookup(stated).name.removesuffix("-sig")
         names = [_BYTE_ORDER.get(mark, "utf-16-le") if name == "utf-16" else name]
     for name in names:
         try:
@@ -147,7 +147,7 @@ _CLOCK = re.compile(
 )
 
 
-def is_number(cell: str, decimal: str) -> bool:
+def is_number_text(cell: str, decimal: str) -> bool:
     """Whether a cell, stripped, is a number or a text for a missing one."""
     if _NUMBER[decimal].fullmatch(cell):
         return True
@@ -181,7 +181,7 @@ _NAMES = {",": "commas", ";": "semicolons", "\t": "tabs", " ": "spaces", "|": "b
 _THREE = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")
 
 
-class Layout(NamedTuple):
+class TextLayout(NamedTuple):
     """How the rows of a text file are to be taken apart."""
 
     delimiter: str
@@ -215,13 +215,15 @@ class Layout(NamedTuple):
 
     def numbers_in(self, cells: Sequence[str]) -> list[bool]:
         """Of the cells in columns of numbers that are not empty, which are numbers."""
-        filled = [cell for cell, one in zip(cells, self.numeric, strict=False) if one and cell]
-        return [is_number(cell, self.decimal) for cell in filled]
+        filled = [
+            cell for cell, numeric in zip(cells, self.numeric, strict=False) if numeric and cell
+        ]
+        return [is_number_text(cell, self.decimal) for cell in filled]
 
     def fits(self, cells: Sequence[str]) -> bool:
         """Whether there are numbers wherever the sample has, and as many cells."""
-        found = self.numbers_in(cells)
-        return len(cells) == self.width and bool(found) and all(found)
+        numbers = self.numbers_in(cells)
+        return len(cells) == self.width and bool(numbers) and all(numbers)
 
     def is_blank(self, line: str) -> bool:
         """Whether a line is no row; one of nothing but tabs is a row of empty cells."""
@@ -230,32 +232,32 @@ class Layout(NamedTuple):
         return self.delimiter != "\t" or len(self.cells(line)) != self.width
 
 
-def find_layout(lines: Sequence[str], options: TextOptions, path: Path) -> Layout:
+def find_layout(lines: Sequence[str], options: TextOptions, path: Path) -> TextLayout:
     """Delimiter and decimal sign under which a sample of lines makes most sense as rows of numbers.
 
     Comments and blank lines must not be among the lines; header lines may. Two readings that are as
     good as each other are refused.
     """
     quoted = any('"' in line for line in lines)
-    given = {key: getattr(options, key) for key in ("delimiter", "decimal")}
+    stated = {key: getattr(options, key) for key in ("delimiter", "decimal")}
     mark = options.delimiter and _NAMED.get(options.delimiter, options.delimiter)
     trials = [
         trial
         for delimiter in ([mark] if mark else [",", ";", "\t", " ", "|"])
         for decimal in ([options.decimal] if options.decimal else [".", ","])
-        if delimiter != decimal or quoted or None not in given.values()
-        for trial in _tried(lines, Layout(delimiter, decimal))
+        if delimiter != decimal or quoted or None not in stated.values()
+        for trial in _tried(lines, TextLayout(delimiter, decimal))
     ]
     if not trials:
-        said = " and ".join(f"{key} {value!r}" for key, value in given.items() if value)
+        settings = " and ".join(f"{key} {value!r}" for key, value in stated.items() if value)
         count = f"{len(lines)} line" + "s" * (len(lines) > 1)
         raise FileError(
-            f"{path} has no rows of two or more numbers{said and f' with {said}'}, only {count} of "
-            "text."
+            f"{path} has no rows of two or more numbers{settings and f' with {settings}'}, only "
+            f"{count} of text."
         )
     # a tab between numbers delimits them, whatever spaces there are in names
     tabbed = max((rows for _, rows, trial in trials if trial.delimiter == "\t"), default=0)
-    trials = [each for each in trials if each[2].delimiter != " " or each[1] > tabbed]
+    trials = [trial for trial in trials if trial[2].delimiter != " " or trial[1] > tabbed]
     best = max(score for score, _, _ in trials)
     equal = [trial for score, _, trial in trials if score > best - 1e-9]
     if len({trial.delimiter for trial in equal}) > 1:
@@ -265,54 +267,54 @@ def find_layout(lines: Sequence[str], options: TextOptions, path: Path) -> Layou
             f"{path} can be read in more than one way, '{shown(row)}' as {readings}; "
             "give 'delimiter' or 'decimal' as an option."
         )
-    chosen = equal[0]  # with a point: where both signs are alike, there are whole numbers alone
-    if options.decimal is None and chosen.delimiter != "," and chosen.decimal == ",":
-        rows = (zip(chosen.cells(line), chosen.numeric, strict=False) for line in lines)
-        cells = [cell for row in rows for cell, one in row if one and "," in cell]
-        cells = [cell for cell in cells if is_number(cell, ",")]
+    layout = equal[0]  # with a point: where both signs are alike, there are whole numbers alone
+    if options.decimal is None and layout.delimiter != "," and layout.decimal == ",":
+        rows = (zip(layout.cells(line), layout.numeric, strict=False) for line in lines)
+        cells = [cell for row in rows for cell, numeric in row if numeric and "," in cell]
+        cells = [cell for cell in cells if is_number_text(cell, ",")]
         if cells and all(_THREE.fullmatch(cell) for cell in cells):
             raise FileError(
                 f"{path} has numbers like '{cells[0]}', where the comma may be a decimal sign or "
                 "separate thousands; give 'decimal' as an option."
             )
-    return chosen
+    return layout
 
 
-def _tried(lines: Sequence[str], layout: Layout) -> Iterator[tuple[float, int, Layout]]:
+def _tried(lines: Sequence[str], layout: TextLayout) -> Iterator[tuple[float, int, TextLayout]]:
     """A layout with its width and columns of numbers, behind its score and its number of rows.
 
     The score is the share of rows that fit times the share of their characters in numbers; a header
     of as many fields adds a half. A log of one column has no time and gives nothing.
     """
     rows = [layout.cells(line) for line in lines]
-    marks = [[is_number(cell, layout.decimal) for cell in row] for row in rows]
+    marks = [[is_number_text(cell, layout.decimal) for cell in row] for row in rows]
     counts = Counter(len(row) for row, mark in zip(rows, marks, strict=True) if any(mark))
     texts = {len(row) for row, mark in zip(rows, marks, strict=True) if not any(mark)}
     # as many fields as most rows have; among equals, as many as a header has, then as the first
-    width = max(counts, key=lambda each: (counts[each], each in texts), default=0)
-    kept = [
+    width = max(counts, key=lambda cells: (counts[cells], cells in texts), default=0)
+    full_rows = [
         list(zip(row, mark, strict=True))
         for row, mark in zip(rows, marks, strict=True)
         if len(row) == width > 1 and any(mark)
     ]
-    columns = zip(*kept, strict=True)
+    columns = zip(*full_rows, strict=True)
     numeric = [
-        2 * sum(one for _, one in each) >= sum(cell != "" for cell, _ in each)
-        and any(one for _, one in each)
-        for each in columns
+        2 * sum(one for _, one in column) >= sum(cell != "" for cell, _ in column)
+        and any(one for _, one in column)
+        for column in columns
     ]
     layout = layout._replace(width=width, numeric=tuple(numeric))
-    begin = next((place for place, row in enumerate(rows) if layout.fits(row)), None)
+    begin = next((row_number for row_number, row in enumerate(rows) if layout.fits(row)), None)
     if begin is None:
         return
-    letters = sum(len(cell) for row in kept for cell, _ in row)
-    share = sum(len(cell) for row in kept for cell, one in row if one) / letters
-    score = len(kept) / (len(rows) - begin) * share
+    letters = sum(len(cell) for row in full_rows for cell, _ in row)
+    share = sum(len(cell) for row in full_rows for cell, one in row if one) / letters
+    score = len(full_rows) / (len(rows) - begin) * share
     # the line of text above the rows, the header, should have as many fields as they
     header = next((len(rows[i]) for i in reversed(range(begin)) if not any(marks[i])), 0)
     if header > 1:
         score += 0.5 if header == width else 0.25
-    yield score, len(kept), layout
+    yield score, len(full_rows), layout
 
 
 # --- names and units, above the rows --------------------------------------------------------------
@@ -321,10 +323,14 @@ _Units = list[str | None]
 
 
 def read_heading(
-    head: Sequence[str], layout: Layout, options: TextOptions, path: Path
-) -> tuple[tuple[Column, ...], int]:
+    head: Sequence[str], layout: TextLayout, options: TextOptions, path: Path
+) -> tuple[tuple[LogColumn, ...], int]:
     """Columns by the first lines of a file, and the line of the first row; the first line is 1."""
-    numbered = [each for each in enumerate(head, 1) if not layout.is_blank(each[1])]
+    numbered = [
+        numbered_line
+        for numbered_line in enumerate(head, 1)
+        if not layout.is_blank(numbered_line[1])
+    ]
     marks = "|".join(map(re.escape, options.marks))
     # comments without their marks, as NumPy writes names into one
     comments = {
@@ -332,12 +338,12 @@ def read_heading(
         for number, line in numbered
         if line.lstrip().startswith(options.marks)
     }
-    plain = [each for each in numbered if each[0] not in comments]
+    plain = [numbered_line for numbered_line in numbered if numbered_line[0] not in comments]
     names: list[str] = []
     units: _Units | None = None
     if options.header_row:
         number = options.header_row
-        plain = [each for each in plain if each[0] > number]
+        plain = [numbered_line for numbered_line in plain if numbered_line[0] > number]
         header = comments.get(number, head[number - 1] if number <= len(head) else "")
         if layout.is_blank(header) or not plain:
             raise FileError(f"{path} has no header in line {number}, or no rows below it.")
@@ -364,22 +370,24 @@ def read_heading(
                 break
             first -= 1
     if options.header_row is None:
-        filled = [each for each in plain[:first] if any(layout.cells(each[1]))]
+        filled = [
+            numbered_line for numbered_line in plain[:first] if any(layout.cells(numbered_line[1]))
+        ]
         names, units = _names_and_units([line for _, line in filled], layout)
         if filled and not names:
             title = filled[-1][1].rstrip()
             if len(layout.names(title)) > 1 and not title.endswith((":", ".")):
                 raise _wrong_header(*filled[-1], layout, path)
         if not names:
-            said = [line for number, line in comments.items() if number < plain[first][0]]
-            names, units = _names_and_units(said, layout)
+            notes = [line for number, line in comments.items() if number < plain[first][0]]
+            names, units = _names_and_units(notes, layout)
             if units is None and (not all(names) or any(layout.numbers_in(names))):
                 names = []
     begin, row = plain[first]
     return tuple(_columns(names, units, layout, layout.cells(row))), begin
 
 
-def _names_and_units(above: Sequence[str], layout: Layout) -> tuple[list[str], _Units | None]:
+def _names_and_units(above: Sequence[str], layout: TextLayout) -> tuple[list[str], _Units | None]:
     """Names and units in the last one or two of some lines; no names where these are none."""
     if not above:
         return [], None
@@ -395,7 +403,7 @@ def _names_and_units(above: Sequence[str], layout: Layout) -> tuple[list[str], _
     return (before, units) if len(before) == layout.width else (names, None)
 
 
-def _wrong_header(number: int, line: str, layout: Layout, path: Path) -> FileError:
+def _wrong_header(number: int, line: str, layout: TextLayout, path: Path) -> FileError:
     count, hint = len(layout.names(line)), ""
     if layout.delimiter == "," and layout.width >= 2 * count - 1:
         hint = " Do decimal commas stand between commas? Export it with semicolons."
@@ -406,20 +414,20 @@ def _wrong_header(number: int, line: str, layout: Layout, path: Path) -> FileErr
 
 
 def _columns(
-    names: Sequence[str], units: _Units | None, layout: Layout, cells: Sequence[str]
-) -> Iterator[Column]:
+    names: Sequence[str], units: _Units | None, layout: TextLayout, cells: Sequence[str]
+) -> Iterator[LogColumn]:
     """Columns by names, each its own, and units; a first cell that is a date makes it seconds."""
     named = [*names] or [""] * layout.width
     if names and not names[-1] and not layout.numeric[-1] and not cells[-1]:
         named.pop()  # a delimiter at the end of each line
-    called = [name or f"column {place}" for place, name in enumerate(named, 1)]
+    called = [name or f"column {position}" for position, name in enumerate(named, 1)]
     counts, seen = Counter(called), Counter[str]()
-    for place, name in enumerate(called):
+    for position, name in enumerate(called):
         seen[name] += 1
-        unit = split_unit(name)[1] or (units[place] if units else None)
-        if place < len(cells) and date_form(cells[place]):
+        unit = split_unit(name)[1] or (units[position] if units else None)
+        if position < len(cells) and date_form(cells[position]):
             unit = "s"
-        yield Column(printable(f"{name} #{seen[name]}" if counts[name] > 1 else name), unit)
+        yield LogColumn(printable(f"{name} #{seen[name]}" if counts[name] > 1 else name), unit)
 
 
 _KNOWN = frozenset(
@@ -441,7 +449,7 @@ _BRACKETS = re.compile(r"\[.*\]|\(.*\)")
 
 
 def _units_of(cells: Sequence[str]) -> _Units | None:
-    """Units of a row of them, None where a cell is empty; or None if it is no such row."""
+    """Units of a row of them, None if a cell is empty; or None if it is no such row."""
     filled = [cell for cell in cells if cell]
     # a short word of another language may stand among units, such as Imp for pulses
     others = [cell for cell in filled if not _is_unit(cell)]
@@ -453,5 +461,5 @@ def _units_of(cells: Sequence[str]) -> _Units | None:
 def _is_unit(cell: str) -> bool:
     if _BRACKETS.fullmatch(cell) or cell.lower() in _KNOWN or speed_unit(cell) != cell:
         return True
-    parts = [part for part in _PARTS.split(cell.lower()) if part]
-    return bool(parts) and all(part in _KNOWN for part in parts)
+    words = [part for part in _PARTS.split(cell.lower()) if part]
+    return bool(words) and all(part in _KNOWN for part in words)

@@ -17,13 +17,13 @@ from swashplate.units import to_si
 Array = NDArray[np.float64]
 
 
-class Column(NamedTuple):
+class LogColumn(NamedTuple):
     """A column of a log."""
 
     name: str
     """As the file has it, a unit in brackets included."""
     unit: str | None = None
-    """As written in the header, in a row of units or in an attribute; None where there is none."""
+    """As written in the header, in a row of units or in an attribute; None if there is none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +33,7 @@ class Log:
     path: Path
     format: str
     """What it was read as, for people: ``CSV, semicolons, decimal comma``."""
-    columns: tuple[Column, ...]
+    columns: tuple[LogColumn, ...]
     """The columns that hold numbers; in text, all columns."""
     load: Callable[[Sequence[int], int, int | None], Sequence[Array]] = field(repr=False)
     """Columns at some positions, each once, from a row to before a last one (None: to the end)."""
@@ -53,19 +53,21 @@ class Log:
 
     def __post_init__(self) -> None:
         """Make all that may get into a sentence printable: names are what a file says they are."""
-        columns = (Column(printable(name), unit and printable(unit)) for name, unit in self.columns)
+        columns = (
+            LogColumn(printable(name), unit and printable(unit)) for name, unit in self.columns
+        )
         left_out = {printable(name): printable(why) for name, why in self.left_out.items()}
         object.__setattr__(self, "columns", tuple(columns))
         object.__setattr__(self, "left_out", left_out)
 
-    def find(self, wanted: str) -> Column:
+    def find(self, requested: str) -> LogColumn:
         """The column of a name.
 
         Parameters
         ----------
-        wanted : str
+        requested : str
             As in the file; or without its unit (``time`` for ``time [ms]``, ``time (ms)`` and
-            ``time_ms``); or without its group, where no other column has the same last part.
+            ``time_ms``); or without its group, if no other column has the same last part.
 
         Raises
         ------
@@ -75,27 +77,29 @@ class Log:
             If it is there, but holds no numbers.
         """
         names = {column.name: _without_unit(column) for column in self.columns}
-        suffixed = re.compile(rf"{re.escape(wanted)}_\w+")
+        suffixed = re.compile(rf"{re.escape(requested)}_\w+")
         matches: list[str] = []
-        for found in (
-            [name for name in names if name == wanted],
-            [name for name in names if name.lstrip("/") == wanted.lstrip("/")],
-            [name for name, bare in names.items() if bare == wanted],
+        for candidates in (
+            [name for name in names if name == requested],
+            [name for name in names if name.lstrip("/") == requested.lstrip("/")],
+            [name for name, bare in names.items() if bare == requested],
             [name for name in names if suffixed.fullmatch(name)],
-            [name for name, bare in names.items() if wanted in (_last(name), _last(bare))],
+            [name for name, bare in names.items() if requested in (_last(name), _last(bare))],
         ):
-            matches = matches or found
+            matches = matches or candidates
         for name, reason in self.left_out.items():
-            if not matches and wanted in (name, _last(name)):
+            if not matches and requested in (name, _last(name)):
                 raise FileError(f"{self.path}: '{name}' cannot be read as numbers: {reason}.")
         listed = ", ".join(map(repr, (matches or list(names))[:_LISTED]))
         listed += f" and {len(names) - _LISTED} more" if len(matches or names) > _LISTED else ""
         if not matches:
             raise InputError(
-                f"{self.path} has no column '{wanted}'; it has {listed}: name the one to take."
+                f"{self.path} has no column '{requested}'; it has {listed}: name the one to take."
             )
         if len(matches) > 1:
-            raise InputError(f"{self.path} has more than one '{wanted}': {listed}; name the one.")
+            raise InputError(
+                f"{self.path} has more than one '{requested}': {listed}; name the one."
+            )
         return next(column for column in self.columns if column.name == matches[0])
 
     def read(self, names: Sequence[str]) -> dict[str, Array]:
@@ -136,9 +140,9 @@ class Log:
         return {name: arrays[position] for name, position in positions.items()}
 
     def rows_of(self, names: Iterable[str]) -> int | None:
-        """Rows of some columns, None where they differ in length or it is not known."""
-        places = [self.columns.index(self.find(name)) for name in names if self.lengths]
-        counts = {self.lengths[place] for place in places}
+        """Rows of some columns, None if they differ in length or it is not known."""
+        positions = [self.columns.index(self.find(name)) for name in names if self.lengths]
+        counts = {self.lengths[position] for position in positions}
         return counts.pop() if len(counts) == 1 else None
 
 
@@ -151,7 +155,7 @@ MOST = 100_000_000
 
 def printable(text: str) -> str:
     """A text for a sentence: what cannot be printed is replaced."""
-    return "".join(each if each.isprintable() else "�" for each in text)
+    return "".join(character if character.isprintable() else "�" for character in text)
 
 
 def said(error: BaseException) -> str:
@@ -204,7 +208,7 @@ def split_unit(name: str) -> tuple[str, str | None]:
     return match[1], (match[2] if match[2] is not None else match[3]).strip()
 
 
-def unit_of(column: Column, wanted: str, si: str) -> str:
+def unit_of(column: LogColumn, requested: str, si: str) -> str:
     """Unit of a column that `Log.find` returned: its own, the ending of its name, or else `si`.
 
     A name like ``time_ms`` means milliseconds where that is a unit of the same quantity, or where
@@ -212,7 +216,7 @@ def unit_of(column: Column, wanted: str, si: str) -> str:
     """
     if column.unit is not None:
         return "1" if column.unit in _NO_UNIT else column.unit
-    suffixed = re.fullmatch(rf"{re.escape(wanted)}_(\w+)", column.name)
+    suffixed = re.fullmatch(rf"{re.escape(requested)}_(\w+)", column.name)
     if suffixed:
         return suffixed[1]
     _, underscore, ending = column.name.rpartition("_")
@@ -223,7 +227,7 @@ def unit_of(column: Column, wanted: str, si: str) -> str:
     return ending if underscore else si
 
 
-def _without_unit(column: Column) -> str:
+def _without_unit(column: LogColumn) -> str:
     # x(1,:) is a row of a matrix and no x in the unit 1,:
     name, unit = split_unit(column.name)
     return name if unit is not None and unit == column.unit else column.name

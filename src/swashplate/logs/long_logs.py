@@ -49,8 +49,10 @@ def in_parts(log: Log, names: Sequence[str]) -> Log:
     if not columns <= {*stored}:
         stored = sorted(columns.union(stored))
         _convert(log, stored, table, json.dumps([*stamp, stored]))
-    kept = tuple(log.columns[position] for position in stored)
-    return replace(open_in_subprocess("Parquet", table), path=log.path, columns=kept, table=table)
+    stored_columns = tuple(log.columns[position] for position in stored)
+    return replace(
+        open_in_subprocess("Parquet", table), path=log.path, columns=stored_columns, table=table
+    )
 
 
 def _held(log: Log, names: Sequence[str]) -> Log:
@@ -59,9 +61,9 @@ def _held(log: Log, names: Sequence[str]) -> Log:
     arrays = [*log.read([column.name for column in columns]).values()]
 
     def load(positions: Sequence[int], first: int = 0, last: int | None = None) -> list[Array]:
-        parts = [arrays[position][first:last] for position in positions]
+        blocks = [arrays[position][first:last] for position in positions]
         # a part must not keep all the rest in memory
-        return [part if part.size == arrays[0].size else part.copy() for part in parts]
+        return [part if part.size == arrays[0].size else part.copy() for part in blocks]
 
     return replace(
         log,

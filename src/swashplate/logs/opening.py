@@ -42,7 +42,7 @@ def open_log(path: str | Path, *, options: TextOptions | None = None) -> Log:
         Its ending says what it is: text (CSV and its kin), Parquet, MATLAB (all versions), HDF5,
         TDMS or MDF 4.
     options : TextOptions, optional
-        How a text file is written, where that cannot be recognised from it.
+        How a text file is written, if that cannot be recognised from it.
 
     Returns
     -------
@@ -153,11 +153,11 @@ def read_series(
         )
     check_stamps(log, time_column, time)
     check_finite(log, column, values)
-    made = []
+    series = []
     for name, si in ((time_column, "s"), (column, unit)):
-        found = log.find(name)
-        given = unit_of(found, name, si)
-        given = speed_unit(given) if si == "rad/s" else given
-        factor, zero = scaling(given, si, f"{log.path}: column '{found.name}'")
-        made.append(factor * read[name] + zero)
-    return Series(check_duration(log, f"column '{time_column}'", made[0]), made[1])
+        log_column = log.find(name)
+        stated_unit = unit_of(log_column, name, si)
+        stated_unit = speed_unit(stated_unit) if si == "rad/s" else stated_unit
+        factor, zero = scaling(stated_unit, si, f"{log.path}: column '{log_column.name}'")
+        series.append(factor * read[name] + zero)
+    return Series(check_duration(log, f"column '{time_column}'", series[0]), series[1])

@@ -26,7 +26,7 @@ import numpy as np
 
 from swashplate.errors import FileError, InputError, SwashplateError
 from swashplate.logs.binary import look
-from swashplate.logs.log import Array, Column, Log, printable, said
+from swashplate.logs.log import Array, Log, LogColumn, printable, said
 
 _PATIENCE = 30.0
 """How long a small file may take [s]."""
@@ -52,9 +52,9 @@ def open_in_subprocess(reader: str, path: Path) -> Log:
     def load(positions: Sequence[int], first: int = 0, last: int | None = None) -> list[Array]:
         return ask([*positions], first, last)[1]
 
-    found = ask()[0]
-    columns = tuple(Column(*column) for column in found["columns"])
-    return Log(path, found["format"], columns, load, found["left_out"], tuple(found["lengths"]))
+    shown = ask()[0]
+    columns = tuple(LogColumn(*column) for column in shown["columns"])
+    return Log(path, shown["format"], columns, load, shown["left_out"], tuple(shown["lengths"]))
 
 
 class _ReaderProcess:
@@ -92,18 +92,18 @@ class _ReaderProcess:
         """What the other process has to say of a file, and the columns asked for."""
         with cls.lock:
             try:
-                cls.running = other = cls.running or cls()
+                cls.running = process = cls.running or cls()
             except OSError as error:
                 raise FileError(
                     f"{path} is read in a process of its own, which cannot be started: "
                     f"{error.strerror}."
                 ) from None
             try:
-                answer, arrays = other._answer(path, question)
+                answer, arrays = process._answer(path, question)
             except BaseException:
                 # also at Ctrl-C: what is half said must not meet the next question
                 cls.running = None
-                other._end()
+                process._end()
                 raise
         if "error" in answer:
             raise (InputError if answer["kind"] == "InputError" else FileError)(answer["error"])
@@ -134,7 +134,7 @@ class _ReaderProcess:
         self._started = True
         answer = json.loads(line) if line.endswith(b"\n") else {}
         arrays = [np.empty(size) for size in answer.get("sizes", [])]
-        read = [source.readinto(each.view(np.uint8).data) == each.nbytes for each in arrays]
+        read = [source.readinto(array.view(np.uint8).data) == array.nbytes for array in arrays]
         if not answer or not all(read):
             self._process.wait()
             lines = self._said.read_bytes()[-2000:].decode("utf-8", "replace").split("\n")
@@ -173,11 +173,11 @@ def serve() -> None:
     os.dup2(2, 1)  # what libraries print must not get between the answers
     warnings.simplefilter("ignore")
     for line in sys.stdin.buffer:
-        reader, name, shown, *wanted = json.loads(line)
+        reader, name, shown, *requested = json.loads(line)
         answer, arrays = dict[str, Any](), list[Array]()
         try:
             _limit_memory(Path(name))
-            answer, arrays = look(reader, Path(name), *wanted)
+            answer, arrays = look(reader, Path(name), *requested)
         except (KeyboardInterrupt, SystemExit):
             raise
         except BaseException as error:
@@ -197,7 +197,7 @@ def serve() -> None:
 
 
 def _limit_memory(path: Path) -> None:
-    """Let a file take no more than could be in it, where the system has such limits (Linux)."""
+    """Let a file take no more than could be in it, if the system has such limits (Linux)."""
     if not _USED.exists():
         return
     import resource

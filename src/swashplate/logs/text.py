@@ -20,16 +20,16 @@ from swashplate.logs.dialect import (
     INFINITE,
     NOT_A_NUMBER,
     SIGNS,
-    Layout,
+    TextLayout,
     TextOptions,
     date_form,
     encoding_of,
     find_layout,
-    is_number,
+    is_number_text,
     read_heading,
     shown,
 )
-from swashplate.logs.log import Array, Column, Log, printable
+from swashplate.logs.log import Array, Log, LogColumn, printable
 
 if TYPE_CHECKING:
     import polars
@@ -103,8 +103,8 @@ class _Table:
     path: Path
     encoding: str
     skipped: int
-    layout: Layout
-    columns: tuple[Column, ...]
+    layout: TextLayout
+    columns: tuple[LogColumn, ...]
     first: int
     marks: tuple[str, ...]
 
@@ -116,8 +116,8 @@ class _Table:
             begin += piece.count("\n")
             if lines:
                 yield [
-                    self._numbers(cells[str(each)], lines, each, count, clocks)
-                    for each in positions
+                    self._numbers(cells[str(position)], lines, position, count, clocks)
+                    for position in positions
                 ]
             count += len(lines)
 
@@ -127,7 +127,7 @@ class _Table:
 
         text = piece.split("\n", max(self.first - begin, 0))[-1]
         delimiter, width = self.layout.delimiter, self.layout.width
-        if not text or any(each in text for each in ('"', "\0", *self.marks)):
+        if not text or any(mark in text for mark in ('"', "\0", *self.marks)):
             return None
         if delimiter == " ":
             text, delimiter = "\n".join("\t".join(row.split()) for row in text.split("\n")), "\t"
@@ -137,7 +137,7 @@ class _Table:
                 has_header=False,
                 separator=delimiter,
                 quote_char=None,
-                schema={str(place): pl.String for place in range(width)},
+                schema={str(position): pl.String for position in range(width)},
             )
         except pl.exceptions.PolarsError:
             return None
@@ -158,20 +158,20 @@ class _Table:
             comment = text.lstrip().startswith(self.marks)
             if line < self.first or comment or self.layout.is_blank(text):
                 continue
-            place = f"data row {count + len(rows) + 1} (line {line})"
+            where = f"data row {count + len(rows) + 1} (line {line})"
             if "\0" in text:
-                raise FileError(f"{self.path} has a NUL byte in {place}; it is damaged.")
+                raise FileError(f"{self.path} has a NUL byte in {where}; it is damaged.")
             try:
                 cells = self.layout.cells(text, strict=True)
             except csv.Error as error:
-                why = f"{place}: {printable(str(error))}"
+                why = f"{where}: {printable(str(error))}"
                 raise FileError(f"{self.path} has misplaced quotes in {why}.") from None
             if len(cells) != self.layout.width:
                 has = f"{len(cells)} field{'s' * (len(cells) > 1)} instead of {self.layout.width}"
-                raise FileError(f"{self.path}: {place} has {has}.")
+                raise FileError(f"{self.path}: {where} has {has}.")
             lines.append(line)
             rows.append(cells)
-        names = [str(place) for place in range(self.layout.width)]
+        names = [str(where) for where in range(self.layout.width)]
         return lines, pl.DataFrame(rows, dict.fromkeys(names, pl.String), orient="row")
 
     def _numbers(
@@ -184,26 +184,28 @@ class _Table:
     ) -> Array:
         """A column of a piece, before which there are `count` rows."""
         text, kind, decimal = cells.str.strip_chars().fill_null(""), "number", self.layout.decimal
-        found = clocks[position].seconds(text) if position in clocks else _numbers_of(text, decimal)
-        if count == 0 and isinstance(found, int) and (form := date_form(text[found])):
+        is_clock = position in clocks
+        read = clocks[position].seconds(text) if is_clock else _numbers_of(text, decimal)
+        if count == 0 and isinstance(read, int) and (form := date_form(text[read])):
             clocks[position] = _Clock(form)
-            found = clocks[position].seconds(text)
-        if isinstance(found, int):
-            other = "," if decimal == "." else "."
-            if position in clocks:
-                kind = "date like the first one"
-            elif is_number(text[found], other):
-                kind += f" with a decimal {'comma' if other == '.' else 'point'}"
-            raise FileError(
-                f"{self.path}: column '{self.columns[position].name}' holds "
-                f"'{shown(text[found])}', which is no {kind}, in data row {count + found + 1} "
-                f"(line {lines[found]})."
-            )
-        return found
+            read = clocks[position].seconds(text)
+        if not isinstance(read, int):
+            return read
+        row = read
+        other_mark = "," if decimal == "." else "."
+        if position in clocks:
+            kind = "date like the first one"
+        elif is_number_text(text[row], other_mark):
+            kind += f" with a decimal {'comma' if other_mark == '.' else 'point'}"
+        raise FileError(
+            f"{self.path}: column '{self.columns[position].name}' holds "
+            f"'{shown(text[row])}', which is no {kind}, in data row {count + row + 1} "
+            f"(line {lines[row]})."
+        )
 
 
 def _numbers_of(text: polars.Series, decimal: str) -> Array | int:
-    """Numbers of a column, an empty cell as NaN; or the place of the first cell that holds none."""
+    """Numbers of a column, an empty cell as NaN; or the row of the first cell that holds none."""
     import polars as pl
 
     plain = text
@@ -234,7 +236,7 @@ _DAY = 86_400_000_000
 class _Clock:
     """A column of dates of one form, read piece after piece.
 
-    Stamps count from 1970 in universal time where a zone is written; a clock without a date begins
+    Stamps count from 1970 in universal time if a zone is written; a clock without a date begins
     anew at midnight.
     """
 
@@ -245,25 +247,25 @@ class _Clock:
         self.last = self.ahead = 0  # the stamp before, and days passed since the first [µs]
 
     def seconds(self, text: polars.Series) -> Array | int:
-        """Seconds since the column's first stamp, or the place of the first cell that is none."""
+        """Seconds since the column's first stamp, or the row of the first cell that is none."""
         import polars as pl
 
         text = text.set(text == "", None)
         plain = text.str.replace(",", ".", literal=True)  # of the fraction
         plain = plain if self.dated else "1970-01-01 " + plain
-        found = plain.str.to_datetime(self.form, time_unit="us", strict=False)
-        wrong = found.is_null() & text.is_not_null()
+        stamps_read = plain.str.to_datetime(self.form, time_unit="us", strict=False)
+        wrong = stamps_read.is_null() & text.is_not_null()
         if wrong.any():
             return int(wrong.arg_max() or 0)
-        stamps = found.cast(pl.Int64)
+        stamps = stamps_read.cast(pl.Int64)
         if stamps.null_count() == len(stamps):
             return np.full(len(text), np.nan)
         if self.first is None:
             self.first = self.last = int(stamps.drop_nulls()[0])
-        whole = stamps.fill_null(strategy="forward").fill_null(self.last).to_numpy()
+        filled = stamps.fill_null(strategy="forward").fill_null(self.last).to_numpy()
         if not self.dated:
-            back = np.diff(whole, prepend=self.last) < -_DAY // 2
+            back = np.diff(filled, prepend=self.last) < -_DAY // 2
             stamps = stamps + self.ahead + _DAY * pl.Series(np.cumsum(back, dtype=np.int64))
             self.ahead += _DAY * int(back.sum())
-        self.last = int(whole[-1])
+        self.last = int(filled[-1])
         return 1e-6 * (stamps - self.first).cast(pl.Float64).to_numpy()

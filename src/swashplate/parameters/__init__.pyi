@@ -9,7 +9,7 @@ from .definitions import Definition as Definition
 from .definitions import Definitions as Definitions
 from .definitions import options_of as options_of
 from .files import AXES as AXES
-from .files import Entry as Entry
+from .files import ParameterEntry as ParameterEntry
 from .files import SetFile as SetFile
 from .files import dump_set as dump_set
 from .files import load_preset as load_preset

@@ -29,14 +29,17 @@ INPUTS = ("pump_speed",)
 def _collected() -> Iterator[tuple[Definition, dict[str, str]]]:
     """All parameters in the order of Kruse's tables, the refinements last, with their paths."""
     for part, kind in (("card", Card), ("pump", Pump)):
-        for each in declared_by(kind):
-            if each.symbol in INPUTS:
+        for definition in declared_by(kind):
+            if definition.symbol in INPUTS:
                 continue
-            paths = {c: f"{part}.{path}" for c, path in zip(each.columns, each.fields, strict=True)}
+            paths = {
+                c: f"{part}.{path}"
+                for c, path in zip(definition.columns, definition.fields, strict=True)
+            }
             block: Block = "control_card"
             if part == "pump":
-                block = "pump_motor" if each.default is None else "refinements"
-            yield replace(each, block=block), paths
+                block = "pump_motor" if definition.default is None else "refinements"
+            yield replace(definition, block=block), paths
 
 
 _COLLECTED = tuple(_collected())
@@ -49,11 +52,13 @@ REFINEMENTS: dict[str, Definition] = {d.symbol: d for d in _ALL if d.block == "r
 """Definitions of what a set may leave out, by symbol, along the chain; each has one value."""
 
 COLUMNS: dict[str, str] = {
-    column: symbol for symbol, each in CATALOGUE.items() for column in each.columns
+    column: symbol for symbol, definition in CATALOGUE.items() for column in definition.columns
 }
 """Symbol of every single value that every set has, e.g. ``Z16_plus`` → ``Z16``."""
 
-SWITCHES: dict[str, str] = {each.symbol: each.switch for each in _ALL if each.switch}
+SWITCHES: dict[str, str] = {
+    definition.symbol: definition.switch for definition in _ALL if definition.switch
+}
 """Option of the pump (`PumpOptions` of `swashplate.models.displacement_control`) that a parameter
 belongs to, by symbol; each has one value."""
 
@@ -63,7 +68,7 @@ OPTIONS: tuple[str, ...] = tuple(dict.fromkeys(SWITCHES.values()))
 
 def options_of(numbers: Mapping[str, float]) -> frozenset[str]:
     """Options whose parameters are not all zero; what is not among the numbers is off."""
-    return frozenset(each for name, each in SWITCHES.items() if numbers.get(name, 0.0) != 0.0)
+    return frozenset(switch for name, switch in SWITCHES.items() if numbers.get(name, 0.0) != 0.0)
 
 
 # --- names and what they stand for ----------------------------------------------------------------
@@ -85,7 +90,9 @@ class Definitions:
     def columns(self) -> dict[str, str]:
         """Symbol of every column."""
         return {
-            column: symbol for symbol, each in self.by_symbol.items() for column in each.columns
+            column: symbol
+            for symbol, definition in self.by_symbol.items()
+            for column in definition.columns
         }
 
     def find(self, name: str) -> Definition:
@@ -121,11 +128,15 @@ class Definitions:
         close = get_close_matches(str(name), [*self.by_symbol, *self.columns], n=1)
         hint = f" (did you mean {close[0]}?)" if close else ""
         refinements = [
-            symbol for symbol, each in self.by_symbol.items() if each.block == "refinements"
+            symbol
+            for symbol, definition in self.by_symbol.items()
+            if definition.block == "refinements"
         ]
         others = [symbol for symbol in self.by_symbol if symbol not in refinements]
         sentence = f"There is no parameter '{name}'{hint}; the parameters are {', '.join(others)}"
-        directional = [each for each in self.by_symbol.values() if each.directional]
+        directional = [
+            definition for definition in self.by_symbol.values() if definition.directional
+        ]
         if directional:
             plus, minus = directional[0].columns
             sentence += f", those with two directions also as e.g. {plus} and {minus}"
@@ -157,21 +168,21 @@ def definitions_of(kinds: tuple[type, ...]) -> Definitions:
     """
     if not kinds:
         return DEFINITIONS
-    known = dict(DEFINITIONS.by_symbol)
+    by_symbol = dict(DEFINITIONS.by_symbol)
     for kind in kinds:
-        for each in declared_by(kind):
-            default = kind._field_defaults.get(each.symbol)  # type: ignore[attr-defined]
-            if each.directional or default is None or not each.unit:
+        for declared in declared_by(kind):
+            default = kind._field_defaults.get(declared.symbol)  # type: ignore[attr-defined]
+            if declared.directional or default is None or not declared.unit:
                 raise ParameterError(
-                    f"{kind.__name__}.{each.symbol} needs a Definition with a unit, one value and "
-                    "a default."
+                    f"{kind.__name__}.{declared.symbol} needs a Definition with a unit, one value "
+                    "and a default."
                 )
-            definition = replace(each, block="refinements", default=default)
-            other = known.setdefault(each.symbol, definition)
-            if other != definition:
+            definition = replace(declared, block="refinements", default=default)
+            earlier = by_symbol.setdefault(declared.symbol, definition)
+            if earlier != definition:
                 raise ParameterError(
-                    f"{kind.__name__}.{each.symbol}: there is another parameter {each.symbol}, "
-                    f"{other.name}; give yours a name of its own."
+                    f"{kind.__name__}.{declared.symbol}: there is another parameter "
+                    f"{declared.symbol}, {earlier.name}; give yours a name of its own."
                 )
-    own = known.keys() - DEFINITIONS.by_symbol.keys()
-    return Definitions(known, {**DEFINITIONS.paths, **{name: f"pump.{name}" for name in own}})
+    added = by_symbol.keys() - DEFINITIONS.by_symbol.keys()
+    return Definitions(by_symbol, {**DEFINITIONS.paths, **{name: f"pump.{name}" for name in added}})

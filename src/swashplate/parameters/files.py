@@ -6,10 +6,10 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from swashplate.documents import parse_toml, read_text, validated
-from swashplate.entries import Name, NotNegative, Number, Positive, Version
+from swashplate.entries import FileTable, Name, NotNegative, Number, Positive, Version
 from swashplate.equations.replacement import Replacement, again, found_at, uses
 from swashplate.errors import InputError, MissingFileError, ParameterError, meant
 from swashplate.parameters.definitions import Block, Definition, definitions_of, options_of
@@ -32,13 +32,7 @@ from swashplate.units import to_si
 TwoNumbers = Annotated[list[Number], Field(min_length=2, max_length=2)]
 
 
-class FilePart(BaseModel):
-    """What a file may have, and nothing else."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class Entry(FilePart):
+class ParameterEntry(FileTable):
     """One parameter: ``Z16 = { value = [1.2e-4, 1.5e-4], unit = "m", source = "table 7.2" }``."""
 
     value: Number | TwoNumbers
@@ -48,7 +42,7 @@ class Entry(FilePart):
     bounds: TwoNumbers | None = None
 
 
-class EquationPlaces(FilePart):
+class EquationPlaces(FileTable):
     """An equation in the place of another one, each as ``module:name``."""
 
     old: str
@@ -56,7 +50,7 @@ class EquationPlaces(FilePart):
     parameters: str | None = None
 
 
-class ModelOptions(FilePart):
+class ModelOptions(FileTable):
     """Variants of the equations; the defaults are those the published values belong to."""
 
     pressure_root: PressureRoot = "published"
@@ -66,15 +60,15 @@ class ModelOptions(FilePart):
     """Samples a second that the recursion of the card's filter belongs to; none is the filter's
     differential equation, for any rate."""
     options: list[str] | None = None
-    """Terms of the pump that count; where they are not given, those whose parameters are not 0."""
-    equations: list[EquationPlaces] = []
-    """One's own equations in place of the package's, each as ``module:name``."""
+    """Terms of the pump that count; if they are not given, those whose parameters are not 0."""
+    equations: list[EquationPlaces] = Field([])
+    """User-defined equations in place of the package's, each as ``module:name``."""
     motion: Motion = "shaft"
-    unreached: dict[str, NotNegative] = {}
+    unreached: dict[str, NotNegative] = Field({})
     """Limits that the tests never reached, by column, and how far they went. [SI]"""
 
 
-class CardFile(FilePart):
+class CardFile(FileTable):
     """A control card by itself, so that several sets can use it."""
 
     format: Version = 1
@@ -82,22 +76,22 @@ class CardFile(FilePart):
     title: str = ""
     rate: Positive | None = None
     """Of the recursion that its filter belongs to."""
-    control_card: dict[str, Entry]
+    control_card: dict[str, ParameterEntry]
 
 
-class SetFile(FilePart):
+class SetFile(FileTable):
     """A whole drive; `control_card` is the name of a packaged card or the card's own table."""
 
     format: Version = 1
     name: Name
     title: str = ""
-    control_card: str | dict[str, Entry]
+    control_card: str | dict[str, ParameterEntry]
     card: Name = ""
     """Name of a card that is given by its own table."""
-    pump_motor: dict[str, Entry]
+    pump_motor: dict[str, ParameterEntry]
     model: ModelOptions = ModelOptions()
-    refinements: dict[str, Entry] = {}
-    """What goes beyond Kruse's equations; all of it is off where it is not given."""
+    refinements: dict[str, ParameterEntry] = Field({})
+    """What goes beyond Kruse's equations; all of it is off if it is not given."""
 
 
 # --- reading --------------------------------------------------------------------------------------
@@ -112,7 +106,7 @@ NEUTRAL = "neutral"
 
 def preset_names() -> tuple[str, ...]:
     """Names of the packaged sets, Kruse's axes first."""
-    names = {each.name.removesuffix(".toml") for each in SETS.iterdir() if each.is_file()}
+    names = {path.name.removesuffix(".toml") for path in SETS.iterdir() if path.is_file()}
     return (*AXES, *sorted(names - set(AXES) - {"__init__.py"}))
 
 
@@ -149,7 +143,7 @@ def fitted_drive(folder: str | Path) -> Path:
         return file
     if (Path(folder) / FITTED_NUMBERS).is_file():
         raise MissingFileError(
-            f"{folder} is the fit of a model of your own: give its file by --model where the "
+            f"{folder} is the fit of a user-defined model: give its file by --model where the "
             "command has that option. In Python swashplate.equations.simulate(model, ...) runs it, "
             'and swashplate.export.fmu(model, "model.fmu", parameters=..., step=...) writes an FMU '
             f"of it, with the numbers in {Path(folder) / FITTED_NUMBERS}."
@@ -204,13 +198,13 @@ def read_set(text: str, origin: str) -> ParameterSet:
     else:
         card_name, entries = contents.card or f"{contents.name} card", contents.control_card
     equations = _replacements(model.equations, origin)
-    blocks: dict[Block, Mapping[str, Entry]] = {
+    blocks: dict[Block, Mapping[str, ParameterEntry]] = {
         "control_card": entries,
         "pump_motor": contents.pump_motor,
         "refinements": contents.refinements,
     }
     parameters: dict[str, Parameter] = {}
-    kinds = (each.parameters for each in equations)
+    kinds = (equation.parameters for equation in equations)
     try:
         definitions = definitions_of(tuple(kind for kind in kinds if kind is not None))
         for column in model.unreached:
@@ -223,7 +217,7 @@ def read_set(text: str, origin: str) -> ParameterSet:
                 parameters[symbol] = parameter_of(definition, entry)
     except ParameterError as error:
         raise ParameterError(f"{origin}: {error}") from None
-    values = {symbol: each.values[0] for symbol, each in parameters.items()}
+    values = {symbol: parameter.values[0] for symbol, parameter in parameters.items()}
     return ParameterSet(
         name=contents.name,
         title=contents.title,
@@ -264,7 +258,7 @@ def _replacements(entries: Sequence[EquationPlaces], origin: str) -> tuple[Repla
 
 def _packaged_card(name: str, origin: str) -> CardFile:
     cards = SETS.joinpath("cards")
-    names = sorted(each.name.removesuffix(".toml") for each in cards.iterdir())
+    names = sorted(path.name.removesuffix(".toml") for path in cards.iterdir())
     if name not in names:
         raise ParameterError(
             f"{origin}: there is no packaged control card '{name}'; there are "
@@ -274,14 +268,14 @@ def _packaged_card(name: str, origin: str) -> CardFile:
     return validated(parse_toml(text, f"{name}.toml"), CardFile, f"{name}.toml")
 
 
-def parameter_of(definition: Definition, entry: Entry) -> Parameter:
+def parameter_of(definition: Definition, entry: ParameterEntry) -> Parameter:
     """A parameter from its entry, in SI; what does not fit the definition is a `ParameterError`."""
     what = f"{definition.symbol} ({definition.name})"
-    given = entry.value if isinstance(entry.value, list) else [entry.value]
+    stated = entry.value if isinstance(entry.value, list) else [entry.value]
     try:
         numbers, bounds = (
-            tuple(to_si(each, entry.unit, definition.unit, what) for each in values)
-            for values in (given, entry.bounds or ())
+            tuple(to_si(value, entry.unit, definition.unit, what) for value in values)
+            for values in (stated, entry.bounds or ())
         )
     except InputError as error:
         raise ParameterError(str(error)) from None
@@ -308,7 +302,7 @@ def dump_set(parameters: ParameterSet) -> str:
     if parameters.options != options_of(parameters.numbers):
         options["options"] = sorted(parameters.options)
     if parameters.equations:
-        options["equations"] = [each.places for each in parameters.equations]
+        options["equations"] = [equation.places for equation in parameters.equations]
     if parameters.motion != "shaft":
         options["motion"] = parameters.motion
     if parameters.unreached:
@@ -316,16 +310,19 @@ def dump_set(parameters: ParameterSet) -> str:
         unreached.update(parameters.unreached)
         options["unreached"] = unreached
     blocks: dict[str, dict[str, object]] = {"model": options}
-    for symbol, each in parameters.items():
+    for symbol, parameter in parameters.items():
         entry = inline_table()
-        entry.append("value", list(each.values) if isinstance(each.value, Pair) else each.value)
-        entry.append("unit", each.unit)
-        if each.source:
-            entry.append("source", each.source)
-        entry.append("status", each.status)
-        if each.own_bounds is not None:
-            entry.append("bounds", list(each.own_bounds))
-        blocks.setdefault(each.definition.block, {})[symbol] = entry
+        entry.append(
+            "value",
+            list(parameter.values) if isinstance(parameter.value, Pair) else parameter.value,
+        )
+        entry.append("unit", parameter.unit)
+        if parameter.source:
+            entry.append("source", parameter.source)
+        entry.append("status", parameter.status)
+        if parameter.own_bounds is not None:
+            entry.append("bounds", list(parameter.own_bounds))
+        blocks.setdefault(parameter.definition.block, {})[symbol] = entry
     text = document()
     text.add(comment("swashplate parameter set; SI units; [plus, minus] as magnitudes"))
     text.add("format", 1)

@@ -85,10 +85,10 @@ class Parameter(Result):
             Column("status"),
             Column("source", wrap=True),
         )
-        made = Table("", columns, si=True)
+        table = Table("", columns, si=True)
         plus, minus = (*self.values, None)[:2]
-        made.add(self.symbol, self.name, plus, minus, self.status, self.source, unit=self.unit)
-        return made
+        table.add(self.symbol, self.name, plus, minus, self.status, self.source, unit=self.unit)
+        return table
 
     @property
     def values(self) -> tuple[float, ...]:
@@ -121,7 +121,7 @@ class Entries(Mapping[str, Parameter]):
 
     def _keep(self, parameters: Mapping[str, Parameter]) -> None:
         """Keep parameters as they are from now on, and all their numbers by column."""
-        numbers = {k: v for each in parameters.values() for k, v in each.numbers.items()}
+        numbers = {k: v for parameter in parameters.values() for k, v in parameter.numbers.items()}
         object.__setattr__(self, "parameters", MappingProxyType(parameters))
         object.__setattr__(self, "numbers", MappingProxyType(numbers))
 
@@ -186,8 +186,8 @@ class ParameterSet(Entries):
 
     def __post_init__(self) -> None:
         definitions = self.definitions
-        known = definitions.by_symbol
-        for name in self.parameters.keys() - known.keys():
+        by_symbol = definitions.by_symbol
+        for name in self.parameters.keys() - by_symbol.keys():
             raise ParameterError(
                 f"{self.name}: there is no parameter '{name}'; those of a user-defined equation "
                 "belong to a drive that has it, see Drive.with_equation."
@@ -195,16 +195,16 @@ class ParameterSet(Entries):
         missing = [symbol for symbol in CATALOGUE if symbol not in self.parameters]
         if missing:
             raise ParameterError(f"{self.name}: no value for {', '.join(missing)}.")
-        self._keep({name: self.parameters[name] for name in known if name in self.parameters})
-        for each in self.values():
-            if each.own_bounds is None:
+        self._keep({name: self.parameters[name] for name in by_symbol if name in self.parameters})
+        for parameter in self.values():
+            if parameter.own_bounds is None:
                 continue
-            low, high = each.own_bounds
-            for column, value in each.numbers.items():
+            low, high = parameter.own_bounds
+            for column, value in parameter.numbers.items():
                 if not low <= value <= high:
                     raise ParameterError(
-                        f"{self.name}: {column} ({each.name}) is {value:g} {each.unit}, outside "
-                        f"its bounds {low:g} to {high:g}."
+                        f"{self.name}: {column} ({parameter.name}) is {value:g} {parameter.unit}, "
+                        f"outside its bounds {low:g} to {high:g}."
                     )
         numbers = {name: np.array([number]) for name, number in self.numbers.items()}
         refuse(self.name, broken_rules(numbers, definitions))
@@ -213,7 +213,7 @@ class ParameterSet(Entries):
     @property
     def definitions(self) -> Definitions:
         """What the set can have a value of, by symbol: the package's, then its own equations'."""
-        kinds = (each.parameters for each in self.equations)
+        kinds = (equation.parameters for equation in self.equations)
         return definitions_of(tuple(kind for kind in kinds if kind is not None))
 
     def __repr__(self) -> str:
@@ -256,8 +256,8 @@ class ParameterSet(Entries):
         if REFINEMENTS.keys().isdisjoint(self.parameters) and not self.equations:
             return self
         parameters = {symbol: self.parameters[symbol] for symbol in CATALOGUE}
-        own = {SWITCHES[symbol] for symbol in CATALOGUE if symbol in SWITCHES}
-        return replace(self, parameters=parameters, options=self.options & own, equations=())
+        switches = {SWITCHES[symbol] for symbol in CATALOGUE if symbol in SWITCHES}
+        return replace(self, parameters=parameters, options=self.options & switches, equations=())
 
     def unreached_sentence(self, drive: str = "this drive") -> str:
         """What the tests of a drive, as it is called, left open; empty if it is nothing."""
@@ -279,11 +279,13 @@ class ParameterSet(Entries):
             "refinements": "Refinements",
         }
         numbers = (Column("plus", ".6g"), Column("minus", ".6g"))
-        made = []
+        tables = []
         for block, title in titles.items():
             columns = (Column("symbol"), Column("name", wrap=True), *numbers)
             table = Table(title, (*columns, UNIT, Column("status")), si=True)
-            members = [each for each in self.values() if each.definition.block == block]
+            members = [
+                parameter for parameter in self.values() if parameter.definition.block == block
+            ]
             for source, group in groupby(members, key=lambda each: each.source):
                 if source:
                     table.add("", f"{source}:", None, None, "", section=True)
@@ -292,8 +294,8 @@ class ParameterSet(Entries):
                     start = not source and number == 0
                     cells = (each.symbol, each.name, *values, each.status)
                     table.add(*cells, unit=each.unit, section=start)
-            made += [table] if members else []
-        return made
+            tables += [table] if members else []
+        return tables
 
     def replace(self, changes: Mapping[str, Change]) -> Self:
         """Copy with other values, marked as the user's.
@@ -344,8 +346,8 @@ class ParameterSet(Entries):
             touched = {SWITCHES[name] for name in changes if name in SWITCHES}
             options = (self.options - touched) | (options_of(numbers) & touched)
         # a number that someone gives is no longer one that tests left open
-        given = self.definitions.columns_of(changes)
-        unreached = {k: v for k, v in self.unreached.items() if k not in given}
+        columns = self.definitions.columns_of(changes)
+        unreached = {k: v for k, v in self.unreached.items() if k not in columns}
         return replace(self, parameters=parameters, options=options, unreached=unreached)
 
     def scale(self, factors: Mapping[str, Change]) -> Self:
@@ -373,10 +375,10 @@ def value_of(
         raise ParameterError(f"{name} has one value, not a plus and a minus one.")
     if isinstance(change, tuple) and len(change) != 2:
         raise ParameterError(f"{name} takes one value or two (plus, minus), not {len(change)}.")
-    given = change if isinstance(change, tuple) else (change,)
+    stated = change if isinstance(change, tuple) else (change,)
     what = f"{name} ({definition.name})"
     try:
-        numbers = [float(in_si(number, definition.unit, what)) for number in given]
+        numbers = [float(in_si(number, definition.unit, what)) for number in stated]
     except InputError as error:
         raise ParameterError(str(error)) from None
     except (TypeError, ValueError):

@@ -92,9 +92,9 @@ OF_A_SIDE: tuple[Rule, ...] = (
         "G3_{side}.",
     ),
     (
-        lambda n: ~(n["moment"] < 1.0),
-        f"Z5·F/√Z4 reaches {{moment:.4g}} within {FULL_VOLTAGE:g} V ({{side}}), but must be below "
-        "1: the solenoid would overpower the feedback spring; check Z19 to Z22, Z4 and Z5.",
+        lambda n: ~(n["moment_sine"] < 1.0),
+        f"Z5·F/√Z4 reaches {{moment_sine:.4g}} within {FULL_VOLTAGE:g} V ({{side}}), but must be "
+        "below 1: the solenoid would overpower the feedback spring; check Z19 to Z22, Z4 and Z5.",
     ),
 )
 
@@ -112,18 +112,19 @@ def check_options(owner: str, options: frozenset[str], numbers: Mapping[str, flo
     Raises
     ------
     ParameterError
-        For an unknown option, or one whose parameters are all 0 where that has no meaning.
+        For an unknown option, or one whose parameters are all 0 if that has no meaning.
     """
     for option in sorted(options):
         if option not in OPTIONS:
             raise ParameterError(
                 f"{owner}: there is no option '{option}'; there are {', '.join(OPTIONS)}."
             )
-        own = [DEFINITIONS.find(name) for name, each in SWITCHES.items() if each == option]
-        sized = [each for each in own if each.least is not None]
-        if sized and all(numbers.get(each.symbol, 0.0) == 0.0 for each in sized):
+        switched = [DEFINITIONS.find(name) for name, switch in SWITCHES.items() if switch == option]
+        sized = [definition for definition in switched if definition.least is not None]
+        if sized and all(numbers.get(definition.symbol, 0.0) == 0.0 for definition in sized):
+            symbols = " and ".join(definition.symbol for definition in sized)
             raise ParameterError(
-                f"{owner}: {option} is on, but {' and '.join(each.symbol for each in sized)} "
+                f"{owner}: {option} is on, but {symbols} "
                 f"{'are' if len(sized) > 1 else 'is'} 0; give at least {sized[0].least:g} "
                 f"{sized[0].unit}, or take {option} out of the options."
             )
@@ -152,13 +153,13 @@ def broken_rules(
     n["depth"] = n["cam_ripple"] + n["cam_ripple_per_torque"] * np.abs(n["load_torque"])
     for rule in (*OF_REFINEMENTS, AT_REST):
         yield applied(rule, n)
-    lowest, moment = _static(n, size)
+    lowest, moment_sines = _static(n, size)
     for k, side in enumerate(SIDES):
-        own = {name: n[f"{name}_{side}"] for name in ("I_t1", "I_t2", "Z13")}
-        own |= {"side": side, "lowest": lowest[:, k], "moment": moment[:, k]}
-        own["arm_sine"] = n["Z3"] * np.tan(own["Z13"])
+        side_values = {name: n[f"{name}_{side}"] for name in ("I_t1", "I_t2", "Z13")}
+        side_values |= {"side": side, "lowest": lowest[:, k], "moment_sine": moment_sines[:, k]}
+        side_values["arm_sine"] = n["Z3"] * np.tan(side_values["Z13"])
         for rule in OF_A_SIDE:
-            yield applied(rule, own)
+            yield applied(rule, side_values)
 
 
 def applied(rule: Rule, n: Values) -> Broken:
@@ -187,20 +188,23 @@ def range_rule(definition: Definition, column: str, values: Array) -> Broken:
 
 
 def _static(n: Values, size: int) -> tuple[Array, Array]:
-    """Lowest steady current [A] and largest sin φ of every set (rows) and side (columns)."""
+    """Lowest steady current [A] and largest |sin φ| of every set (rows) and side (columns).
+
+    sin φ is the solenoid's moment over the greatest moment of the feedback spring.
+    """
     sides = [[n[f"{name}_{side}"] for name in Channel._fields] for side in SIDES]
     channels = np.moveaxis(np.array(sides), -1, 0)
     pumps = np.column_stack([n[name] for name in Pump._fields])
-    lowest, moment = np.empty((size, 2)), np.empty((size, 2))
+    lowest, moment_sines = np.empty((size, 2)), np.empty((size, 2))
     if size == 1 and next(_alone) < FEW:
         # commands that read a few sets and simulate nothing need not wait for machine code
         pump, volts = Pump(*pumps[0].tolist()), VOLTAGES.tolist()
         for k in range(2):
             channel = Channel(*channels[0, k].tolist())
-            lowest[0, k], moment[0, k] = interpreted(_extremes)(channel, pump, k, volts)
+            lowest[0, k], moment_sines[0, k] = interpreted(_extremes)(channel, pump, k, volts)
     else:
-        static_extremes(channels, pumps, VOLTAGES, lowest, moment)
-    return lowest, moment
+        static_extremes(channels, pumps, VOLTAGES, lowest, moment_sines)
+    return lowest, moment_sines
 
 
 @inlined
@@ -211,14 +215,14 @@ def _extremes(channel: Channel, pump: Pump, side: int, voltages: Array) -> tuple
         current = channel_level(voltage, channel)
         force = solenoid_force(-current if side == 1 else current, pump)
         sine = abs(moment_sine(force, pump))
-        # what is no number stays
+        # NaN stays
         least = current if current < least or current != current else least
         most = sine if sine > most or sine != sine else most
     return least, most
 
 
 def _plain_tuple(values: Array, length: int) -> tuple[float, ...]:
-    return tuple(float(each) for each in values)
+    return tuple(float(value) for value in values)
 
 
 # compiled code needs to know the length; Numba's function for it does not run uncompiled
@@ -227,15 +231,15 @@ tuple_of: Any = _plain_tuple if JIT_OFF else to_fixed_tuple
 
 @kernel
 def static_extremes(
-    channels: Array, pumps: Array, voltages: Array, lowest: Array, moment: Array
+    channels: Array, pumps: Array, voltages: Array, lowest: Array, moment_sines: Array
 ) -> None:
     """Lowest steady current [A] and largest |sin φ| of both sides of many sets, (m, 2) outputs.
 
     `channels` are the fields of `Channel` of every set and side, (m, 2, 13), `pumps` those of
-    `Pump`, (m, 43); not a number where any of what is computed is none.
+    `Pump`, (m, 43); NaN if what is computed of a set and side has no value.
     """
     for i in range(pumps.shape[0]):
         pump = Pump(*tuple_of(pumps[i], N_PUMP))
         for side in range(2):
             channel = Channel(*tuple_of(channels[i, side], N_CHANNEL))
-            lowest[i, side], moment[i, side] = _extremes(channel, pump, side, voltages)
+            lowest[i, side], moment_sines[i, side] = _extremes(channel, pump, side, voltages)

@@ -80,22 +80,22 @@ def thinned(time: Array, values: Array, breaks: Rows, columns: int = COLUMNS) ->
     first[breaks + 1] = True
     starts = np.flatnonzero(first)
     sizes = np.diff(starts, append=time.size)
-    kept = np.zeros(time.size, dtype=np.bool_)
-    kept[[0, -1]] = True
-    kept[breaks] = True
-    kept[breaks + 1] = True
+    is_kept = np.zeros(time.size, dtype=np.bool_)
+    is_kept[[0, -1]] = True
+    is_kept[breaks] = True
+    is_kept[breaks + 1] = True
     for extreme in (np.minimum, np.maximum):
         # the first sample of each stretch that is as low, or as high, as any of it
         reached = np.flatnonzero(values == np.repeat(extreme.reduceat(values, starts), sizes))
         stretch = np.searchsorted(starts, reached, side="right")
-        kept[reached[np.flatnonzero(np.diff(stretch, prepend=0))]] = True
-    return np.flatnonzero(kept)
+        is_kept[reached[np.flatnonzero(np.diff(stretch, prepend=0))]] = True
+    return np.flatnonzero(is_kept)
 
 
 def broken(
     time: Array, values: Array, breaks: Rows | None = None, columns: int = COLUMNS
 ) -> tuple[Array, Array]:
-    """Points of a signal's line, thinned out, with a NaN where it is broken.
+    """Points of a signal's line, thinned out, with a NaN if it is broken.
 
     Without `breaks`, rows after which the line is broken, it is broken at the gaps of the stamps.
     The NaN has the stamp of the sample before it, so that a staircase ends there too.
@@ -103,8 +103,10 @@ def broken(
     if breaks is None:
         breaks = gap_rows(time)
     rows = thinned(time, values, breaks, columns)
-    places = np.searchsorted(rows, breaks, side="right")
-    return np.insert(time[rows], places, time[breaks]), np.insert(values[rows], places, np.nan)
+    rows_after = np.searchsorted(rows, breaks, side="right")
+    return np.insert(time[rows], rows_after, time[breaks]), np.insert(
+        values[rows], rows_after, np.nan
+    )
 
 
 def draw(
@@ -129,23 +131,23 @@ def draw(
     if values.size > LONG:
         width *= 0.6
     style: Literal["default", "steps-post"] = "steps-post" if held else "default"
-    how: dict[str, Any] = {"color": color, "zorder": zorder}
+    keywords: dict[str, Any] = {"color": color, "zorder": zorder}
     joints: dict[str, Any] = {"solid_capstyle": "butt", "solid_joinstyle": "round"}
     points = broken(time, values, breaks, columns)
-    ax.plot(*points, ls=dashes, lw=width, drawstyle=style, label=label, **joints, **how)
+    ax.plot(*points, ls=dashes, lw=width, drawstyle=style, label=label, **joints, **keywords)
     # with a break, or nothing, on both sides no line would show it
     apart = np.ones(time.size + 1, dtype=np.bool_)
     apart[1:-1] = False
     apart[breaks + 1] = True
     if (lonely := apart[1:] & apart[:-1]).any():
         dots: dict[str, Any] = {"marker": ".", "markersize": 2.0 * width, "markeredgewidth": 0.0}
-        ax.plot(time[lonely], values[lonely], linestyle="none", **dots, **how)
+        ax.plot(time[lonely], values[lonely], linestyle="none", **dots, **keywords)
 
 
 # --- stretches of time ----------------------------------------------------------------------------
 
 MOST_SPANS = 1000
-"""More stretches than this on one panel are merged where none could see the gap between them."""
+"""More stretches than this on one panel are merged if none could see the gap between them."""
 
 
 class Shade(NamedTuple):
@@ -182,7 +184,7 @@ def stretches(time: Array, active: Mask) -> Array:
     return np.stack((time[turns[::2]] - half, time[turns[1::2] - 1] + half), axis=1)
 
 
-def merged(spans: Array, most: int = MOST_SPANS) -> Array:
+def merged_spans(spans: Array, most: int = MOST_SPANS) -> Array:
     """Join neighbours closer than 1 / `most` of all if there are more than `most` spans."""
     if spans.shape[0] <= most:
         return spans
@@ -198,8 +200,8 @@ def shade(ax: Axes, spans: Array, look: Shade) -> None:
         return
     from matplotlib.collections import PolyCollection
 
-    left, right = merged(spans).T
-    x, y = np.stack((left, right, right, left), axis=1), np.array([0.0, 0.0, 1.0, 1.0])
+    begin, end = merged_spans(spans).T
+    x, y = np.stack((begin, end, end, begin), axis=1), np.array([0.0, 0.0, 1.0, 1.0])
     ax.add_collection(
         PolyCollection(
             list(np.stack(np.broadcast_arrays(x, y), axis=2)),
@@ -219,8 +221,8 @@ def shade_handle(look: Shade, words: str = "") -> Patch:
     """Handle for a legend of shaded stretches."""
     from matplotlib.patches import Patch
 
-    how: dict[str, Any] = {"facecolor": look.color, "edgecolor": look.edge or "#00000030"}
-    return Patch(hatch=look.hatch, linewidth=0.5, label=words or look.name, **how)
+    style: dict[str, Any] = {"facecolor": look.color, "edgecolor": look.edge or "#00000030"}
+    return Patch(hatch=look.hatch, linewidth=0.5, label=words or look.name, **style)
 
 
 def mark_gaps(ax: Axes, time: Array) -> None:

@@ -69,10 +69,10 @@ def new_figure(
     """An empty white figure of a size [inch], whose panels find their places by themselves."""
     from swashplate.report.figure import PlainFigure
 
-    made = PlainFigure(figsize=(width, height), dpi=DPI, facecolor="white")
+    figure = PlainFigure(figsize=(width, height), dpi=DPI, facecolor="white")
     if layout == "constrained":
-        made.set_layout_engine("constrained", w_pad=0.06, h_pad=0.04, hspace=0.02, wspace=0.02)
-    return made
+        figure.set_layout_engine("constrained", w_pad=0.06, h_pad=0.04, hspace=0.02, wspace=0.02)
+    return figure
 
 
 def sheet(
@@ -165,8 +165,8 @@ def legend_within(ax: Axes, handles: Sequence[Artist], location: Any = "best") -
 
 def write_title(figure: Figure, title: str) -> None:
     """Write a title at the top left."""
-    how = {"fontsize": LARGE, "fontweight": "bold", "color": INK}
-    figure.suptitle(title, x=0.012, ha="left", **how)
+    style = {"fontsize": LARGE, "fontweight": "bold", "color": INK}
+    figure.suptitle(title, x=0.012, ha="left", **style)
 
 
 def dress(ax: Axes, label: str = "", below: str = "") -> None:
@@ -200,11 +200,11 @@ def right_axis(ax: Axes, factor: float, label: str) -> Any:
     import numpy as np
 
     functions = (lambda y: factor * np.asarray(y), lambda v: np.asarray(v) / factor)
-    made = ax.secondary_yaxis("right", functions=functions)
-    made.tick_params(length=3.0, width=0.6, color=FAINT, labelsize=SMALL, labelcolor=GREY)
-    made.spines["right"].set_color(FAINT)
-    made.set_ylabel(label, fontsize=NORMAL, color=GREY)
-    return made
+    axis = ax.secondary_yaxis("right", functions=functions)
+    axis.tick_params(length=3.0, width=0.6, color=FAINT, labelsize=SMALL, labelcolor=GREY)
+    axis.spines["right"].set_color(FAINT)
+    axis.set_ylabel(label, fontsize=NORMAL, color=GREY)
+    return axis
 
 
 def in_lines(label: str, letters: int) -> str:
@@ -215,7 +215,7 @@ def in_lines(label: str, letters: int) -> str:
     lines = wrap(label.replace("_", "_ "), max(letters, 8), break_on_hyphens=False)
     if len(lines) > 3:
         lines = [lines[0], f"{lines[1].rstrip('_')}…", lines[-1]]
-    return "\n".join(each.replace("_ ", "_") for each in lines)
+    return "\n".join(line.replace("_ ", "_") for line in lines)
 
 
 def handle(name: str, color: str, dashes: Dashes = "solid", width: float = 2.0) -> Line2D:
@@ -229,13 +229,13 @@ def put_legend(
     ax: Axes, handles: Sequence[Artist], *, beyond: bool = False, room: float = ROOM
 ) -> None:
     """Write a legend above a panel, on one line or more, `beyond` its right end if need be."""
-    made = ax.legend(
+    legend = ax.legend(
         handles=handles,
         loc="lower left",
         bbox_to_anchor=(0.0, 1.01),
         borderaxespad=0.0,
         borderpad=0.2,
-        ncols=legend_columns([str(each.get_label()) for each in handles], room),
+        ncols=legend_columns([str(handle.get_label()) for handle in handles], room),
         frameon=False,
         fontsize=SMALL,
         labelcolor=INK,
@@ -244,7 +244,7 @@ def put_legend(
         columnspacing=1.4,
         labelspacing=0.35,
     )
-    made.set_in_layout(not beyond)
+    legend.set_in_layout(not beyond)
 
 
 def legend_columns(names: Sequence[str], room: float = ROOM) -> int:
@@ -255,7 +255,7 @@ def legend_columns(names: Sequence[str], room: float = ROOM) -> int:
 
 def legend_rows(handles: Sequence[Artist], room: float = ROOM) -> int:
     """Lines of the legend of these handles in some room [inch]."""
-    names = [str(each.get_label()) for each in handles]
+    names = [str(handle.get_label()) for handle in handles]
     return -(-len(names) // legend_columns(names, room))
 
 
@@ -266,7 +266,7 @@ def zero_line(ax: Axes, *, upright: bool = False) -> None:
         ax.axvline(0.0, color=FAINT, linewidth=0.8, zorder=1.2)
 
 
-def write(
+def write_words(
     ax: Axes,
     words: str,
     place: tuple[float, float],
@@ -317,13 +317,13 @@ def label_margin(ax: Axes, labels: Sequence[MarginLabel], inches: float) -> None
     # of two at the same height, hair's breadths apart, the first is above
     heights = [round((label.height - low) / (high - low), 2) for label in labels]
     order = sorted(range(len(labels)), key=lambda index: (heights[index], -index))
-    for place, index in zip(spread([heights[i] for i in order], gap), order, strict=True):
+    for position, index in zip(spread_out([heights[i] for i in order], gap), order, strict=True):
         label = labels[index]
-        how: dict[str, Any] = {"va": "center", "annotation_clip": False}
-        write(ax, label.words, (1.0, place), (5.0, 0.0), color=label.color, **how)
+        style: dict[str, Any] = {"va": "center", "annotation_clip": False}
+        write_words(ax, label.words, (1.0, position), (5.0, 0.0), color=label.color, **style)
 
 
-def spread(wanted: Sequence[float], gap: float) -> list[float]:
+def spread_out(positions: Sequence[float], gap: float) -> list[float]:
     """Places as near to the wanted ones, in rising order, as a gap between neighbours allows.
 
     Neighbours that come too near form a group, which is centred on what its members want.
@@ -333,8 +333,8 @@ def spread(wanted: Sequence[float], gap: float) -> list[float]:
     def bottom(group: Sequence[float]) -> float:
         return sum(group) / len(group) - 0.5 * gap * (len(group) - 1)
 
-    for place in wanted:
-        groups.append([place])
+    for position in positions:
+        groups.append([position])
         while len(groups) > 1 and bottom(groups[-1]) < bottom(groups[-2]) + gap * len(groups[-2]):
             last = groups.pop()
             groups[-1].extend(last)
@@ -363,9 +363,9 @@ def save_figure(figure: Figure, path: str | Path) -> None:
 
     kind = ending(path, FIGURE).removeprefix(".")
 
-    def write(beside: Path) -> None:
+    def write_words(beside: Path) -> None:
         # without a salt of its own, an SVG's clip paths get random names
         with matplotlib.rc_context({"svg.hashsalt": "swashplate"}):
             figure.savefig(beside, format=kind, metadata=_METADATA[kind])
 
-    write_whole(path, write)
+    write_whole(path, write_words)

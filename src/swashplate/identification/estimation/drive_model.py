@@ -399,7 +399,7 @@ def with_edges(experiment: Experiment, values: Mapping[str, float]) -> Experimen
     """An experiment with the edges of its command where values say."""
     command = experiment.input
     edges = _instants_of(command).items()
-    late = {edge.place: values[name] for name, edge in edges if name in values}
+    late = {edge.row: values[name] for name, edge in edges if name in values}
     return replace(experiment, input=command.with_edges(late)) if late else experiment
 
 
@@ -413,8 +413,8 @@ def unknown_instants(run: Experiment, found: Instants) -> list[Unknown]:
     unknowns = list[Unknown]()
     edges = _instants_of(run.input) if run.input.kind == "voltage" else {}
     for name, edge in edges.items():
-        most = 0.5 * (edge.apart + RISE)
-        prior = found.get((run.name, name), Prior(0.0, edge.apart / sqrt(12.0)))
+        most = 0.5 * (edge.interval + RISE)
+        prior = found.get((run.name, name), Prior(0.0, edge.interval / sqrt(12.0)))
         unknown = Unknown(
             name,
             prior.mean,
@@ -424,7 +424,7 @@ def unknown_instants(run: Experiment, found: Instants) -> list[Unknown]:
             prior=prior,
             run=run.name,
             kind="instant",
-            scale=edge.apart,
+            scale=edge.interval,
         )
         unknowns.append(unknown)
     return unknowns

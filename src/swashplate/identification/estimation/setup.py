@@ -15,12 +15,12 @@ from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from swashplate.campaign import ChannelKind
-from swashplate.campaign.schema import LARGEST_PRESSURE, Weight, Window
+from swashplate.campaign.schema import LARGEST_PRESSURE, TimeWindow, WeightWindow
 from swashplate.documents import parse_toml, read_text, validated
-from swashplate.entries import Finite, Flag, NotNegative, Positive
+from swashplate.entries import FileTable, Finite, Flag, NotNegative, Positive
 from swashplate.equations.fields import is_real
 from swashplate.errors import (
     ParameterError,
@@ -30,7 +30,6 @@ from swashplate.identification.estimation.unknowns import Prior, Unknown
 from swashplate.parameters.definitions import Definitions
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.parameters.rules import SIDES
-from swashplate.results import short
 
 Array = NDArray[np.float64]
 _SETUPS = files("swashplate.identification").joinpath("setups")
@@ -39,15 +38,6 @@ StandardUncertainty = Positive | Annotated[str, Field(pattern=r"^\d+(\.\d+)? ?%$
 """A standard uncertainty: in SI units, or as "5 %" of the value."""
 COEFFICIENTS = ("Z19", "Z20", "Z21", "Z22")
 """Of the solenoids: what forces stand for."""
-
-
-class Entry(BaseModel):
-    """A table of the file; a key that it does not know is refused."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True)
-
-    def __repr__(self) -> str:
-        return short(self)
 
 
 def rising(pair: tuple[float, float]) -> tuple[float, float]:
@@ -63,7 +53,7 @@ def rising(pair: tuple[float, float]) -> tuple[float, float]:
 Bounds = Annotated[Pair, AfterValidator(rising)]
 
 
-class Free(Entry):
+class Free(FileTable):
     """How a parameter is free: both directions apart, unless tied."""
 
     relative: Bounds | None = Field(None, description="Bounds as factors on the nominal value.")
@@ -79,7 +69,7 @@ class Free(Entry):
         return self
 
 
-class Forces(Entry):
+class Forces(FileTable):
     """Forces at four effective currents each way, as magnitudes: unknowns instead of Z19 to Z22.
 
     ``"force_plus_1"`` is the force at the first of `plus`; the effective current is what is left
@@ -140,7 +130,7 @@ def _coefficients_of_forces(
     return np.linalg.inv(np.block([[positive, zero], [zero, negative]]))
 
 
-class InputWeight(Window):
+class InputWeight(TimeWindow):
     """A weight that depends on the size of the command."""
 
     factors: tuple[tuple[NotNegative, NotNegative], ...] = Field(
@@ -157,7 +147,7 @@ class InputWeight(Window):
         return self
 
 
-class Stage(Entry):
+class Stage(FileTable):
     """One fit: a part of the drive against its channels."""
 
     name: str
@@ -181,7 +171,7 @@ class Stage(Entry):
     channels: tuple[ChannelKind, ...] = Field((), description="Kinds to fit; all if empty.")
     free: dict[str, Free] = Field(min_length=1)
     forces: Forces | None = None
-    weights: dict[ChannelKind, tuple[Weight, ...]] = Field(
+    weights: dict[ChannelKind, tuple[WeightWindow, ...]] = Field(
         {}, description="Windows that count more or less, besides those of the campaign."
     )
     weights_by_input: dict[ChannelKind, tuple[InputWeight, ...]] = Field(
@@ -221,7 +211,7 @@ class Stage(Entry):
         return f"to let it go on, widen {where} of the stage '{self.name}' and fit again"
 
 
-class FitSetup(Entry):
+class FitSetup(FileTable):
     """A fit in one stage or several, each starting from what the ones before found."""
 
     title: str = ""

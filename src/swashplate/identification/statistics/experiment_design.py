@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.campaign import KINDS, ChannelKind
-from swashplate.campaign.experiment import Channel, Experiment, InputSignal, Source
+from swashplate.campaign.experiment import Channel, Experiment, InputSignal, SignalOrigin
 from swashplate.drive import Drive
 from swashplate.errors import InputError
 from swashplate.identification.estimation.arrow import dense_factor, triangular_factor, whitening
@@ -335,7 +335,7 @@ def _of_residuals(
 def _imagined(maneuver: Maneuver, sensor: Sensor) -> Experiment:
     """A test that has not been made: only its stamps count, not its values."""
     time = maneuver.time(RATE)
-    source = Source(Path("none"), sensor.kind)
+    source = SignalOrigin(Path("none"), sensor.kind)
     channel = Channel(
         name=sensor.kind,
         kind=sensor.kind,

@@ -35,7 +35,7 @@ from swashplate.report.lines import (
     Array,
     draw,
     fit_time,
-    merged,
+    merged_spans,
     stretches,
 )
 from swashplate.report.style import (
@@ -66,8 +66,8 @@ from swashplate.report.style import (
     put_legend,
     sheet,
     signed,
-    write,
     write_title,
+    write_words,
     zero_line,
 )
 from swashplate.results import GivenAxes
@@ -148,7 +148,7 @@ def plot_envelope(
 def _draw_envelope(ax: Axes, envelope: Envelope) -> None:
     speed, acceleration = display_unit("rad/s"), display_unit("rad/s^2")
     zero_line(ax, upright=True)
-    low, high = (speed.factor * way.top_speed for way in (envelope.minus, envelope.plus))
+    low, high = (speed.factor * limits.top_speed for limits in (envelope.minus, envelope.plus))
     span = (high - low) or 1.0
     ax.set_xlim(low - (ROOM - 1.0) * span, high + (ROOM - 1.0) * span)
     most = []
@@ -167,18 +167,18 @@ def _draw_envelope(ax: Axes, envelope: Envelope) -> None:
             ax.plot(across[part], up[part], color=color, ls=DASHES[by], lw=width, zorder=above)
     height = 1.3 * max(most[:2]) or 1.0
     ax.set_ylim(-height, height)
-    for way, color in ((envelope.plus, BLUE), (envelope.minus, VERMILION)):
-        _mark_way(ax, way, color, height)
+    for limits, color in ((envelope.plus, BLUE), (envelope.minus, VERMILION)):
+        _mark_way(ax, limits, color, height)
 
 
-def _mark_way(ax: Axes, way: DirectionLimits, color: str, height: float) -> None:
+def _mark_way(ax: Axes, limits: DirectionLimits, color: str, height: float) -> None:
     """The speed that a way ends at, and the acceleration that it begins with."""
     units = display_unit("rad/s"), display_unit("rad/s^2")
-    speed, acceleration = units[0].factor * way.top_speed, units[1].factor * way.acceleration
-    up, stopped = way.acceleration > 0.0, way.top_speed == way.speed_limit
+    speed, acceleration = units[0].factor * limits.top_speed, units[1].factor * limits.acceleration
+    up, stopped = limits.acceleration > 0.0, limits.top_speed == limits.speed_limit
     ax.axvline(speed, color=color, linewidth=1.0, linestyle="solid" if stopped else "dotted")
     what = "swash stop" if stopped else f"at {'+' if up else '−'}{FULL_VOLTAGE:g} V"
-    write(
+    write_words(
         ax,
         f"{what}\n{signed(speed, 3 if abs(speed) < 10.0 else 1)} {units[0].name}",
         (speed, -0.96 * height if up else 0.96 * height),
@@ -190,9 +190,9 @@ def _mark_way(ax: Axes, way: DirectionLimits, color: str, height: float) -> None
     )
     ax.plot([0.0], [acceleration], "o", color=color, markersize=4.5)
     number = signed(acceleration, 2 if abs(acceleration) < 10.0 else 1)
-    write(
+    write_words(
         ax,
-        f"{way.accelerated_by}, at rest\n{number} {units[1].name}",
+        f"{limits.accelerated_by}, at rest\n{number} {units[1].name}",
         (0.0, acceleration),
         (5.0, 6.0) if up else (-5.0, -6.0),  # away from where the line falls
         coords="data",
@@ -225,14 +225,15 @@ def plot_limit_timeline(
     InputError
         If the reference speed has another length than the run.
     """
-    acting, unit = [each for each in Limit if run.held_back(each).any()], display_unit("rad/s")
-    asked = None if reference is None else np.asarray(reference, dtype=np.float64)
-    if asked is not None and asked.shape != run.time.shape:
+    acting, unit = [limit for limit in Limit if run.held_back(limit).any()], display_unit("rad/s")
+    requested = None if reference is None else np.asarray(reference, dtype=np.float64)
+    if requested is not None and requested.shape != run.time.shape:
         raise InputError(
-            f"The reference speed has shape {asked.shape}, but the run has {run.time.size} samples."
+            f"The reference speed has shape {requested.shape}, but the run has {run.time.size} "
+            "samples."
         )
     legend = [handle("speed", BLUE)]
-    if asked is not None:
+    if requested is not None:
         legend.append(handle("without limits", GREY, "dashed"))
     heights = [1.1, 2.2, 0.27 * max(len(acting), 1)]
     labels = ("current (A)" if run.voltage is None else "voltage (V)", unit.label("speed"))
@@ -240,8 +241,8 @@ def plot_limit_timeline(
     figure, axes = sheet(heights, words, labels, "time (s)", legend=legend)
     command, speed, rows = axes
     draw(command, run.time, run.current if run.voltage is None else run.voltage, INK)
-    if asked is not None:
-        draw(speed, run.time, unit.factor * asked, GREY, dashes="dashed")
+    if requested is not None:
+        draw(speed, run.time, unit.factor * requested, GREY, dashes="dashed")
     draw(speed, run.time, unit.factor * run.shaft_speed, BLUE)
     for ax in (command, speed):
         zero_line(ax)
@@ -256,7 +257,7 @@ def _bars(ax: Axes, run: Simulation, acting: list[Limit]) -> None:
     ax.set_yticks(range(count), [SHADES[limit].name for limit in acting])
     ax.grid(False, axis="y")
     for row, limit in enumerate(acting):
-        spans = merged(stretches(run.time, run.held_back(limit)))
+        spans = merged_spans(stretches(run.time, run.held_back(limit)))
         ax.broken_barh(
             [(begin, end - begin) for begin, end in spans.tolist()],
             (row - 0.5 * BAR, BAR),
@@ -264,7 +265,7 @@ def _bars(ax: Axes, run: Simulation, acting: list[Limit]) -> None:
             edgecolor=GREY,
             linewidth=0.4,
         )
-        write(
+        write_words(
             ax,
             share_cell(run.time_share(limit)).text,
             (1.0, row),
@@ -323,10 +324,12 @@ def plot_whatif(
     draw(axes[1], time, speed.factor * result.trial.reference, GREY, dashes="dotted", zorder=1.9)
     middle = 0.5 * (time[1:] + time[:-1])
     for name, look in looks.items():
-        found = result.variants[name].run.shaft_speed
-        rising = acceleration.factor * np.diff(found) * result.trial.rate
+        shaft_speed = result.variants[name].run.shaft_speed
+        rising = acceleration.factor * np.diff(shaft_speed) * result.trial.rate
         order = 3.0 if name in (AS_IS, CHANGED) else 2.0
-        draw(axes[1], time, speed.factor * found, look.color, dashes=look.dashes, zorder=order)
+        draw(
+            axes[1], time, speed.factor * shaft_speed, look.color, dashes=look.dashes, zorder=order
+        )
         draw(axes[2], middle, rising, look.color, dashes=look.dashes, zorder=order)
     fit_time(axes[-1], time)
     return figure
@@ -345,7 +348,7 @@ def _speed_limits(ax: Axes, result: WhatIf, looks: Mapping[str, Stroke]) -> None
 def shade_band(ax: Axes, band: Bands, color: ColorType, *, about: Array | float = 0.0) -> None:
     """Shade a band of speeds; a long one by every so many samples."""
     step, factor = max(-(-band.time.size // (2 * COLUMNS)), 1), display_unit("rad/s").factor
-    lower, upper = (factor * (each - about)[::step] for each in (band.lower, band.upper))
+    lower, upper = (factor * (edge - about)[::step] for edge in (band.lower, band.upper))
     ax.fill_between(
         band.time[::step], lower, upper, color=color, alpha=0.25, linewidth=0.0, zorder=1.6
     )
@@ -399,7 +402,7 @@ def plot_tornado(
         factors = {pair[end] for pair in result.ranges.values()}
         label = f"factor {factors.pop():g}" if len(factors) == 1 else f"{words} factor"
         legend.append(Patch(color=color, label=label))
-    how: dict[str, Any] = {"frameon": False, "fontsize": SMALL}
+    style: dict[str, Any] = {"frameon": False, "fontsize": SMALL}
     if ax is not None:
         axes = given_axes(ax, len(shown), "outcomes")
         _draw_swings(axes, result, shown)
@@ -409,7 +412,7 @@ def plot_tornado(
     rows = -(-len(shown) // columns)
     figure = new_figure(WIDTH, HEAD + ROW + rows * (0.22 * len(result.ranges) + 0.75) + 0.5 * FOOT)
     write_title(figure, "Each design variable alone" if title is None else title)
-    figure.legend(handles=legend, loc="outside lower left", ncols=3, **how)
+    figure.legend(handles=legend, loc="outside lower left", ncols=3, **style)
     panels = list(figure.subplots(rows, columns, squeeze=False).flat)
     for empty in panels[len(shown) :]:
         empty.axis("off")
@@ -512,10 +515,10 @@ def plot_compensation(
         return ax
     heights = [MAP] if improvement is None else [MAP, RUNS, RUNS]
     figure = new_figure(WIDTH, HEAD + ROW + sum(heights) + 2.0 * FOOT)
-    how = {"width_ratios": (1.5, 1.0), "height_ratios": heights}
-    grid = figure.add_gridspec(len(heights), 2, **how)
-    whole, close = (figure.add_subplot(grid[0, column]) for column in (0, 1))
-    _draw_map(inverse, whole, close)
+    proportions = {"width_ratios": (1.5, 1.0), "height_ratios": heights}
+    grid = figure.add_gridspec(len(heights), 2, **proportions)
+    full_range, close_up = (figure.add_subplot(grid[0, column]) for column in (0, 1))
+    _draw_map(inverse, full_range, close_up)
     if improvement is not None:
         pairs = zip(improvement.runs, COLORS, strict=True)
         legend = [handle("map, reference speed", INK)]
@@ -523,20 +526,20 @@ def plot_compensation(
         speed = figure.add_subplot(grid[1, :])
         error = figure.add_subplot(grid[2, :], sharex=speed)
         _draw_improvement(speed, error, improvement)
-        figure.align_ylabels([whole, speed, error])
+        figure.align_ylabels([full_range, speed, error])
     words = f"{inverse.name}: voltage for a reference speed" if title is None else title
     write_title(figure, words)
-    put_legend(whole, legend, beyond=True)
-    whole.set_title(" ", fontsize=NORMAL, pad=8.0)
+    put_legend(full_range, legend, beyond=True)
+    full_range.set_title(" ", fontsize=NORMAL, pad=8.0)
     return figure
 
 
-def _draw_map(inverse: InverseMap, whole: Axes, close: Axes | None = None) -> None:
+def _draw_map(inverse: InverseMap, full_range: Axes, close_up: Axes | None = None) -> None:
     unit, (low, high) = display_unit("rad/s"), inverse.limits
     narrow = max(CLOSE_UP * min(-low, high), 2.0 * max(map(abs, inverse.gap)))
-    panels = [(whole, (low, high))]
-    if close is not None:
-        panels.append((close, (max(low, -narrow), min(high, narrow))))
+    panels = [(full_range, (low, high))]
+    if close_up is not None:
+        panels.append((close_up, (max(low, -narrow), min(high, narrow))))
     for ax, ends in panels:
         speed = np.union1d(np.linspace(*ends, POINTS), np.clip(inverse.gap, *ends))
         straight, across = proportional_command(inverse, speed), unit.factor * speed
@@ -545,29 +548,29 @@ def _draw_map(inverse: InverseMap, whole: Axes, close: Axes | None = None) -> No
         dress(ax, "", unit.label("reference speed"))
         zero_line(ax, upright=True)
     volts = [float(inverse.voltage(end)) for end in (low, high)]
-    whole.set_ylim(1.25 * volts[0], 1.25 * volts[1])  # room for the words there
-    whole.set_ylabel("voltage (V)", fontsize=NORMAL, color=INK)
+    full_range.set_ylim(1.25 * volts[0], 1.25 * volts[1])  # room for the words there
+    full_range.set_ylabel("voltage (V)", fontsize=NORMAL, color=INK)
     for end, height, side, shift in zip(
         (low, high), volts, ("left", "right"), (-10.0, 10.0), strict=True
     ):
-        place = (unit.factor * end, height)
-        whole.plot(*([each] for each in place), "o", color=INK, markersize=4.5)
-        words = f"{place[0]:.4g} {unit.name}, {height:.3g} V".replace("-", "−")
-        write(whole, words, place, (0.0, shift), coords="data", ha=side, va="center")
-    if close is None:
+        point = (unit.factor * end, height)
+        full_range.plot(*([edge] for edge in point), "o", color=INK, markersize=4.5)
+        words = f"{point[0]:.4g} {unit.name}, {height:.3g} V".replace("-", "−")
+        write_words(full_range, words, point, (0.0, shift), coords="data", ha=side, va="center")
+    if close_up is None:
         return
-    below, above = (unit.factor * each for each in inverse.gap)
-    close.axvspan(below, above, color="#ededed", linewidth=0.0, zorder=0.5)
-    write(
-        close,
+    below, above = (unit.factor * edge for edge in inverse.gap)
+    close_up.axvspan(below, above, color="#ededed", linewidth=0.0, zorder=0.5)
+    write_words(
+        close_up,
         "cannot be held",
         (0.5 * (below + above), 0.0),
         (0.0, 4.0),
-        coords=close.get_xaxis_transform(),
+        coords=close_up.get_xaxis_transform(),
         color=GREY,
         ha="center",
     )
-    write(close, "close-up around standstill", (0.0, 1.0), (4.0, -10.0), color=GREY)
+    write_words(close_up, "close-up around standstill", (0.0, 1.0), (4.0, -10.0), color=GREY)
 
 
 def _draw_improvement(speed: Axes, error: Axes, improvement: Improvement) -> None:

@@ -24,7 +24,7 @@ from swashplate.report.lines import (
     draw,
     gap_rows,
     mark_gaps,
-    merged,
+    merged_spans,
     rows_within,
     shade,
     shade_handle,
@@ -49,14 +49,14 @@ from swashplate.report.style import (
     new_figure,
     right_axis,
     sheet,
-    write,
     write_title,
+    write_words,
     zero_line,
 )
 from swashplate.units import DisplayUnit, display_unit
 
 if TYPE_CHECKING:
-    from swashplate.campaign import Channel, Envelope, Experiment, InputSignal, Overview
+    from swashplate.campaign import BlockRanges, Channel, Experiment, InputSignal, Overview
     from swashplate.identification.validation import RunQuality
 
 # --- pages of a campaign --------------------------------------------------------------------------
@@ -75,7 +75,7 @@ _NEAR_ZERO = 0.02
 _ROLES = {"fit": "for the fit", "validate": "for validation"}
 
 
-class Column(NamedTuple):
+class PanelColumn(NamedTuple):
     """What a column of panels shows: a channel by name and unit; the input has no name."""
 
     key: tuple[str, str]
@@ -92,7 +92,9 @@ class Column(NamedTuple):
 
 def _signals(experiment: Experiment) -> dict[tuple[str, str], InputSignal | Channel]:
     """The input, whose name is empty, and the channels, by name and unit."""
-    channels = {(name, each.shown_unit): each for name, each in experiment.channels.items()}
+    channels = {
+        (name, channel.shown_unit): channel for name, channel in experiment.channels.items()
+    }
     return {("", experiment.input.unit): experiment.input, **channels}
 
 
@@ -107,18 +109,21 @@ def _counted(signal: InputSignal | Channel) -> Array:
     return signal.values if used is None else signal.values[_scale_rows(used)]
 
 
-def _column(key: tuple[str, str], signals: Sequence[InputSignal | Channel]) -> Column:
+def _column(key: tuple[str, str], signals: Sequence[InputSignal | Channel]) -> PanelColumn:
     # what is ignored may leave the panel: one spike would flatten all runs
     shown = [_counted(signal) for signal in signals]
-    low, high = min(float(each.min()) for each in shown), max(float(each.max()) for each in shown)
+    low, high = (
+        min(float(experiment.min()) for experiment in shown),
+        max(float(experiment.max()) for experiment in shown),
+    )
     kind, unit = signals[0].kind, display_unit(key[1], max(abs(low), abs(high)))
     free = kind in ("position", "encoder_counts")
     if free:
-        high = 0.5 * max(float(np.ptp(each)) for each in shown)
+        high = 0.5 * max(float(np.ptp(experiment)) for experiment in shown)
         low = -high
     words = {"encoder_counts": "encoder's angle", "other": signals[0].source.column}
     label = unit.label(words.get(kind, kind.replace("_", " ")))
-    return Column(key, label, unit, unit.factor * low, unit.factor * high, free)
+    return PanelColumn(key, label, unit, unit.factor * low, unit.factor * high, free)
 
 
 def plot_campaign(experiments: Iterable[Experiment], *, title: str | None = None) -> list[Figure]:
@@ -153,17 +158,20 @@ def plot_campaign(experiments: Iterable[Experiment], *, title: str | None = None
     stretches of time (`lines.thinned`), and as a line also in SVG and PDF.
     """
     axes: dict[str, list[Experiment]] = {}
-    for each in experiments:
-        axes.setdefault(each.axis, []).append(each)
+    for experiment in experiments:
+        axes.setdefault(experiment.axis, []).append(experiment)
     if not axes:
         raise InputError("A page of a campaign needs at least one experiment.")
     figures = []
     for axis, of_axis in axes.items():
-        met: dict[tuple[str, str], list[InputSignal | Channel]] = {}
-        for each in of_axis:
-            for key, signal in _signals(each).items():
-                met.setdefault(key, []).append(signal)
-        columns = [_column(key, met[key]) for key in sorted(met, key=lambda key: key[0] != "")]
+        signals_of: dict[tuple[str, str], list[InputSignal | Channel]] = {}
+        for run in of_axis:
+            for key, signal in _signals(run).items():
+                signals_of.setdefault(key, []).append(signal)
+        columns = [
+            _column(key, signals_of[key])
+            for key in sorted(signals_of, key=lambda key: key[0] != "")
+        ]
         pages = [of_axis[first : first + RUNS] for first in range(0, len(of_axis), RUNS)]
         for number, page in enumerate(pages, start=1):
             words = f"{title or 'Measured tests'}: {axis}"
@@ -173,7 +181,7 @@ def plot_campaign(experiments: Iterable[Experiment], *, title: str | None = None
     return figures
 
 
-def _page(experiments: Sequence[Experiment], columns: Sequence[Column], title: str) -> Figure:
+def _page(experiments: Sequence[Experiment], columns: Sequence[PanelColumn], title: str) -> Figure:
     rows, across = len(experiments), len(columns)
     width = max(WIDTH, across * (NARROWEST + BETWEEN))
     room = width / across - 1.3 * BETWEEN
@@ -194,10 +202,10 @@ def _page(experiments: Sequence[Experiment], columns: Sequence[Column], title: s
                 _fill(ax, column, signals[column.key], experiment)
             else:
                 ax.set_yticks([])
-                write(ax, "not measured", (0.5, 0.5), (0.0, 0.0), ha="center", va="center")
+                write_words(ax, "not measured", (0.5, 0.5), (0.0, 0.0), ha="center", va="center")
             # room for the heading, and in the first row for the columns' names
             heads = (column.key[0] or "input", 0.085), (column.words, 0.066)
-            cut = [shorten(each, room / letter) for each, letter in heads]
+            cut = [shorten(head, room / letter) for head, letter in heads]
             words, pad = ("\n".join(cut), 20.0) if number == 0 else (" ", 6.0)
             ax.set_title(words, loc="left", fontsize=SMALL, color=INK, pad=pad)
         _heading(row[0], experiment)
@@ -210,11 +218,11 @@ def _page(experiments: Sequence[Experiment], columns: Sequence[Column], title: s
         "clipped": Patch(facecolor=ORANGE, label="at the end of the instrument's range"),
         GAP_MARK["label"]: Line2D([], [], **GAP_MARK),
     }
-    met = {a.get_label() for ax in grid.flat for a in (*ax.collections, *ax.lines, *ax.patches)}
+    labels = {a.get_label() for ax in grid.flat for a in (*ax.collections, *ax.lines, *ax.patches)}
     write_title(figure, title)
-    if shown := [handle for key, handle in handles.items() if key in met]:
-        how = {"frameon": False, "fontsize": SMALL, "ncols": 2}
-        figure.legend(handles=shown, loc="outside lower left", **how)
+    if shown := [handle for key, handle in handles.items() if key in labels]:
+        style = {"frameon": False, "fontsize": SMALL, "ncols": 2}
+        figure.legend(handles=shown, loc="outside lower left", **style)
     return figure
 
 
@@ -223,7 +231,9 @@ def shorten(words: str, letters: float) -> str:
     return words if len(words) <= letters else f"{words[: int(letters) - 1]}…"
 
 
-def _fill(ax: Axes, column: Column, signal: InputSignal | Channel, experiment: Experiment) -> None:
+def _fill(
+    ax: Axes, column: PanelColumn, signal: InputSignal | Channel, experiment: Experiment
+) -> None:
     """A signal, with marks where it is ignored, weighted, clipped or missing."""
     time, factor = signal.time, column.unit.factor
     values, counted = factor * signal.values, factor * _counted(signal)
@@ -233,9 +243,9 @@ def _fill(ax: Axes, column: Column, signal: InputSignal | Channel, experiment: E
     ax.set_ylim(middle + column.low - margin, middle + column.high + margin)
     # the input has no weights, and a channel nothing that is held between its samples
     weight = getattr(signal, "weight", None)
-    held = getattr(signal, "interpolation", "") == "previous"
+    is_held = getattr(signal, "interpolation", "") == "previous"
     if weight is None:
-        windows = np.array(sorted(each[:2] for each in experiment.ignored)).reshape(-1, 2)
+        windows = np.array(sorted(window[:2] for window in experiment.ignored)).reshape(-1, 2)
         inside = np.clip(windows, time[0], time[-1])
         shade(ax, inside[inside[:, 0] < inside[:, 1]], IGNORED)
     else:
@@ -253,29 +263,31 @@ def _fill(ax: Axes, column: Column, signal: InputSignal | Channel, experiment: E
         near = np.abs(signal.values - ends[:, None]) <= 1e-9 * (ends[1] - ends[0])
         beyond = np.stack((signal.values < ends[0], signal.values > ends[1]))
         for level, side in zip(factor * ends, near | beyond, strict=True):
-            first, last = merged(stretches(time, side)).T
+            first, last = merged_spans(stretches(time, side)).T
             if first.size:
                 bar: dict[str, Any] = {"color": ORANGE, "linewidth": 4.0, "label": "clipped"}
                 level = np.full(first.size, level)
                 ax.hlines(level, first, last, zorder=1.9, capstyle="projecting", **bar)
     mark_gaps(ax, time)
     color = INK if weight is None else BLUE
-    draw(ax, time, values, color, held=held, width=THIN, columns=COARSE)
+    draw(ax, time, values, color, held=is_held, width=THIN, columns=COARSE)
 
 
 def _heading(ax: Axes, experiment: Experiment) -> None:
     """Name of a run in bold, and what else there is to say of it, above its first panel."""
     words = [experiment.maneuver, _ROLES[experiment.role], *_stamps_in_words(experiment)]
-    how: dict[str, Any] = {"fontsize": SMALL, "color": INK, "textcoords": "offset points"}
+    style: dict[str, Any] = {"fontsize": SMALL, "color": INK, "textcoords": "offset points"}
     # they may reach over the panels on their right
-    how |= {"annotation_clip": False, "in_layout": False}
-    run = ax.annotate(experiment.run, (0.0, 1.0), (0.0, 6.0), "axes fraction", weight="bold", **how)
-    ax.annotate("  ·  ".join(words), (1.0, 1.0), (7.0, 6.0), (run, "axes fraction"), **how)
+    style |= {"annotation_clip": False, "in_layout": False}
+    run = ax.annotate(
+        experiment.run, (0.0, 1.0), (0.0, 6.0), "axes fraction", weight="bold", **style
+    )
+    ax.annotate("  ·  ".join(words), (1.0, 1.0), (7.0, 6.0), (run, "axes fraction"), **style)
 
 
 def _stamps_in_words(experiment: Experiment) -> list[str]:
     """The rates, from the lowest to the highest, and the gaps of the signal that has most."""
-    stamps = [each.time for each in _signals(experiment).values()]
+    stamps = [signal.time for signal in _signals(experiment).values()]
     rates = [1.0 / float(np.median(np.diff(time))) for time in stamps]
     ends = [f"{r:.0f}" if r >= 100.0 else f"{r:.3g}" for r in (min(rates), max(rates))]
     # stamps that jitter do not have quite the same rate
@@ -313,15 +325,15 @@ def plot_overview(overview: Overview, *, title: str | None = None) -> Figure:
     title : str, optional
         By default the run's name.
     """
-    several = len({each.axis for each in overview.signals}) > 1
-    largest = [_largest(each) for each in overview.signals]
+    several = len({signal.axis for signal in overview.signals}) > 1
+    largest = [_largest(signal) for signal in overview.signals]
     units = [
-        display_unit(each.shown_unit, size)
-        for each, size in zip(overview.signals, largest, strict=True)
+        display_unit(signal.shown_unit, size)
+        for signal, size in zip(overview.signals, largest, strict=True)
     ]
     labels = [
-        in_lines(unit.label(f"{each.axis} {each.name}" if several else each.name), LABELLED)
-        for each, unit in zip(overview.signals, units, strict=True)
+        in_lines(unit.label(f"{signal.axis} {signal.name}" if several else signal.name), LABELLED)
+        for signal, unit in zip(overview.signals, units, strict=True)
     ]
     used = np.array([(w.begin, w.end) for w in overview.windows if w.used]).reshape(-1, 2)
     left_out = np.array([(w.begin, w.end) for w in overview.windows if not w.used]).reshape(-1, 2)
@@ -330,34 +342,34 @@ def plot_overview(overview: Overview, *, title: str | None = None) -> Figure:
     heights = [1.3] * len(overview.signals)
     words = f"{overview.run}, the whole log" if title is None else title
     figure, axes = sheet(heights, words, labels, "time (s)", legend=legend)
-    for ax, envelope, unit in zip(axes, overview.signals, units, strict=True):
+    for ax, ranges, unit in zip(axes, overview.signals, units, strict=True):
         zero_line(ax)
         for spans, look in shades:
             shade(ax, spans, look)
-        color = INK if envelope.name == "input" else BLUE
-        _draw_envelope(ax, envelope, unit.factor, color)
-        mark_gaps(ax, envelope.time)
+        color = INK if ranges.name == "input" else BLUE
+        _draw_ranges(ax, ranges, unit.factor, color)
+        mark_gaps(ax, ranges.time)
     axes[-1].set_xlim(overview.begin, overview.end)
     return figure
 
 
-def _largest(envelope: Envelope) -> float:
+def _largest(ranges: BlockRanges) -> float:
     """Largest size of a signal, 0 if it has no number. [unit]"""
-    known = np.isfinite(envelope.low)
-    ends = np.concatenate((envelope.low[known], envelope.high[known]))
+    finite = np.isfinite(ranges.low)
+    ends = np.concatenate((ranges.low[finite], ranges.high[finite]))
     return float(np.abs(ends).max(initial=0.0))
 
 
-def _draw_envelope(ax: Axes, envelope: Envelope, factor: float, color: str) -> None:
+def _draw_ranges(ax: Axes, ranges: BlockRanges, factor: float, color: str) -> None:
     """Draw a signal between its extremes, open where it has none and over gaps of the stamps."""
-    first = np.arange(0, envelope.time.size, -(-envelope.time.size // STRETCHES))
-    time = envelope.time[first]
-    low = np.fmin.reduceat(envelope.low, first)
-    high = np.fmax.reduceat(envelope.high, first)
+    first = np.arange(0, ranges.time.size, -(-ranges.time.size // STRETCHES))
+    time = ranges.time[first]
+    low = np.fmin.reduceat(ranges.low, first)
+    high = np.fmax.reduceat(ranges.high, first)
     breaks = gap_rows(time)
     time, low, high = (
-        np.insert(each, breaks + 1, filling)
-        for each, filling in ((time, time[breaks]), (low, np.nan), (high, np.nan))
+        np.insert(values, breaks + 1, filling)
+        for values, filling in ((time, time[breaks]), (low, np.nan), (high, np.nan))
     )
     # its edge shows a signal that stays as it is, whose area is nothing
     ax.fill_between(
@@ -374,7 +386,7 @@ def _draw_envelope(ax: Axes, envelope: Envelope, factor: float, color: str) -> N
 # --- one channel closely --------------------------------------------------------------------------
 
 ROUGH = "#d2d2d2"
-"""Colour of the difference of neighbours, which fills its panel where the count changes often."""
+"""Colour of the difference of neighbours, which fills its panel if the count changes often."""
 
 
 def plot_channel(
@@ -430,11 +442,11 @@ def plot_channel(
         labels.append(small.label(below))
     heights, words = [2.4, 2.2] if lower else [3.2], channel.name if title is None else title
     figure, axes = sheet(heights, words, labels, "time (s)", legend=legend)
-    how: dict[str, Any] = {"held": channel.is_position, "width": THIN, "zorder": 2.5}
+    style: dict[str, Any] = {"held": channel.is_position, "width": THIN, "zorder": 2.5}
     counted = values[_scale_rows(used)]
     room = 0.12 * float(np.ptp(counted)) or 1.0 / unit.factor
     axes[0].set_ylim(unit.factor * (counted.min() - room), unit.factor * (counted.max() + room))
-    draw(axes[0], time, unit.factor * values, INK if channel.is_position else BLUE, **how)
+    draw(axes[0], time, unit.factor * values, INK if channel.is_position else BLUE, **style)
     if simulated is not None:
         draw(axes[0], time, unit.factor * simulated[rows], VERMILION, zorder=3.0)
     if channel.encoder is not None:
@@ -479,7 +491,7 @@ def plot_prediction(
     quality : RunQuality
         The channel. Below a position stands the speed, by which it is judged: measured and
         simulated positions go through the same filters. The lowest panel is the residual, simulated
-        less measured, of that speed; of a position from which no speed can be told, and of any
+        less measured, of that speed; of a position from which no speed can be computed, and of any
         other channel, its own.
     window : (float, float), optional
         First and last instant to show [s]. Everything is computed from the whole record.
@@ -494,11 +506,11 @@ def plot_prediction(
     rows = rows_within(channel.time, window, str(channel.source))
     time, used = channel.time[rows], channel.used[rows]
     counted = _scale_rows(used)
-    panels = [_overlay(each, rows) for each in signals]
+    panels = [_overlay(signal, rows) for signal in signals]
     judged = signals[-1]
     residual = judged.residual[rows]
     panels.append(Overlay("residual", judged.experiment[judged.channel].unit, [(residual, INK)]))
-    largest = [max(float(np.abs(v[counted]).max()) for v, _ in each.curves) for each in panels]
+    largest = [max(float(np.abs(v[counted]).max()) for v, _ in panel.curves) for panel in panels]
     pairs = zip(panels, largest, strict=True)
     units = [display_unit(panel.unit, size or 1.0) for panel, size in pairs]
     labels = [unit.label(panel.words) for panel, unit in zip(panels, units, strict=True)]
@@ -508,8 +520,8 @@ def plot_prediction(
     figure, axes = sheet(heights, words, labels, "time (s)", legend=legend)
     for ax, panel, unit in zip(axes, panels, units, strict=True):
         shown = [unit.factor * values[counted] for values, _ in panel.curves]
-        low = min(float(each.min()) for each in shown)
-        high = max(float(each.max()) for each in shown)
+        low = min(float(experiment.min()) for experiment in shown)
+        high = max(float(experiment.max()) for experiment in shown)
         room = 0.1 * (high - low) or 1.0
         ax.set_ylim(low - room, high + room)
         zero_line(ax)

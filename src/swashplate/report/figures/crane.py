@@ -76,7 +76,9 @@ def remarks(*texts: str) -> str:
 
 def remark(ax: Axes, words: str, rows: int = 0) -> None:
     """Write grey words above a panel, over so many rows of a legend."""
-    style.write(ax, words, (0.0, 1.0), (0.0, 3.0 + 13.0 * rows), color=style.GREY, va="bottom")
+    style.write_words(
+        ax, words, (0.0, 1.0), (0.0, 3.0 + 13.0 * rows), color=style.GREY, va="bottom"
+    )
 
 
 def _panels(
@@ -250,7 +252,7 @@ def plot_sweep(result: Sweep, *, title: str | None = None) -> Figure:
         low = max(LEAST, 0.5 * float(finite.min(initial=highest)))
         _logarithmic(ax, low, 2.0 * highest)
         ax.axvline(1.0, color=style.FAINT, linewidth=0.8, zorder=1.0)
-        style.write(ax, "as built", (1.0, low), (4.0, 4.0), coords="data", color=style.GREY)
+        style.write_words(ax, "as built", (1.0, low), (4.0, 4.0), coords="data", color=style.GREY)
     return figure
 
 
@@ -415,4 +417,4 @@ def _name_seas(ax: Axes, tops: Mapping[str, tuple[float, float]]) -> None:
         ):
             up += 0.01
         names.append((across, up, width))
-        style.write(ax, name, (across, up), (0.0, 6.0), ha="center", bbox=box)
+        style.write_words(ax, name, (across, up), (0.0, 6.0), ha="center", bbox=box)

@@ -143,7 +143,7 @@ def _swings(ax: Axes, result: Assessment) -> None:
         departures = sum(result.departures(name).values())
         if departures:
             ax.plot(LEFT * edge, row, "x", color=style.INK, ms=6.0)
-            style.write(ax, f"{departures}", (LEFT * edge, row), (7.0, -3.0), coords="data")
+            style.write_words(ax, f"{departures}", (LEFT * edge, row), (7.0, -3.0), coords="data")
         label = style.in_lines(name, NAME)
         if name != NONE:
             worse = round(result.share_worse(name).value * swing.size)

@@ -23,7 +23,7 @@ from swashplate.report.style import (
     handle,
     sheet,
     strokes,
-    write,
+    write_words,
 )
 from swashplate.results import GivenAxes
 from swashplate.units import display_unit
@@ -129,9 +129,9 @@ def plot_bode(
     marker = "o" if response.frequencies.size == 1 else None
     for panel, rows in zip(axes, swept, strict=False):
         for row, moves, look in zip(rows, response.moves, looks.values(), strict=True):
-            how: dict[str, Any] = {"color": look.color, "ls": look.dashes, "lw": LINE}
+            style: dict[str, Any] = {"color": look.color, "ls": look.dashes, "lw": LINE}
             shown_row = np.where(moves, row, np.nan)
-            panel.plot(response.frequencies, shown_row, marker=marker, ms=4.0, **how)
+            panel.plot(response.frequencies, shown_row, marker=marker, ms=4.0, **style)
     if linear is not None:
         highest = np.inf if linear.rate is None else 0.5 * linear.rate
         low, high = response.frequencies[0], response.frequencies[-1]
@@ -142,12 +142,14 @@ def plot_bode(
             panel.plot(fine, row, color=GREY, linestyle="dashed", linewidth=LINE, zorder=1.8)
     _scale(axes, response)
     # the lines are at the top there
-    write(axes[0], "\n".join(response.still()), (0.0, 0.0), (4.0, 4.0), color=GREY, va="bottom")
+    write_words(
+        axes[0], "\n".join(response.still()), (0.0, 0.0), (4.0, 4.0), color=GREY, va="bottom"
+    )
     if mark is not None and response.frequencies[0] <= mark <= response.frequencies[-1]:
         for panel in axes:
             panel.axvline(mark, color=FAINT, linewidth=1.0, zorder=1.3)
-        place: dict[str, Any] = {"coords": ("data", "axes fraction"), "va": "bottom"}
-        write(axes[0], f"{mark:g} Hz", (mark, 0.0), (3.0, 3.0), color=GREY, **place)
+        position: dict[str, Any] = {"coords": ("data", "axes fraction"), "va": "bottom"}
+        write_words(axes[0], f"{mark:g} Hz", (mark, 0.0), (3.0, 3.0), color=GREY, **position)
     return figure if ax is None else ax
 
 
@@ -165,7 +167,7 @@ def _scale(axes: list[Axes], response: FrequencyResponse) -> None:
     gain.set_ylim(low, high)
     _number(gain, "y", high / low)
     low, high = phase.get_ylim()
-    step = next((each for each in STEPS if (high - low) / each <= MOST_STEPS), STEPS[-1])
+    step = next((step for step in STEPS if (high - low) / step <= MOST_STEPS), STEPS[-1])
     phase.yaxis.set_major_locator(MultipleLocator(step))
     for distortion in axes[2:]:
         distortion.set_ylim(0.0, max(1.05 * 100.0 * float(response.distortion.max()), 1e-3))

@@ -51,7 +51,7 @@ from swashplate.report.style import (
     sheet,
     signed,
     strokes,
-    write,
+    write_words,
     zero_line,
 )
 from swashplate.results import GivenAxes
@@ -70,7 +70,7 @@ FAR = 0.3
 # --- one simulation -------------------------------------------------------------------------------
 
 
-class Trace(NamedTuple):
+class Curve(NamedTuple):
     """A signal of a panel; its name if there is more than one."""
 
     values: Array
@@ -91,7 +91,7 @@ class Panel(NamedTuple):
 
     words: str
     si: str
-    traces: tuple[Trace, ...]
+    traces: tuple[Curve, ...]
     limits: tuple[tuple[Shade, Array], ...] = ()
     """Looks of limits with the stretches in which they act."""
     marks: tuple[Mark, ...] = ()
@@ -129,8 +129,8 @@ def plot_simulation(
 
     ends = (pump.Z16_plus, -pump.Z16_minus)
     current = (
-        Trace(run.current_positive, BLUE, "positive"),
-        Trace(run.current_negative, VERMILION, "negative"),
+        Curve(run.current_positive, BLUE, "positive"),
+        Curve(run.current_negative, VERMILION, "negative"),
     )
     # without a dead zone no current is within it, although its flag stands at exactly 0 A
     dead_zone = (Mark(pump.Z17, f"dead zone {pump.Z17:.2f} A"),) if pump.Z17 else ()
@@ -141,15 +141,15 @@ def plot_simulation(
             limits=acting(Limit.ORIFICE, Limit.SPOOL)
         ),
         Panel(
-            "stroking pressure", "Pa", (Trace(run.stroker_pressure, BLUE),), acting(Limit.RELIEF)
+            "stroking pressure", "Pa", (Curve(run.stroker_pressure, BLUE),), acting(Limit.RELIEF)
         ),
         _swash(run.swash_angle, (pump.Z13_plus, -pump.Z13_minus))._replace(
             limits=acting(Limit.SWASH_STOP)
         ),
-        Panel("shaft speed", "rad/s", (Trace(run.shaft_speed, BLUE),), acting(Limit.SWASH_STOP)),
+        Panel("shaft speed", "rad/s", (Curve(run.shaft_speed, BLUE),), acting(Limit.SWASH_STOP)),
     ]
     if run.voltage is not None:
-        panels.insert(0, Panel("voltage", "V", (Trace(run.voltage, INK),)))
+        panels.insert(0, Panel("voltage", "V", (Curve(run.voltage, INK),)))
     rows = rows_within(run.time, window, run.name)
     return _chain(panels, run.time, run.name if title is None else title, rows)
 
@@ -250,16 +250,16 @@ def plot_signals(
         columns=len(columns),
     )
     for number, (heading, column) in enumerate(columns.items()):
-        places = axes[number * longest : (number + 1) * longest]
-        for place, panel in zip(places, column, strict=False):
-            _fill(place, panel._replace(height=height), run.time, rows)
+        column_axes = axes[number * longest : (number + 1) * longest]
+        for panel_axes, panel in zip(column_axes, column, strict=False):
+            _fill(panel_axes, panel._replace(height=height), run.time, rows)
         above = 4.0 + POINTS_PER_INCH * ROW * (legend_rows(legend) if legend else 0)
         if heading:
-            write(places[0], heading, (0.0, 1.0), (0.0, above), color=GREY)
-        last = places[len(column) - 1]
+            write_words(column_axes[0], heading, (0.0, 1.0), (0.0, above), color=GREY)
+        last = column_axes[len(column) - 1]
         last.tick_params(labelbottom=True)
         label_below(last, "time (s)")
-        for unused in places[len(column) :]:
+        for unused in column_axes[len(column) :]:
             unused.remove()
     fit_time(axes[0], run.time[rows])
     return figure
@@ -311,7 +311,7 @@ def _panel(run: Run, signal: str, label: str, rows: slice) -> Panel:
     )
     color = INK if signal in run.records else BLUE
     words = in_lines(definition.name, LETTERS)
-    trace = Trace(values, color, label)
+    trace = Curve(values, color, label)
     return Panel(words, definition.unit, (trace,), marks=marks, from_zero=False)
 
 
@@ -349,24 +349,24 @@ def plot_full_order(found: OrderComparison, *, title: str | None = None) -> Figu
         return ((SHADES[limit], stretches(found.time, held != 0)),)
 
     command = (
-        Panel("current", "A", (Trace(full.current, INK),))
+        Panel("current", "A", (Curve(full.current, INK),))
         if found.voltage is None
-        else Panel("voltage", "V", (Trace(found.voltage, INK),))
+        else Panel("voltage", "V", (Curve(found.voltage, INK),))
     )
     error = (
-        Panel("difference", "% of top", (Trace(100.0 * found.error / found.top_speed, INK),))
+        Panel("difference", "% of top", (Curve(100.0 * found.error / found.top_speed, INK),))
         if found.moves
-        else Panel("difference", "rad/s", (Trace(found.error, INK),))
+        else Panel("difference", "rad/s", (Curve(found.error, INK),))
     )
     speeds = (
         # where the two are the same, the wide line shows on both sides of the narrow one
-        Trace(full.shaft_speed, BLUE, "five states", WIDE),
-        Trace(found.reduced_speed, VERMILION, "one state", NARROW),
+        Curve(full.shaft_speed, BLUE, "five states", WIDE),
+        Curve(found.reduced_speed, VERMILION, "one state", NARROW),
     )
     openings = (machine.orifice_opening_plus, -machine.orifice_opening_minus)
     stops = (machine.swash_stop_plus, -machine.swash_stop_minus)
-    pressure = (Trace(full.stroker_pressure, BLUE),)
-    drop = (Trace(full.motor_pressure_drop, BLUE),)
+    pressure = (Curve(full.stroker_pressure, BLUE),)
+    drop = (Curve(full.motor_pressure_drop, BLUE),)
     relief = holding(Limit.RELIEF, full.relief_hold)
     panels = [
         command,
@@ -386,21 +386,21 @@ def _spool(position: Array, opening: Array, ends: Stops) -> Panel:
     unit = display_unit("m", 0.0)
     marks = (Mark(x, f"orifice {signed(unit.factor * x, 2)} {unit.name}") for x in ends)
     traces = (
-        Trace(position, BLUE, "position", WIDE),
-        Trace(opening, VERMILION, "opening", NARROW),
+        Curve(position, BLUE, "position", WIDE),
+        Curve(opening, VERMILION, "opening", NARROW),
     )
     return Panel("spool", "m", traces, marks=tuple(marks))
 
 
 def _swash(angle: Array, stops: Stops) -> Panel:
     marks = (Mark(x, f"stop {signed(float(np.degrees(x)), 1)}°") for x in stops)
-    return Panel("swash angle", "rad", (Trace(angle, BLUE),), marks=tuple(marks))
+    return Panel("swash angle", "rad", (Curve(angle, BLUE),), marks=tuple(marks))
 
 
 def _chain(panels: Sequence[Panel], time: Array, title: str, rows: slice = slice(None)) -> Figure:
     """The panels one under another, with a legend of the limits that act anywhere."""
     legend = _legend(panels, tuple(SHADES.values()))
-    figure, axes = sheet([each.height for each in panels], title, below="time (s)", legend=legend)
+    figure, axes = sheet([panel.height for panel in panels], title, below="time (s)", legend=legend)
     for ax, panel in zip(axes, panels, strict=True):
         _fill(ax, panel, time, rows)
     fit_time(axes[-1], time[rows])
@@ -420,20 +420,23 @@ def _fill(ax: Axes, panel: Panel, time: Array, rows: slice) -> None:
     """
     for look, spans in panel.limits:
         shade(ax, spans, look)
-    largest = max(float(np.abs(each.values[rows]).max()) for each in panel.traces)
+    largest = max(float(np.abs(trace.values[rows]).max()) for trace in panel.traces)
     unit = display_unit(panel.si, max(largest, panel.least) or inf)
     name, factor = unit
     label = f"{panel.words}\n({name})" if name else panel.words
     ax.set_ylabel(label, fontsize=NORMAL, color=INK)
     zero_line(ax)
-    shown = [factor * each.values[rows] for each in panel.traces]
-    low, high = min(float(each.min()) for each in shown), max(float(each.max()) for each in shown)
+    shown = [factor * trace.values[rows] for trace in panel.traces]
+    low, high = (
+        min(float(curve.min()) for curve in shown),
+        max(float(curve.max()) for curve in shown),
+    )
     labels = []
-    for level, words in ((factor * each.level, each.words) for each in panel.marks):
+    for level, words in ((factor * mark.level, mark.words) for mark in panel.marks):
         if (high if level > 0.0 else -low) >= NEAR * abs(level):
             ax.axhline(level, color=GREY, linewidth=THIN, dashes=(5.0, 3.0), zorder=1.5)
             labels.append(MarginLabel(level, words, GREY))
-    ends = [low, high, *(each.height for each in labels)]
+    ends = [low, high, *(label.height for label in labels)]
     if panel.from_zero or not 0.0 < high - low < FAR * max(abs(low), abs(high)):
         ends.append(0.0)
     span = max(ends) - min(ends)
@@ -517,7 +520,7 @@ def plot_comparison(simulations: Mapping[str, Simulation], *, title: str | None 
     words = "Shaft speed under the same command" if title is None else title
     legend = [handle(name, *look) for name, look in looks.items()]
     heights = [1.2, 2.6, 1.6] if len(simulations) > 1 else [1.2, 2.6]
-    volts = all(each.voltage is not None for each in simulations.values())
+    volts = all(simulation.voltage is not None for simulation in simulations.values())
     labels = ["voltage (V)" if volts else "current (A)", speed.label("shaft speed")]
     labels.append(speed.label("difference"))
     figure, axes = sheet(heights, words, labels, "time (s)", legend=legend)
@@ -525,23 +528,23 @@ def plot_comparison(simulations: Mapping[str, Simulation], *, title: str | None 
         zero_line(ax)
     (reference, first), *_ = simulations.items()
     commands = [
-        each.current if each.voltage is None or not volts else each.voltage
-        for each in simulations.values()
+        simulation.current if simulation.voltage is None or not volts else simulation.voltage
+        for simulation in simulations.values()
     ]
-    for (name, each), command in zip(simulations.items(), commands, strict=True):
-        (color, dashes), time = looks[name], each.time
-        if each is first:
+    for (name, run), command in zip(simulations.items(), commands, strict=True):
+        (color, dashes), time = looks[name], run.time
+        if run is first:
             draw(axes[0], time, command, INK, zorder=3.0)
         elif not np.array_equal(commands[0], command):
             draw(axes[0], time, command, color, dashes=dashes)
-        draw(axes[1], time, speed.factor * each.shaft_speed, color, dashes=dashes)
-        both = (first.time >= time[0]) & (first.time <= time[-1])
-        if each is not first and both.any():
-            at = first.time[both]
-            difference = np.interp(at, each.time, each.shaft_speed) - first.shaft_speed[both]
+        draw(axes[1], time, speed.factor * run.shaft_speed, color, dashes=dashes)
+        common = (first.time >= time[0]) & (first.time <= time[-1])
+        if run is not first and common.any():
+            at = first.time[common]
+            difference = np.interp(at, run.time, run.shaft_speed) - first.shaft_speed[common]
             draw(axes[2], at, speed.factor * difference, color, dashes=dashes)
     if len(simulations) > 1:
-        said = f"speed less that of {reference}"
-        write(axes[2], said, (0.0, 1.0), color=looks[reference].color)
-    fit_time(axes[-1], *(each.time for each in simulations.values()))
+        label = f"speed less that of {reference}"
+        write_words(axes[2], label, (0.0, 1.0), color=looks[reference].color)
+    fit_time(axes[-1], *(simulation.time for simulation in simulations.values()))
     return figure

@@ -18,24 +18,24 @@ STRETCHES = 120
 """Of the lags, of which a chart shows the lowest and the highest value."""
 
 
-def _svg(width: float, height: float, words: str, parts: Iterable[Markup], look: str) -> Markup:
+def _svg(width: float, height: float, words: str, elements: Iterable[Markup], look: str) -> Markup:
     """A chart; `words` say what it shows to those who cannot see it."""
     head = Markup('<svg class="{0}" width="{1:g}" viewBox="0 0 {1:g} {2:g}" role="img" ')
     label = Markup('aria-label="{}">').format(words)
-    return Markup("").join([head.format(look, width, height), label, *parts, Markup("</svg>")])
+    return Markup("").join([head.format(look, width, height), label, *elements, Markup("</svg>")])
 
 
 def _text(x: float, y: float, words: str, anchor: str = "start", turn: float = 0.0) -> Markup:
     """Words at a place, turned about it by an angle [deg]."""
-    made = Markup(
+    template = Markup(
         '<text text-anchor="{}" transform="translate({:.1f} {:.1f}) rotate({:g})">{}</text>'
     )
-    return made.format(anchor, x, y, turn, words.replace("-", "−"))
+    return template.format(anchor, x, y, turn, words.replace("-", "−"))
 
 
 def _line(x1: float, y1: float, x2: float, y2: float, look: str = "axis") -> Markup:
-    made = Markup('<line class="{}" x1="{:.1f}" y1="{:.1f}" x2="{:.1f}" y2="{:.1f}"/>')
-    return made.format(look, x1, y1, x2, y2)
+    template = Markup('<line class="{}" x1="{:.1f}" y1="{:.1f}" x2="{:.1f}" y2="{:.1f}"/>')
+    return template.format(look, x1, y1, x2, y2)
 
 
 def _polyline(x: Array, y: Array) -> Markup:
@@ -45,8 +45,8 @@ def _polyline(x: Array, y: Array) -> Markup:
 
 def profile_chart(profile: Profile, unknown: Unknown) -> Markup:
     """The least cost over one unknown, above that of the optimum, and where the interval ends."""
-    values = np.array([unknown.to_value(each.number) for each in profile.points])
-    rises = np.array([each.cost - profile.cost for each in profile.points])
+    values = np.array([unknown.to_value(point.number) for point in profile.points])
+    rises = np.array([point.cost - profile.cost for point in profile.points])
     if not values.size:
         return Markup("")
     left, right, top, bottom = 70.0, 316.0, 10.0, 182.0
@@ -57,7 +57,7 @@ def profile_chart(profile: Profile, unknown: Unknown) -> Markup:
     up, level = bottom - 6.0 - scale * (rises - low), bottom - 6.0 - scale * (profile.rise - low)
     point = Markup('<circle class="full" cx="{:.1f}" cy="{:.1f}" r="3"><title>{}</title></circle>')
     words = f"{profile.name} ({unknown.unit})" if unknown.unit else profile.name
-    parts = [
+    elements = [
         _line(left, top, left, bottom),
         _line(left, bottom, right, bottom),
         _line(left, level, right, level, "level"),
@@ -73,7 +73,7 @@ def profile_chart(profile: Profile, unknown: Unknown) -> Markup:
         _text(0.5 * (left + right), bottom + 30.0, words, "middle"),
         _text(12.0, 0.5 * (top + bottom), "rise of the cost", "middle", -90.0),
     ]
-    return _svg(330.0, 220.0, f"rise of the cost over {words}", parts, "chart")
+    return _svg(330.0, 220.0, f"rise of the cost over {words}", elements, "chart")
 
 
 def lags_chart(lags: Array, values: Array, band: float, words: str) -> Markup:
@@ -87,19 +87,19 @@ def lags_chart(lags: Array, values: Array, band: float, words: str) -> Markup:
     rows = thinned(lags, values, np.empty(0, dtype=np.intp), STRETCHES)
     reach = float(lags[-1] - lags[0]) or 1.0
     across = edge + (wide - 2.0 * edge) * (lags - lags[0]) / reach
-    zero, top, bottom = (float(height(each)) for each in (0.0, band, -band))
+    zero, top, bottom = (float(height(level)) for level in (0.0, band, -band))
     belt = Markup('<rect class="band" x="{:g}" y="{:.1f}" width="{:g}" height="{:.1f}"/>')
-    parts = [
+    elements = [
         belt.format(edge, top, wide - 2.0 * edge, bottom - top),
         _line(edge, zero, wide - edge, zero),
     ]
     if lags[0] < 0.0:
         middle = float(np.interp(0.0, lags, across))
-        parts.append(_line(middle, edge, middle, tall - edge))
-    parts += [
+        elements.append(_line(middle, edge, middle, tall - edge))
+    elements += [
         _polyline(across[rows], height(values[rows])),
         _text(edge, tall + 12.0, f"{lags[0]:.2g} s"),
         _text(0.5 * wide, tall + 12.0, f"band ±{band:.2g}", "middle"),
         _text(wide - edge, tall + 12.0, f"{lags[-1]:.2g} s", "end"),
     ]
-    return _svg(wide, tall + 16.0, words, parts, "small")
+    return _svg(wide, tall + 16.0, words, elements, "small")

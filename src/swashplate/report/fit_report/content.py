@@ -11,7 +11,7 @@ from pathlib import Path
 from markupsafe import Markup
 
 from swashplate.campaign import Campaign, Overview, examine, quality_table
-from swashplate.campaign.schema import Weight
+from swashplate.campaign.schema import WeightWindow
 from swashplate.drive import Drive
 from swashplate.errors import InputError
 from swashplate.identification import tables
@@ -29,7 +29,14 @@ from swashplate.identification.statistics.profiles import Profile
 from swashplate.identification.validation import RunQuality, at_instants, percent
 from swashplate.parameters.parameter_set import ParameterSet
 from swashplate.report.fit_report import charts
-from swashplate.report.fit_report.html_page import Block, Section, listed_block, page, text, titled
+from swashplate.report.fit_report.html_page import (
+    PageBlock,
+    Section,
+    listed_block,
+    page,
+    text,
+    titled,
+)
 from swashplate.report.fit_report.live import can_run, live_page, run_of
 from swashplate.report.fit_report.runs import ShownRun, run_data, run_words, shown_runs
 from swashplate.report.fit_report.summary import light, run_error, run_lights, summary_section
@@ -48,13 +55,13 @@ _PARTS = {
 
 
 def write_fit_report(
-    found: Identification, path: str | Path, *, truth: ParameterSet | None = None
+    result: Identification, path: str | Path, *, truth: ParameterSet | None = None
 ) -> None:
     """Write the report of a fit: one HTML file, whole or not at all, that needs no network.
 
     Parameters
     ----------
-    found : Identification
+    result : Identification
         The fit, its campaign, and what was found out about it.
     path : path
         The file, which replaces an older one.
@@ -73,28 +80,28 @@ def write_fit_report(
     The page holds what the eye can tell of every run, a few bytes a sample (`runs.run_data`): it
     grows with the number of runs, not with their length.
     """
-    fit, stages = found.fit, found.fit.stages
-    runs = shown_runs(stages, found.predicted)
+    fit, stages = result.fit, result.fit.stages
+    runs = shown_runs(stages, result.predicted)
     held_out = sum(run.role == "validate" for run in runs)
     facts = (
-        f"{count(len(stages), 'stage')}: {', '.join(each.stage.name for each in stages)} · "
+        f"{count(len(stages), 'stage')}: {', '.join(stage.stage.name for stage in stages)} · "
         f"{count(len(runs) - held_out, 'run')} fitted, {held_out} held out · "
-        f"{count(sum(each.problem.samples for each in stages), 'sample')} that count"
+        f"{count(sum(stage.problem.samples for stage in stages), 'sample')} that count"
     )
     with _units_of_people():
         if motion_of(run.experiment for run in runs) == "rod":
             show_rod()
-        own = [
-            _live_section(fit, found.campaign, runs),
+        sections = [
+            _live_section(fit, result.campaign, runs),
             _parameter_section(fit, stages, truth),
             _identifiability_section(stages),
-            _profile_section(fit, found.profiles),
+            _profile_section(fit, result.profiles),
             _starts_section(starts_of(stages)),
-            _folds_section(found.folds, stages),
+            _folds_section(result.folds, stages),
         ]
-        setup = _setup_section(found.campaign, fit.nominal, fit.setup.title, found.notes, stages)
-        made = _page("Fit", facts, found.campaign, fit, runs, found.verdict, setup, own)
-    write_text(made, path)
+        setup = _setup_section(result.campaign, fit.nominal, fit.setup.title, result.notes, stages)
+        page = _page("Fit", facts, result.campaign, fit, runs, result.verdict, setup, sections)
+    write_text(page, path)
 
 
 def write_validation_report(
@@ -129,18 +136,18 @@ def write_validation_report(
         If the file cannot be written.
     """
     runs = shown_runs((), predicted)
-    samples = sum(each.measures.samples for each in predicted)
+    samples = sum(prediction.measures.samples for prediction in predicted)
     facts = (
         f"{count(len(runs), 'run')} predicted from the command alone · "
         f"{count(samples, 'sample')} that count"
     )
-    found = judged if judged is not None else assess_fit((), predicted)
+    assessed = judged if judged is not None else assess_fit((), predicted)
     setup = _setup_section(campaign, drive, "", notes or {}, ())
-    write_text(_page("Validation", facts, campaign, drive, runs, found, setup), path)
+    write_text(_page("Validation", facts, campaign, drive, runs, assessed, setup), path)
 
 
 def _units_of_people() -> AbstractContextManager[None]:
-    """Parameters in mm, bar and degrees rather than SI, where no units were chosen."""
+    """Parameters in mm, bar and degrees rather than SI, if no units were chosen."""
     usual = {"m": "mm", "Pa": "bar", "rad": "deg"}
     return shown_in([unit for si, unit in usual.items() if chosen_unit(si).name == unit_text(si)])
 
@@ -149,39 +156,45 @@ def _page(
     what: str,
     facts: str,
     campaign: Campaign,
-    found: Fit | Parameters,
+    fitted: Fit | Parameters,
     runs: Sequence[ShownRun],
     judged: Verdict,
     setup: Section,
-    own: Sequence[Section] = (),
+    more_sections: Sequence[Section] = (),
 ) -> str:
     """A page of a fit, which has sections of its own, or of a drive held against runs."""
-    stages = found.stages if isinstance(found, Fit) else ()
-    drive, nominal = (found.parameters, found.nominal) if isinstance(found, Fit) else (found, found)
+    stages = fitted.stages if isinstance(fitted, Fit) else ()
+    drive, nominal = (
+        (fitted.parameters, fitted.nominal) if isinstance(fitted, Fit) else (fitted, fitted)
+    )
     named = f"{'Model' if isinstance(nominal, ModelSetup) else 'Drive'} {nominal.name}"
     if isinstance(nominal, ParameterSet) and nominal.title:
         named += f" ({nominal.title})"
     axes = {run.experiment.axis for run in runs}
-    examined = {each: examine(each) for each in campaign if each.axis in axes}
-    said = [
-        (run.name, ended(f"{run.name}, {each.signal}: {words}"))
+    examined = {
+        experiment: examine(experiment) for experiment in campaign if experiment.axis in axes
+    }
+    listed_findings = [
+        (run.name, ended(f"{run.name}, {quality.signal}: {words}"))
         for run, qualities in examined.items()
-        for each in qualities
-        for words in each.findings
+        for quality in qualities
+        for words in quality.findings
     ]
     findings: dict[str, list[int]] = {}
-    for number, (name, _) in enumerate(said, start=1):
+    for number, (name, _) in enumerate(listed_findings, start=1):
         findings.setdefault(name, []).append(number)
-    quality = joined([quality_table(each, of_run) for each, of_run in examined.items()])
-    known = Drive(drive) if isinstance(drive, ParameterSet) else None
+    quality = joined(
+        [quality_table(run_qualities, of_run) for run_qualities, of_run in examined.items()]
+    )
+    known_drive = Drive(drive) if isinstance(drive, ParameterSet) else None
     sections = [
-        summary_section(judged, campaign, known, stages, runs, len(said)),
+        summary_section(judged, campaign, known_drive, stages, runs, len(listed_findings)),
         _agreement_section(runs, findings, judged),
         _curves_section(runs, campaign.virtual),
-        *own,
+        *more_sections,
         _residual_section(runs),
-        _verdict_section(judged, len(said)),
-        _data_section([sentence for _, sentence in said], quality, campaign.overviews),
+        _verdict_section(judged, len(listed_findings)),
+        _data_section([sentence for _, sentence in listed_findings], quality, campaign.overviews),
         setup,
     ]
     return page(
@@ -199,7 +212,7 @@ def _page(
 
 def _qualities(runs: Sequence[ShownRun], role: str = "") -> list[RunQuality]:
     """Of all runs, or of those of a role."""
-    return [each.quality for run in runs if role in ("", run.role) for each in run.channels]
+    return [channel.quality for run in runs if role in ("", run.role) for channel in run.channels]
 
 
 def _agreement_section(
@@ -213,8 +226,8 @@ def _agreement_section(
         part = run_error(run, runs)
         to_curves = Markup('<a href="#run-{}">{}</a>').format(number, run.name)
         links = Markup(" ").join(
-            Markup('<a href="#finding-{0}">{0}</a>').format(each)
-            for each in findings.get(run.experiment.name, [])
+            Markup('<a href="#finding-{0}">{0}</a>').format(finding_number)
+            for finding_number in findings.get(run.experiment.name, [])
         )
         overview.add(
             light(look, why),
@@ -227,16 +240,18 @@ def _agreement_section(
             links,
             look=look != "good",
         )
-    made = [t for role in ("fit", "validate") for t in tables.runs_tables(_qualities(runs, role))]
+    agreement = [
+        t for role in ("fit", "validate") for t in tables.runs_tables(_qualities(runs, role))
+    ]
     words = (
         "RMSE is the root of the mean squared difference of the samples that count; NRMSE is RMSE "
         "over the standard deviation of what was measured; fit % is 100 (1 − NRMSE). Error / range "
         "is RMSE over the largest less the smallest value measured in all runs of that role."
     )
-    measures = Block("table", joined(made), "agreement")
+    measures = PageBlock("table", joined(agreement), "agreement")
     blocks = [
-        Block("table", overview, "overview"),
-        Block("details", [text(words), measures], "Measures of every channel"),
+        PageBlock("table", overview, "overview"),
+        PageBlock("details", [text(words), measures], "Measures of every channel"),
     ]
     return Section("agreement", "Runs", blocks)
 
@@ -249,30 +264,32 @@ def _curves_section(runs: Sequence[ShownRun], virtual: bool) -> Section:
     )
     blocks = [text(words, "screen")]
     for number, run in enumerate(runs):
-        measures = [(each.quality.channel, run_words(each.quality)) for each in run.channels]
+        measures = [
+            (channel.quality.channel, run_words(channel.quality)) for channel in run.channels
+        ]
         content = {"number": number, "run": run, "measures": measures, "measured": measured}
-        blocks.append(Block("run", content))
+        blocks.append(PageBlock("run", content))
     return Section("runs", "Curves", blocks)
 
 
 def _live_section(fit: Fit, campaign: Campaign, runs: Sequence[ShownRun]) -> Section:
     """The drive itself beside the run that it misses most, of those held out if there are any."""
-    blocks: list[Block] = []
+    blocks: list[PageBlock] = []
     drive, nominal = fit.parameters, fit.nominal
     if isinstance(drive, ParameterSet) and isinstance(nominal, ParameterSet):
         # the statuses are those of the nominal set: what was fitted is what has moved
         before, moved = nominal.parameters, {}
-        for symbol, each in drive.parameters.items():
-            same = symbol in before and before[symbol].values == each.values
-            moved[symbol] = replace(each, status="fixed" if same else "fitted")
+        for symbol, parameter in drive.parameters.items():
+            same = symbol in before and before[symbol].values == parameter.values
+            moved[symbol] = replace(parameter, status="fixed" if same else "fitted")
         drive = replace(drive, parameters=moved)
         out = [run for run in runs if run.role == "validate"] or runs
         worst = max(out, key=lambda run: run_error(run, runs)).experiment
         if can_run(drive, worst):
             shown = run_of(at_instants(drive, worst))
-            made = live_page(drive, [shown], campaign.title, campaign.virtual, "drive.toml")
+            page = live_page(drive, [shown], campaign.title, campaign.virtual, "drive.toml")
             words = f"Sliders for every parameter beside {worst.name}"
-            blocks = [Block("live", made, words)]
+            blocks = [PageBlock("live", page, words)]
     return Section("live", "Try other values", blocks)
 
 
@@ -282,29 +299,31 @@ def _residual_section(runs: Sequence[ShownRun]) -> Section:
         "it, and the 95 % band of residuals, coloured as these are, that have no relation to it."
     )
     heads = ("run", "role", "channel", "correlation with the input")
-    made = Table("", tuple(map(Column, (*heads, "verdict"))))
-    for each in _qualities(runs):
-        if (test := each.test) is not None:
+    table = Table("", tuple(map(Column, (*heads, "verdict"))))
+    for quality in _qualities(runs):
+        if (test := quality.test) is not None:
             lag, value = test.peak
-            said = f"correlation with the input, largest {value:+.2f} at {lag:.2g} s"
-            drawn = charts.lags_chart(test.lags, test.correlation, test.band, said)
-            run = each.experiment
-            made.add(run.name, run.role, each.channel, drawn, test.verdict)
-    return Section("residuals", "Residuals", [text(words), Block("table", made, "residuals")])
+            correlation = f"correlation with the input, largest {value:+.2f} at {lag:.2g} s"
+            drawn = charts.lags_chart(test.lags, test.correlation, test.band, correlation)
+            run = quality.experiment
+            table.add(run.name, run.role, quality.channel, drawn, test.verdict)
+    return Section("residuals", "Residuals", [text(words), PageBlock("table", table, "residuals")])
 
 
 def _data_section(
     findings: Sequence[str], quality: Table, overviews: Sequence[Overview]
 ) -> Section:
     """What is used of long logs, what the check of the logs finds, and the quality of signals."""
-    said = f"{count(len(findings), 'finding')}:" if findings else NO_FINDINGS
+    heading = f"{count(len(findings), 'finding')}:" if findings else NO_FINDINGS
     numbered = [
         Markup('<span id="finding-{}">{}</span>').format(number, sentence)
         for number, sentence in enumerate(findings, start=1)
     ]
-    shown = Block("details", [Block("table", quality, "data")], count(len(quality.rows), "signal"))
+    shown = PageBlock(
+        "details", [PageBlock("table", quality, "data")], count(len(quality.rows), "signal")
+    )
     used = listed_block([overview.sentence for overview in overviews])
-    return Section("data", "Data quality", [*used, text(said), *listed_block(numbered), shown])
+    return Section("data", "Data quality", [*used, text(heading), *listed_block(numbered), shown])
 
 
 def _setup_section(
@@ -314,21 +333,21 @@ def _setup_section(
     notes: Mapping[str, str],
     stages: Sequence[StageFit],
 ) -> Section:
-    made = Table("", (Column(""), Column("")))
-    made.add("campaign", str(campaign.path))
+    table = Table("", (Column(""), Column("")))
+    table.add("campaign", str(campaign.path))
     if isinstance(drive, ModelSetup):
-        made.add("model", drive.name)
+        table.add("model", drive.name)
     else:
-        made.add("drive", f"{drive.name}, card {drive.card}" if drive.card else drive.name)
+        table.add("drive", f"{drive.name}, card {drive.card}" if drive.card else drive.name)
     if title:
-        made.add("fit setup", title)
+        table.add("fit setup", title)
     for key, words in notes.items():
         if key != "campaign":
-            made.add(key, words)
-    blocks = [Block("table", made, "notes")]
-    for each in stages:
-        blocks.append(Block("heading", f"Stage {each.stage.name}", "h3"))
-        blocks += listed_block(_stage_words(each))
+            table.add(key, words)
+    blocks = [PageBlock("table", table, "notes")]
+    for stage in stages:
+        blocks.append(PageBlock("heading", f"Stage {stage.stage.name}", "h3"))
+        blocks += listed_block(_stage_words(stage))
     return Section("setup", "Fit setup", blocks)
 
 
@@ -341,14 +360,14 @@ def _stage_words(fit: StageFit) -> list[str]:
     words.append(f"Fits {listed(list(problem.channels))}.")
     words.append(tables.scales_words(fit))
     for kind, windows in stage.weights.items():
-        words += [f"Weight on {kind.replace('_', ' ')}: {_window(each)}." for each in windows]
-    own = sum(each.run is not None for each in problem.unknowns)
-    if own:
-        words.append(f"Besides there are {own} parameters of single runs, with wide bounds.")
+        words += [f"Weight on {kind.replace('_', ' ')}: {_window(window)}." for window in windows]
+    of_runs = sum(unknown.run is not None for unknown in problem.unknowns)
+    if of_runs:
+        words.append(f"Besides there are {of_runs} parameters of single runs, with wide bounds.")
     return words
 
 
-def _window(weight: Weight) -> str:
+def _window(weight: WeightWindow) -> str:
     when = "all of the run"
     if weight.start is not None or weight.stop is not None:
         first = "the start" if weight.start is None else f"{weight.start:g} s"
@@ -365,7 +384,7 @@ def _verdict_section(judged: Verdict, findings: int) -> Section:
     """The three answers, what they rest on, and the stated errors."""
     words = f"{count(findings, 'finding')} on the campaign's data: see the section on them."
     answers = [(name, "look", [text]) for name, text in judged.answers().items()]
-    said = [
+    answers_and_remarks = [
         *answers,
         ("Range of validity", "plain", [judged.validity] if judged.validity else []),
         ("Remarks", "look", judged.remarks),
@@ -373,33 +392,39 @@ def _verdict_section(judged: Verdict, findings: int) -> Section:
         ("Logs", "look", [words] if findings else []),
     ]
     errors = titled(judged.table(), "errors") if judged.predictions else []
-    return Section("verdict", "Verdict in detail", [Block("terms", said, "verdict"), *errors])
+    return Section(
+        "verdict",
+        "Verdict in detail",
+        [PageBlock("terms", answers_and_remarks, "verdict"), *errors],
+    )
 
 
 # --- what the data tell ---------------------------------------------------------------------------
 
 
 def _parameter_section(fit: Fit, stages: Sequence[StageFit], truth: ParameterSet | None) -> Section:
-    made = [tables.estimates_table(each, truth=truth) for each in stages]
+    estimates = [tables.estimates_table(stage, truth=truth) for stage in stages]
     words = (
         "Change is from the nominal value. Intervals are for residuals that are correlated over "
         "time. A parameter at a bound has no symmetric interval. Parameter files have SI units."
     )
     blocks = [text(words)]
     if truth is not None:
-        inside, counted = tables.truth_count(made)
+        inside, counted = tables.truth_count(estimates)
         blocks.append(
             text(
                 "Truth is what was simulated. Fixed parameters that are not true shift the "
                 f"estimates. {inside} of {counted} intervals contain it."
             )
         )
-    for table, each in zip(made, stages, strict=True):
+    for table, stage in zip(estimates, stages, strict=True):
         blocks += titled(table, "parameters")
-        own = tables.estimates_table(each, own=True)
-        if own.rows:
-            summary = f"{count(len(own.rows), 'parameter')} of single runs"
-            blocks.append(Block("details", [Block("table", own, "parameters")], summary))
+        of_runs = tables.estimates_table(stage, own=True)
+        if of_runs.rows:
+            summary = f"{count(len(of_runs.rows), 'parameter')} of single runs"
+            blocks.append(
+                PageBlock("details", [PageBlock("table", of_runs, "parameters")], summary)
+            )
     fixed = tables.fixed_table(fit.stages, truth)
     blocks += titled(fixed, "held") if fixed.rows else []
     return Section("parameters", "Parameters", blocks)
@@ -407,91 +432,103 @@ def _parameter_section(fit: Fit, stages: Sequence[StageFit], truth: ParameterSet
 
 def _identifiability_section(stages: Sequence[StageFit]) -> Section:
     blocks = []
-    for each in stages:
-        found = identifiability_of(each)
-        general = [unknown.run is None for unknown in each.problem.unknowns]
-        blocks.append(Block("heading", f"Stage {each.stage.name}", "h3"))
-        blocks += listed_block(found.sentences())
+    for stage in stages:
+        identifiability = identifiability_of(stage)
+        general = [unknown.run is None for unknown in stage.problem.unknowns]
+        blocks.append(PageBlock("heading", f"Stage {stage.stage.name}", "h3"))
+        blocks += listed_block(identifiability.sentences())
         width = Column("half width", ".3g", "%", none="none")
         columns = (Column("direction"), width, Column("moves together"))
         directions = Table("", (*columns, Column("fix")))
-        for way in found.null + found.weak:
-            kind = way.gauge.name if way.gauge else "weak" if way.weak else "null"
-            moves = ", ".join(f"{name} {change:+.2g} %" for name, change in way.changes.items())
-            known = f"{way.fix} if known" if way.weak else way.fix
-            directions.add(kind, 100.0 * way.half_width if way.weak else None, moves, known)
+        for direction in identifiability.null + identifiability.weak:
+            kind = direction.gauge.name if direction.gauge else "weak" if direction.weak else "null"
+            moves = ", ".join(
+                f"{name} {change:+.2g} %" for name, change in direction.changes.items()
+            )
+            condition = f"{direction.fix} if known" if direction.weak else direction.fix
+            directions.add(
+                kind, 100.0 * direction.half_width if direction.weak else None, moves, condition
+            )
         if directions.rows:
-            blocks.append(Block("table", directions, "directions"))
-        blocks.append(Block("heading", "What the intervals rest on", "h4"))
+            blocks.append(PageBlock("table", directions, "directions"))
+        blocks.append(PageBlock("heading", "What the intervals rest on", "h4"))
         try:
-            blocks += listed_block(uncertainty_of(each).sentences())
+            blocks += listed_block(uncertainty_of(stage).sentences())
         except InputError as error:
             blocks.append(text(f"There are no intervals: {error}"))
-        blocks += _effects(found, general)
-        blocks += _correlations(each, general)
+        blocks += _effects(identifiability, general)
+        blocks += _correlations(stage, general)
     return Section("identifiability", "Uncertainty", blocks)
 
 
-def _effects(found: Identifiability, shown: Sequence[bool]) -> list[Block]:
+def _effects(identifiability: Identifiability, shown: Sequence[bool]) -> list[PageBlock]:
     """How much all weighted residuals change for 1 % of each parameter, the largest first."""
-    made = Table("", (Column("parameter"), Column("change of the residuals for 1 %", ".3g")))
-    pairs = zip(found.sensitivity, found.variables.names, shown, strict=True)
-    for effect, name in sorted(((float(e), name) for e, name, own in pairs if own), reverse=True):
-        made.add(name, effect)
-    return [Block("details", [Block("table", made, "effects")], "Sensitivity")]
+    table = Table("", (Column("parameter"), Column("change of the residuals for 1 %", ".3g")))
+    pairs = zip(identifiability.sensitivity, identifiability.variables.names, shown, strict=True)
+    for effect, name in sorted(
+        ((float(e), name) for e, name, is_shown in pairs if is_shown), reverse=True
+    ):
+        table.add(name, effect)
+    return [PageBlock("details", [PageBlock("table", table, "effects")], "Sensitivity")]
 
 
-def _correlations(stage: StageFit, general: Sequence[bool]) -> list[Block]:
+def _correlations(stage: StageFit, general: Sequence[bool]) -> list[PageBlock]:
     """The estimates that move together most, if there are any."""
     try:
         quoted = uncertainty_of(stage).quoted
     except InputError:  # the sentences above say why there are none
         return []
-    kept = [k for k, own in enumerate(general) if own and quoted.determined[k]]
+    determined = [k for k, is_general in enumerate(general) if is_general and quoted.determined[k]]
     names, values = quoted.variables.names, quoted.correlation
-    pairs = [(float(values[i, j]), names[i], names[j]) for i in kept for j in kept if i < j]
-    made = Table("", (Column("parameter"), Column("with"), Column("r", "+.3f")))
-    for value, name, other in sorted(pairs, key=lambda pair: -abs(pair[0]))[:MOST_PAIRS]:
-        made.add(name, other, value)
-    shown = Block("table", made, "correlations")
-    return [Block("details", [shown], "Strongest correlations of the estimates")] * bool(made.rows)
+    pairs = [
+        (float(values[i, j]), names[i], names[j]) for i in determined for j in determined if i < j
+    ]
+    table = Table("", (Column("parameter"), Column("with"), Column("r", "+.3f")))
+    for value, name, second in sorted(pairs, key=lambda pair: -abs(pair[0]))[:MOST_PAIRS]:
+        table.add(name, second, value)
+    shown = PageBlock("table", table, "correlations")
+    return [PageBlock("details", [shown], "Strongest correlations of the estimates")] * bool(
+        table.rows
+    )
 
 
 def _starts_section(several: Mapping[str, Sequence[Solution]]) -> Section:
     blocks = []
     for stage, results in several.items():
-        failed = sum(not each.cost < 1e300 for each in results)
-        more = f"; {failed} left the model's domain" if failed else ""
-        blocks += [Block("heading", f"Stage {stage}", "h3")] if stage else []
-        made = Table("", (Column("start"), Column("cost, best = 1", ".7g"), Column("ended")))
-        best = min(each.cost for each in results) or 1.0
-        for each in sorted(results, key=lambda each: each.cost):
-            if each.cost < 1e300:
-                made.add(str(each.number), each.cost / best, each.message)
-        words = f"Where each of {len(results)} starts ended, the best first{more}."
-        blocks += [text(words), Block("table", made, "starts")]
+        failed = sum(not result.cost < 1e300 for result in results)
+        failures = f"; {failed} left the model's domain" if failed else ""
+        blocks += [PageBlock("heading", f"Stage {stage}", "h3")] if stage else []
+        table = Table("", (Column("start"), Column("cost, best = 1", ".7g"), Column("ended")))
+        best = min(result.cost for result in results) or 1.0
+        for result in sorted(results, key=lambda result: result.cost):
+            if result.cost < 1e300:
+                table.add(str(result.number), result.cost / best, result.message)
+        words = f"Where each of {len(results)} starts ended, the best first{failures}."
+        blocks += [text(words), PageBlock("table", table, "starts")]
     return Section("starts", "Starts", blocks)
 
 
 def _profile_section(fit: Fit, profiles: Sequence[Profile]) -> Section:
     tiles = []
-    for each in profiles:
-        unknown = fit.stage(each.stage).problem.unknowns.items[each.index]
-        said = [text(words, "remark") for words in each.sentences()]
-        drawn = Block("figure", charts.profile_chart(each, unknown), f"{each.name} ({each.stage})")
-        tiles.append(Block("tile", [drawn, *said]))
+    for profile in profiles:
+        unknown = fit.stage(profile.stage).problem.unknowns.items[profile.index]
+        remarks = [text(words, "remark") for words in profile.sentences()]
+        drawn = PageBlock(
+            "figure", charts.profile_chart(profile, unknown), f"{profile.name} ({profile.stage})"
+        )
+        tiles.append(PageBlock("tile", [drawn, *remarks]))
     words = (
         "The lowest cost with one parameter fixed, above that of the optimum; the dashed line ends "
         "the interval."
     )
-    blocks = [text(words), Block("tiles", tiles)] if tiles else []
+    blocks = [text(words), PageBlock("tiles", tiles)] if tiles else []
     return Section("profiles", "Profile likelihoods", blocks)
 
 
 def _folds_section(folds: CrossValidation | None, stages: Sequence[StageFit]) -> Section:
     if folds is None:
         return Section("folds", "Cross-validation", [])
-    held_out, parts = folds_tables(folds, stages)
+    held_out, fold_tables = folds_tables(folds, stages)
     words = (
         f"The runs were dealt into {folds.planned} folds, kinds of test and directions apart (seed "
         f"{folds.seed}). Each fold was predicted from the command alone by a fit to the others "
@@ -499,8 +536,8 @@ def _folds_section(folds: CrossValidation | None, stages: Sequence[StageFit]) ->
     )
     blocks = [
         text(words),
-        *(text(each, "remark") for each in folds.sentences()),
-        Block("table", held_out, "held-out"),
-        Block("table", parts, "folds"),
+        *(text(sentence, "remark") for sentence in folds.sentences()),
+        PageBlock("table", held_out, "held-out"),
+        PageBlock("table", fold_tables, "folds"),
     ]
     return Section("folds", "Cross-validation", blocks)

@@ -29,7 +29,7 @@ _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 @dataclass(frozen=True)
-class Block:
+class PageBlock:
     """A piece of a section: its kind, of those that `page.html` knows, and what it shows."""
 
     kind: str
@@ -44,23 +44,23 @@ class Section:
 
     id: str
     heading: str
-    blocks: Sequence[Block]
+    blocks: Sequence[PageBlock]
 
 
-def text(words: str, look: str = "") -> Block:
+def text(words: str, look: str = "") -> PageBlock:
     """A paragraph, in a look of `page.css`."""
-    return Block("text", words, look)
+    return PageBlock("text", words, look)
 
 
-def listed_block(sentences: Sequence[str]) -> list[Block]:
+def listed_block(sentences: Sequence[str]) -> list[PageBlock]:
     """A list of sentences, nothing for none."""
-    return [Block("list", sentences)] if sentences else []
+    return [PageBlock("list", sentences)] if sentences else []
 
 
-def titled(table: Table, look: str = "") -> list[Block]:
+def titled(table: Table, look: str = "") -> list[PageBlock]:
     """A table under its title, its caption a remark."""
     remark = [text(table.caption, "remark")] if table.caption else []
-    return [Block("heading", table.title, "h3"), Block("table", table, look), *remark]
+    return [PageBlock("heading", table.title, "h3"), PageBlock("table", table, look), *remark]
 
 
 def page(
@@ -79,7 +79,7 @@ def page(
         ("curves.js", "page.js"),
         ("page.css",),
         embedded=LIVE_SCRIPTS if "live" in kinds else (),
-        sections=[each for each in sections if each.blocks],
+        sections=[section for section in sections if section.blocks],
         what=what,
         title=title,
         facts=facts,
@@ -92,7 +92,7 @@ def rendered(
     template: str,
     scripts: Sequence[str],
     looks: Sequence[str],
-    more: str = "",
+    style: str = "",
     *,
     embedded: Sequence[str] = (),
     **content: Any,
@@ -117,9 +117,9 @@ def rendered(
     if embedded:
         allowed.append(_scoped(folder, embedded))
     live = LIVE_SCRIPTS in (scripts, embedded)
-    made: str = environment.get_template(template).render(
+    page: str = environment.get_template(template).render(
         content,
-        css=Markup("".join(css) + more),
+        css=Markup("".join(css) + style),
         js=Markup(script),
         policy=content_policy(allowed, compiles=live),
         date=f"{date.today():%d %B %Y}",
@@ -128,7 +128,7 @@ def rendered(
     return re.sub(
         "[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069\ud800-\udfff\ufffe\uffff]",
         "\ufffd",
-        made,
+        page,
     )
 
 
@@ -171,36 +171,36 @@ def content_policy(scripts: Sequence[str], *, compiles: bool = False) -> str:
 def html_table(table: Table, look: str = "") -> Markup:
     """A table's columns for a page. A symbol stands below its meaning, a role is a badge."""
     shown = table.of("p")
-    parts = [f'<table class="{escape(look)}"><thead><tr>']
+    pieces = [f'<table class="{escape(look)}"><thead><tr>']
     for column, head in zip(shown.columns, shown.heads(), strict=True):
         if column.name != "meaning":
-            parts.append(f'<th class="{"n" if column.spec else ""}">{escape(head)}</th>')
-    parts.append("</tr></thead><tbody>")
-    parts += [_html_row(shown, row) for row in shown.rows]
-    return Markup("".join([*parts, "</tbody></table>"]))
+            pieces.append(f'<th class="{"n" if column.spec else ""}">{escape(head)}</th>')
+    pieces.append("</tr></thead><tbody>")
+    pieces += [_html_row(shown, row) for row in shown.rows]
+    return Markup("".join([*pieces, "</tbody></table>"]))
 
 
 def _html_row(table: Table, row: Row) -> str:
     # every piece is escaped where it is put in: Markup's own formatting takes ten times as long
     classes = " ".join(w for w, on in (("look", row.look), ("total", row.total)) if on)
-    parts = [f'<tr class="{classes}">' if classes else "<tr>"]
+    pieces = [f'<tr class="{classes}">' if classes else "<tr>"]
     cells = list(zip(table.columns, row.cells, table.texts(row), strict=True))
     meaning = next((words for column, _, words in cells if column.name == "meaning"), "")
-    for place, (column, value, words) in enumerate(cells):
+    for position, (column, value, words) in enumerate(cells):
         if column.name == "meaning":
             continue
         shown = value if isinstance(value, Markup) else escape(typeset(words, column))
         if column.name == "role":
             shown = Markup('<span class="badge {0}">{0}</span>').format(words)
-        if place == 0:
+        if position == 0:
             symbol = f'{escape(meaning)} <span class="symbol">{shown}</span>' if meaning else shown
             look = ' class="n"' if column.spec else ""
-            parts.append(f'<th scope="row"{look}>{symbol}</th>')
+            pieces.append(f'<th scope="row"{look}>{symbol}</th>')
         else:
             missed = " miss" if column.name == "holds" and words == "no" else ""
             look = "unit" if column is UNIT else f"n{missed}" if column.spec else missed.strip()
-            parts.append(f'<td class="{look}">{shown}</td>' if look else f"<td>{shown}</td>")
-    return "".join([*parts, "</tr>\n"])
+            pieces.append(f'<td class="{look}">{shown}</td>' if look else f"<td>{shown}</td>")
+    return "".join([*pieces, "</tr>\n"])
 
 
 def typeset(words: str, column: Column) -> str:
@@ -230,13 +230,15 @@ PATIENCE = 180.0
 
 def find_browser() -> str:
     """Path of a Chromium, which prints pages; a `FileError` where there is none."""
-    found = next((place for each in BROWSERS if (place := which(each)) is not None), None)
-    if found is None:
+    browser_path = next(
+        (path for browser in BROWSERS if (path := which(browser)) is not None), None
+    )
+    if browser_path is None:
         raise FileError(
             f"No browser was found that prints a PDF ({', '.join(BROWSERS)}): install Chromium, or "
             "open report.html in any browser and print it there."
         )
-    return found
+    return browser_path
 
 
 def print_report(page: str | Path, path: str | Path) -> None:

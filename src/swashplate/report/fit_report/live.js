@@ -18,7 +18,7 @@
 
 /**
  * A factor on several parameters.
- * @typedef {object} LeverData
+ * @typedef {object} DesignVariableData
  * @property {string} name
  * @property {string} words
  * @property {[number: number, power: number][]} moves
@@ -66,7 +66,7 @@
  * @property {string} wasm
  * @property {string} values Of the drive: doubles in base64.
  * @property {ParameterData[]} parameters
- * @property {LeverData[]} levers
+ * @property {DesignVariableData[]} design_variables
  * @property {{ name: string, number: number }[]} outputs
  * @property {[bit: number, name: string][]} limits
  * @property {string} before What the values at first are called.
@@ -472,8 +472,8 @@ class Page {
     this.toml = element("toml", HTMLElement);
     /** Values of the sliders by number. */
     this.values = new Map(data.parameters.map(({ number, value }) => [number, value]));
-    /** Factors of the levers by name. */
-    this.factors = new Map(data.levers.map(({ name }) => [name, 1]));
+    /** Factors of the design variables by name. */
+    this.factors = new Map(data.design_variables.map(({ name }) => [name, 1]));
     this.figure = new LiveFigure(element("figure", HTMLElement));
     this.figure.element.dataset.name = "run";
     /**
@@ -531,15 +531,15 @@ class Page {
   /** Set all values as they were at first. */
   reset() {
     for (const { number, value } of data.parameters) this.values.set(number, value);
-    for (const { name } of data.levers) this.factors.set(name, 1);
+    for (const { name } of data.design_variables) this.factors.set(name, 1);
     this.place();
     this.update(true);
   }
 
-  /** Every parameter as the sliders have it: its own value, times the levers that move it. */
+  /** Every parameter as the sliders have it: its own value times the factors of design variables. */
   now() {
     const values = new Map(this.values);
-    for (const { name, moves } of data.levers) {
+    for (const { name, moves } of data.design_variables) {
       const factor = this.factors.get(name) ?? 1;
       for (const [number, power] of moves) {
         values.set(number, (values.get(number) ?? 0) * factor ** power);
@@ -548,11 +548,11 @@ class Page {
     return values;
   }
 
-  /** One slider for each lever and parameter. */
+  /** One slider for each design variable and parameter. */
   sliders() {
-    const levers = element("levers", HTMLElement);
-    for (const { name, words, range } of data.levers) {
-      this.slider(levers, words, "×", range, {
+    const variables = element("design-variables", HTMLElement);
+    for (const { name, words, range } of data.design_variables) {
+      this.slider(variables, words, "×", range, {
         read: () => this.factors.get(name) ?? 1,
         write: (value) => this.factors.set(name, value),
       });

@@ -25,7 +25,7 @@ from swashplate.identification.validation import at_instants, ignored_windows
 from swashplate.maneuvers import Maneuver
 from swashplate.parameters.parameter_set import HasParameters, Parameter, ParameterSet, set_of
 from swashplate.report.fit_report.html_page import LIVE_SCRIPTS, rendered, script_json
-from swashplate.report.fit_report.runs import packed
+from swashplate.report.fit_report.runs import packed_samples
 from swashplate.report.lines import SHADES, gap_rows
 from swashplate.report.style import in_lines
 from swashplate.tables import listed, write_text
@@ -36,7 +36,7 @@ Array = NDArray[np.float64]
 SPAN = 4.0
 """Factor by which a slider goes below and above the present value."""
 SHOWN = ("orifice", "pump", "supply_pressure", "rate_limits", "dead_zone", "spool_offset")
-"""Levers that have a slider of their own; each parameter has one too."""
+"""Design variables that have a slider of their own; each parameter has one too."""
 BEFORE_CURRENT = Limit.DEAD_ZONE | Limit.CURRENT_RATE
 """Limits that are shaded behind a current; the others are behind what the pump does."""
 UNMEASURED = ("current", "shaft_speed")
@@ -56,7 +56,7 @@ def write_live_page(
     """Write the live page of a drive: one HTML file, whole or not at all, that needs no network.
 
     The drive runs in the reader's browser, from the equations' C source as WebAssembly. Parameters
-    and levers have sliders; the curves, their errors and the limits follow at once.
+    and design variables have sliders; the curves, their errors and the limits follow immediately.
 
     Parameters
     ----------
@@ -67,9 +67,9 @@ def write_live_page(
     campaign : Campaign, optional
         Its runs with a voltage as their input are shown beside what the drive makes of them.
     axis : str, optional
-        The axis, where the campaign has several.
+        The axis, if the campaign has several.
     command : Maneuver, optional
-        A voltage that the drive is simulated under where there is no campaign.
+        A voltage that the drive is simulated under if there is no campaign.
     rate : float
         At which the command is sampled. [Hz]
     name : str
@@ -84,32 +84,34 @@ def write_live_page(
     ------
     InputError
         If there is nothing to simulate: no run is driven by a voltage, or neither a campaign nor a
-        command is given; or the drive has an equation of its own.
+        command is given; or the drive has a user-defined equation.
     FileError
         If the file cannot be written.
     """
     parameters = set_of(drive)
     if campaign is not None:
         tests = campaign.select(axis=axis)
-        driven = [each for each in tests if each.input.kind == "voltage"]
+        driven = [test for test in tests if test.input.kind == "voltage"]
         if not driven:
             raise InputError(
                 f"{campaign.path.name} has no run that a voltage drives; a live page needs one."
             )
-        parameters, said = at_rate_of(driven, parameters)
-        left = [each.name for each in tests if each.input.kind != "voltage"]
-        if left:
-            said += (f"Left out, driven by something else than a voltage: {listed(left)}.",)
-        runs = [run_of(at_instants(parameters, each)) for each in driven]
-        made = live_page(parameters, runs, campaign.title, campaign.virtual, name)
+        parameters, sentences = at_rate_of(driven, parameters)
+        left_out = [test.name for test in tests if test.input.kind != "voltage"]
+        if left_out:
+            sentences += (
+                f"Left out, driven by something else than a voltage: {listed(left_out)}.",
+            )
+        runs = [run_of(at_instants(parameters, experiment)) for experiment in driven]
+        page = live_page(parameters, runs, campaign.title, campaign.virtual, name)
     elif command is not None:
-        record, said = record_of(command.sample(rate), rate, what="voltage"), ()
+        record, sentences = record_of(command.sample(rate), rate, what="voltage"), ()
         run = {**_record(record), "name": command.name, "role": "", "channels": []}
-        made = live_page(parameters, [run], parameters.title or parameters.name, False, name)
+        page = live_page(parameters, [run], parameters.title or parameters.name, False, name)
     else:
         raise InputError("A live page needs the runs of a campaign, or a command to simulate.")
-    write_text(made, path)
-    return said
+    write_text(page, path)
+    return sentences
 
 
 def live_page(
@@ -118,24 +120,24 @@ def live_page(
     """HTML of a live page beside runs of `run_of`; see `write_live_page`."""
     if parameters.equations:
         raise InputError(
-            f"{parameters.name} has an equation of its own, which the WebAssembly of the package "
+            f"{parameters.name} has a user-defined equation, which the WebAssembly of the package "
             "does not have: export its C source with swashplate.export.c."
         )
     exported = exported_drive()
     limits = [(1 << k, Limit[name.upper()]) for k, (_, name) in enumerate(exported.limits)]
     numbers = values_of(Drive(parameters), runs[0]["step"])
     values = _parameters(parameters)
-    before = "as fitted" if any(each["main"] for each in values) else "as it is"
+    before = "as fitted" if any(value["main"] for value in values) else "as it is"
     content = {
         "wasm": b64encode(packaged(WASM)).decode("ascii"),
         "values": b64encode(numbers.astype("<f8").tobytes()).decode("ascii"),
         "parameters": values,
-        "levers": _levers(values),
-        "outputs": [{"name": each, "number": k} for k, each in enumerate(exported.names)],
+        "design_variables": _design_variables(values),
+        "outputs": [{"name": output, "number": k} for k, output in enumerate(exported.names)],
         "limits": [[bit, _word(limit)] for bit, limit in limits],
         "before": before,
         "filter": {"low": LOW_PASS, "high": DIFFERENTIATOR},
-        "unmeasured": [_shown(each) for each in UNMEASURED],
+        "unmeasured": [_shown(signal) for signal in UNMEASURED],
         "runs": runs,
     }
     colours = "".join(
@@ -164,31 +166,31 @@ def can_run(parameters: ParameterSet, experiment: Experiment) -> bool:
     return driven and not at_rate_of([experiment], parameters)[1]
 
 
-# --- parameters and levers ------------------------------------------------------------------------
+# --- parameters and design variables --------------------------------------------------------------
 
 
 def _parameters(parameters: ParameterSet) -> list[dict[str, Any]]:
     """Every value of a set: its number in C, its words, and the ends of its slider."""
     names = [name for _, _, name in exported_drive().named("parameters")]
-    made = []
+    entries = []
     for parameter in parameters.values():
-        known = parameter.definition
+        definition = parameter.definition
         # mm, bar and degrees; SI for the others
-        unit = DisplayUnit(unit_text(known.unit), 1.0)
-        if known.unit in ("m", "Pa", "rad"):
-            unit = display_unit(known.unit, 1e5 if known.unit == "Pa" else 0.0)
-        sides = ("",) if len(known.columns) == 1 else (", positive", ", negative")
-        for column, side, value in zip(known.columns, sides, parameter.values, strict=False):
+        unit = DisplayUnit(unit_text(definition.unit), 1.0)
+        if definition.unit in ("m", "Pa", "rad"):
+            unit = display_unit(definition.unit, 1e5 if definition.unit == "Pa" else 0.0)
+        sides = ("",) if len(definition.columns) == 1 else (", positive", ", negative")
+        for column, side, value in zip(definition.columns, sides, parameter.values, strict=False):
             if column not in names:
-                continue  # of an equation of one's own
-            made.append(
+                continue  # of a user-defined equation
+            entries.append(
                 {
                     "number": names.index(column),
                     "symbol": parameter.symbol,
                     "column": column,
-                    "block": known.block,
-                    "words": f"{known.name}{side}",
-                    "si": known.unit,
+                    "block": definition.block,
+                    "words": f"{definition.name}{side}",
+                    "si": definition.unit,
                     "unit": unit.name,
                     "factor": unit.factor,
                     "value": value if isfinite(value) else 1e30,
@@ -196,11 +198,11 @@ def _parameters(parameters: ParameterSet) -> list[dict[str, Any]]:
                     "main": parameter.status == "fitted",
                 }
             )
-    return made
+    return entries
 
 
 def slider(parameter: Parameter, value: float) -> tuple[float, float] | None:
-    """Ends of a value's slider; None where no factor moves it. SI"""
+    """Ends of a value's slider; None if no factor moves it. SI"""
     if parameter.own_bounds is not None and all(map(isfinite, parameter.own_bounds)):
         low, high = parameter.own_bounds
         return (low, high) if low < high else None
@@ -211,22 +213,22 @@ def slider(parameter: Parameter, value: float) -> tuple[float, float] | None:
     return max(low, definition.lower), min(high, definition.upper)
 
 
-def _levers(values: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Levers with the numbers that they move and the powers with which they do."""
-    made = []
+def _design_variables(values: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Design variables with the numbers that they move and the powers with which they do."""
+    variables = []
     for name in SHOWN:
         powers = DESIGN_VARIABLES[name]
         moves = [
-            (each["number"], powers[key])
-            for each in values
-            for key in {each["symbol"], each["column"]}  # the same without directions
-            if key in powers and each["value"] not in (0.0, 1e30)
+            (value["number"], powers[key])
+            for value in values
+            for key in {value["symbol"], value["column"]}  # the same without directions
+            if key in powers and value["value"] not in (0.0, 1e30)
         ]
         if moves:
             words = name.replace("_", " ").capitalize()
             ends = (1.0 / SPAN, SPAN)
-            made.append({"name": name, "words": words, "moves": moves, "range": ends})
-    return made
+            variables.append({"name": name, "words": words, "moves": moves, "range": ends})
+    return variables
 
 
 # --- runs -----------------------------------------------------------------------------------------
@@ -255,10 +257,7 @@ def _record(record: Record) -> dict[str, Any]:
 
 
 def _comparable(channels: Iterable[Channel]) -> list[Channel]:
-    """Channels that a drive simulates; positions only if the filters of `speed_of` take them.
-
-    The page compares the speed of a position, see `_channel`.
-    """
+    """Channels that a drive simulates; a position only if its speed can be computed."""
     comparable = []
     for channel in channels:
         if channel.kind not in SIGNALS or not channel.used.any():
@@ -288,9 +287,9 @@ def _channel(channel: Channel) -> dict[str, Any]:
         **shown,
         "also": also,
         "speed": channel.is_position,
-        "time": packed(channel.time, interval / 2**20),
-        "measured": packed(shown["factor"] * values),
-        "breaks": [int(each) for each in gap_rows(channel.time)],
+        "time": packed_samples(channel.time, interval / 2**20),
+        "measured": packed_samples(shown["factor"] * values),
+        "breaks": [int(row) for row in gap_rows(channel.time)],
         "ignored": ignored_windows(channel),
     }
 
@@ -308,7 +307,7 @@ def _shown(signal: str, name: str = "", unit: str = "", size: float = 0.0) -> di
         "factor": shown.factor,
         "label": in_lines(shown.label(words), 24),
         "residual": in_lines(shown.label("residual"), 14),
-        "shaded": [_word(each) for each in Limit if bool(each & BEFORE_CURRENT) == electric],
+        "shaded": [_word(limit) for limit in Limit if bool(limit & BEFORE_CURRENT) == electric],
     }
 
 

@@ -34,7 +34,7 @@ LETTERS = {"input": 13, "overlay": 24, "residual": 14}
 
 
 @dataclass(frozen=True, eq=False)
-class Shown:
+class ShownChannel:
     """One channel of a run, the stage that fits it, and the units it is shown in."""
 
     quality: RunQuality
@@ -58,7 +58,7 @@ class ShownRun:
     name: str
     role: str
     """Whether it was fitted, ``"fit"``, or held out, ``"validate"``."""
-    channels: tuple[Shown, ...]
+    channels: tuple[ShownChannel, ...]
 
     @property
     def experiment(self) -> Experiment:
@@ -73,16 +73,18 @@ class ShownRun:
     @property
     def labels(self) -> list[Any]:
         """Labels of the panels in lines: of the input, then of each channel and its residual."""
-        names = [each.quality.channel for each in self.channels]
-        several = len({each.stage for each in self.channels}) > 1
+        names = [channel.quality.channel for channel in self.channels]
+        several = len({channel.stage for channel in self.channels}) > 1
         kind = self.experiment.input.kind
         first = self.input_unit.label("input" if kind == "other" else kind)
-        made: list[Any] = [in_lines(first, LETTERS["input"])]
-        for each, name in zip(self.channels, names, strict=True):
-            words = f"{name}, {each.stage}" if names.count(name) > 1 and several else name
-            signal = in_lines(each.unit.label(words), LETTERS["overlay"])
-            made.append((signal, in_lines(each.small.label("residual"), LETTERS["residual"])))
-        return made
+        panel_labels: list[Any] = [in_lines(first, LETTERS["input"])]
+        for channel, name in zip(self.channels, names, strict=True):
+            words = f"{name}, {channel.stage}" if names.count(name) > 1 and several else name
+            signal = in_lines(channel.unit.label(words), LETTERS["overlay"])
+            panel_labels.append(
+                (signal, in_lines(channel.small.label("residual"), LETTERS["residual"]))
+            )
+        return panel_labels
 
     @property
     def input_unit(self) -> DisplayUnit:
@@ -95,23 +97,23 @@ def shown_runs(stages: Sequence[StageFit], predicted: Sequence[RunQuality]) -> t
 
     A position is followed by its speed.
     """
-    found = [
-        (replace(each, experiment=replace(each.experiment, role="fit")), stage.stage.name)
+    qualities = [
+        (replace(speed, experiment=replace(speed.experiment, role="fit")), stage.stage.name)
         for stage in stages
-        for each in with_speeds(stage.runs)
+        for speed in with_speeds(stage.runs)
     ]
-    found += [(each, "") for each in with_speeds(predicted)]
-    units, runs = {}, dict[tuple[str, str], list[Shown]]()
-    for name in {each.channel for each, _ in found}:
-        alike = [each for each, _ in found if each.channel == name]
-        channels = [each.experiment[name] for each in alike]
-        largest = max(_largest(each.values) for each in channels)
-        residual = max(_largest(each.residual) for each in alike)
+    qualities += [(speed, "") for speed in with_speeds(predicted)]
+    units, runs = {}, dict[tuple[str, str], list[ShownChannel]]()
+    for name in {quality.channel for quality, _ in qualities}:
+        alike = [quality for quality, _ in qualities if quality.channel == name]
+        channels = [run.experiment[name] for run in alike]
+        largest = max(_largest(channel.values) for channel in channels)
+        residual = max(_largest(run.residual) for run in alike)
         unit = channels[0].shown_unit
         units[name] = [display_unit(unit, size) for size in (largest, residual)]
-    for each, stage in found:
-        of_run = runs.setdefault((each.experiment.name, each.experiment.role), [])
-        of_run.append(Shown(each, stage, *units[each.channel]))
+    for quality, stage in qualities:
+        of_run = runs.setdefault((quality.experiment.name, quality.experiment.role), [])
+        of_run.append(ShownChannel(quality, stage, *units[quality.channel]))
     return tuple(ShownRun(*key, tuple(channels)) for key, channels in runs.items())
 
 
@@ -132,14 +134,14 @@ def off_scale(channel: Channel, values: Array) -> Mask:
 
 def run_words(quality: RunQuality) -> str:
     """What must stand beside every fit %: RMSE, initial state, what is ignored."""
-    found, run = quality.measures, quality.experiment
+    measures, run = quality.measures, quality.experiment
     channel = run[quality.channel]
-    parts = [f"RMSE {quantity(found.rmse, channel.shown_unit)}"]
-    if found.fit_percent is not None and found.nrmse is not None:
-        parts.insert(0, f"fit {found.fit_percent:.2f} %")
-        parts.append(f"NRMSE {found.nrmse:.3g}")
-    parts.append(f"initial state {start_words(run)}")
-    return " · ".join([*parts, f"ignored: {ignored_words(run, channel)}"])
+    words = [f"RMSE {quantity(measures.rmse, channel.shown_unit)}"]
+    if measures.fit_percent is not None and measures.nrmse is not None:
+        words.insert(0, f"fit {measures.fit_percent:.2f} %")
+        words.append(f"NRMSE {measures.nrmse:.3g}")
+    words.append(f"initial state {start_words(run)}")
+    return " · ".join([*words, f"ignored: {ignored_words(run, channel)}"])
 
 
 def write_samples(runs: Sequence[ShownRun], path: str | Path) -> None:
@@ -155,14 +157,14 @@ def write_samples(runs: Sequence[ShownRun], path: str | Path) -> None:
     """
     import polars as pl
 
-    parts = []
+    files = []
     for run in runs:
-        for each in run.channels:
-            channel, quality = each.channel, each.quality
+        for measured in run.channels:
+            channel, quality = measured.channel, measured.quality
             columns = {
                 "run": run.name,
                 "role": run.role,
-                "stage": each.stage,
+                "stage": measured.stage,
                 "channel": quality.channel,
                 "unit": channel.unit,
                 "time": channel.time,
@@ -170,8 +172,8 @@ def write_samples(runs: Sequence[ShownRun], path: str | Path) -> None:
                 "simulated": quality.simulated,
                 "weight": channel.weight,
             }
-            parts.append(pl.DataFrame(columns))
-    write_table(pl.concat(parts), path)
+            files.append(pl.DataFrame(columns))
+    write_table(pl.concat(files), path)
 
 
 # --- samples of the page --------------------------------------------------------------------------
@@ -189,11 +191,11 @@ def run_data(run: ShownRun) -> dict[str, Any]:
     return {
         "held": drive.interpolation == "previous",
         "input": _signals(drive.time, [(run.input_unit.factor * drive.values, None)]),
-        "channels": [_channel(each) for each in run.channels],
+        "channels": [_channel(channel) for channel in run.channels],
     }
 
 
-def _channel(shown: Shown) -> dict[str, Any]:
+def _channel(shown: ShownChannel) -> dict[str, Any]:
     channel, factor, small = shown.channel, shown.unit.factor, shown.small.factor
     residual = small * shown.quality.residual
     rms = float(np.sqrt(np.mean(np.square(residual[channel.used])))) if channel.used.any() else 0.0
@@ -222,13 +224,13 @@ def _signals(
     stamps = time[rows]
     interval = float(np.median(np.diff(stamps))) if stamps.size > 1 else 1.0
     return {
-        "time": packed(stamps, interval / FINE),
-        "breaks": [int(each) for each in ends if 0 <= each < rows.size - 1],
-        "signals": [packed(values[rows], step) for values, step in signals],
+        "time": packed_samples(stamps, interval / FINE),
+        "breaks": [int(end) for end in ends if 0 <= end < rows.size - 1],
+        "signals": [packed_samples(values[rows], step) for values, step in signals],
     }
 
 
-def packed(values: Array, step: float | None = None) -> dict[str, Any]:
+def packed_samples(values: Array, step: float | None = None) -> dict[str, Any]:
     """Finite numbers as whole multiples of a step, differenced, deflated and in base64.
 
     ``size``, ``zero`` and ``step``: value = zero + step · number; the step is at least 2⁻²⁸ of
@@ -239,11 +241,11 @@ def packed(values: Array, step: float | None = None) -> dict[str, Any]:
     zero = float(np.median(values)) if values.size else 0.0
     reach = float(np.ptp(values)) if values.size else 0.0
     step = max(step or reach / LEVELS, reach / 2**28) or 1.0
-    whole = np.rint((values - zero) / step).astype(np.int64)
-    orders = [whole]
+    steps = np.rint((values - zero) / step).astype(np.int64)
+    orders = [steps]
     for _ in range(2):
         orders.append(np.diff(orders[-1], prepend=0))
-    sizes = [float(np.log2(1.0 + np.abs(each)).sum()) for each in orders]
+    sizes = [float(np.log2(1.0 + np.abs(order)).sum()) for order in orders]
     order = int(np.argmin(sizes))
     number = np.where(orders[order] < 0, -2 * orders[order] - 1, 2 * orders[order]).astype("<u4")
     planes = number.view(np.uint8).reshape(-1, 4).T.tobytes()

@@ -34,7 +34,7 @@ from swashplate.identification.validation import (
     range_of,
 )
 from swashplate.parameters.rules import FULL_VOLTAGE
-from swashplate.report.fit_report.html_page import Block, Section, listed_block, text
+from swashplate.report.fit_report.html_page import PageBlock, Section, listed_block, text
 from swashplate.report.fit_report.runs import ShownRun
 from swashplate.tables import NONE, UNIT, Cell, Column, Table, count, listed
 from swashplate.units import display_unit
@@ -70,7 +70,7 @@ ACCELERATION, DELAY, LAG, CREEP = 2, 3, 4, 5
 FULL: Commands = (FULL_VOLTAGE, FULL_VOLTAGE)
 
 
-def numbers_of(drive: Drive, largest: Commands = FULL) -> Array:
+def machine_numbers_of(drive: Drive, largest: Commands = FULL) -> Array:
     """What matters about a drive, (6, 2): each way, positive and negative. SI
 
     Dead zone [V]; top speed [rad/s], steady under ±10 V; largest acceleration [rad/s²], delay and
@@ -79,24 +79,24 @@ def numbers_of(drive: Drive, largest: Commands = FULL) -> Array:
     where the drive has none.
     """
     rest = float(drive.steady_speed(0.0))
-    made = np.full((6, 2), np.nan)
-    for column, way in enumerate((1.0, -1.0)):
-        volts = way * largest[column]
+    values = np.full((6, 2), np.nan)
+    for column, direction in enumerate((1.0, -1.0)):
+        volts = direction * largest[column]
         command = np.full(int(SECONDS * RATE) + 1, volts)
         command[0] = 0.0
         run = drive.simulate(command, RATE, start="steady")
         final = float(drive.steady_speed(volts))
-        made[0, column] = dead_zone(drive, way)[0]
-        made[1, column] = float(drive.steady_speed(way * FULL_VOLTAGE))
-        made[5, column] = rest
+        values[0, column] = dead_zone(drive, direction)[0]
+        values[1, column] = float(drive.steady_speed(direction * FULL_VOLTAGE))
+        values[5, column] = rest
         if final == rest:
             continue
-        made[2, column] = way * RATE * float((way * np.diff(run.shaft_speed)).max())
+        values[2, column] = direction * RATE * float((direction * np.diff(run.shaft_speed)).max())
         done = np.maximum.accumulate((run.shaft_speed - rest) / (final - rest))
         if done[-1] >= MOST_OF_IT:
             first, last = np.interp((MOVES, MOST_OF_IT), done, run.time)
-            made[3:5, column] = first, last - first
-    return made
+            values[3:5, column] = first, last - first
+    return values
 
 
 def largest_commands(stages: Sequence[StageFit]) -> Commands:
@@ -121,7 +121,7 @@ def tested_commands(stages: Sequence[StageFit]) -> Commands:
     minus = max((float(-values.min()) for values in commands), default=0.0)
     # noise about 0 V is no command
     tested = [
-        min(each, FULL_VOLTAGE) if each > NO_COMMAND * size else 0.0 for each in (plus, minus)
+        min(volts, FULL_VOLTAGE) if volts > NO_COMMAND * size else 0.0 for volts in (plus, minus)
     ]
     return tested[0], tested[1]
 
@@ -130,7 +130,7 @@ class _Range(NamedTuple):
     """How far numbers (6, 2) can be off."""
 
     half: Array
-    """Half widths of 95 % intervals, NaN where there is none."""
+    """Half widths of 95 % intervals, NaN if there is none."""
     doubt: NDArray[np.object_]
     """Why a number has no interval, in words; empty if it has one."""
     near: Array
@@ -146,14 +146,14 @@ def numbers_table(drive: Drive, stages: Sequence[StageFit]) -> tuple[Table, list
     Without stages of a fit there are no intervals.
     """
     largest = largest_commands(stages)
-    values, sentences = numbers_of(drive, largest), list[str]()
+    values, sentences = machine_numbers_of(drive, largest), list[str]()
     range_ = _Range(np.full((6, 2), np.nan), np.full((6, 2), "", dtype=object), values, values)
     if stages:
         try:
             range_ = _range_of(drive, stages, values, largest)
         except SwashplateError as error:
             sentences.append(f"There are no intervals: {error}")
-    made = Table("", (Column("quantity"), Column("positive", "s"), Column("negative", "s"), UNIT))
+    table = Table("", (Column("quantity"), Column("positive", "s"), Column("negative", "s"), UNIT))
     rows = (
         ("Dead zone, up to", "V"),
         ("Top speed at ±10 V", "rad/s"),
@@ -164,10 +164,10 @@ def numbers_table(drive: Drive, stages: Sequence[StageFit]) -> tuple[Table, list
     )
     for row, (words, unit) in enumerate(rows):
         factor = display_unit(unit, float(np.nanmax(np.abs(values[row]), initial=0.0))).factor
-        cells = [_cell(factor, values, range_, (row, way)) for way in (0, 1)]
+        cells = [_cell(factor, values, range_, (row, side)) for side in (0, 1)]
         if words.startswith("Creep"):
             cells[1] = Cell(None, "")
-        made.add(words, *cells, unit=unit, spec=".3f")
+        table.add(words, *cells, unit=unit, spec=".3f")
     if stages and assumed_parameters(stages):
         sentences.append(
             f"Parameters that were assumed count as known to {percent(ASSUMED)}, their standard "
@@ -178,7 +178,7 @@ def numbers_table(drive: Drive, stages: Sequence[StageFit]) -> tuple[Table, list
             "Acceleration, delay and lag are those of steps from rest to "
             f"{largest[0]:.3g} and -{largest[1]:.3g} V, the largest commands of the fitted runs."
         )
-    return made, sentences
+    return table, sentences
 
 
 def _at_limits(drive: Drive, limits: Mapping[str, float]) -> Drive:
@@ -189,14 +189,14 @@ def _at_limits(drive: Drive, limits: Mapping[str, float]) -> Drive:
 def _range_of(drive: Drive, stages: Sequence[StageFit], values: Array, largest: Commands) -> _Range:
     """Errors of the numbers: of what the tests determine, and of unseen limits by both ends."""
 
-    def numbers(one: Drive) -> Array:
-        return numbers_of(one, largest)
+    def numbers(drive: Drive) -> Array:
+        return machine_numbers_of(drive, largest)
 
     unseen, assumed = unseen_limits(stages), assumed_parameters(stages)
     errors = standard_errors(stages, numbers, assumed)
     half = QUANTILE * errors
     nearest, farthest = _at_limits(drive, unseen), without_limits(drive, unseen)
-    near, far = numbers_of(nearest, largest), numbers_of(farthest, largest)
+    near, far = machine_numbers_of(nearest, largest), machine_numbers_of(farthest, largest)
     moved = np.maximum(np.abs(near - values), np.abs(far - values))
     left_open = np.abs(far - near) > OPEN * np.abs(near)
     doubt = np.full((6, 2), "", dtype=object)
@@ -204,15 +204,17 @@ def _range_of(drive: Drive, stages: Sequence[StageFit], values: Array, largest: 
         # what has one end alone has no interval to lose
         doubt[~left_open & (variances > LEANS * errors**2)] = f"{name} {AT_BOUND}"
     doubt[changes_left_open(stages, numbers, unseen) > FOLLOWS * np.abs(values)] = "not determined"
-    for way, volts in enumerate(tested_commands(stages)):
+    for side, volts in enumerate(tested_commands(stages)):
         if volts == 0.0:
-            doubt[:CREEP, way] = "not tested"
-    for way, column in enumerate(("Z16_plus", "Z16_minus")):
+            doubt[:CREEP, side] = "not tested"
+    for side, column in enumerate(("Z16_plus", "Z16_minus")):
         if mistaken_for_a_lag(column, stages, unseen):
             # the lag is the same both ways, and the delay follows it
-            doubt[ACCELERATION, way] = doubt[DELAY : LAG + 1] = f"{column} fixed"
+            doubt[ACCELERATION, side] = doubt[DELAY : LAG + 1] = f"{column} fixed"
     if left_open.any():
-        at_ends = standard_errors(stages, lambda one: numbers_of(_at_limits(one, unseen), largest))
+        at_ends = standard_errors(
+            stages, lambda varied: machine_numbers_of(_at_limits(varied, unseen), largest)
+        )
         cautious = QUANTILE * at_ends * np.sign(near)
         near = np.where(np.abs(far) > np.abs(near), near - cautious, near + cautious)
     half = np.where(left_open, np.nan, half + moved)
@@ -309,19 +311,25 @@ def _rounded(value: float, down: bool) -> str:
 def light(look: Light, words: str) -> Markup:
     """A traffic light with its meaning, which does not rest on colour alone."""
     sign = {"good": "✓", "look": "!", "bad": "✗"}[look]
-    made = Markup('<span class="light {}" title="{}" role="img" aria-label="{}">{}</span>')
-    return made.format(look, words, words, sign)
+    template = Markup('<span class="light {}" title="{}" role="img" aria-label="{}">{}</span>')
+    return template.format(look, words, words, sign)
 
 
 def run_error(run: ShownRun, runs: Sequence[ShownRun]) -> float:
     """RMSE of a run's judged channel over its range in all runs of its role, as the verdict has it.
 
-    Infinite where nothing moves.
+    Infinite if nothing moves.
     """
-    own = run.judged
-    judged = [each.judged for each in runs if each.role == run.role]
-    reach = range_of([each for each in judged if each.channel == own.channel])
-    return pooled([own], without_noise=True)[own.channel].rmse / reach if reach > 0.0 else np.inf
+    judged_channel = run.judged
+    judged = [other_run.judged for other_run in runs if other_run.role == run.role]
+    reach = range_of(
+        [other_run for other_run in judged if other_run.channel == judged_channel.channel]
+    )
+    return (
+        pooled([judged_channel], without_noise=True)[judged_channel.channel].rmse / reach
+        if reach > 0.0
+        else np.inf
+    )
 
 
 def run_lights(
@@ -331,22 +339,22 @@ def run_lights(
 
     Findings on the data are by the name of their run.
     """
-    unsound = {each.run for each in judged.unsound}
-    made = list[tuple[Light, str]]()
+    unsound = {doubt.run for doubt in judged.unsound}
+    lights = list[tuple[Light, str]]()
     for run in runs:
         name = run.experiment.name
         look = [
-            f"residuals of {each.quality.channel} follow the input"
-            for each in run.channels
-            if following([each.quality], each.quality.channel)[1]
+            f"residuals of {channel.quality.channel} follow the input"
+            for channel in run.channels
+            if following([channel.quality], channel.quality.channel)[1]
         ]
-        if own := findings.get(name, []):
-            look.append(count(len(own), "finding"))
+        if run_findings := findings.get(name, []):
+            look.append(count(len(run_findings), "finding"))
         if name in unsound:
-            made.append(("bad", "not sound"))
+            lights.append(("bad", "not sound"))
         else:
-            made.append(("look", "; ".join(look)) if look else ("good", "as the others"))
-    return made
+            lights.append(("look", "; ".join(look)) if look else ("good", "as the others"))
+    return lights
 
 
 # --- section --------------------------------------------------------------------------------------
@@ -364,36 +372,38 @@ def summary_section(
     look: Light = "good" if judged.usable else "bad"
     headline = judged.headline.replace(" %", "\N{NO-BREAK SPACE}%")
     shown = [
-        Block("verdict", (light(look, "Usable" if judged.usable else "Not usable"), headline), look)
+        PageBlock(
+            "verdict", (light(look, "Usable" if judged.usable else "Not usable"), headline), look
+        )
     ]
-    shown.append(Block("pair", list(_curves(runs, campaign.virtual))))
+    shown.append(PageBlock("pair", list(_curves(runs, campaign.virtual))))
     numbers, limits = [], []
     if drive is not None:
-        numbers.append(Block("heading", "Numbers that matter", "h3"))
+        numbers.append(PageBlock("heading", "Numbers that matter", "h3"))
         table = None
         try:
-            table, said = numbers_table(drive, stages)
-            numbers.append(Block("table", table, "numbers"))
+            table, remarks = numbers_table(drive, stages)
+            numbers.append(PageBlock("table", table, "numbers"))
         except SwashplateError as error:
-            said = [f"This drive has none: {error}"]
+            remarks = [f"This drive has none: {error}"]
         if stages:
-            said = [INTERVALS, *(_meanings(table) if table else ()), *said]
-        numbers.append(text(" ".join(said), "remark"))
-        limits.append(Block("heading", "What limits it", "h3"))
+            remarks = [INTERVALS, *(_meanings(table) if table else ()), *remarks]
+        numbers.append(text(" ".join(remarks), "remark"))
+        limits.append(PageBlock("heading", "What limits it", "h3"))
         limits += listed_block(_limits(drive, stages))
-    limits.append(Block("heading", "What to do next", "h3"))
+    limits.append(PageBlock("heading", "What to do next", "h3"))
     limits += listed_block(_next(judged, campaign, stages, runs, findings))
-    shown.append(Block("pair", [Block("tile", each) for each in (numbers, limits) if each]))
+    shown.append(PageBlock("pair", [PageBlock("tile", tile) for tile in (numbers, limits) if tile]))
     return Section("summary", "Summary", shown)
 
 
-def _curves(runs: Sequence[ShownRun], virtual: bool) -> Iterable[Block]:
+def _curves(runs: Sequence[ShownRun], virtual: bool) -> Iterable[PageBlock]:
     """The runs that are predicted best and worst, of those held out if there are any."""
-    held = [k for k, run in enumerate(runs) if run.role == "validate"]
-    chosen = sorted(held or range(len(runs)), key=lambda k: run_error(runs[k], runs))
-    ends = {"Best": chosen[0], "Worst": chosen[-1]} if len(chosen) > 1 else {"The": chosen[0]}
+    held_out = [k for k, run in enumerate(runs) if run.role == "validate"]
+    ordered = sorted(held_out or range(len(runs)), key=lambda k: run_error(runs[k], runs))
+    ends = {"Best": ordered[0], "Worst": ordered[-1]} if len(ordered) > 1 else {"The": ordered[0]}
     for which, k in ends.items():
-        kind = "held-out run" if held else "run" if runs[k].role == "validate" else "fitted run"
+        kind = "held-out run" if held_out else "run" if runs[k].role == "validate" else "fitted run"
         part = run_error(runs[k], runs)
         error = "never moves" if part == np.inf else f"error {percent(part)} of the range"
         content = {
@@ -403,7 +413,7 @@ def _curves(runs: Sequence[ShownRun], virtual: bool) -> Iterable[Block]:
             "channel": len(runs[k].channels) - 1,
             "measured": "virtual test" if virtual else "measured",
         }
-        yield Block("curve", content)
+        yield PageBlock("curve", content)
 
 
 def _limits(drive: Drive, stages: Sequence[StageFit]) -> list[str]:
@@ -415,13 +425,13 @@ def _limits(drive: Drive, stages: Sequence[StageFit]) -> list[str]:
     command = np.repeat((0.0, plus, 0.0, -minus, 0.0), length)
     try:
         limited = without_limits(drive, unseen_limits(stages)) if stages else drive
-        found = limit_shares(limited, command, RATE, interpolation="previous")
+        limit_times = limit_shares(limited, command, RATE, interpolation="previous")
     except SwashplateError as error:
         return [str(error)]
-    acting = sorted(found.shares, key=lambda each: each.time_share or 0.0, reverse=True)
+    acting = sorted(limit_times.shares, key=lambda limit: limit.time_share or 0.0, reverse=True)
     shares = [f"{e.limit} {percent(e.time_share)}" for e in acting[:3] if e.time_share]
     head = f"Share of the time of steps from rest to {plus:.3g} and -{minus:.3g} V and back"
-    return [f"{head}: {', '.join(shares) or 'nothing acts'}.", *found.sentences()[:1]]
+    return [f"{head}: {', '.join(shares) or 'nothing acts'}.", *limit_times.sentences()[:1]]
 
 
 def _next(
@@ -431,29 +441,29 @@ def _next(
     runs: Sequence[ShownRun],
     findings: int,
 ) -> list[str | Markup]:
-    said: list[str | Markup] = [f"Settle first: {each}." for each in judged.unfinished]
-    said += [f"Settle first: {each.sentence}" for each in judged.unsound[:3]]
+    steps: list[str | Markup] = [f"Settle first: {sentence}." for sentence in judged.unfinished]
+    steps += [f"Settle first: {sentence.sentence}" for sentence in judged.unsound[:3]]
     if judged.cause:
-        said.append(f"Error beyond noise: {judged.cause}")
+        steps.append(f"Error beyond noise: {judged.cause}")
     if findings:
         link = Markup('Look into the <a href="#data">{}</a> on the logs.')
-        said.append(link.format(count(findings, "finding")))
-    weak = [name for each in stages for name in weak_unknowns(each)]
-    thing = "model" if any(each.stage.part == "model" for each in stages) else "drive"
+        steps.append(link.format(count(findings, "finding")))
+    weak = [name for stage in stages for name in weak_unknowns(stage)]
+    thing = "model" if any(stage.stage.part == "model" for stage in stages) else "drive"
     named = listed(weak[:6]) if len(weak) <= 6 else f"{', '.join(weak[:6])} and others"
     if weak and thing == "model":
-        said.append(f"Not determined to within ±10 %: {named}. Add tests that move them.")
+        steps.append(f"Not determined to within ±10 %: {named}. Add tests that move them.")
     elif weak:
         code = Markup(
             "Not determined to within ±10 %: {}. The tests that would determine them are ranked by "
             "<code>swashplate advise {} --drive drive.toml --setup setup.toml</code>."
         )
-        said.append(code.format(named, campaign.path))
+        steps.append(code.format(named, campaign.path))
     if stages and not any(run.role == "validate" for run in runs):
-        said.append('Hold a run out of the fit (role = "validate"): nothing was predicted yet.')
+        steps.append('Hold a run out of the fit (role = "validate"): nothing was predicted yet.')
     if judged.usable:
         what = f"Use the {thing}"
-        said.append(f"{what}. {judged.validity}" if judged.validity else f"{what}.")
+        steps.append(f"{what}. {judged.validity}" if judged.validity else f"{what}.")
         if stages and thing == "drive":
-            said.append(Markup("Try it: <code>swashplate simulate drive.toml step:9</code>."))
-    return said
+            steps.append(Markup("Try it: <code>swashplate simulate drive.toml step:9</code>."))
+    return steps

@@ -18,7 +18,7 @@ from swashplate.crane.studies.operating import WORKABLE, label_of
 from swashplate.crane.studies.study import NONE
 from swashplate.errors import DomainError, InputError
 from swashplate.report.fit_report.html_page import (
-    Block,
+    PageBlock,
     Section,
     listed_block,
     page,
@@ -79,7 +79,7 @@ def write_assessment(assessment: Assessment, path: str | Path) -> None:
     differences, acting, *remedies = tables[2 + len(limited) :]
     look = OUTCOMES[assessment.outcome]
     summary = [
-        Block("verdict", (light(look, assessment.outcome), _headline(assessment)), look),
+        PageBlock("verdict", (light(look, assessment.outcome), _headline(assessment)), look),
         *_answers(assessment),
         *_fit_verdicts(crane),
         *(block for table in limited for block in titled(table, "limits")),
@@ -121,7 +121,7 @@ def _headline(assessment: Assessment) -> str:
     return f"{sentence} {assessment.unusable_sentence()}".rstrip()
 
 
-def _answers(assessment: Assessment) -> list[Block]:
+def _answers(assessment: Assessment) -> list[PageBlock]:
     """Both answers with a light of their own, asked or not."""
     harmless: Decision = "no" if assessment.idle else assessment.harmless
     terms = [("Harm", LIGHTS[harmless], [assessment.harm_sentence()])]
@@ -131,10 +131,10 @@ def _answers(assessment: Assessment) -> list[Block]:
     for subject, _, sentences in terms:
         if subject.lower() not in assessment.questions:
             sentences.append("This was not asked: it does not count for the outcome.")
-    return [Block("terms", terms, "verdict")]
+    return [PageBlock("terms", terms, "verdict")]
 
 
-def _remedies(assessment: Assessment, tables: Sequence[Table]) -> list[Block]:
+def _remedies(assessment: Assessment, tables: Sequence[Table]) -> list[PageBlock]:
     """What would do, and what was tried in vain."""
     blocks = [text(words) for words in assessment.remedy_sentences()]
     blocks += [block for table in tables for block in titled(table)]
@@ -143,7 +143,7 @@ def _remedies(assessment: Assessment, tables: Sequence[Table]) -> list[Block]:
     return blocks
 
 
-def _fit_verdicts(crane: Crane) -> list[Block]:
+def _fit_verdicts(crane: Crane) -> list[PageBlock]:
     """The verdict on the fit of each drive that comes from one, and what its tests left open."""
     looks: dict[bool | None, Light] = {True: "good", False: "bad"}
     terms: list[tuple[str, Light, list[str]]] = []
@@ -156,10 +156,10 @@ def _fit_verdicts(crane: Crane) -> list[Block]:
             words.append(unreached)
         if words:
             terms.append((f"{axis.capitalize()}'s drive", look, words))
-    return [Block("terms", terms, "verdict")] if terms else []
+    return [PageBlock("terms", terms, "verdict")] if terms else []
 
 
-def _drives_limits(assessment: Assessment, acting: Table) -> list[Block]:
+def _drives_limits(assessment: Assessment, acting: Table) -> list[PageBlock]:
     """What the axes can follow, and for how long limits act; nothing for ideal drives alone."""
     if not acting.rows:
         return []
@@ -170,7 +170,7 @@ def _drives_limits(assessment: Assessment, acting: Table) -> list[Block]:
     return [text(LIMITS_IN_WORDS), _drawn(followable.plot(), FOLLOWED), *titled(acting)]
 
 
-def _example(assessment: Assessment) -> list[Block]:
+def _example(assessment: Assessment) -> list[PageBlock]:
     """The runs of a typical seaway; nothing if one of them was stopped."""
     from swashplate.report.figures import plot_crane
 
@@ -187,7 +187,7 @@ def _example(assessment: Assessment) -> list[Block]:
     return [_drawn(plot_crane(runs, title=f"Swing in seaway {seed}"), caption)]
 
 
-def _basis(assessment: Assessment) -> list[Block]:
+def _basis(assessment: Assessment) -> list[PageBlock]:
     """Pose, controllers, drives, ship, limits and geometry."""
     study = assessment.study
     crane = study.crane
@@ -221,13 +221,13 @@ def _ship_sentence(seaway: Seaway) -> str:
     )
 
 
-def _assumptions(crane: Crane) -> list[Block]:
+def _assumptions(crane: Crane) -> list[PageBlock]:
     """Limits and geometry with their sources, what is assumed marked."""
     blocks = []
     if crane.limits:
         blocks += titled(crane.limit_table())
-    geometry = [Block("table", crane.table())]
-    return [*blocks, Block("details", geometry, "Geometry, with its sources"), text(ASSUMED)]
+    geometry = [PageBlock("table", crane.table())]
+    return [*blocks, PageBlock("details", geometry, "Geometry, with its sources"), text(ASSUMED)]
 
 
 # --- operability ----------------------------------------------------------------------------------
@@ -281,7 +281,7 @@ def _lead(operability: Operability) -> str:
     return f"{sentence} Most often the rest is limited by {limit} first: {share:.0f} % of the year."
 
 
-def _drawn(figure: Figure, caption: str) -> Block:
+def _drawn(figure: Figure, caption: str) -> PageBlock:
     """A figure as SVG within the page, whole on a narrow screen as well."""
     from matplotlib import rc_context
 
@@ -290,4 +290,6 @@ def _drawn(figure: Figure, caption: str) -> Block:
         figure.savefig(written, format="svg", metadata={"Date": None})
     drawn = written.getvalue()
     drawn = drawn[drawn.index("<svg") :]
-    return Block("figure", Markup(drawn.replace("<svg", '<svg class="chart sheet"', 1)), caption)
+    return PageBlock(
+        "figure", Markup(drawn.replace("<svg", '<svg class="chart sheet"', 1)), caption
+    )

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from swashplate.analysis.design_variables import FactorRange
     from swashplate.analysis.outcomes import Trial
     from swashplate.campaign import Campaign, Experiment
-    from swashplate.cli.options import Sampling, Simulating, Start
+    from swashplate.cli.options import CommandSampling, Simulating, Start
     from swashplate.drive import Drive, Simulation
     from swashplate.drive.simulation import Array
     from swashplate.identification.estimation.model_setup import ModelSetup
@@ -62,13 +62,13 @@ def file_kind(path: Path) -> str:
     if path.name.lower().endswith((*SUFFIXES, ".xlsx", ".xls")):
         return "log"
     try:
-        found = parse_toml(read_text(path), str(path))
+        tables = parse_toml(read_text(path), str(path))
     except FileError:
         return ""
-    return next((kind for mark, kind in _MARKS.items() if mark in found), "")
+    return next((kind for mark, kind in _MARKS.items() if mark in tables), "")
 
 
-def check_kind(path: Path, expected: str) -> None:
+def check_file_kind(path: Path, expected: str) -> None:
     """Refuse a file that is plainly of another kind than expected; say where such a file goes."""
     kind = file_kind(path)
     instead = _INSTEAD.get((kind, expected))
@@ -92,7 +92,7 @@ def campaign_of(path: Path, axis: str | None = None) -> tuple[Campaign, str]:
             f"There is no file {path}: name a campaign, or make one of your logs with 'swashplate "
             "campaign init LOGS'."
         )
-    check_kind(path, "campaign")
+    check_file_kind(path, "campaign")
     campaign = Campaign.from_toml(path)
     if axis is None and len(campaign.axes) > 1:
         raise InputError(f"{path} has the axes {', '.join(campaign.axes)}; name one with --axis.")
@@ -108,9 +108,14 @@ def fit_of(
     from swashplate.identification.estimation.stages import setup_of
     from swashplate.identification.identifying import runs_to_fit
 
-    campaign, chosen = campaign_of(path, axis)
-    start = campaign.drive(chosen).parameters if begin is None else parameters_of(begin)
-    return campaign, runs_to_fit(campaign, chosen), setup_of(campaign, chosen, start, setup), start
+    campaign, axis_name = campaign_of(path, axis)
+    start = campaign.drive(axis_name).parameters if begin is None else parameters_of(begin)
+    return (
+        campaign,
+        runs_to_fit(campaign, axis_name),
+        setup_of(campaign, axis_name, start, setup),
+        start,
+    )
 
 
 def drive_file(word: str) -> Path | None:
@@ -122,7 +127,7 @@ def drive_file(word: str) -> Path | None:
 
     file = set_file(word)
     if file is not None:
-        check_kind(file, "drive")
+        check_file_kind(file, "drive")
     return file
 
 
@@ -140,18 +145,19 @@ def model_parameters_of(folder: str, file: Path, runs: Sequence[Experiment]) -> 
     from swashplate.identification.estimation.model_setup import ModelSetup
 
     setup = ModelSetup.from_file(file)
-    place = Path(folder) / NUMBERS if Path(folder).is_dir() else Path(folder)
-    table = parse_toml(read_text(place), str(place)).get(setup.name)
+    numbers_file = Path(folder) / NUMBERS if Path(folder).is_dir() else Path(folder)
+    table = parse_toml(read_text(numbers_file), str(numbers_file)).get(setup.name)
     nominal = setup.nominal(runs)
     if not isinstance(table, dict) or table.keys() != nominal.numbers.keys():
         raise InputError(
-            f"{place} has no table [{setup.name}] with {', '.join(nominal.numbers)}: give the "
-            f"folder that 'swashplate fit --model {file}' wrote."
+            f"{numbers_file} has no table [{setup.name}] with {', '.join(nominal.numbers)}: give "
+            f"the folder that 'swashplate fit --model {file}' wrote."
         )
     for name, value in table.items():
         if isinstance(value, bool) or not is_real(value):
             raise InputError(
-                f"{place}: {name} under [{setup.name}] is {value!r:.60}, which is not a number."
+                f"{numbers_file}: {name} under [{setup.name}] is {value!r:.60}, which is not a "
+                "number."
             )
     return replace(nominal, numbers={name: float(value) for name, value in table.items()})
 
@@ -159,7 +165,7 @@ def model_parameters_of(folder: str, file: Path, runs: Sequence[Experiment]) -> 
 # --- changes and design variables -----------------------------------------------------------------
 
 
-def assigned(
+def assignments_of(
     option: str,
     words: Iterable[str],
     example: str,
@@ -175,23 +181,23 @@ def assigned(
     """
     from swashplate.units import to_si
 
-    found: dict[str, Any] = {}
+    values: dict[str, Any] = {}
     for word in words:
-        name, _, given = (part.strip() for part in word.partition("="))
-        match = _VALUE.fullmatch(given)
+        name, _, value = (part.strip() for part in word.partition("="))
+        match = _VALUE.fullmatch(value)
         definition, numbers, unit = None, list[float](), ""
         if match is not None:
             definition, unit = known(name), (match[3] or "").strip()
-            numbers = [float(each) for each in match.group(1, 2) if each]
+            numbers = [float(number) for number in match.group(1, 2) if number]
         if len(numbers) not in counts or (unit and not units):
             raise InputError(f"{option} cannot read '{word}'; write it as {example}.")
-        if name in found:
+        if name in values:
             raise InputError(f"{option} gives {name} twice; give it once.")
         if unit and definition is not None:
             what = f"{name} ({definition.name})"
-            numbers = [to_si(each, unit, definition.unit, what) for each in numbers]
-        found[name] = numbers[0] if len(numbers) == 1 else (numbers[0], numbers[1])
-    return found
+            numbers = [to_si(number, unit, definition.unit, what) for number in numbers]
+        values[name] = numbers[0] if len(numbers) == 1 else (numbers[0], numbers[1])
+    return values
 
 
 def drive_of(word: str, values: Sequence[str] = (), factors: Sequence[str] = ()) -> Drive:
@@ -222,10 +228,10 @@ def drive_of(word: str, values: Sequence[str] = (), factors: Sequence[str] = ())
 
             return powers_of(name)  # refuses it, and lists design variables as well
 
-    chosen = assigned("--set", values, set_as, valued, units=True)
-    changes = assigned("--scale", scaled_variables, scaled_as, str, (1,))
+    chosen = assignments_of("--set", values, set_as, valued, units=True)
+    changes = assignments_of("--scale", scaled_variables, scaled_as, str, (1,))
     drive = drive.replace(**chosen)
-    drive = drive.scale(**assigned("--scale", scaling, scaled_as, scalable))
+    drive = drive.scale(**assignments_of("--scale", scaling, scaled_as, scalable))
     if changes:
         from swashplate.analysis.design_variables import with_factors
 
@@ -248,33 +254,33 @@ def physical_values(words: Sequence[str]) -> dict[str, Change]:
     from swashplate.full_order.physical_set import chosen_quantity
 
     example = "oil_volume=1e-4 or oil_volume=100cm^3"
-    return assigned("--physical", words, example, chosen_quantity, units=True)
+    return assignments_of("--physical", words, example, chosen_quantity, units=True)
 
 
 def factors_of(words: Sequence[str]) -> dict[str, float]:
     """Factors by design variable or parameter from words such as ``orifice=1.5``."""
     from swashplate.analysis.design_variables import powers_of
 
-    return assigned("--scale", words, "orifice=1.5", powers_of, (1,))
+    return assignments_of("--scale", words, "orifice=1.5", powers_of, (1,))
 
 
-def ranges_of(words: Sequence[str], usual: FactorRange) -> dict[str, FactorRange]:
+def factor_ranges_of(words: Sequence[str], usual: FactorRange) -> dict[str, FactorRange]:
     """Ranges of factors by design variable from words such as ``pump`` or ``pump=0.8/1.5``."""
     from swashplate.analysis.design_variables import powers_of
 
-    whole = [word if "=" in word else f"{word}={usual[0]}/{usual[1]}" for word in words]
-    return assigned("--variable", whole, "pump or pump=0.8/1.5", powers_of, (2,))
+    completed = [word if "=" in word else f"{word}={usual[0]}/{usual[1]}" for word in words]
+    return assignments_of("--variable", completed, "pump or pump=0.8/1.5", powers_of, (2,))
 
 
 def pairs_of(
-    option: str, given: Sequence[str] | None, example: str, *, often: bool = False
+    option: str, texts: Sequence[str] | None, example: str, *, often: bool = False
 ) -> list[tuple[str, str]]:
     """The text before and after each equals sign; the first is given once, or often."""
     pairs = list[tuple[str, str]]()
-    for each in given or ():
-        name, equals, value = each.partition("=")
+    for pair in texts or ():
+        name, equals, value = pair.partition("=")
         if not equals:
-            raise InputError(f"{option} {each} has no equals sign: write {option} {example}.")
+            raise InputError(f"{option} {pair} has no equals sign: write {option} {example}.")
         if name in dict(pairs) and not often:
             raise InputError(f"{option} {name}=... is given twice; give it once.")
         pairs.append((name, value))
@@ -282,21 +288,23 @@ def pairs_of(
 
 
 def changes_between(before: ParameterSet, after: ParameterSet) -> list[str]:
-    """A line for each parameter of two sets that differs, with a question where it surprises."""
-    known = {each.symbol for each in before.values()}
-    added = [each for each in after.values() if each.symbol not in known]
+    """A line for each parameter of two sets that differs, with a question if it surprises."""
+    symbols = {parameter.symbol for parameter in before.values()}
+    added = [parameter for parameter in after.values() if parameter.symbol not in symbols]
     lines = [
-        f"{each.symbol} ({each.name}): {'/'.join(f'{v:g}' for v in each.values)} "
-        f"{unit_text(each.unit)}".rstrip()
-        for each in added
+        f"{parameter.symbol} ({parameter.name}): {'/'.join(f'{v:g}' for v in parameter.values)} "
+        f"{unit_text(parameter.unit)}".rstrip()
+        for parameter in added
     ]
-    if UNFELT in {each.symbol for each in added} and not set(FEELING) & set(after.refinements):
+    if UNFELT in {parameter.symbol for parameter in added} and not set(FEELING) & set(
+        after.refinements
+    ):
         lines.append(f"! {UNFELT} changes nothing without {' or '.join(FEELING)}: set one as well.")
     for old in before.values():
         new = after[old.symbol]
         if new.value == old.value:
             continue
-        words = ("/".join(f"{v:g}" for v in each.values) for each in (old, new))
+        words = ("/".join(f"{v:g}" for v in parameter.values) for parameter in (old, new))
         unit = unit_text(old.unit)
         lines.append(f"{old.symbol} ({old.name}): {' -> '.join(words)} {unit}".rstrip())
         ratios = [b / a for a, b in zip(old.values, new.values, strict=False) if a and isfinite(a)]
@@ -312,7 +320,7 @@ def changes_between(before: ParameterSet, after: ParameterSet) -> list[str]:
 # --- commands -------------------------------------------------------------------------------------
 
 
-def maneuver_of(word: str, *drives: Drive) -> Maneuver:
+def named_maneuver(word: str, *drives: Drive) -> Maneuver:
     """A maneuver such as ``step:9``, or the thesis's test of that name for these drives."""
     from swashplate.maneuvers import parse, source_tests
     from swashplate.parameters.files import AXES
@@ -326,10 +334,10 @@ def maneuver_of(word: str, *drives: Drive) -> Maneuver:
     except InputError as error:
         if ":" in word or not tests:
             raise
-        said = str(error).rstrip(".")
+        sentence = str(error).rstrip(".")
         near = get_close_matches(word, tests, 1) or [*tests]
         raise InputError(
-            f'{said}; or name one of the tests of {" or ".join(axes)}, such as "{near[0]}".'
+            f'{sentence}; or name one of the tests of {" or ".join(axes)}, such as "{near[0]}".'
         ) from None
 
 
@@ -338,20 +346,20 @@ def at_rate(drive: Drive, rate: float) -> Drive:
     from swashplate.cli.terminal import note
     from swashplate.equations.marching.record import least_substeps
 
-    own, marched = drive.parameters.rate, rate * least_substeps(rate)
-    if own is None or abs(marched / own - 1.0) < 1e-9:
+    filter_rate, marched = drive.parameters.rate, rate * least_substeps(rate)
+    if filter_rate is None or abs(marched / filter_rate - 1.0) < 1e-9:
         return drive
     steps = "" if marched == rate else f", computed in steps of 1/{marched:g} s,"
     note(
-        f"{drive.name}: the card's filter is a recursion for {own:g} Hz; at {rate:g} Hz{steps} the "
-        "differential equation with the same poles replaces it."
+        f"{drive.name}: the card's filter is a recursion for {filter_rate:g} Hz; at {rate:g} "
+        f"Hz{steps} the differential equation with the same poles replaces it."
     )
     return drive.at_every_rate()
 
 
 def simulated_as(drive: Drive, command: str, options: Simulating) -> tuple[str, Simulation]:
-    """As `simulated`, from the start and with the inputs that the options name."""
-    return simulated(
+    """As `simulated_run`, from the start and with the inputs that the options name."""
+    return simulated_run(
         drive,
         command,
         options,
@@ -361,10 +369,10 @@ def simulated_as(drive: Drive, command: str, options: Simulating) -> tuple[str, 
     )
 
 
-def simulated(
+def simulated_run(
     drive: Drive,
     command: str,
-    options: Sampling,
+    options: CommandSampling,
     *,
     start: Start = "rest",
     clip: bool = False,
@@ -375,7 +383,7 @@ def simulated(
 
     head = command.partition(":")[0]  # stairs:2/4/0 is not a path
     if not ("/" in head or _ENDING.search(head) or Path(command).is_file()):
-        maneuver = maneuver_of(command, drive)
+        maneuver = named_maneuver(command, drive)
         name, where, values, time = maneuver.name, "", maneuver.sample(options.rate), None
     else:
         kind = file_kind(Path(command))
@@ -418,18 +426,18 @@ def _measured(measured: Sequence[str], log: str, time_column: str) -> dict[str, 
 
     found = dict[str, Any]()
     for word in measured:
-        name, _, said = (part.strip() for part in word.partition("="))
-        if name not in MEASURED or not said or name in found:
-            known = ", ".join(MEASURED)
-            raise InputError(f"--measured {word}: write NAME=COLUMN, once for each of {known}.")
+        name, _, text = (part.strip() for part in word.partition("="))
+        if name not in MEASURED or not text or name in found:
+            names = ", ".join(MEASURED)
+            raise InputError(f"--measured {word}: write NAME=COLUMN, once for each of {names}.")
         try:
-            found[name] = float(said)
+            found[name] = float(text)
         except ValueError:
             if not log:
                 must = "a maneuver has no columns, so give a number in SI"
                 raise InputError(f"--measured {word}: {must}.") from None
             unit = MEASURED[name][0]
-            found[name] = read_series(log, said, unit, time_column=time_column).values
+            found[name] = read_series(log, text, unit, time_column=time_column).values
     return found
 
 
@@ -440,10 +448,10 @@ def window_of(time: Array, begin: float | None, end: float | None) -> tuple[floa
     return None if whole else (first if begin is None else begin, last if end is None else end)
 
 
-def trial_of(drive: Drive, command: str, options: Sampling) -> tuple[str, Trial]:
+def named_trial(drive: Drive, command: str, options: CommandSampling) -> tuple[str, Trial]:
     """Name of a command, a maneuver or a log, and the trial that it makes."""
     from swashplate.analysis.outcomes import trial_of
 
     drive = at_rate(drive, options.rate)
-    name, run = simulated(drive, command, options)
+    name, run = simulated_run(drive, command, options)
     return name, trial_of(drive, run["voltage"], options.rate)
