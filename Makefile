@@ -15,7 +15,7 @@ export PIP_DISABLE_PIP_VERSION_CHECK := 1
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: help .venv demo test test-slow test-kernels lint lint-js docs figures reproduce bench cluster fuzz tools browser packages calibration faults owner-table \
+.PHONY: help .venv demo test test-slow test-kernels lint lint-js docs sentences figures reproduce bench cluster fuzz tools browser packages calibration faults owner-table \
   coverage dist matrix binaries format clean
 
 help: ## list the targets
@@ -82,6 +82,9 @@ lint-js: ## style, format and types of the pages' JavaScript (needs Node.js)
 docs: $(STAMP) ## build the documentation into docs/_build/html; warnings are errors
 	@$(BIN)/sphinx-build -q -W --keep-going -b html docs docs/_build/html
 	@echo "Open docs/_build/html/index.html"
+
+sentences: $(STAMP) ## write down all that the package says, for review, in tests/golden/sentences.txt
+	@$(BIN)/python tools/sentences.py --write
 
 figures: $(STAMP) ## make all figures of README and documentation again
 	@$(BIN)/python docs/figures.py
