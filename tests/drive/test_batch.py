@@ -26,8 +26,8 @@ from swashplate.drive import drive_instance
 from swashplate.equations import Model, Tap, equation, simulate
 from swashplate.equations.code_generation.lowering import definition_in, lowered
 from swashplate.equations.code_generation.machine_code import optimised
+from swashplate.equations.marching.kernels import KERNEL_KINDS
 from swashplate.equations.marching.lanes import LANES, MARCH_KINDS, lanes_of
-from swashplate.equations.marching.pieces import PIECE_KINDS
 from swashplate.equations.marching.run import LIBRARY
 from swashplate.equations.marching.structure import structure_of
 from swashplate.models.displacement_control import PumpOptions
@@ -319,7 +319,7 @@ def test_partial_derivatives_are_filled_as_vectors() -> None:
     pieces = structure_of(pump_drive, ("current",), options, ("shaft_speed",)).facts.pieces
     (fill,) = (piece for piece in pieces if piece.member == "fill_pump")
     function = definition_in(fill.text, fill.member, LIBRARY)
-    text = str(optimised(lowered(function, PIECE_KINDS, "fill")))
+    text = str(optimised(lowered(function, KERNEL_KINDS, "fill")))
     assert re.search(r"<\d+ x double> @llvm\.sqrt", text)
 
 
