@@ -316,8 +316,8 @@ def test_samples_without_weight_may_be_missing(hoist: Drive) -> None:
 @pytest.mark.skipif(bool(config.DISABLE_JIT), reason="nothing is compiled")
 def test_partial_derivatives_are_filled_as_vectors() -> None:
     options = (None, PumpOptions())
-    pieces = structure_of(pump_drive, ("current",), options, ("shaft_speed",)).facts.pieces
-    (fill,) = (piece for piece in pieces if piece.member == "fill_pump")
+    kernels = structure_of(pump_drive, ("current",), options, ("shaft_speed",)).facts.kernels
+    (fill,) = (kernel for kernel in kernels if kernel.member == "fill_pump")
     function = definition_in(fill.text, fill.member, LIBRARY)
     text = str(optimised(lowered(function, KERNEL_KINDS, "fill")))
     assert re.search(r"<\d+ x double> @llvm\.sqrt", text)
