@@ -57,7 +57,7 @@ can hold."""
 def read_text(path: str | Path) -> str:
     """The text of a UTF-8 file, without the byte-order mark that some editors begin it with.
 
-    A `FileError` if there is none, it cannot be read, or is no ordinary file of up to 64 MB.
+    A `FileError` if there is none, it cannot be read, or is not an ordinary file of up to 64 MB.
     """
     file = Path(path)
     try:
@@ -65,7 +65,7 @@ def read_text(path: str | Path) -> str:
         if S_ISDIR(status.st_mode):
             raise FileError(f"{path} is a folder, not a file.")
         if not S_ISREG(status.st_mode):
-            raise FileError(f"{path} is no ordinary file.")
+            raise FileError(f"{path} is not an ordinary file.")
         if status.st_size > LARGEST:
             raise FileError(f"{path} has more than {LARGEST // 2**20} MB: it is not such a text.")
         return file.read_text("utf-8-sig")

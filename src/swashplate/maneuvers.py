@@ -548,7 +548,7 @@ def parse(text: str) -> Maneuver:
     """
     name, _, arguments = text.partition(":")
     if name not in _COMMANDS:
-        raise InputError(f"{name!r} is no maneuver: choose one of {', '.join(_COMMANDS)}.")
+        raise InputError(f"{name!r} is not a maneuver: choose one of {', '.join(_COMMANDS)}.")
     items = [item.rpartition("=") for item in arguments.split(",")] if arguments else []
     positional = [_value(value) for _, equals, value in items if not equals]
     keywords = {key.strip(): _value(value) for key, equals, value in items if equals}

@@ -458,7 +458,7 @@ def _counter(counts: Array, tools: Instruments, chance: Generator) -> Array:
 
     It shows how many edges were passed. Where between two edges the shaft stands at first is
     chance, so that on average the steps are no error. A counter of b bits counts from −2ᵇ⁻¹ to
-    2ᵇ⁻¹ − 1 and begins anew.
+    2ᵇ⁻¹ − 1 and wraps.
     """
     first = float(chance.random())
     if tools.encoder_step:

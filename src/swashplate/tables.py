@@ -330,7 +330,7 @@ def check_place(path: str | Path) -> None:
         if not folder.exists():
             reason = f"folder {folder} does not exist"
         elif not folder.is_dir():
-            reason = f"{folder} is no folder"
+            reason = f"{folder} is not a folder"
         elif target.is_dir():
             reason = "it is a folder"
         elif not os.access(folder, os.W_OK):
@@ -356,7 +356,7 @@ def check_folder(folder: Path) -> None:
         parent for parent in (folder.absolute(), *folder.absolute().parents) if parent.exists()
     )
     if not there.is_dir():
-        raise FileError(f"{folder} cannot be made: {there} is no folder.")
+        raise FileError(f"{folder} cannot be made: {there} is not a folder.")
     if not os.access(there, os.W_OK | os.X_OK):
         raise FileError(f"{folder} cannot be written to: {there} is read-only or another user's.")
 

@@ -109,7 +109,7 @@ THERE_AND_BACK = np.floor(9000.0 * np.sin(0.6 * LONG))
         (THERE_AND_BACK % 3990, None, 4000),
         (THERE_AND_BACK % 3990, 3990.0, 3990),  # the counts of a turn are likely
         ((THERE_AND_BACK + 2048) % 4096 - 2048, None, 4096),  # signed
-        (THERE_AND_BACK, None, 0),  # never begins anew
+        (THERE_AND_BACK, None, 0),  # never wraps
         (np.arange(2001.0) % 256, None, 0),  # counts the samples
         (THERE_AND_BACK % 4096 + 0.5, None, 0),
         (np.where(LONG % 2.0 < 1.0, 0.0, 1000.0), None, 0),  # a switch

@@ -33,7 +33,7 @@ REFUSED = {
     "full-order hoist --physical oil_volume": "--physical cannot read 'oil_volume'; write",
     "simulate crane step:9": "no packaged set, file or folder 'crane'; packaged are hoist, slew",
     "simulate none.toml step:9": "There is no file none.toml",
-    "simulate hoist stepp:9": "'stepp' is no maneuver: choose one of rest, step",
+    "simulate hoist stepp:9": "'stepp' is not a maneuver: choose one of rest, step",
     "simulate hoist 'step +8 V'": 'multisine; or name one of the tests of hoist, such as "step +9',
     "simulate hoist step": "'amplitude'; step takes amplitude, start, stop, length; or name one",
     "simulate hoist step:9 --set z16=1e-4": "did you mean Z16?",

@@ -337,7 +337,7 @@ def test_cut_files_and_other_conventions_are_refused(tmp_path):
         del file["RAO"]
     for _ in range(2):
         with pytest.raises(
-            FileError, match="is no file of netCDF 4 with an array RAO over complex"
+            FileError, match="is not a file of netCDF 4 with an array RAO over complex"
         ):
             read_ship(nc)
         nc.write_text("nothing", "utf-8")

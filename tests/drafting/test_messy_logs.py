@@ -252,14 +252,14 @@ def test_a_run_is_split_where_its_counter_may_have_gone_round(drafted, again) ->
     assert (first.start, second.start) == ("rest", "estimated")
     assert first.input.time[-1] < 5.0
     assert "split at 7.305 s" in first.notes[0]
-    assert "the counter 'encoder_counts', which begins anew after 65536" in first.notes[0]
+    assert "the counter 'encoder_counts', which wraps at 65536" in first.notes[0]
     # each part turns as fast as the shaft did
     for part, true in ((first, speed[TIME < 5.0]), (second, speed[TIME > 7.3])):
         turns = np.diff(part["encoder_counts"].values) / (2.0 * np.pi) * 4096.0 * RATE
         assert turns[-50:].mean() == pytest.approx(true[-50:].mean(), rel=2e-3)
 
 
-# --- an angle that begins anew --------------------------------------------------------------------
+# --- an angle that wraps --------------------------------------------------------------------
 
 SPEED = 4.0 * lagged(BOTH)
 """Of a shaft that turns by about seven turns to and fro. [rad/s]"""
@@ -303,7 +303,7 @@ def test_a_sample_read_while_the_angle_went_back_turns_no_shaft(drafted: Drafted
 def test_a_run_is_split_where_an_angle_may_have_gone_round(drafted: Drafted) -> None:
     kept = (TIME < 2.0) | (TIME > 2.9)
     first, second = drafted(keep=kept, **{"angle [deg]": TURNED % 360.0})
-    assert "the position 'position', which begins anew after 360, may have" in first.notes[0]
+    assert "the position 'position', which wraps at 360, may have" in first.notes[0]
     assert (first.start, second.start) == ("rest", "estimated")
 
 

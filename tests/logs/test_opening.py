@@ -27,8 +27,8 @@ NO_FILES = {
     "none.csv": "There is no file",
     "log.xyz": r"ends in '\.xyz'; a log is read from \.csv, ",
     "log.xlsx": r"ends in '\.xlsx'.*: save a spreadsheet as CSV",
-    "pipe.csv": "pipe.csv is no ordinary file",
-    "zero.csv": "zero.csv is no ordinary file",
+    "pipe.csv": "pipe.csv is not an ordinary file",
+    "zero.csv": "zero.csv is not an ordinary file",
     "a" * 300 + ".csv": "cannot be read",
 }
 
@@ -237,13 +237,13 @@ DAMAGED = [
     ("empty.csv", text(""), "empty.csv is empty"),
     ("comments.csv", text("# a\n% b\n"), "only comments and empty lines"),
     ("header.csv", text("time,voltage\n"), "only 1 line of text"),
-    ("word.csv", rows("0.25,x"), "'voltage' holds 'x', which is no number, in data row 3 (line 4)"),
+    ("word.csv", rows("0.25,x"), "'voltage' holds 'x', ... in data row 3 (line 4)"),
     ("first.csv", text("time,voltage\nx,1\n1,2\n2,3\n"), "holds 'x', ... in data row 1 (line 2)"),
-    ("mixed.csv", text("time,u\n10:00:00,1\n11,2\n"), "'11', which is no date ... row 2 (line 3)"),
+    ("mixed.csv", text("time,u\n10:00:00,1\n11,2\n"), "'11', ... date ... row 2 (line 3)"),
     (
         "late.csv",
         text("time,u\n" + "10:00:00.5,1\n" * 200_000 + "7,1\n8,1\n"),
-        "'7', which is no date ... row 200001 (line 200002)",
+        "'7', which is not a date ... row 200001 (line 200002)",
     ),
     ("control.csv", rows("0.25,\x1b[2J"), "control.csv has the byte 0x1b in line 4"),
     ("short.csv", rows("0.25"), "data row 3 (line 4) has 1 field instead of 2"),
@@ -257,7 +257,7 @@ DAMAGED = [
     ("thousands.csv", text("a;b\n1,234;5\n2,345;6\n"), "'1,234', where the comma may be a decimal"),
     ("either.csv", text("voltage\n0,5\n1,5\n"), "has no column 'voltage'; it has 'column 1',"),
     ("open.csv", text('a,b\n1,"2\n3,4\n'), "misplaced quotes in data row 1 (line 2)"),
-    ("wide.csv", text("time,u\n0,1\n".encode("utf-16")[:-1]), "is no text in utf-16-le"),
+    ("wide.csv", text("time,u\n0,1\n".encode("utf-16")[:-1]), "is not text in utf-16-le"),
     ("excel.csv", text(b"PK\x03\x04" + bytes(50)), "ends in '.csv' but holds Excel or zip"),
     ("parquet.csv", disguised, "ends in '.csv' but holds Parquet"),
     # Parquet

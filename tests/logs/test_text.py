@@ -108,7 +108,7 @@ def test_only_what_is_asked_for_must_be_numbers_and_quotes_may_hold_delimiters(t
     log = text('time,"note, left",voltage\n0,"on, off",1\n1,,2\n')
     assert log.columns[1].name == "note, left"
     assert log.read(["voltage"])["voltage"].tolist() == [1.0, 2.0]
-    with pytest.raises(FileError, match="holds 'on, off', which is no number, in data row 1"):
+    with pytest.raises(FileError, match="holds 'on, off', which is not a number, in data row 1"):
         log.read(["note, left"])
 
 

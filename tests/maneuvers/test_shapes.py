@@ -120,8 +120,8 @@ def test_parse_makes_what_the_function_makes(text, same):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("jump:9", "'jump' is no maneuver: choose one of rest, step, ramp, sine, stairs, chirp"),
-        ("", "'' is no maneuver"),
+        ("jump:9", "'jump' is not a maneuver: choose one of rest, step, ramp, sine, stairs, chirp"),
+        ("", "'' is not a maneuver"),
         ("step", "missing a required argument: 'amplitude'; step takes amplitude, start, stop"),
         ("step:1,2", "too many positional arguments; step takes amplitude, start, stop, length"),
         ("step:1,end=2", "unexpected keyword argument 'end'; step takes amplitude, start, stop"),

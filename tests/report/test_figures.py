@@ -455,7 +455,7 @@ def test_few_signals_of_a_user_defined_model_stand_in_one_column(assert_legible)
     ax = Figure().subplots()
     assert run.plot("pressure", ax=ax, title="here") is ax
     assert (ax.get_ylabel(), ax.get_xlabel()) == ("chamber pressure (bar)", "time (s)")
-    # a column of a table has a name, too, but is no maneuver
+    # a column of a table has a name, too, but is not a maneuver
     column = pl.Series("force", run["force"])
     again = simulate(SHAKER, Masses(), {"force": column}, 100.0)
     assert again.title == "shaker"

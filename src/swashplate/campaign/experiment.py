@@ -109,7 +109,7 @@ class Encoder(NamedTuple):
     sign: Literal[1, -1]
     """-1 if it counts down at positive speed."""
     rolls_over_at: int | None
-    """Counts after which the counter begins anew."""
+    """Counts at which the counter wraps."""
 
     @property
     def angle_per_count(self) -> float:
@@ -274,7 +274,7 @@ class Channel(Result):
     stated: float = 1.0
     """Size of the unit in which the campaign file states it, in `unit`."""
     rolls_over_at: float | None = None
-    """Reading after which a position begins anew, in `unit`; it is unwrapped."""
+    """Reading after which a position wraps, in `unit`; it is unwrapped."""
     interpolation: Interpolation = "linear"
     """What it is between two stamps, if a model takes it as an input."""
     accuracy: Accuracy | None = None

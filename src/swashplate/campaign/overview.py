@@ -53,7 +53,7 @@ class BlockRanges(Result):
     """The last stamp. [s]"""
     low: Array
     high: Array
-    """(n,) as recorded: a counter that begins anew does so here; NaN in a block without a number.
+    """(n,) as recorded: a counter that wraps does so here; NaN in a block without a number.
     [unit]"""
     missing: int
     """Samples that are no finite number."""

@@ -293,7 +293,7 @@ def unsigned_currents(experiments: Iterable[Experiment]) -> dict[tuple[str, str]
 
 
 def wrapped_positions(experiments: Iterable[Experiment]) -> dict[tuple[str, str], str]:
-    """Positions that jump by a turn where their angle begins anew, with the line that mends it.
+    """Positions that jump by a turn where their angle wraps, with the line that mends it.
 
     By axis and channel.
     """
@@ -307,7 +307,7 @@ def wrapped_positions(experiments: Iterable[Experiment]) -> dict[tuple[str, str]
                 where = f"axes.{experiment.axis}.channels.{name}"
                 sentences[experiment.axis, name] = (
                     f"'{name}' of the axis '{experiment.axis}' jumps by about a whole turn, as an "
-                    f"angle that begins anew does; write rolls_over_at = {size} in [{where}]"
+                    f"angle that wraps does; write rolls_over_at = {size} in [{where}]"
                 )
     return sentences
 
@@ -326,7 +326,7 @@ def spikes(signal: Channel | InputSignal, drive: InputSignal) -> list[tuple[floa
     A sample is one where it lies more than 8 median absolute deviations from the running median of
     11 samples, and beyond all values of that median by a tenth of their range; or, of a channel
     while the input has stood still for 0.3 s, by a quarter of the range from the median within it.
-    Of a position that begins anew a quarter of a turn is enough: it is read while it goes back.
+    Of a position that wraps a quarter of a turn is enough: it is read while it goes back.
     """
     from scipy.ndimage import median_filter
 

@@ -232,7 +232,7 @@ class _Columns:
     ) -> tuple[str, NDArray[np.float64]]:
         """The SI unit of a signal, and all its samples (n,) in it; NaN if one is not finite.
 
-        Nothing is left out, and a counter that begins anew does so.
+        Nothing is left out, and a counter that wraps does so.
         """
         si, factor, zero = self._conversion(what, signal)
         numbers = signal.scale * self.values[signal.column] + signal.offset
@@ -374,7 +374,7 @@ def _experiments(
         for row in ambiguous_gaps(time, values, factor * size) if size is not None else ():
             cuts[float(time[row])] = (
                 f"within the gap of {time[row] - time[row - 1]:.3g} s the {what} '{channel}', "
-                f"which begins anew after {size:.12g}, may have gone round once more or less"
+                f"which wraps at {size:.12g}, may have wrapped once more or less"
             )
     if not signals:
         raise InputError(

@@ -156,7 +156,7 @@ def unwrap_counts(counts: ArrayLike, modulus: int) -> Array:
 
 
 def unwrap_position(position: Array, size: float) -> Array:
-    """Position (n,) of a sensor that begins anew after `size`, by the short way at each step.
+    """Position (n,) of a sensor that wraps after `size`, by the short way at each step.
 
     A single sample about halfway between two near ones, taken while the sensor went back, does not
     turn the shaft; it stays what it is, half a turn off.
@@ -169,7 +169,7 @@ def unwrap_position(position: Array, size: float) -> Array:
     if (reach := float(np.ptp(position))) > BEYOND * size:
         raise InputError(
             f"the readings reach over {reach / size:.4g} times rolls_over_at, but a position that "
-            "begins anew stays within it; give its own size, or leave rolls_over_at out."
+            "wraps stays within it; give its own size, or leave rolls_over_at out."
         )
     steps = _shortest(np.diff(position), size)
     far = np.concatenate([[False], np.abs(steps) > 0.25 * size, [False]])
@@ -243,7 +243,7 @@ def find_lost_counts(time: Array, counts: Array) -> Rows:
 
 
 def rolls_over_at(values: Array, counts_per_turn: float | None = None) -> int:
-    """Counts after which a counter begins anew, 0 if the numbers are not such a counter's.
+    """Counts after which a counter wraps, 0 if the numbers are not such a counter's.
 
     The numbers are whole and many, and some steps go over more than half of their range, which
     become as small as the others when they are taken the other way round. Numbers that only go up
@@ -260,7 +260,7 @@ def rolls_over_at(values: Array, counts_per_turn: float | None = None) -> int:
 
 
 def turns_over(position: Array, turn: float) -> bool:
-    """Whether a position (n,) of one unit jumps by about a `turn`, where its angle begins anew."""
+    """Whether a position (n,) of one unit jumps by about a `turn`, where its angle wraps."""
     values = position[np.isfinite(position)]
     reach = float(np.ptp(values)) if values.size else 0.0
     within = 0.5 * turn < reach < BEYOND * turn

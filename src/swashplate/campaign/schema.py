@@ -304,7 +304,7 @@ class ChannelEntry(SignalEntry):
     )
     rolls_over_at: Positive | None = Field(
         None,
-        description="Counts after which the counter begins anew, 65536 for 16 bits; of a position "
+        description="Counts at which the counter wraps, 65536 for 16 bits; of a position "
         "the reading in `unit`, 360 for deg.",
     )
     noise: Positive | None = Field(

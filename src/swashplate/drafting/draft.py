@@ -92,7 +92,7 @@ class _Guess(NamedTuple):
     in_header: bool = True
     """Whether its unit stands in brackets, or in a row of its own, where it is read from again."""
     rolls_over_at: float = 0.0
-    """Reading after which an encoder's counter or an angle begins anew; 0 if it does not."""
+    """Reading after which an encoder's counter or an angle wraps; 0 if it does not."""
     why: str = "from its name"
     """What its unit rests on, for the comment beside it, if it does not stand in the header."""
     of_plc: bool = False
@@ -489,7 +489,7 @@ def _signal_lines(
         why = f"range of the instrument over {guess.full_scale}, as of a PLC's word at full scale"
         lines.append(f"scale = 1.0    # {FIXME}: {why}")
     if size := guess.rolls_over_at:
-        lines.append(f"rolls_over_at = {size:.9g}    # guessed: begins anew there")
+        lines.append(f"rolls_over_at = {size:.9g}    # guessed: wraps there")
     if empty := sum(int(np.count_nonzero(~np.isfinite(part))) for part in blocks):
         lines.append(f'missing = "drop"    # guessed: {empty} cells are empty')
     neutral = next((x for part in blocks for x in part[np.isfinite(part)][:1].tolist()), 0.0)
@@ -521,7 +521,7 @@ def _unit_lines(signal: _Guess) -> list[str]:
     units = KINDS[signal.kind].units
     usual = (*units, "1")[0]
     if signal.unit is not None and units and not _measures(signal.kind, signal.unit):
-        why = f"'{signal.unit}', as the header has it, is no unit of a {signal.kind}"
+        why = f"'{signal.unit}', as the header has it, is not a unit of a {signal.kind}"
         return [f"unit = {toml_string(usual)}    # {FIXME}: {why}"]
     if signal.in_header:
         return []

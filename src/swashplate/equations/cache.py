@@ -41,7 +41,7 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 UNCACHED = (
-    "swashplate's compiled kernels cannot be kept, so that every session compiles them anew; set "
+    "swashplate's compiled kernels cannot be kept, so that every session compiles them again; set "
     "NUMBA_CACHE_DIR to a folder that can be written."
 )
 COMPILING = "Compiling equations, once on this machine"

@@ -96,11 +96,11 @@ def check_members(members: Mapping[str, Any], names: Mapping[str, str]) -> None:
     for what in ("old", "new"):
         if not is_function(members[what]):
             raise InputError(
-                f"{names[what]} is no equation: give a function marked with @equation."
+                f"{names[what]} is not an equation: give a function marked with @equation."
             )
     parameters = members.get("parameters")
     if parameters is not None and not is_named_tuple(parameters):
-        raise InputError(f"{names['parameters']} is no class of named tuples.")
+        raise InputError(f"{names['parameters']} is not a class of named tuples.")
 
 
 def uses(model: Model, equation: Equation) -> bool:

@@ -459,4 +459,4 @@ def _step_of(path: Path, fmpy: Any) -> float:
         (step,) = [variable for variable in described.modelVariables if variable.name == "step"]
         return float(step.start)
     except Exception:
-        raise FileError(f"{path} is no FMU of swashplate.") from None
+        raise FileError(f"{path} is not an FMU of swashplate.") from None

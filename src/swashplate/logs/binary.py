@@ -172,7 +172,7 @@ def _signals(
     ``"[{}]"`` of HDF5. In `reverse` its dimensions are stored the other way round.
     """
     shape, kind = array.shape[::-1] if reverse else array.shape, array.dtype.kind
-    reason = "" if kind in "iufb" else _KINDS.get(kind, "it is no array of numbers")
+    reason = "" if kind in "iufb" else _KINDS.get(kind, "it is not an array of numbers")
     reason = reason or ("it is empty" if 0 in shape else "")
     if not reason and len(shape) > 2:
         reason = f"it has {len(shape)} dimensions"
@@ -302,7 +302,7 @@ def _capytaine(path: Path) -> Iterator[Iterable[_Item]]:
             columns = _wave_rows(file["RAO"])
     except Exception as error:  # at a broken byte the library and its objects raise all there is
         raise FileError(
-            f"{path} is no file of netCDF 4 with an array RAO over complex, {', '.join(_AXES)}, "
+            f"{path} is not a file of netCDF 4 with an array RAO over complex, {', '.join(_AXES)}, "
             f"with their coordinates and the parts re and im: {said(error)}."
         ) from None
     yield (

@@ -107,7 +107,7 @@ def encoding_of(path: Path, stated: str | None) -> tuple[str, int]:
             text = codecs.getincrementaldecoder(name)("strict").decode(head[len(mark) :])
             break
         except UnicodeError as error:
-            why = f"is no text in {name}: {error}"
+            why = f"is not text in {name}: {error}"
     else:
         check_kind(path)
         raise FileError(f"{path} {why}.")

@@ -89,7 +89,7 @@ def _check_readable(source: Path, why: str = "") -> None:
         if source.is_dir():
             why = "is a folder, not a log"
         elif not why and source.exists() and not source.is_file():
-            why = "is no ordinary file"
+            why = "is not an ordinary file"
         elif not why:
             with source.open("rb") as file:
                 why = "" if file.read(1) else "is empty"

@@ -82,7 +82,7 @@ def _pieces(path: Path, encoding: str, skipped: int) -> Iterator[str]:
                 if len(rest) == LONGEST_LINE:
                     megabytes = LONGEST_LINE >> 20
                     raise FileError(
-                        f"{path} has a line of more than {megabytes} MB; it is no table of text."
+                        f"{path} has a line of more than {megabytes} MB; it is not a table of text."
                     )
                 text += rest
                 # old programs end a text with a mark
@@ -90,7 +90,7 @@ def _pieces(path: Path, encoding: str, skipped: int) -> Iterator[str]:
         except UnicodeError as error:
             # the error's position is within the bytes that were read last
             why = getattr(error, "reason", error)
-            raise FileError(f"{path} is no text in {encoding}: {why}.") from None
+            raise FileError(f"{path} is not text in {encoding}: {why}.") from None
 
 
 # --- rows -----------------------------------------------------------------------------------------
@@ -199,7 +199,7 @@ class _Table:
             kind += f" with a decimal {'comma' if other_mark == '.' else 'point'}"
         raise FileError(
             f"{self.path}: column '{self.columns[position].name}' holds "
-            f"'{shown(text[row])}', which is no {kind}, in data row {count + row + 1} "
+            f"'{shown(text[row])}', which is not a {kind}, in data row {count + row + 1} "
             f"(line {lines[row]})."
         )
 

@@ -316,7 +316,7 @@ def plot_overview(overview: Overview, *, title: str | None = None) -> Figure:
     """Figure of a whole long log, with its windows: a panel for the input and each channel.
 
     A signal is drawn from its lowest to its highest sample in each short stretch of time, as
-    recorded: a counter that begins anew does so here.
+    recorded: a counter that wraps does so here.
 
     Parameters
     ----------
