@@ -181,7 +181,7 @@ def test_a_recursion_for_another_rate_becomes_its_equation(done):
     [
         (
             "time,voltage\n0,1\n1,x\n2,1\n",
-            "'voltage' holds 'x', which is not a number, in data row 2",
+            "'voltage' holds 'x', which is not a number",
         ),
         ("time,voltage\n0,1\n2,1\n1,1\n", "'time' goes back from 2.0 to 1.0 in data row 3"),
         ("time,voltage\n0,1\n1,-10.5\n", "-10.5 V at 1 s, but the card takes ±10 V"),

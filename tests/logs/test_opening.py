@@ -286,7 +286,7 @@ DAMAGED = [
     ("open.tdms", changed(tdms, 12, b"\xff" * 8), "Last segment of file has less data"),
     ("note.tdms", tdms, "note' cannot be read as numbers: it holds text"),
     # MDF
-    ("text.mf4", text("time,voltage\n0,1\n"), "text.mf4 is no MDF file"),
+    ("text.mf4", text("time,voltage\n0,1\n"), "text.mf4 is not an MDF file"),
     ("three.mf4", text(b"MDF     3.30    ".ljust(64, b"\0")), "is MDF '3.30'; convert it to MDF 4"),
     ("unfinished.mf4", text(b"UnFinMF 4.10    ".ljust(64, b"\0")), "was not finished by"),
     ("cut.mf4", cut(mdf, 0.5), "cut.mf4"),

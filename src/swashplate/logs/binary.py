@@ -80,7 +80,7 @@ def _form_of(reader: str, path: Path) -> str:
         version = head[8:16].decode("latin-1").strip(" \0")
         why = "" if version.startswith("4") else f"is MDF {version!r}; convert it to MDF 4"
         if not head.startswith(b"MDF     ") or len(head) < 64:
-            why = "is no MDF file"
+            why = "is not an MDF file"
         if head.startswith(b"UnFinMF "):
             why = "was not finished by its logger; let its program finalise it"
         if why:
