@@ -55,9 +55,11 @@ class Drive(Result, Mapping[str, Parameter]):
 
     Examples
     --------
+    >>> from swashplate import Drive, maneuvers
     >>> hoist = Drive.preset("hoist")
-    >>> run = hoist.simulate(maneuvers.step(9.0).sample(512.0))
-    >>> run.shaft_speed.max()
+    >>> run = hoist.simulate(maneuvers.step(9.0))
+    >>> round(float(run.shaft_speed.max()), 2)
+    3.42
     """
 
     parameters: ParameterSet
@@ -77,7 +79,30 @@ class Drive(Result, Mapping[str, Parameter]):
 
     @classmethod
     def preset(cls, name: str) -> Drive:
-        """A packaged drive, ``"hoist"``, ``"slew"``, ``"luff"`` or ``"neutral"``, by its name."""
+        """A packaged drive by its name.
+
+        Parameters
+        ----------
+        name : {"hoist", "slew", "luff", "neutral"}
+            One of Kruse's three axes, or a straight line without limits to begin another machine
+            with.
+
+        Returns
+        -------
+        Drive
+            With the values, bounds and sources of its parameter file.
+
+        Raises
+        ------
+        ParameterError
+            For another name; the sentence lists those that there are.
+
+        Examples
+        --------
+        >>> from swashplate import Drive
+        >>> Drive.preset("hoist")
+        Drive('hoist', card 'rexroth_mdsd_1k_2x_2')
+        """
         return cls(load_preset(name))
 
     @classmethod
@@ -90,19 +115,47 @@ class Drive(Result, Mapping[str, Parameter]):
             The file, or a folder that `Identification.save` or ``swashplate fit`` wrote, of which
             ``drive.toml`` is read.
 
+        Returns
+        -------
+        Drive
+            With the file's parameters; of a folder those that the fit found.
+
         Raises
         ------
         FileError
             If there is no such file, or the folder does not hold a drive.
         ParameterError
             If an entry is wrong; the sentence names file, parameter and rule.
+
+        Examples
+        --------
+        >>> from swashplate import Drive
+        >>> Drive.preset("hoist").replace(Z16_plus=1.2e-4).to_toml("hoist.toml")
+        >>> Drive.from_toml("hoist.toml")["Z16_plus"].value
+        0.00012
         """
         return cls(load_set(path))
 
     def to_toml(self, path: str | Path) -> None:
         """Store the parameters; `from_toml` gives an equal drive back.
 
-        If the file cannot be written (`FileError`), an older one stays as it was.
+        Parameters
+        ----------
+        path : path
+            The file to write. An older one is replaced as a whole.
+
+        Raises
+        ------
+        FileError
+            If the file cannot be written; an older one stays as it was.
+
+        Examples
+        --------
+        >>> from swashplate import Drive
+        >>> hoist = Drive.preset("hoist")
+        >>> hoist.to_toml("hoist.toml")
+        >>> Drive.from_toml("hoist.toml") == hoist
+        True
         """
         from swashplate.tables import write_text
 
@@ -148,15 +201,53 @@ class Drive(Result, Mapping[str, Parameter]):
             By symbol (``Z16=1.2e-4`` both ways, ``Z16=(1.2e-4, 1.5e-4)`` plus and minus) or by one
             direction (``Z16_plus=1.2e-4``), in SI or with a unit (``Z16=0.12 * ureg.mm``).
 
+        Returns
+        -------
+        Drive
+            A new drive, whose changed parameters have the status ``"user"``. This one stays as it
+            is.
+
         Raises
         ------
         ParameterError
             For an unknown name or a value that breaks a rule.
+
+        Examples
+        --------
+        >>> from swashplate import Drive
+        >>> wider = Drive.preset("hoist").replace(Z16=(1.2e-4, 1.6e-4))
+        >>> wider["Z16"].value
+        Pair(plus=0.00012, minus=0.00016)
         """
         return Drive(self.parameters.replace(changes))
 
     def scale(self, **factors: Change) -> Drive:
-        """A drive with values multiplied, e.g. ``scale(Z16=1.5, Z10=1.5)``; as `replace`."""
+        """A drive with values multiplied.
+
+        Parameters
+        ----------
+        **factors : float, or a pair of them
+            By symbol (``Z16=1.5`` both ways, ``Z16=(1.5, 1.2)`` plus and minus) or by one direction
+            (``Z16_plus=1.5``). [1]
+
+        Returns
+        -------
+        Drive
+            A new drive, as of `replace`.
+
+        Raises
+        ------
+        ParameterError
+            For an unknown name, or a product that breaks a rule.
+
+        Examples
+        --------
+        >>> from swashplate import Drive
+        >>> hoist = Drive.preset("hoist")
+        >>> twice = hoist.scale(Z10=2.0)
+        >>> twice["Z10"].value / hoist["Z10"].value
+        2.0
+        """
         return Drive(self.parameters.scale(factors))
 
     def with_equation(
@@ -255,6 +346,15 @@ class Drive(Result, Mapping[str, Parameter]):
             For a record or option that cannot be simulated.
         DomainError
             If the solenoid overpowers the feedback spring.
+
+        Examples
+        --------
+        >>> from swashplate import Drive, maneuvers
+        >>> run = Drive.preset("hoist").simulate(maneuvers.step(9.0), 512.0)
+        >>> run.shaft_speed.shape
+        (5121,)
+        >>> round(float(run.shaft_speed.max()), 2)
+        3.42
         """
         records = drive_records("voltage", voltage, rate, **keywords)
         return simulate_drive(self.parameters, records, start)
@@ -285,6 +385,16 @@ class Drive(Result, Mapping[str, Parameter]):
         ------
         InputError, DomainError
             As in `simulate`.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from swashplate import Drive
+        >>> run = Drive.preset("hoist").simulate_current(np.full(1024, 0.7))
+        >>> run.shaft_speed.shape
+        (1024,)
+        >>> run.voltage is None
+        True
         """
         records = drive_records("current", current, rate, **keywords)
         return simulate_drive(self.parameters, records, start)
@@ -320,6 +430,16 @@ class Drive(Result, Mapping[str, Parameter]):
             If no parameter has a name.
         InputError
             As in `simulate`.
+
+        Examples
+        --------
+        >>> from swashplate import Drive, maneuvers
+        >>> hoist = Drive.preset("hoist")
+        >>> by = hoist.sensitivities(maneuvers.step(9.0), parameters=["Z16"])
+        >>> by.names
+        ('Z16_plus', 'Z16_minus')
+        >>> by["shaft_speed"].shape
+        (5121, 2)
         """
         from swashplate.drive.derivatives import drive_sensitivities
 
@@ -398,6 +518,14 @@ class Drive(Result, Mapping[str, Parameter]):
             If no parameter has a name.
         InputError, FileError
             As in `swashplate.simulate_many`.
+
+        Examples
+        --------
+        >>> from swashplate import Drive, maneuvers
+        >>> hoist = Drive.preset("hoist")
+        >>> batch = hoist.simulate_many({"Z10": [11.0, 12.0, 13.0]}, voltage=maneuvers.step(9.0))
+        >>> batch.output.shape
+        (3, 5121)
         """
         from swashplate.drive.batch import simulate_drives
 
@@ -439,6 +567,15 @@ class Drive(Result, Mapping[str, Parameter]):
         InputError
             For a rate or option that there is not, and a rate at which the card's filter is
             unstable.
+
+        Examples
+        --------
+        >>> from swashplate import Drive
+        >>> stepper = Drive.preset("hoist").stepper(512.0)
+        >>> for _ in range(2560):
+        ...     sample = stepper.step(9.0)
+        >>> round(sample.shaft_speed, 2)
+        3.42
         """
         rate = in_si(rate, "Hz", "The rate")
         return drive_stepper(self.parameters, rate, interpolation, start, measured)
@@ -525,6 +662,15 @@ class Drive(Result, Mapping[str, Parameter]):
         DomainError
             Where the gain is 0: in a dead zone, within the hysteresis, at a stop, or with a
             friction that has no presliding.
+
+        Examples
+        --------
+        >>> from swashplate import Drive
+        >>> linear = Drive.preset("hoist").linearize(5.0)
+        >>> linear
+        LinearDrive('hoist', voltage to shaft_speed, continuous)
+        >>> round(linear.gain, 3)
+        0.447
         """
         from swashplate.drive.linearisation import linearize_drive
 
@@ -566,12 +712,25 @@ class Drive(Result, Mapping[str, Parameter]):
             Relative change of the first harmonic, from the middle of a simulation to its end, below
             which the drive repeats itself.
 
+        Returns
+        -------
+        FrequencyResponse
+            First harmonic of the output by that of the input, complex, with distortion and mean
+            of the output; each (a, f).
+
         Raises
         ------
         InputError
             For frequencies, amplitudes or options out of range.
         DomainError
             If nothing moves at all, or the answer does not come to repeat itself.
+
+        Examples
+        --------
+        >>> from swashplate import Drive
+        >>> response = Drive.preset("hoist").frequency_response([0.5, 1.0], [1.0], bias=4.0)
+        >>> round(float(abs(response.gain[0, 0])), 2)
+        0.42
         """
         from swashplate.drive.frequency_response import sweep_drive
 
@@ -610,6 +769,12 @@ class Drive(Result, Mapping[str, Parameter]):
         ------
         InputError
             For a command that is not finite or beyond ±10 V.
+
+        Examples
+        --------
+        >>> from swashplate import Drive
+        >>> Drive.preset("hoist").steady_speed([-9.0, 0.0, 9.0]).round(2).tolist()
+        [-3.23, 0.05, 3.42]
         """
         return self._steady(voltage)[1]
 
@@ -634,6 +799,12 @@ class Drive(Result, Mapping[str, Parameter]):
         ------
         InputError
             For a command that is not finite or beyond ±10 V.
+
+        Examples
+        --------
+        >>> from swashplate import Drive
+        >>> round(Drive.preset("hoist").steady_current(9.0), 3)
+        0.745
         """
         return self._steady(voltage)[0]
 
