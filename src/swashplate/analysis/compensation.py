@@ -295,6 +295,13 @@ def inverse_map(drive: Drive, points: int = 101) -> InverseMap:
     DomainError
         Where there is no inverse: no command moves the drive one way, or a larger command makes it
         slower.
+
+    Examples
+    --------
+    >>> from swashplate import Drive, analysis
+    >>> inverse = analysis.inverse_map(Drive.preset("hoist"))
+    >>> round(float(inverse.voltage(1.0)), 2)
+    2.41
     """
     if not FEWEST <= points <= MOST:
         raise InputError(

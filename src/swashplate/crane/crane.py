@@ -60,9 +60,11 @@ class Crane:
 
     Examples
     --------
+    >>> from swashplate.crane import Crane, OperatorCommand, simulate
     >>> crane = Crane.preset("tg3637")
-    >>> run = simulate(crane, OperatorCommand.trapezoid(slew=1.0, until={"slew_deg": 45}))
-    >>> run.residual_deg
+    >>> run = simulate(crane, OperatorCommand.trapezoid(slew=1.0, until={"slew_deg": 45.0}))
+    >>> round(run.residual_deg, 1)
+    7.4
     """
 
     name: str
@@ -84,12 +86,52 @@ class Crane:
 
     @classmethod
     def preset(cls, name: str) -> Crane:
-        """A packaged crane, ``"tg3637"``."""
+        """A packaged crane by its name.
+
+        Parameters
+        ----------
+        name : {"tg3637"}
+            The crane that Kruse's three drives belong to.
+
+        Returns
+        -------
+        Crane
+            With its geometry, limits and drives.
+
+        Raises
+        ------
+        ParameterError
+            For another name; the sentence lists those that there are.
+
+        Examples
+        --------
+        >>> from swashplate.crane import Crane
+        >>> Crane.preset("tg3637").safe_load  # kg
+        35000.0
+        """
         return _read(preset_text(name), f"crane {name}", Path())
 
     @classmethod
     def from_toml(cls, path: str | Path) -> Crane:
-        """A crane from a file; a `ParameterError` names file, entry and rule."""
+        """A crane from a file.
+
+        Parameters
+        ----------
+        path : path
+            The file. Paths of drives in it count from its folder.
+
+        Returns
+        -------
+        Crane
+            With the geometry, limits and drives of the file.
+
+        Raises
+        ------
+        FileError
+            If there is no such file, or it cannot be read.
+        ParameterError
+            If an entry is wrong; the sentence names file, entry and rule.
+        """
         crane = _read(read_text(path), str(path), Path(path).parent)
         for name in packaged_names():
             packaged = cls.preset(name)
@@ -145,6 +187,26 @@ class Crane:
             Each is a drive, ``luff=crane.luff.scale(Z16=1.5)``; the result of a fit; a packaged
             name; a parameter file; or the folder that a fit wrote. The verdict on a fit stands in
             `sources`; a drive that is not usable is taken, and assessments say so.
+
+        Returns
+        -------
+        Crane
+            A new crane; this one stays as it is.
+
+        Raises
+        ------
+        InputError
+            For an axis that a crane does not have.
+        FileError, ParameterError
+            If a drive's file cannot be read or a packaged name is unknown.
+
+        Examples
+        --------
+        >>> from swashplate.crane import Crane
+        >>> crane = Crane.preset("tg3637")
+        >>> changed = crane.with_drive(luff=crane.luff.scale(Z16=1.5))
+        >>> changed.luff == crane.luff.scale(Z16=1.5)
+        True
         """
         check_names("A crane has no drive", drives, AXES, "it has")
         replacements, new_sources = drives_of(drives, Path())
@@ -174,10 +236,28 @@ class Crane:
         return drive
 
     def with_geometry(self, **changes: float | tuple[float, ...]) -> Crane:
-        """The crane with other quantities, in SI and by name: ``boom_length=38.0``.
+        """The crane with other quantities.
 
-        A `ParameterError` for an unknown name, a value out of its plausible range, or lengths that
-        make no crane.
+        Parameters
+        ----------
+        **changes : float or tuple of float
+            By name and in SI: ``boom_length=38.0``.
+
+        Returns
+        -------
+        Crane
+            A new crane, whose changed quantities are marked as the user's.
+
+        Raises
+        ------
+        ParameterError
+            For an unknown name, a value out of its plausible range, or lengths that make no crane.
+
+        Examples
+        --------
+        >>> from swashplate.crane import Crane
+        >>> Crane.preset("tg3637").with_geometry(boom_length=38.0).geometry.boom
+        38.0
         """
         quantities = dict(self.quantities)
         for name, value in changes.items():
@@ -187,9 +267,28 @@ class Crane:
         return replace(self, quantities=quantities)
 
     def with_limits(self, **limits: float) -> Crane:
-        """The crane with other limits, in SI and by name: ``side_lead=0.07``.
+        """The crane with other limits.
 
-        A `ParameterError` for an unknown name, or a value out of its plausible range.
+        Parameters
+        ----------
+        **limits : float
+            By name of `swashplate.crane.LIMITED` and in SI: ``side_lead=0.07``.
+
+        Returns
+        -------
+        Crane
+            A new crane, whose other limits stay as they are.
+
+        Raises
+        ------
+        ParameterError
+            For an unknown name, or a value out of its plausible range.
+
+        Examples
+        --------
+        >>> from swashplate.crane import Crane
+        >>> Crane.preset("tg3637").with_limits(side_lead=0.07).limits_si["side_lead"]
+        0.07
         """
         quantities = {
             name: CraneQuantity(

@@ -197,9 +197,10 @@ class FullOrderDrive:
 
     Examples
     --------
-    >>> hoist = FullOrderDrive.preset("hoist")
-    >>> run = hoist.simulate(maneuvers.step(9.0).sample(512.0))
-    >>> run.motor_pressure_drop.max()
+    >>> from swashplate import FullOrderDrive, maneuvers
+    >>> run = FullOrderDrive.preset("hoist").simulate(maneuvers.step(9.0))
+    >>> round(float(run.shaft_speed.max()), 1)
+    3.4
     """
 
     drive: Drive
@@ -217,7 +218,29 @@ class FullOrderDrive:
 
     @classmethod
     def preset(cls, name: str) -> FullOrderDrive:
-        """Kruse's ``"hoist"``, ``"slew"`` or ``"luff"`` drive with its assumed physical set."""
+        """One of Kruse's drives with its assumed physical set.
+
+        Parameters
+        ----------
+        name : {"hoist", "slew", "luff"}
+            The axis.
+
+        Returns
+        -------
+        FullOrderDrive
+            The packaged drive of that name and `PhysicalSet.preset` of it.
+
+        Raises
+        ------
+        ParameterError
+            For another name; the sentence lists those that there are.
+
+        Examples
+        --------
+        >>> from swashplate import FullOrderDrive
+        >>> FullOrderDrive.preset("hoist").physical
+        PhysicalSet('hoist', 31 quantities)
+        """
         physical = PhysicalSet.preset(name)
         return cls(Drive.preset(name), physical)
 
@@ -239,7 +262,32 @@ class FullOrderDrive:
         return cls(drive, from_lumped(drive.parameters, like, **quantities))
 
     def replace(self, **changes: Change) -> FullOrderDrive:
-        """With other physical values in SI, e.g. ``replace(load_torque=2e3)``."""
+        """A drive with other physical values.
+
+        Parameters
+        ----------
+        **changes : float, Pint quantity, or a pair of them
+            By name of the quantity, in SI or with a unit: ``load_torque=2e3``.
+
+        Returns
+        -------
+        FullOrderDrive
+            A new drive; this one stays as it is.
+
+        Raises
+        ------
+        UnknownParameterError
+            For a name that no quantity has.
+        ParameterError
+            For a value out of its plausible range, or that breaks a rule.
+
+        Examples
+        --------
+        >>> from swashplate import FullOrderDrive
+        >>> loaded = FullOrderDrive.preset("hoist").replace(load_torque=2e3)
+        >>> loaded.physical["load_torque"].value
+        2000.0
+        """
         return replace(self, physical=self.physical.replace(**changes))
 
     @property

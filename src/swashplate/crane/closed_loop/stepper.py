@@ -120,6 +120,13 @@ class CraneStepper:
         The crane with its drives.
     **options
         Where it begins, what controls it, what hangs on it: see `RunOptions`.
+
+    Examples
+    --------
+    >>> from swashplate.crane import Crane, CraneStepper
+    >>> stepper = CraneStepper(Crane.preset("tg3637"))
+    >>> stepper.step([0.0, 0.0, 0.0])["rope"]
+    20.0
     """
 
     def __init__(self, crane: Crane, **options: Unpack[RunOptions]) -> None:
