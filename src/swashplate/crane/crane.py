@@ -91,7 +91,7 @@ class Crane:
         Parameters
         ----------
         name : {"tg3637"}
-            The crane that Kruse's three drives belong to.
+            The Hägglunds crane of a T-ACS crane ship, with Kruse's three drives.
 
         Returns
         -------
@@ -357,7 +357,33 @@ class Crane:
         return _inverse(self.controller_drive(axis))
 
     def home(self, slew_deg: float = 0.0, boom_deg: float = 45.0, rope_m: float = 20.0) -> Home:
-        """Where a run starts; an `InputError` if boom or rope are beyond the crane's limits."""
+        """Where a run starts.
+
+        Parameters
+        ----------
+        slew_deg : float
+            From forward to starboard, within 720. [deg]
+        boom_deg : float
+            Elevation of the boom. [deg]
+        rope_m : float
+            Rope below the tip. [m]
+
+        Returns
+        -------
+        Home
+            Slew [rad], rope of the luff [m] and rope below the tip [m].
+
+        Raises
+        ------
+        InputError
+            If slew, boom or rope are beyond the crane's limits.
+
+        Examples
+        --------
+        >>> from swashplate.crane import Crane
+        >>> Crane.preset("tg3637").home(rope_m=25.0).rope
+        25.0
+        """
         low, high = map(degrees, self.boom_limits)
         if not low - 1e-9 <= boom_deg <= high + 1e-9:
             raise InputError(

@@ -267,6 +267,11 @@ class Drive(Result, Mapping[str, Parameter]):
             are parameters of the drive from then on: ``drive.replace(seal_drag=1e-5)``, a fit's
             unknowns, columns of `sensitivities`. Only the pump's equations can have some.
 
+        Returns
+        -------
+        Drive
+            A new drive; this one stays as it is.
+
         Raises
         ------
         InputError
@@ -277,7 +282,31 @@ class Drive(Result, Mapping[str, Parameter]):
         return Drive(with_equation(self.parameters, Replacement(old, new, parameters)))
 
     def renamed(self, name: str, title: str | None = None) -> Drive:
-        """The same drive under another name, which is not empty, and perhaps another title."""
+        """The same drive under another name, and perhaps another title.
+
+        Parameters
+        ----------
+        name : str
+            Not empty.
+        title : str, optional
+            By default the title stays.
+
+        Returns
+        -------
+        Drive
+            A new drive with the same numbers.
+
+        Raises
+        ------
+        InputError
+            If the name is empty.
+
+        Examples
+        --------
+        >>> from swashplate import Drive
+        >>> Drive.preset("hoist").renamed("winch").name
+        'winch'
+        """
         if not str(name or "").strip():
             raise InputError(f"A drive's name is text, not {name!r}.")
         if title is None:
@@ -346,6 +375,10 @@ class Drive(Result, Mapping[str, Parameter]):
             For a record or option that cannot be simulated.
         DomainError
             If the solenoid overpowers the feedback spring.
+
+        Notes
+        -----
+        Control card: Kruse (2001), eqs. 3.1-3.9. Pump and motor: eqs. 6.55-6.71 and 8.9.
 
         Examples
         --------

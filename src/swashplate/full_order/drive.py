@@ -362,10 +362,41 @@ class FullOrderDrive:
         clip: bool = False,
         substeps: int | None = None,
     ) -> FullOrderSimulation:
-        """Simulate card and machine over a command [V]; arguments as `Drive.simulate`.
+        """Simulate card and machine over a command.
 
         The card's current at its own steps drives the machine, a straight line between them.
-        `substeps` as in `follow`.
+
+        Parameters
+        ----------
+        voltage : (n,) array_like, Pint quantity or Maneuver
+            Command. [V]
+        rate, time, interpolation, start, clip :
+            As in `Drive.simulate`.
+        substeps : int, optional
+            As in `follow`.
+
+        Returns
+        -------
+        FullOrderSimulation
+            All signals of the chain.
+
+        Raises
+        ------
+        InputError
+            For a record or option that cannot be simulated.
+        DomainError
+            If the machine is too stiff for the march, or the solenoid overpowers the feedback spring.
+
+        Notes
+        -----
+        Kruse (2001), chapter 6, as of `swashplate.models.machine`.
+
+        Examples
+        --------
+        >>> from swashplate import FullOrderDrive, maneuvers
+        >>> run = FullOrderDrive.preset("hoist").simulate(maneuvers.step(9.0))
+        >>> run.shaft_speed.shape
+        (5121,)
         """
         run = self.drive.simulate(
             voltage, rate, time=time, interpolation=interpolation, start=start, clip=clip
@@ -388,6 +419,11 @@ class FullOrderDrive:
             Sub-steps of the march a sample, at least 512 samples a second; by default 8, or so
             many that the fastest mode takes six steps a turn.
 
+        Returns
+        -------
+        FullOrderSimulation
+            All signals of the chain, at the samples of the earlier run.
+
         Raises
         ------
         InputError
@@ -405,6 +441,27 @@ class FullOrderDrive:
         The slow pole is the eigenvalue nearest zero. The spool's mode is the one in which position
         and velocity of the spool take the largest part, by the product of left and right
         eigenvectors.
+
+        Parameters
+        ----------
+        current : float
+            Signed current. [A]
+
+        Returns
+        -------
+        Modes
+            Five eigenvalues, and which of them are slow, the spool's and the swash plate's. [1/s]
+
+        Raises
+        ------
+        InputError
+            If the current is not finite.
+
+        Examples
+        --------
+        >>> from swashplate import FullOrderDrive
+        >>> round(FullOrderDrive.preset("hoist").modes().slow.real, 2)
+        -8.39
         """
         if not np.isfinite(current):
             raise InputError(f"The current is {current}, but must be a finite number of amperes.")

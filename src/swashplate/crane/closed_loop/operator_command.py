@@ -28,6 +28,12 @@ class OperatorCommand(Result):
     """Commands of hoist, slew and luff, each from -1 to 1.
 
     Positive ones hoist, slew to starboard, lift the boom. Made by `trapezoid`, `record`, `rest`.
+
+    Examples
+    --------
+    >>> from swashplate.crane import OperatorCommand
+    >>> OperatorCommand.trapezoid(hoist=0.5, duration=10.0)
+    OperatorCommand(length=60, start=1, ramp=0.5, parts={hoist}, until={}, duration=10, rate=512)
     """
 
     length: float
@@ -159,7 +165,29 @@ class OperatorCommand(Result):
 
     @classmethod
     def rest(cls, length: float = 60.0) -> OperatorCommand:
-        """Nothing, for so long. [s]"""
+        """Nothing: the stick stays at zero.
+
+        Parameters
+        ----------
+        length : float
+            How long, at most a day. [s]
+
+        Returns
+        -------
+        OperatorCommand
+            Zero on all axes.
+
+        Raises
+        ------
+        InputError
+            For a length that is not positive, or longer than a day.
+
+        Examples
+        --------
+        >>> from swashplate.crane import OperatorCommand
+        >>> OperatorCommand.rest(10.0).length
+        10.0
+        """
         return cls.trapezoid(length=length)
 
     def sample(self, crane: Crane, home: Home, rate: float) -> tuple[Array, float]:

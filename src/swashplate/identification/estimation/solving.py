@@ -164,6 +164,16 @@ def solve(
         Called at each iteration. Ctrl-C ends the search with the best point so far.
     hopeless : callable, optional
         Called with the best point after each `LEG` evaluations; true gives the search up.
+
+    Returns
+    -------
+    Solution
+        The (K,) vector of the optimum, or of the best point so far, with its cost.
+
+    Raises
+    ------
+    DomainError
+        If the model does not hold at the start.
     """
     from scipy.optimize import least_squares
 

@@ -60,7 +60,21 @@ or a card's current there, or the instant of a jump of the command between two s
 
 @dataclass(frozen=True)
 class Unknown:
-    """One number that a fit is to find."""
+    """One number that a fit is to find.
+
+    Raises
+    ------
+    ParameterError
+        If the bounds are not finite or not in their order, the nominal value lies outside them, or a
+        logarithmic unknown may be 0 or negative.
+
+    Examples
+    --------
+    >>> from swashplate.identification import Unknown
+    >>> gain = Unknown("gain", 0.05, 0.001, 1.0, "m/(V s)", log=True)
+    >>> gain.label
+    'gain'
+    """
 
     name: str
     start: float
@@ -166,6 +180,18 @@ class Unknowns(Result):
 
     The solver moves ln(value) of a logarithmic one, else value/scale: a change of 0.01 in its
     vector is one per cent, of the value or of the scale.
+
+    Raises
+    ------
+    ParameterError
+        If two unknowns set the same number of the model.
+
+    Examples
+    --------
+    >>> from swashplate.identification import Unknown, Unknowns
+    >>> unknowns = Unknowns((Unknown("gain", 0.05, 0.001, 1.0), Unknown("lag", 0.1, 0.01, 1.0, "s")))
+    >>> unknowns.names
+    ('gain', 'lag')
     """
 
     items: tuple[Unknown, ...]
