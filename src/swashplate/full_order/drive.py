@@ -198,7 +198,7 @@ class FullOrderDrive:
     Examples
     --------
     >>> from swashplate import FullOrderDrive, maneuvers
-    >>> run = FullOrderDrive.preset("hoist").simulate(maneuvers.step(9.0))
+    >>> run = FullOrderDrive.preset("hoist").simulate(maneuvers.step(9.0).sample(512.0))
     >>> round(float(run.shaft_speed.max()), 1)
     3.4
     """
@@ -368,7 +368,7 @@ class FullOrderDrive:
 
         Parameters
         ----------
-        voltage : (n,) array_like, Pint quantity or Maneuver
+        voltage : (n,) array_like
             Command. [V]
         rate, time, interpolation, start, clip :
             As in `Drive.simulate`.
@@ -385,7 +385,8 @@ class FullOrderDrive:
         InputError
             For a record or option that cannot be simulated.
         DomainError
-            If the machine is too stiff for the march, or the solenoid overpowers the feedback spring.
+            If the machine is too stiff for the march, or the solenoid overpowers the feedback
+            spring.
 
         Notes
         -----
@@ -394,7 +395,7 @@ class FullOrderDrive:
         Examples
         --------
         >>> from swashplate import FullOrderDrive, maneuvers
-        >>> run = FullOrderDrive.preset("hoist").simulate(maneuvers.step(9.0))
+        >>> run = FullOrderDrive.preset("hoist").simulate(maneuvers.step(9.0).sample(512.0))
         >>> run.shaft_speed.shape
         (5121,)
         """

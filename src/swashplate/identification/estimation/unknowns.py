@@ -65,8 +65,8 @@ class Unknown:
     Raises
     ------
     ParameterError
-        If the bounds are not finite or not in their order, the nominal value lies outside them, or a
-        logarithmic unknown may be 0 or negative.
+        If the bounds are not finite or not in their order, the nominal value lies outside them, or
+        a logarithmic unknown may be 0 or negative.
 
     Examples
     --------
@@ -189,8 +189,9 @@ class Unknowns(Result):
     Examples
     --------
     >>> from swashplate.identification import Unknown, Unknowns
-    >>> unknowns = Unknowns((Unknown("gain", 0.05, 0.001, 1.0), Unknown("lag", 0.1, 0.01, 1.0, "s")))
-    >>> unknowns.names
+    >>> gain = Unknown("gain", 0.05, 0.001, 1.0)
+    >>> lag = Unknown("lag", 0.1, 0.01, 1.0, "s")
+    >>> Unknowns((gain, lag)).names
     ('gain', 'lag')
     """
 
