@@ -696,6 +696,10 @@ class Drive(Result, Mapping[str, Parameter]):
             Where the gain is 0: in a dead zone, within the hysteresis, at a stop, or with a
             friction that has no presliding.
 
+        Notes
+        -----
+        The pump's lag of small motions: Kruse (2001), eqs. 6.72-6.74.
+
         Examples
         --------
         >>> from swashplate import Drive

@@ -89,7 +89,14 @@ def mean_over_sample(window: Window) -> float:
 
 
 class Tap(NamedTuple):
-    """How a model looks at a signal that comes from outside or from another model."""
+    """How a model looks at a signal that comes from outside or from another model.
+
+    Examples
+    --------
+    >>> from swashplate import equations
+    >>> equations.Tap("command", delay="delay", hold="mean").samples
+    3
+    """
 
     signal: str
     """Name of the signal."""
@@ -447,6 +454,11 @@ def join(
     **changes
         `integrals`, `outputs`, `free_start`, `replacements` of the whole.
 
+    Returns
+    -------
+    Model
+        The whole; `Model.parts` are the models that were given.
+
     Raises
     ------
     InputError
@@ -456,6 +468,14 @@ def join(
     Notes
     -----
     A signal must be known before it is needed: loops without delay between parts are not possible.
+
+    Examples
+    --------
+    >>> from swashplate import equations
+    >>> from swashplate.models.amplifier import card
+    >>> from swashplate.models.pump import pump
+    >>> equations.join("winch", card, pump).external
+    ('voltage', 'pump_speed', 'load_torque', 'supply_pressure')
     """
     for part in parts:
         if not isinstance(part, Model):
