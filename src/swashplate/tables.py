@@ -443,6 +443,14 @@ def write_text(text: str, path: str | Path) -> None:
     ------
     FileError
         If the file cannot be written; an older one stays as it was.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from swashplate.tables import write_text
+    >>> write_text("Z16 is fitted.", "notes.txt")
+    >>> Path("notes.txt").read_text("utf-8")
+    'Z16 is fitted.'
     """
     write_whole(path, lambda beside: beside.write_text(text, "utf-8"))
 

@@ -131,6 +131,17 @@ class Crane:
             If there is no such file, or it cannot be read.
         ParameterError
             If an entry is wrong; the sentence names file, entry and rule.
+
+        Examples
+        --------
+        >>> from pathlib import Path
+        >>> from swashplate.crane import Crane
+        >>> from swashplate.crane.crane import preset_text
+        >>> text = preset_text("tg3637").replace("tg3637", "mine")
+        >>> Path("crane.toml").write_text(text, "utf-8") > 0
+        True
+        >>> Crane.from_toml("crane.toml").name
+        'mine'
         """
         crane = _read(read_text(path), str(path), Path(path).parent)
         for name in packaged_names():

@@ -34,10 +34,12 @@ class MachineModel(Protocol):
 
     Examples
     --------
-    >>> class Lag:
+    >>> import numpy as np
+    >>> class Gain:
     ...     def simulate(self, values, experiment):
-    ...         speed = values["gain"] * filtered(experiment.input, values["time constant"])
-    ...         return {"speed": np.interp(experiment["speed"].time, experiment.input.time, speed)}
+    ...         command, speed = experiment.input, experiment["speed"]
+    ...         volts = np.interp(speed.time, command.time, command.values)
+    ...         return {"speed": values["gain"] * volts}
     """
 
     def simulate(self, values: Mapping[str, float], experiment: Experiment) -> Mapping[str, Array]:

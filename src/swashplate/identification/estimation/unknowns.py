@@ -355,7 +355,30 @@ class Unknowns(Result):
         return {name: value for unknown, value in values for name in unknown.targets}
 
     def zeros(self, vector: Array, run: str) -> dict[str, float]:
-        """Free zeros of one experiment by their channels. [unit of the channel]"""
+        """Free zeros of one experiment by their channels.
+
+        Parameters
+        ----------
+        vector : (K,) array
+            The solver's.
+        run : str
+            Name of the experiment.
+
+        Returns
+        -------
+        dict of str to float
+            Zeros that are unknown, by channel; empty if none is. [unit of the channel]
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from swashplate.identification import Unknown, Unknowns
+        >>> zero = Unknown(
+        ...     "offset", 0.0, -1.0, 1.0, "A", run="test", kind="zero", channel="current", scale=1.0
+        ... )
+        >>> Unknowns((zero,)).zeros(np.array([0.02]), "test")
+        {'current': 0.02}
+        """
         zeros = dict[str, float]()
         for number in self.columns(run).tolist():
             unknown = self.items[number]
