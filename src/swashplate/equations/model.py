@@ -149,7 +149,16 @@ class Link(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """A machine as equations over named tuples of floats; see the module's text."""
+    """A machine as equations over named tuples of floats; see the module's text.
+
+    Examples
+    --------
+    >>> from swashplate.models.full_order import plant
+    >>> plant
+    Model('plant', 42 parameters)
+    >>> plant.external
+    ('current',)
+    """
 
     name: str
     parameters: type[Any]
@@ -632,6 +641,13 @@ def discretised(
     straight between samples keeps the method's order on a finer grid only, or with a tap that has
     a delay of a step at least: ``Tap("command", "delay", ahead=1.0, hold="mean")`` is its mean over
     the step.
+
+    Examples
+    --------
+    >>> from swashplate import equations
+    >>> from swashplate.models.full_order import plant_rates
+    >>> equations.discretised(plant_rates, "heun", substeps=2).__name__
+    'plant_rates_heun'
     """
     if method not in TABLEAUS:
         raise InputError(f"There is no method '{method}'; there are {', '.join(get_args(Method))}.")

@@ -289,13 +289,10 @@ class UserModel(Result, EquationModel):
 
     Examples
     --------
-    >>> problem = Problem(
-    ...     UserModel(valve, rate=100.0, begin={"position": "position"}),
-    ...     campaign.experiments,
-    ...     Unknowns((Unknown("lag", 0.06, 0.005, 0.5, "s", log=True), ...)),
-    ...     channels=("position",),
-    ...     scales={"position": 1e-3},
-    ... )
+    >>> from swashplate.identification import UserModel
+    >>> from swashplate.models.full_order import plant
+    >>> UserModel(plant, rate=512.0).signals[:2]
+    ['solenoid_force', 'spool_position']
     """
 
     model: Equations
