@@ -117,6 +117,24 @@ def simulate_many(
         For what does not fit the model, or outputs that need more memory than there is.
     FileError
         If files cannot be written.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from swashplate import FullOrderDrive, simulate_many
+    >>> from swashplate.models.full_order import Substeps, plant
+    >>> numbers = FullOrderDrive.preset("hoist").plant
+    >>> batch = simulate_many(
+    ...     plant,
+    ...     numbers,
+    ...     {"machine.load_torque": [0.0, 1e3]},
+    ...     {"current": np.full(1024, 0.7)},
+    ...     512.0,
+    ...     output="shaft_speed",
+    ...     given=Substeps(8.0),
+    ... )
+    >>> batch.output.shape
+    (2, 1024)
     """
     instance = instance_of(model, p, options=options, given=given)
     records = inputs_of(instance, inputs, rate, **sampling)

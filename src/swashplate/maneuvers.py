@@ -145,12 +145,28 @@ class Maneuver(Drawn):
         return np.clip(voltage, 0.0 - self.amplitude, self.amplitude)[()]
 
     def time(self, rate: float = 512.0) -> Array:
-        """Instants n/rate [s] of the samples, shape (rate·length + 1,).
+        """Instants n/rate of the samples.
+
+        Parameters
+        ----------
+        rate : float
+            Samples a second. [Hz]
+
+        Returns
+        -------
+        (rate·length + 1,) array
+            From 0 to the length. [s]
 
         Raises
         ------
         InputError
-            If `rate` [Hz] is not positive or the length is not a whole number of samples.
+            If `rate` is not positive or the length is not a whole number of samples.
+
+        Examples
+        --------
+        >>> from swashplate import maneuvers
+        >>> maneuvers.step(9.0, length=8.0).time(512.0)[-1].item()
+        8.0
         """
         samples = positive("rate", rate) * self.length
         if samples > LONGEST:
@@ -166,12 +182,28 @@ class Maneuver(Drawn):
         return np.arange(round(samples) + 1) / rate
 
     def sample(self, rate: float = 512.0) -> Array:
-        """Voltage [V] at the instants of `time(rate)`.
+        """Voltage at the instants of `time`.
+
+        Parameters
+        ----------
+        rate : float
+            Samples a second. [Hz]
+
+        Returns
+        -------
+        (rate·length + 1,) array
+            Voltage. [V]
 
         Raises
         ------
         InputError
             As `time`, and if a sine is not below half the rate.
+
+        Examples
+        --------
+        >>> from swashplate import maneuvers
+        >>> maneuvers.step(9.0).sample(512.0).shape
+        (5121,)
         """
         time = self.time(rate)
         if self.highest >= 0.5 * rate:
@@ -310,7 +342,29 @@ def _window(start: float, settle: float | None, length: float) -> tuple[float, f
 
 
 def rest(duration: float) -> Maneuver:
-    """Nothing, 0 V, for `duration` [s]; it raises InputError if that is negative."""
+    """Nothing, 0 V.
+
+    Parameters
+    ----------
+    duration : float
+        How long, not negative. [s]
+
+    Returns
+    -------
+    Maneuver
+        To put before, between or after others with ``+``.
+
+    Raises
+    ------
+    InputError
+        If the duration is negative or not finite.
+
+    Examples
+    --------
+    >>> from swashplate import maneuvers
+    >>> (maneuvers.rest(2.0) + maneuvers.step(9.0)).length
+    12.0
+    """
     duration = finite("duration", duration, 0.0)
     return Maneuver(f"rest {duration:g} s", duration, ((0.0, _line),), 0.0)
 
@@ -318,12 +372,33 @@ def rest(duration: float) -> Maneuver:
 def step(
     amplitude: float, *, start: float = 1.0, stop: float = 6.0, length: float = 10.0
 ) -> Maneuver:
-    """Step of `amplitude` [V], on at `start` and off at `stop` [s].
+    """Step of a voltage, on and off again.
+
+    Parameters
+    ----------
+    amplitude : float
+        Voltage between `start` and `stop`, of either sign. [V]
+    start, stop, length : float
+        When it comes on, when it goes off, and duration of the maneuver. [s]
+
+    Returns
+    -------
+    Maneuver
+        Called with times it gives the voltage.
 
     Raises
     ------
     InputError
-        Unless 0 <= start < stop <= length.
+        Unless 0 <= start < stop <= length and all are finite.
+
+    Examples
+    --------
+    >>> from swashplate import maneuvers
+    >>> command = maneuvers.step(9.0)
+    >>> command([0.5, 1.0, 6.0]).tolist()
+    [0.0, 9.0, 0.0]
+    >>> command.sample(512.0).shape
+    (5121,)
     """
     amplitude, length = finite("amplitude", amplitude), finite("length", length)
     start, stop = finite("start", start), finite("stop", stop)
@@ -351,6 +426,29 @@ def ramp(
         Negative for a ramp downwards. [V/s]
     limit : float
         Largest magnitude, positive. [V]
+    start : float
+        When it begins. [s]
+    settle : float or None
+        Time left at the end for the cubic return to rest; None or 0 leaves none. [s]
+    length : float
+        Duration of the maneuver, `settle` included. [s]
+
+    Returns
+    -------
+    Maneuver
+        Called with times it gives the voltage.
+
+    Raises
+    ------
+    InputError
+        If a number is not finite or out of its range, or `start` and `settle` leave nothing of
+        `length`.
+
+    Examples
+    --------
+    >>> from swashplate import maneuvers
+    >>> maneuvers.ramp(2.0)([2.0, 6.0, 10.0]).tolist()
+    [2.0, 10.0, 10.0]
     """
     slope, limit = finite("slope", slope), positive("limit", limit)
     start, end, length = _window(start, settle, length)
@@ -373,6 +471,27 @@ def stairs(
         At least one. [V]
     dwell : float
         How long each is held, positive. [s]
+    start : float
+        When the first level begins. [s]
+    settle : float or None
+        Time after the last level for the cubic return to rest, if that level is not zero; None or 0
+        leaves none. [s]
+
+    Returns
+    -------
+    Maneuver
+        Called with times it gives the voltage.
+
+    Raises
+    ------
+    InputError
+        If there is no level, or a number is not finite or out of its range.
+
+    Examples
+    --------
+    >>> from swashplate import maneuvers
+    >>> maneuvers.stairs([3.0, 6.0, -3.0])([1.5, 3.5, 5.5]).tolist()
+    [3.0, 6.0, -3.0]
     """
     volts, dwell = row("levels", levels).tolist(), positive("dwell", dwell)
     start, settle = finite("start", start, 0.0), finite("settle", settle or 0.0, 0.0)
@@ -399,6 +518,30 @@ def sine(
         Peak. [V]
     frequency : float
         Positive. [Hz]
+    start : float
+        When it begins. [s]
+    settle : float or None
+        Time left at the end for the cubic return to rest; None or 0 leaves none. [s]
+    length : float
+        Duration of the maneuver, `settle` included. [s]
+
+    Returns
+    -------
+    Maneuver
+        Called with times it gives the voltage.
+
+    Raises
+    ------
+    InputError
+        If a number is not finite or out of its range, or `start` and `settle` leave nothing of
+        `length`.
+
+    Examples
+    --------
+    >>> from swashplate import maneuvers
+    >>> command = maneuvers.sine(9.0, 0.5)
+    >>> command([1.0, 1.5, 2.0]).round(6).tolist()
+    [0.0, 9.0, 0.0]
     """
     amplitude, frequency = finite("amplitude", amplitude), positive("frequency", frequency)
     name = f"sine {amplitude:g} V {frequency:g} Hz"
@@ -422,6 +565,29 @@ def chirp(
         Peak. [V]
     first, last : float
         Frequencies in either order, not negative. [Hz]
+    start : float
+        When it begins. [s]
+    settle : float or None
+        Time left at the end for the cubic return to rest; None or 0 leaves none. [s]
+    length : float
+        Duration of the maneuver, `settle` included. [s]
+
+    Returns
+    -------
+    Maneuver
+        Called with times it gives the voltage.
+
+    Raises
+    ------
+    InputError
+        If a number is not finite or out of its range, or `start` and `settle` leave nothing of
+        `length`.
+
+    Examples
+    --------
+    >>> from swashplate import maneuvers
+    >>> maneuvers.chirp(5.0, 0.1, 2.0).sample(512.0).shape
+    (30721,)
     """
     amplitude = finite("amplitude", amplitude)
     first, last = finite("first", first, 0.0), finite("last", last, 0.0)
@@ -454,12 +620,30 @@ def multisine(
         the return: the signal is periodic there. Positive. [Hz]
     seed : int
         Not negative. The same seed gives the same phases.
+    start : float
+        When it begins. [s]
+    settle : float or None
+        Time left at the end for the cubic return to rest; None or 0 leaves none. [s]
+    length : float
+        Duration of the maneuver, `settle` included. [s]
+
+    Returns
+    -------
+    Maneuver
+        Called with times it gives the voltage.
 
     Raises
     ------
     InputError
         If an argument is out of its range, `start` and `settle` leave nothing of `length`, or what
         they leave is too short to tell the frequencies of a band apart.
+
+    Examples
+    --------
+    >>> from swashplate import maneuvers
+    >>> command = maneuvers.multisine(5.0, (0.1, 2.0, 12), seed=1)
+    >>> bool(abs(command.sample(512.0)).max() <= 5.0)
+    True
     """
     amplitude, seed = finite("amplitude", amplitude), whole("seed", seed)
     start, end, length = window = _window(start, settle, length)

@@ -257,6 +257,12 @@ def run(
         For an unknown name, a number out of range, two maneuvers of one name, or a maneuver that
         cannot be simulated at 512 Hz; or if no draw of `perturb` keeps the rules of a parameter
         set.
+
+    Examples
+    --------
+    >>> from swashplate import maneuvers, rig
+    >>> rig.run("hoist", {"step": maneuvers.step(9.0)}, seed=1)
+    VirtualTests('hoist', 1 runs, realistic, seed 1)
     """
     preset = drive if isinstance(drive, str) else None
     nominal = Drive.preset(drive) if isinstance(drive, str) else drive
@@ -506,6 +512,14 @@ def write(tests: VirtualTests, folder: str | Path, *, overwrite: bool = False) -
     ------
     FileError
         If the folder is not empty or something cannot be written.
+
+    Examples
+    --------
+    >>> from swashplate import maneuvers, rig
+    >>> tests = rig.run("hoist", {"step": maneuvers.step(9.0)})
+    >>> file = rig.write(tests, "tests")
+    >>> file.name
+    'campaign.toml'
     """
     root = Path(folder)
     try:

@@ -430,7 +430,28 @@ def write_bytes(content: bytes, path: str | Path) -> None:
 
 
 def write_text(text: str, path: str | Path) -> None:
-    """Write UTF-8 text, whole or not at all."""
+    """Write UTF-8 text, whole or not at all.
+
+    Parameters
+    ----------
+    text : str
+        The content.
+    path : path
+        The file; an older one is replaced.
+
+    Raises
+    ------
+    FileError
+        If the file cannot be written; an older one stays as it was.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from swashplate.tables import write_text
+    >>> write_text("Z16 is fitted.", "notes.txt")
+    >>> Path("notes.txt").read_text("utf-8")
+    'Z16 is fitted.'
+    """
     write_whole(path, lambda beside: beside.write_text(text, "utf-8"))
 
 

@@ -338,6 +338,24 @@ def envelope(drive: Drive) -> Envelope:
     Dead zone, creep and gains of the steady map, limits of speed and acceleration, and the times
     of a full step, which are those of a simulation. Of a drive that was fitted or guessed, a number
     that a limit decides which no test reached has one end, or none.
+
+    Parameters
+    ----------
+    drive : Drive
+        The drive.
+
+    Returns
+    -------
+    Envelope
+        Each number one way and the other: dead zone [V], gains [rad/s/V], speeds [rad/s],
+        accelerations [rad/s²] and times [s].
+
+    Examples
+    --------
+    >>> from swashplate import Drive, analysis
+    >>> ability = analysis.envelope(Drive.preset("hoist"))
+    >>> round(ability.plus.dead_zone, 2), round(ability.plus.top_speed, 2)
+    (0.21, 3.42)
     """
     plus, minus = _both_directions(drive)
     capability = Envelope(

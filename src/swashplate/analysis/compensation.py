@@ -128,8 +128,29 @@ class InverseMap(Result):
     def voltage(self, speed: ArrayLike, *, clip: bool = False) -> Array:
         """Voltage for reference speeds, element by element; it never falls where the speed rises.
 
-        Reference speeds of any shape [rad/s]. One beyond the limits is refused in an `InputError`,
-        as is one that is not finite; with `clip` the limit is taken. [V]
+        Parameters
+        ----------
+        speed : array_like of any shape
+            Reference speeds. [rad/s]
+        clip : bool
+            Take the limit for a speed beyond it instead of refusing it.
+
+        Returns
+        -------
+        array of the same shape
+            Commands. [V]
+
+        Raises
+        ------
+        InputError
+            For a reference speed that is not finite, or beyond the limits without `clip`.
+
+        Examples
+        --------
+        >>> from swashplate import Drive, analysis
+        >>> inverse = analysis.inverse_map(Drive.preset("hoist"))
+        >>> inverse.voltage([-1.0, 1.0]).round(2).shape
+        (2,)
         """
         try:
             reference = np.asarray(speed, dtype=np.float64)
@@ -295,6 +316,13 @@ def inverse_map(drive: Drive, points: int = 101) -> InverseMap:
     DomainError
         Where there is no inverse: no command moves the drive one way, or a larger command makes it
         slower.
+
+    Examples
+    --------
+    >>> from swashplate import Drive, analysis
+    >>> inverse = analysis.inverse_map(Drive.preset("hoist"))
+    >>> round(float(inverse.voltage(1.0)), 2)
+    2.41
     """
     if not FEWEST <= points <= MOST:
         raise InputError(

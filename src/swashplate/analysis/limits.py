@@ -247,6 +247,14 @@ def limit_shares(
     simulated again and compared with the same reference speed. By default that speed still has the
     lags of the card's filter and of the valve, so that only the limits make an error. A measured
     pump speed or supply pressure is a limit, too: without it the value of the parameter set counts.
+
+    Examples
+    --------
+    >>> from swashplate import Drive, analysis, maneuvers
+    >>> hoist = Drive.preset("hoist")
+    >>> shares = analysis.limit_shares(hoist, maneuvers.sine(9.0, 0.2, length=12.5))
+    >>> shares.shares[0].limit
+    'orifice'
     """
     return shares_of(drive, drive.simulate(voltage, rate, start=start, **keywords), reference)
 

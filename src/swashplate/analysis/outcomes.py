@@ -97,11 +97,23 @@ def trial_of(
         Speed that a perfect drive would have; by default `proportional_speed` of this drive,
         which stays the reference of its variants. [rad/s]
 
+    Returns
+    -------
+    Trial
+        Command [V] and reference speed [rad/s] at the samples.
+
     Raises
     ------
     InputError
         If the command is not a row of at least two numbers within ±10 V that changes, or the
         reference speed is not as long.
+
+    Examples
+    --------
+    >>> from swashplate import Drive, analysis, maneuvers
+    >>> hoist = Drive.preset("hoist")
+    >>> analysis.trial_of(hoist, maneuvers.step(9.0)).reference.shape
+    (5121,)
     """
     volts = np.array(sampled(voltage, rate), dtype=np.float64)
     if volts.ndim != 1 or volts.size < 2 or not (np.abs(volts) <= FULL_VOLTAGE).all():

@@ -89,7 +89,28 @@ REQUIRED = {
 
 @dataclass(frozen=True)
 class Requirements(Result):
-    """What is required; None is not."""
+    """What is required; None is not.
+
+    Parameters
+    ----------
+    speed, acceleration : float, optional
+        What is to be reached at least, positive. [rad/s, rad/s²]
+    tracking_error : float, optional
+        RMS of the tracking error at most, positive. [rad/s]
+    direction : {"both", "positive", "negative"}
+        In which directions speed and acceleration are required.
+
+    Raises
+    ------
+    InputError
+        If nothing is required, or a number is not positive.
+
+    Examples
+    --------
+    >>> from swashplate import analysis
+    >>> analysis.Requirements(speed=4.0).given
+    {'speed': 4.0}
+    """
 
     speed: float | None = None  # At least. [rad/s]
     acceleration: float | None = None  # At least. [rad/s²]
@@ -218,6 +239,11 @@ def size(
     follow : Trial, optional
         Whose reference speed is to be followed, needed for a required tracking error.
 
+    Returns
+    -------
+    Sizing
+        The factors, the drive that has them, and what it does before and after.
+
     Raises
     ------
     InputError
@@ -227,6 +253,14 @@ def size(
     Notes
     -----
     Smallest means the least Σ (factor - 1)².
+
+    Examples
+    --------
+    >>> from swashplate import Drive, analysis
+    >>> hoist = Drive.preset("hoist")
+    >>> found = analysis.size(hoist, analysis.Requirements(speed=4.0), {"pump": (0.5, 2.0)})
+    >>> round(found.factors["pump"], 2)
+    1.24
     """
     if requirements.tracking_error is not None and follow is None:
         raise InputError("A tracking error can only be required with a speed to follow.")

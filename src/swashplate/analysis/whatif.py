@@ -148,12 +148,25 @@ def what_if(
     outcomes : sequence of str
         Names in `outcomes.OUTCOMES`.
 
+    Returns
+    -------
+    WhatIf
+        Outcomes and runs of the drive as it is, with each factor alone, and with all of them.
+
     Raises
     ------
     InputError
         If there is no design variable, an unknown one, or an impossible factor.
     ParameterError
         If the changed drive breaks a rule of the model.
+
+    Examples
+    --------
+    >>> from swashplate import Drive, analysis, maneuvers
+    >>> hoist = Drive.preset("hoist")
+    >>> changed = analysis.what_if(hoist, {"orifice": 1.5}, maneuvers.step(9.0))
+    >>> list(changed.variants)
+    ['as it is', 'changed']
     """
     if not factors:
         raise InputError("Scale at least one design variable, such as orifice=1.5.")

@@ -42,8 +42,12 @@ class Campaign(Result):
 
     Examples
     --------
-    >>> tests = Campaign.from_toml("harbour/campaign.toml")
-    >>> tests["hoistr6"]["counts"].values
+    >>> from swashplate import Campaign, maneuvers, rig
+    >>> tests = rig.run("hoist", {"step": maneuvers.step(9.0)})
+    >>> file = rig.write(tests, "virtual")
+    >>> tests = Campaign.from_toml(file)
+    >>> list(tests["hoist_step"].channels)
+    ['current', 'counts']
     """
 
     path: Path
@@ -69,6 +73,11 @@ class Campaign(Result):
         logs : path, optional
             Folder of the logs; by default that of the campaign file.
 
+        Returns
+        -------
+        Campaign
+            Its experiments in the order in which they were recorded, in SI.
+
         Raises
         ------
         FileError
@@ -77,6 +86,14 @@ class Campaign(Result):
             If an entry of the campaign file is wrong; the sentence names it.
         InputError
             If a column is missing, a unit wrong or a name taken twice.
+
+        Examples
+        --------
+        >>> from swashplate import Campaign, maneuvers, rig
+        >>> tests = rig.run("hoist", {"step": maneuvers.step(9.0)})
+        >>> file = rig.write(tests, "logged")
+        >>> Campaign.from_toml(file)
+        Campaign('Virtual tests, hoist', 1 experiments on hoist)
         """
         file, folder = read_campaign_file(path), Path(path).parent if logs is None else Path(logs)
         experiments, overviews = list[Experiment](), list[Overview]()

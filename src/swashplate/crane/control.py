@@ -147,6 +147,22 @@ class TipShaper(Control):
     Each impulse comes half a period of the present rope later. Swing is linear in that path, so
     what cancels in it cancels in the swing, in a turn as well; and the path ends where the
     operator's ends, whatever the rope does.
+
+    Parameters
+    ----------
+    shape : {"zv", "zvd", "ei"}
+        Impulses of the shaper.
+
+    Raises
+    ------
+    InputError
+        For another shape.
+
+    Examples
+    --------
+    >>> from swashplate.crane import control
+    >>> control.TipShaper("zvd").words()
+    "shaper zvd of the tip's path"
     """
 
     shape: Shaping = "zv"
@@ -166,6 +182,12 @@ class DelayedFeedback(Control):
     """Delayed position feedback (Masoud and Nayfeh): the tip follows the load of a moment ago.
 
     It comes with a position loop of 0.7 /s, see `PositionLoop`.
+
+    Examples
+    --------
+    >>> from swashplate.crane import control
+    >>> control.DelayedFeedback(gain=0.2, delay=0.25).words()
+    'delayed feedback of 0.2 at 0.25 periods'
     """
 
     gain: float = 0.2
@@ -183,7 +205,16 @@ class DelayedFeedback(Control):
 
 @dataclass(frozen=True)
 class ShipCompensation(Control):
-    """Compensation of the ship's motion: the reference tip keeps its place over the sea."""
+    """Compensation of the ship's motion: the reference tip keeps its place over the sea.
+
+    Examples
+    --------
+    >>> from swashplate.crane import Crane, OperatorCommand, control, simulate
+    >>> crane, stick = Crane.preset("tg3637"), OperatorCommand.rest(5.0)
+    >>> run = simulate(crane, stick, control=control.ShipCompensation())
+    >>> round(run.residual_deg, 3)
+    0.0
+    """
 
     kind = "ship compensation"
 
@@ -194,6 +225,13 @@ class Clip(Control):
 
     It is static, so that it has no phase: it can take authority from the controller, but never feed
     the swing. Alone it still makes the path of the tip controlled, by a position loop of 0.7 /s.
+
+    Examples
+    --------
+    >>> from swashplate.crane import control
+    >>> feedback = control.DelayedFeedback() | control.Clip(1.5)
+    >>> control.Clip(1.5).words()
+    'a clip of 1.5 m'
     """
 
     size: float | Literal["auto"] = "auto"

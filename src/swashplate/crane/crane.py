@@ -60,9 +60,11 @@ class Crane:
 
     Examples
     --------
+    >>> from swashplate.crane import Crane, OperatorCommand, simulate
     >>> crane = Crane.preset("tg3637")
-    >>> run = simulate(crane, OperatorCommand.trapezoid(slew=1.0, until={"slew_deg": 45}))
-    >>> run.residual_deg
+    >>> run = simulate(crane, OperatorCommand.trapezoid(slew=1.0, until={"slew_deg": 45.0}))
+    >>> round(run.residual_deg, 1)
+    7.4
     """
 
     name: str
@@ -84,12 +86,63 @@ class Crane:
 
     @classmethod
     def preset(cls, name: str) -> Crane:
-        """A packaged crane, ``"tg3637"``."""
+        """A packaged crane by its name.
+
+        Parameters
+        ----------
+        name : {"tg3637"}
+            The Hägglunds crane of a T-ACS crane ship, with Kruse's three drives.
+
+        Returns
+        -------
+        Crane
+            With its geometry, limits and drives.
+
+        Raises
+        ------
+        ParameterError
+            For another name; the sentence lists those that there are.
+
+        Examples
+        --------
+        >>> from swashplate.crane import Crane
+        >>> Crane.preset("tg3637").safe_load  # kg
+        35000.0
+        """
         return _read(preset_text(name), f"crane {name}", Path())
 
     @classmethod
     def from_toml(cls, path: str | Path) -> Crane:
-        """A crane from a file; a `ParameterError` names file, entry and rule."""
+        """A crane from a file.
+
+        Parameters
+        ----------
+        path : path
+            The file. Paths of drives in it count from its folder.
+
+        Returns
+        -------
+        Crane
+            With the geometry, limits and drives of the file.
+
+        Raises
+        ------
+        FileError
+            If there is no such file, or it cannot be read.
+        ParameterError
+            If an entry is wrong; the sentence names file, entry and rule.
+
+        Examples
+        --------
+        >>> from pathlib import Path
+        >>> from swashplate.crane import Crane
+        >>> from swashplate.crane.crane import preset_text
+        >>> text = preset_text("tg3637").replace("tg3637", "mine")
+        >>> Path("crane.toml").write_text(text, "utf-8") > 0
+        True
+        >>> Crane.from_toml("crane.toml").name
+        'mine'
+        """
         crane = _read(read_text(path), str(path), Path(path).parent)
         for name in packaged_names():
             packaged = cls.preset(name)
@@ -145,6 +198,26 @@ class Crane:
             Each is a drive, ``luff=crane.luff.scale(Z16=1.5)``; the result of a fit; a packaged
             name; a parameter file; or the folder that a fit wrote. The verdict on a fit stands in
             `sources`; a drive that is not usable is taken, and assessments say so.
+
+        Returns
+        -------
+        Crane
+            A new crane; this one stays as it is.
+
+        Raises
+        ------
+        InputError
+            For an axis that a crane does not have.
+        FileError, ParameterError
+            If a drive's file cannot be read or a packaged name is unknown.
+
+        Examples
+        --------
+        >>> from swashplate.crane import Crane
+        >>> crane = Crane.preset("tg3637")
+        >>> changed = crane.with_drive(luff=crane.luff.scale(Z16=1.5))
+        >>> changed.luff == crane.luff.scale(Z16=1.5)
+        True
         """
         check_names("A crane has no drive", drives, AXES, "it has")
         replacements, new_sources = drives_of(drives, Path())
@@ -174,10 +247,28 @@ class Crane:
         return drive
 
     def with_geometry(self, **changes: float | tuple[float, ...]) -> Crane:
-        """The crane with other quantities, in SI and by name: ``boom_length=38.0``.
+        """The crane with other quantities.
 
-        A `ParameterError` for an unknown name, a value out of its plausible range, or lengths that
-        make no crane.
+        Parameters
+        ----------
+        **changes : float or tuple of float
+            By name and in SI: ``boom_length=38.0``.
+
+        Returns
+        -------
+        Crane
+            A new crane, whose changed quantities are marked as the user's.
+
+        Raises
+        ------
+        ParameterError
+            For an unknown name, a value out of its plausible range, or lengths that make no crane.
+
+        Examples
+        --------
+        >>> from swashplate.crane import Crane
+        >>> Crane.preset("tg3637").with_geometry(boom_length=38.0).geometry.boom
+        38.0
         """
         quantities = dict(self.quantities)
         for name, value in changes.items():
@@ -187,9 +278,28 @@ class Crane:
         return replace(self, quantities=quantities)
 
     def with_limits(self, **limits: float) -> Crane:
-        """The crane with other limits, in SI and by name: ``side_lead=0.07``.
+        """The crane with other limits.
 
-        A `ParameterError` for an unknown name, or a value out of its plausible range.
+        Parameters
+        ----------
+        **limits : float
+            By name of `swashplate.crane.LIMITED` and in SI: ``side_lead=0.07``.
+
+        Returns
+        -------
+        Crane
+            A new crane, whose other limits stay as they are.
+
+        Raises
+        ------
+        ParameterError
+            For an unknown name, or a value out of its plausible range.
+
+        Examples
+        --------
+        >>> from swashplate.crane import Crane
+        >>> Crane.preset("tg3637").with_limits(side_lead=0.07).limits_si["side_lead"]
+        0.07
         """
         quantities = {
             name: CraneQuantity(
@@ -258,7 +368,33 @@ class Crane:
         return _inverse(self.controller_drive(axis))
 
     def home(self, slew_deg: float = 0.0, boom_deg: float = 45.0, rope_m: float = 20.0) -> Home:
-        """Where a run starts; an `InputError` if boom or rope are beyond the crane's limits."""
+        """Where a run starts.
+
+        Parameters
+        ----------
+        slew_deg : float
+            From forward to starboard, within 720. [deg]
+        boom_deg : float
+            Elevation of the boom. [deg]
+        rope_m : float
+            Rope below the tip. [m]
+
+        Returns
+        -------
+        Home
+            Slew [rad], rope of the luff [m] and rope below the tip [m].
+
+        Raises
+        ------
+        InputError
+            If slew, boom or rope are beyond the crane's limits.
+
+        Examples
+        --------
+        >>> from swashplate.crane import Crane
+        >>> Crane.preset("tg3637").home(rope_m=25.0).rope
+        25.0
+        """
         low, high = map(degrees, self.boom_limits)
         if not low - 1e-9 <= boom_deg <= high + 1e-9:
             raise InputError(

@@ -19,16 +19,38 @@ OUTPUTS = ("swing_out", "swing_across", "rope", "slew", "boom")
 def linearize(crane: Crane, boom_deg: float = 45.0, rope_m: float = 20.0) -> LinearModel:
     """Linear crane about a load that hangs at rest; the slew changes nothing in the boom's axes.
 
-    Inputs are the shafts' speeds, hoist, slew, luff. [rad/s] States are load less tip, outwards
-    along the boom and across it to starboard [m], and the load's speed that way [m/s]; rope [m],
-    slew and boom [rad] from where they are. Outputs are angles of the rope outwards and to
-    starboard [rad], rope, slew, boom.
-    An `InputError` for a boom or rope beyond the crane's limits.
+    Parameters
+    ----------
+    crane : Crane
+        Whose geometry counts.
+    boom_deg : float
+        Elevation of the boom. [deg]
+    rope_m : float
+        Rope below the tip. [m]
+
+    Returns
+    -------
+    LinearModel
+        Inputs are the shafts' speeds, hoist, slew, luff [rad/s]. States are load less tip, outwards
+        along the boom and across it to starboard [m], and the load's speed that way [m/s]; rope
+        [m], slew and boom [rad] from where they are. Outputs are angles of the rope outwards and to
+        starboard [rad], rope [m], slew and boom [rad].
+
+    Raises
+    ------
+    InputError
+        For a boom or rope beyond the crane's limits.
 
     Notes
     -----
     Both axes of the swing are pendulums, apart from each other: d' = v - p', v' = -g/L d with p'
     the speed of the tip, -∂ρ/∂θ of the luff and ρ of the slew.
+
+    Examples
+    --------
+    >>> from swashplate.crane import Crane, linearize
+    >>> linearize(Crane.preset("tg3637"), boom_deg=45.0, rope_m=20.0).A.shape
+    (7, 7)
     """
     crane.home(0.0, boom_deg, rope_m)
     g = crane.geometry

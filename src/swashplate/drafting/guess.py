@@ -231,7 +231,20 @@ def guess_drive(tests: Campaign | Sequence[Experiment]) -> Guess:
 
 
 def steady_speed(guess: Guess, side: int) -> float:
-    """Speed that settles under the largest command one way, as a magnitude. [unit]"""
+    """Speed that settles under the largest command one way.
+
+    Parameters
+    ----------
+    guess : Guess
+        Of one axis.
+    side : {0, 1}
+        0 for plus, 1 for minus.
+
+    Returns
+    -------
+    float
+        Magnitude, in the guess's unit.
+    """
     volts = guess.command[side] or max(guess.command)
     beyond = max(volts - guess.dead_zone[side], 0.0)
     along = (1.0 - 2.0 * side) * (guess.creep or 0.0)

@@ -55,9 +55,11 @@ class Drive(Result, Mapping[str, Parameter]):
 
     Examples
     --------
+    >>> from swashplate import Drive, maneuvers
     >>> hoist = Drive.preset("hoist")
-    >>> run = hoist.simulate(maneuvers.step(9.0).sample(512.0))
-    >>> run.shaft_speed.max()
+    >>> run = hoist.simulate(maneuvers.step(9.0))
+    >>> round(float(run.shaft_speed.max()), 2)
+    3.42
     """
 
     parameters: ParameterSet
@@ -77,7 +79,30 @@ class Drive(Result, Mapping[str, Parameter]):
 
     @classmethod
     def preset(cls, name: str) -> Drive:
-        """A packaged drive, ``"hoist"``, ``"slew"``, ``"luff"`` or ``"neutral"``, by its name."""
+        """A packaged drive by its name.
+
+        Parameters
+        ----------
+        name : {"hoist", "slew", "luff", "neutral"}
+            One of Kruse's three axes, or a straight line without limits to begin another machine
+            with.
+
+        Returns
+        -------
+        Drive
+            With the values, bounds and sources of its parameter file.
+
+        Raises
+        ------
+        ParameterError
+            For another name; the sentence lists those that there are.
+
+        Examples
+        --------
+        >>> from swashplate import Drive
+        >>> Drive.preset("hoist")
+        Drive('hoist', card 'rexroth_mdsd_1k_2x_2')
+        """
         return cls(load_preset(name))
 
     @classmethod
@@ -90,19 +115,47 @@ class Drive(Result, Mapping[str, Parameter]):
             The file, or a folder that `Identification.save` or ``swashplate fit`` wrote, of which
             ``drive.toml`` is read.
 
+        Returns
+        -------
+        Drive
+            With the file's parameters; of a folder those that the fit found.
+
         Raises
         ------
         FileError
             If there is no such file, or the folder does not hold a drive.
         ParameterError
             If an entry is wrong; the sentence names file, parameter and rule.
+
+        Examples
+        --------
+        >>> from swashplate import Drive
+        >>> Drive.preset("hoist").replace(Z16_plus=1.2e-4).to_toml("hoist.toml")
+        >>> Drive.from_toml("hoist.toml")["Z16_plus"].value
+        0.00012
         """
         return cls(load_set(path))
 
     def to_toml(self, path: str | Path) -> None:
         """Store the parameters; `from_toml` gives an equal drive back.
 
-        If the file cannot be written (`FileError`), an older one stays as it was.
+        Parameters
+        ----------
+        path : path
+            The file to write. An older one is replaced as a whole.
+
+        Raises
+        ------
+        FileError
+            If the file cannot be written; an older one stays as it was.
+
+        Examples
+        --------
+        >>> from swashplate import Drive
+        >>> hoist = Drive.preset("hoist")
+        >>> hoist.to_toml("hoist.toml")
+        >>> Drive.from_toml("hoist.toml") == hoist
+        True
         """
         from swashplate.tables import write_text
 
@@ -148,15 +201,53 @@ class Drive(Result, Mapping[str, Parameter]):
             By symbol (``Z16=1.2e-4`` both ways, ``Z16=(1.2e-4, 1.5e-4)`` plus and minus) or by one
             direction (``Z16_plus=1.2e-4``), in SI or with a unit (``Z16=0.12 * ureg.mm``).
 
+        Returns
+        -------
+        Drive
+            A new drive, whose changed parameters have the status ``"user"``. This one stays as it
+            is.
+
         Raises
         ------
         ParameterError
             For an unknown name or a value that breaks a rule.
+
+        Examples
+        --------
+        >>> from swashplate import Drive
+        >>> wider = Drive.preset("hoist").replace(Z16=(1.2e-4, 1.6e-4))
+        >>> wider["Z16"].value
+        Pair(plus=0.00012, minus=0.00016)
         """
         return Drive(self.parameters.replace(changes))
 
     def scale(self, **factors: Change) -> Drive:
-        """A drive with values multiplied, e.g. ``scale(Z16=1.5, Z10=1.5)``; as `replace`."""
+        """A drive with values multiplied.
+
+        Parameters
+        ----------
+        **factors : float, or a pair of them
+            By symbol (``Z16=1.5`` both ways, ``Z16=(1.5, 1.2)`` plus and minus) or by one direction
+            (``Z16_plus=1.5``). [1]
+
+        Returns
+        -------
+        Drive
+            A new drive, as of `replace`.
+
+        Raises
+        ------
+        ParameterError
+            For an unknown name, or a product that breaks a rule.
+
+        Examples
+        --------
+        >>> from swashplate import Drive
+        >>> hoist = Drive.preset("hoist")
+        >>> twice = hoist.scale(Z10=2.0)
+        >>> twice["Z10"].value / hoist["Z10"].value
+        2.0
+        """
         return Drive(self.parameters.scale(factors))
 
     def with_equation(
@@ -176,6 +267,11 @@ class Drive(Result, Mapping[str, Parameter]):
             are parameters of the drive from then on: ``drive.replace(seal_drag=1e-5)``, a fit's
             unknowns, columns of `sensitivities`. Only the pump's equations can have some.
 
+        Returns
+        -------
+        Drive
+            A new drive; this one stays as it is.
+
         Raises
         ------
         InputError
@@ -186,7 +282,31 @@ class Drive(Result, Mapping[str, Parameter]):
         return Drive(with_equation(self.parameters, Replacement(old, new, parameters)))
 
     def renamed(self, name: str, title: str | None = None) -> Drive:
-        """The same drive under another name, which is not empty, and perhaps another title."""
+        """The same drive under another name, and perhaps another title.
+
+        Parameters
+        ----------
+        name : str
+            Not empty.
+        title : str, optional
+            By default the title stays.
+
+        Returns
+        -------
+        Drive
+            A new drive with the same numbers.
+
+        Raises
+        ------
+        InputError
+            If the name is empty.
+
+        Examples
+        --------
+        >>> from swashplate import Drive
+        >>> Drive.preset("hoist").renamed("winch").name
+        'winch'
+        """
         if not str(name or "").strip():
             raise InputError(f"A drive's name is text, not {name!r}.")
         if title is None:
@@ -255,6 +375,19 @@ class Drive(Result, Mapping[str, Parameter]):
             For a record or option that cannot be simulated.
         DomainError
             If the solenoid overpowers the feedback spring.
+
+        Notes
+        -----
+        Control card: Kruse (2001), eqs. 3.1-3.9. Pump and motor: eqs. 6.55-6.71 and 8.9.
+
+        Examples
+        --------
+        >>> from swashplate import Drive, maneuvers
+        >>> run = Drive.preset("hoist").simulate(maneuvers.step(9.0), 512.0)
+        >>> run.shaft_speed.shape
+        (5121,)
+        >>> round(float(run.shaft_speed.max()), 2)
+        3.42
         """
         records = drive_records("voltage", voltage, rate, **keywords)
         return simulate_drive(self.parameters, records, start)
@@ -285,6 +418,16 @@ class Drive(Result, Mapping[str, Parameter]):
         ------
         InputError, DomainError
             As in `simulate`.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from swashplate import Drive
+        >>> run = Drive.preset("hoist").simulate_current(np.full(1024, 0.7))
+        >>> run.shaft_speed.shape
+        (1024,)
+        >>> run.voltage is None
+        True
         """
         records = drive_records("current", current, rate, **keywords)
         return simulate_drive(self.parameters, records, start)
@@ -320,6 +463,16 @@ class Drive(Result, Mapping[str, Parameter]):
             If no parameter has a name.
         InputError
             As in `simulate`.
+
+        Examples
+        --------
+        >>> from swashplate import Drive, maneuvers
+        >>> hoist = Drive.preset("hoist")
+        >>> by = hoist.sensitivities(maneuvers.step(9.0), parameters=["Z16"])
+        >>> by.names
+        ('Z16_plus', 'Z16_minus')
+        >>> by["shaft_speed"].shape
+        (5121, 2)
         """
         from swashplate.drive.derivatives import drive_sensitivities
 
@@ -398,6 +551,14 @@ class Drive(Result, Mapping[str, Parameter]):
             If no parameter has a name.
         InputError, FileError
             As in `swashplate.simulate_many`.
+
+        Examples
+        --------
+        >>> from swashplate import Drive, maneuvers
+        >>> hoist = Drive.preset("hoist")
+        >>> batch = hoist.simulate_many({"Z10": [11.0, 12.0, 13.0]}, voltage=maneuvers.step(9.0))
+        >>> batch.output.shape
+        (3, 5121)
         """
         from swashplate.drive.batch import simulate_drives
 
@@ -439,6 +600,15 @@ class Drive(Result, Mapping[str, Parameter]):
         InputError
             For a rate or option that there is not, and a rate at which the card's filter is
             unstable.
+
+        Examples
+        --------
+        >>> from swashplate import Drive
+        >>> stepper = Drive.preset("hoist").stepper(512.0)
+        >>> for _ in range(2560):
+        ...     sample = stepper.step(9.0)
+        >>> round(sample.shaft_speed, 2)
+        3.42
         """
         rate = in_si(rate, "Hz", "The rate")
         return drive_stepper(self.parameters, rate, interpolation, start, measured)
@@ -525,6 +695,19 @@ class Drive(Result, Mapping[str, Parameter]):
         DomainError
             Where the gain is 0: in a dead zone, within the hysteresis, at a stop, or with a
             friction that has no presliding.
+
+        Notes
+        -----
+        The pump's lag of small motions: Kruse (2001), eqs. 6.72-6.74.
+
+        Examples
+        --------
+        >>> from swashplate import Drive
+        >>> linear = Drive.preset("hoist").linearize(5.0)
+        >>> linear
+        LinearDrive('hoist', voltage to shaft_speed, continuous)
+        >>> round(linear.gain, 3)
+        0.447
         """
         from swashplate.drive.linearisation import linearize_drive
 
@@ -566,12 +749,25 @@ class Drive(Result, Mapping[str, Parameter]):
             Relative change of the first harmonic, from the middle of a simulation to its end, below
             which the drive repeats itself.
 
+        Returns
+        -------
+        FrequencyResponse
+            First harmonic of the output by that of the input, complex, with distortion and mean
+            of the output; each (a, f).
+
         Raises
         ------
         InputError
             For frequencies, amplitudes or options out of range.
         DomainError
             If nothing moves at all, or the answer does not come to repeat itself.
+
+        Examples
+        --------
+        >>> from swashplate import Drive
+        >>> response = Drive.preset("hoist").frequency_response([0.5, 1.0], [1.0], bias=4.0)
+        >>> round(float(abs(response.gain[0, 0])), 2)
+        0.42
         """
         from swashplate.drive.frequency_response import sweep_drive
 
@@ -610,6 +806,12 @@ class Drive(Result, Mapping[str, Parameter]):
         ------
         InputError
             For a command that is not finite or beyond ±10 V.
+
+        Examples
+        --------
+        >>> from swashplate import Drive
+        >>> Drive.preset("hoist").steady_speed([-9.0, 0.0, 9.0]).round(2).tolist()
+        [-3.23, 0.05, 3.42]
         """
         return self._steady(voltage)[1]
 
@@ -634,6 +836,12 @@ class Drive(Result, Mapping[str, Parameter]):
         ------
         InputError
             For a command that is not finite or beyond ±10 V.
+
+        Examples
+        --------
+        >>> from swashplate import Drive
+        >>> round(Drive.preset("hoist").steady_current(9.0), 3)
+        0.745
         """
         return self._steady(voltage)[0]
 

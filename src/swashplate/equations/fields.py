@@ -27,7 +27,15 @@ ON: Final = True
 
 @dataclass(frozen=True)
 class Definition:
-    """What a parameter is, whatever its value."""
+    """What a parameter is, whatever its value.
+
+    Examples
+    --------
+    >>> from swashplate.equations import Definition
+    >>> lag = Definition("lag of the valve", "s", above=0.0, plausible=(1e-3, 10.0))
+    >>> lag.lower
+    0.0
+    """
 
     name: str
     """What it is, in words."""

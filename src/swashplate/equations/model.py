@@ -89,7 +89,14 @@ def mean_over_sample(window: Window) -> float:
 
 
 class Tap(NamedTuple):
-    """How a model looks at a signal that comes from outside or from another model."""
+    """How a model looks at a signal that comes from outside or from another model.
+
+    Examples
+    --------
+    >>> from swashplate import equations
+    >>> equations.Tap("command", delay="delay", hold="mean").samples
+    3
+    """
 
     signal: str
     """Name of the signal."""
@@ -142,7 +149,16 @@ class Link(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """A machine as equations over named tuples of floats; see the module's text."""
+    """A machine as equations over named tuples of floats; see the module's text.
+
+    Examples
+    --------
+    >>> from swashplate.models.full_order import plant
+    >>> plant
+    Model('plant', 42 parameters)
+    >>> plant.external
+    ('current',)
+    """
 
     name: str
     parameters: type[Any]
@@ -447,6 +463,11 @@ def join(
     **changes
         `integrals`, `outputs`, `free_start`, `replacements` of the whole.
 
+    Returns
+    -------
+    Model
+        The whole; `Model.parts` are the models that were given.
+
     Raises
     ------
     InputError
@@ -456,6 +477,14 @@ def join(
     Notes
     -----
     A signal must be known before it is needed: loops without delay between parts are not possible.
+
+    Examples
+    --------
+    >>> from swashplate import equations
+    >>> from swashplate.models.amplifier import card
+    >>> from swashplate.models.pump import pump
+    >>> equations.join("winch", card, pump).external
+    ('voltage', 'pump_speed', 'load_torque', 'supply_pressure')
     """
     for part in parts:
         if not isinstance(part, Model):
@@ -612,6 +641,13 @@ def discretised(
     straight between samples keeps the method's order on a finer grid only, or with a tap that has
     a delay of a step at least: ``Tap("command", "delay", ahead=1.0, hold="mean")`` is its mean over
     the step.
+
+    Examples
+    --------
+    >>> from swashplate import equations
+    >>> from swashplate.models.full_order import plant_rates
+    >>> equations.discretised(plant_rates, "heun", substeps=2).__name__
+    'plant_rates_heun'
     """
     if method not in TABLEAUS:
         raise InputError(f"There is no method '{method}'; there are {', '.join(get_args(Method))}.")

@@ -197,9 +197,10 @@ class FullOrderDrive:
 
     Examples
     --------
-    >>> hoist = FullOrderDrive.preset("hoist")
-    >>> run = hoist.simulate(maneuvers.step(9.0).sample(512.0))
-    >>> run.motor_pressure_drop.max()
+    >>> from swashplate import FullOrderDrive, maneuvers
+    >>> run = FullOrderDrive.preset("hoist").simulate(maneuvers.step(9.0).sample(512.0))
+    >>> round(float(run.shaft_speed.max()), 1)
+    3.4
     """
 
     drive: Drive
@@ -217,7 +218,29 @@ class FullOrderDrive:
 
     @classmethod
     def preset(cls, name: str) -> FullOrderDrive:
-        """Kruse's ``"hoist"``, ``"slew"`` or ``"luff"`` drive with its assumed physical set."""
+        """One of Kruse's drives with its assumed physical set.
+
+        Parameters
+        ----------
+        name : {"hoist", "slew", "luff"}
+            The axis.
+
+        Returns
+        -------
+        FullOrderDrive
+            The packaged drive of that name and `PhysicalSet.preset` of it.
+
+        Raises
+        ------
+        ParameterError
+            For another name; the sentence lists those that there are.
+
+        Examples
+        --------
+        >>> from swashplate import FullOrderDrive
+        >>> FullOrderDrive.preset("hoist").physical
+        PhysicalSet('hoist', 31 quantities)
+        """
         physical = PhysicalSet.preset(name)
         return cls(Drive.preset(name), physical)
 
@@ -239,7 +262,32 @@ class FullOrderDrive:
         return cls(drive, from_lumped(drive.parameters, like, **quantities))
 
     def replace(self, **changes: Change) -> FullOrderDrive:
-        """With other physical values in SI, e.g. ``replace(load_torque=2e3)``."""
+        """A drive with other physical values.
+
+        Parameters
+        ----------
+        **changes : float, Pint quantity, or a pair of them
+            By name of the quantity, in SI or with a unit: ``load_torque=2e3``.
+
+        Returns
+        -------
+        FullOrderDrive
+            A new drive; this one stays as it is.
+
+        Raises
+        ------
+        UnknownParameterError
+            For a name that no quantity has.
+        ParameterError
+            For a value out of its plausible range, or that breaks a rule.
+
+        Examples
+        --------
+        >>> from swashplate import FullOrderDrive
+        >>> loaded = FullOrderDrive.preset("hoist").replace(load_torque=2e3)
+        >>> loaded.physical["load_torque"].value
+        2000.0
+        """
         return replace(self, physical=self.physical.replace(**changes))
 
     @property
@@ -314,10 +362,42 @@ class FullOrderDrive:
         clip: bool = False,
         substeps: int | None = None,
     ) -> FullOrderSimulation:
-        """Simulate card and machine over a command [V]; arguments as `Drive.simulate`.
+        """Simulate card and machine over a command.
 
         The card's current at its own steps drives the machine, a straight line between them.
-        `substeps` as in `follow`.
+
+        Parameters
+        ----------
+        voltage : (n,) array_like
+            Command. [V]
+        rate, time, interpolation, start, clip :
+            As in `Drive.simulate`.
+        substeps : int, optional
+            As in `follow`.
+
+        Returns
+        -------
+        FullOrderSimulation
+            All signals of the chain.
+
+        Raises
+        ------
+        InputError
+            For a record or option that cannot be simulated.
+        DomainError
+            If the machine is too stiff for the march, or the solenoid overpowers the feedback
+            spring.
+
+        Notes
+        -----
+        Kruse (2001), chapter 6, as of `swashplate.models.machine`.
+
+        Examples
+        --------
+        >>> from swashplate import FullOrderDrive, maneuvers
+        >>> run = FullOrderDrive.preset("hoist").simulate(maneuvers.step(9.0).sample(512.0))
+        >>> run.shaft_speed.shape
+        (5121,)
         """
         run = self.drive.simulate(
             voltage, rate, time=time, interpolation=interpolation, start=start, clip=clip
@@ -340,6 +420,11 @@ class FullOrderDrive:
             Sub-steps of the march a sample, at least 512 samples a second; by default 8, or so
             many that the fastest mode takes six steps a turn.
 
+        Returns
+        -------
+        FullOrderSimulation
+            All signals of the chain, at the samples of the earlier run.
+
         Raises
         ------
         InputError
@@ -357,6 +442,27 @@ class FullOrderDrive:
         The slow pole is the eigenvalue nearest zero. The spool's mode is the one in which position
         and velocity of the spool take the largest part, by the product of left and right
         eigenvectors.
+
+        Parameters
+        ----------
+        current : float
+            Signed current. [A]
+
+        Returns
+        -------
+        Modes
+            Five eigenvalues, and which of them are slow, the spool's and the swash plate's. [1/s]
+
+        Raises
+        ------
+        InputError
+            If the current is not finite.
+
+        Examples
+        --------
+        >>> from swashplate import FullOrderDrive
+        >>> round(FullOrderDrive.preset("hoist").modes().slow.real, 2)
+        -8.39
         """
         if not np.isfinite(current):
             raise InputError(f"The current is {current}, but must be a finite number of amperes.")

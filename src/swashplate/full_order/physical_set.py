@@ -111,7 +111,30 @@ class PhysicalSet(Entries):
 
     @classmethod
     def preset(cls, name: str) -> PhysicalSet:
-        """An assumed set of one of Kruse's axes: ``"hoist"``, ``"slew"``, ``"luff"``."""
+        """An assumed set of one of Kruse's axes.
+
+        Parameters
+        ----------
+        name : {"hoist", "slew", "luff"}
+            The axis.
+
+        Returns
+        -------
+        PhysicalSet
+            Completed by `swashplate.full_order.from_lumped` so that it stands for the packaged
+            lumps.
+
+        Raises
+        ------
+        ParameterError
+            For another name; the sentence lists those that there are.
+
+        Examples
+        --------
+        >>> from swashplate import PhysicalSet
+        >>> PhysicalSet.preset("hoist")
+        PhysicalSet('hoist', 31 quantities)
+        """
         title, _ = _assumed(name)
         return replace(from_lumped(load_parameters(name), name), title=title)
 
@@ -160,7 +183,31 @@ class PhysicalSet(Entries):
         }
 
     def replace(self, **changes: Change) -> PhysicalSet:
-        """A set with other values in SI, ``replace(load_torque=2e3)``, marked as the user's."""
+        """A set with other values, marked as the user's.
+
+        Parameters
+        ----------
+        **changes : float, Pint quantity, or a pair of them
+            By name of the quantity, in SI or with a unit: ``load_torque=2e3``.
+
+        Returns
+        -------
+        PhysicalSet
+            A new set; this one stays as it is.
+
+        Raises
+        ------
+        UnknownParameterError
+            For a name that no quantity has.
+        ParameterError
+            For a value out of its plausible range, or that breaks a rule.
+
+        Examples
+        --------
+        >>> from swashplate import PhysicalSet
+        >>> PhysicalSet.preset("hoist").replace(load_torque=2e3)["load_torque"].value
+        2000.0
+        """
         changed = {
             name: Parameter(quantity_of(name), meant_value(name, quantity_of(name), change))
             for name, change in changes.items()

@@ -58,6 +58,13 @@ def linearize(
         If a signal is unknown, or the model cannot settle by itself.
     DomainError
         If the point lies outside the model's domain.
+
+    Examples
+    --------
+    >>> from swashplate import FullOrderDrive, linear
+    >>> machine = FullOrderDrive.preset("hoist").instance(1.0 / 512.0, card=False)
+    >>> linear.linearize(machine, {"current": 0.5}, 512.0)
+    LinearModel('hoist', current to shaft_speed, sampled at 512 Hz)
     """
     if not isinstance(instance, Instance):
         raise InputError(

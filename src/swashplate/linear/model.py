@@ -255,14 +255,30 @@ class LinearModel:
     def margins(self, controller: float | Response) -> LoopMargins:
         """Margins of the loop u = K (r - y) closed over the first output.
 
-        The controller is a proportional gain K, e.g. in V/(rad/s), or its frequency response: a
-        function of frequencies [Hz] that returns complex numbers. It must not be unstable by
-        itself; one that integrates is fine.
+        Parameters
+        ----------
+        controller : float or callable
+            A proportional gain K, in the input's unit by the output's, e.g. V/(rad/s), or its
+            frequency response: a function of frequencies [Hz] that returns complex numbers. It must
+            not be unstable by itself; one that integrates is fine.
+
+        Returns
+        -------
+        LoopMargins
+            Crossover, and margins of phase, delay and gain.
 
         Raises
         ------
+        InputError
+            If the controller is not a gain, nor a function that gives as many numbers.
         DomainError
             If the closed loop is unstable, as it then has no margin, or the model is.
+
+        Examples
+        --------
+        >>> from swashplate import Drive
+        >>> round(Drive.preset("hoist").linearize(5.0).margins(2.0).gain_margin, 1)
+        6.8
         """
 
         def loop(frequency: Array) -> ComplexArray:

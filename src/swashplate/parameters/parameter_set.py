@@ -306,11 +306,23 @@ class ParameterSet(Entries):
             Symbol (``Z16``, both directions or a pair) or column (``Z16_plus``) to value: a number
             in SI, or a Pint quantity.
 
+        Returns
+        -------
+        ParameterSet
+            A new set; this one stays as it is.
+
         Raises
         ------
         ParameterError
             For an unknown name, a pair for a parameter without directions, a value beyond its
             plausible range, or a broken rule.
+
+        Examples
+        --------
+        >>> from swashplate import Drive
+        >>> plain = Drive.preset("hoist").parameters
+        >>> plain.replace({"Z16_plus": 1.2e-4})["Z16_plus"].value
+        0.00012
         """
         for name, change in changes.items():
             definition = self.definitions.find(name)

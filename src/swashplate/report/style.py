@@ -354,10 +354,23 @@ def save_figure(figure: Figure, path: str | Path) -> None:
 
     The same figure gives the same bytes.
 
+    Parameters
+    ----------
+    figure : Figure
+        The figure.
+    path : path
+        File that ends in ``.png``, ``.svg`` or ``.pdf``.
+
     Raises
     ------
     FileError
         For another ending, or a folder that cannot be written.
+
+    Examples
+    --------
+    >>> from swashplate import maneuvers
+    >>> from swashplate.report.figures import save_figure
+    >>> save_figure(maneuvers.step(9.0).plot(), "step.png")
     """
     import matplotlib
 

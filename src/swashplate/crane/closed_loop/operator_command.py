@@ -28,6 +28,12 @@ class OperatorCommand(Result):
     """Commands of hoist, slew and luff, each from -1 to 1.
 
     Positive ones hoist, slew to starboard, lift the boom. Made by `trapezoid`, `record`, `rest`.
+
+    Examples
+    --------
+    >>> from swashplate.crane import OperatorCommand
+    >>> OperatorCommand.trapezoid(hoist=0.5, duration=10.0)
+    OperatorCommand(length=60, start=1, ramp=0.5, parts={hoist}, until={}, duration=10, rate=512)
     """
 
     length: float
@@ -69,6 +75,24 @@ class OperatorCommand(Result):
             Of an axis without target. [s]
         start, ramp, length : float
             Moment of the first ramp, time of each ramp, length of the record, at most a day. [s]
+
+        Returns
+        -------
+        OperatorCommand
+            Sampled when a run begins: how long an axis moves depends on the crane.
+
+        Raises
+        ------
+        InputError
+            For a part beyond -1 to 1, a target without a command of its axis, a command without
+            target or duration, or times out of their range.
+
+        Examples
+        --------
+        >>> from swashplate.crane import OperatorCommand
+        >>> stick = OperatorCommand.trapezoid(slew=1.0, until={"slew_deg": 45.0})
+        >>> stick.length
+        60.0
         """
         parts = {"hoist": hoist, "slew": slew, "luff": luff}
         targets = dict(until or {})
@@ -94,9 +118,32 @@ class OperatorCommand(Result):
 
     @classmethod
     def record(cls, commands: ArrayLike, rate: float = 512.0) -> OperatorCommand:
-        """Commands as they were recorded at a rate [Hz], straight between samples.
+        """Commands as they were recorded, straight between samples.
 
-        They are (n, 3), of hoist, slew and luff, -1 to 1.
+        Parameters
+        ----------
+        commands : (n, 3) array_like
+            Of hoist, slew and luff, -1 to 1; two rows or more.
+        rate : float
+            Samples a second. [Hz]
+
+        Returns
+        -------
+        OperatorCommand
+            As long as the record.
+
+        Raises
+        ------
+        InputError
+            For another shape, a number beyond -1 to 1, a rate that is not positive, or a record
+            longer than a day.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from swashplate.crane import OperatorCommand
+        >>> OperatorCommand.record(np.zeros((513, 3)), rate=512.0).length
+        1.0
         """
         samples = np.array(commands, dtype=np.float64)
         if samples.ndim != 2 or samples.shape[1] != 3 or len(samples) < 2 or not rate > 0.0:
@@ -118,13 +165,65 @@ class OperatorCommand(Result):
 
     @classmethod
     def rest(cls, length: float = 60.0) -> OperatorCommand:
-        """Nothing, for so long. [s]"""
+        """Nothing: the stick stays at zero.
+
+        Parameters
+        ----------
+        length : float
+            How long, at most a day. [s]
+
+        Returns
+        -------
+        OperatorCommand
+            Zero on all axes.
+
+        Raises
+        ------
+        InputError
+            For a length that is not positive, or longer than a day.
+
+        Examples
+        --------
+        >>> from swashplate.crane import OperatorCommand
+        >>> OperatorCommand.rest(10.0).length
+        10.0
+        """
         return cls.trapezoid(length=length)
 
     def sample(self, crane: Crane, home: Home, rate: float) -> tuple[Array, float]:
-        """Commands (n, 3) at a rate for a crane that starts at its home; when the last ends. [s]
+        """Commands for a crane that starts at its home.
 
-        An `InputError` if one does not end within the record, or leads away from its target.
+        Parameters
+        ----------
+        crane : Crane
+            Whose full speeds and lengths count.
+        home : Home
+            Where the run starts, as of `Crane.home`.
+        rate : float
+            Samples a second. [Hz]
+
+        Returns
+        -------
+        (n, 3) array
+            Of hoist, slew and luff, -1 to 1.
+        float
+            When the last command ends. [s]
+
+        Raises
+        ------
+        InputError
+            If a command does not end within the record, or leads away from its target.
+
+        Examples
+        --------
+        >>> from swashplate.crane import Crane, OperatorCommand
+        >>> crane = Crane.preset("tg3637")
+        >>> stick = OperatorCommand.trapezoid(slew=1.0, until={"slew_deg": 45.0})
+        >>> commands, end = stick.sample(crane, crane.home(), 512.0)
+        >>> commands.shape
+        (30721, 3)
+        >>> round(end, 1)
+        12.1
         """
         time = np.arange(round(self.length * rate) + 1) / rate
         if self.samples is not None:

@@ -37,6 +37,11 @@ def simulate(
     **options
         Where it begins, what controls it, what hangs on it: see `RunOptions`.
 
+    Returns
+    -------
+    CraneRun
+        All signals of drives, tip and load at 512 Hz.
+
     Raises
     ------
     InputError
@@ -45,6 +50,16 @@ def simulate(
         fast for the rope.
     DomainError
         If boom or rope meet a limit, or a drive leaves its domain.
+
+    Examples
+    --------
+    >>> from swashplate.crane import Crane, OperatorCommand, control, simulate
+    >>> crane = Crane.preset("tg3637")
+    >>> stick = OperatorCommand.trapezoid(slew=1.0, until={"slew_deg": 45.0})
+    >>> round(simulate(crane, stick).residual_deg, 1)
+    7.4
+    >>> round(simulate(crane, stick, control=control.TipShaper("zv")).residual_deg, 1)
+    1.0
     """
     prepared = prepare(crane, stick, options)
     ship = ship_motion_of(sea, len(prepared.commands), RATE)

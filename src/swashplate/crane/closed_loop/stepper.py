@@ -120,6 +120,13 @@ class CraneStepper:
         The crane with its drives.
     **options
         Where it begins, what controls it, what hangs on it: see `RunOptions`.
+
+    Examples
+    --------
+    >>> from swashplate.crane import Crane, CraneStepper
+    >>> stepper = CraneStepper(Crane.preset("tg3637"))
+    >>> stepper.step([0.0, 0.0, 0.0])["rope"]
+    20.0
     """
 
     def __init__(self, crane: Crane, **options: Unpack[RunOptions]) -> None:
@@ -198,8 +205,21 @@ class CraneStepper:
         Returns
         -------
         dict
-            Signals by name as of `CraneRun.rows`, and the angle ``swing``, SI; errors are those of
-            `simulate`.
+            Signals by name as of `CraneRun.rows`, and the angle ``swing``, SI.
+
+        Raises
+        ------
+        InputError
+            For a command beyond its bounds, or a ship's motion that is not six finite numbers.
+        DomainError
+            As of `simulate`.
+
+        Examples
+        --------
+        >>> from swashplate.crane import Crane, CraneStepper
+        >>> stepper = CraneStepper(Crane.preset("tg3637"))
+        >>> stepper.step((0.0, 1.0, 0.0))["rope"]
+        20.0
         """
         most = FULL_VOLTAGE if self.fixed.actuation == loop.DIRECT else 1.0
         commands = np.array([command], dtype=np.float64)

@@ -464,12 +464,28 @@ def simulate(
     begin : mapping of str to float, optional
         Numbers of the state at the first sample, by path.
 
+    Returns
+    -------
+    Run
+        Signals of the model by name, ``run["speed"]``, on the grid of `rate`.
+
     Raises
     ------
     InputError
         For inputs or numbers that do not fit the model.
     DomainError
         If the model leaves its domain, or a number overflows.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from swashplate import FullOrderDrive, equations
+    >>> from swashplate.models.full_order import Substeps, plant
+    >>> numbers = FullOrderDrive.preset("hoist").plant
+    >>> current = {"current": np.full(1024, 0.7)}
+    >>> run = equations.simulate(plant, numbers, current, 512.0, given=Substeps(8.0))
+    >>> run["shaft_speed"].shape
+    (1024,)
     """
     instance = instance_of(model, p, options=options, given=given)
     records = inputs_of(
@@ -642,6 +658,13 @@ class Stepper(Generic[S]):
             it was.
         DomainError
             If the model leaves its domain, or a number grows beyond all bounds.
+
+        Examples
+        --------
+        >>> from swashplate import Drive
+        >>> stepper = Drive.preset("hoist").stepper(512.0)
+        >>> stepper.step(0.0).shaft_speed
+        0.0
         """
         if len(inputs) != len(self.inputs):
             raise InputError(
@@ -705,6 +728,27 @@ def stepper(
         Signals that go in.
     outputs : sequence of str, optional
         Signals that come out, and limits by their names, true if they act; by default all.
+
+    Returns
+    -------
+    Stepper
+        Its ``step(*inputs)`` returns inputs and outputs by name.
+
+    Raises
+    ------
+    InputError
+        For numbers, names or options that do not fit the model.
+
+    Examples
+    --------
+    >>> from swashplate import FullOrderDrive, equations
+    >>> from swashplate.models.full_order import Substeps, plant
+    >>> numbers = FullOrderDrive.preset("hoist").plant
+    >>> machine = equations.stepper(
+    ...     plant, numbers, ["current"], ["shaft_speed"], rate=512.0, given=Substeps(8.0)
+    ... )
+    >>> machine.step(0.0)
+    {'current': 0.0, 'shaft_speed': 0.0}
     """
     instance = instance_of(model, p, options=options, given=given)
     limits = model.limit_bits

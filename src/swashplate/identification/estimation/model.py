@@ -34,10 +34,12 @@ class MachineModel(Protocol):
 
     Examples
     --------
-    >>> class Lag:
+    >>> import numpy as np
+    >>> class Gain:
     ...     def simulate(self, values, experiment):
-    ...         speed = values["gain"] * filtered(experiment.input, values["time constant"])
-    ...         return {"speed": np.interp(experiment["speed"].time, experiment.input.time, speed)}
+    ...         command, speed = experiment.input, experiment["speed"]
+    ...         volts = np.interp(speed.time, command.time, command.values)
+    ...         return {"speed": values["gain"] * volts}
     """
 
     def simulate(self, values: Mapping[str, float], experiment: Experiment) -> Mapping[str, Array]:
@@ -287,13 +289,10 @@ class UserModel(Result, EquationModel):
 
     Examples
     --------
-    >>> problem = Problem(
-    ...     UserModel(valve, rate=100.0, begin={"position": "position"}),
-    ...     campaign.experiments,
-    ...     Unknowns((Unknown("lag", 0.06, 0.005, 0.5, "s", log=True), ...)),
-    ...     channels=("position",),
-    ...     scales={"position": 1e-3},
-    ... )
+    >>> from swashplate.identification import UserModel
+    >>> from swashplate.models.full_order import plant
+    >>> UserModel(plant, rate=512.0).signals[:2]
+    ['solenoid_force', 'spool_position']
     """
 
     model: Equations

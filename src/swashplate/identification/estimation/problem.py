@@ -68,6 +68,34 @@ class Problem(Result):
     """Half the weighted sum of squares of all experiments, as a function of the unknowns.
 
     The residual of a sample is sqrt(weight)/scale times (simulated less measured).
+
+    Raises
+    ------
+    InputError
+        If there is no unknown, no experiment, or no sample that counts.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from swashplate import Campaign, maneuvers, rig
+    >>> from swashplate.identification import Problem, Unknown, Unknowns
+    >>> class Gain:
+    ...     def simulate(self, values, experiment):
+    ...         command, speed = experiment.input, experiment["shaft_speed"]
+    ...         volts = np.interp(speed.time, command.time, command.values)
+    ...         return {"shaft_speed": values["gain"] * volts}
+    >>> sine = {"sine": maneuvers.sine(9.0, 0.1)}
+    >>> tests = rig.run("hoist", sine, channels=("shaft_speed",))
+    >>> campaign = Campaign.from_toml(rig.write(tests, "sines"))
+    >>> problem = Problem(
+    ...     Gain(),
+    ...     campaign.experiments,
+    ...     Unknowns((Unknown("gain", 0.3, 0.01, 1.0, "rad/(s V)"),)),
+    ...     channels=("shaft_speed",),
+    ...     scales={"shaft_speed": 0.01},
+    ... )
+    >>> problem.start.shape
+    (1,)
     """
 
     model: MachineModel

@@ -164,6 +164,40 @@ def solve(
         Called at each iteration. Ctrl-C ends the search with the best point so far.
     hopeless : callable, optional
         Called with the best point after each `LEG` evaluations; true gives the search up.
+
+    Returns
+    -------
+    Solution
+        The (K,) vector of the optimum, or of the best point so far, with its cost.
+
+    Raises
+    ------
+    DomainError
+        If the model does not hold at the start.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from swashplate import Campaign, maneuvers, rig
+    >>> from swashplate.identification import Problem, Unknown, Unknowns, solve
+    >>> class Gain:
+    ...     def simulate(self, values, experiment):
+    ...         command, speed = experiment.input, experiment["shaft_speed"]
+    ...         volts = np.interp(speed.time, command.time, command.values)
+    ...         return {"shaft_speed": values["gain"] * volts}
+    >>> sine = {"sine": maneuvers.sine(9.0, 0.1)}
+    >>> tests = rig.run("hoist", sine, channels=("shaft_speed",))
+    >>> campaign = Campaign.from_toml(rig.write(tests, "sine"))
+    >>> problem = Problem(
+    ...     Gain(),
+    ...     campaign.experiments,
+    ...     Unknowns((Unknown("gain", 0.3, 0.01, 1.0, "rad/(s V)"),)),
+    ...     channels=("shaft_speed",),
+    ...     scales={"shaft_speed": 0.01},
+    ... )
+    >>> found = solve(problem)
+    >>> round(problem.unknowns.values(found.vector)["gain"], 2)
+    0.4
     """
     from scipy.optimize import least_squares
 

@@ -60,7 +60,21 @@ or a card's current there, or the instant of a jump of the command between two s
 
 @dataclass(frozen=True)
 class Unknown:
-    """One number that a fit is to find."""
+    """One number that a fit is to find.
+
+    Raises
+    ------
+    ParameterError
+        If the bounds are not finite or not in their order, the nominal value lies outside them, or
+        a logarithmic unknown may be 0 or negative.
+
+    Examples
+    --------
+    >>> from swashplate.identification import Unknown
+    >>> gain = Unknown("gain", 0.05, 0.001, 1.0, "m/(V s)", log=True)
+    >>> gain.label
+    'gain'
+    """
 
     name: str
     start: float
@@ -166,6 +180,19 @@ class Unknowns(Result):
 
     The solver moves ln(value) of a logarithmic one, else value/scale: a change of 0.01 in its
     vector is one per cent, of the value or of the scale.
+
+    Raises
+    ------
+    ParameterError
+        If two unknowns set the same number of the model.
+
+    Examples
+    --------
+    >>> from swashplate.identification import Unknown, Unknowns
+    >>> gain = Unknown("gain", 0.05, 0.001, 1.0)
+    >>> lag = Unknown("lag", 0.1, 0.01, 1.0, "s")
+    >>> Unknowns((gain, lag)).names
+    ('gain', 'lag')
     """
 
     items: tuple[Unknown, ...]
@@ -328,7 +355,30 @@ class Unknowns(Result):
         return {name: value for unknown, value in values for name in unknown.targets}
 
     def zeros(self, vector: Array, run: str) -> dict[str, float]:
-        """Free zeros of one experiment by their channels. [unit of the channel]"""
+        """Free zeros of one experiment by their channels.
+
+        Parameters
+        ----------
+        vector : (K,) array
+            The solver's.
+        run : str
+            Name of the experiment.
+
+        Returns
+        -------
+        dict of str to float
+            Zeros that are unknown, by channel; empty if none is. [unit of the channel]
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> from swashplate.identification import Unknown, Unknowns
+        >>> zero = Unknown(
+        ...     "offset", 0.0, -1.0, 1.0, "A", run="test", kind="zero", channel="current", scale=1.0
+        ... )
+        >>> Unknowns((zero,)).zeros(np.array([0.02]), "test")
+        {'current': 0.02}
+        """
         zeros = dict[str, float]()
         for number in self.columns(run).tolist():
             unknown = self.items[number]
