@@ -132,7 +132,7 @@ def test_an_interrupted_search_goes_on(campaign: Path, tmp_path: Path, how: sign
         assert "leaked" not in warnings
         assert running.returncode == 130
         assert "Interrupted in the stage 'card': interrupted after " in said
-        assert "--resume goes on" in said
+        assert "--resume continues" in said
         assert "Usable" not in said
     assert not (store / "pump").exists()
     assert not (tmp_path / "fitted" / "drive.toml").exists()
