@@ -313,6 +313,15 @@ def test_samples_without_weight_may_be_missing(hoist: Drive) -> None:
     assert batch.cost[0] == pytest.approx(speed[0] ** 2 + (speed[2] - 1.0) ** 2, rel=1e-14)
 
 
+def test_names_of_equations_are_not_those_of_the_march(hoist: Drive) -> None:
+    """The card's differential equation has a `length`, as the rows of a batch's outputs have."""
+    drive = hoist.at_every_rate()
+    voltage = 6.0 * np.sin(np.arange(300) / 40.0)
+    batch = drive.simulate_many({"Z10": [12.0, 13.0]}, voltage=voltage)
+    for Z10, speed in zip((12.0, 13.0), batch.output, strict=True):
+        np.testing.assert_array_equal(speed, drive.replace(Z10=Z10).simulate(voltage).shaft_speed)
+
+
 @pytest.mark.skipif(bool(config.DISABLE_JIT), reason="nothing is compiled")
 def test_partial_derivatives_are_filled_as_vectors() -> None:
     options = (None, PumpOptions())

@@ -44,7 +44,7 @@ n m j c lane first last worst h half value error total count size used progress 
 delay_samples delay_fraction params given constants states out flags records before measured weight
 outputs flat inputs table kept tangent lanes columns program plan sink room block
 worst_margin lower context volts current speed at everything voltage target counts coming cost rate
-integral shown choose width
+integral shown choose width length
 """
 RESERVED = {*_OWN.split(), *(name for name in vars(math) if not name.startswith("_"))}
 """Names that the kernels use themselves."""
