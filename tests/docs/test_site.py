@@ -166,7 +166,7 @@ def messages_of(package: str) -> list[str]:
     """Texts in a package's code; what is put into them stands as a line's end."""
     return [
         "".join(str(part.value) if isinstance(part, ast.Constant) else "\n" for part in parts)
-        for path in (ROOT / "src" / "swashplate" / package).glob("*.py")
+        for path in (ROOT / "src" / "swashplate" / package).rglob("*.py")
         for node in ast.walk(ast.parse(path.read_text("utf-8")))
         for parts in [node.values if isinstance(node, ast.JoinedStr) else [node]]
         if isinstance(parts[0], (ast.Constant, ast.FormattedValue))
