@@ -51,7 +51,7 @@ from swashplate.equations import sensitivities, simulate
 
 p, command = machine.Lag(0.5), np.ones(4)
 end = simulate(machine.rod, p, {"command": command}, 100.0)["position"][-1]
-slope = sensitivities(machine.rod, p, {"command": command}, 100.0, output="position")[-1, 0]
+slope = sensitivities(machine.rod, p, {"command": command}, 100.0)["position"][-1, 0]
 print(end, slope, len(compiled))
 """
 END, SLOPE = 1.0 - 0.5**3, 3.0 * 0.5**2
