@@ -279,12 +279,12 @@ def whole_interface(model: Any) -> None:
             broken[at] = bad
             model.init(broken)
     model.init(values, 3)
-    # a search for the steady state that ends at an end of its bracket: an equation of one's own,
-    # and hardly any supply pressure
+    # a search for the steady state that ends at an end of its bracket: as with leakage, and hardly
+    # any supply pressure
     flags = 1 + model.number("", "pump_speed") + 1
-    own, symmetric = flags + 3 + PumpOptions._fields.index("own"), flags + 3
+    leaky, symmetric = flags + 3 + PumpOptions._fields.index("leaky"), flags + 3
     for on in (0.0, 1.0):
-        values[own], values[symmetric], values[1 + model.number("", "Z9")] = 1.0, on, 1e3
+        values[leaky], values[symmetric], values[1 + model.number("", "Z9")] = 1.0, on, 1e3
         assert model.init(values) == 0
         for voltage in (-9.0, 9.0):
             model.settle(voltage)
