@@ -34,6 +34,7 @@ from swashplate.drive import Drive, Simulation
 from swashplate.equations.marching.record import SOURCE_RATE
 from swashplate.errors import FileError, InputError, ParameterError
 from swashplate.maneuvers import Maneuver, positive, source_tests, whole
+from swashplate.results import Result
 from swashplate.tables import write_text, write_whole
 
 if TYPE_CHECKING:
@@ -160,7 +161,7 @@ moves steps by a part of a sample, gaps and a counter that rolls over.
 
 
 @dataclass(frozen=True, eq=False)
-class VirtualRun:
+class VirtualRun(Result):
     """One simulated test."""
 
     name: str
