@@ -72,3 +72,12 @@ def source_parameters() -> dict:
     """Kruse's tables as facts apart from the package."""
     path = Path(__file__).parent / "thesis" / "published.toml"
     return tomllib.loads(path.read_text("utf-8"))
+
+
+@pytest.fixture(scope="session")
+def source_text() -> str:
+    """The source itself: others' work, which stays outside the project."""
+    path = Path(__file__).parents[2] / "shared" / "spec" / "thesis.txt"
+    if not path.exists():
+        pytest.skip("Kruse's text is not beside this checkout, and may not be copied into it")
+    return path.read_text("utf-8")
