@@ -50,7 +50,7 @@ test-slow: $(STAMP) ## the slow tests: pages, examples, reproduction, searches, 
 # 512 bits on processors that have them.
 KERNELS ?= Prescott Haswell Zen $(shell grep -qs avx512f /proc/cpuinfo && echo SkylakeX)
 # What depends on rounding: searches, and what is computed from their results.
-ROUNDED := tests/analysis tests/campaign tests/identification tests/linear tests/recovery tests/thesis
+ROUNDED := tests/analysis tests/campaign tests/drafting tests/identification tests/linear tests/recovery tests/thesis
 TESTS ?= tests
 
 test-kernels: $(STAMP) ## the quick tests with other kernels of the linear algebra, and compiled for any processor
