@@ -610,7 +610,10 @@ def _run(
         low, high = -float(away.min()), float(away.max())
         two_sided = min(low, high) > 0.25 * max(low, high)
         kind = unseen.recognised.kind if unseen.recognised else ""
-        stratum += f"{kind} {'two_sided' if two_sided else 'up' if high > low else 'down'}, "
+        direction = "up" if high > low else "down"
+        if two_sided:
+            direction = "two_sided"
+        stratum += f"{kind} {direction}, "
         peak = max(peak, low, high)
     return run._replace(
         file=said,

@@ -101,6 +101,17 @@ def lowered(function: FunctionDefinition, kinds: Sequence[str], symbol: str) -> 
             continue
 
 
+def not_lowered(node: ast.AST) -> TypeError:
+    """An error for what no generated text may have: the writer of the text, not its user, reads it.
+
+    What users write is checked by `language` long before, in sentences.
+    """
+    return TypeError(
+        f"'{ast.unparse(node)}' has no counterpart in LLVM's language here: generate other text, "
+        "or teach it to swashplate.equations.code_generation.lowering."
+    )
+
+
 def llvm_type(kind: str) -> str:
     """LLVM's type of a kind."""
     return "ptr" if kind.startswith("*") else TYPES[kind]
@@ -274,7 +285,7 @@ class Lowering:
                 self._return(None if value is None else self._value(value, scope), scope)
                 return False
             case _:
-                raise NotImplementedError(ast.unparse(node))
+                raise not_lowered(node)
         return True
 
     def _put(self, target: ast.expr, value: Any, scope: Scope) -> None:
@@ -292,7 +303,7 @@ class Lowering:
                 value = self.cast(value, kind)
                 self.emit(f"store {llvm_type(kind)} {value.text}, ptr {place.text}")
             case _:
-                raise NotImplementedError(ast.unparse(target))
+                raise not_lowered(target)
 
     def _if(
         self, test: ast.expr, then: list[ast.stmt], other: list[ast.stmt], scope: Scope
@@ -385,7 +396,7 @@ class Lowering:
                 return self._value(value, scope).field(self, name)
             case ast.Call(ast.Name(name), arguments, []):
                 return self._call(scope.find(name), self._values_of(arguments, scope))
-        raise NotImplementedError(ast.unparse(node))
+        raise not_lowered(node)
 
     def _values_of(self, nodes: Sequence[ast.expr], scope: Scope) -> list[Any]:
         values: list[Any] = []

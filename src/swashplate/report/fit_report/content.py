@@ -441,7 +441,9 @@ def _identifiability_section(stages: Sequence[StageFit]) -> Section:
         columns = (Column("direction"), width, Column("moves together"))
         directions = Table("", (*columns, Column("fix")))
         for direction in identifiability.null + identifiability.weak:
-            kind = direction.gauge.name if direction.gauge else "weak" if direction.weak else "null"
+            kind = "weak" if direction.weak else "null"
+            if direction.gauge:
+                kind = direction.gauge.name
             moves = ", ".join(
                 f"{name} {change:+.2g} %" for name, change in direction.changes.items()
             )
@@ -486,10 +488,10 @@ def _correlations(stage: StageFit, general: Sequence[bool]) -> list[PageBlock]:
     table = Table("", (Column("parameter"), Column("with"), Column("r", "+.3f")))
     for value, name, second in sorted(pairs, key=lambda pair: -abs(pair[0]))[:MOST_PAIRS]:
         table.add(name, second, value)
+    if not table.rows:
+        return []
     shown = PageBlock("table", table, "correlations")
-    return [PageBlock("details", [shown], "Strongest correlations of the estimates")] * bool(
-        table.rows
-    )
+    return [PageBlock("details", [shown], "Strongest correlations of the estimates")]
 
 
 def _starts_section(several: Mapping[str, Sequence[Solution]]) -> Section:
