@@ -166,11 +166,11 @@ USED = "swashplate.models.pump:shaft_speed"
 @pytest.mark.parametrize(
     ("entry", "sentence"),
     [
-        ({"old": "os:system", "new": "os:system"}, "os:system is no equation"),
-        ({"old": USED, "new": "json:dumps"}, "json:dumps is no equation"),
-        ({"old": USED, "new": "os:environ"}, "os:environ is no equation"),
-        ({"old": USED, "new": PLACE, "parameters": "os:environ"}, "os:environ is no class of"),
-        ({"old": USED, "new": PLACE, "parameters": "builtins:dict"}, "builtins:dict is no class"),
+        ({"old": "os:system", "new": "os:system"}, "os:system is not an equation"),
+        ({"old": USED, "new": "json:dumps"}, "json:dumps is not an equation"),
+        ({"old": USED, "new": "os:environ"}, "os:environ is not an equation"),
+        ({"old": USED, "new": PLACE, "parameters": "os:environ"}, "os:environ is not a class of"),
+        ({"old": USED, "new": PLACE, "parameters": "builtins:dict"}, "builtins:dict is not a class"),
         ({"old": PLACE, "new": PLACE}, "does not use faster"),
         ({"old": USED, "new": f"{__name__}:sealed_balance"}, "arguments of shaft_speed"),
         ({"old": "swashplate.cli:x", "new": PLACE}, "x of the module swashplate.cli"),

@@ -597,7 +597,7 @@ def test_comparison_says_what_is_equal(hoist, tmp_path, fmi):
 
 def test_comparison_refuses_what_it_cannot_run(hoist, tmp_path):
     (tmp_path / "no.fmu").write_bytes(b"no")
-    with pytest.raises(ValueError, match="no FMU of swashplate"):
+    with pytest.raises(ValueError, match="no.fmu is not an FMU"):
         export.compare(tmp_path / "no.fmu", hoist, command(10))
     path = export.fmu(hoist, tmp_path / "drive.fmu")
     with pytest.raises(ValueError, match="two samples"):
