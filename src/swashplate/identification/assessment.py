@@ -79,11 +79,17 @@ class Identification(Estimated):
 
     Examples
     --------
-    >>> result = swashplate.identify("virtual/campaign.toml")
-    >>> result.verdict.headline
-    >>> result["Z8"].value, result["Z8"].standard_error, result["Z8"].interval
-    >>> result.save("fitted")
-    >>> again = swashplate.Identification.load("fitted")
+    >>> from swashplate import Identification, identify, maneuvers, rig
+    >>> tests = rig.run("hoist", {"step": maneuvers.step(9.0), "sine": maneuvers.sine(9.0, 0.1)})
+    >>> file = rig.write(tests, "measured")
+    >>> result = identify(file, "hoist", {"Z8": (0.5, 2), "Z16": (0.5, 2)})
+    >>> low, high = result["Z8"].interval
+    >>> low < result["Z8"].value < high
+    True
+    >>> [path.name for path in result.save("fitted")]
+    ['drive.toml', 'setup.toml', 'estimates.csv', 'fit.json']
+    >>> Identification.load("fitted")["Z8"].value == result["Z8"].value
+    True
     """
 
     campaign: Campaign

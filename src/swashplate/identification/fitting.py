@@ -287,8 +287,13 @@ def fit(
 
     Examples
     --------
-    >>> fit(Drive.preset("hoist"), campaign, load_setup("hoist"))
-    >>> fit(valve, campaign, {"lag": (0.005, 0.06, 0.5), "gain": (0.1, 1.0, 10.0)})
+    >>> from swashplate import Campaign, Drive, maneuvers, rig
+    >>> from swashplate.identification import fit
+    >>> tests = rig.run("hoist", {"step": maneuvers.step(9.0), "sine": maneuvers.sine(9.0, 0.1)})
+    >>> campaign = Campaign.from_toml(rig.write(tests, "excited"))
+    >>> result = fit(Drive.preset("hoist"), campaign, {"Z8": (0.5, 2), "Z16": (0.5, 2)})
+    >>> abs(result.drive["Z8"].value / Drive.preset("hoist")["Z8"].value - 1.0) < 0.05
+    True
     """
     runs = tests.select(role="fit") if isinstance(tests, Campaign) else tuple(tests)
     if not runs:

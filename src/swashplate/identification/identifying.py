@@ -123,9 +123,14 @@ def identify(
 
     Examples
     --------
-    >>> result = identify("virtual/campaign.toml")
-    >>> result = identify("harbour/campaign.toml", "hoist", {"Z8": (0.5, 2), "Z16": (0.5, 2)})
-    >>> result = identify("valve/campaign.toml", valve, {"lag": (0.005, 0.06, 0.5)})
+    >>> from swashplate import Drive, identify, maneuvers, rig
+    >>> tests = rig.run("hoist", {"step": maneuvers.step(9.0), "sine": maneuvers.sine(9.0, 0.1)})
+    >>> file = rig.write(tests, "virtual")
+    >>> result = identify(file, "hoist", {"Z8": (0.5, 2), "Z16": (0.5, 2)})
+    >>> abs(result["Z8"].value / Drive.preset("hoist")["Z8"].value - 1.0) < 0.05
+    True
+    >>> result.verdict.usable
+    True
     """
     _check_numbers(
         starts=0 if starts is None else starts,

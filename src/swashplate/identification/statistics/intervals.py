@@ -61,7 +61,14 @@ class Estimate(Result):
 
     Examples
     --------
-    >>> result["Z8"].value, result["Z8"].standard_error, result["Z8"].interval
+    >>> from swashplate import identify, maneuvers, rig
+    >>> tests = rig.run("hoist", {"step": maneuvers.step(9.0), "sine": maneuvers.sine(9.0, 0.1)})
+    >>> file = rig.write(tests, "tests")
+    >>> estimate = identify(file, "hoist", {"Z8": (0.5, 2), "Z16": (0.5, 2)})["Z8"]
+    >>> estimate.unit
+    'sqrt(Pa)/(m s)'
+    >>> estimate.standard_error < 0.05 * estimate.value
+    True
     """
 
     name: str
