@@ -3,9 +3,10 @@
     python tools/mirror.py [--tree FOLDER] [--trips]
 
 For each package: tokens, tokens a line, complexity, empty names, then names with two meanings and
-circles of imports (type imports count). With ``--trips`` four commands are run and the files and
-functions of the package that they pass are counted. Nobody passes or fails by these numbers, and
-nobody writes code to please them.
+circles of imports (type imports count). With ``--trips`` three commands and a program are run and
+the files and functions of the package that they pass are counted. Nobody passes or fails by these
+numbers, and nobody writes code to please them. Run it with the Python of the environment: circles
+need its graph of imports.
 """
 
 from __future__ import annotations
@@ -60,6 +61,30 @@ TRIPS = {
     "a crane's drive": ["crane", "assess", "tg3637", "--seeds", "2"],
 }
 """Commands whose way through the code is counted."""
+EQUATION = """
+from typing import NamedTuple
+
+from swashplate.equations import Model, discretised, equation, simulate
+
+
+class Numbers(NamedTuple):
+    lag: float = 0.05
+
+
+class State(NamedTuple):
+    spool: float = 0.0
+
+
+@equation
+def rates(state: State, u: float, p: Numbers) -> State:
+    return State((u - state.spool) / p.lag)
+
+
+def main() -> None:
+    valve = Model("valve", Numbers, State, discretised(rates, "midpoint"))
+    simulate(valve, Numbers(), {"u": [0.0] * 10 + [1.0] * 90}, 1000.0)
+"""
+"""A program that simulates an equation of a user, counted likewise."""
 
 
 class Size(NamedTuple):
@@ -255,7 +280,8 @@ def note(frame, event, argument):
     code = frame.f_code
     if event == "call" and {source!r} in code.co_filename and "<" not in code.co_name:
         passed.add((code.co_filename, code.co_qualname))
-from swashplate.cli import main
+sys.path.insert(0, {folder!r})
+from {module} import main
 sys.argv = ["swashplate", *{command!r}]
 sys.setprofile(note)
 try:
@@ -273,10 +299,18 @@ def print_trips(tree: Path) -> None:
     with TemporaryDirectory() as folder:
         in_tree(tree, ["-m", PACKAGE, "demo", "--out", f"{folder}/demo"])
         places = {"campaign": f"{folder}/demo/virtual/campaign.toml", "out": folder}
+        (Path(folder) / "valve.py").write_text(EQUATION, "utf-8")
+        programs = {what: ("swashplate.cli", command) for what, command in TRIPS.items()}
+        programs["a user's equation"] = ("valve", [])
         print("\nTrips (files, functions):")
-        for what, command in TRIPS.items():
-            filled = [word.format(**places) for word in command]
-            script = TRIP.format(source=source, command=filled)
+        for what, (module, command) in programs.items():
+            arguments = [word.format(**places) for word in command]
+            script = TRIP.format(
+                source=source,
+                folder=folder,
+                module=module,
+                command=arguments,
+            )
             for _ in range(2):  # the first time compiles
                 for old in (Path(folder) / "fit").glob("*"):
                     old.unlink()

@@ -56,6 +56,21 @@ class Batch(Result):
 
     A set that breaks a rule or leaves the model's domain does not stop the others: its cost is
     infinite, its outputs are NaN, and `failures` says why.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from swashplate import Drive, SquaredError, maneuvers
+    >>> hoist = Drive.preset("hoist")
+    >>> measured = hoist.simulate(maneuvers.step(9.0)).shaft_speed
+    >>> gains = hoist["Z8"].value * np.array([0.9, 1.0, 1.1])
+    >>> batch = hoist.simulate_many(
+    ...     {"Z8": gains},
+    ...     voltage=maneuvers.step(9.0),
+    ...     cost=SquaredError(measured),
+    ... )
+    >>> int(np.argmin(batch.cost))
+    1
     """
 
     cost: Array | None

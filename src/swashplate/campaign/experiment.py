@@ -339,7 +339,16 @@ def _between(signal: InputSignal | Channel, time: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Experiment(Tabular):
-    """One run of one axis."""
+    """One run of one axis.
+
+    Examples
+    --------
+    >>> from swashplate import Campaign, maneuvers, rig
+    >>> file = rig.write(rig.run("hoist", {"step": maneuvers.step(9.0)}), "tests")
+    >>> experiment = Campaign.from_toml(file)["hoist_step"]
+    >>> experiment.role, experiment.input.kind, experiment["counts"].unit
+    ('fit', 'voltage', 'rad')
+    """
 
     name: str
     """The run's name, with the axis if a campaign has several: ``"trial1 boom"``."""

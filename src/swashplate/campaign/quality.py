@@ -84,6 +84,13 @@ def examine(experiment: Experiment, unsigned: Collection[str] = ()) -> tuple[Qua
     """Quality of an experiment's input and channels, in that order.
 
     The sign of `unsigned` channels says nothing, see `unsigned_currents`.
+
+    Examples
+    --------
+    >>> from swashplate import Campaign, campaign, maneuvers, rig
+    >>> file = rig.write(rig.run("hoist", {"step": maneuvers.step(9.0)}), "tests")
+    >>> [quality.signal for quality in campaign.examine(Campaign.from_toml(file)["hoist_step"])]
+    ['input', 'current', 'counts']
     """
     moving = moves_at_first(experiment)
     signals: dict[str, InputSignal | Channel] = {"input": experiment.input, **experiment.channels}

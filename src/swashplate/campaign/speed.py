@@ -50,6 +50,14 @@ def speed_of(channel: Channel, method: Method = "exact") -> DerivedSpeed:
     ------
     InputError
         If the channel measures something else, or there is no such method.
+
+    Examples
+    --------
+    >>> from swashplate import Campaign, campaign, maneuvers, rig
+    >>> file = rig.write(rig.run("hoist", {"step": maneuvers.step(9.0)}), "tests")
+    >>> derived = campaign.speed_of(Campaign.from_toml(file)["hoist_step"]["counts"])
+    >>> derived.speed.shape == derived.time.shape  # rad/s, s
+    True
     """
     time, values, encoder = channel.time, channel.values, channel.encoder
     if channel.kind == "shaft_speed":

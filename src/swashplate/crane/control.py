@@ -276,6 +276,12 @@ class Sensors(Control):
     one; before the start it is that of the start. Noise is white, drawn again for each measurement.
     The run itself keeps the true signals. The default values are assumed, not those of a certain
     product.
+
+    Examples
+    --------
+    >>> from swashplate.crane import control
+    >>> control.PositionLoop(0.5) | control.Sensors(delay=0.1)
+    PositionLoop(gain=0.5) | Sensors(rope_angle_noise_deg=0.1, ..., delay=0.1, rate=50.0, seed=0)
     """
 
     rope_angle_noise_deg: float = 0.1

@@ -65,6 +65,15 @@ def swing_damping(time: ArrayLike, angle: ArrayLike, *, rope: float | None = Non
     decrement. The interval takes the residuals as correlated: their effective number is that of the
     samples over one plus twice the sum of their autocorrelation up to the first value that is not
     positive.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from swashplate.crane import swing_damping
+    >>> time = np.arange(0.0, 60.0, 0.05)
+    >>> angle = 0.1 * np.exp(-0.01 * time) * np.cos(1.0 * time)
+    >>> round(swing_damping(time, angle).value, 4)
+    0.01
     """
     from scipy.optimize import least_squares
     from scipy.special import stdtrit

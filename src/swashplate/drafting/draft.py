@@ -150,6 +150,15 @@ def draft_campaign(
     InputError
         If there is no log, none has a column that is named, or a unit that is given measures
         something else than the column's kind.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from swashplate import drafting, maneuvers, rig
+    >>> file = rig.write(rig.run("hoist", {"step": maneuvers.step(9.0)}), "tests")
+    >>> text = drafting.draft_campaign(sorted(Path("tests").glob("*.csv")), "tests", "hoist", 4096)
+    >>> "[axes.hoist." in text
+    True
     """
     kinds, units, folder = dict(columns or {}), dict(units or {}), Path(folder).resolve()
     opened = [open_log(path) for path in logs]

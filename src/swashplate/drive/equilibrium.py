@@ -46,7 +46,15 @@ def steady_states(parameters: ParameterSet, voltage: Array) -> tuple[Array, Arra
 
 @dataclass(frozen=True)
 class OperatingPoint:
-    """A steady state; signs as everywhere: positive goes with more speed."""
+    """A steady state; signs as everywhere: positive goes with more speed.
+
+    Examples
+    --------
+    >>> from swashplate import Drive
+    >>> point = Drive.preset("hoist").linearize(6.0).operating_point
+    >>> point.voltage, round(point.shaft_speed, 1)  # V, rad/s
+    (6.0, 2.6)
+    """
 
     voltage: float | None
     """None if a current was given. [V]"""

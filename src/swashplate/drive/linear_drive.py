@@ -28,7 +28,15 @@ SHOWN_AT = 0.3
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class LinearDrive(LinearModel, Result):
-    """Small motions of a drive about an operating point."""
+    """Small motions of a drive about an operating point.
+
+    Examples
+    --------
+    >>> from swashplate import Drive
+    >>> linear = Drive.preset("hoist").linearize(6.0)
+    >>> linear.inputs, linear.outputs, linear.A.shape
+    (('voltage',), ('shaft_speed',), (3, 3))
+    """
 
     operating_point: OperatingPoint
     coulomb: Coulomb

@@ -67,6 +67,16 @@ class Simulation(Run):
 
     Signs: positive voltage, current, force, opening, angle and speed go together; positive speed
     hoists, slews right, lifts the boom. The record is a voltage, or without a card a current.
+
+    Examples
+    --------
+    >>> from swashplate import Drive, maneuvers
+    >>> run = Drive.preset("hoist").simulate(maneuvers.step(9.0))
+    >>> run.shaft_speed.shape  # rad/s, 10 s at 512 Hz
+    (5121,)
+    >>> frame = run.to_polars()
+    >>> "shaft_speed" in frame.columns
+    True
     """
 
     first_signals = FIRST_SIGNALS

@@ -91,6 +91,12 @@ def source(function: Any) -> str:
     -------
     str
         Python.
+
+    Examples
+    --------
+    >>> from swashplate.equations import derive, soft_threshold, source
+    >>> "def soft_threshold_by_value" in source(derive(soft_threshold, "value"))
+    True
     """
     text = getattr(function, "source", None)
     if isinstance(text, str):

@@ -247,6 +247,12 @@ def c(
     -----
     UserWarning
         Where the recursion of the card's filter was converted to another step.
+
+    Examples
+    --------
+    >>> from swashplate import Drive, export
+    >>> sorted(path.name for path in export.c(Drive.preset("hoist"), "source"))[2:]
+    ['hoist_values.h', 'main.c', 'swashplate_drive.c', 'swashplate_drive.h']
     """
     prefix = c_name(what.name) if isinstance(what, Model) else "swp"
     content = content_of(

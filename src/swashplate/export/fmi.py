@@ -114,6 +114,12 @@ def fmu(
         Where a delay is so short that outputs depend on an input of their own instant (of a drive's
         voltage 1.5 steps), and a master that does not set it before it reads them is a sample
         behind; where the recursion of the card's filter was converted to another step.
+
+    Examples
+    --------
+    >>> from swashplate import Drive, export
+    >>> export.fmu(Drive.preset("hoist"), "hoist.fmu").name
+    'hoist.fmu'
     """
     if fmi not in ("2.0", "3.0"):
         raise InputError(f"fmi is '{fmi}'; it is '2.0' or '3.0'.")

@@ -234,6 +234,12 @@ def wasm(
         If the card's filter is unstable at that step, or a compiler is missing.
     FileError
         If the file cannot be written.
+
+    Examples
+    --------
+    >>> from swashplate import Drive, export
+    >>> export.wasm(Drive.preset("hoist"), "hoist.wasm").name
+    'hoist.wasm'
     """
     content = content_of(what, step, parameters=parameters, options=options, given=given)
     numbers = content.values.astype("<f8").tobytes()

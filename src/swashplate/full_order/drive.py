@@ -672,6 +672,14 @@ def compare(full: FullOrderDrive, run: Simulation, *, start: Start = "rest") -> 
     """Simulate both models over the current of a run of ``full.drive``.
 
     The reduced model has the lumps of the full-order one; `start` as in `FullOrderDrive.follow`.
+
+    Examples
+    --------
+    >>> from swashplate import FullOrderDrive, full_order, maneuvers
+    >>> full = FullOrderDrive.preset("hoist")
+    >>> comparison = full_order.compare(full, full.drive.simulate(maneuvers.step(9.0)))
+    >>> comparison.full.shaft_speed.shape == comparison.reduced_speed.shape
+    True
     """
     followed = full.follow(run, start=start)
     record = followed.record

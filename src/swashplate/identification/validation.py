@@ -271,6 +271,14 @@ def predict(
         If a run is driven by neither, or has no channel that a drive has.
     DomainError
         If the model does not hold under a run's input.
+
+    Examples
+    --------
+    >>> from swashplate import Campaign, Drive, maneuvers, rig
+    >>> from swashplate.identification import predict
+    >>> file = rig.write(rig.run("hoist", {"step": maneuvers.step(9.0)}), "tests")
+    >>> [quality.channel for quality in predict(Drive.preset("hoist"), Campaign.from_toml(file))]
+    ['current', 'counts']
     """
     parameters = model if isinstance(model, ModelSetup) else set_of(model)
     if isinstance(parameters, ModelSetup):

@@ -43,6 +43,13 @@ class FrequencyResponse(Tabular):
     """First harmonic of the answer to bias + amplitude · sin(2π f t), once it repeats itself.
 
     A row for each amplitude, a column for each frequency.
+
+    Examples
+    --------
+    >>> from swashplate import Drive
+    >>> response = Drive.preset("hoist").frequency_response([0.1, 0.5], [3.0], bias=6.0)
+    >>> response.ratio.shape  # amplitudes, frequencies
+    (1, 2)
     """
 
     name: str

@@ -54,6 +54,14 @@ def open_log(path: str | Path, *, options: TextOptions | None = None) -> Log:
     FileError
         If it is missing, empty, of an unknown or another kind, damaged, or needs an extra that is
         not installed; one sentence, which names the file.
+
+    Examples
+    --------
+    >>> from swashplate import logs, maneuvers, rig
+    >>> file = rig.write(rig.run("hoist", {"step": maneuvers.step(9.0)}), "tests")
+    >>> log = logs.open_log("tests/hoist_step.csv")
+    >>> [column.name for column in log.columns]
+    ['time', 'voltage', 'current', 'counts']
     """
     source = Path(path)
     suffix = source.suffix.lower()
@@ -116,7 +124,7 @@ def read_series(
     time_column: str = "time",
     options: TextOptions | None = None,
 ) -> Series:
-    """Read time stamps and one column of a log, in SI.
+    r"""Read time stamps and one column of a log, in SI.
 
     Parameters
     ----------
@@ -142,6 +150,15 @@ def read_series(
         stamps do not increase; the sentence names file, column and row.
     InputError
         If a column is missing or its unit wrong; the sentence lists what there is.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from swashplate import logs
+    >>> Path("log.csv").write_text("time [s],pressure [bar]\n0.0,20\n0.1,25\n", "utf-8") > 0
+    True
+    >>> logs.read_series("log.csv", "pressure", "Pa").values
+    array([2000000., 2500000.])
     """
     log = open_log(path, options=options)
     read = log.read([time_column, column])

@@ -50,7 +50,15 @@ Change = float | Quantity | tuple[float | Quantity, float | Quantity]
 
 @dataclass(frozen=True)
 class Parameter(Result):
-    """One parameter of a set."""
+    """One parameter of a set.
+
+    Examples
+    --------
+    >>> from swashplate import Drive
+    >>> orifice = Drive.preset("hoist")["Z16_plus"]
+    >>> orifice.definition.unit
+    'm'
+    """
 
     definition: Definition
     value: Value

@@ -68,6 +68,12 @@ class Spectrum:
 
     An `InputError` unless all are above 0 and plausible, and most of the energy lies at waves of
     1.05 to 31 s.
+
+    Examples
+    --------
+    >>> from swashplate.crane import Seaway, Spectrum
+    >>> Seaway(Spectrum(height=2.0, period=8.0)).sea.height  # m
+    2.0
     """
 
     height: float
@@ -173,6 +179,12 @@ class Seaway(Result):
     at each length of the record. The variances of all add up to Hs²/16, whatever of the spectrum
     lies outside the band. Under way the frequencies at which the ship meets the waves are rounded
     to the bins.
+
+    Examples
+    --------
+    >>> from swashplate.crane import Seaway
+    >>> Seaway("ss4", heading_deg=45.0, seed=3).motion(512).shape  # one second at 512 Hz
+    (512, 6)
     """
 
     sea: str | Spectrum = "ss3"

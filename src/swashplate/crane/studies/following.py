@@ -78,6 +78,13 @@ def follow(
 
     Seas are names of `SEA_STATES` or spectra; ship and heading are those of the seaway, by default
     the crane ship's hull in beam waves.
+
+    Examples
+    --------
+    >>> from swashplate.crane import Crane, follow
+    >>> followable = follow(Crane.preset("tg3637"), [6.0, 9.0], seas=("ss3",))
+    >>> followable.periods  # s
+    array([6., 9.])
     """
     times = np.atleast_1d(np.asarray(periods, dtype=np.float64))
     if not (((times > 0.0) & (times <= SLOWEST)).all() and times.size):

@@ -36,6 +36,13 @@ class Sensitivities(Generic[R]):
         On reading, if the model has no such signal.
     DomainError
         On reading, if the model leaves its domain, or a number or a derivative overflows.
+
+    Examples
+    --------
+    >>> from swashplate import Drive, maneuvers
+    >>> sensitivities = Drive.preset("hoist").sensitivities(maneuvers.step(9.0))
+    >>> sensitivities["shaft_speed"].shape == (5121, len(sensitivities.names))
+    True
     """
 
     run: R

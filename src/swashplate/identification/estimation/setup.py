@@ -292,6 +292,12 @@ def load_setup(name: str | Path) -> FitSetup:
         If there is none of that name, or an entry is wrong.
     FileError
         If the file cannot be read.
+
+    Examples
+    --------
+    >>> from swashplate.identification import load_setup
+    >>> [stage.name for stage in load_setup("hoist").stages]
+    ['card', 'pump']
     """
     file = str(name)
     if file.lower().endswith(".toml"):

@@ -98,6 +98,12 @@ def as_fit_setup(
     ------
     FileError, ParameterError
         If the fit setup cannot be read, or an entry is wrong.
+
+    Examples
+    --------
+    >>> from swashplate.identification import as_fit_setup
+    >>> [stage.name for stage in as_fit_setup("hoist", ()).stages]
+    ['card', 'pump']
     """
     if isinstance(free, FitSetup):
         return _with_known_names(free, "the fit setup", definitions)

@@ -125,6 +125,12 @@ def plot_envelope(
     Returns
     -------
     Figure, or `ax` as it was given
+
+    Examples
+    --------
+    >>> from swashplate import Drive, analysis
+    >>> from swashplate.report.figures import plot_envelope
+    >>> plot_envelope(analysis.envelope(Drive.preset("hoist"))).savefig("envelope.png")
     """
     colors = [handle(name, color) for color, name in ENVELOPE_LOOKS]
     curves = (*envelope.accelerating, envelope.released)

@@ -95,6 +95,13 @@ def plot_bode(
     InputError
         If the linear model has another input or first output than the sweep, or for another number
         of axes.
+
+    Examples
+    --------
+    >>> from swashplate import Drive
+    >>> from swashplate.report.figures import plot_bode
+    >>> response = Drive.preset("hoist").frequency_response([0.1, 0.5], [3.0], bias=6.0)
+    >>> plot_bode(response).savefig("bode.png")
     """
     ends = (response.input, response.output)
     if linear is not None and (linear.input, linear.outputs[0]) != ends:

@@ -121,6 +121,13 @@ def plot_simulation(
     ------
     InputError
         If the window holds fewer than two samples.
+
+    Examples
+    --------
+    >>> from swashplate import Drive, maneuvers
+    >>> from swashplate.report.figures import plot_simulation
+    >>> figure = plot_simulation(Drive.preset("hoist").simulate(maneuvers.step(9.0)))
+    >>> figure.savefig("step.png")
     """
     pump, run = simulation.pump, simulation
 

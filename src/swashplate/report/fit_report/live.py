@@ -87,6 +87,13 @@ def write_live_page(
         command is given; or the drive has a user-defined equation.
     FileError
         If the file cannot be written.
+
+    Examples
+    --------
+    >>> from swashplate import Drive, maneuvers
+    >>> from swashplate.report.fit_report import write_live_page
+    >>> write_live_page(Drive.preset("hoist"), "hoist.html", command=maneuvers.step(9.0))
+    ()
     """
     parameters = set_of(drive)
     if campaign is not None:
