@@ -625,16 +625,15 @@ def full_order(
     and the difference in speed. Without a command, a table of maneuvers.
     """
     from swashplate import full_order as full
-    from swashplate.full_order import physical_set
 
     if maneuver is None and plot is not None:
         raise InputError("--plot draws one run; name a maneuver or a log, such as step:9.")
     physical_values = parsing.physical_values(physical or ())
     with spinner("Completing the physical values"):
         marched = parsing.at_rate(drive.chosen, sampling.rate)
-        axis = physical_set.nearest_set(marched.name) if like is None else like
+        axis = full.nearest_set(marched.name) if like is None else like
         full_drive = full.FullOrderDrive.from_drive(marched.plain, axis, **physical_values)
-        tables = [physical_set.choices_table(axis, physical_values), full_drive.modes().table()]
+        tables = [full.choices_table(axis, physical_values), full_drive.modes().table()]
     with spinner("Simulating"):
         if maneuver is None:
             domain = full.validity(full_drive, sampling.rate)

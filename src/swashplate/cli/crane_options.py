@@ -15,9 +15,11 @@ from swashplate.cli.terminal import long_work, side
 from swashplate.errors import InputError
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from swashplate.crane import Crane, Hull, Seaway, Spectrum, TransferFunctions
     from swashplate.crane.control import Control
-    from swashplate.crane.sea.seaway import Array
 
 START = ("slew_deg", "boom_deg", "rope_m")
 AXES = ("hoist", "slew", "luff")
@@ -185,7 +187,7 @@ class AtSea(Placed):
         record = max(RECORDS[0], length)
         return Seaway(sea, ship=self._hull(), spread=spread, record=record, **options)
 
-    def motion(self, count: int) -> Array | None:
+    def motion(self, count: int) -> NDArray[np.float64] | None:
         """Motion of the ship in calm water, (count, 6): its lean; None if it is upright."""
         import numpy as np
 

@@ -15,12 +15,14 @@ from swashplate.errors import FileError, InputError, MissingFileError, UnknownPa
 from swashplate.units import unit_text
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from swashplate.analysis.design_variables import FactorRange
     from swashplate.analysis.outcomes import Trial
     from swashplate.campaign import Campaign, Experiment
     from swashplate.cli.options import CommandSampling, Simulating, Start
     from swashplate.drive import Drive, Simulation
-    from swashplate.drive.simulation import Array
     from swashplate.identification.estimation.model_setup import ModelSetup
     from swashplate.identification.estimation.setup import FitSetup
     from swashplate.maneuvers import Maneuver
@@ -441,7 +443,9 @@ def _measured(measured: Sequence[str], log: str, time_column: str) -> dict[str, 
     return found
 
 
-def window_of(time: Array, begin: float | None, end: float | None) -> tuple[float, float] | None:
+def window_of(
+    time: NDArray[np.float64], begin: float | None, end: float | None
+) -> tuple[float, float] | None:
     """The part of a record that --from and --to name; None for all of it. [s]"""
     first, last = float(time[0]), float(time[-1])
     whole = begin is None and end is None

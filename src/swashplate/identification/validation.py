@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft
 
 from swashplate.campaign.experiment import Channel, Experiment
+from swashplate.campaign.schema import SIGNALS
 from swashplate.campaign.speed import DIFFERENTIATOR, speed_from_angle, speed_of
 from swashplate.errors import InputError
 from swashplate.identification.estimation.drive_model import (
-    SIGNALS,
     DriveModel,
     edges_problem,
     with_edges,

@@ -18,11 +18,11 @@ from swashplate.campaign.quality import (
     unsigned_currents,
     wrapped_positions,
 )
+from swashplate.campaign.schema import SIGNALS
 from swashplate.drive import Simulation
 from swashplate.errors import InputError, UnsoundDataError
 from swashplate.identification.estimation.drive_model import (
     CURRENTS,
-    SIGNALS,
     kinds_of,
     simulated_run,
 )

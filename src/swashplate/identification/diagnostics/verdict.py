@@ -9,6 +9,7 @@ from math import isinf, isnan, nan
 from typing import get_args
 
 from swashplate.campaign.experiment import Channel, Experiment
+from swashplate.campaign.schema import SIGNALS
 from swashplate.errors import DomainError, InputError
 from swashplate.identification.diagnostics.causes import Cause, causes_of, fixed_numbers
 from swashplate.identification.diagnostics.data_checks import Finding
@@ -22,7 +23,6 @@ from swashplate.identification.diagnostics.soundness import unsound_data
 from swashplate.identification.estimation.drive_model import (
     LIMIT_COLUMNS,
     LIMITS,
-    SIGNALS,
     DriveModel,
     limits_reached,
 )

@@ -16,7 +16,7 @@ from swashplate.campaign import ChannelKind
 from swashplate.campaign.experiment import APART, RISE, Channel, Edge, Experiment, InputSignal
 from swashplate.campaign.samples import signed_by_command
 from swashplate.campaign.schema import CURRENTS as CURRENTS
-from swashplate.campaign.schema import SIGNALS as SIGNALS
+from swashplate.campaign.schema import SIGNALS
 from swashplate.drive import (
     PRESSURE_PATH,
     START,

@@ -14,13 +14,14 @@ from numpy.typing import NDArray
 
 from swashplate.analysis.design_variables import DESIGN_VARIABLES
 from swashplate.campaign import Campaign, Channel, Experiment
+from swashplate.campaign.schema import SIGNALS
 from swashplate.campaign.speed import DIFFERENTIATOR, LOW_PASS, speed_of
 from swashplate.drive import Drive, Limit
 from swashplate.equations.marching.record import Record, record_of
 from swashplate.errors import InputError
 from swashplate.export import exported_drive, values_of
 from swashplate.export.libraries import WASM, packaged
-from swashplate.identification.estimation.drive_model import SIGNALS, at_rate_of, voltage_record
+from swashplate.identification.estimation.drive_model import at_rate_of, voltage_record
 from swashplate.identification.validation import at_instants, ignored_windows
 from swashplate.maneuvers import Maneuver
 from swashplate.parameters.parameter_set import HasParameters, Parameter, ParameterSet, set_of
