@@ -18,9 +18,9 @@ from .__about__ import __version__ as __version__
 from .batch import Batch as Batch
 from .batch import SquaredError as SquaredError
 from .batch import simulate_many as simulate_many
-from .campaign.campaign import Campaign as Campaign
-from .campaign.experiment import Channel as Channel
-from .campaign.experiment import Experiment as Experiment
+from .campaign import Campaign as Campaign
+from .campaign import Channel as Channel
+from .campaign import Experiment as Experiment
 from .drive import Drive as Drive
 from .drive import Limit as Limit
 from .drive import LinearDrive as LinearDrive

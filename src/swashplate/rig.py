@@ -29,7 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.__about__ import __version__
-from swashplate.campaign.schema import CHANNEL_KINDS, KINDS, SIGNALS, ChannelKind
+from swashplate.campaign import CHANNEL_KINDS, KINDS, SIGNALS, ChannelKind
 from swashplate.drive import Drive, Simulation
 from swashplate.equations.marching.record import SOURCE_RATE
 from swashplate.errors import FileError, InputError, ParameterError

@@ -275,8 +275,7 @@ def plot(
     are several. A log of more than 250,000 rows has a figure of its own that
     marks the windows in use.
     """
-    from swashplate.campaign import Campaign
-    from swashplate.campaign.schema import SIGNALS
+    from swashplate.campaign import SIGNALS, Campaign
     from swashplate.identification import predict
 
     with spinner(f"Reading {path}"):

@@ -15,8 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.campaign.experiment import Channel, Experiment
-from swashplate.campaign.schema import CURRENTS
+from swashplate.campaign import CURRENTS, Channel, Experiment
 from swashplate.drive import Drive
 from swashplate.errors import InputError
 from swashplate.parameters.files import preset_names

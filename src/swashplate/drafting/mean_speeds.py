@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.campaign.experiment import Channel, Experiment, InputSignal
+from swashplate.campaign import Channel, Experiment, InputSignal
 from swashplate.drafting.plain_drive import MODEL, JumpWidth, PlainDrive
 from swashplate.equations.marching.derivatives import jacobian, residuals
 from swashplate.equations.marching.observation import ObservedRecord, RunValues, every_sample

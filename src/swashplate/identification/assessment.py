@@ -17,9 +17,7 @@ from pydantic import Field
 from tomlkit import dumps
 
 from swashplate.__about__ import __version__
-from swashplate.campaign.campaign import Campaign
-from swashplate.campaign.experiment import Experiment
-from swashplate.campaign.schema import Between
+from swashplate.campaign import Between, Campaign, Experiment
 from swashplate.documents import read_json
 from swashplate.drive import Drive
 from swashplate.entries import FileTable

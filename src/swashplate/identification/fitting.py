@@ -17,8 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.__about__ import __version__
-from swashplate.campaign.campaign import Campaign
-from swashplate.campaign.experiment import Channel, Experiment
+from swashplate.campaign import Campaign, Channel, Experiment
 from swashplate.drive import Drive
 from swashplate.equations import Model as Equations
 from swashplate.errors import InputError, UnknownNameError

@@ -10,8 +10,7 @@ from typing import get_args
 
 import numpy as np
 
-from swashplate.campaign.campaign import Campaign
-from swashplate.campaign.experiment import Experiment
+from swashplate.campaign import Campaign, Experiment
 from swashplate.drive import Drive
 from swashplate.equations import Model as Equations
 from swashplate.equations.fields import is_real

@@ -10,9 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft
 
-from swashplate.campaign.experiment import Channel, Experiment
-from swashplate.campaign.schema import SIGNALS
-from swashplate.campaign.speed import DIFFERENTIATOR, speed_from_angle, speed_of
+from swashplate.campaign import (
+    DIFFERENTIATOR,
+    SIGNALS,
+    Channel,
+    Experiment,
+    speed_from_angle,
+    speed_of,
+)
 from swashplate.errors import InputError
 from swashplate.identification.estimation.drive_model import (
     DriveModel,

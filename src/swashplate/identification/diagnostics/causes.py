@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_banded
 
-from swashplate.campaign.experiment import Experiment
+from swashplate.campaign import Experiment
 from swashplate.errors import DomainError, InputError, ParameterError
 from swashplate.identification.estimation.drive_model import (
     CURRENTS,

@@ -9,16 +9,17 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.campaign.campaign import Campaign
-from swashplate.campaign.experiment import Channel, Experiment
-from swashplate.campaign.quality import (
+from swashplate.campaign import (
+    SIGNALS,
+    Campaign,
+    Channel,
+    Experiment,
     beyond_the_card,
     spiked,
     turned,
     unsigned_currents,
     wrapped_positions,
 )
-from swashplate.campaign.schema import SIGNALS
 from swashplate.drive import Simulation
 from swashplate.errors import InputError, UnsoundDataError
 from swashplate.identification.estimation.drive_model import (

@@ -8,8 +8,7 @@ from html import escape
 from math import isinf, isnan, nan
 from typing import get_args
 
-from swashplate.campaign.experiment import Channel, Experiment
-from swashplate.campaign.schema import SIGNALS
+from swashplate.campaign import SIGNALS, Channel, Experiment
 from swashplate.errors import DomainError, InputError
 from swashplate.identification.diagnostics.causes import Cause, causes_of, fixed_numbers
 from swashplate.identification.diagnostics.data_checks import Finding

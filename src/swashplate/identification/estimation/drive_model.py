@@ -12,11 +12,18 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.campaign import ChannelKind
-from swashplate.campaign.experiment import APART, RISE, Channel, Edge, Experiment, InputSignal
-from swashplate.campaign.samples import signed_by_command
-from swashplate.campaign.schema import CURRENTS as CURRENTS
-from swashplate.campaign.schema import SIGNALS
+from swashplate.campaign import (
+    APART,
+    RISE,
+    SIGNALS,
+    Channel,
+    ChannelKind,
+    Edge,
+    Experiment,
+    InputSignal,
+    signed_by_command,
+)
+from swashplate.campaign import CURRENTS as CURRENTS
 from swashplate.drive import (
     PRESSURE_PATH,
     START,

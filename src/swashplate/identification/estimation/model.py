@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.campaign.experiment import Edge, Experiment
+from swashplate.campaign import Edge, Experiment
 from swashplate.equations import BoundModel, instance_of, parameter_paths, state_paths
 from swashplate.equations import Model as Equations
 from swashplate.equations.fields import made

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.campaign.experiment import Experiment
+from swashplate.campaign import Experiment
 from swashplate.documents import validated
 from swashplate.equations import Model as Equations
 from swashplate.equations.fields import check_mapping, is_real

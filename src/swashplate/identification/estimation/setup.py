@@ -17,8 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import AfterValidator, Field, model_validator
 
-from swashplate.campaign import ChannelKind
-from swashplate.campaign.schema import LARGEST_PRESSURE, TimeWindow, WeightWindow
+from swashplate.campaign import LARGEST_PRESSURE, ChannelKind, TimeWindow, WeightWindow
 from swashplate.documents import parse_toml, read_text, validated
 from swashplate.entries import FileTable, Finite, Flag, NotNegative, Positive
 from swashplate.equations.fields import is_real

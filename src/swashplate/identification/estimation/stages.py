@@ -15,9 +15,7 @@ from typing import Literal, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.campaign import applying, inside
-from swashplate.campaign.campaign import Campaign
-from swashplate.campaign.experiment import Experiment
+from swashplate.campaign import Campaign, Experiment, applying, inside
 from swashplate.documents import validated
 from swashplate.drive import Drive
 from swashplate.equations.marching.record import Record

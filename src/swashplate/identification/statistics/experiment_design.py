@@ -17,8 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.campaign import KINDS, ChannelKind
-from swashplate.campaign.experiment import Channel, Experiment, InputSignal, SignalOrigin
+from swashplate.campaign import KINDS, Channel, ChannelKind, Experiment, InputSignal, SignalOrigin
 from swashplate.drive import Drive
 from swashplate.errors import InputError
 from swashplate.identification.estimation.arrow import dense_factor, triangular_factor, whitening

@@ -10,8 +10,7 @@ from pathlib import Path
 
 from markupsafe import Markup
 
-from swashplate.campaign import Campaign, Overview, examine, quality_table
-from swashplate.campaign.schema import WeightWindow
+from swashplate.campaign import Campaign, Overview, WeightWindow, examine, quality_table
 from swashplate.drive import Drive
 from swashplate.errors import InputError
 from swashplate.identification.assessment import Identification, motion_of

@@ -13,9 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.analysis.design_variables import DESIGN_VARIABLES
-from swashplate.campaign import Campaign, Channel, Experiment
-from swashplate.campaign.schema import SIGNALS
-from swashplate.campaign.speed import DIFFERENTIATOR, LOW_PASS, speed_of
+from swashplate.campaign import (
+    DIFFERENTIATOR,
+    LOW_PASS,
+    SIGNALS,
+    Campaign,
+    Channel,
+    Experiment,
+    speed_of,
+)
 from swashplate.drive import Drive, Limit
 from swashplate.equations.marching.record import Record, record_of
 from swashplate.errors import InputError
