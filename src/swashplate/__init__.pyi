@@ -48,6 +48,6 @@ from .full_order import PhysicalSet as PhysicalSet
 from .identification.assessment import Identification as Identification
 from .identification.identifying import identify as identify
 from .linear import FrequencyResponse as FrequencyResponse
-from .parameters.parameter_set import Pair as Pair
-from .parameters.parameter_set import Parameter as Parameter
-from .parameters.parameter_set import ParameterSet as ParameterSet
+from .parameters import Pair as Pair
+from .parameters import Parameter as Parameter
+from .parameters import ParameterSet as ParameterSet

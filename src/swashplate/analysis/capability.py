@@ -16,7 +16,7 @@ from swashplate.equations.marching.record import SOURCE_RATE
 from swashplate.equations.marching.run import Instance, PartNumbers, called
 from swashplate.models.displacement_control import PumpOptions, pressure_limits
 from swashplate.models.pump import PumpState
-from swashplate.parameters.rules import FULL_VOLTAGE
+from swashplate.parameters import FULL_VOLTAGE
 from swashplate.results import Drawn, Result, Tabular
 from swashplate.tables import UNIT, Cell, Column, Table, plain
 from swashplate.units import display_unit

@@ -16,7 +16,7 @@ from swashplate.drive import Drive, Limit, RunKeywords, Simulation, simulate_dri
 from swashplate.equations.marching.record import SOURCE_RATE
 from swashplate.equations.marching.run import Start
 from swashplate.errors import DomainError, ParameterError, SwashplateError
-from swashplate.parameters.parameter_set import Change
+from swashplate.parameters import Change
 from swashplate.results import Result, Tabular, figures
 from swashplate.tables import Column, Table, listed, quantity, share_cell
 

@@ -22,8 +22,7 @@ from swashplate.identification.stage_fit import StageFit
 from swashplate.identification.statistics.determination import identifiability_of
 from swashplate.identification.statistics.effects import effect_of_fixed, slopes_by
 from swashplate.identification.statistics.intervals import uncertainty_of
-from swashplate.parameters.parameter_set import ParameterSet
-from swashplate.parameters.rules import FULL_VOLTAGE
+from swashplate.parameters import FULL_VOLTAGE, ParameterSet
 from swashplate.results import Result
 
 Array = NDArray[np.float64]

@@ -47,7 +47,7 @@ if TYPE_CHECKING:
     from swashplate.identification.assessment import Identification
     from swashplate.identification.diagnostics.verdict import Verdict
     from swashplate.identification.estimation.stages import Parameters
-    from swashplate.parameters.parameter_set import ParameterSet
+    from swashplate.parameters import ParameterSet
 
 INTERRUPTED = 130
 """Exit code after Ctrl-C, as of other programs."""

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from swashplate.identification.estimation.model_setup import ModelSetup
     from swashplate.identification.estimation.setup import FitSetup
     from swashplate.maneuvers import Maneuver
-    from swashplate.parameters.parameter_set import Change, ParameterSet
+    from swashplate.parameters import Change, ParameterSet
 
 _NUMBER = r"[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|inf\b|nan\b)"
 _VALUE = re.compile(rf"\s*({_NUMBER})(?:/({_NUMBER}))?\s*((?:1/)?[^\W\d_].*|°.*)?")
@@ -125,7 +125,7 @@ def drive_file(word: str) -> Path | None:
 
     A file that is plainly of another kind is refused.
     """
-    from swashplate.parameters.files import set_file
+    from swashplate.parameters import set_file
 
     file = set_file(word)
     if file is not None:
@@ -135,7 +135,7 @@ def drive_file(word: str) -> Path | None:
 
 def parameters_of(word: str) -> ParameterSet:
     """The packaged set of a name, the set in a TOML file, or the one that a fit's folder holds."""
-    from swashplate.parameters.files import load_preset, load_set
+    from swashplate.parameters import load_preset, load_set
 
     file = drive_file(word)
     return load_preset(word) if file is None else load_set(file)
@@ -242,7 +242,7 @@ def drive_of(word: str, values: Sequence[str] = (), factors: Sequence[str] = ())
 
 
 def _is_design_variable(name: str) -> bool:
-    from swashplate.parameters.definitions import CATALOGUE, COLUMNS, REFINEMENTS
+    from swashplate.parameters import CATALOGUE, COLUMNS, REFINEMENTS
 
     if name in CATALOGUE or name in COLUMNS or name in REFINEMENTS:
         return False
@@ -325,7 +325,7 @@ def changes_between(before: ParameterSet, after: ParameterSet) -> list[str]:
 def named_maneuver(word: str, *drives: Drive) -> Maneuver:
     """A maneuver such as ``step:9``, or the thesis's test of that name for these drives."""
     from swashplate.maneuvers import parse, source_tests
-    from swashplate.parameters.files import AXES
+    from swashplate.parameters import AXES
 
     axes = [drive.name for drive in drives if drive.name in AXES]
     tests = {name: test for axis in reversed(axes) for name, test in source_tests(axis).items()}

@@ -168,7 +168,7 @@ def show_parameters(
     # in SI: a rod's drive has angles inside, which chosen units of its motion would change
     parameters = parsing.drive_of(drive, values or (), factors or ()).parameters
     if toml:
-        from swashplate.parameters.files import dump_set
+        from swashplate.parameters import dump_set
 
         typer.echo(dump_set(parameters), nl=False)
         return

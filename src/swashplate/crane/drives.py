@@ -10,7 +10,7 @@ from swashplate.crane.axes import AXES
 from swashplate.documents import parse_toml, read_text
 from swashplate.drive import Drive
 from swashplate.errors import ParameterError, SwashplateError
-from swashplate.parameters.files import preset_names
+from swashplate.parameters import preset_names
 
 if TYPE_CHECKING:
     from swashplate.identification.diagnostics.verdict import Verdict

@@ -37,7 +37,7 @@ from swashplate.campaign import (
 from swashplate.documents import parse_toml, toml_key, toml_string, validated
 from swashplate.errors import FileError, InputError
 from swashplate.logs import Log, LogColumn, open_log
-from swashplate.parameters.files import NEUTRAL, preset_names
+from swashplate.parameters import NEUTRAL, preset_names
 from swashplate.units import speed_unit, to_si
 
 Array = NDArray[np.float64]

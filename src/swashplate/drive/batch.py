@@ -21,9 +21,7 @@ from swashplate.equations.library import TAN_22_5
 from swashplate.equations.marching.record import Record
 from swashplate.errors import InputError
 from swashplate.executors import Executor
-from swashplate.parameters.definitions import SWITCHES
-from swashplate.parameters.parameter_set import ParameterSet
-from swashplate.parameters.rules import broken_rules
+from swashplate.parameters import SWITCHES, ParameterSet, broken_rules
 from swashplate.units import in_si
 
 Array = NDArray[np.float64]

@@ -21,8 +21,7 @@ from swashplate.equations.marching.record import Record
 from swashplate.equations.marching.run import Start
 from swashplate.equations.marching.sensitivity import Sensitivities
 from swashplate.errors import InputError
-from swashplate.parameters.definitions import DEFINITIONS, SWITCHES, Definitions
-from swashplate.parameters.parameter_set import ParameterSet
+from swashplate.parameters import DEFINITIONS, SWITCHES, Definitions, ParameterSet
 
 CURRENTS = ("current", "current_sum", "current_positive", "current_negative")
 

@@ -28,9 +28,16 @@ from swashplate.equations.model import Equation
 from swashplate.equations.replacement import Replacement
 from swashplate.errors import InputError
 from swashplate.maneuvers import Maneuver
-from swashplate.parameters.files import dump_set, load_preset, load_set, preset_names
-from swashplate.parameters.parameter_set import Change, Parameter, ParameterSet
-from swashplate.parameters.rules import FULL_VOLTAGE
+from swashplate.parameters import (
+    FULL_VOLTAGE,
+    Change,
+    Parameter,
+    ParameterSet,
+    dump_set,
+    load_preset,
+    load_set,
+    preset_names,
+)
 from swashplate.results import Result
 from swashplate.units import in_si
 

@@ -18,8 +18,7 @@ from swashplate.equations.marching.run import InitialStates, called, marched
 from swashplate.errors import DomainError, InputError
 from swashplate.models.displacement_control import moment_sine, solenoid_force
 from swashplate.models.pump import overpowered
-from swashplate.parameters.parameter_set import ParameterSet
-from swashplate.parameters.rules import FULL_VOLTAGE
+from swashplate.parameters import FULL_VOLTAGE, ParameterSet
 
 Array = NDArray[np.float64]
 

@@ -21,8 +21,7 @@ from swashplate.linear import (
     sweep,
 )
 from swashplate.models.displacement_control import Pump
-from swashplate.parameters.parameter_set import ParameterSet
-from swashplate.parameters.rules import FULL_VOLTAGE
+from swashplate.parameters import FULL_VOLTAGE, ParameterSet
 from swashplate.tables import Column, Table
 
 SWEPT_OUTPUTS = OUTPUTS[:7]  # Without the motor's.

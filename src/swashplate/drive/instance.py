@@ -29,8 +29,7 @@ from swashplate.models.drive import (
     settled_drive,
 )
 from swashplate.models.pump import searched_pressure, settled_pressure
-from swashplate.parameters.parameter_set import ParameterSet
-from swashplate.parameters.rules import SIDES, Broken, Rule, applied
+from swashplate.parameters import SIDES, Broken, ParameterSet, Rule, applied
 
 Array = NDArray[np.float64]
 

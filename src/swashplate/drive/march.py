@@ -17,8 +17,7 @@ from swashplate.equations.marching.run import Instance, Start
 from swashplate.equations.marching.simulation import Stepper
 from swashplate.errors import DomainError, InputError
 from swashplate.models.displacement_control import pressure_limits
-from swashplate.parameters.parameter_set import ParameterSet
-from swashplate.parameters.rules import FULL_VOLTAGE
+from swashplate.parameters import FULL_VOLTAGE, ParameterSet
 
 
 def simulate_drive(

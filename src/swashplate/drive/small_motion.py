@@ -22,7 +22,7 @@ from swashplate.equations.marching.run import Instance, called
 from swashplate.linear import LinearModel, Matrices, linearize
 from swashplate.models.amplifier import Card
 from swashplate.models.refinements import dither_factor, friction_width
-from swashplate.parameters.parameter_set import ParameterSet
+from swashplate.parameters import ParameterSet
 
 Array = NDArray[np.float64]
 Coulomb = Literal["ignored", "tangent"]

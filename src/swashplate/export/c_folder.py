@@ -33,8 +33,7 @@ from swashplate.export.c_source import Exported, interface, numbers
 from swashplate.export.variable_list import DRIVE, DRIVE_WORDS, OWN, References, Words, words_of
 from swashplate.models.amplifier import stable_step
 from swashplate.models.displacement_control import steep_stops
-from swashplate.parameters.parameter_set import ParameterSet
-from swashplate.parameters.rules import FULL_VOLTAGE
+from swashplate.parameters import FULL_VOLTAGE, ParameterSet
 from swashplate.tables import write_text
 
 Array = NDArray[np.float64]

@@ -40,8 +40,7 @@ from swashplate.models.displacement_control import Solenoids
 from swashplate.models.drive import Source as CurrentSource
 from swashplate.models.full_order import PlantOptions, PlantSignals
 from swashplate.models.machine import fastest_rate, relief_pressures
-from swashplate.parameters.definitions import CATALOGUE, DEFINITIONS, Definition, Definitions
-from swashplate.parameters.parameter_set import Change
+from swashplate.parameters import CATALOGUE, DEFINITIONS, Change, Definition, Definitions
 from swashplate.results import Named, Result, Tabular, figures
 from swashplate.tables import UNIT, Cell, Column, Table
 from swashplate.units import PLATE_RATE, SHAFT_ANGLE

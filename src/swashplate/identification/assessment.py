@@ -48,14 +48,15 @@ from swashplate.identification.statistics.intervals import (
 from swashplate.identification.statistics.profiles import Profile
 from swashplate.identification.validation import RunQuality, predict
 from swashplate.locks import locked
-from swashplate.parameters.files import (
+from swashplate.parameters import (
     FITTED_DRIVE,
     FITTED_NUMBERS,
     NEUTRAL,
+    Motion,
+    ParameterSet,
     dump_set,
     read_set,
 )
-from swashplate.parameters.parameter_set import Motion, ParameterSet
 from swashplate.progress import working
 from swashplate.results import folded
 from swashplate.tables import Table, write_text

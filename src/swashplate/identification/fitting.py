@@ -55,8 +55,7 @@ from swashplate.identification.estimation.stages import (
 from swashplate.identification.estimation.unknowns import Prior
 from swashplate.identification.stage_fit import Interval, StageFit
 from swashplate.identification.statistics.intervals import Estimate, uncertainty_of, weighed
-from swashplate.parameters.parameter_set import ParameterSet
-from swashplate.parameters.rules import SIDES
+from swashplate.parameters import SIDES, ParameterSet
 from swashplate.progress import LOGGER, working
 from swashplate.results import Tabular
 from swashplate.tables import Table, count, listed

@@ -29,8 +29,7 @@ from swashplate.identification.fitting import Fit, Search, fit
 from swashplate.identification.resampling import cross_validate
 from swashplate.identification.stage_fit import StageFit
 from swashplate.identification.statistics.profiles import Profile, profiles_of
-from swashplate.parameters.files import named_set
-from swashplate.parameters.parameter_set import ParameterSet
+from swashplate.parameters import ParameterSet, named_set
 
 MOST_EVALUATIONS = 600
 

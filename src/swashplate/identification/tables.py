@@ -30,8 +30,7 @@ from swashplate.identification.validation import (
     ignored_windows,
     pooled,
 )
-from swashplate.parameters.definitions import CATALOGUE, COLUMNS
-from swashplate.parameters.parameter_set import ParameterSet
+from swashplate.parameters import CATALOGUE, COLUMNS, ParameterSet
 from swashplate.tables import (
     NONE,
     UNIT,

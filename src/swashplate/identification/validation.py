@@ -29,7 +29,7 @@ from swashplate.identification.estimation.problem import Problem
 from swashplate.identification.estimation.solving import solve
 from swashplate.identification.estimation.stages import Parameters
 from swashplate.identification.noise import LONGEST, Grid, correlation_length, grid_of, pair_sums
-from swashplate.parameters.parameter_set import HasParameters, ParameterSet, set_of
+from swashplate.parameters import HasParameters, ParameterSet, set_of
 from swashplate.results import Result, figures
 
 if TYPE_CHECKING:

@@ -54,7 +54,7 @@ from swashplate.crane.rope import (
 )
 from swashplate.equations import StepContext, equation, inlined, kernel
 from swashplate.equations.code_generation.functions import generating
-from swashplate.parameters.rules import FULL_VOLTAGE
+from swashplate.parameters import FULL_VOLTAGE
 
 Array = NDArray[np.float64]
 

@@ -32,7 +32,7 @@ from swashplate.equations import CompiledStep, StepContext, compiled_step
 from swashplate.equations.marching.run import marched
 from swashplate.equations.marching.stepping import stored_of
 from swashplate.errors import DomainError, InputError
-from swashplate.parameters.rules import FULL_VOLTAGE
+from swashplate.parameters import FULL_VOLTAGE
 
 Array = NDArray[np.float64]
 Actuation = Literal["ideal", "volts", "inverse", "direct"]

@@ -33,7 +33,7 @@ from swashplate.identification.statistics.effects import (
     source_of,
 )
 from swashplate.identification.validation import percent
-from swashplate.parameters.definitions import CATALOGUE, COLUMNS, SWITCHES
+from swashplate.parameters import CATALOGUE, COLUMNS, SWITCHES
 from swashplate.results import Result
 from swashplate.units import display_unit
 

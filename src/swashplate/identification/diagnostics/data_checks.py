@@ -32,8 +32,7 @@ from swashplate.identification.estimation.model_setup import ModelSetup
 from swashplate.identification.estimation.problem import Loss, Problem
 from swashplate.identification.estimation.setup import FitSetup
 from swashplate.identification.estimation.stages import smooth
-from swashplate.parameters.parameter_set import ParameterSet
-from swashplate.parameters.rules import FULL_VOLTAGE
+from swashplate.parameters import FULL_VOLTAGE, ParameterSet
 from swashplate.tables import count
 
 Array = NDArray[np.float64]

@@ -29,7 +29,7 @@ from swashplate.identification.estimation.solving import Solution
 from swashplate.identification.stage_fit import StageFit
 from swashplate.identification.statistics.determination import WIDE, weak_unknowns
 from swashplate.identification.validation import RunQuality, percent
-from swashplate.parameters.definitions import COLUMNS
+from swashplate.parameters import COLUMNS
 from swashplate.results import Result, listing
 from swashplate.tables import UNIT, Column, Table, listed
 

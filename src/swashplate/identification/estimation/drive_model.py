@@ -49,7 +49,7 @@ from swashplate.identification.estimation.model import EquationModel, Simulation
 from swashplate.identification.estimation.problem import Problem
 from swashplate.identification.estimation.setup import Forces
 from swashplate.identification.estimation.unknowns import Prior, Unknown, Unknowns, zero_name
-from swashplate.parameters.parameter_set import ParameterSet
+from swashplate.parameters import ParameterSet
 from swashplate.results import Result
 
 Array = NDArray[np.float64]

@@ -39,7 +39,7 @@ from swashplate.identification.estimation.setup import (
 )
 from swashplate.identification.estimation.solving import solve
 from swashplate.identification.estimation.unknowns import Unknown, Unknowns, zero_name
-from swashplate.parameters.plausible import check_plausible
+from swashplate.parameters import check_plausible
 from swashplate.results import Result
 
 Array = NDArray[np.float64]

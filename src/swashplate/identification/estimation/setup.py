@@ -26,9 +26,7 @@ from swashplate.errors import (
     meant,
 )
 from swashplate.identification.estimation.unknowns import Prior, Unknown
-from swashplate.parameters.definitions import Definitions
-from swashplate.parameters.parameter_set import ParameterSet
-from swashplate.parameters.rules import SIDES
+from swashplate.parameters import SIDES, Definitions, ParameterSet
 
 Array = NDArray[np.float64]
 _SETUPS = files("swashplate.identification").joinpath("setups")

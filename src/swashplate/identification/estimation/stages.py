@@ -47,10 +47,15 @@ from swashplate.identification.estimation.setup import (
     setup_names,
 )
 from swashplate.identification.estimation.unknowns import Unknown, Unknowns, bounded
-from swashplate.parameters.definitions import DEFINITIONS, SWITCHES, Definition, Definitions
-from swashplate.parameters.parameter_set import ParameterSet
-from swashplate.parameters.plausible import check_plausible
-from swashplate.parameters.rules import FULL_VOLTAGE
+from swashplate.parameters import (
+    DEFINITIONS,
+    FULL_VOLTAGE,
+    SWITCHES,
+    Definition,
+    Definitions,
+    ParameterSet,
+    check_plausible,
+)
 
 Array = NDArray[np.float64]
 Parameters = ParameterSet | ModelSetup

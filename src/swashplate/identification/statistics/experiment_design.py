@@ -35,9 +35,14 @@ from swashplate.identification.estimation.unknowns import Unknowns
 from swashplate.identification.noise import spectral_covariance
 from swashplate.identification.statistics.determination import Identifiability, identifiability
 from swashplate.maneuvers import Maneuver, multisine, ramp, sine, stairs, step
-from swashplate.parameters.definitions import CATALOGUE, COLUMNS
-from swashplate.parameters.parameter_set import HasParameters, ParameterSet, set_of
-from swashplate.parameters.rules import FULL_VOLTAGE
+from swashplate.parameters import (
+    CATALOGUE,
+    COLUMNS,
+    FULL_VOLTAGE,
+    HasParameters,
+    ParameterSet,
+    set_of,
+)
 from swashplate.results import Result
 from swashplate.rig import COUNTS_PER_TURN
 from swashplate.tables import Column, Table, listed

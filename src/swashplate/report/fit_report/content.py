@@ -32,7 +32,7 @@ from swashplate.identification.tables import (
     truth_count,
 )
 from swashplate.identification.validation import RunQuality, at_instants, percent
-from swashplate.parameters.parameter_set import ParameterSet
+from swashplate.parameters import ParameterSet
 from swashplate.report.fit_report import charts
 from swashplate.report.fit_report.html_page import (
     PageBlock,

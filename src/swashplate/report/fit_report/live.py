@@ -30,7 +30,7 @@ from swashplate.export.libraries import WASM, packaged
 from swashplate.identification.estimation.drive_model import at_rate_of, voltage_record
 from swashplate.identification.validation import at_instants, ignored_windows
 from swashplate.maneuvers import Maneuver
-from swashplate.parameters.parameter_set import HasParameters, Parameter, ParameterSet, set_of
+from swashplate.parameters import HasParameters, Parameter, ParameterSet, set_of
 from swashplate.report.fit_report.html_page import LIVE_SCRIPTS, rendered, script_json
 from swashplate.report.fit_report.runs import packed_samples
 from swashplate.report.lines import SHADES, gap_rows

@@ -33,7 +33,7 @@ from swashplate.identification.validation import (
     pooled,
     range_of,
 )
-from swashplate.parameters.rules import FULL_VOLTAGE
+from swashplate.parameters import FULL_VOLTAGE
 from swashplate.report.fit_report.html_page import PageBlock, Section, listed_block, text
 from swashplate.report.fit_report.runs import ShownRun
 from swashplate.tables import NONE, UNIT, Cell, Column, Table, count, listed
