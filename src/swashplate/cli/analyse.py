@@ -85,8 +85,7 @@ def limits(
     which component to change first. The error is the RMS difference of the speed
     from that of a drive without limits. The shares need not add up to 100 %.
     """
-    from swashplate.analysis.capability import envelope
-    from swashplate.analysis.limits import shares_of
+    from swashplate.analysis import envelope, shares_of
 
     if maneuver is None:
         with spinner("Measuring"):
@@ -115,7 +114,7 @@ def limits(
 
 def _list_variables(requested: bool) -> None:
     if requested:
-        from swashplate.analysis.design_variables import design_variables_table
+        from swashplate.analysis import design_variables_table
 
         show(design_variables_table())
         raise typer.Exit
@@ -181,8 +180,7 @@ def whatif(
     the drive as it is. With --uncertainty, metrics get intervals and the
     figure gets bands: drives are drawn from the errors of a fit's estimates.
     """
-    from swashplate.analysis import monte_carlo
-    from swashplate.analysis.whatif import AS_IS, CHANGED, what_if
+    from swashplate.analysis import AS_IS, CHANGED, monte_carlo, what_if
 
     moved = parsing.factors_of(factors)
     choice = DriveChoice(drive)
@@ -267,8 +265,7 @@ def size(
     be reached. The design variables are orifice and pump, from half to twice,
     unless others are named.
     """
-    from swashplate.analysis import sizing
-    from swashplate.analysis.outcomes import proportional_speed, trial_of
+    from swashplate.analysis import proportional_speed, sizing, trial_of
 
     if (tracking_deg_s is None) != (maneuver is None):
         raise InputError("--tracking-deg-s and --maneuver belong together: give both or neither.")

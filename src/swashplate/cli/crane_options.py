@@ -355,7 +355,7 @@ class Studied(Operated):
 
     def sets(self) -> dict[str, Any]:
         """Sets of drives by name."""
-        from swashplate.analysis.design_variables import powers_of
+        from swashplate.analysis import powers_of
         from swashplate.crane import drawn_cranes, with_design_change
 
         names = filter(None, map(str.strip, (self.drives or "ideal,identified").split(",")))

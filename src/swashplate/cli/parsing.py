@@ -18,8 +18,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-    from swashplate.analysis.design_variables import FactorRange
-    from swashplate.analysis.outcomes import Trial
+    from swashplate.analysis import FactorRange, Trial
     from swashplate.campaign import Campaign, Experiment
     from swashplate.cli.options import CommandSampling, Simulating, Start
     from swashplate.drive import Drive, Simulation
@@ -226,7 +225,7 @@ def drive_of(word: str, values: Sequence[str] = (), factors: Sequence[str] = ())
         try:
             return definitions.find(name)
         except UnknownParameterError:
-            from swashplate.analysis.design_variables import powers_of
+            from swashplate.analysis import powers_of
 
             return powers_of(name)  # refuses it, and lists design variables as well
 
@@ -235,7 +234,7 @@ def drive_of(word: str, values: Sequence[str] = (), factors: Sequence[str] = ())
     drive = drive.replace(**chosen)
     drive = drive.scale(**assignments_of("--scale", scaling, scaled_as, scalable))
     if changes:
-        from swashplate.analysis.design_variables import with_factors
+        from swashplate.analysis import with_factors
 
         drive = with_factors(drive, changes)
     return drive
@@ -246,7 +245,7 @@ def _is_design_variable(name: str) -> bool:
 
     if name in CATALOGUE or name in COLUMNS or name in REFINEMENTS:
         return False
-    from swashplate.analysis.design_variables import DESIGN_VARIABLES
+    from swashplate.analysis import DESIGN_VARIABLES
 
     return name in DESIGN_VARIABLES
 
@@ -261,14 +260,14 @@ def physical_values(words: Sequence[str]) -> dict[str, Change]:
 
 def factors_of(words: Sequence[str]) -> dict[str, float]:
     """Factors by design variable or parameter from words such as ``orifice=1.5``."""
-    from swashplate.analysis.design_variables import powers_of
+    from swashplate.analysis import powers_of
 
     return assignments_of("--scale", words, "orifice=1.5", powers_of, (1,))
 
 
 def factor_ranges_of(words: Sequence[str], usual: FactorRange) -> dict[str, FactorRange]:
     """Ranges of factors by design variable from words such as ``pump`` or ``pump=0.8/1.5``."""
-    from swashplate.analysis.design_variables import powers_of
+    from swashplate.analysis import powers_of
 
     completed = [word if "=" in word else f"{word}={usual[0]}/{usual[1]}" for word in words]
     return assignments_of("--variable", completed, "pump or pump=0.8/1.5", powers_of, (2,))
@@ -454,7 +453,7 @@ def window_of(
 
 def named_trial(drive: Drive, command: str, options: CommandSampling) -> tuple[str, Trial]:
     """Name of a command, a maneuver or a log, and the trial that it makes."""
-    from swashplate.analysis.outcomes import trial_of
+    from swashplate.analysis import trial_of
 
     drive = at_rate(drive, options.rate)
     name, run = simulated_run(drive, command, options)

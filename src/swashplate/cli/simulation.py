@@ -100,7 +100,7 @@ def compare(
     and both speeds.
     """
     with spinner("Simulating"):
-        from swashplate.analysis.outcomes import rms_difference, side_by_side
+        from swashplate.analysis import rms_difference, side_by_side
 
         pair = [parsing.at_rate(parsing.drive_of(word), rate) for word in (first, second)]
         labels = [drive.name for drive in pair]

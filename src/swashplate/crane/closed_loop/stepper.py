@@ -10,7 +10,7 @@ from typing import Any, Literal, TypedDict, Unpack, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swashplate.analysis.compensation import InverseMap
+from swashplate.analysis import InverseMap
 from swashplate.crane.axes import AXES, RATE, check_names
 from swashplate.crane.closed_loop import loop
 from swashplate.crane.closed_loop.loop import Fixed, Inverse, LoopArrays, State

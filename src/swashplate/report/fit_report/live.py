@@ -12,7 +12,7 @@ from zlib import compress
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.analysis.design_variables import DESIGN_VARIABLES
+from swashplate.analysis import DESIGN_VARIABLES
 from swashplate.campaign import (
     DIFFERENTIATOR,
     LOW_PASS,
