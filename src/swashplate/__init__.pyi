@@ -45,8 +45,8 @@ from .executors import Serial as Serial
 from .executors import Threads as Threads
 from .full_order import FullOrderDrive as FullOrderDrive
 from .full_order import PhysicalSet as PhysicalSet
-from .identification.assessment import Identification as Identification
-from .identification.identifying import identify as identify
+from .identification import Identification as Identification
+from .identification import identify as identify
 from .linear import FrequencyResponse as FrequencyResponse
 from .parameters import Pair as Pair
 from .parameters import Parameter as Parameter

@@ -196,7 +196,7 @@ def check(
     simulation of the axis's drive.
     """
     from swashplate import campaign as tests
-    from swashplate.identification.diagnostics.data_checks import beside_the_drives
+    from swashplate.identification.diagnostics import beside_the_drives
 
     parsing.check_file_kind(path, "campaign")
     with spinner(f"Reading {path}"):
@@ -422,7 +422,7 @@ def guess(
     from swashplate import drafting
     from swashplate.campaign import spiked
     from swashplate.drive import Drive
-    from swashplate.identification.identifying import runs_to_fit
+    from swashplate.identification import runs_to_fit
 
     folder = path.parent if out is None else out
     start, setup = folder / "start.toml", folder / "setup.toml"
@@ -520,17 +520,19 @@ def advise(
     """
     from swashplate.campaign import KINDS
     from swashplate.drive import Drive
-    from swashplate.identification.diagnostics.data_checks import check_runs, refuse_unsound
-    from swashplate.identification.estimation.setup import load_setup
-    from swashplate.identification.estimation.stages import smooth
-    from swashplate.identification.statistics.experiment_design import (
+    from swashplate.identification import (
         RunInformation,
-        advice_table,
         advise,
-        best_tests_table,
-        default_maneuvers,
+        load_setup,
         prior_information,
         run_information,
+    )
+    from swashplate.identification.diagnostics import check_runs, refuse_unsound
+    from swashplate.identification.estimation import smooth
+    from swashplate.identification.statistics import (
+        advice_table,
+        best_tests_table,
+        default_maneuvers,
         sequential_plan,
     )
 

@@ -44,9 +44,8 @@ from swashplate.errors import InputError
 from swashplate.tables import PRINTED, TABLE, check_folder, joined, made_folder
 
 if TYPE_CHECKING:
-    from swashplate.identification.assessment import Identification
-    from swashplate.identification.diagnostics.verdict import Verdict
-    from swashplate.identification.estimation.stages import Parameters
+    from swashplate.identification import Identification, Verdict
+    from swashplate.identification.estimation import Parameters
     from swashplate.parameters import ParameterSet
 
 INTERRUPTED = 130
@@ -202,7 +201,7 @@ def fit(
         )
     with spinner("Starting"), clock.part("start and kernels"):
         from swashplate.executors import Dask, Processes
-        from swashplate.identification.identifying import identify
+        from swashplate.identification import identify
     with spinner(f"Reading {path}"), clock.part("reading"):
         campaign, axis_name = parsing.campaign_of(path, axis)
         start: Path | ParameterSet | None = model
@@ -250,7 +249,7 @@ def fit(
 
 def _say_fit(result: Identification) -> None:
     """What was found, stage by stage, and how well each run is followed."""
-    from swashplate.identification.assessment import parts_of
+    from swashplate.identification import parts_of
 
     text_above = False
     for part in parts_of(result):
@@ -324,11 +323,8 @@ def validate(
     Prints the errors of each run, the structure left in the residuals, and a
     verdict. Exit code 1: the drive is not usable for these runs.
     """
-    from swashplate.identification import tables
-    from swashplate.identification.assessment import versions
-    from swashplate.identification.diagnostics.data_checks import refuse_unsound, spike_findings
-    from swashplate.identification.diagnostics.verdict import assess_fit
-    from swashplate.identification.validation import predict, with_speeds
+    from swashplate.identification import assess_fit, predict, tables, versions, with_speeds
+    from swashplate.identification.diagnostics import refuse_unsound, spike_findings
 
     if out is not None:
         check_folder(out)
@@ -421,7 +417,7 @@ def report(
     Nothing is fitted. The campaign must be the one that was fitted: if its
     samples, weights or ignored windows have changed, the report is refused.
     """
-    from swashplate.identification.assessment import Identification
+    from swashplate.identification import Identification
     from swashplate.report.fit_report import find_browser, print_report, shown_runs, write_samples
 
     if pdf is not None:
@@ -484,11 +480,7 @@ def demo(
     from swashplate import rig
     from swashplate.campaign import Campaign
     from swashplate.drive import Drive
-    from swashplate.identification import tables
-    from swashplate.identification.estimation.setup import load_setup
-    from swashplate.identification.fitting import drawn
-    from swashplate.identification.identifying import identify
-    from swashplate.identification.validation import with_speeds
+    from swashplate.identification import drawn, identify, load_setup, tables, with_speeds
     from swashplate.report.figures import plot_channel, save_figure
 
     if not (out / "virtual" / "truth").is_dir():  # only an earlier demo is replaced

@@ -22,8 +22,7 @@ if TYPE_CHECKING:
     from swashplate.campaign import Campaign, Experiment
     from swashplate.cli.options import CommandSampling, Simulating, Start
     from swashplate.drive import Drive, Simulation
-    from swashplate.identification.estimation.model_setup import ModelSetup
-    from swashplate.identification.estimation.setup import FitSetup
+    from swashplate.identification import FitSetup, ModelSetup
     from swashplate.maneuvers import Maneuver
     from swashplate.parameters import Change, ParameterSet
 
@@ -106,8 +105,8 @@ def fit_of(
     path: Path, axis: str | None, setup: str | None, begin: str | None
 ) -> tuple[Campaign, tuple[Experiment, ...], FitSetup, ParameterSet]:
     """What a fit is about: campaign, runs to fit, what is free, and the drive it begins at."""
-    from swashplate.identification.estimation.stages import setup_of
-    from swashplate.identification.identifying import runs_to_fit
+    from swashplate.identification import runs_to_fit
+    from swashplate.identification.estimation import setup_of
 
     campaign, axis_name = campaign_of(path, axis)
     start = campaign.drive(axis_name).parameters if begin is None else parameters_of(begin)
@@ -143,7 +142,7 @@ def parameters_of(word: str) -> ParameterSet:
 def model_parameters_of(folder: str, file: Path, runs: Sequence[Experiment]) -> ModelSetup:
     """A user-defined model with the numbers that a fit wrote into its folder."""
     from swashplate.equations.fields import is_real
-    from swashplate.identification.estimation.model_setup import ModelSetup
+    from swashplate.identification import ModelSetup
 
     setup = ModelSetup.from_file(file)
     numbers_file = Path(folder) / NUMBERS if Path(folder).is_dir() else Path(folder)

@@ -13,25 +13,32 @@ from markupsafe import Markup
 from swashplate.campaign import Campaign, Overview, WeightWindow, examine, quality_table
 from swashplate.drive import Drive
 from swashplate.errors import InputError
-from swashplate.identification.assessment import Identification, motion_of
-from swashplate.identification.diagnostics.verdict import Verdict, assess_fit, starts_of
-from swashplate.identification.estimation.model_setup import ModelSetup
-from swashplate.identification.estimation.solving import Solution
-from swashplate.identification.estimation.stages import Parameters
-from swashplate.identification.fitting import Fit
-from swashplate.identification.resampling import CrossValidation, folds_tables
-from swashplate.identification.stage_fit import StageFit
-from swashplate.identification.statistics.determination import Identifiability, identifiability_of
-from swashplate.identification.statistics.intervals import uncertainty_of
-from swashplate.identification.statistics.profiles import Profile
-from swashplate.identification.tables import (
+from swashplate.identification import (
+    CrossValidation,
+    Fit,
+    Identifiability,
+    Identification,
+    ModelSetup,
+    Profile,
+    RunQuality,
+    Solution,
+    StageFit,
+    Verdict,
+    assess_fit,
+    at_instants,
     estimates_table,
     fixed_table,
+    folds_tables,
+    identifiability_of,
+    motion_of,
+    percent,
     runs_tables,
     scales_words,
     truth_count,
+    uncertainty_of,
 )
-from swashplate.identification.validation import RunQuality, at_instants, percent
+from swashplate.identification.diagnostics import starts_of
+from swashplate.identification.estimation import Parameters
 from swashplate.parameters import ParameterSet
 from swashplate.report.fit_report import charts
 from swashplate.report.fit_report.html_page import (

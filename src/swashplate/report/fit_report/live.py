@@ -27,8 +27,8 @@ from swashplate.equations.marching.record import Record, record_of
 from swashplate.errors import InputError
 from swashplate.export import exported_drive, values_of
 from swashplate.export.libraries import WASM, packaged
-from swashplate.identification.estimation.drive_model import at_rate_of, voltage_record
-from swashplate.identification.validation import at_instants, ignored_windows
+from swashplate.identification import at_instants, ignored_windows
+from swashplate.identification.estimation import at_rate_of, voltage_record
 from swashplate.maneuvers import Maneuver
 from swashplate.parameters import HasParameters, Parameter, ParameterSet, set_of
 from swashplate.report.fit_report.html_page import LIVE_SCRIPTS, rendered, script_json
