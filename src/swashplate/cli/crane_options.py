@@ -169,7 +169,7 @@ class AtSea(Placed):
         Its record is at least as long as a length. [s]
         """
         from swashplate.crane import Seaway
-        from swashplate.crane.sea.seaway import RECORDS
+        from swashplate.crane.sea import RECORDS
 
         words = self.sea or ([] if default is None else [default])
         if not words:
@@ -200,7 +200,7 @@ class AtSea(Placed):
     def _hull(self) -> Hull | TransferFunctions:
         """The ship of a file, or the packaged hull as its roll is given."""
         from swashplate.crane import read_ship
-        from swashplate.crane.sea.transfer_functions import CRANE_SHIP
+        from swashplate.crane.sea import CRANE_SHIP
 
         roll = _given(roll_period=self.roll_period, roll_damping=self.roll_damping)
         if self.ship is None:
@@ -346,7 +346,7 @@ class Studied(Operated):
     @cached_property
     def waters(self) -> Seaway | None:
         """The seaway, in ss3 if only the ship is given; None if nothing of either is."""
-        from swashplate.crane.studies.study import LENGTH, RUN_IN
+        from swashplate.crane.studies import LENGTH, RUN_IN
 
         counted = LENGTH if self.length is None else self.length
         before = RUN_IN if self.run_in is None else self.run_in
