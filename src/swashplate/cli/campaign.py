@@ -133,7 +133,7 @@ def init(
     full scale, is scaled to volts; a sensor in such words needs its range.
     Correct the entries, then run 'swashplate campaign check'.
     """
-    from swashplate.drafting.draft import FIXME, NO_ENCODER, UNUSED, draft_campaign
+    from swashplate.drafting import FIXME, NO_ENCODER, UNUSED, draft_campaign
 
     target = out or logs[0].parent / "campaign.toml"
     check_writable(target, CAMPAIGN_FILE, force=force)
