@@ -25,8 +25,7 @@ from swashplate.campaign import (
 from swashplate.drive import Drive, Limit
 from swashplate.equations.marching.record import Record, record_of
 from swashplate.errors import InputError
-from swashplate.export import exported_drive, values_of
-from swashplate.export.libraries import WASM, packaged
+from swashplate.export import WASM, exported_drive, packaged, values_of
 from swashplate.identification import at_instants, ignored_windows
 from swashplate.identification.estimation import at_rate_of, voltage_record
 from swashplate.maneuvers import Maneuver
