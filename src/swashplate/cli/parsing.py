@@ -251,7 +251,7 @@ def _is_design_variable(name: str) -> bool:
 
 def physical_values(words: Sequence[str]) -> dict[str, Change]:
     """Physical values in SI from words such as ``oil_volume=100cm^3``."""
-    from swashplate.full_order.physical_set import chosen_quantity
+    from swashplate.full_order import chosen_quantity
 
     example = "oil_volume=1e-4 or oil_volume=100cm^3"
     return assignments_of("--physical", words, example, chosen_quantity, units=True)
