@@ -11,9 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.drive import Drive, drive_instance
-from swashplate.equations.declaration import interpreted
-from swashplate.equations.marching.record import SOURCE_RATE
-from swashplate.equations.marching.run import Instance, PartNumbers, called
+from swashplate.equations import Instance, interpreted
+from swashplate.equations.marching import SOURCE_RATE, PartNumbers, called
 from swashplate.models.displacement_control import PumpOptions, pressure_limits
 from swashplate.models.pump import PumpState
 from swashplate.parameters import FULL_VOLTAGE

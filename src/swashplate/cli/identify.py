@@ -80,7 +80,7 @@ class StageClock:
     def part(self, name: str) -> Iterator[None]:
         """Count what is done to a part."""
         begin = perf_counter()
-        from swashplate.equations.code_generation.functions import generating_time
+        from swashplate.equations.code_generation import generating_time
 
         before = generating_time()
         yield

@@ -141,7 +141,7 @@ def parameters_of(word: str) -> ParameterSet:
 
 def model_parameters_of(folder: str, file: Path, runs: Sequence[Experiment]) -> ModelSetup:
     """A user-defined model with the numbers that a fit wrote into its folder."""
-    from swashplate.equations.fields import is_real
+    from swashplate.equations import is_real
     from swashplate.identification import ModelSetup
 
     setup = ModelSetup.from_file(file)
@@ -344,7 +344,7 @@ def named_maneuver(word: str, *drives: Drive) -> Maneuver:
 def at_rate(drive: Drive, rate: float) -> Drive:
     """The drive for a rate: a recursion for another one becomes its equation, said in a note."""
     from swashplate.cli.terminal import note
-    from swashplate.equations.marching.record import least_substeps
+    from swashplate.equations.marching import least_substeps
 
     filter_rate, marched = drive.parameters.rate, rate * least_substeps(rate)
     if filter_rate is None or abs(marched / filter_rate - 1.0) < 1e-9:

@@ -16,9 +16,8 @@ from swashplate.drive.instance import (
     unstable_filters,
 )
 from swashplate.drive.signals import check_output
-from swashplate.equations.fields import check_mapping
-from swashplate.equations.library import TAN_22_5
-from swashplate.equations.marching.record import Record
+from swashplate.equations import TAN_22_5, check_mapping
+from swashplate.equations.marching import Record
 from swashplate.errors import InputError
 from swashplate.executors import Executor
 from swashplate.parameters import SWITCHES, ParameterSet, broken_rules

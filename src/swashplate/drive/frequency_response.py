@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 from swashplate.drive.instance import check_filter_stability, drive_instance, without_ripple
 from swashplate.drive.signals import UNITS
 from swashplate.drive.small_motion import OUTPUTS
-from swashplate.equations.fields import is_real
-from swashplate.equations.marching.record import FASTEST, SOURCE_RATE, check_rate
+from swashplate.equations import is_real
+from swashplate.equations.marching import FASTEST, SOURCE_RATE, check_rate
 from swashplate.errors import InputError
 from swashplate.linear import (
     FrequencyResponse,

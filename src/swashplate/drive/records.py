@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.drive.signals import MEASURED, UNITS
-from swashplate.equations.fields import Definition, is_real
-from swashplate.equations.marching.record import Interpolation, Record, least_substeps, on_grid
+from swashplate.equations import Definition, is_real
+from swashplate.equations.marching import Interpolation, Record, least_substeps, on_grid
 from swashplate.errors import InputError, ParameterError
 from swashplate.maneuvers import Maneuver, sampled
 from swashplate.parameters import FULL_VOLTAGE, check_plausible

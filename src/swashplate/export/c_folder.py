@@ -22,12 +22,9 @@ from swashplate.drive import (
     drive_instance,
     models_of,
 )
-from swashplate.equations import instance_of
-from swashplate.equations.code_generation.printing_c import c_name, comment_line, filled, literal
-from swashplate.equations.fields import declared_by
-from swashplate.equations.marching.record import SOURCE_RATE, check_rate
-from swashplate.equations.marching.run import Instance
-from swashplate.equations.model import Model
+from swashplate.equations import Instance, Model, declared_by, instance_of
+from swashplate.equations.code_generation import c_name, comment_line, filled, literal
+from swashplate.equations.marching import SOURCE_RATE, check_rate
 from swashplate.errors import FileError, InputError, InputTypeError
 from swashplate.export.c_source import Exported, interface, numbers
 from swashplate.export.variable_list import DRIVE, DRIVE_WORDS, OWN, References, Words, words_of

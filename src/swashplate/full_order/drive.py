@@ -23,15 +23,15 @@ from swashplate.drive import (
     check_filter_stability,
     drive_records,
 )
-from swashplate.equations import BoundModel, Sensitivities
-from swashplate.equations.declaration import interpreted
-from swashplate.equations.marching.record import (
+from swashplate.equations import BoundModel, Instance, Run, Sensitivities, interpreted
+from swashplate.equations.marching import (
     SOURCE_RATE,
     Interpolation,
+    PartNumbers,
+    Start,
     least_substeps,
+    read_only,
 )
-from swashplate.equations.marching.run import Instance, PartNumbers, Start
-from swashplate.equations.marching.simulation import Run, read_only
 from swashplate.errors import DomainError, InputError
 from swashplate.full_order.physical_set import QUANTITIES, PhysicalSet, from_lumped
 from swashplate.linear import linearize

@@ -18,8 +18,7 @@ import numpy as np
 
 from swashplate.documents import parse_toml, validated
 from swashplate.entries import FileTable
-from swashplate.equations.declaration import interpreted
-from swashplate.equations.fields import Definition, Flag, declared_by
+from swashplate.equations import Definition, Flag, declared_by, interpreted
 from swashplate.errors import ParameterError, UnknownParameterError
 from swashplate.models import machine as equations
 from swashplate.models.machine import Machine

@@ -13,7 +13,7 @@ import numpy as np
 from swashplate.campaign import Campaign, Experiment
 from swashplate.drive import Drive
 from swashplate.equations import Model as Equations
-from swashplate.equations.fields import is_real
+from swashplate.equations import is_real
 from swashplate.errors import InputError, InputTypeError
 from swashplate.executors import Executor, Serial
 from swashplate.identification.assessment import Identification, versions

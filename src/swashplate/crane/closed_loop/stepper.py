@@ -29,8 +29,7 @@ from swashplate.crane.rope import (
 )
 from swashplate.drive import Drive, drive_instance
 from swashplate.equations import CompiledStep, StepContext, compiled_step
-from swashplate.equations.marching.run import marched
-from swashplate.equations.marching.stepping import stored_of
+from swashplate.equations.marching import marched, stored_of
 from swashplate.errors import DomainError, InputError
 from swashplate.parameters import FULL_VOLTAGE
 

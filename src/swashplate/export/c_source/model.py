@@ -15,25 +15,34 @@ from typing import Any, get_type_hints
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.equations import graph
-from swashplate.equations.code_generation.functions import GENERATING, Function
-from swashplate.equations.code_generation.printing import CodeBlock, function_source
-from swashplate.equations.code_generation.printing_c import (
+from swashplate.equations import (
+    Definition,
+    Equation,
+    Instance,
+    Link,
+    Model,
+    SignalSource,
+    declared_by,
+    floats_of,
+    graph,
+    plain,
+    value_at,
+)
+from swashplate.equations.code_generation import (
+    GENERATING,
     C,
+    CodeBlock,
+    Function,
     Loops,
+    Trace,
     c_name,
     first_line,
     function,
+    function_source,
     literal,
 )
-from swashplate.equations.code_generation.tracing import Trace
-from swashplate.equations.fields import Definition, declared_by, floats_of, value_at
 from swashplate.equations.graph import Node, names_in
-from swashplate.equations.language import plain
-from swashplate.equations.marching.march import SampleCode, output_of
-from swashplate.equations.marching.part_code import TapOf, taps_of
-from swashplate.equations.marching.run import Instance, module
-from swashplate.equations.model import Equation, Link, Model, SignalSource
+from swashplate.equations.marching import SampleCode, TapOf, module, output_of, taps_of
 from swashplate.export.c_source.parts import PartInC, path_of
 from swashplate.export.c_source.structs import Structs, struct
 

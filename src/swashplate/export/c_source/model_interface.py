@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import inf
 
-from swashplate.equations.code_generation.printing_c import (
+from swashplate.equations import Definition
+from swashplate.equations.code_generation import (
     HELPERS,
     c_name,
     comment_line,
@@ -17,7 +18,6 @@ from swashplate.equations.code_generation.printing_c import (
     sections,
     wrapped,
 )
-from swashplate.equations.fields import Definition
 from swashplate.export.c_source.model import Exported
 from swashplate.export.c_source.parts import path_of
 

@@ -10,25 +10,32 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, get_type_hints
 
-from swashplate.equations import graph
-from swashplate.equations.code_generation.functions import FUNCTIONS, RESERVED, Function, fresh_name
-from swashplate.equations.code_generation.printing import STEMS, CodeBlock, assigned
-from swashplate.equations.code_generation.printing_c import (
+from swashplate.equations import Equation, Parsed, SignalSource, arguments_of, graph
+from swashplate.equations.code_generation import (
+    FEW,
+    FUNCTIONS,
+    RESERVED,
+    STEMS,
     C,
+    CodeBlock,
+    Function,
+    Trace,
+    Tuple,
+    Value,
     as_double,
+    assigned,
     c_name,
+    fixed,
+    fresh_name,
     function,
+    leaves,
     literal,
     mentions,
+    undecided,
     without_comments,
 )
-from swashplate.equations.code_generation.scheduling import FEW
-from swashplate.equations.code_generation.tracing import Trace
-from swashplate.equations.code_generation.values import Tuple, Value, fixed, leaves, undecided
 from swashplate.equations.graph import LEAVES, MATH_FUNCTIONS, Node, names_in, ordered
-from swashplate.equations.language import Parsed
-from swashplate.equations.marching.part_code import PartCode
-from swashplate.equations.model import Equation, SignalSource, arguments_of
+from swashplate.equations.marching import PartCode
 
 if TYPE_CHECKING:
     from swashplate.export.c_source.model import Writer

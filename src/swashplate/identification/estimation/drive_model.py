@@ -35,12 +35,14 @@ from swashplate.drive import (
     simulate_drive,
 )
 from swashplate.equations import BoundModel
-from swashplate.equations.marching.observation import Observation, ObservedRecord, RunValues
-from swashplate.equations.marching.record import (
+from swashplate.equations.marching import (
     SLOWEST,
     SOURCE_RATE,
     Interpolation,
+    Observation,
+    ObservedRecord,
     Record,
+    RunValues,
     even_rate,
     record_of,
 )

@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 from swashplate.campaign import Experiment
 from swashplate.documents import validated
 from swashplate.equations import Model as Equations
-from swashplate.equations.fields import check_mapping, is_real
-from swashplate.equations.model import parameter_paths
+from swashplate.equations import check_mapping, is_real, parameter_paths
 from swashplate.errors import (
     FileError,
     InputError,

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from swashplate.campaign import Channel, Experiment
 from swashplate.equations import Model as OfEquations
-from swashplate.equations.marching.observation import ObservedRecord
+from swashplate.equations.marching import ObservedRecord
 from swashplate.errors import InputError
 from swashplate.identification.estimation.arrow import (
     ArrowFactor,

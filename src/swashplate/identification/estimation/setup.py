@@ -20,7 +20,7 @@ from pydantic import AfterValidator, Field, model_validator
 from swashplate.campaign import LARGEST_PRESSURE, ChannelKind, TimeWindow, WeightWindow
 from swashplate.documents import parse_toml, read_text, validated
 from swashplate.entries import FileTable, Finite, Flag, NotNegative, Positive
-from swashplate.equations.fields import is_real
+from swashplate.equations import is_real
 from swashplate.errors import (
     ParameterError,
     meant,

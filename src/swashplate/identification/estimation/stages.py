@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from swashplate.campaign import Campaign, Experiment, applying, inside
 from swashplate.documents import validated
 from swashplate.drive import Drive
-from swashplate.equations.marching.record import Record
+from swashplate.equations.marching import Record
 from swashplate.errors import InputError, UnknownParameterError
 from swashplate.executors import available_cores
 from swashplate.identification.estimation.drive_model import (

@@ -23,7 +23,7 @@ from swashplate.campaign import (
     speed_of,
 )
 from swashplate.drive import Drive, Limit
-from swashplate.equations.marching.record import Record, record_of
+from swashplate.equations.marching import Record, record_of
 from swashplate.errors import InputError
 from swashplate.export import WASM, exported_drive, packaged, values_of
 from swashplate.identification import at_instants, ignored_windows
