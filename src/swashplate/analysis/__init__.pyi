@@ -7,6 +7,7 @@ from .capability import dead_zone as dead_zone
 from .capability import envelope as envelope
 from .capability import speed_limits as speed_limits
 from .capability import without_limits as without_limits
+from .compensation import INVERSE_MAP as INVERSE_MAP
 from .compensation import Improvement as Improvement
 from .compensation import InverseMap as InverseMap
 from .compensation import improvement as improvement

@@ -180,23 +180,24 @@ def whatif(
     the drive as it is. With --uncertainty, metrics get intervals and the
     figure gets bands: drives are drawn from the errors of a fit's estimates.
     """
-    from swashplate.analysis import AS_IS, CHANGED, monte_carlo, what_if
+    from swashplate import analysis
+    from swashplate.analysis import AS_IS, CHANGED, what_if
 
     moved = parsing.factors_of(factors)
     choice = DriveChoice(drive)
     with spinner("Simulating"):
         name, trial = parsing.named_trial(choice.chosen, maneuver, sampling)
         result = what_if(choice.chosen, moved, trial, outcomes=(*OUTCOMES, "travel"))
-    bands, sentences = dict[str, monte_carlo.Bands](), list[str]()
+    bands, sentences = dict[str, analysis.Bands](), list[str]()
     if uncertainty is not None:
         with spinner("Drawing drives"):
-            draws = monte_carlo.stored_draws(uncertainty, drive=choice.chosen, campaign=campaign)
+            draws = analysis.stored_draws(uncertainty, drive=choice.chosen, campaign=campaign)
             drawn = {AS_IS: draws, CHANGED: draws.with_factors(moved)}
             sentences.append(
                 f"± is half of the interval that contains {100.0 * LEVEL:g} % of the drives."
             )
             for which, variant in drawn.items():
-                band = monte_carlo.bands(variant, trial, result.outcomes, level=LEVEL)
+                band = analysis.bands(variant, trial, result.outcomes, level=LEVEL)
                 bands[which], (width, when) = band, band.widest
                 sentences.append(
                     f"Band of {band.draws} drives, {which}: at most "
@@ -265,7 +266,8 @@ def size(
     be reached. The design variables are orifice and pump, from half to twice,
     unless others are named.
     """
-    from swashplate.analysis import proportional_speed, sizing, trial_of
+    from swashplate import analysis
+    from swashplate.analysis import proportional_speed, trial_of
 
     if (tracking_deg_s is None) != (maneuver is None):
         raise InputError("--tracking-deg-s and --maneuver belong together: give both or neither.")
@@ -273,15 +275,15 @@ def size(
     speed, acceleration, error = (
         None if degrees is None else radians(degrees) for degrees in requested
     )
-    required = sizing.Requirements(speed, acceleration, error, direction)
+    required = analysis.Requirements(speed, acceleration, error, direction)
     with spinner("Sizing"):
-        follow, ranges = None, parsing.factor_ranges_of(variables or SIZED, sizing.DEFAULT_RANGE)
+        follow, ranges = None, parsing.factor_ranges_of(variables or SIZED, analysis.DEFAULT_RANGE)
         if maneuver is not None:
             voltage = parsing.named_maneuver(maneuver, drive.chosen).sample()
             # a larger drive may well be what it takes to reach it
             reference = proportional_speed(drive.chosen, voltage, limited=False)
             follow = trial_of(drive.chosen, voltage, reference=reference)
-        result = sizing.size(drive.chosen, required, ranges, follow=follow)
+        result = analysis.size(drive.chosen, required, ranges, follow=follow)
     save(out, "Changed drive", result.drive.to_toml)
     drive.note(drive.title)
     show(*result.tables())
@@ -391,9 +393,9 @@ def compensate(
     joystick command, three controllers are compared in simulation: a straight
     line, the map, and the map with compensation of the drive's lag.
     """
-    from swashplate.analysis import compensation
+    from swashplate import analysis
 
-    check_writable(out, compensation.INVERSE_MAP, force=force)
+    check_writable(out, analysis.INVERSE_MAP, force=force)
     if stick is not None and stick.lstrip("+-").replace(".", "", 1).isdecimal():
         raise InputError(
             f"{stick} is a number, not a maneuver or a log: for the voltage of a speed, write "
@@ -401,14 +403,12 @@ def compensate(
         )
     with spinner("Inverting"):
         marched = parsing.at_rate(drive.chosen, sampling.rate)
-        inverse, improvement = compensation.inverse_map(marched, points), None
+        inverse, improvement = analysis.inverse_map(marched, points), None
         tables = inverse.tables([radians(speed) for speed in speeds_deg_s or ()])
         if stick is not None:
             name, run = parsing.simulated_run(marched, stick, sampling)
-            reference = compensation.speed_of_command(inverse, run["voltage"])
-            improvement = compensation.improvement(
-                marched, reference, run.record.rate, inverse=inverse
-            )
+            reference = analysis.speed_of_command(inverse, run["voltage"])
+            improvement = analysis.improvement(marched, reference, run.record.rate, inverse=inverse)
             tables.append(replace(improvement.table(), title=f"Error of the speed under {name}"))
     save(out, "Inverse map, in SI", inverse.write)
     draw_figure(plot, "plot_compensation", inverse, improvement)

@@ -323,7 +323,7 @@ def validate(
     Prints the errors of each run, the structure left in the residuals, and a
     verdict. Exit code 1: the drive is not usable for these runs.
     """
-    from swashplate.identification import assess_fit, predict, tables, versions, with_speeds
+    from swashplate.identification import assess_fit, predict, runs_tables, versions, with_speeds
     from swashplate.identification.diagnostics import refuse_unsound, spike_findings
 
     if out is not None:
@@ -350,7 +350,7 @@ def validate(
         if not predicted:
             raise InputError(f"{path}: all samples of these runs are ignored; nothing is left.")
         judged = assess_fit((), predicted, required=require / 100.0)
-        measures = tables.runs_tables(with_speeds(predicted))
+        measures = runs_tables(with_speeds(predicted))
     lines = []
     if out is not None:
         from swashplate.report.fit_report import write_validation_report
@@ -480,7 +480,15 @@ def demo(
     from swashplate import rig
     from swashplate.campaign import Campaign
     from swashplate.drive import Drive
-    from swashplate.identification import drawn, identify, load_setup, tables, with_speeds
+    from swashplate.identification import (
+        drawn,
+        estimates_table,
+        identify,
+        load_setup,
+        runs_tables,
+        truth_count,
+        with_speeds,
+    )
     from swashplate.report.figures import plot_channel, save_figure
 
     if not (out / "virtual" / "truth").is_dir():  # only an earlier demo is replaced
@@ -507,12 +515,12 @@ def demo(
         figure = plot_channel(run.experiment[run.channel], run.simulated, title=title)
         save_figure(figure, out / "result.png")
     note(f"Campaign:  {path}")
-    estimates = [tables.estimates_table(e, truth=truth.parameters) for e in result.fit.stages]
+    estimates = [estimates_table(e, truth=truth.parameters) for e in result.fit.stages]
     show(*estimates)
-    inside, counted = tables.truth_count(estimates)
+    inside, counted = truth_count(estimates)
     say(f"The truth lies within the 95 % interval for {inside} of {counted} parameters.")
     note("\nHeld out of the fit, and predicted")
-    show(*tables.runs_tables(result.predicted))
+    show(*runs_tables(result.predicted))
     say(verdict.headline)
     for line in [*lines, f"Figure:    {out / 'result.png'}"]:
         note(line)
