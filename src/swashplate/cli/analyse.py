@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from swashplate.cli import parsing
+from swashplate.cli import parsing, trials
 from swashplate.cli.commands import command
 from swashplate.cli.options import (
     NO_VALUE,
@@ -96,8 +96,8 @@ def limits(
         show(limits_found.table())
         return
     with spinner("Simulating"):
-        marched = parsing.at_rate(drive.chosen, sampling.rate)
-        name, run = parsing.simulated_as(marched, maneuver, sampling)
+        marched = trials.at_rate(drive.chosen, sampling.rate)
+        name, run = trials.simulated_as(marched, maneuver, sampling)
         shares = shares_of(marched, run)
     title = f"{drive.title}, {name}"
     save(out, "Shares of each limit, in SI", shares.write)
@@ -186,7 +186,7 @@ def whatif(
     moved = parsing.factors_of(factors)
     choice = DriveChoice(drive)
     with spinner("Simulating"):
-        name, trial = parsing.named_trial(choice.chosen, maneuver, sampling)
+        name, trial = trials.named_trial(choice.chosen, maneuver, sampling)
         result = what_if(choice.chosen, moved, trial, outcomes=(*OUTCOMES, "travel"))
     bands, sentences = dict[str, analysis.Bands](), list[str]()
     if uncertainty is not None:
@@ -279,7 +279,7 @@ def size(
     with spinner("Sizing"):
         follow, ranges = None, parsing.factor_ranges_of(variables or SIZED, analysis.DEFAULT_RANGE)
         if maneuver is not None:
-            voltage = parsing.named_maneuver(maneuver, drive.chosen).sample()
+            voltage = trials.named_maneuver(maneuver, drive.chosen).sample()
             # a larger drive may well be what it takes to reach it
             reference = proportional_speed(drive.chosen, voltage, limited=False)
             follow = trial_of(drive.chosen, voltage, reference=reference)
@@ -330,7 +330,7 @@ def sensitivity(
     from swashplate.analysis import one_at_a_time
 
     with spinner("Simulating"):
-        name, trial = parsing.named_trial(drive.chosen, maneuver, sampling)
+        name, trial = trials.named_trial(drive.chosen, maneuver, sampling)
         ranges = parsing.factor_ranges_of(variables or (*VARIED, "spool_offset"), SPAN)
         result = one_at_a_time(drive.chosen, ranges, trial, outcomes=tuple(outcomes or OUTCOMES))
     title = f"{drive.title}, {name}"
@@ -402,11 +402,11 @@ def compensate(
             f"--speed-deg-s {stick}."
         )
     with spinner("Inverting"):
-        marched = parsing.at_rate(drive.chosen, sampling.rate)
+        marched = trials.at_rate(drive.chosen, sampling.rate)
         inverse, improvement = analysis.inverse_map(marched, points), None
         tables = inverse.tables([radians(speed) for speed in speeds_deg_s or ()])
         if stick is not None:
-            name, run = parsing.simulated_run(marched, stick, sampling)
+            name, run = trials.simulated_run(marched, stick, sampling)
             reference = analysis.speed_of_command(inverse, run["voltage"])
             improvement = analysis.improvement(marched, reference, run.record.rate, inverse=inverse)
             tables.append(replace(improvement.table(), title=f"Error of the speed under {name}"))
@@ -627,7 +627,7 @@ def full_order(
         raise InputError("--plot draws one run; name a maneuver or a log, such as step:9.")
     physical_values = parsing.physical_values(physical or ())
     with spinner("Completing the physical values"):
-        marched = parsing.at_rate(drive.chosen, sampling.rate)
+        marched = trials.at_rate(drive.chosen, sampling.rate)
         axis = full.nearest_set(marched.name) if like is None else like
         full_drive = full.FullOrderDrive.from_drive(marched.plain, axis, **physical_values)
         tables = [full.choices_table(axis, physical_values), full_drive.modes().table()]
@@ -636,7 +636,7 @@ def full_order(
             domain = full.validity(full_drive, sampling.rate)
             title, heading = drive.title, f"{len(domain.rows)} maneuvers"
         else:
-            name, run = parsing.simulated_as(full_drive.drive, maneuver, sampling)
+            name, run = trials.simulated_as(full_drive.drive, maneuver, sampling)
             comparison = full.compare(full_drive, run, start=sampling.start)
             domain = full.validity_table(full_drive.physical.name, [(name, comparison)])
             title = f"{drive.title}, {name}"

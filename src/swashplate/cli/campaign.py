@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from swashplate.cli import parsing
+from swashplate.cli import parsing, trials
 from swashplate.cli.commands import command
 from swashplate.cli.options import (
     CAMPAIGN,
@@ -300,7 +300,7 @@ def plot(
                 ),
                 None,
             )
-        window = parsing.window_of(shown.time, begin, end)
+        window = trials.window_of(shown.time, begin, end)
         labels = {"window": window, "title": f"{run}, {channel}"}
         draw_figure(out, "plot_channel", shown, simulated, **labels)
     else:
@@ -368,7 +368,7 @@ def rig(
         nominal = parsing.drive_of(drive.drive)
         tests = bench.run(
             nominal if parsing.drive_file(drive.drive) else drive.drive,
-            [parsing.named_maneuver(word, nominal) for word in maneuver or ()] or None,
+            [trials.named_maneuver(word, nominal) for word in maneuver or ()] or None,
             seed=seed,
             severity=severity,
             instruments=replace(bench.SEVERITIES[severity], backlash=radians(backlash_deg)),
@@ -567,7 +567,7 @@ def advise(
             start = parsing.parameters_of(subject)
             prior = prior_information(smooth(start), load_setup(setup or start.name))
         machine = Drive(prior.parameters)
-        requested = [parsing.named_maneuver(word, machine) for word in maneuver or ()]
+        requested = [trials.named_maneuver(word, machine) for word in maneuver or ()]
         maneuvers = {each.name: each for each in requested or default_maneuvers()}
         candidates = [prior.candidate(each) for each in maneuvers.values()]
         ranked = advise(prior.present, candidates, prior.variables)
