@@ -18,9 +18,9 @@ from .__about__ import __version__ as __version__
 from .batch import Batch as Batch
 from .batch import SquaredError as SquaredError
 from .batch import simulate_many as simulate_many
-from .campaign.campaign import Campaign as Campaign
-from .campaign.experiment import Channel as Channel
-from .campaign.experiment import Experiment as Experiment
+from .campaign import Campaign as Campaign
+from .campaign import Channel as Channel
+from .campaign import Experiment as Experiment
 from .drive import Drive as Drive
 from .drive import Limit as Limit
 from .drive import LinearDrive as LinearDrive
@@ -45,9 +45,9 @@ from .executors import Serial as Serial
 from .executors import Threads as Threads
 from .full_order import FullOrderDrive as FullOrderDrive
 from .full_order import PhysicalSet as PhysicalSet
-from .identification.assessment import Identification as Identification
-from .identification.identifying import identify as identify
+from .identification import Identification as Identification
+from .identification import identify as identify
 from .linear import FrequencyResponse as FrequencyResponse
-from .parameters.parameter_set import Pair as Pair
-from .parameters.parameter_set import Parameter as Parameter
-from .parameters.parameter_set import ParameterSet as ParameterSet
+from .parameters import Pair as Pair
+from .parameters import Parameter as Parameter
+from .parameters import ParameterSet as ParameterSet

@@ -15,14 +15,26 @@ from typing import Any, NamedTuple, Unpack
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swashplate.equations import Model, instance_of, parameter_paths, state_paths
-from swashplate.equations.fields import Definition, check_mapping
-from swashplate.equations.marching.lanes import LANES, lanes_of
-from swashplate.equations.marching.march import output_of
-from swashplate.equations.marching.observation import Observation
-from swashplate.equations.marching.record import Record, Sampling
-from swashplate.equations.marching.run import Instance, outside
-from swashplate.equations.marching.simulation import Command, inputs_of
+from swashplate.equations import (
+    Definition,
+    Instance,
+    Model,
+    check_mapping,
+    instance_of,
+    parameter_paths,
+    state_paths,
+)
+from swashplate.equations.marching import (
+    LANES,
+    Command,
+    Observation,
+    Record,
+    Sampling,
+    inputs_of,
+    lanes_of,
+    output_of,
+    outside,
+)
 from swashplate.errors import FileError, InputError
 from swashplate.executors import Executor, Threads
 from swashplate.results import Result

@@ -29,9 +29,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.__about__ import __version__
-from swashplate.campaign.schema import CHANNEL_KINDS, KINDS, SIGNALS, ChannelKind
+from swashplate.campaign import CHANNEL_KINDS, KINDS, SIGNALS, ChannelKind
 from swashplate.drive import Drive, Simulation
-from swashplate.equations.marching.record import SOURCE_RATE
+from swashplate.equations.marching import SOURCE_RATE
 from swashplate.errors import FileError, InputError, ParameterError
 from swashplate.maneuvers import Maneuver, positive, source_tests, whole
 from swashplate.results import Result

@@ -9,8 +9,8 @@ import numpy as np
 import polars as pl
 import pytest
 
-from swashplate import Drive, maneuvers
-from swashplate.analysis import monte_carlo, performance, with_factors
+from swashplate import Drive, analysis, maneuvers
+from swashplate.analysis import performance, with_factors
 
 FULL_ORDER = Path(__file__).parents[2] / "docs" / "full-order.md"
 
@@ -62,8 +62,8 @@ def test_figure_9_1(done, number, tmp_path):
 def test_bands(done, tmp_path, monkeypatch):
     pumps = 12.396 + 0.12396 * np.random.default_rng(0).normal(size=50)
     hoist = Drive.preset("hoist")
-    drawn = monte_carlo.Draws(tuple(hoist.replace(Z10=each) for each in pumps), 0)
-    monkeypatch.setattr(monte_carlo, "stored_draws", lambda *_, **__: drawn)
+    drawn = analysis.Draws(tuple(hoist.replace(Z10=each) for each in pumps), 0)
+    monkeypatch.setattr(analysis, "stored_draws", lambda *_, **__: drawn)
     words = ("--uncertainty", "fitted", "--plot", "w.svg")
     text = done("whatif", "hoist", "--scale", "pump=1.5", "--maneuver", "step:9", *words)
     _, before, _, after, *_ = final = cells(text, "final speed")

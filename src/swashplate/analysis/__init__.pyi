@@ -7,6 +7,7 @@ from .capability import dead_zone as dead_zone
 from .capability import envelope as envelope
 from .capability import speed_limits as speed_limits
 from .capability import without_limits as without_limits
+from .compensation import INVERSE_MAP as INVERSE_MAP
 from .compensation import Improvement as Improvement
 from .compensation import InverseMap as InverseMap
 from .compensation import improvement as improvement
@@ -16,11 +17,13 @@ from .compensation import speed_of_command as speed_of_command
 from .design_variables import DESIGN_VARIABLES as DESIGN_VARIABLES
 from .design_variables import DesignVariable as DesignVariable
 from .design_variables import FactorRange as FactorRange
+from .design_variables import design_variables_table as design_variables_table
 from .design_variables import powers_of as powers_of
 from .design_variables import with_factors as with_factors
 from .limits import LimitShare as LimitShare
 from .limits import LimitShares as LimitShares
 from .limits import limit_shares as limit_shares
+from .limits import shares_of as shares_of
 from .monte_carlo import ASSUMED as ASSUMED
 from .monte_carlo import Bands as Bands
 from .monte_carlo import Draws as Draws
@@ -37,6 +40,8 @@ from .outcomes import Trial as Trial
 from .outcomes import find_outcomes as find_outcomes
 from .outcomes import outcome_matrix as outcome_matrix
 from .outcomes import proportional_speed as proportional_speed
+from .outcomes import rms_difference as rms_difference
+from .outcomes import side_by_side as side_by_side
 from .outcomes import speed_per_volt as speed_per_volt
 from .outcomes import trial_of as trial_of
 from .sizing import DEFAULT_RANGE as DEFAULT_RANGE

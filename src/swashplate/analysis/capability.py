@@ -11,12 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.drive import Drive, drive_instance
-from swashplate.equations.declaration import interpreted
-from swashplate.equations.marching.record import SOURCE_RATE
-from swashplate.equations.marching.run import Instance, PartNumbers, called
+from swashplate.equations import Instance, interpreted
+from swashplate.equations.marching import SOURCE_RATE, PartNumbers, called
 from swashplate.models.displacement_control import PumpOptions, pressure_limits
 from swashplate.models.pump import PumpState
-from swashplate.parameters.rules import FULL_VOLTAGE
+from swashplate.parameters import FULL_VOLTAGE
 from swashplate.results import Drawn, Result, Tabular
 from swashplate.tables import UNIT, Cell, Column, Table, plain
 from swashplate.units import display_unit

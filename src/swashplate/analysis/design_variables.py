@@ -9,7 +9,7 @@ from typing import NamedTuple
 from swashplate.analysis.outcomes import meant
 from swashplate.drive import Drive
 from swashplate.errors import InputError
-from swashplate.parameters.definitions import CATALOGUE, COLUMNS, REFINEMENTS
+from swashplate.parameters import CATALOGUE, COLUMNS, REFINEMENTS
 from swashplate.tables import Column, Table
 
 FactorRange = tuple[float, float]

@@ -15,15 +15,16 @@ from swashplate.analysis.design_variables import with_factors
 from swashplate.analysis.outcomes import Outcome, Trial, outcome_matrix
 from swashplate.drive import Drive
 from swashplate.errors import DomainError, InputError, ParameterError
-from swashplate.identification.assessment import Identification
-from swashplate.identification.estimation.drive_model import LIMIT_COLUMNS, DriveModel
-from swashplate.identification.estimation.setup import Forces
-from swashplate.identification.stage_fit import StageFit
-from swashplate.identification.statistics.determination import identifiability_of
-from swashplate.identification.statistics.effects import effect_of_fixed, slopes_by
-from swashplate.identification.statistics.intervals import uncertainty_of
-from swashplate.parameters.parameter_set import ParameterSet
-from swashplate.parameters.rules import FULL_VOLTAGE
+from swashplate.identification import (
+    DriveModel,
+    Identification,
+    StageFit,
+    identifiability_of,
+    uncertainty_of,
+)
+from swashplate.identification.estimation import LIMIT_COLUMNS, Forces
+from swashplate.identification.statistics import effect_of_fixed, slopes_by
+from swashplate.parameters import FULL_VOLTAGE, ParameterSet
 from swashplate.results import Result
 
 Array = NDArray[np.float64]

@@ -15,7 +15,7 @@ from swashplate.analysis.capability import saturation
 from swashplate.drive import Drive
 from swashplate.errors import InputError
 from swashplate.maneuvers import Maneuver, sampled
-from swashplate.parameters.rules import FULL_VOLTAGE
+from swashplate.parameters import FULL_VOLTAGE
 from swashplate.results import Result
 from swashplate.tables import UNIT, Column, Table
 from swashplate.units import DisplayUnit, display_unit, of_shaft

@@ -13,7 +13,7 @@ from swashplate.analysis.design_variables import FactorRange, check_ranges, with
 from swashplate.analysis.outcomes import Trial, rms_difference, speed_per_volt
 from swashplate.drive import Drive
 from swashplate.errors import DomainError, InputError, ParameterError
-from swashplate.parameters.rules import FULL_VOLTAGE
+from swashplate.parameters import FULL_VOLTAGE
 from swashplate.results import Result
 from swashplate.tables import UNIT, Cell, Column, Table, listed, quantity
 from swashplate.units import display_unit

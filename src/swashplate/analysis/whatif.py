@@ -21,7 +21,7 @@ from swashplate.analysis.outcomes import (
 from swashplate.drive import Drive, Simulation
 from swashplate.errors import DomainError, InputError, ParameterError
 from swashplate.maneuvers import Maneuver
-from swashplate.parameters.rules import FULL_VOLTAGE
+from swashplate.parameters import FULL_VOLTAGE
 from swashplate.results import Drawn, Result, figures
 from swashplate.tables import UNIT, Column, Table, listed, quantity
 from swashplate.units import of_shaft

@@ -25,7 +25,7 @@ from swashplate.campaign.samples import (
     turns_over,
 )
 from swashplate.campaign.schema import applying, ends, inside, shown_unit
-from swashplate.parameters.rules import FULL_VOLTAGE
+from swashplate.parameters import FULL_VOLTAGE
 from swashplate.results import Result
 from swashplate.tables import Column, Table, count
 from swashplate.units import display_unit

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from swashplate.campaign.experiment import Channel
 from swashplate.campaign.samples import Array, interpolate_counts, signal, stamps_of
-from swashplate.equations.cache import kernel
+from swashplate.equations import kernel
 from swashplate.errors import InputError
 
 LOW_PASS = 2.0 * np.pi * 10.0

@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from swashplate.cli import parsing
+from swashplate.cli import parsing, trials
 from swashplate.cli.commands import command
 from swashplate.cli.options import (
     NO_VALUE,
@@ -85,8 +85,7 @@ def limits(
     which component to change first. The error is the RMS difference of the speed
     from that of a drive without limits. The shares need not add up to 100 %.
     """
-    from swashplate.analysis.capability import envelope
-    from swashplate.analysis.limits import shares_of
+    from swashplate.analysis import envelope, shares_of
 
     if maneuver is None:
         with spinner("Measuring"):
@@ -97,8 +96,8 @@ def limits(
         show(limits_found.table())
         return
     with spinner("Simulating"):
-        marched = parsing.at_rate(drive.chosen, sampling.rate)
-        name, run = parsing.simulated_as(marched, maneuver, sampling)
+        marched = trials.at_rate(drive.chosen, sampling.rate)
+        name, run = trials.simulated_as(marched, maneuver, sampling)
         shares = shares_of(marched, run)
     title = f"{drive.title}, {name}"
     save(out, "Shares of each limit, in SI", shares.write)
@@ -115,7 +114,7 @@ def limits(
 
 def _list_variables(requested: bool) -> None:
     if requested:
-        from swashplate.analysis.design_variables import design_variables_table
+        from swashplate.analysis import design_variables_table
 
         show(design_variables_table())
         raise typer.Exit
@@ -181,24 +180,24 @@ def whatif(
     the drive as it is. With --uncertainty, metrics get intervals and the
     figure gets bands: drives are drawn from the errors of a fit's estimates.
     """
-    from swashplate.analysis import monte_carlo
-    from swashplate.analysis.whatif import AS_IS, CHANGED, what_if
+    from swashplate import analysis
+    from swashplate.analysis import AS_IS, CHANGED, what_if
 
     moved = parsing.factors_of(factors)
     choice = DriveChoice(drive)
     with spinner("Simulating"):
-        name, trial = parsing.named_trial(choice.chosen, maneuver, sampling)
+        name, trial = trials.named_trial(choice.chosen, maneuver, sampling)
         result = what_if(choice.chosen, moved, trial, outcomes=(*OUTCOMES, "travel"))
-    bands, sentences = dict[str, monte_carlo.Bands](), list[str]()
+    bands, sentences = dict[str, analysis.Bands](), list[str]()
     if uncertainty is not None:
         with spinner("Drawing drives"):
-            draws = monte_carlo.stored_draws(uncertainty, drive=choice.chosen, campaign=campaign)
+            draws = analysis.stored_draws(uncertainty, drive=choice.chosen, campaign=campaign)
             drawn = {AS_IS: draws, CHANGED: draws.with_factors(moved)}
             sentences.append(
                 f"± is half of the interval that contains {100.0 * LEVEL:g} % of the drives."
             )
             for which, variant in drawn.items():
-                band = monte_carlo.bands(variant, trial, result.outcomes, level=LEVEL)
+                band = analysis.bands(variant, trial, result.outcomes, level=LEVEL)
                 bands[which], (width, when) = band, band.widest
                 sentences.append(
                     f"Band of {band.draws} drives, {which}: at most "
@@ -267,8 +266,8 @@ def size(
     be reached. The design variables are orifice and pump, from half to twice,
     unless others are named.
     """
-    from swashplate.analysis import sizing
-    from swashplate.analysis.outcomes import proportional_speed, trial_of
+    from swashplate import analysis
+    from swashplate.analysis import proportional_speed, trial_of
 
     if (tracking_deg_s is None) != (maneuver is None):
         raise InputError("--tracking-deg-s and --maneuver belong together: give both or neither.")
@@ -276,15 +275,15 @@ def size(
     speed, acceleration, error = (
         None if degrees is None else radians(degrees) for degrees in requested
     )
-    required = sizing.Requirements(speed, acceleration, error, direction)
+    required = analysis.Requirements(speed, acceleration, error, direction)
     with spinner("Sizing"):
-        follow, ranges = None, parsing.factor_ranges_of(variables or SIZED, sizing.DEFAULT_RANGE)
+        follow, ranges = None, parsing.factor_ranges_of(variables or SIZED, analysis.DEFAULT_RANGE)
         if maneuver is not None:
-            voltage = parsing.named_maneuver(maneuver, drive.chosen).sample()
+            voltage = trials.named_maneuver(maneuver, drive.chosen).sample()
             # a larger drive may well be what it takes to reach it
             reference = proportional_speed(drive.chosen, voltage, limited=False)
             follow = trial_of(drive.chosen, voltage, reference=reference)
-        result = sizing.size(drive.chosen, required, ranges, follow=follow)
+        result = analysis.size(drive.chosen, required, ranges, follow=follow)
     save(out, "Changed drive", result.drive.to_toml)
     drive.note(drive.title)
     show(*result.tables())
@@ -331,7 +330,7 @@ def sensitivity(
     from swashplate.analysis import one_at_a_time
 
     with spinner("Simulating"):
-        name, trial = parsing.named_trial(drive.chosen, maneuver, sampling)
+        name, trial = trials.named_trial(drive.chosen, maneuver, sampling)
         ranges = parsing.factor_ranges_of(variables or (*VARIED, "spool_offset"), SPAN)
         result = one_at_a_time(drive.chosen, ranges, trial, outcomes=tuple(outcomes or OUTCOMES))
     title = f"{drive.title}, {name}"
@@ -394,24 +393,22 @@ def compensate(
     joystick command, three controllers are compared in simulation: a straight
     line, the map, and the map with compensation of the drive's lag.
     """
-    from swashplate.analysis import compensation
+    from swashplate import analysis
 
-    check_writable(out, compensation.INVERSE_MAP, force=force)
+    check_writable(out, analysis.INVERSE_MAP, force=force)
     if stick is not None and stick.lstrip("+-").replace(".", "", 1).isdecimal():
         raise InputError(
             f"{stick} is a number, not a maneuver or a log: for the voltage of a speed, write "
             f"--speed-deg-s {stick}."
         )
     with spinner("Inverting"):
-        marched = parsing.at_rate(drive.chosen, sampling.rate)
-        inverse, improvement = compensation.inverse_map(marched, points), None
+        marched = trials.at_rate(drive.chosen, sampling.rate)
+        inverse, improvement = analysis.inverse_map(marched, points), None
         tables = inverse.tables([radians(speed) for speed in speeds_deg_s or ()])
         if stick is not None:
-            name, run = parsing.simulated_run(marched, stick, sampling)
-            reference = compensation.speed_of_command(inverse, run["voltage"])
-            improvement = compensation.improvement(
-                marched, reference, run.record.rate, inverse=inverse
-            )
+            name, run = trials.simulated_run(marched, stick, sampling)
+            reference = analysis.speed_of_command(inverse, run["voltage"])
+            improvement = analysis.improvement(marched, reference, run.record.rate, inverse=inverse)
             tables.append(replace(improvement.table(), title=f"Error of the speed under {name}"))
     save(out, "Inverse map, in SI", inverse.write)
     draw_figure(plot, "plot_compensation", inverse, improvement)
@@ -625,22 +622,21 @@ def full_order(
     and the difference in speed. Without a command, a table of maneuvers.
     """
     from swashplate import full_order as full
-    from swashplate.full_order import physical_set
 
     if maneuver is None and plot is not None:
         raise InputError("--plot draws one run; name a maneuver or a log, such as step:9.")
     physical_values = parsing.physical_values(physical or ())
     with spinner("Completing the physical values"):
-        marched = parsing.at_rate(drive.chosen, sampling.rate)
-        axis = physical_set.nearest_set(marched.name) if like is None else like
+        marched = trials.at_rate(drive.chosen, sampling.rate)
+        axis = full.nearest_set(marched.name) if like is None else like
         full_drive = full.FullOrderDrive.from_drive(marched.plain, axis, **physical_values)
-        tables = [physical_set.choices_table(axis, physical_values), full_drive.modes().table()]
+        tables = [full.choices_table(axis, physical_values), full_drive.modes().table()]
     with spinner("Simulating"):
         if maneuver is None:
             domain = full.validity(full_drive, sampling.rate)
             title, heading = drive.title, f"{len(domain.rows)} maneuvers"
         else:
-            name, run = parsing.simulated_as(full_drive.drive, maneuver, sampling)
+            name, run = trials.simulated_as(full_drive.drive, maneuver, sampling)
             comparison = full.compare(full_drive, run, start=sampling.start)
             domain = full.validity_table(full_drive.physical.name, [(name, comparison)])
             title = f"{drive.title}, {name}"

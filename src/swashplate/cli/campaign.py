@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from swashplate.cli import parsing
+from swashplate.cli import parsing, trials
 from swashplate.cli.commands import command
 from swashplate.cli.options import (
     CAMPAIGN,
@@ -133,7 +133,7 @@ def init(
     full scale, is scaled to volts; a sensor in such words needs its range.
     Correct the entries, then run 'swashplate campaign check'.
     """
-    from swashplate.drafting.draft import FIXME, NO_ENCODER, UNUSED, draft_campaign
+    from swashplate.drafting import FIXME, NO_ENCODER, UNUSED, draft_campaign
 
     target = out or logs[0].parent / "campaign.toml"
     check_writable(target, CAMPAIGN_FILE, force=force)
@@ -196,7 +196,7 @@ def check(
     simulation of the axis's drive.
     """
     from swashplate import campaign as tests
-    from swashplate.identification.diagnostics.data_checks import beside_the_drives
+    from swashplate.identification.diagnostics import beside_the_drives
 
     parsing.check_file_kind(path, "campaign")
     with spinner(f"Reading {path}"):
@@ -275,9 +275,8 @@ def plot(
     are several. A log of more than 250,000 rows has a figure of its own that
     marks the windows in use.
     """
-    from swashplate.campaign import Campaign
+    from swashplate.campaign import SIGNALS, Campaign
     from swashplate.identification import predict
-    from swashplate.identification.estimation.drive_model import SIGNALS
 
     with spinner(f"Reading {path}"):
         campaign = Campaign.from_toml(path)
@@ -301,7 +300,7 @@ def plot(
                 ),
                 None,
             )
-        window = parsing.window_of(shown.time, begin, end)
+        window = trials.window_of(shown.time, begin, end)
         labels = {"window": window, "title": f"{run}, {channel}"}
         draw_figure(out, "plot_channel", shown, simulated, **labels)
     else:
@@ -369,7 +368,7 @@ def rig(
         nominal = parsing.drive_of(drive.drive)
         tests = bench.run(
             nominal if parsing.drive_file(drive.drive) else drive.drive,
-            [parsing.named_maneuver(word, nominal) for word in maneuver or ()] or None,
+            [trials.named_maneuver(word, nominal) for word in maneuver or ()] or None,
             seed=seed,
             severity=severity,
             instruments=replace(bench.SEVERITIES[severity], backlash=radians(backlash_deg)),
@@ -423,7 +422,7 @@ def guess(
     from swashplate import drafting
     from swashplate.campaign import spiked
     from swashplate.drive import Drive
-    from swashplate.identification.identifying import runs_to_fit
+    from swashplate.identification import runs_to_fit
 
     folder = path.parent if out is None else out
     start, setup = folder / "start.toml", folder / "setup.toml"
@@ -521,10 +520,21 @@ def advise(
     """
     from swashplate.campaign import KINDS
     from swashplate.drive import Drive
-    from swashplate.identification.diagnostics.data_checks import check_runs, refuse_unsound
-    from swashplate.identification.estimation.setup import load_setup
-    from swashplate.identification.estimation.stages import smooth
-    from swashplate.identification.statistics import experiment_design as design
+    from swashplate.identification import (
+        RunInformation,
+        advise,
+        load_setup,
+        prior_information,
+        run_information,
+    )
+    from swashplate.identification.diagnostics import check_runs, refuse_unsound
+    from swashplate.identification.estimation import smooth
+    from swashplate.identification.statistics import (
+        advice_table,
+        best_tests_table,
+        default_maneuvers,
+        sequential_plan,
+    )
 
     tested = parsing.file_kind(Path(subject)) == "campaign"
     options = {"--axis": axis, "--from": begin, "--drive": drive, "--runs": runs}
@@ -541,7 +551,7 @@ def advise(
         # a fit writes what it estimated next to the drive that it found
         estimated = source.parent / parsing.SETUP_FILE
         setup = str(estimated) if estimated.is_file() else None
-    run_informations = list[design.RunInformation]()
+    run_informations = list[RunInformation]()
     doubts = tuple[str, ...]()
     run_names = list[str]()
     with spinner("Evaluating the tests"):
@@ -549,25 +559,23 @@ def advise(
             _, experiments, plan, start = parsing.fit_of(Path(subject), axis, setup, drive or begin)
             doubts = refuse_unsound(check_runs(experiments, smooth(start)))
             run_informations = [
-                design.run_information(stage, smooth(start), experiments) for stage in plan.stages
+                run_information(stage, smooth(start), experiments) for stage in plan.stages
             ]
             run_names = [experiment.name for experiment in experiments]
-            prior = design.prior_information(
-                smooth(start), plan, experiments, fitted=drive is not None
-            )
+            prior = prior_information(smooth(start), plan, experiments, fitted=drive is not None)
         else:
             start = parsing.parameters_of(subject)
-            prior = design.prior_information(smooth(start), load_setup(setup or start.name))
+            prior = prior_information(smooth(start), load_setup(setup or start.name))
         machine = Drive(prior.parameters)
-        requested = [parsing.named_maneuver(word, machine) for word in maneuver or ()]
-        maneuvers = {each.name: each for each in requested or design.default_maneuvers()}
+        requested = [trials.named_maneuver(word, machine) for word in maneuver or ()]
+        maneuvers = {each.name: each for each in requested or default_maneuvers()}
         candidates = [prior.candidate(each) for each in maneuvers.values()]
-        ranked = design.advise(prior.present, candidates, prior.variables)
-        plan_of_tests = design.sequential_plan(prior.present, candidates, prior.variables, tests)
+        ranked = advise(prior.present, candidates, prior.variables)
+        plan_of_tests = sequential_plan(prior.present, candidates, prior.variables, tests)
     determined = [information.table(run_names) for information in run_informations]
     if determined:
         save(runs, "Shares of the information", joined(determined).write)
-    save(out, "Tests", design.advice_table("", ranked).write)
+    save(out, "Tests", advice_table("", ranked).write)
     for sentence in doubts:
         say(f"! {sentence}")
     for information, table in zip(run_informations, determined, strict=True):
@@ -583,14 +591,14 @@ def advise(
         say(INFORMATION)
         if all(information.identifiability.complete for information in run_informations):
             note("The fit setup can stay as it is.")
-    show(design.advice_table("Tests", ranked[:top]))
+    show(advice_table("Tests", ranked[:top]))
     if plan_of_tests:
-        show(design.advice_table("Plan, each test in addition to those before it", plan_of_tests))
+        show(advice_table("Plan, each test in addition to those before it", plan_of_tests))
         errors = zip(plan_of_tests[-1].names, plan_of_tests[-1].after, strict=True)
         undetermined = [name for name, error in errors if not error <= 1.0]
         if undetermined:
             say(f"- Still not determined after these: {', '.join(undetermined)}.")
-    show(design.best_tests_table(ranked))
+    show(best_tests_table(ranked))
     for sensor in prior.sensors:
         noise = f"{sensor.noise:.3g} {KINDS[sensor.kind].units[0]} ({sensor.origin})"
         note(f"{sensor.kind}: noise {noise}, one independent sample every {sensor.memory:.3g} s")

@@ -73,7 +73,7 @@ def show_crane(
 ) -> None:
     """Show a crane's geometry and limits, their sources, and what is assumed."""
     if toml:
-        from swashplate.crane.crane import preset_text
+        from swashplate.crane import preset_text
         from swashplate.documents import read_text
 
         read = read_text if crane.endswith(".toml") else preset_text
@@ -160,8 +160,7 @@ def run(
     if out is not None and len(variant or ()) > 1:
         raise InputError("--out writes one run's signals: take one --variant.")
     with spinner("Simulating"):
-        from swashplate.crane import OperatorCommand, run_tables, simulate
-        from swashplate.crane.axes import RATE
+        from swashplate.crane import RATE, OperatorCommand, run_tables, simulate
 
         crane = operated.chosen
         seaway = operated.seaway(seed=seed, length=length)
@@ -268,7 +267,7 @@ def assess(
 
         keywords["executor"] = Dask(dask)
     from swashplate.crane import assess as assess_control
-    from swashplate.crane.studies.assessing import SEAWAYS, seaways_needed
+    from swashplate.crane.studies import SEAWAYS, seaways_needed
 
     crane = study.chosen
     side.print(seaways_needed(study.seeds or SEAWAYS, allowed / 100.0))

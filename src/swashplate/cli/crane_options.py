@@ -15,9 +15,11 @@ from swashplate.cli.terminal import long_work, side
 from swashplate.errors import InputError
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from swashplate.crane import Crane, Hull, Seaway, Spectrum, TransferFunctions
     from swashplate.crane.control import Control
-    from swashplate.crane.sea.seaway import Array
 
 START = ("slew_deg", "boom_deg", "rope_m")
 AXES = ("hoist", "slew", "luff")
@@ -167,7 +169,7 @@ class AtSea(Placed):
         Its record is at least as long as a length. [s]
         """
         from swashplate.crane import Seaway
-        from swashplate.crane.sea.seaway import RECORDS
+        from swashplate.crane.sea import RECORDS
 
         words = self.sea or ([] if default is None else [default])
         if not words:
@@ -185,7 +187,7 @@ class AtSea(Placed):
         record = max(RECORDS[0], length)
         return Seaway(sea, ship=self._hull(), spread=spread, record=record, **options)
 
-    def motion(self, count: int) -> Array | None:
+    def motion(self, count: int) -> NDArray[np.float64] | None:
         """Motion of the ship in calm water, (count, 6): its lean; None if it is upright."""
         import numpy as np
 
@@ -198,7 +200,7 @@ class AtSea(Placed):
     def _hull(self) -> Hull | TransferFunctions:
         """The ship of a file, or the packaged hull as its roll is given."""
         from swashplate.crane import read_ship
-        from swashplate.crane.sea.transfer_functions import CRANE_SHIP
+        from swashplate.crane.sea import CRANE_SHIP
 
         roll = _given(roll_period=self.roll_period, roll_damping=self.roll_damping)
         if self.ship is None:
@@ -344,7 +346,7 @@ class Studied(Operated):
     @cached_property
     def waters(self) -> Seaway | None:
         """The seaway, in ss3 if only the ship is given; None if nothing of either is."""
-        from swashplate.crane.studies.study import LENGTH, RUN_IN
+        from swashplate.crane.studies import LENGTH, RUN_IN
 
         counted = LENGTH if self.length is None else self.length
         before = RUN_IN if self.run_in is None else self.run_in
@@ -353,7 +355,7 @@ class Studied(Operated):
 
     def sets(self) -> dict[str, Any]:
         """Sets of drives by name."""
-        from swashplate.analysis.design_variables import powers_of
+        from swashplate.analysis import powers_of
         from swashplate.crane import drawn_cranes, with_design_change
 
         names = filter(None, map(str.strip, (self.drives or "ideal,identified").split(",")))

@@ -18,8 +18,9 @@ from swashplate.cli.options import (
     Force,
     new_file,
 )
-from swashplate.cli.parsing import campaign_of, drive_file, named_maneuver
+from swashplate.cli.parsing import campaign_of, drive_file
 from swashplate.cli.terminal import check_free, note, save, spinner
+from swashplate.cli.trials import named_maneuver
 from swashplate.errors import InputError
 from swashplate.tables import PAGE, Form, check_folder
 

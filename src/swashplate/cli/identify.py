@@ -44,10 +44,9 @@ from swashplate.errors import InputError
 from swashplate.tables import PRINTED, TABLE, check_folder, joined, made_folder
 
 if TYPE_CHECKING:
-    from swashplate.identification.assessment import Identification
-    from swashplate.identification.diagnostics.verdict import Verdict
-    from swashplate.identification.estimation.stages import Parameters
-    from swashplate.parameters.parameter_set import ParameterSet
+    from swashplate.identification import Identification, Verdict
+    from swashplate.identification.estimation import Parameters
+    from swashplate.parameters import ParameterSet
 
 INTERRUPTED = 130
 """Exit code after Ctrl-C, as of other programs."""
@@ -81,7 +80,7 @@ class StageClock:
     def part(self, name: str) -> Iterator[None]:
         """Count what is done to a part."""
         begin = perf_counter()
-        from swashplate.equations.code_generation.functions import generating_time
+        from swashplate.equations.code_generation import generating_time
 
         before = generating_time()
         yield
@@ -202,7 +201,7 @@ def fit(
         )
     with spinner("Starting"), clock.part("start and kernels"):
         from swashplate.executors import Dask, Processes
-        from swashplate.identification.identifying import identify
+        from swashplate.identification import identify
     with spinner(f"Reading {path}"), clock.part("reading"):
         campaign, axis_name = parsing.campaign_of(path, axis)
         start: Path | ParameterSet | None = model
@@ -250,7 +249,7 @@ def fit(
 
 def _say_fit(result: Identification) -> None:
     """What was found, stage by stage, and how well each run is followed."""
-    from swashplate.identification.assessment import parts_of
+    from swashplate.identification import parts_of
 
     text_above = False
     for part in parts_of(result):
@@ -324,11 +323,8 @@ def validate(
     Prints the errors of each run, the structure left in the residuals, and a
     verdict. Exit code 1: the drive is not usable for these runs.
     """
-    from swashplate.identification import tables
-    from swashplate.identification.assessment import versions
-    from swashplate.identification.diagnostics.data_checks import refuse_unsound, spike_findings
-    from swashplate.identification.diagnostics.verdict import assess_fit
-    from swashplate.identification.validation import predict, with_speeds
+    from swashplate.identification import assess_fit, predict, runs_tables, versions, with_speeds
+    from swashplate.identification.diagnostics import refuse_unsound, spike_findings
 
     if out is not None:
         check_folder(out)
@@ -354,7 +350,7 @@ def validate(
         if not predicted:
             raise InputError(f"{path}: all samples of these runs are ignored; nothing is left.")
         judged = assess_fit((), predicted, required=require / 100.0)
-        measures = tables.runs_tables(with_speeds(predicted))
+        measures = runs_tables(with_speeds(predicted))
     lines = []
     if out is not None:
         from swashplate.report.fit_report import write_validation_report
@@ -421,7 +417,7 @@ def report(
     Nothing is fitted. The campaign must be the one that was fitted: if its
     samples, weights or ignored windows have changed, the report is refused.
     """
-    from swashplate.identification.assessment import Identification
+    from swashplate.identification import Identification
     from swashplate.report.fit_report import find_browser, print_report, shown_runs, write_samples
 
     if pdf is not None:
@@ -484,11 +480,15 @@ def demo(
     from swashplate import rig
     from swashplate.campaign import Campaign
     from swashplate.drive import Drive
-    from swashplate.identification import tables
-    from swashplate.identification.estimation.setup import load_setup
-    from swashplate.identification.fitting import drawn
-    from swashplate.identification.identifying import identify
-    from swashplate.identification.validation import with_speeds
+    from swashplate.identification import (
+        drawn,
+        estimates_table,
+        identify,
+        load_setup,
+        runs_tables,
+        truth_count,
+        with_speeds,
+    )
     from swashplate.report.figures import plot_channel, save_figure
 
     if not (out / "virtual" / "truth").is_dir():  # only an earlier demo is replaced
@@ -515,12 +515,12 @@ def demo(
         figure = plot_channel(run.experiment[run.channel], run.simulated, title=title)
         save_figure(figure, out / "result.png")
     note(f"Campaign:  {path}")
-    estimates = [tables.estimates_table(e, truth=truth.parameters) for e in result.fit.stages]
+    estimates = [estimates_table(e, truth=truth.parameters) for e in result.fit.stages]
     show(*estimates)
-    inside, counted = tables.truth_count(estimates)
+    inside, counted = truth_count(estimates)
     say(f"The truth lies within the 95 % interval for {inside} of {counted} parameters.")
     note("\nHeld out of the fit, and predicted")
-    show(*tables.runs_tables(result.predicted))
+    show(*runs_tables(result.predicted))
     say(verdict.headline)
     for line in [*lines, f"Figure:    {out / 'result.png'}"]:
         note(line)

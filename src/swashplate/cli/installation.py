@@ -72,7 +72,7 @@ def doctor() -> None:
     show(table)
     with spinner("Simulating the hoist"):
         from swashplate.drive import Drive
-        from swashplate.equations.cache import UNCACHED, cache_folder
+        from swashplate.equations import UNCACHED, cache_folder
         from swashplate.maneuvers import step
 
         run = Drive.preset("hoist").simulate(step(9.0, start=0.0, stop=10.0, length=10.0))

@@ -245,7 +245,7 @@ class CommandSampling:
 
     def __post_init__(self) -> None:
         """Refuse a rate out of range, before anything is sampled."""
-        from swashplate.equations.marching.record import least_substeps
+        from swashplate.equations.marching import least_substeps
 
         least_substeps(self.rate)
 

@@ -1,11 +1,10 @@
-"""From the words of a command line to drives, commands, campaigns and simulations."""
+"""From the words of a command line to drives, values and campaigns."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import replace
-from difflib import get_close_matches
 from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,20 +14,14 @@ from swashplate.errors import FileError, InputError, MissingFileError, UnknownPa
 from swashplate.units import unit_text
 
 if TYPE_CHECKING:
-    from swashplate.analysis.design_variables import FactorRange
-    from swashplate.analysis.outcomes import Trial
+    from swashplate.analysis import FactorRange
     from swashplate.campaign import Campaign, Experiment
-    from swashplate.cli.options import CommandSampling, Simulating, Start
-    from swashplate.drive import Drive, Simulation
-    from swashplate.drive.simulation import Array
-    from swashplate.identification.estimation.model_setup import ModelSetup
-    from swashplate.identification.estimation.setup import FitSetup
-    from swashplate.maneuvers import Maneuver
-    from swashplate.parameters.parameter_set import Change, ParameterSet
+    from swashplate.drive import Drive
+    from swashplate.identification import FitSetup, ModelSetup
+    from swashplate.parameters import Change, ParameterSet
 
 _NUMBER = r"[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|inf\b|nan\b)"
 _VALUE = re.compile(rf"\s*({_NUMBER})(?:/({_NUMBER}))?\s*((?:1/)?[^\W\d_].*|°.*)?")
-_ENDING = re.compile(r"\.[A-Za-z]\w*$")
 SETUP_FILE, NUMBERS = "setup.toml", "parameters.toml"
 """In a folder that a fit wrote: its fit setup, or the numbers of a user-defined model."""
 UNFELT, FEELING = "load_torque", ("motor_leakage", "motor_constant")
@@ -38,7 +31,7 @@ SURPRISING = 1000.0
 
 # --- files and what they are ----------------------------------------------------------------------
 
-_NAMES = {
+KIND_NAMES = {
     "log": "a log",
     "campaign": "a campaign",
     "drive": "a drive",
@@ -74,7 +67,7 @@ def check_file_kind(path: Path, expected: str) -> None:
     instead = _INSTEAD.get((kind, expected))
     if path.is_file() and instead is not None:
         raise InputError(
-            f"{path} is {_NAMES[kind]}, not {_NAMES[expected]}: {instead.format(path)}."
+            f"{path} is {KIND_NAMES[kind]}, not {KIND_NAMES[expected]}: {instead.format(path)}."
         )
 
 
@@ -105,8 +98,8 @@ def fit_of(
     path: Path, axis: str | None, setup: str | None, begin: str | None
 ) -> tuple[Campaign, tuple[Experiment, ...], FitSetup, ParameterSet]:
     """What a fit is about: campaign, runs to fit, what is free, and the drive it begins at."""
-    from swashplate.identification.estimation.stages import setup_of
-    from swashplate.identification.identifying import runs_to_fit
+    from swashplate.identification import runs_to_fit
+    from swashplate.identification.estimation import setup_of
 
     campaign, axis_name = campaign_of(path, axis)
     start = campaign.drive(axis_name).parameters if begin is None else parameters_of(begin)
@@ -123,7 +116,7 @@ def drive_file(word: str) -> Path | None:
 
     A file that is plainly of another kind is refused.
     """
-    from swashplate.parameters.files import set_file
+    from swashplate.parameters import set_file
 
     file = set_file(word)
     if file is not None:
@@ -133,7 +126,7 @@ def drive_file(word: str) -> Path | None:
 
 def parameters_of(word: str) -> ParameterSet:
     """The packaged set of a name, the set in a TOML file, or the one that a fit's folder holds."""
-    from swashplate.parameters.files import load_preset, load_set
+    from swashplate.parameters import load_preset, load_set
 
     file = drive_file(word)
     return load_preset(word) if file is None else load_set(file)
@@ -141,8 +134,8 @@ def parameters_of(word: str) -> ParameterSet:
 
 def model_parameters_of(folder: str, file: Path, runs: Sequence[Experiment]) -> ModelSetup:
     """A user-defined model with the numbers that a fit wrote into its folder."""
-    from swashplate.equations.fields import is_real
-    from swashplate.identification.estimation.model_setup import ModelSetup
+    from swashplate.equations import is_real
+    from swashplate.identification import ModelSetup
 
     setup = ModelSetup.from_file(file)
     numbers_file = Path(folder) / NUMBERS if Path(folder).is_dir() else Path(folder)
@@ -224,7 +217,7 @@ def drive_of(word: str, values: Sequence[str] = (), factors: Sequence[str] = ())
         try:
             return definitions.find(name)
         except UnknownParameterError:
-            from swashplate.analysis.design_variables import powers_of
+            from swashplate.analysis import powers_of
 
             return powers_of(name)  # refuses it, and lists design variables as well
 
@@ -233,25 +226,25 @@ def drive_of(word: str, values: Sequence[str] = (), factors: Sequence[str] = ())
     drive = drive.replace(**chosen)
     drive = drive.scale(**assignments_of("--scale", scaling, scaled_as, scalable))
     if changes:
-        from swashplate.analysis.design_variables import with_factors
+        from swashplate.analysis import with_factors
 
         drive = with_factors(drive, changes)
     return drive
 
 
 def _is_design_variable(name: str) -> bool:
-    from swashplate.parameters.definitions import CATALOGUE, COLUMNS, REFINEMENTS
+    from swashplate.parameters import CATALOGUE, COLUMNS, REFINEMENTS
 
     if name in CATALOGUE or name in COLUMNS or name in REFINEMENTS:
         return False
-    from swashplate.analysis.design_variables import DESIGN_VARIABLES
+    from swashplate.analysis import DESIGN_VARIABLES
 
     return name in DESIGN_VARIABLES
 
 
 def physical_values(words: Sequence[str]) -> dict[str, Change]:
     """Physical values in SI from words such as ``oil_volume=100cm^3``."""
-    from swashplate.full_order.physical_set import chosen_quantity
+    from swashplate.full_order import chosen_quantity
 
     example = "oil_volume=1e-4 or oil_volume=100cm^3"
     return assignments_of("--physical", words, example, chosen_quantity, units=True)
@@ -259,14 +252,14 @@ def physical_values(words: Sequence[str]) -> dict[str, Change]:
 
 def factors_of(words: Sequence[str]) -> dict[str, float]:
     """Factors by design variable or parameter from words such as ``orifice=1.5``."""
-    from swashplate.analysis.design_variables import powers_of
+    from swashplate.analysis import powers_of
 
     return assignments_of("--scale", words, "orifice=1.5", powers_of, (1,))
 
 
 def factor_ranges_of(words: Sequence[str], usual: FactorRange) -> dict[str, FactorRange]:
     """Ranges of factors by design variable from words such as ``pump`` or ``pump=0.8/1.5``."""
-    from swashplate.analysis.design_variables import powers_of
+    from swashplate.analysis import powers_of
 
     completed = [word if "=" in word else f"{word}={usual[0]}/{usual[1]}" for word in words]
     return assignments_of("--variable", completed, "pump or pump=0.8/1.5", powers_of, (2,))
@@ -315,143 +308,3 @@ def changes_between(before: ParameterSet, after: ParameterSet) -> list[str]:
                 f"! {old.symbol} changes by a factor of {max(far):.3g}: check its unit{in_unit}."
             )
     return lines
-
-
-# --- commands -------------------------------------------------------------------------------------
-
-
-def named_maneuver(word: str, *drives: Drive) -> Maneuver:
-    """A maneuver such as ``step:9``, or the thesis's test of that name for these drives."""
-    from swashplate.maneuvers import parse, source_tests
-    from swashplate.parameters.files import AXES
-
-    axes = [drive.name for drive in drives if drive.name in AXES]
-    tests = {name: test for axis in reversed(axes) for name, test in source_tests(axis).items()}
-    if word in tests:
-        return tests[word]
-    try:
-        return parse(word)
-    except InputError as error:
-        if ":" in word or not tests:
-            raise
-        sentence = str(error).rstrip(".")
-        near = get_close_matches(word, tests, 1) or [*tests]
-        raise InputError(
-            f'{sentence}; or name one of the tests of {" or ".join(axes)}, such as "{near[0]}".'
-        ) from None
-
-
-def at_rate(drive: Drive, rate: float) -> Drive:
-    """The drive for a rate: a recursion for another one becomes its equation, said in a note."""
-    from swashplate.cli.terminal import note
-    from swashplate.equations.marching.record import least_substeps
-
-    filter_rate, marched = drive.parameters.rate, rate * least_substeps(rate)
-    if filter_rate is None or abs(marched / filter_rate - 1.0) < 1e-9:
-        return drive
-    steps = "" if marched == rate else f", computed in steps of 1/{marched:g} s,"
-    note(
-        f"{drive.name}: the card's filter is a recursion for {filter_rate:g} Hz; at {rate:g} "
-        f"Hz{steps} the differential equation with the same poles replaces it."
-    )
-    return drive.at_every_rate()
-
-
-def simulated_as(drive: Drive, command: str, options: Simulating) -> tuple[str, Simulation]:
-    """As `simulated_run`, from the start and with the inputs that the options name."""
-    return simulated_run(
-        drive,
-        command,
-        options,
-        start=options.start,
-        clip=options.clip,
-        measured=options.measured or (),
-    )
-
-
-def simulated_run(
-    drive: Drive,
-    command: str,
-    options: CommandSampling,
-    *,
-    start: Start = "rest",
-    clip: bool = False,
-    measured: Sequence[str] = (),
-) -> tuple[str, Simulation]:
-    """Name of a command, a maneuver or a file, and the drive's simulation over it."""
-    from swashplate.logs import open_log, read_series
-
-    head = command.partition(":")[0]  # stairs:2/4/0 is not a path
-    if not ("/" in head or _ENDING.search(head) or Path(command).is_file()):
-        maneuver = named_maneuver(command, drive)
-        name, where, values, time = maneuver.name, "", maneuver.sample(options.rate), None
-    else:
-        kind = file_kind(Path(command))
-        if kind not in ("log", ""):
-            words = "not a command: name a maneuver such as step:9, or a log."
-            raise InputError(f"{command} is {_NAMES[kind]}, {words}")
-        log = open_log(command)
-        columns = (("--time-column", options.time_column), ("--column", options.column))
-        for option, column in columns:
-            try:
-                log.find(column)
-            except InputError as error:
-                raise InputError(f"{str(error).rstrip('.')}, with {option}.") from None
-        series = read_series(command, options.column, "V", time_column=options.time_column)
-        if options.interpolation is None:
-            raise InputError(
-                f"{command} needs --interpolation linear (a straight line from row to row) or "
-                "--interpolation previous (each row held until the next)."
-            )
-        name, where, values, time = Path(command).name, f"{command}: ", series.values, series.time
-    inputs = _measured(measured, command if where else "", options.time_column)
-    try:
-        return name, drive.simulate(
-            values,
-            options.rate,
-            time=time,
-            interpolation=options.interpolation,
-            start=start,
-            clip=clip,
-            **inputs,
-        )
-    except InputError as error:
-        raise InputError(f"{where}{error}") from None
-
-
-def _measured(measured: Sequence[str], log: str, time_column: str) -> dict[str, Any]:
-    """Inputs other than the voltage by name: a column of a log, or a number."""
-    from swashplate.drive import MEASURED
-    from swashplate.logs import read_series
-
-    found = dict[str, Any]()
-    for word in measured:
-        name, _, text = (part.strip() for part in word.partition("="))
-        if name not in MEASURED or not text or name in found:
-            names = ", ".join(MEASURED)
-            raise InputError(f"--measured {word}: write NAME=COLUMN, once for each of {names}.")
-        try:
-            found[name] = float(text)
-        except ValueError:
-            if not log:
-                must = "a maneuver has no columns, so give a number in SI"
-                raise InputError(f"--measured {word}: {must}.") from None
-            unit = MEASURED[name][0]
-            found[name] = read_series(log, text, unit, time_column=time_column).values
-    return found
-
-
-def window_of(time: Array, begin: float | None, end: float | None) -> tuple[float, float] | None:
-    """The part of a record that --from and --to name; None for all of it. [s]"""
-    first, last = float(time[0]), float(time[-1])
-    whole = begin is None and end is None
-    return None if whole else (first if begin is None else begin, last if end is None else end)
-
-
-def named_trial(drive: Drive, command: str, options: CommandSampling) -> tuple[str, Trial]:
-    """Name of a command, a maneuver or a log, and the trial that it makes."""
-    from swashplate.analysis.outcomes import trial_of
-
-    drive = at_rate(drive, options.rate)
-    name, run = simulated_run(drive, command, options)
-    return name, trial_of(drive, run["voltage"], options.rate)

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from swashplate.cli import parsing
+from swashplate.cli import parsing, trials
 from swashplate.cli.commands import command
 from swashplate.cli.options import (
     NO_VALUE,
@@ -61,11 +61,11 @@ def simulate(
     maneuvers.
     """
     with spinner("Simulating"):
-        marched = parsing.at_rate(drive.chosen, sampling.rate)
-        name, run = parsing.simulated_as(marched, maneuver, sampling)
+        marched = trials.at_rate(drive.chosen, sampling.rate)
+        name, run = trials.simulated_as(marched, maneuver, sampling)
         tables, title = run.tables(), f"{drive.title}, {name}"
     save(out, "All signals, in SI", run.write)
-    window = parsing.window_of(run.time, begin, end)
+    window = trials.window_of(run.time, begin, end)
     draw_figure(plot, "plot_simulation", run, window=window, title=title)
     duration = f"{run.time[-1] - run.time[0]:.6g} s"
     drive.note(f"{title}: {run.time.size} samples at {sampling.rate:g} Hz, {duration}")
@@ -100,14 +100,14 @@ def compare(
     and both speeds.
     """
     with spinner("Simulating"):
-        from swashplate.analysis.outcomes import rms_difference, side_by_side
+        from swashplate.analysis import rms_difference, side_by_side
 
-        pair = [parsing.at_rate(parsing.drive_of(word), rate) for word in (first, second)]
+        pair = [trials.at_rate(parsing.drive_of(word), rate) for word in (first, second)]
         labels = [drive.name for drive in pair]
         if labels[0] == labels[1]:  # then by what was typed
             labels = [first, second if second != first else f"{second} (2)"]
         drives = dict(zip(labels, pair, strict=True))
-        test = parsing.named_maneuver(maneuver, *pair)
+        test = trials.named_maneuver(maneuver, *pair)
         voltage = test.sample(rate)
         runs = {label: drive.simulate(voltage, rate) for label, drive in drives.items()}
         table = side_by_side(runs)
@@ -168,7 +168,7 @@ def show_parameters(
     # in SI: a rod's drive has angles inside, which chosen units of its motion would change
     parameters = parsing.drive_of(drive, values or (), factors or ()).parameters
     if toml:
-        from swashplate.parameters.files import dump_set
+        from swashplate.parameters import dump_set
 
         typer.echo(dump_set(parameters), nl=False)
         return

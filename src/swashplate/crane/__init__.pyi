@@ -1,11 +1,16 @@
 from . import control as control
+from .axes import AXES as AXES
+from .axes import RATE as RATE
 from .closed_loop.operator_command import OperatorCommand as OperatorCommand
 from .closed_loop.result import CraneRun as CraneRun
+from .closed_loop.result import named_runs as named_runs
 from .closed_loop.result import run_tables as run_tables
 from .closed_loop.simulating import simulate as simulate
 from .closed_loop.stepper import CraneStepper as CraneStepper
 from .closed_loop.stepper import RunOptions as RunOptions
 from .crane import Crane as Crane
+from .crane import preset_text as preset_text
+from .drives import UNUSABLE as UNUSABLE
 from .drives import DriveSource as DriveSource
 from .free_swing import FreeSwing as FreeSwing
 from .free_swing import swing_damping as swing_damping

@@ -12,7 +12,7 @@ from typing import Annotated, Literal, NamedTuple
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from swashplate.analysis.compensation import InverseMap, inverse_map
+from swashplate.analysis import InverseMap, inverse_map
 from swashplate.crane.axes import AXES, check_names
 from swashplate.crane.drives import DriveLike, DriveSource, drives_of
 from swashplate.crane.kinematics import Boom, Geometry, Home, Vector, luff_rope

@@ -10,10 +10,10 @@ from swashplate.crane.axes import AXES
 from swashplate.documents import parse_toml, read_text
 from swashplate.drive import Drive
 from swashplate.errors import ParameterError, SwashplateError
-from swashplate.parameters.files import preset_names
+from swashplate.parameters import preset_names
 
 if TYPE_CHECKING:
-    from swashplate.identification.diagnostics.verdict import Verdict
+    from swashplate.identification import Verdict
 
 DRIVE_FILE, FIT_FILE = "drive.toml", "fit.json"
 """What a fit writes into its folder: the drive, and the fit itself with its verdict."""
@@ -177,7 +177,7 @@ def _source_of_file(path: Path, drive: Drive) -> DriveSource:
 def _stored_verdict(path: Path, drive: Drive) -> tuple[Verdict | None, str]:
     """The verdict of a stored fit on a drive; None and the clause why if it is not known."""
     # only what comes from a fit needs the identification
-    from swashplate.identification.assessment import read_verdict
+    from swashplate.identification import read_verdict
 
     try:
         stored = read_verdict(path)

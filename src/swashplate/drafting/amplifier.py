@@ -15,12 +15,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.campaign.experiment import Channel, Experiment
-from swashplate.campaign.schema import CURRENTS
+from swashplate.campaign import CURRENTS, Channel, Experiment
 from swashplate.drive import Drive
 from swashplate.errors import InputError
-from swashplate.parameters.files import preset_names
-from swashplate.parameters.parameter_set import ParameterSet
+from swashplate.parameters import ParameterSet, preset_names
 from swashplate.results import short
 from swashplate.tables import UNIT, Cell, Column, Table
 

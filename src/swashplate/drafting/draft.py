@@ -18,15 +18,26 @@ from typing import NamedTuple, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.campaign.experiment import ASSUMED, Accuracy
-from swashplate.campaign.quality import ESTIMATED, has_sign, moves_at_first
-from swashplate.campaign.reading import read_run
-from swashplate.campaign.samples import rolls_over_at, turns_over
-from swashplate.campaign.schema import KINDS, ROD, TURNS, CampaignFile, InputKind, conversion
+from swashplate.campaign import (
+    ASSUMED,
+    ESTIMATED,
+    KINDS,
+    ROD,
+    TURNS,
+    Accuracy,
+    CampaignFile,
+    InputKind,
+    conversion,
+    has_sign,
+    moves_at_first,
+    read_run,
+    rolls_over_at,
+    turns_over,
+)
 from swashplate.documents import parse_toml, toml_key, toml_string, validated
 from swashplate.errors import FileError, InputError
 from swashplate.logs import Log, LogColumn, open_log
-from swashplate.parameters.files import NEUTRAL, preset_names
+from swashplate.parameters import NEUTRAL, preset_names
 from swashplate.units import speed_unit, to_si
 
 Array = NDArray[np.float64]

@@ -15,10 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.campaign.campaign import Campaign
-from swashplate.campaign.experiment import Experiment
-from swashplate.campaign.quality import spiked
-from swashplate.campaign.schema import CURRENTS, ChannelKind
+from swashplate.campaign import CURRENTS, Campaign, ChannelKind, Experiment, spiked
 from swashplate.drafting.amplifier import AmplifierGuess, guess_amplifier
 from swashplate.drafting.mean_speeds import (
     WINDOW,

@@ -9,12 +9,17 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.campaign.experiment import Channel, Experiment, InputSignal
+from swashplate.campaign import Channel, Experiment, InputSignal
 from swashplate.drafting.plain_drive import MODEL, JumpWidth, PlainDrive
-from swashplate.equations.marching.derivatives import jacobian, residuals
-from swashplate.equations.marching.observation import ObservedRecord, RunValues, every_sample
-from swashplate.equations.marching.record import Record
-from swashplate.equations.marching.run import Instance, instance_of
+from swashplate.equations import Instance, instance_of
+from swashplate.equations.marching import (
+    ObservedRecord,
+    Record,
+    RunValues,
+    every_sample,
+    jacobian,
+    residuals,
+)
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -13,8 +13,7 @@ from swashplate.drafting.amplifier import AmplifierGuess
 from swashplate.drafting.guess import Guess, steady_speed
 from swashplate.drive import Drive
 from swashplate.errors import ParameterError
-from swashplate.parameters.parameter_set import ParameterSet, set_of
-from swashplate.parameters.rules import SIDES
+from swashplate.parameters import SIDES, ParameterSet, set_of
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -16,14 +16,11 @@ from swashplate.drive.instance import (
     unstable_filters,
 )
 from swashplate.drive.signals import check_output
-from swashplate.equations.fields import check_mapping
-from swashplate.equations.library import TAN_22_5
-from swashplate.equations.marching.record import Record
+from swashplate.equations import TAN_22_5, check_mapping
+from swashplate.equations.marching import Record
 from swashplate.errors import InputError
 from swashplate.executors import Executor
-from swashplate.parameters.definitions import SWITCHES
-from swashplate.parameters.parameter_set import ParameterSet
-from swashplate.parameters.rules import broken_rules
+from swashplate.parameters import SWITCHES, ParameterSet, broken_rules
 from swashplate.units import in_si
 
 Array = NDArray[np.float64]

@@ -15,14 +15,10 @@ from swashplate.drive.instance import (
 from swashplate.drive.march import start_states
 from swashplate.drive.signals import check_output
 from swashplate.drive.simulation import Simulation
-from swashplate.equations.marching.derivatives import NO_RUN_VALUES, BoundModel
-from swashplate.equations.marching.observation import ObservedRecord, RunValues
-from swashplate.equations.marching.record import Record
-from swashplate.equations.marching.run import Start
-from swashplate.equations.marching.sensitivity import Sensitivities
+from swashplate.equations import BoundModel, Sensitivities
+from swashplate.equations.marching import NO_RUN_VALUES, ObservedRecord, Record, RunValues, Start
 from swashplate.errors import InputError
-from swashplate.parameters.definitions import DEFINITIONS, SWITCHES, Definitions
-from swashplate.parameters.parameter_set import ParameterSet
+from swashplate.parameters import DEFINITIONS, SWITCHES, Definitions, ParameterSet
 
 CURRENTS = ("current", "current_sum", "current_positive", "current_negative")
 

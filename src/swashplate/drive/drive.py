@@ -20,17 +20,20 @@ from swashplate.drive.instance import (
 from swashplate.drive.march import Sample, drive_stepper, simulate_drive
 from swashplate.drive.records import RunKeywords, drive_records
 from swashplate.drive.simulation import Simulation
-from swashplate.equations.marching.record import SOURCE_RATE, Interpolation, check_rate
-from swashplate.equations.marching.run import Start
-from swashplate.equations.marching.simulation import Stepper
-from swashplate.equations.marching.stepping import CompiledStep, stored_of
-from swashplate.equations.model import Equation
-from swashplate.equations.replacement import Replacement
+from swashplate.equations import CompiledStep, Equation, Replacement, Stepper
+from swashplate.equations.marching import SOURCE_RATE, Interpolation, Start, check_rate, stored_of
 from swashplate.errors import InputError
 from swashplate.maneuvers import Maneuver
-from swashplate.parameters.files import dump_set, load_preset, load_set, preset_names
-from swashplate.parameters.parameter_set import Change, Parameter, ParameterSet
-from swashplate.parameters.rules import FULL_VOLTAGE
+from swashplate.parameters import (
+    FULL_VOLTAGE,
+    Change,
+    Parameter,
+    ParameterSet,
+    dump_set,
+    load_preset,
+    load_set,
+    preset_names,
+)
 from swashplate.results import Result
 from swashplate.units import in_si
 
@@ -38,7 +41,7 @@ if TYPE_CHECKING:
     from swashplate.batch import Batch, SquaredError
     from swashplate.drive.linear_drive import LinearDrive
     from swashplate.drive.small_motion import Coulomb, Input
-    from swashplate.equations.marching.sensitivity import Sensitivities
+    from swashplate.equations import Sensitivities
     from swashplate.executors import Executor
     from swashplate.linear import FrequencyResponse
     from swashplate.tables import Table

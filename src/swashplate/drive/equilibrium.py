@@ -10,16 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.drive.instance import card_of, drive_instance, models_of, without_ripple
-from swashplate.equations.declaration import interpreted
-from swashplate.equations.fields import is_real
-from swashplate.equations.marching.part_code import SignalId
-from swashplate.equations.marching.record import SOURCE_RATE
-from swashplate.equations.marching.run import InitialStates, called, marched
+from swashplate.equations import interpreted, is_real
+from swashplate.equations.marching import SOURCE_RATE, InitialStates, SignalId, called, marched
 from swashplate.errors import DomainError, InputError
 from swashplate.models.displacement_control import moment_sine, solenoid_force
 from swashplate.models.pump import overpowered
-from swashplate.parameters.parameter_set import ParameterSet
-from swashplate.parameters.rules import FULL_VOLTAGE
+from swashplate.parameters import FULL_VOLTAGE, ParameterSet
 
 Array = NDArray[np.float64]
 

@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 from swashplate.drive.instance import check_filter_stability, drive_instance, without_ripple
 from swashplate.drive.signals import UNITS
 from swashplate.drive.small_motion import OUTPUTS
-from swashplate.equations.fields import is_real
-from swashplate.equations.marching.record import FASTEST, SOURCE_RATE, check_rate
+from swashplate.equations import is_real
+from swashplate.equations.marching import FASTEST, SOURCE_RATE, check_rate
 from swashplate.errors import InputError
 from swashplate.linear import (
     FrequencyResponse,
@@ -21,8 +21,7 @@ from swashplate.linear import (
     sweep,
 )
 from swashplate.models.displacement_control import Pump
-from swashplate.parameters.parameter_set import ParameterSet
-from swashplate.parameters.rules import FULL_VOLTAGE
+from swashplate.parameters import FULL_VOLTAGE, ParameterSet
 from swashplate.tables import Column, Table
 
 SWEPT_OUTPUTS = OUTPUTS[:7]  # Without the motor's.

@@ -11,11 +11,17 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swashplate.equations.declaration import interpreted
-from swashplate.equations.language import plain
-from swashplate.equations.marching.run import Instance, PartNumbers
-from swashplate.equations.model import Model
-from swashplate.equations.replacement import Replacement, again, check_members, uses
+from swashplate.equations import (
+    Instance,
+    Model,
+    Replacement,
+    again,
+    check_members,
+    interpreted,
+    plain,
+    uses,
+)
+from swashplate.equations.marching import PartNumbers
 from swashplate.errors import InputError
 from swashplate.models.amplifier import Card, CardOptions, Channel
 from swashplate.models.amplifier import step_limit as filter_limit
@@ -29,8 +35,7 @@ from swashplate.models.drive import (
     settled_drive,
 )
 from swashplate.models.pump import searched_pressure, settled_pressure
-from swashplate.parameters.parameter_set import ParameterSet
-from swashplate.parameters.rules import SIDES, Broken, Rule, applied
+from swashplate.parameters import SIDES, Broken, ParameterSet, Rule, applied
 
 Array = NDArray[np.float64]
 

@@ -12,10 +12,10 @@ from swashplate.drive.equilibrium import OperatingPoint
 from swashplate.drive.instance import check_filter_stability
 from swashplate.drive.signals import UNITS
 from swashplate.drive.small_motion import Coulomb, lifted, small_motion_model
-from swashplate.equations.marching.record import Interpolation, least_substeps
+from swashplate.equations.marching import Interpolation, least_substeps
 from swashplate.errors import DomainError, InputError
 from swashplate.linear import LinearModel, with_delay_line
-from swashplate.parameters.parameter_set import ParameterSet
+from swashplate.parameters import ParameterSet
 from swashplate.results import Result
 from swashplate.tables import UNIT, Cell, Column, Table
 from swashplate.units import display_unit, in_si

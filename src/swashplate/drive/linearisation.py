@@ -16,7 +16,7 @@ from swashplate.drive.small_motion import (
     small_motion_model,
 )
 from swashplate.errors import InputError
-from swashplate.parameters.parameter_set import ParameterSet
+from swashplate.parameters import ParameterSet
 
 
 def linearize_drive(

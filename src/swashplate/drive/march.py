@@ -11,14 +11,11 @@ import numpy as np
 from swashplate.drive.instance import check_filter_stability, drive_instance
 from swashplate.drive.records import RANGES
 from swashplate.drive.simulation import Simulation
-from swashplate.equations.declaration import interpreted
-from swashplate.equations.marching.record import Interpolation, Record, least_substeps
-from swashplate.equations.marching.run import Instance, Start
-from swashplate.equations.marching.simulation import Stepper
+from swashplate.equations import Instance, Stepper, interpreted
+from swashplate.equations.marching import Interpolation, Record, Start, least_substeps
 from swashplate.errors import DomainError, InputError
 from swashplate.models.displacement_control import pressure_limits
-from swashplate.parameters.parameter_set import ParameterSet
-from swashplate.parameters.rules import FULL_VOLTAGE
+from swashplate.parameters import FULL_VOLTAGE, ParameterSet
 
 
 def simulate_drive(

@@ -10,12 +10,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.drive.signals import MEASURED, UNITS
-from swashplate.equations.fields import Definition, is_real
-from swashplate.equations.marching.record import Interpolation, Record, least_substeps, on_grid
+from swashplate.equations import Definition, is_real
+from swashplate.equations.marching import Interpolation, Record, least_substeps, on_grid
 from swashplate.errors import InputError, ParameterError
 from swashplate.maneuvers import Maneuver, sampled
-from swashplate.parameters.plausible import check_plausible
-from swashplate.parameters.rules import FULL_VOLTAGE
+from swashplate.parameters import FULL_VOLTAGE, check_plausible
 from swashplate.units import in_si
 
 Array = NDArray[np.float64]

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.drive.signals import FIRST_SIGNALS, MOTOR, SIGNALS, UNITS
-from swashplate.equations.marching.simulation import Run, read_only
+from swashplate.equations import Run
+from swashplate.equations.marching import read_only
 from swashplate.errors import InputError
 from swashplate.models.displacement_control import Pump
 from swashplate.results import Named, figures

@@ -16,13 +16,12 @@ from numpy.typing import NDArray
 
 from swashplate.drive.equilibrium import OperatingPoint
 from swashplate.drive.instance import drive_instance, models_of, without_ripple
-from swashplate.equations.declaration import interpreted
-from swashplate.equations.marching.record import SOURCE_RATE
-from swashplate.equations.marching.run import Instance, called
+from swashplate.equations import Instance, interpreted
+from swashplate.equations.marching import SOURCE_RATE, called
 from swashplate.linear import LinearModel, Matrices, linearize
 from swashplate.models.amplifier import Card
 from swashplate.models.refinements import dither_factor, friction_width
-from swashplate.parameters.parameter_set import ParameterSet
+from swashplate.parameters import ParameterSet
 
 Array = NDArray[np.float64]
 Coulomb = Literal["ignored", "tangent"]

@@ -9,7 +9,9 @@ from .fmi import FmuComparison as FmuComparison
 from .fmi import compare as compare
 from .fmi import fmu as fmu
 from .libraries import PLATFORMS as PLATFORMS
+from .libraries import WASM as WASM
 from .libraries import compiled_c as compiled_c
+from .libraries import packaged as packaged
 from .libraries import wasm as wasm
 from .variable_list import Variable as Variable
 from .variable_list import variables as variables

@@ -22,19 +22,15 @@ from swashplate.drive import (
     drive_instance,
     models_of,
 )
-from swashplate.equations import instance_of
-from swashplate.equations.code_generation.printing_c import c_name, comment_line, filled, literal
-from swashplate.equations.fields import declared_by
-from swashplate.equations.marching.record import SOURCE_RATE, check_rate
-from swashplate.equations.marching.run import Instance
-from swashplate.equations.model import Model
+from swashplate.equations import Instance, Model, declared_by, instance_of
+from swashplate.equations.code_generation import c_name, comment_line, filled, literal
+from swashplate.equations.marching import SOURCE_RATE, check_rate
 from swashplate.errors import FileError, InputError, InputTypeError
-from swashplate.export.c_source import Exported, interface, numbers
+from swashplate.export.c_source import Exported, interface, numbers, writer_of
 from swashplate.export.variable_list import DRIVE, DRIVE_WORDS, OWN, References, Words, words_of
 from swashplate.models.amplifier import stable_step
 from swashplate.models.displacement_control import steep_stops
-from swashplate.parameters.parameter_set import ParameterSet
-from swashplate.parameters.rules import FULL_VOLTAGE
+from swashplate.parameters import FULL_VOLTAGE, ParameterSet
 from swashplate.tables import write_text
 
 Array = NDArray[np.float64]
@@ -289,7 +285,7 @@ _SPEED = Sample._fields[1:].index("shaft_speed")
 
 def _initialiser(exported: Exported, values: Array, name: str, title: str) -> str:
     """Values as an array of C, each with its name."""
-    writer = exported.writer
+    writer = writer_of(exported)
     names = ["step [s]", *(written for written, _ in writer.values()), *writer.constant_names()]
     guard = f"{name.upper()}_VALUES_H"
     head = f"Values of {name} for {exported.prefix}_init, as swashplate computed them."

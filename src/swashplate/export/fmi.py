@@ -22,8 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from swashplate.__about__ import __version__
 from swashplate.drive import Drive
-from swashplate.equations.fields import value_at
-from swashplate.equations.model import Model
+from swashplate.equations import Model, value_at
 from swashplate.errors import FileError, InputError
 from swashplate.export.c_folder import LONGEST_STEP, Content, content_of
 from swashplate.export.c_source import feedthrough, newest

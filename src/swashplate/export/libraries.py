@@ -22,8 +22,8 @@ from typing import Any, NamedTuple
 
 from swashplate.documents import parse_toml
 from swashplate.drive import Drive
-from swashplate.equations.code_generation.printing_c import filled
-from swashplate.equations.model import Model
+from swashplate.equations import Model
+from swashplate.equations.code_generation import filled
 from swashplate.errors import FileError, InputError
 from swashplate.export.c_folder import (
     LONGEST_STEP,

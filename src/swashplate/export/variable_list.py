@@ -13,8 +13,8 @@ from math import inf, isfinite
 from typing import Any, Literal, NamedTuple
 
 from swashplate.drive import CHAIN, MEASURED, MOTOR
-from swashplate.equations.code_generation.printing_c import c_name, literal
-from swashplate.equations.fields import Definition, declared_by
+from swashplate.equations import Definition, declared_by
+from swashplate.equations.code_generation import c_name, literal
 from swashplate.export.c_source import Exported
 
 Causality = Literal["input", "output", "parameter", "independent"]

@@ -23,15 +23,15 @@ from swashplate.drive import (
     check_filter_stability,
     drive_records,
 )
-from swashplate.equations import BoundModel, Sensitivities
-from swashplate.equations.declaration import interpreted
-from swashplate.equations.marching.record import (
+from swashplate.equations import BoundModel, Instance, Run, Sensitivities, interpreted
+from swashplate.equations.marching import (
     SOURCE_RATE,
     Interpolation,
+    PartNumbers,
+    Start,
     least_substeps,
+    read_only,
 )
-from swashplate.equations.marching.run import Instance, PartNumbers, Start
-from swashplate.equations.marching.simulation import Run, read_only
 from swashplate.errors import DomainError, InputError
 from swashplate.full_order.physical_set import QUANTITIES, PhysicalSet, from_lumped
 from swashplate.linear import linearize
@@ -40,8 +40,7 @@ from swashplate.models.displacement_control import Solenoids
 from swashplate.models.drive import Source as CurrentSource
 from swashplate.models.full_order import PlantOptions, PlantSignals
 from swashplate.models.machine import fastest_rate, relief_pressures
-from swashplate.parameters.definitions import CATALOGUE, DEFINITIONS, Definition, Definitions
-from swashplate.parameters.parameter_set import Change
+from swashplate.parameters import CATALOGUE, DEFINITIONS, Change, Definition, Definitions
 from swashplate.results import Named, Result, Tabular, figures
 from swashplate.tables import UNIT, Cell, Column, Table
 from swashplate.units import PLATE_RATE, SHAFT_ANGLE

@@ -18,25 +18,30 @@ import numpy as np
 
 from swashplate.documents import parse_toml, validated
 from swashplate.entries import FileTable
-from swashplate.equations.declaration import interpreted
-from swashplate.equations.fields import Definition, Flag, declared_by
+from swashplate.equations import Definition, Flag, declared_by, interpreted
 from swashplate.errors import ParameterError, UnknownParameterError
 from swashplate.models import machine as equations
 from swashplate.models.machine import Machine
-from swashplate.parameters.files import AXES, ParameterEntry, parameter_of
-from swashplate.parameters.files import load_preset as load_parameters
-from swashplate.parameters.parameter_set import (
+from swashplate.parameters import (
+    AXES,
+    Broken,
     Change,
     Entries,
     HasParameters,
     Pair,
     Parameter,
+    ParameterEntry,
     ParameterSet,
+    Rule,
     Value,
+    applied,
     meant_value,
+    parameter_of,
+    range_rule,
+    refuse,
     set_of,
 )
-from swashplate.parameters.rules import Broken, Rule, applied, range_rule, refuse
+from swashplate.parameters import load_preset as load_parameters
 from swashplate.tables import Column, Table
 from swashplate.units import chosen_unit, unit_text
 

@@ -17,9 +17,7 @@ from pydantic import Field
 from tomlkit import dumps
 
 from swashplate.__about__ import __version__
-from swashplate.campaign.campaign import Campaign
-from swashplate.campaign.experiment import Experiment
-from swashplate.campaign.schema import Between
+from swashplate.campaign import Between, Campaign, Experiment
 from swashplate.documents import read_json
 from swashplate.drive import Drive
 from swashplate.entries import FileTable
@@ -50,14 +48,15 @@ from swashplate.identification.statistics.intervals import (
 from swashplate.identification.statistics.profiles import Profile
 from swashplate.identification.validation import RunQuality, predict
 from swashplate.locks import locked
-from swashplate.parameters.files import (
+from swashplate.parameters import (
     FITTED_DRIVE,
     FITTED_NUMBERS,
     NEUTRAL,
+    Motion,
+    ParameterSet,
     dump_set,
     read_set,
 )
-from swashplate.parameters.parameter_set import Motion, ParameterSet
 from swashplate.progress import working
 from swashplate.results import folded
 from swashplate.tables import Table, write_text

@@ -17,8 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.__about__ import __version__
-from swashplate.campaign.campaign import Campaign
-from swashplate.campaign.experiment import Channel, Experiment
+from swashplate.campaign import Campaign, Channel, Experiment
 from swashplate.drive import Drive
 from swashplate.equations import Model as Equations
 from swashplate.errors import InputError, UnknownNameError
@@ -56,8 +55,7 @@ from swashplate.identification.estimation.stages import (
 from swashplate.identification.estimation.unknowns import Prior
 from swashplate.identification.stage_fit import Interval, StageFit
 from swashplate.identification.statistics.intervals import Estimate, uncertainty_of, weighed
-from swashplate.parameters.parameter_set import ParameterSet
-from swashplate.parameters.rules import SIDES
+from swashplate.parameters import SIDES, ParameterSet
 from swashplate.progress import LOGGER, working
 from swashplate.results import Tabular
 from swashplate.tables import Table, count, listed

@@ -10,11 +10,10 @@ from typing import get_args
 
 import numpy as np
 
-from swashplate.campaign.campaign import Campaign
-from swashplate.campaign.experiment import Experiment
+from swashplate.campaign import Campaign, Experiment
 from swashplate.drive import Drive
 from swashplate.equations import Model as Equations
-from swashplate.equations.fields import is_real
+from swashplate.equations import is_real
 from swashplate.errors import InputError, InputTypeError
 from swashplate.executors import Executor, Serial
 from swashplate.identification.assessment import Identification, versions
@@ -30,8 +29,7 @@ from swashplate.identification.fitting import Fit, Search, fit
 from swashplate.identification.resampling import cross_validate
 from swashplate.identification.stage_fit import StageFit
 from swashplate.identification.statistics.profiles import Profile, profiles_of
-from swashplate.parameters.files import named_set
-from swashplate.parameters.parameter_set import ParameterSet
+from swashplate.parameters import ParameterSet, named_set
 
 MOST_EVALUATIONS = 600
 

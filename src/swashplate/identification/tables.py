@@ -9,7 +9,7 @@ from collections.abc import Collection, Mapping, Sequence
 from math import inf
 from typing import NamedTuple
 
-from swashplate.campaign.experiment import Channel, Experiment
+from swashplate.campaign import Channel, Experiment
 from swashplate.identification.estimation.drive_model import DriveModel, true_value
 from swashplate.identification.estimation.model_setup import ModelSetup
 from swashplate.identification.estimation.stages import Parameters
@@ -30,8 +30,7 @@ from swashplate.identification.validation import (
     ignored_windows,
     pooled,
 )
-from swashplate.parameters.definitions import CATALOGUE, COLUMNS
-from swashplate.parameters.parameter_set import ParameterSet
+from swashplate.parameters import CATALOGUE, COLUMNS, ParameterSet
 from swashplate.tables import (
     NONE,
     UNIT,

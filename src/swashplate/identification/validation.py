@@ -10,11 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft
 
-from swashplate.campaign.experiment import Channel, Experiment
-from swashplate.campaign.speed import DIFFERENTIATOR, speed_from_angle, speed_of
+from swashplate.campaign import (
+    DIFFERENTIATOR,
+    SIGNALS,
+    Channel,
+    Experiment,
+    speed_from_angle,
+    speed_of,
+)
 from swashplate.errors import InputError
 from swashplate.identification.estimation.drive_model import (
-    SIGNALS,
     DriveModel,
     edges_problem,
     with_edges,
@@ -24,7 +29,7 @@ from swashplate.identification.estimation.problem import Problem
 from swashplate.identification.estimation.solving import solve
 from swashplate.identification.estimation.stages import Parameters
 from swashplate.identification.noise import LONGEST, Grid, correlation_length, grid_of, pair_sums
-from swashplate.parameters.parameter_set import HasParameters, ParameterSet, set_of
+from swashplate.parameters import HasParameters, ParameterSet, set_of
 from swashplate.results import Result, figures
 
 if TYPE_CHECKING:

@@ -13,10 +13,8 @@ from typing import TYPE_CHECKING, cast, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swashplate.equations.fields import is_real
-from swashplate.equations.marching.march import output_of
-from swashplate.equations.marching.record import check_rate
-from swashplate.equations.marching.run import Instance, marched
+from swashplate.equations import Instance, is_real
+from swashplate.equations.marching import check_rate, marched, output_of
 from swashplate.errors import DomainError, InputError
 from swashplate.linear.model import LinearModel
 from swashplate.results import GivenAxes, Tabular, figures

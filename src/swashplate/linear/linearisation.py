@@ -7,13 +7,16 @@ from typing import Any
 
 import numpy as np
 
-from swashplate.equations.fields import check_mapping, floats_of, is_real, value_at
-from swashplate.equations.marching.march import output_of
-from swashplate.equations.marching.one_step import step_derivatives
-from swashplate.equations.marching.part_code import taps_of
-from swashplate.equations.marching.record import check_rate
-from swashplate.equations.marching.run import InitialStates, Instance, called, outside
-from swashplate.equations.model import state_paths
+from swashplate.equations import Instance, check_mapping, floats_of, is_real, state_paths, value_at
+from swashplate.equations.marching import (
+    InitialStates,
+    called,
+    check_rate,
+    output_of,
+    outside,
+    step_derivatives,
+    taps_of,
+)
 from swashplate.errors import DomainError, InputError
 from swashplate.linear.model import LinearModel
 

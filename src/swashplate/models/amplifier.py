@@ -17,11 +17,19 @@ and C mean the same at every rate.
 from math import cos, exp, inf, pi, sin, sqrt
 from typing import Annotated, NamedTuple
 
-from swashplate.equations.code_generation.derivatives import declared
-from swashplate.equations.declaration import equation
-from swashplate.equations.fields import OFF, Definition, Flag
-from swashplate.equations.library import faded, interpolated, soft_threshold
-from swashplate.equations.model import Model, Tap, Window
+from swashplate.equations import (
+    OFF,
+    Definition,
+    Flag,
+    Model,
+    Tap,
+    Window,
+    declared,
+    equation,
+    faded,
+    interpolated,
+    soft_threshold,
+)
 
 COULOMB_WIDTH = 0.01
 """Rate of current below which the smooth Coulomb sign is proportional to it. [A/s]"""

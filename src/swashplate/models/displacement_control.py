@@ -16,10 +16,17 @@ term Z6, the plate's own motion, is absent while the plate rests on a stop.
 from math import asin, atan, inf, pi, sin, sqrt, tan
 from typing import Annotated, NamedTuple
 
-from swashplate.equations.code_generation.derivatives import declared
-from swashplate.equations.declaration import equation
-from swashplate.equations.fields import MINUS, OFF, Definition, Flag
-from swashplate.equations.library import TAN_22_5, arctangent, small_arctangent
+from swashplate.equations import (
+    MINUS,
+    OFF,
+    TAN_22_5,
+    Definition,
+    Flag,
+    arctangent,
+    declared,
+    equation,
+    small_arctangent,
+)
 
 WELL_CONDITIONED = 0.25
 """cos(φ+α) cos(φ-α) / cos²φ above which the form without a root in its denominator is used."""

@@ -3,8 +3,7 @@
 from dataclasses import replace
 from typing import NamedTuple
 
-from swashplate.equations.declaration import equation
-from swashplate.equations.model import Model, join
+from swashplate.equations import Model, equation, join
 from swashplate.models.amplifier import (
     Card,
     CardOptions,

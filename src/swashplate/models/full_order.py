@@ -14,11 +14,7 @@ below 2. Limits are projections: what is beyond a stop is put back on it and sto
 from math import atan, tan
 from typing import NamedTuple
 
-from swashplate.equations.code_generation.loops import repeated, root
-from swashplate.equations.declaration import equation
-from swashplate.equations.fields import OFF, Flag
-from swashplate.equations.library import clipped
-from swashplate.equations.model import Model, join
+from swashplate.equations import OFF, Flag, Model, clipped, equation, join, repeated, root
 from swashplate.models.amplifier import card
 from swashplate.models.displacement_control import Solenoids, solenoid_force
 from swashplate.models.drive import AMMETER, POSITION, source

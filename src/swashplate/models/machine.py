@@ -13,10 +13,7 @@ eq. 6.38 has d4 alone, which would not conserve energy (erratum 16).
 from math import asin, atan, pi, sin, sqrt, tan
 from typing import Annotated, NamedTuple
 
-from swashplate.equations.code_generation.loops import root
-from swashplate.equations.declaration import equation
-from swashplate.equations.fields import MINUS, Definition, Flag
-from swashplate.equations.library import clipped
+from swashplate.equations import MINUS, Definition, Flag, clipped, equation, root
 from swashplate.models.displacement_control import flow_head, head_root
 
 ATMOSPHERE = 101325.0

@@ -8,9 +8,7 @@ stand in the same sample and the same step; an option that is off leaves nothing
 from math import sqrt
 from typing import NamedTuple
 
-from swashplate.equations.code_generation.loops import root
-from swashplate.equations.declaration import equation
-from swashplate.equations.model import Model
+from swashplate.equations import Model, equation, root
 from swashplate.models.displacement_control import (
     Pump,
     PumpOptions,

@@ -41,8 +41,7 @@ stiff (k → ∞), which leaves Ω = Ω_0 - K_mL (C_g + J Ω').
 
 from math import exp, sin, sqrt
 
-from swashplate.equations.code_generation.derivatives import declared
-from swashplate.equations.declaration import equation
+from swashplate.equations import declared, equation
 from swashplate.models.displacement_control import Pump
 
 

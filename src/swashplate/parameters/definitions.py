@@ -14,8 +14,8 @@ from difflib import get_close_matches
 from functools import cached_property, lru_cache
 from typing import Literal
 
-from swashplate.equations.fields import Definition as Definition
-from swashplate.equations.fields import declared_by
+from swashplate.equations import Definition as Definition
+from swashplate.equations import declared_by
 from swashplate.errors import ParameterError, UnknownParameterError
 from swashplate.models.amplifier import Card
 from swashplate.models.displacement_control import Pump

@@ -10,7 +10,7 @@ from pydantic import Field
 
 from swashplate.documents import parse_toml, read_text, validated
 from swashplate.entries import FileTable, Name, NotNegative, Number, Positive, Version
-from swashplate.equations.replacement import Replacement, again, found_at, uses
+from swashplate.equations import Replacement, again, found_at, uses
 from swashplate.errors import InputError, MissingFileError, ParameterError, meant
 from swashplate.parameters.definitions import Block, Definition, definitions_of, options_of
 from swashplate.parameters.parameter_set import (

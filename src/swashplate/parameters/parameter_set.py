@@ -10,8 +10,7 @@ from typing import Any, Literal, NamedTuple, Protocol, Self
 
 import numpy as np
 
-from swashplate.equations.fields import is_real
-from swashplate.equations.replacement import Replacement
+from swashplate.equations import Replacement, is_real
 from swashplate.errors import InputError, ParameterError
 from swashplate.parameters.definitions import (
     CATALOGUE,

@@ -13,8 +13,7 @@ import numpy as np
 from numba.np.unsafe.ndarray import to_fixed_tuple
 from numpy.typing import NDArray
 
-from swashplate.equations.cache import kernel
-from swashplate.equations.declaration import JIT_OFF, inlined, interpreted
+from swashplate.equations import JIT_OFF, inlined, interpreted, kernel
 from swashplate.errors import ParameterError
 from swashplate.models.amplifier import Channel, channel_level
 from swashplate.models.displacement_control import (

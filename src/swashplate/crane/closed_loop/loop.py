@@ -53,8 +53,8 @@ from swashplate.crane.rope import (
     set_off,
 )
 from swashplate.equations import StepContext, equation, inlined, kernel
-from swashplate.equations.code_generation.functions import generating
-from swashplate.parameters.rules import FULL_VOLTAGE
+from swashplate.equations.code_generation import generating
+from swashplate.parameters import FULL_VOLTAGE
 
 Array = NDArray[np.float64]
 

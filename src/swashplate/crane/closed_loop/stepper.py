@@ -10,7 +10,7 @@ from typing import Any, Literal, TypedDict, Unpack, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swashplate.analysis.compensation import InverseMap
+from swashplate.analysis import InverseMap
 from swashplate.crane.axes import AXES, RATE, check_names
 from swashplate.crane.closed_loop import loop
 from swashplate.crane.closed_loop.loop import Fixed, Inverse, LoopArrays, State
@@ -29,10 +29,9 @@ from swashplate.crane.rope import (
 )
 from swashplate.drive import Drive, drive_instance
 from swashplate.equations import CompiledStep, StepContext, compiled_step
-from swashplate.equations.marching.run import marched
-from swashplate.equations.marching.stepping import stored_of
+from swashplate.equations.marching import marched, stored_of
 from swashplate.errors import DomainError, InputError
-from swashplate.parameters.rules import FULL_VOLTAGE
+from swashplate.parameters import FULL_VOLTAGE
 
 Array = NDArray[np.float64]
 Actuation = Literal["ideal", "volts", "inverse", "direct"]

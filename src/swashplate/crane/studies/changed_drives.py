@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from swashplate.analysis.design_variables import with_factors
+from swashplate.analysis import with_factors
 from swashplate.crane.axes import AXES, check_names
 from swashplate.crane.crane import Crane
 from swashplate.crane.drives import DriveSource
 from swashplate.errors import InputError
 
 if TYPE_CHECKING:
-    from swashplate.analysis.monte_carlo import Draws
+    from swashplate.analysis import Draws
 
 
 def with_design_change(crane: Crane, axis: str, factors: Mapping[str, float]) -> Crane:
@@ -60,7 +60,7 @@ def drawn_cranes(crane: Crane, **draws: Draws) -> tuple[Crane, ...]:
         For a name that is not an axis, and without draws if no drive comes from a fit's folder.
     """
     # only what is drawn needs the identification
-    from swashplate.analysis.monte_carlo import stored_draws
+    from swashplate.analysis import stored_draws
 
     check_names("A crane has no drive", draws, AXES, "it has")
     draws = draws or {

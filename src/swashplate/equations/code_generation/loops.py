@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from math import inf
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeVar
+from typing import Any, Literal, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,13 +24,11 @@ from swashplate.equations.code_generation.printing import (
     function_text,
     named_by_text,
 )
+from swashplate.equations.code_generation.runner import Callee, Runner
 from swashplate.equations.code_generation.values import Flag, Tuple, Value, alike, leaves, rebuilt
 from swashplate.equations.declaration import inlined
 from swashplate.equations.graph import ONE, ZERO, Call, Node, Rule, choose, make, names_in
 from swashplate.equations.language import Parsed
-
-if TYPE_CHECKING:
-    from swashplate.equations.code_generation.tracing import Callee, Trace
 
 S = TypeVar("S")
 
@@ -208,7 +206,7 @@ class Loop(NamedTuple):
     inner: Inner
 
 
-def _inner(outer: Trace, callee: Callee, leading: Sequence[Value], rest: Sequence[Value]) -> Inner:
+def _inner(outer: Runner, callee: Callee, leading: Sequence[Value], rest: Sequence[Value]) -> Inner:
     """An equation whose `leading` arguments the loop gives, the others as where it is called."""
     source = callee.source
     trace = outer.inner(source)
@@ -251,7 +249,7 @@ def _inner(outer: Trace, callee: Callee, leading: Sequence[Value], rest: Sequenc
     )
 
 
-def called_apart(trace: Trace, callee: Callee, values: Sequence[Value]) -> Value:
+def called_apart(trace: Runner, callee: Callee, values: Sequence[Value]) -> Value:
     """An equation as a call of a generated function, without derivatives."""
     inner = _inner(trace, callee, [], values)
     function = inner.function(flat=True)
@@ -264,7 +262,7 @@ def called_apart(trace: Trace, callee: Callee, values: Sequence[Value]) -> Value
     return rebuilt(inner.result, iter(results))
 
 
-def solved(trace: Trace, callee: Callee, low: Value, high: Value, rest: Sequence[Value]) -> Value:
+def solved(trace: Runner, callee: Callee, low: Value, high: Value, rest: Sequence[Value]) -> Value:
     """`root` as a call of a generated function, with the rule of its derivatives."""
     residual = callee.source
     inner = _inner(trace, callee, [graph.name("x")], rest)
@@ -316,7 +314,7 @@ def solved(trace: Trace, callee: Callee, low: Value, high: Value, rest: Sequence
 
 
 def repetition(
-    trace: Trace, callee: Callee, count: Value, state: Value, rest: Sequence[Value]
+    trace: Runner, callee: Callee, count: Value, state: Value, rest: Sequence[Value]
 ) -> Value:
     """`repeated` as a call of a generated function, with one that carries its derivatives along."""
     step = callee.source

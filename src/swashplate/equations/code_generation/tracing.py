@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from functools import reduce
 from inspect import Parameter, Signature
 from types import FunctionType, ModuleType
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, TypeVar
 
 from swashplate.equations import graph
 from swashplate.equations.code_generation.loops import (
@@ -23,6 +23,7 @@ from swashplate.equations.code_generation.loops import (
     root,
     solved,
 )
+from swashplate.equations.code_generation.runner import Callee
 from swashplate.equations.code_generation.values import (
     Flag,
     Tuple,
@@ -61,13 +62,6 @@ LOOPS = {
     "repeated": ("step, count, state", ("a state", "the number of the repetition"), repetition),
 }
 """What loops take ahead of the rest, what their equation takes ahead of it, how they are made."""
-
-
-class Callee(NamedTuple):
-    """An equation that is run, and what stands for others within it."""
-
-    source: Parsed
-    replacements: Replacements
 
 
 def callee_of(equation: Any, replacements: Replacements) -> Callee:

@@ -7,11 +7,18 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
-from swashplate.equations.code_generation.printing_c import Loops, scalar_function
-from swashplate.equations.code_generation.tracing import Trace
-from swashplate.equations.code_generation.values import Flag, Tuple, Value, arguments, leaves
+from swashplate.equations import parsed
+from swashplate.equations.code_generation import (
+    Flag,
+    Loops,
+    Trace,
+    Tuple,
+    Value,
+    arguments,
+    leaves,
+    scalar_function,
+)
 from swashplate.equations.graph import Node, names_in
-from swashplate.equations.language import parsed
 from swashplate.errors import EquationError
 
 

@@ -6,195 +6,42 @@ samples every part in the order of the flow, and then takes all states to the ne
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import cached_property
-from math import inf
-from typing import Any, get_type_hints
+from collections.abc import Iterator, Sequence
+from functools import cached_property, lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.equations import graph
-from swashplate.equations.code_generation.functions import GENERATING, Function
-from swashplate.equations.code_generation.printing import CodeBlock, function_source
-from swashplate.equations.code_generation.printing_c import (
+from swashplate.equations import (
+    Definition,
+    Instance,
+    Link,
+    SignalSource,
+    declared_by,
+    graph,
+    value_at,
+)
+from swashplate.equations.code_generation import (
+    GENERATING,
     C,
-    Loops,
+    CodeBlock,
+    Function,
+    Trace,
     c_name,
     first_line,
     function,
+    function_source,
     literal,
 )
-from swashplate.equations.code_generation.tracing import Trace
-from swashplate.equations.fields import Definition, declared_by, floats_of, value_at
 from swashplate.equations.graph import Node, names_in
-from swashplate.equations.language import plain
-from swashplate.equations.marching.march import SampleCode, output_of
-from swashplate.equations.marching.part_code import TapOf, taps_of
-from swashplate.equations.marching.run import Instance, module
-from swashplate.equations.model import Equation, Link, Model, SignalSource
-from swashplate.export.c_source.parts import PartInC, path_of
-from swashplate.export.c_source.structs import Structs, struct
+from swashplate.equations.marching import SampleCode, module, output_of
+from swashplate.export.c_source.exported import Exported
+from swashplate.export.c_source.layout import Layout, path_of
+from swashplate.export.c_source.parts import PartInC
+from swashplate.export.c_source.structs import struct
 
 Array = NDArray[np.float64]
-
-OWN = """
-number_at put_at is_finite all_finite in_range number_of placed seen constant_window before_all
-good_inputs put_inputs taken one_sample rested_start settled_start checked computed switched
-ranges value_table option_places parameter_names output_names input_names option_names name_of
-one_of flag_at put_flag input_ranges flag_places finite_outputs
-"""
-PUBLIC = """
-size value_count init reset settle step correct output limits set_input clear_input set get
-set_option get_option set_step get_step update find find_output find_input find_option
-parameter_name output_name sentence valid memory inputs measured value range
-"""
-"""Names that the interface takes, of its own and behind the prefix."""
-
-
-@dataclass(frozen=True)
-class Exported:
-    """A model as C: what its names are, and what goes beyond its equations."""
-
-    model: Model
-    prefix: str
-    """What all public names begin with: ``swp`` for ``swp_step``."""
-    title: str = ""
-    """First sentence of the header."""
-    parameters: Mapping[str, str] = field(default_factory=dict)
-    """Names of parameters by path; by default the paths, with ``_`` for dots."""
-    outputs: tuple[str, ...] = ()
-    """Signals that can be read; by default all."""
-    bounds: Mapping[str, float] = field(default_factory=dict)
-    """Largest magnitude of an input."""
-    ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    """Least and largest value of a measured input."""
-    stable: Mapping[int, Equation] = field(default_factory=dict)
-    """By part: margin above 0 where its equations bear the step, of ``p, h, options``."""
-    follows: Mapping[tuple[int, str], Equation] = field(default_factory=dict)
-    """By part and option: whether it is on, of ``p``; it cannot be set."""
-    internal: frozenset[str] = frozenset()
-    """Options that belong to the equations, and are not for users."""
-    longest: float = inf
-    """Longest step. [s]"""
-    free_step: str = ""
-    """Option without which the equations are for one step alone; none if empty."""
-
-    @property
-    def file(self) -> str:
-        """Name of header and source."""
-        own = self.prefix == c_name(self.model.name)
-        return self.prefix if own else f"swashplate_{self.model.name}"
-
-    @property
-    def type(self) -> str:
-        """Name of the struct."""
-        own = self.prefix == c_name(self.model.name)
-        return f"{self.prefix}_{'model' if own else self.model.name}"
-
-    # -- names -------------------------------------------------------------------------------------
-
-    @cached_property
-    def members(self) -> list[str]:
-        """Name of each part within the structs."""
-        return [c_name(part.name) for part in self.model.parts]
-
-    def named(self, kind: str) -> list[tuple[int, str, str]]:
-        """Part, path and name of every number of its parameters or givens."""
-        found = []
-        for part, path in self.model.places(kind):
-            full = f"{self.model.prefix(part)}{path}"
-            name = self.parameters.get(full) or full.replace(".", "_")
-            found.append((part, path, c_name(name)))
-        return found
-
-    @cached_property
-    def options(self) -> list[tuple[int, str]]:
-        """Part and name of every option."""
-        return [
-            (i, name)
-            for i, part in enumerate(self.model.parts)
-            if part.options is not None
-            for name in part.options._fields
-        ]
-
-    @cached_property
-    def switches(self) -> dict[tuple[int, str], list[str]]:
-        """By part and option: paths of the parameters that switch it on."""
-        found: dict[tuple[int, str], list[str]] = {}
-        for i, part in enumerate(self.model.parts):
-            for each in declared_by(part.parameters):
-                if each.switch:
-                    found.setdefault((i, each.switch), []).extend(each.fields)
-        return {key: paths for key, paths in found.items() if key in self.options}
-
-    @cached_property
-    def settable(self) -> list[tuple[int, str]]:
-        """Options that do not follow from parameters."""
-        follows = {*self.switches, *self.follows}
-        return [o for o in self.options if o not in follows and o[1] not in self.internal]
-
-    @cached_property
-    def signals(self) -> tuple[str, ...]:
-        """External signals that must be given."""
-        return tuple(name for name in self.model.external if name not in self.measured)
-
-    @cached_property
-    def measured(self) -> tuple[str, ...]:
-        """External signals for which a parameter stands where they are not given."""
-        found: dict[str, None] = {}
-        for i, part in enumerate(self.model.parts):
-            for name in part.input_types:
-                if self.model.link_of(i, name) is None and name in part.defaults:
-                    found[part.tap(name).signal] = None
-        return tuple(found)
-
-    @cached_property
-    def names(self) -> tuple[str, ...]:
-        """All outputs."""
-        every = self.outputs or (*self.model.every_signal, *self.model.integrals)
-        return tuple(dict.fromkeys(every))
-
-    @cached_property
-    def limits(self) -> list[tuple[int, str]]:
-        """Part and name of every limit."""
-        return [(part, name) for name, (part, _) in self.model.limit_bits.items()]
-
-    @cached_property
-    def flags(self) -> list[str]:
-        """Places in the struct of all that is true or false."""
-        options = [f"{self.members[i]}_options.{c_name(name)}" for i, name in self.options]
-        limits = [f"{self.members[i]}_limits.{c_name(name)}" for i, name in self.limits]
-        given = [f"inputs.measured[{k}].given" for k in range(max(len(self.measured), 1))]
-        return [*options, *limits, *given, "now.begun", "before.begun", "stale", "settled"]
-
-    @cached_property
-    def writer(self) -> Writer:
-        """What its C is written by."""
-        with GENERATING:
-            return Writer(self)
-
-    @property
-    def taps(self) -> tuple[TapOf, ...]:
-        """What is read through a line."""
-        return taps_of(self.model, self.model.external)
-
-    @cached_property
-    def lines(self) -> tuple[str, ...]:
-        """External signals that are kept in delay lines."""
-        return tuple(dict.fromkeys(each.tap.signal for each in self.taps))
-
-    @property
-    def settles(self) -> bool:
-        """Whether every part that remembers something has an equation for its steady state."""
-        return all(p.settled is not None or not floats_of(p.state) for p in self.model.parts)
-
-    @cached_property
-    def widest(self) -> int:
-        """Samples of the widest window."""
-        return max([each.tap.samples for each in self.taps], default=3)
-
 
 # --- source ---------------------------------------------------------------------------------------
 
@@ -204,8 +51,8 @@ class Writer:
 
     Attributes
     ----------
-    tags : list of dict
-        Tags of the structs of each part, by what they hold; parameters by nothing.
+    layout : Layout
+        Where the C keeps the model's numbers.
     parts : list of PartInC
         The parts of the model.
     core : list of str
@@ -214,21 +61,16 @@ class Writer:
 
     def __init__(self, exported: Exported) -> None:
         self.e, self.model = exported, exported.model
-        self.P = exported.prefix.upper()
-        own = {*OWN.split(), *(f"{exported.prefix}_{each}" for each in PUBLIC.split())}
-        own |= {exported.type, f"{exported.prefix}_window", f"{exported.prefix}_memory"}
-        self.structs, self.loops = Structs(exported.prefix, own), Loops(own)
+        self.layout = layout = Layout(exported)
+        self.P, self.structs, self.loops, self.tags = (
+            layout.P,
+            layout.structs,
+            layout.loops,
+            layout.tags,
+        )
         self.links: dict[str, str] = {}
         self._link_names: dict[str, str] = {}
-        self.tags: list[dict[str, str]] = []
-        for part in self.model.parts:
-            kinds = {"": part.parameters, "options": part.options, "given": part.given}
-            kinds |= {"signals": part.signals, "state": part.state}
-            if part.limits is not None:
-                kinds["limits"] = get_type_hints(plain(part.limits))["return"]
-            tags = {word: self.structs.of(kind) for word, kind in kinds.items() if kind}
-            self.tags.append(tags)
-        self.parts = [PartInC(self, i) for i in range(len(self.model.parts))]
+        self.parts = [PartInC(layout, i) for i in range(len(self.model.parts))]
         self.constants: list[str] = []
         """Structs of constants."""
         for each, tags in zip(self.parts, self.tags, strict=True):
@@ -256,21 +98,16 @@ class Writer:
         ends = [self._finite_states(), self._finite_outputs(), self._sample()]
         return [*self.loops.texts, *self.links.values(), *made, *ends]
 
-    def place(self, source: SignalSource, state: str) -> str:
-        """Where a signal of a part stands, or a number of its state."""
-        part, member = self.model.parts[source.part], self.e.members[source.part]
-        inside = part.signals is not None and source.signal in floats_of(part.signals)
-        where = f"m->{member}_signals" if inside else f"m->{state}.{member}"
-        return f"{where}.{path_of(source.signal)}"
-
     def _link(self, link: Link) -> str:
         """A signal that is made of those of several parts, at the last sample."""
         if link.equation is None:
-            return self.place(link.sources[0], "before")
+            return self.layout.place(link.sources[0], "before")
         name = c_name(link.name)
         if name not in self.links:
             trace = Trace(replacements=self.model.replacements)
-            sources = {each.signal: graph.name(self.place(each, "before")) for each in link.sources}
+            sources = {
+                each.signal: graph.name(self.layout.place(each, "before")) for each in link.sources
+            }
             value = trace.call(link.equation, sources)
             assert isinstance(value, Node)
             taken = {*self.loops.taken, "m"}
@@ -284,13 +121,6 @@ class Writer:
             self.links[name] = function(says, head, lines)
             self._link_names[name] = function_name
         return f"{self._link_names[name]}(m)"
-
-    def value_of(self, signal: str) -> str:
-        """Where the newest value of an external signal stands."""
-        own = c_name(signal)
-        if signal in self.e.measured:
-            return f"m->inputs.measured[{self.P}_INPUT_{own}].value"
-        return f"m->inputs.{own}"
 
     def _sampled(self) -> str:
         """A sample of each part."""
@@ -405,7 +235,7 @@ class Writer:
         stored, _ = output_of(self.model, name)
         if stored.kind == "link":
             return self._link(self.model.links[stored.path])
-        return self.place(SignalSource(stored.part, stored.path), "before")
+        return self.layout.place(SignalSource(stored.part, stored.path), "before")
 
     def ranges(self) -> Iterator[tuple[str, str, Definition]]:
         """Name, place and definition of each parameter."""
@@ -440,7 +270,7 @@ class Writer:
         lines: list[str] = []
         functions: dict[str, Function] = {}
         for part in self.parts:
-            own, called = part.prepared()
+            own, called = part.prepared(self.first_constant(part.number))
             lines += own
             functions |= called
         head = "prepare(params, given, options, h, constants)"
@@ -448,6 +278,13 @@ class Writer:
         inner = {name: text for each in functions.values() for name, text in each.texts.items()}
         texts = [*(f"@inlined\n{each}" for each in inner.values()), text]
         return module(f"{self.model.name}_constants", "\n\n".join(texts))["prepare"]
+
+
+@lru_cache(maxsize=16)
+def writer_of(exported: Exported) -> Writer:
+    """What the C of a model is written by."""
+    with GENERATING:
+        return Writer(exported)
 
 
 def numbers(exported: Exported, instance: Instance, step: float) -> Array:
@@ -458,7 +295,7 @@ def numbers(exported: Exported, instance: Instance, step: float) -> Array:
         if model.options is not None
         for each in part.options
     ]
-    writer = exported.writer
+    writer = writer_of(exported)
     constants = np.zeros(len(writer.constant_names()))
     flags = np.array(options, dtype=np.bool_)
     if constants.size:

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import inf
 
-from swashplate.equations.code_generation.printing_c import (
+from swashplate.equations import Definition
+from swashplate.equations.code_generation import (
     HELPERS,
     c_name,
     comment_line,
@@ -17,9 +18,9 @@ from swashplate.equations.code_generation.printing_c import (
     sections,
     wrapped,
 )
-from swashplate.equations.fields import Definition
-from swashplate.export.c_source.model import Exported
-from swashplate.export.c_source.parts import path_of
+from swashplate.export.c_source.exported import Exported
+from swashplate.export.c_source.layout import path_of
+from swashplate.export.c_source.model import writer_of
 
 TEXTS = sections(__package__, "interface.c.in")
 """Sections of the text around the equations, by name."""
@@ -35,7 +36,7 @@ class _Interface:
     """Fills the texts above."""
 
     def __init__(self, exported: Exported) -> None:
-        self.e, self.model, self.writer = exported, exported.model, exported.writer
+        self.e, self.model, self.writer = exported, exported.model, writer_of(exported)
         self.P = self.writer.P
         self.arguments = [c_name(name) for name in exported.signals]
         self.rows, self.numbers = list(self.writer.ranges()), self.writer.values()
@@ -197,7 +198,7 @@ class _Interface:
     def pushed(self) -> str:
         lines = [f"m->inputs.{name} = {name};" for name in self.arguments]
         for k, signal in enumerate(self.e.lines):
-            lines.append(f"m->line[{k}][m->newest] = {self.writer.value_of(signal)};")
+            lines.append(f"m->line[{k}][m->newest] = {self.writer.layout.value_of(signal)};")
         return _body(lines or ["(void)m;"])
 
     def moved(self) -> str:

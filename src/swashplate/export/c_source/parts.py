@@ -8,30 +8,35 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, get_type_hints
+from typing import Any, get_type_hints
 
-from swashplate.equations import graph
-from swashplate.equations.code_generation.functions import FUNCTIONS, RESERVED, Function, fresh_name
-from swashplate.equations.code_generation.printing import STEMS, CodeBlock, assigned
-from swashplate.equations.code_generation.printing_c import (
+from swashplate.equations import Equation, Parsed, SignalSource, arguments_of, graph
+from swashplate.equations.code_generation import (
+    FEW,
+    FUNCTIONS,
+    RESERVED,
+    STEMS,
     C,
+    CodeBlock,
+    Function,
+    Trace,
+    Tuple,
+    Value,
     as_double,
+    assigned,
     c_name,
+    fixed,
+    fresh_name,
     function,
+    leaves,
     literal,
     mentions,
+    undecided,
     without_comments,
 )
-from swashplate.equations.code_generation.scheduling import FEW
-from swashplate.equations.code_generation.tracing import Trace
-from swashplate.equations.code_generation.values import Tuple, Value, fixed, leaves, undecided
 from swashplate.equations.graph import LEAVES, MATH_FUNCTIONS, Node, names_in, ordered
-from swashplate.equations.language import Parsed
-from swashplate.equations.marching.part_code import PartCode
-from swashplate.equations.model import Equation, SignalSource, arguments_of
-
-if TYPE_CHECKING:
-    from swashplate.export.c_source.model import Writer
+from swashplate.equations.marching import PartCode
+from swashplate.export.c_source.layout import Layout, path_of
 
 LIBRARY = {*MATH_FUNCTIONS} - {"sqrt", "floor"}
 """Functions of which libraries differ in the last bit, or that take long."""
@@ -52,10 +57,10 @@ class PartInC:
         Names of its functions by their purposes.
     """
 
-    def __init__(self, writer: Writer, number: int) -> None:
-        self.w, self.number = writer, number
-        model = writer.e.model
-        self.own, self.member = model.parts[number], writer.e.members[number]
+    def __init__(self, layout: Layout, number: int) -> None:
+        self.layout, self.number = layout, number
+        model = layout.e.model
+        self.own, self.member = model.parts[number], layout.e.members[number]
         kind = self.own.options
         self.options: dict[str, Node] = {}
         self._symbols: Any = None
@@ -77,14 +82,14 @@ class PartInC:
             for tap in self.part.taps
         ]
         self.names = {
-            word: writer.loops.fresh(f"{self.member}_{word}")
+            word: layout.loops.fresh(f"{self.member}_{word}")
             for word in ("constants", "sample", "rest", "settled")
         }
         ends = [node for nodes in self.results.values() for _, node in nodes]
         ends += [] if self.part.margin is None else [self.part.margin]
         for node in ordered(ends):
             if node.op == "call":
-                writer.loops.name_of(node.value.loop, set())
+                layout.loops.name_of(node.value.loop, set())
         self._labels = self.labels(self.part.trace, ends)
         self.constants = self._constants(ends)
 
@@ -96,7 +101,7 @@ class PartInC:
 
     def _trace(self, trace: Trace) -> None:
         """Run the equations of a sample on symbols."""
-        model = self.w.e.model
+        model = self.layout.e.model
         self.part = PartCode(model, self.number, model.external, self._symbols, trace=trace)
         self.results = self._results()
 
@@ -169,15 +174,15 @@ class PartInC:
         known |= {node: f"state->{path_of(path)}" for path, node in leaves(self.part.state)}
         known |= {node: f"options->{c_name(name)}" for name, node in self.options.items()}
         known |= {node: f"k->{name}" for node, name in self.constants.items()}
-        for i, part in enumerate(self.w.e.model.parts[: self.number]):
+        for i, part in enumerate(self.layout.e.model.parts[: self.number]):
             for path in part.signal_names:
                 source = SignalSource(i, path)
-                known[graph.name(self.part.source(source))] = self.w.place(source, "before")
+                known[graph.name(self.part.source(source))] = self.layout.place(source, "before")
         return known
 
     def pointers(self) -> dict[str, str]:
         """Declarations of what a function reads and writes, by the names that they make."""
-        member, tags = self.member, self.w.tags[self.number]
+        member, tags = self.member, self.layout.tags[self.number]
         found = {"p": f"const struct {tags['']} *p = &m->{member};"}
         for word, name in (("constants", "k"), ("options", "options"), ("given", "given")):
             if word in tags:
@@ -203,11 +208,11 @@ class PartInC:
         `inputs` are values that get their names ahead, each with its name and its text. The `last`
         of all is returned. `pointers` are further declarations, or others, by name.
         """
-        taken = {*self.w.loops.taken, *OWN, *self.windows}
+        taken = {*self.layout.loops.taken, *OWN, *self.windows}
         names = {node: fresh_name(name, taken) for node, (name, _) in inputs.items()}
         nodes = [node for each in results.values() for _, node in each]
         nodes += [last] if last is not None else []
-        language = C(self.w.loops, trace.origins, taken)
+        language = C(self.layout.loops, trace.origins, taken)
         labels = self.labels(trace, nodes)
         block = CodeBlock(nodes, labels, taken, known={**known, **names}, language=language)
         lines, texts = language.headed(block.lines), iter(block.texts)
@@ -234,9 +239,9 @@ class PartInC:
 
         At a `start` what is read through a line has its value before the record.
         """
-        w, model = self.w, self.w.e.model
+        layout, model = self.layout, self.layout.e.model
         places, named = dict[Node, str](), dict[Node, tuple[str, str]]()
-        before = {each: f"m->before_record[{k}]" for k, each in enumerate(w.e.lines)}
+        before = {each: f"m->before_record[{k}]" for k, each in enumerate(layout.e.lines)}
         for tap, window in zip(self.part.taps, self.windows, strict=True):
             for j, name in enumerate(self.part.tap_samples(tap)):
                 signal = tap.tap.signal
@@ -249,20 +254,22 @@ class PartInC:
                 continue
             if link is not None:
                 if link.equation is None:
-                    named[node] = c_name(name), w.place(link.sources[0], "before")
+                    named[node] = c_name(name), layout.place(link.sources[0], "before")
                 continue
-            text = w.value_of(signal)
+            text = layout.value_of(signal)
             if name in self.own.taps:
                 text = before[signal] if start else self._looked(node, places)
             if default is not None:
-                given = f"m->inputs.measured[{w.P}_INPUT_{c_name(signal)}].given"
+                given = f"m->inputs.measured[{layout.P}_INPUT_{c_name(signal)}].given"
                 text = f"{given} ? {text} : p->{path_of(default)}"
             named[node] = c_name(name), text
         return places, named
 
     def _looked(self, value: Node, places: Mapping[Node, str]) -> str:
         """What a tap makes of its window, as one expression."""
-        block = CodeBlock([value], {}, set(), known=places, language=C(self.w.loops, {}, set()))
+        block = CodeBlock(
+            [value], {}, set(), known=places, language=C(self.layout.loops, {}, set())
+        )
         assert not block.lines
         return block.texts[0]
 
@@ -277,9 +284,9 @@ class PartInC:
         lines = self.body(self.part.trace, self.results, known, named, holds)
         text = without_comments("\n".join(lines))
         idle = [name for name in ("next", *windows) if not mentions(text, name)]
-        tag = self.w.tags[self.number]["state"]
-        formals = [f"{self.w.e.type} *m", f"struct {tag} *next"]
-        formals += [f"const struct {self.w.e.prefix}_window *{each}" for each in windows]
+        tag = self.layout.tags[self.number]["state"]
+        formals = [f"{self.layout.e.type} *m", f"struct {tag} *next"]
+        formals += [f"const struct {self.layout.e.prefix}_window *{each}" for each in windows]
         back = "void" if margin is None else "bool"
         head = f"static {back} {self.names['sample']}({', '.join(formals)})"
         says = f"A sample of the {self.own.name}: what is known at it, and the state at the next."
@@ -290,8 +297,8 @@ class PartInC:
         """The state at the first sample."""
         equation = self.own.settled if settled else self.own.rest
         word = "settled" if settled else "rest"
-        head = f"static void {self.names[word]}({self.w.e.type} *m)"
-        tag = self.w.tags[self.number]["state"]
+        head = f"static void {self.names[word]}({self.layout.e.type} *m)"
+        tag = self.layout.tags[self.number]["state"]
         pointer = f"struct {tag} *next = &m->now.{self.member};"
         if equation is not None:
             places, named = self.inputs(start=True)
@@ -313,13 +320,13 @@ class PartInC:
 
     def computed(self) -> str:
         """Constants of these parameters, options and this step."""
-        head = f"static void {self.names['constants']}({self.w.e.type} *m)"
+        head = f"static void {self.names['constants']}({self.layout.e.type} *m)"
         known = self.places()
         results = []
         for node, name in self.constants.items():
             del known[node]
             results.append((name, node))
-        tag = self.w.tags[self.number]["constants"]
+        tag = self.layout.tags[self.number]["constants"]
         pointer = f"struct {tag} *k = &m->{self.member}_constants;"
         lines = self.body(self.part.trace, {"k": results}, known, {}, pointers={"k": pointer})
         says = f"What follows from the parameters of the {self.own.name}, its options and the step."
@@ -334,11 +341,11 @@ class PartInC:
         lines = self.body(trace, {}, known, {}, value)
         back = "bool" if value.kind == "bool" else "double"
         says = (equation.__doc__ or "").strip().partition("\n")[0]
-        return function(says, f"static {back} {name}(const {self.w.e.type} *m)", lines)
+        return function(says, f"static {back} {name}(const {self.layout.e.type} *m)", lines)
 
     # -- numbers -----------------------------------------------------------------------------------
 
-    def prepared(self) -> tuple[list[str], dict[str, Function]]:
+    def prepared(self, first: int) -> tuple[list[str], dict[str, Function]]:
         """Lines of Python that compute the constants, and the functions that these call.
 
         They read ``params``, ``given``, ``options`` and ``h``, and fill ``constants``.
@@ -346,22 +353,16 @@ class PartInC:
         taken = {*FUNCTIONS, *RESERVED, "params", "given", "options", "h", "constants", "prepare"}
         known = {}
         for array, value in (("params", self.part.p), ("given", self.part.given)):
-            places = self.w.e.model.places("parameters" if array == "params" else "given")
+            places = self.layout.e.model.places("parameters" if array == "params" else "given")
             for path, node in leaves(value):
                 known[node] = f"{array}[{places.index((self.number, path))}]"
         for name, node in self.options.items():
-            known[node] = f"options[{self.w.e.options.index((self.number, name))}]"
+            known[node] = f"options[{self.layout.e.options.index((self.number, name))}]"
         block = CodeBlock([*self.constants], self._labels, taken, known=known)
-        first = self.w.first_constant(self.number)
         lines = [*block.lines]
         for k, text in enumerate(block.texts):
             lines += assigned(f"constants[{first + k}]", text)
         return lines, block.functions
-
-
-def path_of(path: str) -> str:
-    """A path of Python's as one of C's."""
-    return ".".join(c_name(each) for each in path.split("."))
 
 
 def formulas(trace: Trace) -> set[Parsed]:

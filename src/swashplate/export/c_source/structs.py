@@ -7,10 +7,8 @@ import re
 from collections.abc import Iterable
 from typing import Any, get_type_hints
 
-from swashplate.equations.code_generation.functions import fresh_name
-from swashplate.equations.code_generation.printing_c import c_name, comment, comment_line
-from swashplate.equations.fields import definition_of
-from swashplate.equations.language import is_named_tuple
+from swashplate.equations import definition_of, is_named_tuple
+from swashplate.equations.code_generation import c_name, comment, comment_line, fresh_name
 
 
 class Structs:

@@ -1,1 +1,6 @@
 """Whether data and model are sound: checks, causes of errors, discrepancy, and the verdict."""
+
+import lazy_loader
+
+# what other packages use besides the names of the package above
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

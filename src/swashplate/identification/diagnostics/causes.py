@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_banded
 
-from swashplate.campaign.experiment import Experiment
+from swashplate.campaign import Experiment
 from swashplate.errors import DomainError, InputError, ParameterError
 from swashplate.identification.estimation.drive_model import (
     CURRENTS,
@@ -33,7 +33,7 @@ from swashplate.identification.statistics.effects import (
     source_of,
 )
 from swashplate.identification.validation import percent
-from swashplate.parameters.definitions import CATALOGUE, COLUMNS, SWITCHES
+from swashplate.parameters import CATALOGUE, COLUMNS, SWITCHES
 from swashplate.results import Result
 from swashplate.units import display_unit
 

@@ -9,9 +9,11 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.campaign.campaign import Campaign
-from swashplate.campaign.experiment import Channel, Experiment
-from swashplate.campaign.quality import (
+from swashplate.campaign import (
+    SIGNALS,
+    Campaign,
+    Channel,
+    Experiment,
     beyond_the_card,
     spiked,
     turned,
@@ -22,7 +24,6 @@ from swashplate.drive import Simulation
 from swashplate.errors import InputError, UnsoundDataError
 from swashplate.identification.estimation.drive_model import (
     CURRENTS,
-    SIGNALS,
     kinds_of,
     simulated_run,
 )
@@ -31,8 +32,7 @@ from swashplate.identification.estimation.model_setup import ModelSetup
 from swashplate.identification.estimation.problem import Loss, Problem
 from swashplate.identification.estimation.setup import FitSetup
 from swashplate.identification.estimation.stages import smooth
-from swashplate.parameters.parameter_set import ParameterSet
-from swashplate.parameters.rules import FULL_VOLTAGE
+from swashplate.parameters import FULL_VOLTAGE, ParameterSet
 from swashplate.tables import count
 
 Array = NDArray[np.float64]

@@ -20,8 +20,7 @@ from scipy.optimize import nnls
 from scipy.signal import fftconvolve
 from scipy.special import stdtrit
 
-from swashplate.campaign.experiment import Experiment
-from swashplate.campaign.recognition import UNNAMED
+from swashplate.campaign import UNNAMED, Experiment
 from swashplate.identification.estimation.problem import LinearisedFit, LinearisedRun
 from swashplate.identification.stage_fit import StageFit
 from swashplate.identification.validation import RunQuality

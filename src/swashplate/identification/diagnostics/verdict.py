@@ -8,7 +8,7 @@ from html import escape
 from math import isinf, isnan, nan
 from typing import get_args
 
-from swashplate.campaign.experiment import Channel, Experiment
+from swashplate.campaign import SIGNALS, Channel, Experiment
 from swashplate.errors import DomainError, InputError
 from swashplate.identification.diagnostics.causes import Cause, causes_of, fixed_numbers
 from swashplate.identification.diagnostics.data_checks import Finding
@@ -22,7 +22,6 @@ from swashplate.identification.diagnostics.soundness import unsound_data
 from swashplate.identification.estimation.drive_model import (
     LIMIT_COLUMNS,
     LIMITS,
-    SIGNALS,
     DriveModel,
     limits_reached,
 )
@@ -30,7 +29,7 @@ from swashplate.identification.estimation.solving import Solution
 from swashplate.identification.stage_fit import StageFit
 from swashplate.identification.statistics.determination import WIDE, weak_unknowns
 from swashplate.identification.validation import RunQuality, percent
-from swashplate.parameters.definitions import COLUMNS
+from swashplate.parameters import COLUMNS
 from swashplate.results import Result, listing
 from swashplate.tables import UNIT, Column, Table, listed
 

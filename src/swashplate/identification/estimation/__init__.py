@@ -1,1 +1,6 @@
 """What a fit is to find, of which model, from which runs, and the solver that finds it."""
+
+import lazy_loader
+
+# what other packages use besides the names of the package above
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

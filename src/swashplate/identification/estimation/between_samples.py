@@ -12,8 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from swashplate.campaign.experiment import Experiment
-from swashplate.campaign.schema import Between
+from swashplate.campaign import Between, Experiment
 from swashplate.errors import DomainError
 from swashplate.identification.estimation.model import EquationModel
 from swashplate.identification.estimation.problem import Loss

@@ -12,11 +12,18 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.campaign import ChannelKind
-from swashplate.campaign.experiment import APART, RISE, Channel, Edge, Experiment, InputSignal
-from swashplate.campaign.samples import signed_by_command
-from swashplate.campaign.schema import CURRENTS as CURRENTS
-from swashplate.campaign.schema import SIGNALS as SIGNALS
+from swashplate.campaign import (
+    APART,
+    RISE,
+    SIGNALS,
+    Channel,
+    ChannelKind,
+    Edge,
+    Experiment,
+    InputSignal,
+    signed_by_command,
+)
+from swashplate.campaign import CURRENTS as CURRENTS
 from swashplate.drive import (
     PRESSURE_PATH,
     START,
@@ -28,12 +35,14 @@ from swashplate.drive import (
     simulate_drive,
 )
 from swashplate.equations import BoundModel
-from swashplate.equations.marching.observation import Observation, ObservedRecord, RunValues
-from swashplate.equations.marching.record import (
+from swashplate.equations.marching import (
     SLOWEST,
     SOURCE_RATE,
     Interpolation,
+    Observation,
+    ObservedRecord,
     Record,
+    RunValues,
     even_rate,
     record_of,
 )
@@ -42,7 +51,7 @@ from swashplate.identification.estimation.model import EquationModel, Simulation
 from swashplate.identification.estimation.problem import Problem
 from swashplate.identification.estimation.setup import Forces
 from swashplate.identification.estimation.unknowns import Prior, Unknown, Unknowns, zero_name
-from swashplate.parameters.parameter_set import ParameterSet
+from swashplate.parameters import ParameterSet
 from swashplate.results import Result
 
 Array = NDArray[np.float64]

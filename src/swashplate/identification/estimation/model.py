@@ -11,13 +11,18 @@ from typing import Any, NamedTuple, Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.campaign.experiment import Edge, Experiment
-from swashplate.equations import BoundModel, instance_of, parameter_paths, state_paths
+from swashplate.campaign import Edge, Experiment
+from swashplate.equations import BoundModel, instance_of, made, parameter_paths, state_paths
 from swashplate.equations import Model as Equations
-from swashplate.equations.fields import made
-from swashplate.equations.marching.layout import started_by
-from swashplate.equations.marching.observation import Observation, ObservedRecord, RunValues
-from swashplate.equations.marching.record import Record, even_rate, on_grid
+from swashplate.equations.marching import (
+    Observation,
+    ObservedRecord,
+    Record,
+    RunValues,
+    even_rate,
+    on_grid,
+    started_by,
+)
 from swashplate.errors import DomainError, InputError
 from swashplate.results import Result, short
 

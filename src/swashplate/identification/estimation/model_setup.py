@@ -14,11 +14,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.campaign.experiment import Experiment
+from swashplate.campaign import Experiment
 from swashplate.documents import validated
 from swashplate.equations import Model as Equations
-from swashplate.equations.fields import check_mapping, is_real
-from swashplate.equations.model import parameter_paths
+from swashplate.equations import check_mapping, is_real, parameter_paths
 from swashplate.errors import (
     FileError,
     InputError,
@@ -39,7 +38,7 @@ from swashplate.identification.estimation.setup import (
 )
 from swashplate.identification.estimation.solving import solve
 from swashplate.identification.estimation.unknowns import Unknown, Unknowns, zero_name
-from swashplate.parameters.plausible import check_plausible
+from swashplate.parameters import check_plausible
 from swashplate.results import Result
 
 Array = NDArray[np.float64]

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeVar, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.campaign.experiment import Channel, Experiment
+from swashplate.campaign import Channel, Experiment
 from swashplate.equations import Model as OfEquations
-from swashplate.equations.marching.observation import ObservedRecord
+from swashplate.equations.marching import ObservedRecord
 from swashplate.errors import InputError
 from swashplate.identification.estimation.arrow import (
     ArrowFactor,

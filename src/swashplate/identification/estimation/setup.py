@@ -17,19 +17,16 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import AfterValidator, Field, model_validator
 
-from swashplate.campaign import ChannelKind
-from swashplate.campaign.schema import LARGEST_PRESSURE, TimeWindow, WeightWindow
+from swashplate.campaign import LARGEST_PRESSURE, ChannelKind, TimeWindow, WeightWindow
 from swashplate.documents import parse_toml, read_text, validated
 from swashplate.entries import FileTable, Finite, Flag, NotNegative, Positive
-from swashplate.equations.fields import is_real
+from swashplate.equations import is_real
 from swashplate.errors import (
     ParameterError,
     meant,
 )
 from swashplate.identification.estimation.unknowns import Prior, Unknown
-from swashplate.parameters.definitions import Definitions
-from swashplate.parameters.parameter_set import ParameterSet
-from swashplate.parameters.rules import SIDES
+from swashplate.parameters import SIDES, Definitions, ParameterSet
 
 Array = NDArray[np.float64]
 _SETUPS = files("swashplate.identification").joinpath("setups")

@@ -15,12 +15,10 @@ from typing import Literal, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.campaign import applying, inside
-from swashplate.campaign.campaign import Campaign
-from swashplate.campaign.experiment import Experiment
+from swashplate.campaign import Campaign, Experiment, applying, inside
 from swashplate.documents import validated
 from swashplate.drive import Drive
-from swashplate.equations.marching.record import Record
+from swashplate.equations.marching import Record
 from swashplate.errors import InputError, UnknownParameterError
 from swashplate.executors import available_cores
 from swashplate.identification.estimation.drive_model import (
@@ -49,10 +47,15 @@ from swashplate.identification.estimation.setup import (
     setup_names,
 )
 from swashplate.identification.estimation.unknowns import Unknown, Unknowns, bounded
-from swashplate.parameters.definitions import DEFINITIONS, SWITCHES, Definition, Definitions
-from swashplate.parameters.parameter_set import ParameterSet
-from swashplate.parameters.plausible import check_plausible
-from swashplate.parameters.rules import FULL_VOLTAGE
+from swashplate.parameters import (
+    DEFINITIONS,
+    FULL_VOLTAGE,
+    SWITCHES,
+    Definition,
+    Definitions,
+    ParameterSet,
+    check_plausible,
+)
 
 Array = NDArray[np.float64]
 Parameters = ParameterSet | ModelSetup

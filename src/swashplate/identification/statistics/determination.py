@@ -19,8 +19,7 @@ from swashplate.identification.estimation.unknowns import Unknown, Unknowns
 from swashplate.identification.stage_fit import StageFit, once_per_stage
 from swashplate.identification.statistics.intervals import estimates_of, uncertainty_of
 from swashplate.models.displacement_control import FORCE, MOTION, PRESSURE, TRAVEL, ZERO
-from swashplate.parameters.definitions import CATALOGUE, DEFINITIONS
-from swashplate.parameters.parameter_set import ParameterSet
+from swashplate.parameters import CATALOGUE, DEFINITIONS, ParameterSet
 from swashplate.results import Result
 from swashplate.tables import listed
 

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.campaign.experiment import Channel, Experiment, resolution_of_inputs
+from swashplate.campaign import Channel, Experiment, resolution_of_inputs
 from swashplate.identification.estimation.drive_model import (
     CURRENTS,
     DriveModel,

@@ -17,8 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.campaign import KINDS, ChannelKind
-from swashplate.campaign.experiment import Channel, Experiment, InputSignal, SignalOrigin
+from swashplate.campaign import KINDS, Channel, ChannelKind, Experiment, InputSignal, SignalOrigin
 from swashplate.drive import Drive
 from swashplate.errors import InputError
 from swashplate.identification.estimation.arrow import dense_factor, triangular_factor, whitening
@@ -36,9 +35,14 @@ from swashplate.identification.estimation.unknowns import Unknowns
 from swashplate.identification.noise import spectral_covariance
 from swashplate.identification.statistics.determination import Identifiability, identifiability
 from swashplate.maneuvers import Maneuver, multisine, ramp, sine, stairs, step
-from swashplate.parameters.definitions import CATALOGUE, COLUMNS
-from swashplate.parameters.parameter_set import HasParameters, ParameterSet, set_of
-from swashplate.parameters.rules import FULL_VOLTAGE
+from swashplate.parameters import (
+    CATALOGUE,
+    COLUMNS,
+    FULL_VOLTAGE,
+    HasParameters,
+    ParameterSet,
+    set_of,
+)
 from swashplate.results import Result
 from swashplate.rig import COUNTS_PER_TURN
 from swashplate.tables import Column, Table, listed

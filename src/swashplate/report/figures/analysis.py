@@ -28,7 +28,7 @@ from swashplate.analysis import (
 )
 from swashplate.drive import Limit, Simulation
 from swashplate.errors import InputError
-from swashplate.parameters.rules import FULL_VOLTAGE
+from swashplate.parameters import FULL_VOLTAGE
 from swashplate.report.lines import (
     COLUMNS,
     SHADES,

@@ -13,7 +13,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
 from swashplate.errors import InputError
-from swashplate.identification.validation import with_speeds
+from swashplate.identification import with_speeds
 from swashplate.report.lines import (
     COARSE,
     GAP_MARK,
@@ -57,7 +57,7 @@ from swashplate.units import DisplayUnit, display_unit
 
 if TYPE_CHECKING:
     from swashplate.campaign import BlockRanges, Channel, Experiment, InputSignal, Overview
-    from swashplate.identification.validation import RunQuality
+    from swashplate.identification import RunQuality
 
 # --- pages of a campaign --------------------------------------------------------------------------
 

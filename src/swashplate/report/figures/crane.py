@@ -12,9 +12,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 from numpy.typing import NDArray
 
-from swashplate.crane import Crane, CraneRun, Followable, Hull, Seaway, Sweep
-from swashplate.crane.closed_loop.result import named_runs
-from swashplate.crane.sea.confidence import rms_of
+from swashplate.crane import Crane, CraneRun, Followable, Hull, Seaway, Sweep, named_runs
+from swashplate.crane.sea import rms_of
 from swashplate.drive import Limit
 from swashplate.report import style
 from swashplate.report.lines import SHADES, draw, fit_time, shade_handle, stretches

@@ -17,9 +17,8 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, NullLoca
 from numpy.typing import NDArray
 
 from swashplate.crane import LIMITED, AssessedQuantity, Assessment, Hull, Operability
-from swashplate.crane.sea.confidence import rms_of
-from swashplate.crane.studies.operating import WORKABLE, label_of
-from swashplate.crane.studies.study import NONE
+from swashplate.crane.sea import rms_of
+from swashplate.crane.studies import NONE, WORKABLE, label_of
 from swashplate.report import style
 from swashplate.report.figures.crane import assumed, remark, remarks, seaway_words
 from swashplate.results import GivenAxes

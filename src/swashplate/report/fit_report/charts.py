@@ -8,8 +8,7 @@ import numpy as np
 from markupsafe import Markup
 from numpy.typing import NDArray
 
-from swashplate.identification.estimation.unknowns import Unknown
-from swashplate.identification.statistics.profiles import Profile
+from swashplate.identification import Profile, Unknown
 from swashplate.report.lines import thinned
 
 Array = NDArray[np.float64]

@@ -10,24 +10,36 @@ from pathlib import Path
 
 from markupsafe import Markup
 
-from swashplate.campaign import Campaign, Overview, examine, quality_table
-from swashplate.campaign.schema import WeightWindow
+from swashplate.campaign import Campaign, Overview, WeightWindow, examine, quality_table
 from swashplate.drive import Drive
 from swashplate.errors import InputError
-from swashplate.identification import tables
-from swashplate.identification.assessment import Identification, motion_of
-from swashplate.identification.diagnostics.verdict import Verdict, assess_fit, starts_of
-from swashplate.identification.estimation.model_setup import ModelSetup
-from swashplate.identification.estimation.solving import Solution
-from swashplate.identification.estimation.stages import Parameters
-from swashplate.identification.fitting import Fit
-from swashplate.identification.resampling import CrossValidation, folds_tables
-from swashplate.identification.stage_fit import StageFit
-from swashplate.identification.statistics.determination import Identifiability, identifiability_of
-from swashplate.identification.statistics.intervals import uncertainty_of
-from swashplate.identification.statistics.profiles import Profile
-from swashplate.identification.validation import RunQuality, at_instants, percent
-from swashplate.parameters.parameter_set import ParameterSet
+from swashplate.identification import (
+    CrossValidation,
+    Fit,
+    Identifiability,
+    Identification,
+    ModelSetup,
+    Profile,
+    RunQuality,
+    Solution,
+    StageFit,
+    Verdict,
+    assess_fit,
+    at_instants,
+    estimates_table,
+    fixed_table,
+    folds_tables,
+    identifiability_of,
+    motion_of,
+    percent,
+    runs_tables,
+    scales_words,
+    truth_count,
+    uncertainty_of,
+)
+from swashplate.identification.diagnostics import starts_of
+from swashplate.identification.estimation import Parameters
+from swashplate.parameters import ParameterSet
 from swashplate.report.fit_report import charts
 from swashplate.report.fit_report.html_page import (
     PageBlock,
@@ -240,9 +252,7 @@ def _agreement_section(
             links,
             look=look != "good",
         )
-    agreement = [
-        t for role in ("fit", "validate") for t in tables.runs_tables(_qualities(runs, role))
-    ]
+    agreement = [t for role in ("fit", "validate") for t in runs_tables(_qualities(runs, role))]
     words = (
         "RMSE is the root of the mean squared difference of the samples that count; NRMSE is RMSE "
         "over the standard deviation of what was measured; fit % is 100 (1 − NRMSE). Error / range "
@@ -358,7 +368,7 @@ def _stage_words(fit: StageFit) -> list[str]:
     if stage.part == "pump":
         words.append(f"The current is the {stage.current} one.")
     words.append(f"Fits {listed(list(problem.channels))}.")
-    words.append(tables.scales_words(fit))
+    words.append(scales_words(fit))
     for kind, windows in stage.weights.items():
         words += [f"Weight on {kind.replace('_', ' ')}: {_window(window)}." for window in windows]
     of_runs = sum(unknown.run is not None for unknown in problem.unknowns)
@@ -403,14 +413,14 @@ def _verdict_section(judged: Verdict, findings: int) -> Section:
 
 
 def _parameter_section(fit: Fit, stages: Sequence[StageFit], truth: ParameterSet | None) -> Section:
-    estimates = [tables.estimates_table(stage, truth=truth) for stage in stages]
+    estimates = [estimates_table(stage, truth=truth) for stage in stages]
     words = (
         "Change is from the nominal value. Intervals are for residuals that are correlated over "
         "time. A parameter at a bound has no symmetric interval. Parameter files have SI units."
     )
     blocks = [text(words)]
     if truth is not None:
-        inside, counted = tables.truth_count(estimates)
+        inside, counted = truth_count(estimates)
         blocks.append(
             text(
                 "Truth is what was simulated. Fixed parameters that are not true shift the "
@@ -419,13 +429,13 @@ def _parameter_section(fit: Fit, stages: Sequence[StageFit], truth: ParameterSet
         )
     for table, stage in zip(estimates, stages, strict=True):
         blocks += titled(table, "parameters")
-        of_runs = tables.estimates_table(stage, own=True)
+        of_runs = estimates_table(stage, own=True)
         if of_runs.rows:
             summary = f"{count(len(of_runs.rows), 'parameter')} of single runs"
             blocks.append(
                 PageBlock("details", [PageBlock("table", of_runs, "parameters")], summary)
             )
-    fixed = tables.fixed_table(fit.stages, truth)
+    fixed = fixed_table(fit.stages, truth)
     blocks += titled(fixed, "held") if fixed.rows else []
     return Section("parameters", "Parameters", blocks)
 

@@ -12,18 +12,24 @@ from zlib import compress
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.analysis.design_variables import DESIGN_VARIABLES
-from swashplate.campaign import Campaign, Channel, Experiment
-from swashplate.campaign.speed import DIFFERENTIATOR, LOW_PASS, speed_of
+from swashplate.analysis import DESIGN_VARIABLES
+from swashplate.campaign import (
+    DIFFERENTIATOR,
+    LOW_PASS,
+    SIGNALS,
+    Campaign,
+    Channel,
+    Experiment,
+    speed_of,
+)
 from swashplate.drive import Drive, Limit
-from swashplate.equations.marching.record import Record, record_of
+from swashplate.equations.marching import Record, record_of
 from swashplate.errors import InputError
-from swashplate.export import exported_drive, values_of
-from swashplate.export.libraries import WASM, packaged
-from swashplate.identification.estimation.drive_model import SIGNALS, at_rate_of, voltage_record
-from swashplate.identification.validation import at_instants, ignored_windows
+from swashplate.export import WASM, exported_drive, packaged, values_of
+from swashplate.identification import at_instants, ignored_windows
+from swashplate.identification.estimation import at_rate_of, voltage_record
 from swashplate.maneuvers import Maneuver
-from swashplate.parameters.parameter_set import HasParameters, Parameter, ParameterSet, set_of
+from swashplate.parameters import HasParameters, Parameter, ParameterSet, set_of
 from swashplate.report.fit_report.html_page import LIVE_SCRIPTS, rendered, script_json
 from swashplate.report.fit_report.runs import packed_samples
 from swashplate.report.lines import SHADES, gap_rows

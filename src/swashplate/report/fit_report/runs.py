@@ -13,9 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.campaign import Channel, Experiment
-from swashplate.identification.stage_fit import StageFit
-from swashplate.identification.tables import ignored_words, start_words
-from swashplate.identification.validation import RunQuality, ignored_windows, with_speeds
+from swashplate.identification import (
+    RunQuality,
+    StageFit,
+    ignored_windows,
+    ignored_words,
+    start_words,
+    with_speeds,
+)
 from swashplate.report.lines import gap_rows, thinned
 from swashplate.report.style import in_lines
 from swashplate.tables import quantity, write_table

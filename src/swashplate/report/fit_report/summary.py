@@ -23,17 +23,9 @@ from swashplate.analysis import (
 from swashplate.campaign import Campaign
 from swashplate.drive import Drive
 from swashplate.errors import SwashplateError
-from swashplate.identification.diagnostics.verdict import Verdict
-from swashplate.identification.stage_fit import StageFit
-from swashplate.identification.statistics.determination import weak_unknowns
-from swashplate.identification.statistics.intervals import unseen_limits
-from swashplate.identification.validation import (
-    following,
-    percent,
-    pooled,
-    range_of,
-)
-from swashplate.parameters.rules import FULL_VOLTAGE
+from swashplate.identification import StageFit, Verdict, following, percent, pooled, range_of
+from swashplate.identification.statistics import unseen_limits, weak_unknowns
+from swashplate.parameters import FULL_VOLTAGE
 from swashplate.report.fit_report.html_page import PageBlock, Section, listed_block, text
 from swashplate.report.fit_report.runs import ShownRun
 from swashplate.tables import NONE, UNIT, Cell, Column, Table, count, listed

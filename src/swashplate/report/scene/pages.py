@@ -8,9 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from swashplate.crane import CraneRun
-from swashplate.crane.axes import RATE
-from swashplate.crane.closed_loop.result import named_runs
+from swashplate.crane import RATE, CraneRun, named_runs
 from swashplate.errors import InputError
 from swashplate.report.fit_report.html_page import rendered, script_json
 from swashplate.tables import write_text

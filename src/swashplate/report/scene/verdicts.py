@@ -10,12 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from markupsafe import Markup
 
-from swashplate.crane import Assessment, Crane, Hull, Operability, Seaway, follow
-from swashplate.crane.axes import AXES
-from swashplate.crane.drives import UNUSABLE
-from swashplate.crane.studies.crane_assessment import Decision
-from swashplate.crane.studies.operating import WORKABLE, label_of
-from swashplate.crane.studies.study import NONE
+from swashplate.crane import AXES, UNUSABLE, Assessment, Crane, Hull, Operability, Seaway, follow
+from swashplate.crane.studies import NONE, WORKABLE, Decision, label_of
 from swashplate.errors import DomainError, InputError
 from swashplate.report.fit_report.html_page import (
     PageBlock,

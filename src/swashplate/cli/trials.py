@@ -1,0 +1,162 @@
+"""Commands that a drive gets, named maneuvers or logs, and its runs under them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from difflib import get_close_matches
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from swashplate.cli.parsing import KIND_NAMES, file_kind
+from swashplate.errors import InputError
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from swashplate.analysis import Trial
+    from swashplate.cli.options import CommandSampling, Simulating, Start
+    from swashplate.drive import Drive, Simulation
+    from swashplate.maneuvers import Maneuver
+
+_ENDING = re.compile(r"\.[A-Za-z]\w*$")
+
+
+def named_maneuver(word: str, *drives: Drive) -> Maneuver:
+    """A maneuver such as ``step:9``, or the thesis's test of that name for these drives."""
+    from swashplate.maneuvers import parse, source_tests
+    from swashplate.parameters import AXES
+
+    axes = [drive.name for drive in drives if drive.name in AXES]
+    tests = {name: test for axis in reversed(axes) for name, test in source_tests(axis).items()}
+    if word in tests:
+        return tests[word]
+    try:
+        return parse(word)
+    except InputError as error:
+        if ":" in word or not tests:
+            raise
+        sentence = str(error).rstrip(".")
+        near = get_close_matches(word, tests, 1) or [*tests]
+        raise InputError(
+            f'{sentence}; or name one of the tests of {" or ".join(axes)}, such as "{near[0]}".'
+        ) from None
+
+
+def at_rate(drive: Drive, rate: float) -> Drive:
+    """The drive for a rate: a recursion for another one becomes its equation, said in a note."""
+    from swashplate.cli.terminal import note
+    from swashplate.equations.marching import least_substeps
+
+    filter_rate, marched = drive.parameters.rate, rate * least_substeps(rate)
+    if filter_rate is None or abs(marched / filter_rate - 1.0) < 1e-9:
+        return drive
+    steps = "" if marched == rate else f", computed in steps of 1/{marched:g} s,"
+    note(
+        f"{drive.name}: the card's filter is a recursion for {filter_rate:g} Hz; at {rate:g} "
+        f"Hz{steps} the differential equation with the same poles replaces it."
+    )
+    return drive.at_every_rate()
+
+
+def simulated_as(drive: Drive, command: str, options: Simulating) -> tuple[str, Simulation]:
+    """As `simulated_run`, from the start and with the inputs that the options name."""
+    return simulated_run(
+        drive,
+        command,
+        options,
+        start=options.start,
+        clip=options.clip,
+        measured=options.measured or (),
+    )
+
+
+def simulated_run(
+    drive: Drive,
+    command: str,
+    options: CommandSampling,
+    *,
+    start: Start = "rest",
+    clip: bool = False,
+    measured: Sequence[str] = (),
+) -> tuple[str, Simulation]:
+    """Name of a command, a maneuver or a file, and the drive's simulation over it."""
+    from swashplate.logs import open_log, read_series
+
+    head = command.partition(":")[0]  # stairs:2/4/0 is not a path
+    if not ("/" in head or _ENDING.search(head) or Path(command).is_file()):
+        maneuver = named_maneuver(command, drive)
+        name, where, values, time = maneuver.name, "", maneuver.sample(options.rate), None
+    else:
+        kind = file_kind(Path(command))
+        if kind not in ("log", ""):
+            words = "not a command: name a maneuver such as step:9, or a log."
+            raise InputError(f"{command} is {KIND_NAMES[kind]}, {words}")
+        log = open_log(command)
+        columns = (("--time-column", options.time_column), ("--column", options.column))
+        for option, column in columns:
+            try:
+                log.find(column)
+            except InputError as error:
+                raise InputError(f"{str(error).rstrip('.')}, with {option}.") from None
+        series = read_series(command, options.column, "V", time_column=options.time_column)
+        if options.interpolation is None:
+            raise InputError(
+                f"{command} needs --interpolation linear (a straight line from row to row) or "
+                "--interpolation previous (each row held until the next)."
+            )
+        name, where, values, time = Path(command).name, f"{command}: ", series.values, series.time
+    inputs = _measured(measured, command if where else "", options.time_column)
+    try:
+        return name, drive.simulate(
+            values,
+            options.rate,
+            time=time,
+            interpolation=options.interpolation,
+            start=start,
+            clip=clip,
+            **inputs,
+        )
+    except InputError as error:
+        raise InputError(f"{where}{error}") from None
+
+
+def _measured(measured: Sequence[str], log: str, time_column: str) -> dict[str, Any]:
+    """Inputs other than the voltage by name: a column of a log, or a number."""
+    from swashplate.drive import MEASURED
+    from swashplate.logs import read_series
+
+    found = dict[str, Any]()
+    for word in measured:
+        name, _, text = (part.strip() for part in word.partition("="))
+        if name not in MEASURED or not text or name in found:
+            names = ", ".join(MEASURED)
+            raise InputError(f"--measured {word}: write NAME=COLUMN, once for each of {names}.")
+        try:
+            found[name] = float(text)
+        except ValueError:
+            if not log:
+                must = "a maneuver has no columns, so give a number in SI"
+                raise InputError(f"--measured {word}: {must}.") from None
+            unit = MEASURED[name][0]
+            found[name] = read_series(log, text, unit, time_column=time_column).values
+    return found
+
+
+def window_of(
+    time: NDArray[np.float64], begin: float | None, end: float | None
+) -> tuple[float, float] | None:
+    """The part of a record that --from and --to name; None for all of it. [s]"""
+    first, last = float(time[0]), float(time[-1])
+    whole = begin is None and end is None
+    return None if whole else (first if begin is None else begin, last if end is None else end)
+
+
+def named_trial(drive: Drive, command: str, options: CommandSampling) -> tuple[str, Trial]:
+    """Name of a command, a maneuver or a log, and the trial that it makes."""
+    from swashplate.analysis import trial_of
+
+    drive = at_rate(drive, options.rate)
+    name, run = simulated_run(drive, command, options)
+    return name, trial_of(drive, run["voltage"], options.rate)

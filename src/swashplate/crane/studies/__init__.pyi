@@ -1,0 +1,8 @@
+from .assessing import SEAWAYS as SEAWAYS
+from .assessing import seaways_needed as seaways_needed
+from .crane_assessment import Decision as Decision
+from .operating import WORKABLE as WORKABLE
+from .operating import label_of as label_of
+from .study import LENGTH as LENGTH
+from .study import NONE as NONE
+from .study import RUN_IN as RUN_IN

@@ -1,0 +1,149 @@
+"""A model that is written as C: its names, and what goes beyond its equations."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from math import inf
+
+from swashplate.equations import Equation, Model, declared_by, floats_of
+from swashplate.equations.code_generation import c_name
+from swashplate.equations.marching import TapOf, taps_of
+
+
+@dataclass(frozen=True, eq=False)
+class Exported:
+    """A model as C: what its names are, and what goes beyond its equations."""
+
+    model: Model
+    prefix: str
+    """What all public names begin with: ``swp`` for ``swp_step``."""
+    title: str = ""
+    """First sentence of the header."""
+    parameters: Mapping[str, str] = field(default_factory=dict)
+    """Names of parameters by path; by default the paths, with ``_`` for dots."""
+    outputs: tuple[str, ...] = ()
+    """Signals that can be read; by default all."""
+    bounds: Mapping[str, float] = field(default_factory=dict)
+    """Largest magnitude of an input."""
+    ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    """Least and largest value of a measured input."""
+    stable: Mapping[int, Equation] = field(default_factory=dict)
+    """By part: margin above 0 where its equations bear the step, of ``p, h, options``."""
+    follows: Mapping[tuple[int, str], Equation] = field(default_factory=dict)
+    """By part and option: whether it is on, of ``p``; it cannot be set."""
+    internal: frozenset[str] = frozenset()
+    """Options that belong to the equations, and are not for users."""
+    longest: float = inf
+    """Longest step. [s]"""
+    free_step: str = ""
+    """Option without which the equations are for one step alone; none if empty."""
+
+    @property
+    def file(self) -> str:
+        """Name of header and source."""
+        own = self.prefix == c_name(self.model.name)
+        return self.prefix if own else f"swashplate_{self.model.name}"
+
+    @property
+    def type(self) -> str:
+        """Name of the struct."""
+        own = self.prefix == c_name(self.model.name)
+        return f"{self.prefix}_{'model' if own else self.model.name}"
+
+    # -- names -------------------------------------------------------------------------------------
+
+    @cached_property
+    def members(self) -> list[str]:
+        """Name of each part within the structs."""
+        return [c_name(part.name) for part in self.model.parts]
+
+    def named(self, kind: str) -> list[tuple[int, str, str]]:
+        """Part, path and name of every number of its parameters or givens."""
+        found = []
+        for part, path in self.model.places(kind):
+            full = f"{self.model.prefix(part)}{path}"
+            name = self.parameters.get(full) or full.replace(".", "_")
+            found.append((part, path, c_name(name)))
+        return found
+
+    @cached_property
+    def options(self) -> list[tuple[int, str]]:
+        """Part and name of every option."""
+        return [
+            (i, name)
+            for i, part in enumerate(self.model.parts)
+            if part.options is not None
+            for name in part.options._fields
+        ]
+
+    @cached_property
+    def switches(self) -> dict[tuple[int, str], list[str]]:
+        """By part and option: paths of the parameters that switch it on."""
+        found: dict[tuple[int, str], list[str]] = {}
+        for i, part in enumerate(self.model.parts):
+            for each in declared_by(part.parameters):
+                if each.switch:
+                    found.setdefault((i, each.switch), []).extend(each.fields)
+        return {key: paths for key, paths in found.items() if key in self.options}
+
+    @cached_property
+    def settable(self) -> list[tuple[int, str]]:
+        """Options that do not follow from parameters."""
+        follows = {*self.switches, *self.follows}
+        return [o for o in self.options if o not in follows and o[1] not in self.internal]
+
+    @cached_property
+    def signals(self) -> tuple[str, ...]:
+        """External signals that must be given."""
+        return tuple(name for name in self.model.external if name not in self.measured)
+
+    @cached_property
+    def measured(self) -> tuple[str, ...]:
+        """External signals for which a parameter stands where they are not given."""
+        found: dict[str, None] = {}
+        for i, part in enumerate(self.model.parts):
+            for name in part.input_types:
+                if self.model.link_of(i, name) is None and name in part.defaults:
+                    found[part.tap(name).signal] = None
+        return tuple(found)
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """All outputs."""
+        every = self.outputs or (*self.model.every_signal, *self.model.integrals)
+        return tuple(dict.fromkeys(every))
+
+    @cached_property
+    def limits(self) -> list[tuple[int, str]]:
+        """Part and name of every limit."""
+        return [(part, name) for name, (part, _) in self.model.limit_bits.items()]
+
+    @cached_property
+    def flags(self) -> list[str]:
+        """Places in the struct of all that is true or false."""
+        options = [f"{self.members[i]}_options.{c_name(name)}" for i, name in self.options]
+        limits = [f"{self.members[i]}_limits.{c_name(name)}" for i, name in self.limits]
+        given = [f"inputs.measured[{k}].given" for k in range(max(len(self.measured), 1))]
+        return [*options, *limits, *given, "now.begun", "before.begun", "stale", "settled"]
+
+    @property
+    def taps(self) -> tuple[TapOf, ...]:
+        """What is read through a line."""
+        return taps_of(self.model, self.model.external)
+
+    @cached_property
+    def lines(self) -> tuple[str, ...]:
+        """External signals that are kept in delay lines."""
+        return tuple(dict.fromkeys(each.tap.signal for each in self.taps))
+
+    @property
+    def settles(self) -> bool:
+        """Whether every part that remembers something has an equation for its steady state."""
+        return all(p.settled is not None or not floats_of(p.state) for p in self.model.parts)
+
+    @cached_property
+    def widest(self) -> int:
+        """Samples of the widest window."""
+        return max([each.tap.samples for each in self.taps], default=3)

@@ -1,0 +1,17 @@
+from .drive import SIGNAL_UNITS as SIGNAL_UNITS
+from .drive import SIGNALS as SIGNALS
+from .drive import TABLE_MANEUVERS as TABLE_MANEUVERS
+from .drive import FullOrderDrive as FullOrderDrive
+from .drive import FullOrderSimulation as FullOrderSimulation
+from .drive import Modes as Modes
+from .drive import OrderComparison as OrderComparison
+from .drive import compare as compare
+from .drive import validity as validity
+from .drive import validity_table as validity_table
+from .drive import validity_verdict as validity_verdict
+from .physical_set import QUANTITIES as QUANTITIES
+from .physical_set import PhysicalSet as PhysicalSet
+from .physical_set import choices_table as choices_table
+from .physical_set import chosen_quantity as chosen_quantity
+from .physical_set import from_lumped as from_lumped
+from .physical_set import nearest_set as nearest_set
