@@ -60,7 +60,7 @@ def test_draws_outside_the_bounds_are_drawn_again(hoist):
     assert found.fixed == ("Z18",)
     assert (found.columns["Z18"] == 2.1667e-5).all()
     kept, redrawn = found.sentences()
-    assert "Not drawn, as fitted in all drives: Z18" in kept
+    assert "Not varied, with the fitted value in all drives: Z18" in kept
     share = 100.0 * found.redrawn / (300 + found.redrawn)
     assert f"too narrow: {share:.0f} %" in redrawn
     assert "Widen the bounds in the fit setup" in redrawn

@@ -152,7 +152,7 @@ def test_missing_samples_are_refused_or_dropped_and_counted(edited: Edit) -> Non
         (
             'kind = "rectified_current"\ncolumn = "ammeter"\nunit = "mA"',
             'kind = "position"\ncolumn = "ammeter"\nunit = "deg"\nrolls_over_at = 360',
-            "up.csv: column 'ammeter': the readings reach over 1.111 times rolls_over_at",
+            "up.csv: column 'ammeter': the readings span 1.111 times rolls_over_at",
         ),
     ],
 )

@@ -68,7 +68,7 @@ def test_windows_with_motion_are_runs_of_their_own(long, tmp_path, layout):
     (overview,) = campaign.overviews
     assert "12,000 rows" in overview.sentence
     assert "2 windows with motion, which are all used" in overview.sentence
-    assert "log.csv.parquet, written beside it" in overview.sentence
+    assert "log.csv.parquet, written next to it" in overview.sentence
     assert not any(each.notes for each in campaign)
 
 

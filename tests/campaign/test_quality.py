@@ -93,8 +93,9 @@ GEAR = "gear_ratio = 2.0\n"
             GEAR,
             f'{GEAR}ignore = [{{ maneuver = "setp *" }}]\n',
             (
-                "axes.winch.channels.counts.ignore: no run has the maneuver 'setp *', so that its "
-                "window does nothing; there are 'step +4 V', 'step -4 V'",
+                "axes.winch.channels.counts.ignore: no run has the maneuver 'setp *', so its "
+                "window "
+                "has no effect; the maneuvers are 'step +4 V', 'step -4 V'",
             ),
         ),
         # in ms, as the log's stamps are

@@ -102,7 +102,7 @@ def test_a_folder_that_is_gone(tmp_path):
     folder.mkdir()
     done = python("-c", f"{words}from swashplate.cli import main; main()", cwd=folder)
     assert done.returncode == 2
-    assert done.stderr == "Error: The current folder does not exist any more; go to another.\n"
+    assert done.stderr == "Error: The current folder no longer exists; change to another.\n"
 
 
 @pytest.mark.parametrize(

@@ -54,7 +54,7 @@ REFUSED = {
     "advise none.toml --out no/a.csv": "folder no does not exist",
     "campaign plot none.toml --out a.gif": ".png, .svg or .pdf",
     "simulate hoist step:11 --out run.csv": "11 V at 1 s, but the card takes ±10 V; check its unit",
-    "export hoist": "Say what to export: --fmu FILE.fmu, --c DIR or --wasm FILE.wasm",
+    "export hoist": "Choose what to export: --fmu FILE.fmu, --c DIR or --wasm FILE.wasm",
     "export hoist --compile --fmu a.fmu": "name its folder with --c DIR",
     "export hoist --platforms win64 --c f": "--platforms is of an FMU",
     "export hoist --fmu a.zip": "an FMU is written as .fmu",

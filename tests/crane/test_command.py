@@ -194,7 +194,7 @@ def test_follow_and_a_sweep_print_their_tables(tmp_path):
         ("assess tg3637 --scale luff.bore=2", "bore"),
         (
             "assess tg3637 --allowed 0.05",
-            "0.05 % of the seaways would ask for thousands of them: did",
+            "0.05 % of the seaways would need thousands of them: did",
         ),
         ("assess tg3637 --allowed 200", "allowed_share_worse is 2, but must be a share of seaways"),
         ("assess tg3637 --out assessment.pdf", "a verdict is written as"),

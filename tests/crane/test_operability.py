@@ -157,7 +157,7 @@ def test_what_was_computed_is_said(found):
         "load 35000 kg",
         "the clip is 0.24 m along the boom",
         "2 seaways of 5 min",
-        "Headings as likely as each other: 90 deg.",
+        "Equally likely headings: 90 deg.",
     )
     for part in parts:
         assert part in words

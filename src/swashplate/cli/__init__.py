@@ -27,7 +27,7 @@ Hydrostatic drives: from a joystick's voltage to the speed of the shaft.
 
 A drive is a proportional amplifier (the control card), a pump and a motor.
 Included: three identified drives, the hoist, slew and luff axes of a crane,
-and a neutral one to start your own from. A command is a file of measured
+and a neutral one as a starting point. A command is a file of measured
 voltages or a maneuver: a name and its numbers in V, s and Hz.
 
 Maneuvers, and some of the options that may follow their numbers:
@@ -193,7 +193,7 @@ def _check_surroundings() -> None:
     try:
         Path.cwd()
     except OSError:
-        raise InputError("The current folder does not exist any more; go to another") from None
+        raise InputError("The current folder no longer exists; change to another") from None
 
 
 def main() -> None:

@@ -308,7 +308,7 @@ class Sensors(Control):
                 )
         if type(self.seed) is not int or self.seed < 0:
             raise InputError(
-                f"The seed of sensors is {self.seed!r}, but must be a whole number from 0 on."
+                f"The seed of sensors is {self.seed!r}, but must be a whole number of at least 0."
             )
 
     def sensing(self) -> Sensing:
@@ -366,7 +366,7 @@ def stages_of(control: Control | None) -> Stages:
     if control is None:
         return Stages(Settings(), None, None)
     if not isinstance(control, Control):
-        raise InputError(f"{control!r} is not a control of a crane; see swashplate.crane.control.")
+        raise InputError(f"{control!r} is not a crane control; see swashplate.crane.control.")
     settings: dict[str, Any] = {
         "path": any(not isinstance(stage, Sensors) for stage in control.stages)
     }

@@ -88,7 +88,7 @@ def prepare(crane: Crane, stick: OperatorCommand, options: RunOptions) -> Prepar
     stepper = CraneStepper(crane, **options)
     if stepper.fixed.actuation == DIRECT:
         raise InputError(
-            "With direct actuation commands are voltages, but a stick gives parts of the full "
+            "With direct actuation commands are voltages, but a stick gives fractions of full "
             "speed: take a CraneStepper, or actuation='volts'."
         )
     if not isinstance(stick, OperatorCommand):
