@@ -424,8 +424,8 @@ def _make_folder(folder: Path) -> None:
         folder.mkdir(parents=True, exist_ok=True)
         there = next(folder.glob("*.parquet"), None)
     except OSError as error:
-        raise FileError(f"{folder} cannot be made: {error.strerror or error}.") from None
+        raise FileError(f"{folder} cannot be created: {error.strerror or error}.") from None
     if there is not None:
         raise FileError(
-            f"{folder} holds {there.name} already; name an empty folder for the outputs."
+            f"{folder} already contains {there.name}; name an empty folder for the outputs."
         )

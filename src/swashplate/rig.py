@@ -544,9 +544,9 @@ def write(tests: VirtualTests, folder: str | Path, *, overwrite: bool = False) -
     tests.drive.to_toml(root / "truth" / DRIVE_FILE)
     campaign, truth = _contents(tests)
     header = (
-        f"# Virtual tests, simulated by swashplate {__version__}: nothing here was measured.\n"
-        f"# Instruments: {tests.severity}; {refinements}; seed {tests.seed}.\n"
-        "# What was simulated stands in truth/truth.toml: open it only after the fit.\n"
+        f"# Virtual tests, simulated by swashplate {__version__}: nothing here was measured.\n# "
+        f"Instruments: {tests.severity}; {refinements}; seed {tests.seed}.\n# The simulated values "
+        "are in truth/truth.toml: open it only after the fit.\n"
     )
     write_text(f"# The truth behind the virtual tests.\n{truth}", root / "truth" / "truth.toml")
     write_text(header + campaign, root / "campaign.toml")

@@ -211,7 +211,7 @@ def test_the_campaign_may_have_moved(fit_and_folder, tmp_path):
         stored_draws(tmp_path)
     drawn = stored_draws(tmp_path, campaign=old, draws=2)
     assert len(drawn.drives) == 2
-    with pytest.raises(InputError, match="is that of another drive .* differ"):
+    with pytest.raises(InputError, match="another drive .* differ"):
         stored_draws(tmp_path, campaign=old, drive=Drive.preset("luff"))
     with pytest.raises(FileNotFoundError, match="no fit.json in .*virtual: give a folder that"):
         stored_draws(tmp_path / "virtual")

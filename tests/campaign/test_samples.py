@@ -57,7 +57,7 @@ def test_any_motion_slower_than_half_the_range_is_recovered(steps, first, modulu
 REFUSED = {
     r"row 2 \(the first is 0\) has 1.0 s after 1.0 s": lambda: increasing([0.0, 1.0, 1.0, 2.0]),
     "time must be finite, but row 1": lambda: increasing([0.0, np.nan, 1.0]),
-    "two rows at least": lambda: increasing([0.0]),
+    "at least two rows": lambda: increasing([0.0]),
     "one row of numbers": lambda: increasing([[0.0, 1.0]]),
     "half the range of a counter of 8.*row 2 .* is 7": lambda: unwrap_counts([2, 3, 7], 8),
     "from 0 to 7, as of a counter of 8 .* row 1 .* is 9": lambda: unwrap_counts([0, 9], 8),

@@ -696,7 +696,7 @@ def refuse(message, error=InputError):
 MOVING = OperatorCommand.record(np.full((600, 3), [0.0, 0.5, 0.0]))
 REFUSED = [
     ({"stick": slew(45.0, length=5.0)}, "stick of the slew ends at 12.11 s, but .* at 5 s"),
-    ({"stick": slew(-45.0)}, "The slew leads away from slew_deg = -45"),
+    ({"stick": slew(-45.0)}, "The slew moves away from slew_deg = -45"),
     (
         {"stick": MOVING, "actuation": "ideal"},
         "Ideal drives follow instantaneously, .* a row of zeros",
@@ -749,7 +749,7 @@ def test_residual_swing_needs_a_run_that_is_long_enough(crane):
 
 
 def test_sticks_and_controllers_that_make_no_sense_are_refused():
-    with refuse("stick of the luff is 2, but reaches from -1 to 1"):
+    with refuse("stick of the luff is 2, but must be from -1 to 1"):
         OperatorCommand.trapezoid(luff=2.0, duration=1.0)
     with refuse("The slew needs until=.* or a duration"):
         OperatorCommand.trapezoid(slew=1.0)

@@ -420,6 +420,6 @@ def test_a_run_that_goes_the_other_way_is_named() -> None:
     first, second, *others = runs()
     turned = replace(second["shaft_speed"], values=-second["shaft_speed"].values)
     with pytest.raises(
-        InputError, match=f"In {second.name} 'shaft_speed' goes against the command, in"
+        InputError, match=f"In {second.name} 'shaft_speed' moves opposite to the command, in"
     ):
         guess_drive([first, replace(second, channels={"shaft_speed": turned}), *others])

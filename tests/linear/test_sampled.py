@@ -245,7 +245,7 @@ def test_each_input_by_itself(hoist: Drive) -> None:
 @pytest.mark.parametrize(
     ("inputs", "said"),
     [
-        (("load_torque", "voltage"), "the first alone may be a command"),
+        (("load_torque", "voltage"), "only the first may be a command"),
         (("voltage", "voltage"), "several different ones"),
         (("voltage", "wind"), "'wind', but must be one of voltage"),
     ],

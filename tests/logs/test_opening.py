@@ -69,7 +69,7 @@ def test_a_process_that_ends_or_hangs_is_replaced(table, monkeypatch):
     log = open_log(table)
     other = subprocess_reader._ReaderProcess.running
     os.kill(other._process.pid, signal.SIGKILL)
-    with pytest.raises(FileError, match="log.parquet is damaged so that reading it breaks off"):
+    with pytest.raises(FileError, match="log.parquet is damaged: reading it stops"):
         log.read(["time"])
     assert log.read(["time"])["time"].tolist() == [0.0, 1.0]
     monkeypatch.setattr(subprocess_reader, "_PATIENCE", 0.2)
@@ -275,7 +275,7 @@ DAMAGED = [
     ("text.h5", text("time,voltage\n0,1\n"), "cannot be read as HDF5"),
     ("cut.h5", cut(hdf5, 0.7), "cut.h5 cannot be read as HDF5, it is damaged ...truncated"),
     ("block.h5", changed(hdf5, b"x^", b"\xff" * 20), "block.h5 cannot be read as HDF5"),
-    ("larger.h5", claims(10**12), "has 1000000000000 numbers in the 1 columns that are wanted"),
+    ("larger.h5", claims(10**12), "has 1000000000000 numbers in the 1 requested columns"),
     ("huge.h5", claims(10**7), "'/voltage' claims 10000000 numbers, but none is stored"),
     ("unwritten.h5", unwritten, "'/voltage' has only 1 of its 4 blocks"),
     ("external.h5", external, "'/voltage' cannot be read as numbers: its numbers are in"),

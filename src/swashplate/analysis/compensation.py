@@ -335,8 +335,8 @@ def inverse_map(drive: Drive, points: int = 101) -> InverseMap:
         low, at, high = np.degrees([minus.speed[-1], creep, plus.speed[0]])
         raise DomainError(
             f"{drive.name} creeps at {at:.4g} deg/s at 0 V, but the smallest commands give "
-            f"{low:.4g} and {high:.4g} deg/s, so its steady map has no inverse; check Z17, "
-            "Z18 and the card's J."
+            f"{low:.4g} and {high:.4g} deg/s, so its steady map has no inverse; check Z17, Z18 and "
+            "the card's J."
         )
     upwards, _ = starting_acceleration(drive, 1.0)
     downwards, _ = starting_acceleration(drive, -1.0)

@@ -33,7 +33,8 @@ MACHINE: Mapping[str, DesignVariable] = {
     ),
     "orifice_diameter": DesignVariable(
         {"Z16": 2.0},
-        "Bore of the in-line orifices; their area, and with it the opening, scales with its square.",
+        "Bore of the in-line orifices; their area, and with it the opening, scales with its "
+        "square.",
     ),
     "pump": DesignVariable(
         {"Z10": 1.0, "Z12": 1.0},
@@ -42,8 +43,7 @@ MACHINE: Mapping[str, DesignVariable] = {
     "drive_speed": DesignVariable(
         {"Z10": 1.0, "Z12": 1.0},
         "Speed of the motor that drives the pump. Flow is proportional to it, as to the "
-        "displacement; "
-        "the control pressure does not change, because a relief valve sets it.",
+        "displacement; the control pressure does not change, because a relief valve sets it.",
     ),
     "supply_pressure": DesignVariable(
         {"Z9": 1.0},

@@ -71,8 +71,7 @@ class Draws(Result):
         if self.fixed:
             sentences.append(
                 f"Not varied, with the fitted value in all drives: {', '.join(self.fixed)}; the "
-                f"bands do not "
-                "include their errors."
+                "bands do not include their errors."
             )
         attempts = self.redrawn + len(self.drives)
         if self.redrawn > NARROWED * attempts:

@@ -117,7 +117,7 @@ def _quality(
     findings = list[str]()
     if moves:
         findings.append(
-            f"moves at the first sample, although the run is stated to begin at rest: write "
+            "moves at the first sample, although the run is stated to begin at rest: write "
             f"axes.{experiment.axis}.{ESTIMATED} in this run"
         )
     # the input's stamps are reported once, with the input
@@ -307,8 +307,7 @@ def wrapped_positions(experiments: Iterable[Experiment]) -> dict[tuple[str, str]
                 where = f"axes.{experiment.axis}.channels.{name}"
                 sentences[experiment.axis, name] = (
                     f"'{name}' of the axis '{experiment.axis}' jumps by about one turn, as a "
-                    f"wrapping "
-                    f"angle does; write rolls_over_at = {size} in [{where}]"
+                    f"wrapping angle does; write rolls_over_at = {size} in [{where}]"
                 )
     return sentences
 
@@ -439,11 +438,9 @@ def _of_lost_counts(experiment: Experiment, channel: Channel) -> Iterator[str]:
     cut = f"{lasting[0].begin:.6g}"
     yield (
         f"jumps by up to {most:+.0f} counts at {times} faster than any motion, and does not come "
-        f"back: "
-        f"lost or doubled counts. Cut the run there: span = {{ to = {cut} }} in this run, and add "
-        f"a second "
-        f'run of the same file with name = "{experiment.run} from {cut} s", span = {{ from = {cut} }}, '
-        'start = "estimated"'
+        f"back: lost or doubled counts. Cut the run there: span = {{ to = {cut} }} in this run, "
+        "and add a second run of the same file with "
+        f'name = "{experiment.run} from {cut} s", span = {{ from = {cut} }}, start = "estimated"'
     )
 
 
@@ -583,8 +580,7 @@ def _of_other_scale(runs: Sequence[Experiment]) -> Iterator[str]:
                 yield (
                     f"{run}: '{name}' moves {gain / usual:.3g} times as fast as in the other runs "
                     f"at similar commands; check the unit of '{column}' in this log (1 rad/s is "
-                    f"9.55 "
-                    "1/min), its scale and the machine's gear"
+                    "9.55 1/min), its scale and the machine's gear"
                 )
 
 

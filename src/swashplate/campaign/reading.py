@@ -271,8 +271,7 @@ class _Columns:
             others = f" and {rows.size - 1} others" if rows.size > 1 else ""
             raise FileError(
                 f"{described} has no finite number in data row {rows[0]}{others}; correct the log, "
-                f"or "
-                "write missing = 'drop' to omit such samples."
+                "or write missing = 'drop' to omit such samples."
             )
         used &= ~missing
         usable = np.count_nonzero(used)

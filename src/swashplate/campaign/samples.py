@@ -147,7 +147,7 @@ def unwrap_counts(counts: ArrayLike, modulus: int) -> Array:
         "(give its actual size, in a campaign file as rolls_over_at)": (readings < low)
         | (readings > high),
         f"counts must not step by half the range of a counter of {size}, whose direction is then "
-        f"ambiguous (cut "
+        "ambiguous (cut "
         "the record there)": np.concatenate([[False], short == -0.5 * size]),
     }
     for sentence, rows in wrong.items():
@@ -170,8 +170,8 @@ def unwrap_position(position: Array, size: float) -> Array:
     """
     if (reach := float(np.ptp(position))) > BEYOND * size:
         raise InputError(
-            f"the readings span {reach / size:.4g} times rolls_over_at, but a position that "
-            "wraps stays within it; correct rolls_over_at, or leave it out."
+            f"the readings span {reach / size:.4g} times rolls_over_at, but a position that wraps "
+            "stays within it; correct rolls_over_at, or leave it out."
         )
     steps = _shortest(np.diff(position), size)
     far = np.concatenate([[False], np.abs(steps) > 0.25 * size, [False]])

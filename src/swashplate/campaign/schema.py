@@ -238,8 +238,7 @@ class AccuracyEntry(FileTable):
     time: NotNegative | None = Field(
         None,
         description="Of its time stamps, relative to other signals [s] (default: half a sampling "
-        "interval "
-        "for an input, 0 for a channel and for an input stated to be held).",
+        "interval for an input, 0 for a channel and for an input stated to be held).",
     )
 
 
@@ -265,8 +264,7 @@ class SignalEntry(FileTable):
     accuracy: AccuracyEntry | None = Field(
         None,
         description="Limits of the instrument's error, included in intervals; the documentation of "
-        "campaign "
-        "files lists the default of each kind.",
+        "campaign files lists the default of each kind.",
     )
 
     @model_validator(mode="after")
@@ -285,10 +283,8 @@ class InputEntry(SignalEntry):
     interpolation: Between | None = Field(
         None,
         description="Between two samples: hold the earlier one, a straight line, or a straight "
-        "line "
-        "with sudden changes halfway. By default a fit takes what fits best, everything else the "
-        "straight "
-        "line.",
+        "line with sudden changes halfway. By default a fit takes what fits best, everything else "
+        "the straight line.",
     )
     ignore: tuple[TimeWindow, ...] = Field(
         (), description="Windows whose samples are left out; the input continues across them."

@@ -46,7 +46,7 @@ Examples:
   swashplate simulate hoist step:9 --plot step.png    one run, with a figure
   swashplate simulate hoist step:9 --units rpm,bar    in other units
   swashplate simulate hoist log.csv --interpolation previous --out run.csv
-  swashplate show hoist --toml > mine.toml            a drive of your own
+  swashplate show hoist --toml > mine.toml            its file, to edit
   swashplate compare hoist mine.toml                  its differences
   swashplate campaign init logs/*.csv                 tests of your machine
   swashplate rig hoist --out virtual                  tests of a virtual one
@@ -56,7 +56,7 @@ Examples:
   swashplate full-order hoist step:9                  is one state enough
   swashplate crane run tg3637 --slew 1 --until slew_deg=45
   swashplate export hoist --fmu hoist.fmu             for other programs
-  swashplate demo                                     all of it, virtually
+  swashplate demo                                     all steps, on a virtual hoist
 
 Files are in SI units and written atomically. Errors: one sentence on standard
 error, exit code 2. Other exit codes: 0 done, 1 not usable or does not fit,

@@ -450,7 +450,7 @@ def guess(
         note(f"! {sentence}.")
     note(
         f"With these numbers alone: fit {guessed.fit_percent:.1f} % of the mean speeds (100 % is "
-        f"best)."
+        "best)."
     )
     note(f"Start:             {start}")
     note(f"Fit setup: {setup}")

@@ -512,7 +512,6 @@ def _stationary_words(operated: Operated, seaway: Seaway, damping: float) -> str
     response = linear_response(operated.chosen, seaway, **hung)
     return (
         f"Without control the long-run swing is {degrees(response.values['swing'].rms):.2f} deg "
-        f"RMS, "
-        f"from the sea's spectrum and a damping of {100.0 * damping:g} %; a run "
-        "begins at rest."
+        f"RMS, from the sea's spectrum and a damping of {100.0 * damping:g} %; a run begins at "
+        "rest."
     )

@@ -61,8 +61,8 @@ FILES = {
 }
 """What `Identification.save` writes, of a drive or of a user-defined model."""
 MEASURES = (
-    "NRMSE is the RMSE over the standard deviation of what was measured, fit % is 100 (1 - NRMSE); "
-    "'of range' below: over the range of the signal, its largest minus its smallest value."
+    "NRMSE is the RMSE over the standard deviation of what was measured, fit % is 100 (1 - "
+    "NRMSE); 'of range' below: over the range of the signal, its largest minus its smallest value."
 )
 
 Loss = Literal["linear", "soft_l1", "cauchy"]
@@ -432,8 +432,8 @@ def report(
         result = Identification.load(fitted, path, model=model)
         if true is not None and not result.campaign.virtual:
             raise InputError(
-                f"{result.campaign.path} is not virtual, so its true parameters are unknown: "
-                "leave out --truth."
+                f"{result.campaign.path} is not virtual, so its true parameters are unknown: leave "
+                "out --truth."
             )
         if fitted.suffix.lower() == ".toml":
             fitted_numbers, numbers = (

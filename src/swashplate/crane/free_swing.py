@@ -84,8 +84,8 @@ def swing_damping(time: ArrayLike, angle: ArrayLike, *, rope: float | None = Non
     explained = 1.0 - float(np.var(residuals) / np.var(swing))
     if explained < EXPLAINED:
         raise InputError(
-            f"A decaying sine explains {100.0 * max(explained, 0.0):.0f} % of the log, so it "
-            "is not a free swing: cut the log to the part with the crane at rest."
+            f"A decaying sine explains {100.0 * max(explained, 0.0):.0f} % of the log, so it is "
+            "not a free swing: cut the log to the part with the crane at rest."
         )
     period = 2.0 * pi / frequency
     if rope is not None:
@@ -94,16 +94,15 @@ def swing_damping(time: ArrayLike, angle: ArrayLike, *, rope: float | None = Non
         expected = 2.0 * pi * sqrt(rope / GRAVITY)
         if abs(period / expected - 1.0) > NEAR:
             raise InputError(
-                f"The log swings once in {period:.3g} s, but a load on {rope:g} m of rope once "
-                f"in {expected:.3g} s: check the column and the unit of the time."
+                f"The log swings once in {period:.3g} s, but a load on {rope:g} m of rope once in "
+                f"{expected:.3g} s: check the column and the unit of the time."
             )
     correlation = _correlation_time(residuals)
     freedom = residuals.size / correlation - UNKNOWNS
     if freedom < 1.0:
         raise InputError(
             "The log contains changes that are too slow to separate from the swing's damping: "
-            "remove "
-            "any drift, or use a longer log."
+            "remove any drift, or use a longer log."
         )
     variance = float(residuals @ residuals) / freedom
     covariance = np.linalg.inv(fit.jac.T @ fit.jac)

@@ -223,8 +223,8 @@ def check_sources(
     if changed:
         raise ParameterError(
             f"{origin}: {listed(changed)} {'has' if len(changed) == 1 else 'have'} another value "
-            f"than {name}, but the same source: give the source of the new value and its "
-            "status, or delete both."
+            f"than {name}, but the same source: give the source of the new value and its status, "
+            "or delete both."
         )
 
 

@@ -66,7 +66,7 @@ channels = ["shaft_speed", "position", "encoder_counts"]
 [stages.free]
 """
 NO_CREEP = "# {}: Z18 is 0, fixed"
-NOT_TRIED = "# no run goes {}: its numbers are those of the other way, fixed"
+NOT_TRIED = "# no run goes {}: its numbers are those of the other direction, fixed"
 
 
 def guessed_set(guess: Guess, source: str) -> ParameterSet:
@@ -129,7 +129,7 @@ def guessed_set(guess: Guess, source: str) -> ParameterSet:
         drive = base.replace(changed)
     except ParameterError as error:
         raise ParameterError(
-            f"The guess of {guess.axis} from {source} fails; look at units and scales of its "
+            f"The guess of {guess.axis} from {source} fails; check units and scales of its "
             f"signals: {error}"
         ) from None
     parameters = {

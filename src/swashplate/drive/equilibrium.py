@@ -126,9 +126,10 @@ def operating_point(
         if options.hysteresis is not None:
             raise DomainError(
                 f"{name}: a current that moves by less than the solenoids' hysteresis of "
-                f"±{pump.solenoid_hysteresis:g} A moves no force, so the gain is 0; linearise the "
-                "drive without it (solenoid_hysteresis=0) for larger motions, or the pump alone "
-                "with input solenoid_force, or sweep sines of a size with frequency_response."
+                f"±{pump.solenoid_hysteresis:g} A produces no force, so the gain is 0; linearise "
+                "the drive without it (solenoid_hysteresis=0) for larger motions, or the pump "
+                "alone with input solenoid_force, or sweep sines of a size with "
+                "frequency_response."
             )
         if pump.Z17 == current == 0.0:
             sides.append("solenoids at 0 A: the side of positive current")

@@ -212,8 +212,8 @@ class FullOrderDrive:
         if self.drive.parameters.refinements:
             listed = ", ".join(self.drive.parameters.refinements)
             raise InputError(
-                f"{self.drive.name}: five states do not know refinements, but this drive has "
-                f"{listed}; take it without (its .plain)."
+                f"{self.drive.name}: the five-state model has no refinements, but this drive has "
+                f"{listed}; use it without them (its .plain)."
             )
 
     @classmethod
@@ -726,7 +726,7 @@ def validity_verdict(table: Table) -> str:
     found = table.to_polars()
     moving = found.filter(found["within_1_percent"].is_not_null())
     if not moving.height:
-        return "The shaft does not move, so nothing can be said of one state."
+        return "The shaft does not move, so the one-state model cannot be assessed."
     beyond = moving.filter(~moving["within_1_percent"])["maneuver"].to_list()
     within = moving.height - len(beyond)
     if not beyond:

@@ -291,10 +291,9 @@ def sweep(
                     break
                 if count >= LONGEST * least:
                     raise DomainError(
-                        f"{instance.name}: at {frequency:g} Hz and an amplitude of "
-                        f"{amplitude:g} the answer has not settled to {tolerance:g} within "
-                        f"{count} cycles; allow a larger tolerance, or look at it with a "
-                        "simulation."
+                        f"{instance.name}: at {frequency:g} Hz and an amplitude of {amplitude:g} "
+                        f"the response has not settled to {tolerance:g} within {count} cycles; "
+                        "allow a larger tolerance, or examine it in a simulation."
                     )
                 count *= 2
             ratio[i, j] = last / amplitude

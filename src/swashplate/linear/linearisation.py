@@ -79,7 +79,9 @@ def linearize(
             raise InputError(f"{instance.name}: {name} is {value!r}, but must be a finite number.")
     moving = tuple(at if inputs is None else inputs)
     if not moving:
-        raise InputError(f"{instance.name}: a linear model needs an input that moves, of at.")
+        raise InputError(
+            f"{instance.name}: a linear model needs at least one varying input, named in at."
+        )
     for name in moving:
         if name not in at or name not in instance.model.external:
             raise InputError(

@@ -192,8 +192,8 @@ class LinearModel:
         integrates = np.abs(self.poles - sampled) <= INTEGRATES * self._scale
         if (growth[~integrates] >= 0.0).any():
             raise DomainError(
-                f"{self.name}: the linear model is unstable (poles {self.poles}), so that a "
-                "bandwidth or margin means nothing."
+                f"{self.name}: the linear model is unstable (poles {self.poles}), so bandwidth and "
+                "margins are meaningless."
             )
 
     def _search_end(self) -> float:
@@ -311,7 +311,7 @@ class LinearModel:
         if self.delay != 0.0 and not without_delay:
             raise InputError(
                 f"The model has a delay of {self.delay:g} s, which no state space holds exactly; "
-                "say without_delay=True and put an approximant before it, python-control's pade "
+                "pass without_delay=True and put an approximant before it, python-control's pade "
                 "for example, or take a sampled model (discrete), which has it as states."
             )
         return StateSpace(*matrices)

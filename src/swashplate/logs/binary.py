@@ -57,8 +57,8 @@ def look(
             claimed = len(range(item.rows)[first:last])
             if numbers.size != claimed:
                 raise FileError(
-                    f"{path}: '{item.name}' has {numbers.size} numbers where it claims {claimed}; "
-                    "the file was cut off or is damaged."
+                    f"{path}: '{item.name}' has {numbers.size} numbers, but claims {claimed}; the "
+                    "file is truncated or damaged."
                 )
             arrays.append(numbers)
     lengths = [signal.rows for signal in readable]

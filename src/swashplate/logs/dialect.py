@@ -115,7 +115,7 @@ def encoding_of(path: Path, stated: str | None) -> tuple[str, int]:
         check_kind(path)
         line = len(re.findall(r"\r\n|\n|\r", text[: control.start()])) + 1
         what = "a NUL byte" if control[0] == "\0" else f"the byte {ord(control[0]):#04x}"
-        raise FileError(f"{path} has {what} in line {line}; it is damaged or no text file.")
+        raise FileError(f"{path} has {what} in line {line}; it is damaged or not a text file.")
     return name, len(mark)
 
 
@@ -406,7 +406,7 @@ def _names_and_units(above: Sequence[str], layout: TextLayout) -> tuple[list[str
 def _wrong_header(number: int, line: str, layout: TextLayout, path: Path) -> FileError:
     count, hint = len(layout.names(line)), ""
     if layout.delimiter == "," and layout.width >= 2 * count - 1:
-        hint = " Do decimal commas stand between commas? Export it with semicolons."
+        hint = " Are decimal commas mixed with commas between columns? Export it with semicolons."
     return FileError(
         f"{path} has {count} names in line {number}, but {layout.width} fields in the rows "
         f"below.{hint}"

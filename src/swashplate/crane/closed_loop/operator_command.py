@@ -110,7 +110,7 @@ class OperatorCommand(Result):
                 )
         if not (start >= 0.0 and ramp > 0.0 and 0.0 < length <= LONGEST):
             raise InputError(
-                f"A stick needs a start of 0 s or later, ramps above 0 s, and a length above 0 and "
+                "A stick needs a start of 0 s or later, ramps above 0 s, and a length above 0 and "
                 f"at most {LONGEST:g} s, not {start:g}, {ramp:g} and {length:g} s."
             )
         moving = {axis: part for axis, part in parts.items() if part != 0.0}

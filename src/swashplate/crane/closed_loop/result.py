@@ -278,8 +278,8 @@ class CraneRun(Tabular):
         first = round(starts * RATE)
         if first >= len(self.stored):
             raise InputError(
-                f"The run is {self.time[-1]:g} s long, but its residual swing counts from "
-                f"{starts:.4g} s on: take a longer stick."
+                f"The run is {self.time[-1]:g} s long, but its residual swing is evaluated from "
+                f"{starts:.4g} s on: use a longer stick."
             )
         return slice(first, first + round(WATCHED * RATE))
 
@@ -328,8 +328,7 @@ class CraneRun(Tabular):
         if lowest < 0.0:
             sentences.append(
                 f"The load is down to z = {lowest:.1f} m, below the reference point of the ship's "
-                f"motion, "
-                "near the waterline. The model has no water."
+                "motion, near the waterline. The model has no water."
             )
         departure = self.departure
         if departure is not None and departure.reason != IN_WATER:

@@ -442,8 +442,8 @@ def _check_loaded(crane: Crane, actuation: str, mass: float, suspension: Suspens
         if suspension.stiffness == inf and gives > QUICKEST:
             raise InputError(
                 f"The {axis} of {crane.name} gives way to {mass:g} kg on a rigid rope within a "
-                f"sample, since its motor_leakage costs {lost[axis]:.3g} rad/s per N m: "
-                "take an elastic rope, suspension=Suspension(stiffness=6e7)."
+                f"sample, since its motor_leakage costs {lost[axis]:.3g} rad/s per N m: take an "
+                "elastic rope, suspension=Suspension(stiffness=6e7)."
             )
 
 

@@ -356,7 +356,7 @@ class Seaway(Result):
         """
         inner = round(rate / COARSE)
         if inner < 1 or abs(inner * COARSE - rate) > 1e-9 * rate:
-            raise InputError(f"A ship's motion has a multiple of {COARSE:g} samples a second.")
+            raise InputError(f"The rate of a ship's motion must be a multiple of {COARSE:g} Hz.")
         intervals = max(-(-(count - 1) // inner), 1)
         if intervals > self._samples:
             enough = (1 << (intervals - 1).bit_length()) / COARSE
@@ -450,9 +450,8 @@ def ship_motion(
             seconds = float(series.time[-1] - series.time[0])
             if 6.0 * seconds * rate > LARGEST:
                 raise InputError(
-                    f"{path} lasts {seconds:g} s: at {rate:g} Hz that is more than the "
-                    f"{LARGEST} numbers that can be read at once; cut the log, or take a lower "
-                    f"rate."
+                    f"{path} lasts {seconds:g} s: at {rate:g} Hz that is more than the {LARGEST} "
+                    "numbers that can be read at once; cut the log, or take a lower rate."
                 )
             motions = np.zeros((int(seconds * rate + 1e-6) + 1, 6))
         grid = series.time[0] + np.arange(len(motions)) / rate

@@ -363,7 +363,7 @@ def _numbers(
             raise FileError(
                 f"{path}, line {line}: {name} is {'missing' if word is None else repr(word)}, but "
                 f"must be {_expected(name)}; needed are {required}: the file is truncated or of "
-                f"another kind."
+                "another kind."
             )
         numbers.append(number)
     return numbers
@@ -482,8 +482,8 @@ def _gathered(path: str | Path, rows: Amplitudes, length: float) -> TransferFunc
         raise FileError(
             f"{path}: there is no {MOTIONS[missing]} for {omega[j]:g} rad/s and {headings[i]:g} "
             f"deg; the file is truncated, or its waves are not on a grid: it has {present.size} of "
-            f"the "
-            f"{prod(shape)} amplitudes of {headings.size} headings and {omega.size} frequencies."
+            f"the {prod(shape)} amplitudes of {headings.size} headings and {omega.size} "
+            "frequencies."
         )
     values = np.full(shape, np.nan, dtype=np.complex128)
     # waves from the other side count, by symmetry, if this side lacks them
@@ -498,8 +498,7 @@ def _gathered(path: str | Path, rows: Amplitudes, length: float) -> TransferFunc
         _, i, j, which = at_this_side[:, twice][:, 0]
         raise FileError(
             f"{path}: motion {which + 1} in waves of {omega[j]:g} rad/s and {headings[i]:g} deg "
-            f"occurs "
-            "twice, with different values."
+            "occurs twice, with different values."
         )
     values[..., 3:] /= length
     if headings.size > 1 and (headings[0] > 1e-6 or headings[-1] < 180.0 - 1e-6):

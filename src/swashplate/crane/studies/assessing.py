@@ -123,7 +123,7 @@ def _questions(crane: Crane, questions: Sequence[Question] | None) -> tuple[Ques
     if "sufficiency" in questions and not crane.limits:
         raise InputError(
             f"{crane.name} has no limits by which control could be sufficient: give its file a "
-            f"table [limits], as "
+            "table [limits], as "
             '[limits] with side_lead = { value = 4, unit = "deg" }.'
         )
     return tuple(questions)
@@ -135,8 +135,8 @@ def seaways_needed(seaways: int, allowed: float) -> str:
     needed = fewest_seaways(allowed)
     if seaways >= needed:
         return (
-            f"{count(seaways, 'seaway')} can show that control does no harm: {needed} or more "
-            f"are needed for {100.0 * allowed:g} %."
+            f"{count(seaways, 'seaway')} can show that control does no harm: {needed} or more are "
+            f"needed for {100.0 * allowed:g} %."
         )
     return (
         f"{count(seaways, 'seaway')} cannot show that control does no harm: {needed} or more are "

@@ -288,8 +288,7 @@ class Assessment(Tabular, Drawn):
         if undecided:
             return (
                 f"{drives} makes {worse}; in {undecided} both leave the model, so whether control "
-                f"harms is "
-                "not decided: use a smaller sea."
+                "harms is not decided: use a smaller sea."
             )
         return (
             f"{drives} makes {worse}: too few to decide whether it is more than the "
@@ -506,8 +505,7 @@ class Assessment(Tabular, Drawn):
         start = "a stationary swing" if none.swing_damping > 0.0 else "rest, as it is undamped"
         rule = (
             f"Each seaway is evaluated for {study.length:g} s after {study.run_in:g} s from "
-            f"{start}. "
-            "Control harms if it is worse than none in more than "
+            f"{start}. Control harms if it is worse than none in more than "
             f"{100.0 * self.allowed_share_worse:g} % of them; the 95 % interval of that share "
             "decides."
         )

@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 HEADINGS = tuple(range(0, 360, 45))
-"""Headings of the waves by default, as likely as each other. [deg]"""
+"""Headings of the waves by default, equally likely. [deg]"""
 NEAR = 1.3
 """Factor on a limit, and from it, within which the frequency domain is not relied on."""
 SEEDS = (0, 1)
@@ -198,7 +198,7 @@ def operability(
     scatter : Scatter
         Seas and their shares of the year.
     headings : sequence of float
-        Of the waves, as likely as each other. [deg]
+        Of the waves, equally likely. [deg]
     drives
         As of `assess`.
     sea : Seaway, optional

@@ -154,8 +154,7 @@ def linear_response(
     if damping <= 0.0 and settings.feedback <= 0.0 and not settings.ship:
         raise InputError(
             "Without damping the swing in waves grows without bound: swing_damping must be above "
-            "0, "
-            "as 0.005."
+            "0, as 0.005."
         )
     home = crane.home(slew_deg, boom_deg, rope_m)
     g = crane.geometry

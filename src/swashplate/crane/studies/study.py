@@ -232,16 +232,15 @@ class Study(Result):
         if not (length >= SHORTEST and run_in >= 0.0):
             raise InputError(
                 f"A run is evaluated for {length:g} s after a run-in of {run_in:g} s, but must be "
-                f"evaluated "
-                f"for at least {SHORTEST:g} s, eight swings, after a run-in of 0 s or more."
+                f"evaluated for at least {SHORTEST:g} s, eight swings, after a run-in of 0 s or "
+                "more."
             )
         if stick is None:
             stick = OperatorCommand.rest(run_in + length)
         elif stick.length < run_in + SHORTEST:
             raise InputError(
                 f"The stick is {stick.length:g} s long, but a run is evaluated from {run_in:g} s "
-                f"on for "
-                f"at least {SHORTEST:g} s: take a longer stick, or a shorter run_in."
+                f"on for at least {SHORTEST:g} s: take a longer stick, or a shorter run_in."
             )
         pose: Any = {"slew_deg": 90.0, "boom_deg": 45.0, "rope_m": 27.0, **options}
         none = Case((crane,), pose | {"control": None, "actuation": "inverse"}, stick)

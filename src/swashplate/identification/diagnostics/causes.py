@@ -413,7 +413,7 @@ def _of_readings(stage: StageFit, name: str) -> Iterator[CandidateCause]:
             f"{name} {'rises' if size > 0.0 else 'falls'} by {percent(abs(size))} from the first "
             "run to the last"
         ),
-        advice="warm the oil as it is in use, and test again",
+        advice="warm the oil to its working temperature, and test again",
     )
     unit = channels[0].unit
     unit = unit if unit.endswith("/s") else f"{unit}/s"
@@ -477,7 +477,7 @@ def _of_numbers(stage: StageFit) -> Iterator[CandidateCause]:
             f"spool and solenoids have a friction or hysteresis of ±{1e3 * size:.3g} mA, "
             f"{percent(size / largest)} of the largest current"
         ),
-        advice=f"look at the dither; let the fit setup estimate {name}",
+        advice=f"check the dither; let the fit setup estimate {name}",
         free=name,
     )
     numbers = stage.parameters.numbers

@@ -585,8 +585,8 @@ def linearised_fit(problem: Problem, vector: Array, loss: Loss = "linear") -> Li
         slope = float(np.mean(np.concatenate([slopes for _, slopes in parts] or [np.ones(1)])))
         if not slope > 0.0:
             raise InputError(
-                f"Most residuals of {name} lie in the tails of the loss '{loss}', which says "
-                "nothing of them: state a larger noise for it, or take the loss 'linear'."
+                f"Most residuals of {name} lie in the tails of the loss '{loss}', which gives them "
+                "almost no weight: state a larger noise for it, or take the loss 'linear'."
             )
         for k, (bounded, _) in zip(mine, parts, strict=True):
             runs[k] = runs[k]._replace(residual=bounded / slope)

@@ -106,7 +106,7 @@ def as_fit_setup(
     entries_given: object = free
     if not isinstance(entries_given, Mapping) or not entries_given:
         raise InputError(
-            f"What is free is {free!r}, but must be a fit setup, its name or file, or a "
+            f"The free parameters are {free!r}, but must be a fit setup, its name or file, or a "
             "mapping such as {'Z8': (0.5, 2)}."
         )
     if "stages" in free:
@@ -156,7 +156,8 @@ def setup_of(
     if name not in setup_names():
         raise InputError(
             f"There is no packaged fit setup for the drive '{name}': give a user-defined one, a "
-            ".toml file with stages and free parameters; 'swashplate guess' reads one off the logs."
+            ".toml file with stages and free parameters; 'swashplate guess' derives one from the "
+            "logs."
         )
     return load_setup(name)
 
