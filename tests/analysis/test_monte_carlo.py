@@ -124,7 +124,7 @@ def test_a_band_by_hand(hoist):
     with pytest.raises(InputError, match="level 1 of a band"):
         bands(drawn, command, level=1.0)
     endless = np.broadcast_to(0.0, 100_000_000)
-    with pytest.raises(InputError, match="take too much memory: take 1 drives at most"):
+    with pytest.raises(InputError, match="take too much memory: use 1 drives at most"):
         bands(drawn, Trial(endless, 512.0, endless))
     # of the speed limits each way and of the final speed
     down = hoist.parameters.numbers["Z13_minus"] / angle

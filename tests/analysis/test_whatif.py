@@ -149,7 +149,7 @@ def test_what_is_wanted_and_what_there_is_not(hoist):
     result = what_if(slew, {"dead_zone": 0.0}, task, outcomes=["final_speed", "rise_time"])
     assert result.after.values[0] > result.before.values[0] == 0.0
     (sentence,) = result.sentences()
-    assert sentence.startswith("as it is: no rise_time, the shaft stands still")
+    assert sentence.startswith("as it is: no rise_time, the shaft does not move")
 
 
 # --- sensitivities --------------------------------------------------------------------------------

@@ -102,7 +102,8 @@ GEAR = "gear_ratio = 2.0\n"
             'drive = "hoist"',
             'drive = "hoist"\nignore = [{ from = 100.0, to = 200.0, why = "x" }]',
             (
-                "axes.winch.ignore: the window from 100 s to 200 s contains no sample of any of 2 runs",
+                "axes.winch.ignore: the window from 100 s to 200 s contains no sample of any of 2 "
+                "runs",
             ),
         ),
         (

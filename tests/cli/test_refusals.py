@@ -20,7 +20,7 @@ REFUSED = {
     "export hoist --c folder --step 0.005": "call swp_step several times per sample",
     "linearize hoist": "give one of --at and --current",
     "linearize hoist --current 1 --input voltage": "needs --at, not",
-    "linearize hoist --at 0.1": "lies in the card's dead zone, so the gain is 0; linearise at +0.",
+    "linearize hoist --at 0.1": "is in the card's dead zone, so the gain is 0; linearise at +0.",
     "sensitivity hoist --variable pumpe": "no design variable 'pumpe' (did you mean pump?)",
     "sensitivity hoist --variable pump --variable pump=1/2": "--variable gives pump twice",
     "sensitivity hoist --outcome speed": "There is no outcome 'speed'",

@@ -80,7 +80,7 @@ def test_names_follow_the_contract_of_a_mapping(result: Identification) -> None:
     assert set(result) == set(result.fit.estimates)
     assert len(result) == len(list(result))
     assert result["Z10"] == result.fit["Z10"]
-    with pytest.raises(KeyError, match="J has two directions: ask for J_plus or J_minus"):
+    with pytest.raises(KeyError, match="J has two directions: name J_plus or J_minus"):
         result["J"]
     with pytest.raises(KeyError, match="did you mean Z10"):
         result["Z100"]
@@ -302,7 +302,7 @@ REFUSED: Mapping[str, tuple[Callable[[Campaign], object], type[Exception], str]]
     "nothing": (
         lambda tests: swashplate.identify(tests, free={}),
         InputError,
-        "What is free is {}",
+        "free parameters are {}",
     ),
     "an unknown fit setup": (
         lambda tests: swashplate.identify(tests, free="hoost"),

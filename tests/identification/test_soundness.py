@@ -82,7 +82,7 @@ def test_a_position_that_stands_still_for_a_while_is_named_with_the_window() -> 
         runs[k] = compared(run, "angle", angle)
     (finding,) = found_in(runs)
     assert finding.run == "run 2"
-    assert "it stands still from 8.0" in finding.sentence
+    assert "it does not move from 8.0" in finding.sentence
     assert "ignore this window" in finding.sentence
 
 

@@ -192,7 +192,7 @@ def test_where_friction_or_hysteresis_holds(hoist: Drive) -> None:
             lagging.linearize(**where)
     force = lagging.linearize(4.0, input="solenoid_force")
     assert force.gain == hoist.linearize(4.0, input="solenoid_force").gain
-    with pytest.raises(DomainError, match="holds the spool fast"):
+    with pytest.raises(DomainError, match="prevents small motions of the spool"):
         hoist.replace(spool_friction=0.1).linearize(4.0)
 
 

@@ -254,7 +254,11 @@ DAMAGED = [
         text("time,u\n" + "0,1\n" * 20000 + "\0" * 50),
         "NUL byte in data row 20001 (line ",
     ),
-    ("thousands.csv", text("a;b\n1,234;5\n2,345;6\n"), "'1,234', where the comma may be a decimal"),
+    (
+        "thousands.csv",
+        text("a;b\n1,234;5\n2,345;6\n"),
+        "'1,234', in which the comma may be a decimal",
+    ),
     ("either.csv", text("voltage\n0,5\n1,5\n"), "has no column 'voltage'; it has 'column 1',"),
     ("open.csv", text('a,b\n1,"2\n3,4\n'), "misplaced quotes in data row 1 (line 2)"),
     ("wide.csv", text("time,u\n0,1\n".encode("utf-16")[:-1]), "is not text in utf-16-le"),

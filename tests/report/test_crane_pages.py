@@ -304,7 +304,7 @@ def test_figure_of_an_assessment_has_shares_of_limits(assessed, crane):
 
 
 def swept(crane, over, points, values):
-    """A sweep of one variant beside no control, in two seaways. [deg]"""
+    """A sweep of one variant besides no control, in two seaways. [deg]"""
     both = np.radians(np.array([values, values]))
     seaways = np.stack([both, 0.5 * both], axis=-1)
     seaways[1] *= 1.1

@@ -468,7 +468,7 @@ def improvement(
     reference = np.array(reference_speed, dtype=np.float64)
     if not reference.any():
         raise InputError(
-            "The reference speed is standstill throughout; take one that moves the drive."
+            "The reference speed is standstill throughout; use one that moves the drive."
         )
     commands = {
         "straight line": proportional_command(chosen, reference),

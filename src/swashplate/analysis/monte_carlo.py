@@ -482,8 +482,8 @@ def bands(
     count, size = len(drawn.drives), trial.voltage.size
     if size * count > MOST_SAMPLES:
         raise InputError(
-            f"{count} drives over {size} samples take too much memory: take "
-            f"{MOST_SAMPLES // size} drives at most, or give the command at a lower rate."
+            f"{count} drives over {size} samples take too much memory: use {MOST_SAMPLES // size} "
+            "drives at most, or give the command at a lower rate."
         )
     run = drawn.drives[0].simulate_many(drawn.columns, voltage=trial.voltage, rate=trial.rate)
     if run.failures:

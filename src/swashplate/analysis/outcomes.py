@@ -207,7 +207,7 @@ def _outcome(unit: str, undefined: str = "") -> Callable[[Compute], Compute]:
     return keep
 
 
-_NEVER = "the shaft stands still while the command is at its largest"
+_NEVER = "the shaft does not move while the command is at its largest"
 _NO_RISE = f"{_NEVER}, or the command reverses before it gets there"
 
 

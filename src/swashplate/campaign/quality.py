@@ -203,7 +203,7 @@ def _of_channel(experiment: Experiment, channel: Channel, signed: bool) -> Itera
     if directional and turned(drive.at(at) - drive.values[0], motion):
         yield "moves against the input: should its sign be -1?"
     if outside := int(np.count_nonzero((time < drive.time[0]) | (time > drive.time[-1]))):
-        yield f"{count(outside, 'sample lies', 'samples lie')} before or after the input's record"
+        yield f"{count(outside, 'sample is', 'samples are')} before or after the input's record"
 
 
 def turned(driven: Array, motion: Array) -> bool:

@@ -158,7 +158,7 @@ def run(
     runs = {}
     last = ""
     if out is not None and len(variant or ()) > 1:
-        raise InputError("--out writes one run's signals: take one --variant.")
+        raise InputError("--out writes one run's signals: use one --variant.")
     with spinner("Simulating"):
         from swashplate.crane import OperatorCommand, run_tables, simulate
         from swashplate.crane.axes import RATE

@@ -342,8 +342,8 @@ class Controller(Control):
         unknown = [name for name in self.model.external if name not in SEEN]
         if unknown:
             raise InputError(
-                f"The controller {self.model.name} asks for '{unknown[0]}', but a crane's "
-                f"controller sees {', '.join(SEEN)}."
+                f"The controller {self.model.name} needs '{unknown[0]}', but a crane's controller "
+                f"has {', '.join(SEEN)}."
             )
         missing = [name for name in GIVES if name not in self.model.signal_names]
         if missing:

@@ -110,7 +110,7 @@ def swing_damping(time: ArrayLike, angle: ArrayLike, *, rope: float | None = Non
     if ratio - half <= 0.0:
         raise InputError(
             f"The log does not show that the swing decays: its damping ratio would be {ratio:.2g}, "
-            f"within {ratio - half:.2g} and {ratio + half:.2g}: take a longer log of a load that "
+            f"within {ratio - half:.2g} and {ratio + half:.2g}: use a longer log of a load that "
             "swings freely."
         )
     return FreeSwing(ratio, ratio - half, ratio + half, period)
@@ -154,8 +154,8 @@ def _start(time: Array, swing: Array) -> Array:
     # of a pure offset or a drift the largest line is the lowest one
     if swings < FEWEST:
         raise InputError(
-            f"The log has {swings:.1f} swings, but {FEWEST:g} are needed: take a longer one, from "
-            "where the crane comes to rest."
+            f"The log has {swings:.1f} swings, but {FEWEST:g} are needed: use a longer one, "
+            "beginning when the crane is at rest."
         )
     basis = np.stack(
         [np.ones(time.size), np.cos(frequency * time), np.sin(frequency * time)], axis=1

@@ -78,7 +78,7 @@ def limits_of(limits: Mapping[str, CraneQuantity], origin: str) -> dict[str, flo
     unknown = [name for name in limits if name not in LIMITED]
     if unknown:
         raise ParameterError(
-            f"{origin}: limits knows no '{unknown[0]}'; it has {', '.join(LIMITED)}."
+            f"{origin}: limits has no entry '{unknown[0]}'; it has {', '.join(LIMITED)}."
         )
     values = {}
     for name, quantity in limits.items():

@@ -38,7 +38,7 @@ HEADER = """\
 # all logs and says what is wrong with them.
 """
 UNUSED = "# Columns that are not used"
-BETWEEN = '# interpolation = "previous"    # held, "linear" or "jumps"; without it a fit tries all'
+BETWEEN = '# interpolation = "previous"    # held, "linear" or "jumps"; if omitted, a fit tries all'
 NO_TIME = "# time = { rate = 512 }"
 NO_ENCODER = "# No column looks like an encoder's counts"
 UNORDERED = (

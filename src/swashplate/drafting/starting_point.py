@@ -35,9 +35,9 @@ STEEPEST = 30.0
 """Volts that a radian takes at least, so that at 10 V and at the upper bounds of all gains the
 solenoids do not overpower the feedback spring. [V/rad]"""
 SETUP_TEMPLATE = """\
-# Read off the logs of the axis '{0}' by `swashplate guess`: what they show is
-# free, within bounds about the first guess. A limit that the guess did not see is
-# free as well, within wide ones: a fit tells it from a lag.
+# Written by `swashplate guess` from the logs of the axis '{0}'. Parameters that they
+# show are free, within bounds about the first guess. A limit that the guess did not see
+# is also free, within wide bounds: a fit distinguishes it from a lag.
 title = "{0}, guessed"
 """
 CHAIN = """

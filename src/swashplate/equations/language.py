@@ -82,7 +82,7 @@ INSTEAD: dict[type[ast.AST], tuple[str, str]] = {
 }
 """What to write in place of statements, expressions and operators that an equation may not use."""
 INSTEAD_OF_BUILTIN = {
-    "print": "look at results outside the equation",
+    "print": "inspect results outside the equation",
     "len": "write the number",
     "sum": "write the terms out",
     "float": "write the number as a float",

@@ -366,12 +366,13 @@ def _wrong(model: Model) -> Iterator[str]:
             if name not in (*ARGUMENTS, *input_names):
                 choice = ", ".join((*ARGUMENTS, *input_names))
                 name_of = plain(asking).__name__
-                yield f"{says}{name_of} asks for '{name}', which is not one of {choice}."
+                yield f"{says}{name_of} needs '{name}', which is not one of {choice}."
     for name, tap in model.taps.items():
         if name not in input_names:
             yield f"{says}there is a tap on '{name}', but no input."
         if tap.hold not in get_args(Hold):
-            yield f"{says}'{name}' is held as '{tap.hold}'; there are {', '.join(get_args(Hold))}."
+            choice = ", ".join(get_args(Hold))
+            yield f"{says}'{name}' has the hold '{tap.hold}'; there are {choice}."
         if tap.delay and tap.delay not in parameters:
             choice = ", ".join(parameters)
             yield f"{says}the delay of '{name}' is '{tap.delay}', but the parameters are {choice}."
@@ -501,8 +502,7 @@ def join(
             if source is None:
                 names_of_parts = ", ".join(name for part in single for name in part.signal_names)
                 raise InputError(
-                    f"Model {name}: a link asks for '{argument}', but the parts have "
-                    f"{names_of_parts}."
+                    f"Model {name}: a link needs '{argument}', but the parts have {names_of_parts}."
                 )
             sources.append(source)
         linked[signal] = Link(signal, tuple(sources), link_equation)

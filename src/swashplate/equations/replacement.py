@@ -252,7 +252,7 @@ def _called_like(old: Equation, new: Equation, part: str, kind: type[Any]) -> Eq
     unknown = [path for path in further if path not in kind._fields]
     if unknown:
         raise InputError(
-            f"{plain(new).__name__} asks for {unknown[0]}, which is not a parameter of {part}."
+            f"{plain(new).__name__} needs {unknown[0]}, which is not a parameter of {part}."
         )
     if "p" not in taken:
         raise InputError(

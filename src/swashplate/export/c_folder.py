@@ -168,7 +168,7 @@ def content_of(
             what = what.at_every_rate()
             warnings.warn(
                 f"{what.name}: the card's filter is a recursion for {rate:g} Hz; for a step of "
-                f"{step:g} s the differential equation with the same poles takes its place.",
+                f"{step:g} s the differential equation with the same poles is used instead.",
                 stacklevel=3,
             )
         check_filter_stability(what.parameters, step)

@@ -346,7 +346,7 @@ class FullOrderDrive:
         if needed > MOST_SUBSTEPS:
             raise DomainError(
                 f"{self.physical.name}: the fastest mode, at {fastest:.3g} rad/s, would take "
-                f"{needed} steps a sample, more than {MOST_SUBSTEPS}; take a larger mass or "
+                f"{needed} steps a sample, more than {MOST_SUBSTEPS}; use a larger mass or "
                 "oil_volume."
             )
         return needed

@@ -139,7 +139,7 @@ class Estimated(Tabular, ABC):
             return self.estimates[name]
         sides = [f"{name}_{side}" for side in SIDES]
         if all(side in self.estimates for side in sides):
-            raise UnknownNameError(f"{name} has two directions: ask for {' or '.join(sides)}.")
+            raise UnknownNameError(f"{name} has two directions: name {' or '.join(sides)}.")
         near = get_close_matches(str(name), self.estimates, 1)
         meant = f" (did you mean {near[0]}?)" if near else ""
         names = ", ".join(key for key, estimate in self.estimates.items() if estimate.run is None)

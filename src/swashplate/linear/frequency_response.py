@@ -301,7 +301,7 @@ def sweep(
         middle_of = f"{bias:g} {units.get(input, '')}".rstrip()
         raise DomainError(
             f"{instance.name}: nothing moves about {middle_of} with amplitudes up to {a.max():g}: "
-            "all stay in a dead zone or at a stop; take larger ones or another bias."
+            "all stay in a dead zone or at a stop; use larger ones or another bias."
         )
     return FrequencyResponse(
         name=instance.name,

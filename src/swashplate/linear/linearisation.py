@@ -163,7 +163,7 @@ def _linear_model(
         if name in model.integrals:
             raise InputError(
                 f"{instance.name}: '{name}' is an integral of a signal, which a linear model does "
-                f"not have; ask for '{model.integrals[name]}'."
+                f"not have; use '{model.integrals[name]}'."
             )
     seen = tuple(output_of(model, name)[0] for name in outputs)
     arguments, derived = step_derivatives(model, signals, instance.options, seen)

@@ -70,7 +70,7 @@ class TextOptions:
         try:
             "".encode(self.encoding or "utf-8")  # zlib and the like are codecs, but not of text
         except (LookupError, UnicodeError, ValueError):
-            wrong = f"encoding {self.encoding!r} is unknown; take 'utf-8', 'latin-1' or 'utf-16'"
+            wrong = f"encoding {self.encoding!r} is unknown; use 'utf-8', 'latin-1' or 'utf-16'"
         if wrong:
             raise InputError(f"{wrong}.")
 
@@ -274,8 +274,8 @@ def find_layout(lines: Sequence[str], options: TextOptions, path: Path) -> TextL
         cells = [cell for cell in cells if is_number_text(cell, ",")]
         if cells and all(_THREE.fullmatch(cell) for cell in cells):
             raise FileError(
-                f"{path} has numbers like '{cells[0]}', where the comma may be a decimal sign or "
-                "separate thousands; give 'decimal' as an option."
+                f"{path} has numbers like '{cells[0]}', in which the comma may be a decimal sign "
+                "or a thousands separator; give 'decimal' as an option."
             )
     return layout
 

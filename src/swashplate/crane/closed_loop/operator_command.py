@@ -155,7 +155,7 @@ class OperatorCommand(Result):
         if not length <= LONGEST:
             raise InputError(
                 f"The recorded stick lasts {length:g} s at {rate:g} Hz, but a run at most "
-                f"{LONGEST:g} s: look at its rate."
+                f"{LONGEST:g} s: check its rate."
             )
         wrong = np.flatnonzero(~(np.abs(samples) <= 1.0).all(axis=1))
         if wrong.size:
@@ -272,13 +272,13 @@ class OperatorCommand(Result):
             duration = angle / speed + self.ramp
         if duration < 2.0 * self.ramp:
             raise InputError(
-                f"The {axis} moves for {duration:.3g} s, less than its two ramps of "
-                f"{self.ramp:g} s: take a smaller command or shorter ramps."
+                f"The {axis} moves for {duration:.3g} s, less than its two ramps of {self.ramp:g} "
+                "s: use a smaller command or shorter ramps."
             )
         if self.start + duration > self.length:
             raise InputError(
-                f"The stick of the {axis} ends at {self.start + duration:.4g} s, but the record "
-                f"at {self.length:g} s: take a longer record."
+                f"The stick of the {axis} ends at {self.start + duration:.4g} s, but the record at "
+                f"{self.length:g} s: use a longer record."
             )
         return duration
 

@@ -253,7 +253,7 @@ class CraneRun(Tabular):
         beyond = np.degrees(swing_of(load, tip)) > FARTHEST_SWING
         times = {
             f"the load swings beyond {FARTHEST_SWING:g} deg": _first(beyond, LOOK),
-            "the rope lies on the boom": _first(inboard >= 0.5 * pi - boom, LOOK),
+            "the rope touches the boom": _first(inboard >= 0.5 * pi - boom, LOOK),
             IN_WATER: _first(load[:, 2] < 0.0, LOOK),
         }
         deck = self.crane.deck
@@ -340,7 +340,7 @@ class CraneRun(Tabular):
         if self.snap is None and not jumps:
             sentences.append(
                 f"The slack rope snaps taut at {self.time[self._snaps[0]]:.2f} s. With a rigid "
-                "rope the resulting tension is not computed: take an elastic rope, "
+                "rope the resulting tension is not computed: use an elastic rope, "
                 "suspension=Suspension(stiffness=6e7)."
             )
         return tuple(sentences)

@@ -89,7 +89,7 @@ def prepare(crane: Crane, stick: OperatorCommand, options: RunOptions) -> Prepar
     if stepper.fixed.actuation == DIRECT:
         raise InputError(
             "With direct actuation commands are voltages, but a stick gives fractions of full "
-            "speed: take a CraneStepper, or actuation='volts'."
+            "speed: use a CraneStepper, or actuation='volts'."
         )
     if not isinstance(stick, OperatorCommand):
         raise InputError(

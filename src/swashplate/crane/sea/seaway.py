@@ -88,7 +88,7 @@ class Spectrum:
             low, high = (2.0 * np.pi / omega for omega in BAND[::-1])
             raise InputError(
                 f"A sea with a peak at {self.period:g} s has little energy between waves of "
-                f"{low:.3g} and {high:.3g} s, which are simulated: take a period between."
+                f"{low:.3g} and {high:.3g} s, which are simulated: use a period between."
             )
 
     def density(self, omega: ArrayLike) -> Array:
@@ -235,7 +235,7 @@ class Seaway(Result):
             raise InputError(
                 f"{self.ship.name} has waves of {low:.3g} to {high:.3g} rad/s, but "
                 f"{100.0 * lost:.0f} % of the energy of the sea ({self.title}) lies beyond, more "
-                f"than {100.0 * MOST_LOST:.0f} %: take a file that reaches further, or another sea."
+                f"than {100.0 * MOST_LOST:.0f} %: use a file that reaches further, or another sea."
             )
 
     @property
@@ -275,7 +275,7 @@ class Seaway(Result):
             sentences.append(
                 f"{self.ship.name} has waves of {low:.3g} to {high:.3g} rad/s: for the "
                 f"{100.0 * lost:.1f} % of the energy of the sea ({self.title}) that lies beyond, "
-                "the motions in the nearest of them are taken."
+                "the motions in the nearest of them are used."
             )
         return tuple(sentences)
 
@@ -451,7 +451,7 @@ def ship_motion(
             if 6.0 * seconds * rate > LARGEST:
                 raise InputError(
                     f"{path} lasts {seconds:g} s: at {rate:g} Hz that is more than the {LARGEST} "
-                    "numbers that can be read at once; cut the log, or take a lower rate."
+                    "numbers that can be read at once; cut the log, or use a lower rate."
                 )
             motions = np.zeros((int(seconds * rate + 1e-6) + 1, 6))
         grid = series.time[0] + np.arange(len(motions)) / rate
@@ -499,7 +499,7 @@ def _curve(series: Series, grid: Array, column: str, of: str) -> Array:
         row = int(np.argmin(np.abs(time - grid[worst])))
         raise InputError(
             f"{of}: a curve through the samples of {column} swings to {curve[worst]:.3g} at "
-            f"{grid[worst]:g} s, far beyond them, {low:.3g} to {high:.3g}: look for a spike or a "
+            f"{grid[worst]:g} s, far beyond them, {low:.3g} to {high:.3g}: check for a spike or a "
             f"wrong stamp near data row {row + 1}."
         )
     return curve

@@ -429,7 +429,8 @@ def _csv_rows(path: str | Path) -> Iterator[Amplitude]:
                 yield speed, heading, omega, motion, complex(real, imaginary)
     except csv.Error as error:
         raise FileError(
-            f"{path}, line {table.line_num}: {error}: look for a quotation mark that is not closed."
+            f"{path}, line {table.line_num}: {error}: check for a quotation mark that is not "
+            "closed."
         ) from None
 
 

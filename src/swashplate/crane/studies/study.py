@@ -240,7 +240,7 @@ class Study(Result):
         elif stick.length < run_in + SHORTEST:
             raise InputError(
                 f"The stick is {stick.length:g} s long, but a run is evaluated from {run_in:g} s "
-                f"on for at least {SHORTEST:g} s: take a longer stick, or a shorter run_in."
+                f"on for at least {SHORTEST:g} s: use a longer stick, or a shorter run_in."
             )
         pose: Any = {"slew_deg": 90.0, "boom_deg": 45.0, "rope_m": 27.0, **options}
         none = Case((crane,), pose | {"control": None, "actuation": "inverse"}, stick)

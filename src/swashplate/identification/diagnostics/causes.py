@@ -392,7 +392,7 @@ def _of_readings(stage: StageFit, name: str) -> Iterator[CandidateCause]:
         most=LATEST,
         freed=partial(read, _late),
         states=lambda size: f"{name} is {_time(abs(size))} {'late' if size > 0.0 else 'early'}",
-        advice="compare its clock with that of the command, and look for a delay of the machine",
+        advice="compare its clock with that of the command, and check for a delay of the machine",
     )
     yield CandidateCause(
         name=f"lag of {name}",
@@ -427,7 +427,7 @@ def _of_readings(stage: StageFit, name: str) -> Iterator[CandidateCause]:
             most=np.inf,
             freed=partial(read, partial(_undone_loss, resisting=resisting)),
             states=partial(_lost_speed, unit, load),
-            advice="look for that load, and for a leaking motor",
+            advice="check for that load, and for a leaking motor",
         )
 
 
@@ -459,7 +459,7 @@ def _of_commands(stage: StageFit) -> Iterator[CandidateCause]:
         most=LATEST,
         freed=partial(_with_command, stage, _lagging),
         states=lambda size: f"the command lags by {_time(size)} on its way to the amplifier",
-        advice="look for a filter or delay there",
+        advice="check for a filter or delay there",
     )
 
 

@@ -112,9 +112,9 @@ def unfitted_currents(experiments: Sequence[Experiment], setup: FitSetup) -> lis
         warning(
             None,
             name,
-            f"'{name}' is measured, but no stage fits it, so that the amplifier is not known: let "
-            "'swashplate guess' write a start and a fit setup whose first stage fits the "
-            "amplifier to it, and give them by --from and --setup.",
+            f"'{name}' is measured, but no stage fits it, so the amplifier is not known: let "
+            "'swashplate guess' write an initial drive and a fit setup whose first stage fits the "
+            "amplifier to it, and give them as --from and --setup.",
         )
         for name in unfitted
     ]
@@ -175,8 +175,8 @@ def _unchanging(run: Experiment, names: Sequence[str]) -> Iterator[Finding]:
             yield warning(
                 run.name,
                 name,
-                f"{run.name}: '{name}' never changes, though the input does and it moves in other "
-                "runs; check the sensor, or ignore the channel in this run.",
+                f"{run.name}: '{name}' never changes, although the input does and it moves in "
+                "other runs; check the sensor, or ignore the channel in this run.",
             )
 
 
@@ -242,7 +242,7 @@ def _samples(experiment: Experiment, fitted: Collection[str]) -> Iterator[Findin
         yield refusal(
             run,
             None,
-            f"{run}: its input is not finite at sample {int(np.argmax(bad))}; mend the log or "
+            f"{run}: its input is not finite at sample {int(np.argmax(bad))}; correct the log or "
             "cut the run with a span.",
         )
         return
@@ -393,9 +393,9 @@ def _still(name: str, runs: Sequence[SimulatedReadings]) -> Iterator[Finding]:
             yield refusal(
                 readings.run,
                 name,
-                f"{readings.run}: '{name}' never changes, though the drive should move it by about "
-                f"{simulated_range:.3g} {unit}; check the sensor, and ignore the channel in this "
-                "run.",
+                f"{readings.run}: '{name}' never changes, although the drive should move it by "
+                f"about {simulated_range:.3g} {unit}; check the sensor, and ignore the channel in "
+                "this run.",
             )
         elif channel.is_position:
             yield from _frozen(name, readings, DEAD * fastest)
@@ -412,7 +412,7 @@ def _frozen(name: str, readings: SimulatedReadings, least: float) -> Iterator[Fi
             yield warning(
                 readings.run,
                 name,
-                f"{readings.run}: '{name}' stands still from {begin:.4g} to {end:.4g} s, though "
+                f"{readings.run}: '{name}' does not move from {begin:.4g} to {end:.4g} s, although "
                 "the drive should move it; check the sensor and the machine's stops, and ignore "
                 "that window.",
             )

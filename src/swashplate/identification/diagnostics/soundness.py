@@ -243,7 +243,7 @@ def _sentence(
     if span is not None:
         first, last = span
         return (
-            f"{fault}: it stands still from {first:.4g} to {last:.4g} s. Check the sensor; ignore "
+            f"{fault}: it does not move from {first:.4g} to {last:.4g} s. Check the sensor; ignore "
             f"this window, or {ignored}."
         )
     delay, mean_square_delayed = _delayed(record, measured, simulated)

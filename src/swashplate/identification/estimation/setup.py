@@ -152,7 +152,7 @@ class Stage(FileTable):
 
     name: str
     part: Literal["card", "pump", "chain", "model"] = Field(
-        description="Simulated part: the control card, pump and motor, the whole chain; 'model' "
+        description="Simulated part: the control card, pump and motor, the complete chain; 'model' "
         "is for user-defined models, given by --model."
     )
     current: Literal["simulated", "measured"] = Field(

@@ -266,8 +266,7 @@ def _channels_of(stage: Stage, experiments: Sequence[Experiment]) -> tuple[str, 
     if weighed and not fitted & set(weighed):
         raise InputError(
             f"The stage '{stage.name}' weighs {', '.join(weighed)}, but the runs have "
-            f"{', '.join(sorted(fitted))}: add weights for that, or take a fit setup "
-            "without."
+            f"{', '.join(sorted(fitted))}: add weights for that, or use a fit setup without."
         )
     return tuple(dict.fromkeys(name for name, kind in measured if kind in kinds))
 

@@ -296,8 +296,9 @@ def _live_section(fit: Fit, campaign: Campaign, runs: Sequence[ShownRun]) -> Sec
 
 def _residual_section(runs: Sequence[ShownRun]) -> Section:
     words = (
-        "Correlation of the residuals with the input, positive lags where the residual comes after "
-        "it, and the 95 % band of residuals, coloured as these are, that have no relation to it."
+        "Correlation of the residuals with the input, positive lags where the residual comes "
+        "after it, and the 95 % band of residuals, coloured as these are, that are unrelated to "
+        "it."
     )
     heads = ("run", "role", "channel", "correlation with the input")
     table = Table("", tuple(map(Column, (*heads, "verdict"))))

@@ -230,7 +230,7 @@ MEANINGS = {
     AT_BOUND: "At its bound: depends on an estimate that ended at a bound of its search; size and "
     "sign of its error are not known.",
     "(fixed)": "Fixed: depends on parameters that were not fitted.",
-    "Z16_": "Z16 fixed: an orifice that the fit did not look for can be mistaken for a lag.",
+    "Z16_": "Z16 fixed: the fit did not estimate an orifice, which can be mistaken for a lag.",
 }
 """What words beside a number mean."""
 

@@ -44,16 +44,16 @@ SUFFICES: dict[Decision, str] = {
 }
 IN_WORDS = (
     "No control: the crane as it is, moved only by the operator's stick. Every variant goes "
-    "through the same seaways, so that differences are within each seaway. Swing is the angle "
-    "between rope and plumb line, RMS its root mean square over a seaway."
+    "through the same seaways, so differences are within each seaway. Swing is the angle between "
+    "rope and plumb line, RMS its root mean square over a seaway."
 )
 LIMITS_IN_WORDS = (
-    "Orifice: the in-line orifice limits the flow to the stroking piston, so that the shaft "
-    "cannot accelerate faster. Swash stop: the pump is at full stroke, so that it cannot turn "
-    "faster. A controller that demands more acts late, and late action increases the swing."
+    "Orifice: the in-line orifice limits the flow to the stroking piston, so the shaft cannot "
+    "accelerate faster. Swash stop: the pump is at full stroke, so the motor cannot turn faster. "
+    "A controller that demands more acts late, and late action increases the swing."
 )
 FOLLOWED = (
-    "Largest sine of the tip that each axis can follow, and what the sea asks of it: a filled "
+    "Largest sine of the tip that each axis can follow, and the demand of the sea: a filled "
     "diamond above the line of its colour exceeds what the axis can do"
 )
 ASSUMED = "Shaded rows are assumed: measure or agree them before you rely on a number."
@@ -100,7 +100,7 @@ def write_assessment(assessment: Assessment, path: str | Path) -> None:
     facts = [
         seaway_words(study.seaway),
         f"{count(len(study.seeds), 'seaway')} of {study.length / 60.0:g} min",
-        f"{count(len(assessment.names) - 1, 'variant')} beside no control",
+        f"{count(len(assessment.names) - 1, 'variant')} besides no control",
     ]
     title = crane.title or crane.name
     write_text(page(sections, what="Crane", title=title, facts=" · ".join(facts)), path)
@@ -181,7 +181,7 @@ def _example(assessment: Assessment) -> list[PageBlock]:
     except (DomainError, InputError):  # a run that was stopped has no signals
         return []
     caption = (
-        f"Seaway {seed}, in which '{assessed}' swings as in half of all seaways; it counts from "
+        f"Seaway {seed}, in which '{assessed}' swings as in half of all seaways; evaluated from "
         f"{assessment.study.run_in:g} s on"
     )
     return [_drawn(plot_crane(runs, title=f"Swing in seaway {seed}"), caption)]
