@@ -167,7 +167,7 @@ def test_operability_writes_one_page_and_one_table(tmp_path):
     assert shown.exit_code == 0, shown.output
     assert "Share of the year, and what limits the rest first" in shown.stdout
     assert page.read_text("utf-8").count("<table") >= 1
-    assert "made up" not in shown.stdout
+    assert "fictitious" not in shown.stdout
 
 
 @pytest.mark.slow

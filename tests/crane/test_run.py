@@ -702,7 +702,7 @@ REFUSED = [
         "Ideal drives follow instantaneously, .* a row of zeros",
     ),
     ({"stick": 3}, "The stick is 3, but must be an OperatorCommand"),
-    ({"boom_deg": 85.0}, "boom of tg3637 stands at 85 deg, but moves between 15 and 80"),
+    ({"boom_deg": 85.0}, "boom of tg3637 is at 85 deg, but moves between 15 and 80"),
     ({"load": 36000.0}, "The load is 36000 kg, but tg3637 lifts 35000 kg: use a smaller"),
     ({"rope_m": 2.0}, "rope of tg3637 is 2 m, but can be 3 to 50 m"),
     ({"sea": np.zeros((5121, 6))}, "is 60 s long, but the ship's motion only 10 s"),

@@ -364,7 +364,7 @@ def test_what_tells_nothing_is_refused() -> None:
     (sine, *_) = runs()
     speed = sine["shaft_speed"]
     for changes, said in (
-        ({"values": -speed.values}, "against the command: reverse it with sign = -1"),
+        ({"values": -speed.values}, "opposite to the command: reverse it with sign = -1"),
         ({"weight": np.zeros(TIME.size)}, "No run measures a motion"),
         ({"weight": np.where(TIME[3] > TIME, 1.0, 0.0)}, "too short to guess from"),
     ):

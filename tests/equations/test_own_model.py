@@ -430,7 +430,7 @@ REFUSED = {
     "flow none": ({"flow": [None]}, "flow must be a sequence of real numbers"),
     "rate": ({"rate": "fast"}, "The rate is 'fast' Hz, but must be a number above 0"),
     "no such state": ({"begin": {"depth": 1.0}}, "no state 'depth' to start from; it has level"),
-    "hold": ({"taps": {"flow": Tap("flow", hold="cubic")}}, "held as 'cubic'; there are linear"),
+    "hold": ({"taps": {"flow": Tap("flow", hold="cubic")}}, "hold 'cubic'; there are linear"),
     "delay": (
         {"taps": {"flow": Tap("flow", "width")}, "p": Outlet(-0.1)},
         "tank: width is -0.1 s, but a delay is at least 0",
@@ -462,9 +462,9 @@ LOAD = Model("load", Outlet, Load, pulled)
 JOINED = {
     "order": ((PUMP, FED), {}, f"Model x: pump {LATE}"),
     "loop": ((TANK, PUMP), {}, f"tank needs 'flow', which is known only after pump: {LOOP}"),
-    "load": ((LOAD, *pump_drive.parts), {}, "load needs 'shaft_speed', .* behind pump: a loop"),
-    "drive": ((*pump_drive.parts, LOAD), {}, "pump needs 'load_torque', .* behind load: a loop"),
-    "link": ((TANK,), {"flow": doubled}, f"tank needs 'flow', .* behind tank: {LOOP}"),
+    "load": ((LOAD, *pump_drive.parts), {}, "load needs 'shaft_speed', .* after pump: a loop"),
+    "drive": ((*pump_drive.parts, LOAD), {}, "pump needs 'load_torque', .* after load: a loop"),
+    "link": ((TANK,), {"flow": doubled}, f"tank needs 'flow', .* after tank: {LOOP}"),
     "text": ((TANK, "pump"), {}, "Model x is joined from models, not from 'pump'"),
 }
 
