@@ -464,7 +464,7 @@ def test_files_that_lack_much_of_the_sea_are_refused(table):
         (lambda: Spectrum(1.0, 60.0), "has little energy between waves of 1.05 and 31.4 s"),
         (lambda: Hull(0.0, 20.0, 9.0), "The hull's length is 0"),
         (lambda: read_ship("hull.dat"), "hull.dat: transfer functions are read from .re1 of VERES"),
-        (lambda: Seaway("ss3").motion(100, 500.0), "multiple of 8 samples a second"),
+        (lambda: Seaway("ss3").motion(100, 500.0), "multiple of 8 Hz"),
     ],
 )
 def test_seas_that_make_no_sense_are_refused(make, message):

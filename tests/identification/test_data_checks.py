@@ -160,7 +160,7 @@ def test_a_position_that_freezes_while_the_drive_runs() -> None:
     good = [turned(each, freeze=False) for each in GOOD]
     assert findings(*good) == []
     found = findings(turned(GOOD[0], freeze=True), *good[1:])
-    (said,) = [each.sentence for each in found if "up: 'position' stands still" in each.sentence]
+    (said,) = [each.sentence for each in found if "up: 'position' does not move" in each.sentence]
     first, last = (float(each) for each in said.partition("from ")[2].split()[:3:2])
     assert 1.2 <= first <= 1.4
     assert 2.4 <= last <= 2.6
