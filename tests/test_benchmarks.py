@@ -97,9 +97,9 @@ def test_where_a_verdict_names_a_fault(bench: ModuleType) -> None:
     assert bench.named(record("none", 0.0, 10.0, causes=loss)) == ""
     hidden = record("supply pressure 20 % low", 0.0, 10.0, assumed=["the fixed Z6, Z9 as stated"])
     assert bench.named(hidden) == "assumed"
-    found = ["hoist_ramp_+1_V-s: 'encoder_counts' is 6.1 times as far from what is simulated."]
+    found = ["hoist_ramp_+1_V-s: 'encoder_counts' is 6.1 times as far from the simulation."]
     assert bench.named(record("run of another axis", 0.0, 10.0, unsound=found)) == "unsound"
-    found = ["hoist_step_+4_V: 'encoder_counts' is 6.1 times as far from what is simulated."]
+    found = ["hoist_step_+4_V: 'encoder_counts' is 6.1 times as far from the simulation."]
     assert bench.named(record("run of another axis", 0.0, 10.0, unsound=found)) == ""
 
 

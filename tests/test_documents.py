@@ -109,7 +109,7 @@ def test_texts_that_are_no_files(tmp_path, monkeypatch):
         with pytest.raises(FileError, match="is (not an ordinary|a folder, not a) file"):
             read_text(tmp_path / name)
     monkeypatch.setattr(documents, "LARGEST", 5)
-    with pytest.raises(FileError, match="it is not such a text"):
+    with pytest.raises(FileError, match="it is too large for such a file"):
         read_text(tmp_path / "bom.toml")
 
 

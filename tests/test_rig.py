@@ -148,7 +148,7 @@ def test_tests_of_middle_size_are_kept_for_validation() -> None:
     ("options", "sentence"),
     [
         ({"severity": "awful"}, "severity is 'awful'; it is one of clean, realistic, harsh."),
-        ({"seed": -1}, "seed must be a whole number from 0 up, not -1."),
+        ({"seed": -1}, "seed must be a whole number of at least 0, not -1."),
         ({"maneuvers": []}, "A campaign needs at least one maneuver."),
         ({"maneuvers": [STEP, STEP]}, "Two maneuvers have the same name"),
         ({"maneuvers": {"a b": STEP, "a/b": STEP, "a_b": SINE}}, "would have the same file"),

@@ -100,7 +100,7 @@ WRONG: list[tuple[Callable[..., Any], tuple[Any, ...], str]] = [
         ((), (1,), State(0.1), 3, (State("a"),), (State(nan),), (State(0.1), State(0.1))),
         "lagging: states are .* but must be a tuple of one State of finite numbers",
     ),
-    (lambda inputs: linear(inputs=inputs), ((),), "needs an input"),
+    (lambda inputs: linear(inputs=inputs), ((),), "needs at least one varying input"),
     (lambda outputs: linear(outputs=outputs), ((),), "needs an output"),
     (lambda model: linearize(model, STILL, 10.0), (LAG, None), "is not a model with numbers"),
     (lambda k: linear().margins(k), ("a", None, lambda f: f[:3]), "the controller must be a gain"),

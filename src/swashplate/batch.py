@@ -173,7 +173,7 @@ def simulate_many(
                 f"{model.name} has no parameter '{path}'; it has {', '.join(selectable)}."
             )
     if cost is None and not output:
-        raise InputError(f"{model.name}: say which output of the sets is wanted, or give a cost.")
+        raise InputError(f"{model.name}: name the output of the sets to return, or give a cost.")
     numbers = {path: np.full(count, number) for path, number in _numbers_of(instance).items()}
     return march_sets(
         model,
@@ -226,7 +226,7 @@ def set_columns(changes: Mapping[str, ArrayLike]) -> tuple[dict[str, Array], int
     for name, given in changes.items():
         column = np.asarray(given)
         if column.ndim != 1 or column.size == 0 or column.dtype.kind not in "fiub":
-            raise InputError(f"The values of {name} must be one number a set, in one row.")
+            raise InputError(f"The values of {name} must be one number per set, in one row.")
         values[name] = column.astype(np.float64)
     sizes = {column.size for column in values.values()}
     if len(sizes) != 1:
@@ -415,7 +415,7 @@ def _run(
     for _, marched in (executor or Threads()).run(_march, shared, items):
         for block in marched:
             for number, worst in block.failed.items():
-                why = f"the numbers grow beyond all bounds under this {driver}."
+                why = f"the numbers overflow under this {driver}."
                 if not worst > 0.0:
                     why = outside(shared.model, worst, driver)
                 failures[number] = f"{name}: {why}"
@@ -441,7 +441,7 @@ def _outputs(count: int, samples: int) -> Array:
         pass
     raise InputError(
         f"The outputs of {count} sets, {samples} samples each, take {size / 2**30:.3g} GiB, more "
-        "than this machine's memory: ask for a cost, or have them written to files with to=FOLDER."
+        "than this machine's memory: give a cost, or write them to files with to=FOLDER."
     )
 
 
@@ -451,8 +451,8 @@ def _make_folder(folder: Path) -> None:
         folder.mkdir(parents=True, exist_ok=True)
         there = next(folder.glob("*.parquet"), None)
     except OSError as error:
-        raise FileError(f"{folder} cannot be made: {error.strerror or error}.") from None
+        raise FileError(f"{folder} cannot be created: {error.strerror or error}.") from None
     if there is not None:
         raise FileError(
-            f"{folder} holds {there.name} already; name an empty folder for the outputs."
+            f"{folder} already contains {there.name}; name an empty folder for the outputs."
         )

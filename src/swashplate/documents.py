@@ -67,7 +67,9 @@ def read_text(path: str | Path) -> str:
         if not S_ISREG(status.st_mode):
             raise FileError(f"{path} is not an ordinary file.")
         if status.st_size > LARGEST:
-            raise FileError(f"{path} has more than {LARGEST // 2**20} MB: it is not such a text.")
+            raise FileError(
+                f"{path} has more than {LARGEST // 2**20} MB: it is too large for such a file."
+            )
         return file.read_text("utf-8-sig")
     except FileError:
         raise
@@ -94,7 +96,7 @@ def parse_toml(text: str, origin: str) -> dict[str, Any]:
     """
     if len(text) > LARGEST_TOML:
         raise FileError(
-            f"{origin} has more than {LARGEST_TOML // 2**20} MB: it is not such a text."
+            f"{origin} has more than {LARGEST_TOML // 2**20} MB: it is too large for such a file."
         )
     if _has_deep_key(text):
         raise FileError(f"{origin} has a key of more than {DEEPEST} parts.")
@@ -154,8 +156,8 @@ def _check_text(text: str, longest: int, what: str, origin: str) -> None:
         )
     if len(text) > longest:
         raise FileError(
-            f"{origin} has a {what} of {len(text)} characters that begins with {text[:40]!r}; "
-            f"{longest} are the most."
+            f"{origin} has a {what} of {len(text)} characters that begins with {text[:40]!r}; the "
+            f"limit is {longest}."
         )
 
 
@@ -193,7 +195,7 @@ def read_json(path: str | Path, model: type[Model], *, strict: bool = True) -> M
     try:
         return model.model_validate_json(text, strict=strict)
     except (RecursionError, OverflowError):
-        raise FileError(f"{path} nests too deeply or has a number beyond any use.") from None
+        raise FileError(f"{path} nests too deeply or has a number that is out of range.") from None
     except ValidationError as error:
         errors = error.errors()
         if errors[0]["type"] == "json_invalid":

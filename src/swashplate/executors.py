@@ -124,8 +124,8 @@ class Processes:
                 yield from _completed(pool, partial(_apply, function), items, workers)
             except BrokenProcessPool:
                 raise InputError(
-                    "A worker process died or could not import the model; a model must stand in a "
-                    "module, and a script must guard its start by if __name__ == '__main__'."
+                    "A worker process died or could not import the model; define the model in a "
+                    "module, and guard the start of a script by if __name__ == '__main__'."
                 ) from None
             except BaseException:  # Ctrl-C, or whoever asked has had enough: nobody waits for them
                 for worker in set(active_children()) - others:
@@ -199,8 +199,8 @@ class Dask:
                 raise
             except (OSError, CancelledError) as error:
                 raise InputError(
-                    f"The Dask scheduler at {self.address} was lost "
-                    f"({type(error).__name__}): start it and this again."
+                    f"The Dask scheduler at {self.address} was lost ({type(error).__name__}): "
+                    "start it again, then repeat this."
                 ) from None
 
 

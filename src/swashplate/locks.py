@@ -80,12 +80,12 @@ def _open_locked(path: Path, folder: Path) -> int:
         except BlockingIOError:
             os.close(handle)
             raise FileError(
-                f"{folder} is in use: {_user_of(path)} is writing a fit into it. Wait for its end, "
-                "or name another folder (of a command by --out)."
+                f"{folder} is in use: {_user_of(path)} is writing a fit into it. Wait until it "
+                "ends, or name another folder (with --out)."
             ) from None
         except OSError as error:
             warn(
-                f"{folder} cannot be locked ({error.strerror or error}): see to it that no other "
+                f"{folder} cannot be locked ({error.strerror or error}): make sure that no other "
                 "fit writes into it.",
                 RuntimeWarning,
                 stacklevel=4,

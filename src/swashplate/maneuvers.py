@@ -79,7 +79,7 @@ def positive(name: str, value: float) -> float:
 def whole(name: str, value: object) -> int:
     """Return `value` as an integer, or raise InputError if it is none or negative."""
     if not isinstance(value, int | np.integer) or value < 0:
-        raise InputError(f"{name} must be a whole number from 0 up, not {value!r}.")
+        raise InputError(f"{name} must be a whole number of at least 0, not {value!r}.")
     return int(value)
 
 
@@ -209,7 +209,7 @@ class Maneuver(Drawn):
         if self.highest >= 0.5 * rate:
             raise InputError(
                 f"{self.name} reaches {self.highest:g} Hz, but samples at {rate:g} Hz show only "
-                f"what lies below {0.5 * rate:g} Hz: lower its frequency or raise the rate."
+                f"frequencies below {0.5 * rate:g} Hz: lower its frequency or raise the rate."
             )
         time[-1] = self.length  # its stamp may lie a rounding error before or after the end
         return self(time)
@@ -654,7 +654,7 @@ def multisine(
     points = math.ceil(POINTS_PER_PERIOD * high * (end - start)) + 1
     if points * lines.size > LONGEST:
         raise InputError(
-            f"{lines.size} frequencies up to {high:g} Hz in {end - start:g} s are too many: take "
+            f"{lines.size} frequencies up to {high:g} Hz in {end - start:g} s are too many: use "
             "fewer, lower ones or a shorter time."
         )
     time, spacing = np.linspace(0.0, end - start, points, retstep=True)
@@ -704,7 +704,7 @@ def _band(band: Sequence[float], period: float) -> Array:
     if periods[0] < 1.0 or periods.size < count:
         raise InputError(
             f"{band[2]} frequencies from {low:g} to {high:g} Hz cannot be distinguished in "
-            f"{period:g} s: take fewer, a wider band or a longer time."
+            f"{period:g} s: use fewer, a wider band or a longer time."
         )
     return np.asarray(periods / period)
 

@@ -339,8 +339,8 @@ def _perturbed(drive: Drive, spread: float, seed: int) -> Drive:
         title = f"{drive.parameters.title}; values within ±{100 * spread:g} % by seed {seed}"
         return drawn.renamed(drive.name, title)
     raise InputError(
-        f"No draw of 100 within ±{100 * spread:g} % keeps the rules of {drive.name}'s "
-        "parameters; take a smaller spread."
+        f"No draw of 100 within ±{100 * spread:g} % keeps the rules of {drive.name}'s parameters; "
+        "use a smaller spread."
     )
 
 
@@ -411,7 +411,7 @@ def _logged(
         columns[column] = np.where(gaps, np.nan, values)
     is_logged = ~lost(tools.lost_rows, tools.longest_loss, "rows")
     if not is_logged.any():
-        raise InputError(f"{name}: lost_rows leaves no row; take a smaller share.")
+        raise InputError(f"{name}: lost_rows leaves no row; use a smaller share.")
     columns = {"time": _rounded(sampled_at, tools.stamp_resolution), **columns}
     return {column: values[is_logged] for column, values in columns.items()}
 
@@ -544,11 +544,11 @@ def write(tests: VirtualTests, folder: str | Path, *, overwrite: bool = False) -
     tests.drive.to_toml(root / "truth" / DRIVE_FILE)
     campaign, truth = _contents(tests)
     header = (
-        f"# Virtual tests, simulated by swashplate {__version__}: nothing here was measured.\n"
-        f"# Instruments: {tests.severity}; {refinements}; seed {tests.seed}.\n"
-        "# What was simulated stands in truth/truth.toml: open it only after the fit.\n"
+        f"# Virtual tests, simulated by swashplate {__version__}: nothing here was measured.\n# "
+        f"Instruments: {tests.severity}; {refinements}; seed {tests.seed}.\n# The simulated values "
+        "are in truth/truth.toml: open it only after the fit.\n"
     )
-    write_text(f"# The truth behind the virtual tests.\n{truth}", root / "truth" / "truth.toml")
+    write_text(f"# True parameters of the virtual tests.\n{truth}", root / "truth" / "truth.toml")
     write_text(header + campaign, root / "campaign.toml")
     return root / "campaign.toml"
 

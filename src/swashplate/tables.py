@@ -334,7 +334,7 @@ def check_place(path: str | Path) -> None:
         elif target.is_dir():
             reason = "it is a folder"
         elif not os.access(folder, os.W_OK):
-            reason = f"folder {folder} may not be written to"
+            reason = f"folder {folder} is not writable"
     except OSError as error:  # such as a name that is too long
         reason = error.strerror or str(error)
     if reason is not None:
@@ -346,7 +346,7 @@ def made_folder(folder: Path) -> Path:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise FileError(f"{folder} cannot be made: {error.strerror or error}.") from None
+        raise FileError(f"{folder} cannot be created: {error.strerror or error}.") from None
     return folder
 
 
@@ -356,7 +356,7 @@ def check_folder(folder: Path) -> None:
         parent for parent in (folder.absolute(), *folder.absolute().parents) if parent.exists()
     )
     if not there.is_dir():
-        raise FileError(f"{folder} cannot be made: {there} is not a folder.")
+        raise FileError(f"{folder} cannot be created: {there} is not a folder.")
     if not os.access(there, os.W_OK | os.X_OK):
         raise FileError(f"{folder} cannot be written to: {there} is read-only or another user's.")
 

@@ -122,7 +122,7 @@ def test_a_speed_that_was_reference_and_a_load(hoist: Drive) -> None:
 
 def test_a_machine_that_was_guessed_need_not_have_an_orifice() -> None:
     (said,) = limit_shares(Drive.preset("neutral").replace(Z16=2e-5), SINE).sentences()
-    assert said.startswith("Change first: what limits the acceleration, in the model an in-line")
+    assert said.startswith("Change first: limit of the acceleration, modelled as an in-line")
 
 
 def test_a_removal_outside_the_domain_is_said() -> None:

@@ -60,7 +60,7 @@ def test_draws_outside_the_bounds_are_drawn_again(hoist):
     assert found.fixed == ("Z18",)
     assert (found.columns["Z18"] == 2.1667e-5).all()
     kept, redrawn = found.sentences()
-    assert "Not drawn, as fitted in all drives: Z18" in kept
+    assert "Not varied, with the fitted value in all drives: Z18" in kept
     share = 100.0 * found.redrawn / (300 + found.redrawn)
     assert f"too narrow: {share:.0f} %" in redrawn
     assert "Widen the bounds in the fit setup" in redrawn
@@ -124,7 +124,7 @@ def test_a_band_by_hand(hoist):
     with pytest.raises(InputError, match="level 1 of a band"):
         bands(drawn, command, level=1.0)
     endless = np.broadcast_to(0.0, 100_000_000)
-    with pytest.raises(InputError, match="take too much memory: take 1 drives at most"):
+    with pytest.raises(InputError, match="take too much memory: use 1 drives at most"):
         bands(drawn, Trial(endless, 512.0, endless))
     # of the speed limits each way and of the final speed
     down = hoist.parameters.numbers["Z13_minus"] / angle
@@ -211,7 +211,7 @@ def test_the_campaign_may_have_moved(fit_and_folder, tmp_path):
         stored_draws(tmp_path)
     drawn = stored_draws(tmp_path, campaign=old, draws=2)
     assert len(drawn.drives) == 2
-    with pytest.raises(InputError, match="is that of another drive .* differ"):
+    with pytest.raises(InputError, match="another drive .* differ"):
         stored_draws(tmp_path, campaign=old, drive=Drive.preset("luff"))
     with pytest.raises(FileNotFoundError, match="no fit.json in .*virtual: give a folder that"):
         stored_draws(tmp_path / "virtual")

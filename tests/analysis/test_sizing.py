@@ -101,7 +101,7 @@ def test_what_cannot_be_met_says_what_can(hoist, monkeypatch):
         (
             {"tracking_error": 0.1},
             {"pump": DEFAULT_RANGE},
-            "with a speed to follow",
+            "needs a reference speed",
         ),
     ],
 )

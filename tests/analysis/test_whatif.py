@@ -119,7 +119,7 @@ def test_a_rise_time_belongs_to_a_command_that_goes_one_way(hoist):
         given = trial_of(hoist, command)
         result = what_if(hoist, {"pump": 1.2}, given, outcomes=["rise_time", "response_time"])
         assert np.isfinite(result.before.values).all() == rises
-    assert "the command turns back on its way there" in result.sentences()[0]
+    assert "the command reverses before it gets there" in result.sentences()[0]
 
 
 # --- before and after -----------------------------------------------------------------------------
@@ -149,7 +149,7 @@ def test_what_is_wanted_and_what_there_is_not(hoist):
     result = what_if(slew, {"dead_zone": 0.0}, task, outcomes=["final_speed", "rise_time"])
     assert result.after.values[0] > result.before.values[0] == 0.0
     (sentence,) = result.sentences()
-    assert sentence.startswith("as it is: no rise_time, the shaft stands still")
+    assert sentence.startswith("as it is: no rise_time, the shaft does not move")
 
 
 # --- sensitivities --------------------------------------------------------------------------------
@@ -169,7 +169,9 @@ def test_the_speed_limit_goes_with_the_pump_alone(hoist, task):
     assert np.isnan(result.low[0, 0])
     assert np.isfinite(result.high[0, 0])
     assert result.sentences[0].startswith("Z4 x 0.01 cannot be simulated: hoist: ")
-    assert result.sentences[1].startswith("all variants: no creep, the command does not rest")
+    assert result.sentences[1].startswith(
+        "all variants: no creep, the command does not stay at 0 V"
+    )
 
 
 def test_a_maneuver_is_a_command(hoist):

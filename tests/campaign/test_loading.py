@@ -125,7 +125,7 @@ def test_missing_samples_are_refused_or_dropped_and_counted(edited: Edit) -> Non
         ("gear_ratio = 2.0", "gear_ratio = 0.0", "gear_ratio is 0.0"),
         ('{ column = "time", unit = "ms" }', "{ unit = 'ms' }", "either the column of the time"),
         ('role = "validate"', 'role = "check"', "runs 2.role is 'check'"),
-        ('role = "validate"', 'start = "given"', "start_pressure belong together"),
+        ('role = "validate"', 'start = "given"', "start_pressure go together"),
         (
             'role = "validate"',
             'start = "given"\nstart_pressure = 1e300',
@@ -146,13 +146,17 @@ def test_missing_samples_are_refused_or_dropped_and_counted(edited: Edit) -> Non
         ('unit = "mV"', 'unit = "V", offset = 1e308', "check its unit, scale and offset"),
         ('column = "time", unit = "ms"', "rate = 5e-324", "last inf s by the rate"),
         # they go down to -2040
-        ("gear_ratio = 2.0", "rolls_over_at = 1024", "counter of 1024 readings (give its own size"),
+        (
+            "gear_ratio = 2.0",
+            "rolls_over_at = 1024",
+            "counter of 1024 readings (give its actual size",
+        ),
         ("gear_ratio = 2.0", "rolls_over_at = 10.5", "a whole number of counts"),
-        ('unit = "mA"', 'unit = "mA"\nrolls_over_at = 9', "encoder_counts and positions alone"),
+        ('unit = "mA"', 'unit = "mA"\nrolls_over_at = 9', "only to encoder_counts and positions"),
         (
             'kind = "rectified_current"\ncolumn = "ammeter"\nunit = "mA"',
             'kind = "position"\ncolumn = "ammeter"\nunit = "deg"\nrolls_over_at = 360',
-            "up.csv: column 'ammeter': the readings reach over 1.111 times rolls_over_at",
+            "up.csv: column 'ammeter': the readings span 1.111 times rolls_over_at",
         ),
     ],
 )

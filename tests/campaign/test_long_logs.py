@@ -68,7 +68,7 @@ def test_windows_with_motion_are_runs_of_their_own(long, tmp_path, layout):
     (overview,) = campaign.overviews
     assert "12,000 rows" in overview.sentence
     assert "2 windows with motion, which are all used" in overview.sentence
-    assert "log.csv.parquet, written beside it" in overview.sentence
+    assert "log.csv.parquet, written next to it" in overview.sentence
     assert not any(each.notes for each in campaign)
 
 
@@ -105,7 +105,7 @@ def test_a_long_log_whose_columns_differ_in_length(long, tmp_path, monkeypatch):
     (found,) = long(toml=toml)
     assert found.input.time.size == 2 * found["speed"].time.size == ROWS
     monkeypatch.setattr("swashplate.logs.log.MOST", 3 * ROWS - 1)
-    with pytest.raises(FileError, match="has 36000 numbers in the 4 columns that are wanted, more"):
+    with pytest.raises(FileError, match="has 36000 numbers in the 4 requested columns, more"):
         long(toml=toml)
 
 
@@ -156,16 +156,16 @@ def test_what_is_wrong_names_its_row_in_the_file(long, tmp_path, old, new, error
 
 def test_a_log_without_motion_and_a_table_that_cannot_be_written(long, tmp_path):
     rest = "time,u,n\n" + "".join(f"{k / RATE},0,0\n" for k in range(ROWS))
-    with pytest.raises(InputError, match="12000 rows, in none of which the input moves"):
+    with pytest.raises(InputError, match="12000 rows, but its input never moves"):
         long(rest)
     beside = tmp_path / "log.csv.parquet"
     beside.unlink()
     beside.mkdir()
-    with pytest.raises(FileError, match=r"its table log.csv.parquet cannot be written beside it"):
+    with pytest.raises(FileError, match=r"its table log.csv.parquet cannot be written next to it"):
         long(table())
     beside.rmdir()
     pl.DataFrame({"a": [1]}).write_parquet(beside)
-    with pytest.raises(FileError, match="where the table of a long log belongs; rename it"):
+    with pytest.raises(FileError, match="has the name of the table of a long log; rename it"):
         long(table())
 
 

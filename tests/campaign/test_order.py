@@ -81,7 +81,7 @@ def test_a_draft_takes_the_files_times_if_no_runs_overlap(tmp_path: Path) -> Non
     assert [run["file"] for run in runs] == ["step.csv", "ramp.csv", "sine.csv"]
     stated = {Path(run["file"]).stem: run["recorded"].timestamp() for run in runs}
     assert stated == BEGAN
-    assert text.count("guessed: when its file was written") == 3
+    assert text.count("guessed: time of writing of its file") == 3
 
 
 def test_copies_say_nothing_of_their_order(drafted: Drafted, tmp_path: Path) -> None:

@@ -93,21 +93,24 @@ GEAR = "gear_ratio = 2.0\n"
             GEAR,
             f'{GEAR}ignore = [{{ maneuver = "setp *" }}]\n',
             (
-                "axes.winch.channels.counts.ignore: no run has the maneuver 'setp *', so that its "
-                "window does nothing; there are 'step +4 V', 'step -4 V'",
+                "axes.winch.channels.counts.ignore: no run has the maneuver 'setp *', so its "
+                "window has no effect; the maneuvers are 'step +4 V', 'step -4 V'",
             ),
         ),
         # in ms, as the log's stamps are
         (
             'drive = "hoist"',
             'drive = "hoist"\nignore = [{ from = 100.0, to = 200.0, why = "x" }]',
-            ("axes.winch.ignore: the window from 100 s to 200 s holds no sample of any of 2 runs",),
+            (
+                "axes.winch.ignore: the window from 100 s to 200 s contains no sample of any of 2 "
+                "runs",
+            ),
         ),
         (
             'role = "validate"',
             'role = "validate"\nweights = [{ from = 7.0, factor = 2.0 }]',
             (
-                "run 2 (down.csv): weights: the window from 7 s to its end holds no sample of "
+                "run 2 (down.csv): weights: the window from 7 s to its end contains no sample of "
                 "down, which goes from 0 to 1 s",
             ),
         ),
@@ -138,7 +141,7 @@ def test_a_stick_that_rests_away_from_zero_is_named(edited: Edit) -> None:
     """One that goes from 1 to 9 V about 5 V, as many do."""
     path = edited('unit = "mV" }', 'unit = "mV", offset = 5000.0 }')
     said, *_ = campaign_findings(Campaign.from_toml(path))
-    assert said.startswith("axis 'winch': it moves both ways though its command never changes its")
+    assert said.startswith("axis 'winch': it moves both ways although its command never changes")
     assert "rests at 5 V needs offset = -5 in [axes.winch.input]" in said
 
 

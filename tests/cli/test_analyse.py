@@ -201,7 +201,7 @@ def test_five_states_of_a_drive_of_one_s_own(done, tmp_path):
     assert lines[2] == "Neither model has refinements; these are left out: spool_friction."
     assert cells(text, "spool_mass") == ["10", "g", "assumed"]
     text = done("full-order", "hoist", "rest:2", "--set", "Z18=0")
-    assert "The shaft does not move, so nothing can be said" in text
+    assert "The shaft does not move, so the one-state model cannot be assessed" in text
 
 
 # --- files ----------------------------------------------------------------------------------------

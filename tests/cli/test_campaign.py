@@ -219,7 +219,7 @@ def test_what_positive_steps_determine(done: Words, tmp_path: Path) -> None:
     shares = table.select(pl.sum_horizontal(pl.col("^hoist_.*$"))).to_series()
     assert set(shares.round(9)) == {0.0, 1.0}
     (tmp_path / "mine.toml").write_text(stages(pump="Z8 Z13_plus"), "utf-8")
-    assert "The fit setup can stay as it is." in done("advise", *words, "mine.toml")
+    assert "The fit setup needs no change." in done("advise", *words, "mine.toml")
 
 
 def test_a_guess_looks_for_its_folder_first(refused, virtual, tmp_path, monkeypatch) -> None:

@@ -247,7 +247,7 @@ def test_a_drive_beside_the_runs_that_were_held_out(done, held_out, tmp_path) ->
     assert re.search(r"\nspeed from counts +\n.* deg/s ", said, re.DOTALL)
     assert "'of range' below: over" in " ".join(said.split())
     assert "Usable: predicts speed from counts within 0." in said
-    assert "Data: Not judged: a drive that was not fitted to these runs" in said
+    assert "Data: Not assessed: a drive that was not fitted to these runs" in said
     assert "Values: " not in said
     with (tmp_path / "found" / "measures.csv").open(encoding="utf-8") as file:
         rows = {row["channel"]: row for row in csv.DictReader(file)}
@@ -331,7 +331,7 @@ def test_reports_that_are_refused(refused: Words, fitted: Fit, tmp_path: Path) -
     path.write_text(text.replace("virtual = true", "virtual = false"), "utf-8")
     assert "its true parameters are unknown" in refused(*command, "--truth", "virtual/truth")
     path.write_text(text.replace('role = "fit"', 'role = "fit"\nweight = 2.0', 1), "utf-8")
-    assert "is not as it was when fitted/fit.json was fitted" in refused(*command)
+    assert "has changed since fitted/fit.json was fitted" in refused(*command)
 
 
 # --- demo -----------------------------------------------------------------------------------------

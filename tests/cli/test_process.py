@@ -102,7 +102,7 @@ def test_a_folder_that_is_gone(tmp_path):
     folder.mkdir()
     done = python("-c", f"{words}from swashplate.cli import main; main()", cwd=folder)
     assert done.returncode == 2
-    assert done.stderr == "Error: The current folder does not exist any more; go to another.\n"
+    assert done.stderr == "Error: The current folder no longer exists; change to another.\n"
 
 
 @pytest.mark.parametrize(
@@ -205,7 +205,7 @@ def test_it_prints_versions_extras_cache_and_a_simulated_speed(run) -> None:
     assert f"swashplate {__version__}" in words
     assert f"numba {metadata.version('numba')}" in words
     assert "196.0 deg/s, as published" in words
-    assert "Compiled kernels:" in words or "cannot be kept" in words
+    assert "Compiled kernels:" in words or "cannot be stored" in words
     project = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text("utf-8"))
     extras = set(project["project"]["optional-dependencies"]) - {"dev"}
     assert set(re.findall(r"^extra (\w+)", done.stdout, re.MULTILINE)) == extras

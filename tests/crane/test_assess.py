@@ -149,7 +149,7 @@ def test_two_questions_have_two_answers(crane, assessed):
     )
     assert passed.sufficient == "yes"
     assert passed.passed
-    assert "It suffices: in 3 h all stays within its limits." in passed.verdict()
+    assert "It suffices: in 3 h all quantities stay within their limits." in passed.verdict()
 
 
 def test_a_crane_without_limits_is_asked_for_harm_alone(crane):
@@ -157,7 +157,7 @@ def test_a_crane_without_limits_is_asked_for_harm_alone(crane):
     found = assess(bare, CLIPPED, seeds=range(3), drives=("identified",), **QUICK)
     assert found.questions == ("harm",)
     assert found.sufficient is None
-    with pytest.raises(InputError, match="has no limits to suffice for"):
+    with pytest.raises(InputError, match="has no limits by which"):
         assess(bare, CLIPPED, seeds=range(3), questions=["sufficiency"], **QUICK)
     with pytest.raises(InputError, match="no question 'safety'; there are harm, sufficiency"):
         assess(crane, CLIPPED, seeds=range(3), questions=["safety"], **QUICK)
@@ -233,7 +233,7 @@ def test_what_would_do(crane):
         **SHORT,
     )
     assert f"{clip.what.capitalize()} would do no harm, " in both.verdict()
-    assert "Nothing that was tried surely does all that is asked." in both.verdict()
+    assert "No change that was tried certainly meets all requirements." in both.verdict()
 
 
 def test_few_seaways_decide_nothing(crane):
@@ -282,7 +282,7 @@ def test_differences_are_paired(assessed):
 
 def test_what_the_answer_hangs_on_stands_with_it(crane, assessed):
     words = " ".join(assessed.sentences())
-    assert "Each seaway counts for 60 s after 20 s from a stationary swing." in words
+    assert "Each seaway is evaluated for 60 s after 20 s from a stationary swing." in words
     assert "a damping of 0.5 %, assumed." in words
     assert "14 of 15 quantities of the crane are assumed." in words
     assert "Limits that are assumed: swing, off-lead" in words
@@ -500,13 +500,19 @@ def test_what_makes_no_study_is_said(crane):
         with pytest.raises(InputError, match=message):
             assess(crane, MEANT, **{"seeds": [0], **how})
 
-    refuse("needs a controller, a set of drives and a seed", seeds=[])
-    refuse("needs a controller, a set of drives and a seed", drives=())
+    refuse("one controller, one set of drives and one seed", seeds=[])
+    refuse("one controller, one set of drives and one seed", drives=())
     refuse(r"drawn. are \[\], but must be a name, a crane or a list", drives={"drawn": []})
     refuse("3. are 3, but must be a name, a crane or a list of cranes", drives=[3])
     refuse("drives is 3, but must be a list of names", drives=3)
-    refuse("counts for 30 s after a run-in of 120 s, but must count for at least 60 s", length=30.0)
-    refuse("stick is 100 s long, but a run counts from 120 s on", stick=OperatorCommand.rest(100.0))
+    refuse(
+        "evaluated for 30 s after a run-in of 120 s, but must be evaluated for at least 60 s",
+        length=30.0,
+    )
+    refuse(
+        "stick is 100 s long, but a run is evaluated from 120 s on",
+        stick=OperatorCommand.rest(100.0),
+    )
     moving = OperatorCommand.record(np.full((153_600, 3), [0.0, 0.01, 0.0]))
     refuse("Ideal drives follow instantaneously, .* put a row of zeros before it", stick=moving)
     refuse("seeds is 3, but must be a sequence, as range", seeds=3)

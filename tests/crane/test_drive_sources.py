@@ -129,7 +129,7 @@ def test_a_drive_without_a_verdict_says_so(fit, tmp_path):
     shown = said("run", "tg3637", "--length", "5", "--drive", f"hoist={alone}")
     assert shown.exit_code == 0
     words = " ".join(shown.stdout.split())
-    assert "no verdict on it is known, as there is no fit beside it" in words
+    assert "its verdict is not known: there is no fit next to it" in words
     older = crane.with_drive(hoist=fit(None)).sources["hoist"]
     assert (older.fit_usable, older.usable) == (None, True)
     assert "fit again" in older.verdict
@@ -204,7 +204,7 @@ def test_judgment_and_page_say_the_verdict(fit, tmp_path, usable, look):
         for words in (verdict, UNREACHED):
             assert words.replace("'", "&#39;") in part
     assert f'<dt class="{look}">Hoist&#39;s drive' in summary
-    forced = "It rests on the fit of the hoist, which is not usable."
+    forced = "It is based on the fit of the hoist, which is not usable."
     for words in (found.headline, summary):
         assert (forced in words) == (usable is False)
     hoist = crane.hoist.parameters.title

@@ -625,7 +625,7 @@ def test_snap_of_a_rigid_rope_is_not_computed(crane):
     first = int(np.flatnonzero(run.slack)[-1]) + 1
     assert np.isnan(run.dynamic_factor[first:]).all()
     assert np.isfinite(run.dynamic_factor[: int(np.flatnonzero(run.slack)[0])]).all()
-    assert any("take an elastic rope, suspension=" in sentence for sentence in run.sentences())
+    assert any("use an elastic rope, suspension=" in sentence for sentence in run.sentences())
 
 
 @pytest.mark.parametrize(
@@ -636,8 +636,8 @@ def test_snap_of_a_rigid_rope_is_not_computed(crane):
         # over the bow the load hangs at y = -8.5, within the sides; the tip is 44.5 m up
         ({"rope_m": 38.0}, "the load is in the deck"),
         # 8 m of 20 m towards the crane are 23.6 degrees, beyond a boom at 70
-        ({"load_offset": (-8.0, 0.0), "boom_deg": 70.0}, "the rope lies on the boom"),
-        ({"load_offset": (0.0, 8.0), "boom_deg": 70.0, "slew_deg": 90.0}, "the rope lies on the"),
+        ({"load_offset": (-8.0, 0.0), "boom_deg": 70.0}, "the rope touches the boom"),
+        ({"load_offset": (0.0, 8.0), "boom_deg": 70.0, "slew_deg": 90.0}, "the rope touches the"),
     ],
 )
 def test_a_run_that_is_not_an_operation_any_more_says_since_when(crane, how, why):
@@ -696,14 +696,14 @@ def refuse(message, error=InputError):
 MOVING = OperatorCommand.record(np.full((600, 3), [0.0, 0.5, 0.0]))
 REFUSED = [
     ({"stick": slew(45.0, length=5.0)}, "stick of the slew ends at 12.11 s, but .* at 5 s"),
-    ({"stick": slew(-45.0)}, "The slew leads away from slew_deg = -45"),
+    ({"stick": slew(-45.0)}, "The slew moves away from slew_deg = -45"),
     (
         {"stick": MOVING, "actuation": "ideal"},
         "Ideal drives follow instantaneously, .* a row of zeros",
     ),
     ({"stick": 3}, "The stick is 3, but must be an OperatorCommand"),
-    ({"boom_deg": 85.0}, "boom of tg3637 stands at 85 deg, but moves between 15 and 80"),
-    ({"load": 36000.0}, "The load is 36000 kg, but tg3637 lifts 35000 kg: take less"),
+    ({"boom_deg": 85.0}, "boom of tg3637 is at 85 deg, but moves between 15 and 80"),
+    ({"load": 36000.0}, "The load is 36000 kg, but tg3637 lifts 35000 kg: use a smaller"),
     ({"rope_m": 2.0}, "rope of tg3637 is 2 m, but can be 3 to 50 m"),
     ({"sea": np.zeros((5121, 6))}, "is 60 s long, but the ship's motion only 10 s"),
     ({"sea": "ss3"}, r"A sea is a Seaway, as Seaway\('ss3'\), or the ship's motion in rows"),
@@ -744,12 +744,12 @@ def test_limits_of_travel_stop_a_run(crane):
 
 def test_residual_swing_needs_a_run_that_is_long_enough(crane):
     short = simulate(crane, slew(45.0, length=15.0))
-    with refuse("15 s long, but its residual swing counts from 16.11 s on"):
+    with refuse("15 s long, but its residual swing is evaluated from 16.11 s on"):
         _ = short.residual_deg
 
 
 def test_sticks_and_controllers_that_make_no_sense_are_refused():
-    with refuse("stick of the luff is 2, but reaches from -1 to 1"):
+    with refuse("stick of the luff is 2, but must be from -1 to 1"):
         OperatorCommand.trapezoid(luff=2.0, duration=1.0)
     with refuse("The slew needs until=.* or a duration"):
         OperatorCommand.trapezoid(slew=1.0)
@@ -781,7 +781,7 @@ def test_sticks_and_controllers_that_make_no_sense_are_refused():
         with refuse(sentence):
             stage()
     strange = Model("strange", Gains, Filtered, follow_wind, sample=offset)
-    with refuse("asks for 'wind', but a crane's controller sees swing_x"):
+    with refuse("needs 'wind', but a crane's controller has swing_x"):
         control.Controller(strange, Gains(1.0, 1.0))
     with refuse("must have the signals tip_x and tip_y"):
         control.Controller(Model("mute", Gains, Filtered, follow), Gains(1.0, 1.0))

@@ -144,7 +144,7 @@ def test_a_record_comes_again_only_at_its_end():
     power = np.abs(np.fft.rfft(heave[:-1])) ** 2
     correlation = np.fft.irfft(power)
     assert np.abs(correlation[600 * 8 : 4096 * 8]).max() < 0.3 * correlation[0]
-    with pytest.raises(InputError, match=r"comes again after 8192 s, .*record=16384\)"):
+    with pytest.raises(InputError, match=r"repeats after 8192 s, .*record=16384\)"):
         sea.motion(8192 * 8 + 2, rate=8.0)
 
 
@@ -319,7 +319,7 @@ def test_cut_files_and_other_conventions_are_refused(tmp_path):
         with pytest.raises(error, match=message):
             read_ship(path, 80.0)
 
-    refused("there is no yaw for 0.5 rad/s and 180 deg; the file is cut", lines[:-7])
+    refused("there is no yaw for 0.5 rad/s and 180 deg; the file is truncated", lines[:-7])
     refused("line 3: motion is missing, .* needed are period", [*lines[:2], lines[2][:30]])
     refused("has no motions in waves", [])
     # headings counted from where waves come: everything but heave the other way
@@ -408,7 +408,9 @@ def test_cut_and_strange_files_are_refused_by_their_line(tmp_path, s175):
     lines = S175.read_text("utf-8").splitlines()
     cut = tmp_path / "cut.re1"
     cut.write_text("\n".join(lines[:500]), "utf-8")
-    with pytest.raises(FileError, match=r"cut.re1, line 501: .* is missing, .*the file is cut"):
+    with pytest.raises(
+        FileError, match=r"cut.re1, line 501: .* is missing, .*the file is truncated"
+    ):
         read_ship(cut)
     cut.write_text("\n".join(["something else", *lines[1:]]), "utf-8")
     with pytest.raises(FileError, match="is not a VERES file"):
@@ -462,7 +464,7 @@ def test_files_that_lack_much_of_the_sea_are_refused(table):
         (lambda: Spectrum(1.0, 60.0), "has little energy between waves of 1.05 and 31.4 s"),
         (lambda: Hull(0.0, 20.0, 9.0), "The hull's length is 0"),
         (lambda: read_ship("hull.dat"), "hull.dat: transfer functions are read from .re1 of VERES"),
-        (lambda: Seaway("ss3").motion(100, 500.0), "multiple of 8 samples a second"),
+        (lambda: Seaway("ss3").motion(100, 500.0), "multiple of 8 Hz"),
     ],
 )
 def test_seas_that_make_no_sense_are_refused(make, message):

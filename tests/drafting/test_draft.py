@@ -364,7 +364,7 @@ def test_what_tells_nothing_is_refused() -> None:
     (sine, *_) = runs()
     speed = sine["shaft_speed"]
     for changes, said in (
-        ({"values": -speed.values}, "against the command: reverse it with sign = -1"),
+        ({"values": -speed.values}, "opposite to the command: reverse it with sign = -1"),
         ({"weight": np.zeros(TIME.size)}, "No run measures a motion"),
         ({"weight": np.where(TIME[3] > TIME, 1.0, 0.0)}, "too short to guess from"),
     ):
@@ -420,6 +420,6 @@ def test_a_run_that_goes_the_other_way_is_named() -> None:
     first, second, *others = runs()
     turned = replace(second["shaft_speed"], values=-second["shaft_speed"].values)
     with pytest.raises(
-        InputError, match=f"In {second.name} 'shaft_speed' goes against the command, in"
+        InputError, match=f"In {second.name} 'shaft_speed' moves opposite to the command, in"
     ):
         guess_drive([first, replace(second, channels={"shaft_speed": turned}), *others])

@@ -276,7 +276,7 @@ def test_an_angle_that_begins_anew(drafted: Drafted, noise: float, begin: float)
     assert moved - moved[0] == pytest.approx(true - true[0], abs=1e-6)
     tests = edit(tests, "rolls_over_at = 360", "#")
     (said,) = findings(tests)
-    assert "jumps by about a whole turn" in said
+    assert "jumps by about one turn" in said
     assert said.endswith("write rolls_over_at = 360 in [axes.drive.channels.position]")
     with pytest.raises(InputError, match="rolls_over_at = 360 in"):
         refuse_unsound(check_runs(tests.experiments, Drive.preset("hoist").parameters))
@@ -498,7 +498,7 @@ def test_dashes_are_missing_numbers_and_commas_between_commas_are_named(drafted:
     tests = drafted(speed=cells)
     assert 'missing = "drop"    # guessed: 3 cells are empty' in text_of(tests)
     assert tests["log"]["shaft_speed"].dropped == 3
-    with pytest.raises(FileError, match="Do decimal commas stand between commas"):
+    with pytest.raises(FileError, match="Are decimal commas mixed with commas"):
         drafted({"log.csv": "time,voltage,speed\n0,0,1,0,2,0\n0,1,1,5,2,5\n"})
 
 

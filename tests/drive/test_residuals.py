@@ -224,7 +224,7 @@ def test_threads_do_not_disturb_each_other(hoist: Drive) -> None:
 
 def test_refusals(hoist: Drive) -> None:
     observed = observed_at_samples(HARD, signals=["shaft_speed"])
-    with pytest.raises(InputError, match="Z16_plus is asked for twice"):
+    with pytest.raises(InputError, match="Z16_plus is requested twice"):
         jacobian(hoist.parameters, observed, ["Z16", "Z16_plus"])
     with pytest.raises(InputError, match="no signal 'torque'"):
         residuals(hoist.parameters, observed_at_samples(HARD, signals=["torque"]))

@@ -104,7 +104,7 @@ def test_measured_inputs_without_sense_are_refused(hoist: Drive, measured, input
 @pytest.mark.parametrize(
     ("name", "value", "sentence"),
     [
-        ("pump_speed", 1e308, "1e.308, .* at most 10: look at"),
+        ("pump_speed", 1e308, "1e.308, .* at most 10: check"),
         ("pump_speed", 75.0, "75, .* at most 10: .* per cent"),
         ("load_torque", -1e300, "-1e.300 N m, .* at most 1e.10 N m either way: look at"),
         ("load_torque", 4e10, "4e.10 N m, .* perhaps it is in N mm instead of N m"),

@@ -415,7 +415,7 @@ def run(step: Any = filled, p: Any = WIDE, flow: Any = None, rate: Any = 1.0, **
     return simulate(tank, p, {"flow": np.ones(5) if flow is None else flow}, rate, **begin)
 
 
-NO_STATE = "must return a Fill of numbers on every way"
+NO_STATE = "must return a Fill of numbers on every path"
 REFUSED = {
     "nothing": ({"step": nothing}, f"Model tank: nothing {NO_STATE}"),
     "row": ({"step": row}, f"row {NO_STATE}"),
@@ -430,7 +430,7 @@ REFUSED = {
     "flow none": ({"flow": [None]}, "flow must be a sequence of real numbers"),
     "rate": ({"rate": "fast"}, "The rate is 'fast' Hz, but must be a number above 0"),
     "no such state": ({"begin": {"depth": 1.0}}, "no state 'depth' to start from; it has level"),
-    "hold": ({"taps": {"flow": Tap("flow", hold="cubic")}}, "held as 'cubic'; there are linear"),
+    "hold": ({"taps": {"flow": Tap("flow", hold="cubic")}}, "hold 'cubic'; there are linear"),
     "delay": (
         {"taps": {"flow": Tap("flow", "width")}, "p": Outlet(-0.1)},
         "tank: width is -0.1 s, but a delay is at least 0",
@@ -456,16 +456,16 @@ def test_a_model_that_cannot_be_marched_is_refused(options: dict[str, Any], sent
 
 TANK, PUMP = Model("tank", Outlet, Fill, filled), Model("pump", Outlet, Flow, returned)
 FED = Model("tank", Outlet, Fill, filled, taps={"flow": Tap("inflow")})
-LATE = "needs 'level', which is known only behind tank: put tank before pump"
+LATE = "needs 'level', which is known only after tank: put tank before pump"
 LOOP = "a loop must be one model, or be closed sample by sample"
 LOAD = Model("load", Outlet, Load, pulled)
 JOINED = {
     "order": ((PUMP, FED), {}, f"Model x: pump {LATE}"),
-    "loop": ((TANK, PUMP), {}, f"tank needs 'flow', which is known only behind pump: {LOOP}"),
-    "load": ((LOAD, *pump_drive.parts), {}, "load needs 'shaft_speed', .* behind pump: a loop"),
-    "drive": ((*pump_drive.parts, LOAD), {}, "pump needs 'load_torque', .* behind load: a loop"),
-    "link": ((TANK,), {"flow": doubled}, f"tank needs 'flow', .* behind tank: {LOOP}"),
-    "text": ((TANK, "pump"), {}, "Model x is joined of models, not of 'pump'"),
+    "loop": ((TANK, PUMP), {}, f"tank needs 'flow', which is known only after pump: {LOOP}"),
+    "load": ((LOAD, *pump_drive.parts), {}, "load needs 'shaft_speed', .* after pump: a loop"),
+    "drive": ((*pump_drive.parts, LOAD), {}, "pump needs 'load_torque', .* after load: a loop"),
+    "link": ((TANK,), {"flow": doubled}, f"tank needs 'flow', .* after tank: {LOOP}"),
+    "text": ((TANK, "pump"), {}, "Model x is joined from models, not from 'pump'"),
 }
 
 

@@ -44,49 +44,49 @@ def defined(text: str, file: str = "/somewhere/friction.py") -> Any:
 
 REFUSED = {
     "while x > 0.0: x = x - 1.0": ("a while loop", "literal number of steps"),
-    "for i in range(x): y = i": ("anything but a literal range", "range(4)"),
+    "for i in range(x): y = i": ("something other than a literal range", "range(4)"),
     "for i in range(3):\n        if x > 0.0: break": ("break", "use if within the loop"),
     "for i in range(3):\n        if x > 0.0: continue": ("continue", "use if within the loop"),
     "try:\n        y = x\n    except ValueError:\n        y = 1.0": ("try", "with if"),
     "with x: y = 1.0": ("with", "only computes"),
     "raise ValueError": ("raise", "return a value"),
     "assert x > 0.0": ("assert", "domain"),
-    "def g(z: float) -> float: return z": ("within an equation", "beside it"),
-    "class C: pass": ("a class within", "beside"),
+    "def g(z: float) -> float: return z": ("within an equation", "next to it"),
+    "class C: pass": ("a class within", "next to"),
     "import os": ("an import within", "top of the file"),
     "global z": ("global", "its arguments"),
     "del x": ("del", "alone"),
     "match x:\n        case 1.0: y = 2.0": ("match", "if and elif"),
-    "fine(x)": ("does nothing", "leave it out"),
+    "fine(x)": ("without effect", "leave it out"),
     "t.a = x": ("an assignment to a field", "State(t.a, b)"),
     "y: float": ("a declaration", "assign a value"),
-    "y = lambda z: z": ("lambda", "an equation of its own"),
+    "y = lambda z: z": ("lambda", "a separate equation"),
     "y = [x, x]": ("a list", "tuple"),
     "y = {1: x}": ("a dictionary", "named tuple"),
     "y = [z for z in t]": ("a comprehension", "write the terms out"),
     "y = 'a'": ("a string", "options"),
     "y = 1j": ("1j", "real numbers"),
-    "y = (z := x)": (":=", "assignment of its own"),
+    "y = (z := x)": (":=", "separate assignment"),
     "y = (*t, x)": ("with *", "write the elements out"),
     "y = x // 2.0": ("//", "floor(a / b)"),
     "y = x % 2.0": ("%", "floor(a / b)"),
     "y = (x > 0.0) & (x < 1.0)": ("&", "`and`"),
     "y = x ^ 2": ("^", "**"),
-    "y = x ** 0.5": ("a power with anything", "sqrt(a)"),
-    "y = x ** x": ("a power with anything", "exp(b * log(a))"),
+    "y = x ** 0.5": ("a power other than", "sqrt(a)"),
+    "y = x ** x": ("a power other than", "exp(b * log(a))"),
     "y = x in t": ("`in`", "=="),
-    "y = x is True": ("`is` with anything but None", "=="),
-    "y = t[x]": ("an index that is no whole number", "s[0]"),
+    "y = x is True": ("`is` with something other than None", "=="),
+    "y = t[x]": ("an index that is not a whole number", "s[0]"),
     "y = print(x)": ("a call of print", "outside"),
     "y = sum(t)": ("a call of sum", "terms"),
     "y = round(x)": ("a call of round", "floor(x + 0.5)"),
     "y = sorted(t)": ("a call of sorted", "equations and functions of math"),
     "y = np.sqrt(x)": ("a call of np.sqrt", "sqrt, exp, log"),
     "y = x(1.0)": ("a call of the argument x", "by their names"),
-    "y = t.count(x)": ("the method count", "made anew"),
+    "y = t.count(x)": ("the method count", "make a new"),
     "y = fine(*t)": ("with *", "write the elements out"),
-    "y = f(x, t)": ("a call of itself", "literal range"),
-    "return": ("a return of nothing", "return a value"),
+    "y = f(x, t)": ("a recursive call", "literal range"),
+    "return": ("a return without a value", "return a value"),
 }
 
 
@@ -118,14 +118,14 @@ def test_refused_heads_and_ends(text: str, what: str) -> None:
 
 DERIVED = {
     "y = fine(x) + missing(x)": ("the unknown name missing", "define or import it"),
-    "y = x + WORDS": ("WORDS, which is tuple", "numbers only"),
+    "y = x + WORDS": ("WORDS, which is tuple", "only numbers"),
     "y = x + t": ("arithmetic with a tuple", "name its elements"),
     "y = t.c": ("the field c, which is unknown", "name a field"),
     "y = fine(x, x)": ("fine with too many positional arguments", "it takes x"),
     "y = math.sqrt(x, x)": ("sqrt of 2 arguments", "give it 1"),
     "y = Two(x).a": ("missing a required argument: 'b'", "it takes a, b"),
     "a, b, c = t": ("an unpacking", "as many values"),
-    "if x > 0.0: z = 1.0\n    y = z": ("z without a value on some way", "on every way"),
+    "if x > 0.0: z = 1.0\n    y = z": ("z without a value on some path", "on every path"),
     "if x > 0.0: z = t\n    else: z = x\n    y = x": ("z of two structures", "same kind"),
     "if t > x: y = 2.0": ("a comparison of a tuple", "compare its elements"),
     "y = root(x, 0.0, 1.0)": ("root of something else", "name of an @equation"),
@@ -168,7 +168,7 @@ def test_two_equations_that_call_each_other_are_refused() -> None:
         "@equation\ndef g(x: float) -> float:\n    return f(x)\n\n"
         "@equation\ndef f(x: float) -> float:\n    return g(x)\n"
     )
-    with pytest.raises(EquationError, match="a call of itself in f"):
+    with pytest.raises(EquationError, match="a recursive call in f"):
         derive(f, "x")
 
 

@@ -184,7 +184,7 @@ def test_steady_start_stays(hoist: FullOrderDrive) -> None:
 
 
 def test_wrong_options_are_sentences(hoist: FullOrderDrive, step: np.ndarray) -> None:
-    with pytest.raises(DomainError, match="more than 20000; take a larger mass"):
+    with pytest.raises(DomainError, match="more than 20000; use a larger mass"):
         hoist.replace(spool_mass=1e-20, feedback_arm_inertia=0.0).simulate(step)
     with pytest.raises(InputError, match="substeps is 5, but .* needs at least 6 to be stable"):
         hoist.simulate(step, substeps=5)

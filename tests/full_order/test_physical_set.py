@@ -196,7 +196,7 @@ def test_a_set_is_changed_copied_and_refused_in_words() -> None:
     past = atan(n["control_arm"] / n["swash_arm"]) + 0.01  # where the arm lies at 90°
     for changes, said in (
         ({"swash_stop": (past, 0.2)}, "turn the feedback arm past 90°"),
-        ({"spool_frequency": 200.0}, "chosen only where a set is completed"),
+        ({"spool_frequency": 200.0}, "chosen only if a set is completed"),
         ({"air_fraction": 1.0}, "air_fraction .* at least 0 and below 1"),
         ({"air_fraction": 1.5}, "air_fraction .* is 1.5, .* at most 1: .* per cent"),
         ({"bulk_modulus": 1.4}, "bulk_modulus .* is 1.4 Pa, .* to 1e.11 Pa: .* GPa"),
@@ -206,5 +206,5 @@ def test_a_set_is_changed_copied_and_refused_in_words() -> None:
     with pytest.raises(ParameterError, match="no packaged physical set 'winch'; there are hoist"):
         PhysicalSet.preset("winch")
     rough = Drive.preset("hoist").replace(spool_friction=1.0)
-    with pytest.raises(InputError, match="five states do not know refinements, but .* spool_f"):
+    with pytest.raises(InputError, match="the five-state model has no refinements, but .* spool_f"):
         FullOrderDrive.from_drive(rough)

@@ -156,7 +156,7 @@ def test_a_clipped_ammeter_is_found_with_the_limits_to_state(tmp_path: Path) -> 
 
     _, found = fitted(tmp_path, logs=clip)
     assert not found.usable
-    assert found.headline.startswith("Not usable, as the data are not sound: 'current' stands at")
+    assert found.headline.startswith("Not usable, as the data are not sound: 'current' reads")
     (finding,) = (each for each in found.unsound if each.channel == "current")
     assert ", 0.2] in its channel" in finding.sentence
     # nothing is explained of data that are not sound

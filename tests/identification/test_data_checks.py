@@ -76,7 +76,7 @@ REFUSED = {
     "all of the wrong sign": (
         [run(f"run {v:g}", held(v), np.negative) for v in (8.0, -3.0, 2.0)],
         PUMP,
-        "In all 3 runs 'shaft_speed' goes against the command",
+        "In all 3 runs 'shaft_speed' moves opposite to the command",
     ),
     "two samples": (
         (run("few", held(8.0), weight=FEW),),
@@ -104,7 +104,7 @@ REFUSED = {
     "one sample": (
         (*GOOD, run("one", held(8.0), lambda speed: speed[:1])),
         PUMP,
-        "one: .* has 1 sample that can count",
+        "one: .* has 1 sample in use",
     ),
     "nothing depends on it": (GOOD, pump("Z14", "Z15"), "no run depends on any of Z14, Z15"),
 }
@@ -120,7 +120,7 @@ def test_what_no_fit_could_mean_anything_for_is_refused(runs, setup: FitSetup, s
 WARNED = {
     "scale without a twin": ((*GOOD, run("again", held(5.0), lambda v: 4.0 * v)), "4.4 times as"),
     "degrees": ([run(each.name, each.input.values, np.degrees) for each in GOOD], "check its unit"),
-    "at rest": ((*GOOD, run("timid", held(0.1))), "it shows the drive at rest only."),
+    "at rest": ((*GOOD, run("timid", held(0.1))), "it shows the drive only at rest."),
     "ignored": ((*GOOD, run("ignored", held(8.0), empty, weight=0.0)), None),
 }
 
@@ -160,7 +160,7 @@ def test_a_position_that_freezes_while_the_drive_runs() -> None:
     good = [turned(each, freeze=False) for each in GOOD]
     assert findings(*good) == []
     found = findings(turned(GOOD[0], freeze=True), *good[1:])
-    (said,) = [each.sentence for each in found if "up: 'position' stands still" in each.sentence]
+    (said,) = [each.sentence for each in found if "up: 'position' does not move" in each.sentence]
     first, last = (float(each) for each in said.partition("from ")[2].split()[:3:2])
     assert 1.2 <= first <= 1.4
     assert 2.4 <= last <= 2.6

@@ -276,7 +276,7 @@ def test_a_slow_log_of_steps_is_fitted_as_well_as_a_fast_one(short_campaign: Cam
     assert numbers["J_plus"] == pytest.approx(0.26, rel=2e-5)
     assert numbers["J_minus"] == pytest.approx(0.31, rel=2e-5)
     assert numbers["Z10"] == pytest.approx(13.0, rel=1e-4)
-    assert "Commands jump 8 times between two samples: when is estimated." in found.sentences
+    assert "Commands jump 8 times between two samples: the instant is estimated." in found.sentences
     card, pump = found.stages
     instants = []
     for run in runs:

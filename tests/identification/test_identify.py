@@ -80,7 +80,7 @@ def test_names_follow_the_contract_of_a_mapping(result: Identification) -> None:
     assert set(result) == set(result.fit.estimates)
     assert len(result) == len(list(result))
     assert result["Z10"] == result.fit["Z10"]
-    with pytest.raises(KeyError, match="J has two directions: ask for J_plus or J_minus"):
+    with pytest.raises(KeyError, match="J has two directions: name J_plus or J_minus"):
         result["J"]
     with pytest.raises(KeyError, match="did you mean Z10"):
         result["Z100"]
@@ -302,7 +302,7 @@ REFUSED: Mapping[str, tuple[Callable[[Campaign], object], type[Exception], str]]
     "nothing": (
         lambda tests: swashplate.identify(tests, free={}),
         InputError,
-        "What is free is {}",
+        "free parameters are {}",
     ),
     "an unknown fit setup": (
         lambda tests: swashplate.identify(tests, free="hoost"),
@@ -317,7 +317,7 @@ REFUSED: Mapping[str, tuple[Callable[[Campaign], object], type[Exception], str]]
     "a model without what is free": (
         lambda tests: swashplate.identify(tests, lag_model()),
         InputError,
-        "needs a mapping of what is free",
+        "needs a mapping of its free parameters",
     ),
     "neither a drive nor a model": (
         lambda tests: swashplate.identify(tests, 5),
@@ -540,7 +540,7 @@ def test_a_user_defined_model_has_the_same_interface(turning: Campaign, tmp_path
     setup = ModelSetup(lag_model(), RANGES)
     again = swashplate.identify(turning, setup)
     assert again["lag"].value == found["lag"].value
-    with pytest.raises(InputError, match="says what is free"):
+    with pytest.raises(InputError, match="defines its free parameters"):
         swashplate.identify(turning, setup, RANGES)
     files = found.save(tmp_path)
     assert [file.name for file in files] == ["parameters.toml", "estimates.csv", "fit.json"]

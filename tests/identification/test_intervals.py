@@ -192,7 +192,7 @@ def test_a_better_optimum_stops_it() -> None:
     assert found.better.cost < 1.0
     assert found.better.vector[1] == 7.0
     assert (found.lower, found.upper) == (None, None)
-    assert "met a better optimum" in found.sentences()[0]
+    assert "found a better optimum" in found.sentences()[0]
 
 
 def test_a_cost_that_is_lower_by_next_to_nothing_does_not_stop_it() -> None:

@@ -375,9 +375,9 @@ def test_a_fit_comes_back_with_its_model_alone(tmp_path: Path) -> None:
     starts = [name for name in result.to_polars()["parameter"] if name.startswith("start.place")]
     assert len(starts) == len(RUNS)
     assert f"{len(RUNS)} numbers of single runs, such as {starts[0]}" in result.summary()
-    with pytest.raises(InputError, match=r"user-defined.* Python by model=.*--model FILE"):
+    with pytest.raises(InputError, match=r"user-defined.* Python as model=.*--model FILE"):
         Identification.load(path, tests)
-    with pytest.raises(InputError, match="another model, or of other bounds"):
+    with pytest.raises(InputError, match="another model or other bounds"):
         Identification.load(
             path, tests, model=ModelSetup(servo, {**RANGES, "lag": (0.1, 0.2, 3.0)})
         )
@@ -551,7 +551,7 @@ def test_what_a_model_leaves_out_is_an_error_of_its_prediction() -> None:
 
 @pytest.mark.parametrize(
     ("gain", "late", "said"),
-    [(1.15, 0.0, "it moves 1.1"), (1.0, 0.6, "ms late beside its command")],
+    [(1.15, 0.0, "it moves 1.1"), (1.0, 0.6, "ms late relative to its command")],
 )
 def test_a_run_with_a_scale_or_a_delay_of_its_own_is_named(gain, late, said) -> None:
     """The third of six runs reads 15 % too much or is 600 ms late, the noise is not stated."""

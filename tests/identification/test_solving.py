@@ -132,7 +132,7 @@ ZERO = Unknown("offset y", 0.0, -1.0, 1.0, run="lift", kind="zero", channel="y")
 REFUSED = {
     "Z2 is nominally 0.*absolute bounds": lambda: bounded("Z2", 0.0, factors=(0.5, 2.0)),
     "begins at 5, outside its bounds 0 and 2": lambda: bounded("a", 5.0, **LOW),
-    "from another value; 'swashplate guess' reads": lambda: Unknown("a", np.nan, 0.0, 2.0),
+    "from another value; 'swashplate guess' estimates": lambda: Unknown("a", np.nan, 0.0, 2.0),
     "lower one first": lambda: bounded("a", 1.0, bounds=(2.0, 0.0)),
     "above 0": lambda: bounded("a", 1.0, **LOW, log=True),
     "positive": lambda: bounded("a", 1.0, **LOW, prior=Prior(1.0, 0.0)),

@@ -55,7 +55,7 @@ def test_runs_that_differ_a_little_are_sound(seed: int) -> None:
     ("spoiled", "said"),
     [
         (1.15 * motion(LEVELS[3]), "it moves 1.15 times as far"),
-        (motion(LEVELS[3], 0.2), "it comes 200 ms late beside its command"),
+        (motion(LEVELS[3], 0.2), "it comes 200 ms late relative to its command"),
         (motion(LEVELS[5]), "follows the command of run 5: are their logs swapped?"),
         (np.cos(5.0 * TIME), "Is it a log of this axis and this command?"),
     ],
@@ -82,7 +82,7 @@ def test_a_position_that_stands_still_for_a_while_is_named_with_the_window() -> 
         runs[k] = compared(run, "angle", angle)
     (finding,) = found_in(runs)
     assert finding.run == "run 2"
-    assert "it stands still from 8.0" in finding.sentence
+    assert "it does not move from 8.0" in finding.sentence
     assert "ignore this window" in finding.sentence
 
 
@@ -126,7 +126,7 @@ def test_a_rounded_channel_that_lags_is_not_clipped(rounding: float) -> None:
     cut = bench_run("cut", 1.0, np.minimum(3.0 * np.sin(time), 1.5))
     cut = replace(cut, input=replace(cut.input, values=3.0 * np.sin(time)))
     (found,) = clipped_channels([cut])
-    assert "'y' stands at exactly 1.5 1" in found.sentence
+    assert "'y' reads exactly 1.5 1" in found.sentence
     for upper, count in ((1.5, 0), (1.495, 0), (1.6, 1)):
         stated = replace(cut["y"], limits=(-3.5, upper))
         assert len(list(clipped_channels([replace(cut, channels={"y": stated})]))) == count
@@ -146,4 +146,4 @@ def test_a_channel_that_is_clipped_at_several_steps(noise: float, cut: bool) -> 
     found = list(clipped_channels(runs))
     assert len(found) == (cut and noise > 0.0)
     if found:
-        assert "'y' stands at exactly 1 1 at inputs that differ by 2 1" in found[0].sentence
+        assert "'y' reads exactly 1 1 at inputs that differ by 2 1" in found[0].sentence

@@ -195,7 +195,7 @@ def test_another_campaign_is_refused(path: Path, campaign: Campaign) -> None:
     ignored = replace(second, channels={**second.channels, "current": current})
     assert fingerprint(ignored) != fingerprint(second)
     changed = replace(campaign, experiments=(first, ignored))
-    with pytest.raises(InputError, match="is not as it was when .* was fitted"):
+    with pytest.raises(InputError, match="has changed since .* was fitted"):
         Identification.load(path, changed)
 
 

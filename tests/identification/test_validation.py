@@ -52,7 +52,7 @@ def test_a_constant_has_no_fit(level: float, count: int) -> None:
 @pytest.mark.parametrize(
     ("run", "said"),
     [
-        ((MEASURED, SIMULATED, np.zeros(4)), "No sample counts"),
+        ((MEASURED, SIMULATED, np.zeros(4)), "No sample is used"),
         ((MEASURED, np.full(4, np.nan), None), "Sample 1 of what was simulated is not finite"),
     ],
 )

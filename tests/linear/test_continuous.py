@@ -78,7 +78,7 @@ def test_switches_are_declared(hoist: Drive) -> None:
         ({"at": 0.1}, "the card's dead zone, so the gain is 0; linearise at \\+0.2065 V or beyond"),
         (
             {"at": 0.14},
-            "gives 0.275.* A, which lies in the solenoids' dead zone of Z17 = ±0.27867 A",
+            "gives 0.275.* A, which is in the solenoids' dead zone of Z17 = ±0.27867 A",
         ),
         ({"at": 9.0}, "at its stop, so the gain is 0"),
         ({"current": 5.0}, "overpowers the feedback spring"),
@@ -154,7 +154,7 @@ def test_without_delay(hoist: Drive) -> None:
     late = hoist.linearize(4.0)
     without = late.response(F)[0] * np.exp(2j * np.pi * F * 0.014)
     np.testing.assert_allclose(of_scipy(late.to_scipy(without_delay=True), F, 0), without)
-    with pytest.raises(InputError, match="has a delay of 0.014 s, which no state space holds"):
+    with pytest.raises(InputError, match="has a delay of 0.014 s, which no state space represents"):
         late.to_scipy()
 
 

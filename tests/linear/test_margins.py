@@ -208,7 +208,9 @@ def test_the_table_and_its_parts(hoist: Drive, tmp_path) -> None:
     assert table["gain"].to_list()[4] == swept.gain[1, 1]
     swept.write(tmp_path / "bode.csv")
     assert pl.read_csv(tmp_path / "bode.csv").columns == table.columns
-    with pytest.raises(InputError, match="not taken at 0.15 Hz; the nearest frequency is 0.1 Hz"):
+    with pytest.raises(
+        InputError, match="not computed at 0.15 Hz; the nearest frequency is 0.1 Hz"
+    ):
         response_table(swept, 0.15)
 
 

@@ -192,7 +192,7 @@ def test_where_friction_or_hysteresis_holds(hoist: Drive) -> None:
             lagging.linearize(**where)
     force = lagging.linearize(4.0, input="solenoid_force")
     assert force.gain == hoist.linearize(4.0, input="solenoid_force").gain
-    with pytest.raises(DomainError, match="holds the spool fast"):
+    with pytest.raises(DomainError, match="prevents small motions of the spool"):
         hoist.replace(spool_friction=0.1).linearize(4.0)
 
 
@@ -245,7 +245,7 @@ def test_each_input_by_itself(hoist: Drive) -> None:
 @pytest.mark.parametrize(
     ("inputs", "said"),
     [
-        (("load_torque", "voltage"), "the first alone may be a command"),
+        (("load_torque", "voltage"), "only the first may be a command"),
         (("voltage", "voltage"), "several different ones"),
         (("voltage", "wind"), "'wind', but must be one of voltage"),
     ],

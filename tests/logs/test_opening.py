@@ -69,7 +69,7 @@ def test_a_process_that_ends_or_hangs_is_replaced(table, monkeypatch):
     log = open_log(table)
     other = subprocess_reader._ReaderProcess.running
     os.kill(other._process.pid, signal.SIGKILL)
-    with pytest.raises(FileError, match="log.parquet is damaged so that reading it breaks off"):
+    with pytest.raises(FileError, match="log.parquet is damaged: reading it stops"):
         log.read(["time"])
     assert log.read(["time"])["time"].tolist() == [0.0, 1.0]
     monkeypatch.setattr(subprocess_reader, "_PATIENCE", 0.2)
@@ -254,7 +254,11 @@ DAMAGED = [
         text("time,u\n" + "0,1\n" * 20000 + "\0" * 50),
         "NUL byte in data row 20001 (line ",
     ),
-    ("thousands.csv", text("a;b\n1,234;5\n2,345;6\n"), "'1,234', where the comma may be a decimal"),
+    (
+        "thousands.csv",
+        text("a;b\n1,234;5\n2,345;6\n"),
+        "'1,234', in which the comma may be a decimal",
+    ),
     ("either.csv", text("voltage\n0,5\n1,5\n"), "has no column 'voltage'; it has 'column 1',"),
     ("open.csv", text('a,b\n1,"2\n3,4\n'), "misplaced quotes in data row 1 (line 2)"),
     ("wide.csv", text("time,u\n0,1\n".encode("utf-16")[:-1]), "is not text in utf-16-le"),
@@ -275,7 +279,7 @@ DAMAGED = [
     ("text.h5", text("time,voltage\n0,1\n"), "cannot be read as HDF5"),
     ("cut.h5", cut(hdf5, 0.7), "cut.h5 cannot be read as HDF5, it is damaged ...truncated"),
     ("block.h5", changed(hdf5, b"x^", b"\xff" * 20), "block.h5 cannot be read as HDF5"),
-    ("larger.h5", claims(10**12), "has 1000000000000 numbers in the 1 columns that are wanted"),
+    ("larger.h5", claims(10**12), "has 1000000000000 numbers in the 1 requested columns"),
     ("huge.h5", claims(10**7), "'/voltage' claims 10000000 numbers, but none is stored"),
     ("unwritten.h5", unwritten, "'/voltage' has only 1 of its 4 blocks"),
     ("external.h5", external, "'/voltage' cannot be read as numbers: its numbers are in"),

@@ -35,7 +35,10 @@ from swashplate.errors import InputError
         (lambda: maneuvers.chirp(1, 0.1, math.inf), "last must be finite"),
         (lambda: maneuvers.multisine(1, [0.1, 0.0]), "lowest frequency must be positive, not 0"),
         (lambda: maneuvers.multisine(1, []), "frequencies must be one row"),
-        (lambda: maneuvers.multisine(1, [1.0], seed=-1), "seed must be a whole number from 0 up"),
+        (
+            lambda: maneuvers.multisine(1, [1.0], seed=-1),
+            "seed must be a whole number of at least 0",
+        ),
         (lambda: maneuvers.multisine(1, (0.1, 0.2)), "a tuple of frequencies is"),
         (lambda: maneuvers.multisine(1, (0.1, 0.2, 0.3)), "a tuple of frequencies is"),
         (lambda: maneuvers.multisine(1, (0.1, 0.2, 0)), "a tuple of frequencies is"),

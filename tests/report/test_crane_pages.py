@@ -161,7 +161,7 @@ def test_verdicts_page_has_both_answers_with_a_light_of_their_own(tmp_path, asse
     assert rest.count("<svg") == 2
     failed = written(write_assessment, harming, tmp_path)
     assert '<div class="headline bad">' in failed
-    assert f"'identified' is not an operation in 2 of 3 seaways: {BEYOND}." in failed
+    assert f"'identified' is not a valid operation in 2 of 3 seaways: {BEYOND}." in failed
 
 
 def test_verdicts_page_says_what_the_answer_hangs_on(tmp_path, assessed):
@@ -183,7 +183,7 @@ def test_verdicts_page_says_what_the_answer_hangs_on(tmp_path, assessed):
 
 def test_verdicts_page_of_harm_alone_says_what_was_not_asked(tmp_path, assessed):
     text = written(write_assessment, replace(assessed, questions=("harm",)), tmp_path)
-    assert text.count("This was not asked") == 1
+    assert text.count("This was not requested") == 1
     assert "suffice" not in text.partition('<div class="headline')[2].partition("</div>")[0]
 
 
@@ -304,7 +304,7 @@ def test_figure_of_an_assessment_has_shares_of_limits(assessed, crane):
 
 
 def swept(crane, over, points, values):
-    """A sweep of one variant beside no control, in two seaways. [deg]"""
+    """A sweep of one variant besides no control, in two seaways. [deg]"""
     both = np.radians(np.array([values, values]))
     seaways = np.stack([both, 0.5 * both], axis=-1)
     seaways[1] *= 1.1

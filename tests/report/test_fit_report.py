@@ -393,7 +393,7 @@ def test_each_run_has_a_light_and_links(
     assert lights[-1] == "light bad"
     assert [row["why"] == "not sound" for row in page.rows("overview")] == [False, False, True]
     # why, and what to write, stand on the first screen
-    assert f"Settle first: In {last.name} 'counts' goes against the command" in page.words
+    assert f"Settle first: In {last.name} 'counts' moves opposite to the command" in page.words
     assert "sign = -1" in page.words.partition("Settle first: ")[2].splitlines()[0]
     targets = {of["id"] for _, of in page.tags if "id" in of}
     links = {of["href"] for tag, of in page.tags if tag == "a"}

@@ -84,7 +84,7 @@ class InverseMap(Result):
     lag: float
     """Time by which the speed follows a slow change of the command, see `command`. [s]"""
     error: float
-    """Largest error of the straight lines: steady speed less reference speed half way between two
+    """Largest interpolation error: steady speed less reference speed half way between two
     points. [rad/s]"""
 
     @property
@@ -256,7 +256,7 @@ class InverseMap(Result):
         limits.add("slowest that can be held", *self.gap, unit="rad/s", spec="z.3f")
         limits.add("acceleration at rest", -down, up, unit="rad/s^2", spec=".2f")
         limits.add("lag", "", 1e3 * self.lag, unit="ms", spec=".1f")
-        limits.add("error of the straight lines", "", self.error, unit="rad/s", spec=".2g")
+        limits.add("interpolation error", "", self.error, unit="rad/s", spec=".2g")
         return [voltages_table, points, limits] if speeds else [points, limits]
 
     def write(self, path: str | Path) -> None:
@@ -334,9 +334,9 @@ def inverse_map(drive: Drive, points: int = 101) -> InverseMap:
     if not minus.speed[-1] <= creep <= plus.speed[0]:
         low, at, high = np.degrees([minus.speed[-1], creep, plus.speed[0]])
         raise DomainError(
-            f"{drive.name} creeps at {at:.4g} deg/s at 0 V, but the smallest commands make it "
-            f"{low:.4g} and {high:.4g} deg/s, so that its steady map has no inverse; check Z17, "
-            "Z18 and the card's J."
+            f"{drive.name} creeps at {at:.4g} deg/s at 0 V, but the smallest commands give "
+            f"{low:.4g} and {high:.4g} deg/s, so its steady map has no inverse; check Z17, Z18 and "
+            "the card's J."
         )
     upwards, _ = starting_acceleration(drive, 1.0)
     downwards, _ = starting_acceleration(drive, -1.0)
@@ -468,7 +468,7 @@ def improvement(
     reference = np.array(reference_speed, dtype=np.float64)
     if not reference.any():
         raise InputError(
-            "The reference speed is standstill throughout; take one that moves the drive."
+            "The reference speed is standstill throughout; use one that moves the drive."
         )
     commands = {
         "straight line": proportional_command(chosen, reference),

@@ -33,7 +33,8 @@ MACHINE: Mapping[str, DesignVariable] = {
     ),
     "orifice_diameter": DesignVariable(
         {"Z16": 2.0},
-        "Bore of the in-line orifices; their area, and with it the opening, goes with its square.",
+        "Bore of the in-line orifices; their area, and with it the opening, scales with its "
+        "square.",
     ),
     "pump": DesignVariable(
         {"Z10": 1.0, "Z12": 1.0},
@@ -41,12 +42,12 @@ MACHINE: Mapping[str, DesignVariable] = {
     ),
     "drive_speed": DesignVariable(
         {"Z10": 1.0, "Z12": 1.0},
-        "Speed of the motor that turns the pump. Flow goes with it as with the displacement; the "
-        "control pressure does not, a relief valve holds it.",
+        "Speed of the motor that drives the pump. Flow is proportional to it, as to the "
+        "displacement; the control pressure does not change, because a relief valve sets it.",
     ),
     "supply_pressure": DesignVariable(
         {"Z9": 1.0},
-        "Control pressure that moves the stroking piston: its flow goes with the root.",
+        "Control pressure that moves the stroking piston; its flow scales with the square root.",
     ),
     "rate_limits": DesignVariable(
         {"lim1": 1.0, "lim2": 1.0}, "Both rate limits of the card's ramps."
@@ -55,10 +56,10 @@ MACHINE: Mapping[str, DesignVariable] = {
     "rate_limit_down": DesignVariable({"lim2": 1.0}, "Rate limit of the current towards zero."),
     "dead_zone": DesignVariable(
         {"V_dz": 1.0},
-        "Dead zone of the card's input; 0 is a dead zone compensated in full.",
+        "Dead zone of the card's input; 0 means fully compensated.",
     ),
     "spool_stroke": DesignVariable(
-        {"Z14": 1.0}, "Stroke of the spool: what is left without orifices."
+        {"Z14": 1.0}, "Stroke of the spool: the limit that remains without orifices."
     ),
     "relief": DesignVariable({"Z15": 1.0}, "Relief pressure of the stroking piston."),
     "spool_offset": DesignVariable(

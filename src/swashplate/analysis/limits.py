@@ -68,7 +68,7 @@ def removals(drive: Drive) -> list[Removal]:
     larger = "pump: larger, or a smaller motor (Z10, Z13)"
     orifice = "in-line orifice: larger bore (Z16)"
     if drive.parameters["Z4"].status == "assumed":  # a guessed machine may have no orifice
-        orifice = "what limits the acceleration, in the model an in-line orifice (Z16)"
+        orifice = "limit of the acceleration, modelled as an in-line orifice (Z16)"
     compensated = "card: dead-zone compensation (V_dz, or an inverse map)"
     no_ramp: dict[str, Change] = {"lim1": inf, "lim2": inf}
     candidates = (
@@ -158,12 +158,12 @@ class LimitShares(Tabular):
             ]
         if self.unseen:
             sentences.append(
-                f"No test reached {listed(self.unseen)}: its value here is only where the tests "
-                "ended."
+                f"No test reached {listed(self.unseen)}: its value only marks how far the tests "
+                "went."
             )
         for share in self.shares:
             if share.failure:
-                sentences.append(f"Not without the {share.limit}: {share.failure}")
+                sentences.append(f"Not computed without the {share.limit}: {share.failure}")
         return sentences
 
     def table(self, *, acting: bool = False) -> Table:
@@ -279,8 +279,8 @@ def shares_of(drive: Drive, run: Simulation, reference: ArrayLike | None = None)
         compared = checked_speed(reference, run.shaft_speed.size)
     elif isinstance(unlimited, str):
         raise DomainError(
-            "Without its limits the drive cannot be simulated, so that there is no speed to "
-            f"compare with; give a reference speed ({unlimited.rstrip('.')})."
+            "Without its limits the drive cannot be simulated, so there is no speed to compare "
+            f"with; give a reference speed ({unlimited.rstrip('.')})."
         )
     else:
         compared = checked_speed(unlimited, run.shaft_speed.size)

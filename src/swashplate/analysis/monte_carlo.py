@@ -71,8 +71,8 @@ class Draws(Result):
         sentences = []
         if self.fixed:
             sentences.append(
-                f"Not drawn, as fitted in all drives: {', '.join(self.fixed)}; the bands leave out "
-                "what their errors would add."
+                f"Not varied, with the fitted value in all drives: {', '.join(self.fixed)}; the "
+                "bands do not include their errors."
             )
         attempts = self.redrawn + len(self.drives)
         if self.redrawn > NARROWED * attempts:
@@ -303,7 +303,7 @@ def _slope(
             return np.asarray((numbers(Drive(parameters)) - base) / step)
     raise InputError(
         "A small step along the errors of the estimates leaves the bounds or the model's domain "
-        "either way: widen the bounds, or free fewer parameters."
+        "in both directions: widen the bounds, or free fewer parameters."
     )
 
 
@@ -420,8 +420,8 @@ def stored_draws(
         different = [name for name, value in fitted.items() if numbers[name] != value]
         if different:
             raise InputError(
-                f"The fit in {path} is that of another drive ({', '.join(different[:3])} differ): "
-                f"give the drive that it found, {path}."
+                f"The fit in {path} belongs to another drive ({', '.join(different[:3])} differ): "
+                f"give its fitted drive, {path}."
             )
     return drawn_drives(fit.stages, draws, seed)
 
@@ -483,8 +483,8 @@ def bands(
     count, size = len(drawn.drives), trial.voltage.size
     if size * count > MOST_SAMPLES:
         raise InputError(
-            f"{count} drives over {size} samples take too much memory: take "
-            f"{MOST_SAMPLES // size} drives at most, or give the command at a lower rate."
+            f"{count} drives over {size} samples take too much memory: use {MOST_SAMPLES // size} "
+            "drives at most, or give the command at a lower rate."
         )
     run = drawn.drives[0].simulate_many(drawn.columns, voltage=trial.voltage, rate=trial.rate)
     if run.failures:

@@ -120,7 +120,7 @@ def trial_of(
         raise InputError("A command needs two samples or more, in one row, within ±10 V.")
     if (volts == volts[0]).all():
         raise InputError(
-            f"The command stays at {volts[0]:g} V; to compare drives it has to change."
+            f"The command stays at {volts[0]:g} V; it must change if drives are compared."
         )
     if reference is None:
         reference = proportional_speed(drive, volts)
@@ -207,8 +207,8 @@ def _outcome(unit: str, undefined: str = "") -> Callable[[Compute], Compute]:
     return keep
 
 
-_NEVER = "the shaft stands still while the command is at its largest"
-_NO_RISE = f"{_NEVER}, or the command turns back on its way there"
+_NEVER = "the shaft does not move while the command is at its largest"
+_NO_RISE = f"{_NEVER}, or the command reverses before it gets there"
 
 
 @_outcome("rad/s")
@@ -255,7 +255,7 @@ def tracking_error(speed: Array, trial: Trial) -> Array:
     return np.array([rms_difference(row, trial.reference) for row in speed])
 
 
-@_outcome("rad/s", "the command does not rest at 0 V long enough at its start")
+@_outcome("rad/s", "the command does not stay at 0 V long enough at the start")
 def creep(speed: Array, trial: Trial) -> Array:
     """Speed just before the command first leaves zero."""
     rests = trial.voltage[0] == 0.0 and trial.begin >= REST * trial.rate

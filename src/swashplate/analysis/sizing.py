@@ -263,7 +263,7 @@ def size(
     1.24
     """
     if requirements.tracking_error is not None and follow is None:
-        raise InputError("A tracking error can only be required with a speed to follow.")
+        raise InputError("A required tracking error needs a reference speed.")
     check_ranges(ranges, around=1.0)
     names = list(ranges)
     low, high = np.array(list(ranges.values()), dtype=np.float64).T

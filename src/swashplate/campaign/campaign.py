@@ -102,7 +102,7 @@ class Campaign(Result):
             name = run.name or Path(run.file).stem
             if name in names:
                 raise InputError(
-                    f"{path}: two runs are called '{name}'; give each a name of its own."
+                    f"{path}: two runs are called '{name}'; give each a different name."
                 )
             names.add(name)
             if run.role == "ignore":

@@ -103,9 +103,9 @@ class Encoder(NamedTuple):
     """Scale of an encoder's counts."""
 
     counts_per_turn: float
-    """Counts for one turn of the encoder's shaft, quadrature included."""
+    """Counts per turn of the encoder's shaft, quadrature included."""
     gear_ratio: float
-    """Turns of the encoder for one turn of the axis's shaft."""
+    """Turns of the encoder per turn of the axis's shaft."""
     sign: Literal[1, -1]
     """-1 if it counts down at positive speed."""
     rolls_over_at: int | None

@@ -106,7 +106,7 @@ class Overview(Result):
             words += f"; {len(used)} of them, {rows:,} rows, spread over the log, "
             words += "is used" if len(used) == 1 else "are used"
         if self.read_from is not None:
-            words += f"; its rows are read from {self.read_from.name}, written beside it"
+            words += f"; its rows are read from {self.read_from.name}, written next to it"
         return f"{words}."
 
     def table(self) -> Table:

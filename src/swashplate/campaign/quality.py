@@ -124,7 +124,7 @@ def _quality(
     findings = list[str]()
     if moves:
         findings.append(
-            f"moves at the first sample, where the run is said to be at rest: write "
+            "moves at the first sample, although the run is stated to begin at rest: write "
             f"axes.{experiment.axis}.{ESTIMATED} in this run"
         )
     # the input's stamps are reported once, with the input
@@ -178,7 +178,7 @@ def _of_stamps(stamps: StampStatistics) -> Iterator[str]:
     if stamps.jitter > 0.2 * stamps.period:
         yield (
             f"the interval of {1e3 * stamps.period:.3g} ms varies by {1e3 * stamps.jitter:.2g} ms: "
-            "its own stamps are kept"
+            "the time stamps are used as they are"
         )
 
 
@@ -210,7 +210,7 @@ def _of_channel(experiment: Experiment, channel: Channel, signed: bool) -> Itera
     if directional and turned(drive.at(at) - drive.values[0], motion):
         yield "moves against the input: should its sign be -1?"
     if outside := int(np.count_nonzero((time < drive.time[0]) | (time > drive.time[-1]))):
-        yield f"{count(outside, 'sample lies', 'samples lie')} before or after the input's record"
+        yield f"{count(outside, 'sample is', 'samples are')} before or after the input's record"
 
 
 def turned(driven: Array, motion: Array) -> bool:
@@ -313,8 +313,8 @@ def wrapped_positions(experiments: Iterable[Experiment]) -> dict[tuple[str, str]
                 size = f"{turn / channel.stated:.9g}"
                 where = f"axes.{experiment.axis}.channels.{name}"
                 sentences[experiment.axis, name] = (
-                    f"'{name}' of the axis '{experiment.axis}' jumps by about a whole turn, as an "
-                    f"angle that wraps does; write rolls_over_at = {size} in [{where}]"
+                    f"'{name}' of the axis '{experiment.axis}' jumps by about one turn, as a "
+                    f"wrapping angle does; write rolls_over_at = {size} in [{where}]"
                 )
     return sentences
 
@@ -444,10 +444,10 @@ def _of_lost_counts(experiment: Experiment, channel: Channel) -> Iterator[str]:
     most = max((spike.counts for spike in lasting), key=abs)
     cut = f"{lasting[0].begin:.6g}"
     yield (
-        f"jumps by up to {most:+.0f} counts at {times} as no motion does, and stays there: lost or "
-        f"doubled counts. Cut the run there: span = {{ to = {cut} }} in this run, and a second one "
-        f'of the same file with name = "{experiment.run} from {cut} s", span = {{ from = {cut} }}, '
-        'start = "estimated"'
+        f"jumps by up to {most:+.0f} counts at {times} faster than any motion, and does not come "
+        f"back: lost or doubled counts. Cut the run there: span = {{ to = {cut} }} in this run, "
+        "and add a second run of the same file with "
+        f'name = "{experiment.run} from {cut} s", span = {{ from = {cut} }}, start = "estimated"'
     )
 
 
@@ -540,7 +540,7 @@ def _one_sided(axis: str, runs: Sequence[Experiment]) -> Iterator[str]:
     if still.any() and min(motion.max(), -motion.min()) > most / 3.0:
         rest = float(np.median(command[still]))
         yield (
-            f"axis '{axis}': it moves both ways though its command never changes its sign; a stick "
+            f"axis '{axis}': it moves both ways although its command never changes sign; a stick "
             f"that rests at {rest:.3g} V needs offset = {-rest:.3g} in [axes.{axis}.input]"
         )
 
@@ -586,8 +586,8 @@ def _of_other_scale(runs: Sequence[Experiment]) -> Iterator[str]:
             if min(gain, usual) > 0.0 and not 1.0 / OFF_SCALE < gain / usual < OFF_SCALE:
                 yield (
                     f"{run}: '{name}' moves {gain / usual:.3g} times as fast as in the other runs "
-                    f"at such commands; check the unit of '{column}' in this log (1 rad/s is 9.55 "
-                    "1/min), its scale and the machine's gear"
+                    f"at similar commands; check the unit of '{column}' in this log (1 rad/s is "
+                    "9.55 1/min), its scale and the machine's gear"
                 )
 
 
@@ -629,8 +629,8 @@ def _unused(
             names = list(dict.fromkeys(f"'{run.maneuver}'" for run in runs))
             rest = [f"{len(names) - NAMED} others"] if len(names) > NAMED else []
             yield (
-                f"{where}: no run has the maneuver '{window.maneuver}', so that its window does "
-                f"nothing; there are {', '.join([*names[:NAMED], *rest])}"
+                f"{where}: no run has the maneuver '{window.maneuver}', so its window has no "
+                f"effect; the maneuvers are {', '.join([*names[:NAMED], *rest])}"
             )
         elif not within_log and not any(inside(window, time).any() for time in times):
             first, last = (
@@ -640,7 +640,7 @@ def _unused(
             if len(matching) == 1:
                 time = matching[0].input.time
                 of = f"{matching[0].name}, which goes from {time[0]:.4g} to {time[-1]:.4g} s"
-            yield f"{where}: the window from {first} to {last} holds no sample of {of}"
+            yield f"{where}: the window from {first} to {last} contains no sample of {of}"
 
 
 def quality_table(experiment: Experiment, qualities: Sequence[Quality]) -> Table:

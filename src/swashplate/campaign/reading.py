@@ -116,7 +116,7 @@ def _axes_of(run_origin: str, run: schema.RunEntry, axes: Axes) -> dict[str, sch
                 )
         content = _merged(axis.model_dump(by_alias=True, exclude_unset=True), changes)
         if not content["channels"]:
-            raise InputError(f'{origin} has no channel left; say role = "ignore" instead.')
+            raise InputError(f'{origin} has no channel left; write role = "ignore" instead.')
         tested[name] = validated(content, schema.AxisEntry, origin)
     return tested
 
@@ -270,14 +270,14 @@ class _Columns:
         if rows.size and signal.missing == "refuse":
             others = f" and {rows.size - 1} others" if rows.size > 1 else ""
             raise FileError(
-                f"{described} has no finite number in data row {rows[0]}{others}; mend the log, or "
-                "say missing = 'drop' to leave such samples out."
+                f"{described} has no finite number in data row {rows[0]}{others}; correct the log, "
+                "or write missing = 'drop' to omit such samples."
             )
         used &= ~missing
         usable = np.count_nonzero(used)
         if usable < 2:
             raise FileError(
-                f"{described} has {usable} samples that can be used, but needs two at least."
+                f"{described} has {usable} samples that can be used, but needs at least two."
             )
         si, factor, zero = self._conversion(what, signal)
         # an encoder's sign belongs to the scale of its counts, see `Encoder`
@@ -351,7 +351,7 @@ def _experiments(
             remedy = f"axes.{key}.channels.{channel} = false" if len(axis.channels) > 1 else without
             raise FileError(
                 f"{columns.log.path}: column '{entry.column}' (channel '{channel}' of the axis "
-                f"'{key}') has no number at all; leave it out with {remedy} in this run."
+                f"'{key}') contains no numbers; leave it out with {remedy} in this run."
             )
         if not parts:
             notes.append(f"'{channel}' has no sample here and is left out of this run")
@@ -373,7 +373,7 @@ def _experiments(
         )
         for row in ambiguous_gaps(time, values, factor * size) if size is not None else ():
             cuts[float(time[row])] = (
-                f"within the gap of {time[row] - time[row - 1]:.3g} s the {what} '{channel}', "
+                f"during the gap of {time[row] - time[row - 1]:.3g} s the {what} '{channel}', "
                 f"which wraps at {size:.12g}, may have wrapped once more or less"
             )
     if not signals:
@@ -390,9 +390,7 @@ def _experiments(
             continue
         part_notes = list(notes) if part == 0 else []
         if np.isfinite(end):
-            part_notes.append(
-                f"split at {end:.4g} s, from where it is a run of its own: {cuts[end]}"
-            )
+            part_notes.append(f"split at {end:.4g} s; the rest is a separate run: {cuts[end]}")
         recognised = recognise(command.time, command.values, unit=unit)
         maneuver = run.maneuver or recognised.name
         ignored = applying((*axis.ignore, *run.ignore), maneuver)
@@ -583,7 +581,7 @@ def _overview(
         moving |= _moves(extremes)
     if not moving.any():
         raise InputError(
-            f"{log.path} has {rows} rows, in none of which the input moves: leave the run out with "
+            f"{log.path} has {rows} rows, but its input never moves: leave the run out with "
             'role = "ignore".'
         )
     return Overview(

@@ -52,7 +52,7 @@ def increasing(time: ArrayLike) -> Array:
     """
     stamps = row("time", time)
     if stamps.size < 2:
-        raise InputError("time must have two rows at least, not 1.")
+        raise InputError("time must have at least two rows, not 1.")
     wrong = np.flatnonzero(stamps[1:] <= stamps[:-1]) + 1
     if wrong.size:
         at = int(wrong[0])
@@ -143,10 +143,12 @@ def unwrap_counts(counts: ArrayLike, modulus: int) -> Array:
     short = _shortest(np.diff(readings), size)
     wrong = {
         "counts must be whole numbers": np.floor(readings) != readings,
-        f"counts must be from {low} to {high}, as of a {signed}counter of {size} readings (give "
-        "its own size, in a campaign file rolls_over_at)": (readings < low) | (readings > high),
-        f"counts must not step by half the range of a counter of {size}, which may be up or down "
-        "(cut the record there)": np.concatenate([[False], short == -0.5 * size]),
+        f"counts must be from {low} to {high}, the range of a {signed}counter of {size} readings "
+        "(give its actual size, in a campaign file as rolls_over_at)": (readings < low)
+        | (readings > high),
+        f"counts must not step by half the range of a counter of {size}, whose direction is then "
+        "ambiguous (cut "
+        "the record there)": np.concatenate([[False], short == -0.5 * size]),
     }
     for sentence, rows in wrong.items():
         if rows.any():
@@ -168,8 +170,8 @@ def unwrap_position(position: Array, size: float) -> Array:
     """
     if (reach := float(np.ptp(position))) > BEYOND * size:
         raise InputError(
-            f"the readings reach over {reach / size:.4g} times rolls_over_at, but a position that "
-            "wraps stays within it; give its own size, or leave rolls_over_at out."
+            f"the readings span {reach / size:.4g} times rolls_over_at, but a position that wraps "
+            "stays within it; correct rolls_over_at, or leave it out."
         )
     steps = _shortest(np.diff(position), size)
     far = np.concatenate([[False], np.abs(steps) > 0.25 * size, [False]])

@@ -56,15 +56,15 @@ given; of positions that are a rod's and not a shaft's."""
 
 # fmt: off
 KINDS: Mapping[str, Kind] = {
-    "voltage": Kind(("V",), "", "the card's command, positive towards positive speed",
+    "voltage": Kind(("V",), "", "the card's command, positive for positive speed",
         r"volts?|voltage|u|\w*spannung|spanning|spenning|spænding|spänning|voltaje", ("V", "mV")),
     "current": Kind(("A",), "", "signed current that drives the pump without a card"),
     # by its name an input: channels are of this kind where somebody says so
-    "other": Kind((), "", "anything else, kept in the unit that it is written in",
+    "other": Kind((), "", "any other quantity, in the unit of the log",
         "cmd|command|duty|setpoint|valve|stick|joystick|joy|stellgröße|stellgroesse|sollwert|hebel|"
         "consigne|consigna|manette|palanca|spak|pådrag"),
     "encoder_counts": Kind(("rad",), "shaft_position",
-        "counts of an encoder; an angle from a free zero",
+        "encoder counts; an angle from an arbitrary zero",
         "counts?|encoder|drehgeber|enc|ticks|pulses|impulse|inkremente|impulsen|impulser|impulsions|pulsos",
         ("counts", "count", "Impulse", "pulses")),
     "current_plus": Kind(("A",), "current_positive",
@@ -74,7 +74,7 @@ KINDS: Mapping[str, Kind] = {
         "current of the negative solenoid, a magnitude",
         f"(?:{CURRENT}|i) (?:minus|negative|b|2|down)"),
     "signed_current": Kind(("A",), "current",
-        "positive solenoid's current less the negative one's"),
+        "positive solenoid's current minus the negative one's"),
     "rectified_current": Kind(("A",), "current_sum", "|I+| + |I-|, one ammeter around both leads",
         f"{CURRENT}|amps?|ammeter|i", ("A", "mA")),
     "stroker_pressure": Kind(("Pa",), "stroker_pressure",
@@ -88,7 +88,7 @@ KINDS: Mapping[str, Kind] = {
         rf"speed|omega|velocity|\w*geschwindigkeit|snelheid|hastighe[dt]|vitesse|velocidad|velocità|"
         rf"{TURNS}|n|n \w+",
         ("rad/s", "deg/s", "rpm", "m/s", "mm/s")),
-    "position": Kind(("rad", "m"), "shaft_position", "integral of the speed from a free zero",
+    "position": Kind(("rad", "m"), "shaft_position", "integral of the speed from an arbitrary zero",
         r"position|pos|angle|pos fb|\w*winkel|hoek|vinkel|ángulo|angolo|posisjon|posición|"
         rf"posizione|{ROD}"),
 }
@@ -166,7 +166,7 @@ class TimeWindow(FileTable):
         description="Only in runs of this maneuver, as recognised: 'step +4 V' or, with a "
         "pattern, 'step *' or 'sine * 0.1 Hz'.",
     )
-    why: str = Field("", description="The reason; it stands in the report.")
+    why: str = Field("", description="Reason, printed in the report.")
 
     @model_validator(mode="after")
     def _ordered(self) -> TimeWindow:
@@ -208,10 +208,10 @@ class WeightWindow(TimeWindow):
 class ClockEntry(FileTable):
     """The time stamps of a signal: a column, or a rate if the log has none."""
 
-    column: str | None = Field(None, description="Column of the stamps.")
-    unit: str | None = Field(None, description="Its unit; the header's, or s.")
-    rate: Positive | None = Field(None, description="Samples a second, instead of a column [Hz].")
-    offset: Finite = Field(0.0, description="Added to the stamps [s].")
+    column: str | None = Field(None, description="Column of the time stamps.")
+    unit: str | None = Field(None, description="Unit (default: the header's, or s).")
+    rate: Positive | None = Field(None, description="Sampling rate, instead of a column [Hz].")
+    offset: Finite = Field(0.0, description="Offset added to the time stamps [s].")
 
     @model_validator(mode="after")
     def _one_source(self) -> ClockEntry:
@@ -226,16 +226,19 @@ class AccuracyEntry(FileTable):
     """Limits of an instrument's error, as its data sheet gives them."""
 
     gain: NotNegative | None = Field(
-        None, lt=1.0, description="Share of the reading, 0.005 for 0.5 %; left out, as assumed."
+        None,
+        lt=1.0,
+        description="Share of the reading, such as 0.005 for 0.5 % (default: an assumed value).",
     )
     zero: NotNegative | None = Field(
         None,
-        description="In `unit`; left out, as assumed, and for an input the steps of its converter.",
+        description="In `unit` (default: an assumed value, for an input with the steps of its "
+        "converter).",
     )
     time: NotNegative | None = Field(
         None,
-        description="Of its stamps beside those of other signals [s]; left out, half the time "
-        "between two samples of an input, 0 of one that is said to be held, and of a channel.",
+        description="Of its time stamps, relative to other signals [s] (default: half a sampling "
+        "interval for an input, 0 for a channel and for an input stated to be held).",
     )
 
 
@@ -243,11 +246,13 @@ class SignalEntry(FileTable):
     """Where a signal is and how its numbers become physical: sign * (scale * number + offset)."""
 
     column: str = Field(description="Column of the log, with or without the unit in its header.")
-    unit: str | None = Field(None, description="Unit after scaling; the header's, or SI.")
+    unit: str | None = Field(None, description="Unit after scaling (default: the header's, or SI).")
     scale: Finite = Field(1.0, description="Factor on the log's numbers.")
     offset: Finite = Field(0.0, description="Added after scaling, in `unit`.")
-    sign: Sign = Field(1, description="-1 turns the signal round.")
-    time: ClockEntry | None = Field(None, description="Its own clock, instead of the axis's.")
+    sign: Sign = Field(1, description="-1 reverses the signal.")
+    time: ClockEntry | None = Field(
+        None, description="Clock of this signal, instead of the axis's."
+    )
     missing: Literal["refuse", "drop"] = Field(
         "refuse",
         description="An empty or NaN cell: refuse the log, or leave those samples out (counted "
@@ -258,8 +263,8 @@ class SignalEntry(FileTable):
     )
     accuracy: AccuracyEntry | None = Field(
         None,
-        description="Limits of the instrument's error, which intervals take in; those assumed of "
-        "its kind are in the documentation of campaign files.",
+        description="Limits of the instrument's error, included in intervals; the documentation of "
+        "campaign files lists the default of each kind.",
     )
 
     @model_validator(mode="after")
@@ -277,18 +282,20 @@ class InputEntry(SignalEntry):
     kind: InputKind = Field("voltage", description="voltage, current (signed, no card) or other.")
     interpolation: Between | None = Field(
         None,
-        description="Between two samples: hold the earlier one, a straight line, or such a line "
-        "with sudden changes in the middle of both. Left out, a fit takes what fits best, "
-        "everything else the straight line.",
+        description="Between two samples: hold the earlier one, a straight line, or a straight "
+        "line with sudden changes halfway. By default a fit takes what fits best, everything else "
+        "the straight line.",
     )
     ignore: tuple[TimeWindow, ...] = Field(
-        (), description="Windows whose samples are left out: the input goes on across them."
+        (), description="Windows whose samples are left out; the input continues across them."
     )
 
     @model_validator(mode="after")
     def _of_all_maneuvers(self) -> InputEntry:
         if any(window.maneuver is not None for window in self.ignore):
-            raise ValueError("a window of the input holds in every maneuver: leave it out there")
+            raise ValueError(
+                "a window of the input applies to every maneuver: leave out 'maneuver'"
+            )
         return self
 
 
@@ -297,25 +304,27 @@ class ChannelEntry(SignalEntry):
 
     kind: ChannelKind = Field(description="What it measures.")
     counts_per_turn: Positive | None = Field(
-        None, description="Counts for one turn of the encoder's shaft, quadrature included."
+        None, description="Counts per turn of the encoder's shaft, quadrature included."
     )
     gear_ratio: Positive = Field(
-        1.0, description="Turns of the encoder for one turn of the axis's shaft."
+        1.0, description="Turns of the encoder per turn of the axis's shaft."
     )
     rolls_over_at: Positive | None = Field(
         None,
-        description="Counts at which the counter wraps, 65536 for 16 bits; of a position "
+        description="Counts at which the counter wraps, 65536 for 16 bits; for a position "
         "the reading in `unit`, 360 for deg.",
     )
     noise: Positive | None = Field(
-        None, description="Standard deviation of its noise in `unit`: the weight among channels."
+        None,
+        description="Standard deviation of its noise in `unit`, which sets its weight among "
+        "channels.",
     )
     interpolation: Literal["previous", "linear"] = Field(
         "linear",
-        description="Between two samples, if a user-defined model takes it as an input.",
+        description="Interpolation between samples, if a user-defined model takes it as an input.",
     )
     weight: NotNegative = Field(1.0, description="Factor on its squared errors.")
-    weights: tuple[WeightWindow, ...] = Field((), description="Windows that count more or less.")
+    weights: tuple[WeightWindow, ...] = Field((), description="Windows with another weight.")
     weight_by_input: tuple[tuple[NotNegative, NotNegative], ...] = Field(
         (), description="[|input|, factor] pairs, a polyline: [[3, 1], [10, 0.5]]."
     )
@@ -326,9 +335,9 @@ class ChannelEntry(SignalEntry):
         if self.kind == "encoder_counts" and self.counts_per_turn is None:
             raise ValueError("encoder_counts need counts_per_turn, quadrature included")
         if self.kind != "encoder_counts" and self.counts_per_turn:
-            raise ValueError("counts_per_turn belongs to encoder_counts alone")
+            raise ValueError("counts_per_turn applies only to encoder_counts")
         if self.kind not in ("encoder_counts", "position") and self.rolls_over_at:
-            raise ValueError("rolls_over_at belongs to encoder_counts and positions alone")
+            raise ValueError("rolls_over_at applies only to encoder_counts and positions")
         if self.kind == "encoder_counts" and not (self.rolls_over_at or 1.0).is_integer():
             raise ValueError("rolls_over_at of encoder_counts is a whole number of counts")
         levels = [level for level, _ in self.weight_by_input]
@@ -341,12 +350,12 @@ class AxisEntry(FileTable):
     """One drive of the machine: its model, its input and what is measured of it."""
 
     drive: str | None = Field(
-        None, description="A packaged drive, or a parameter file beside this one."
+        None, description="A packaged drive, or a parameter file next to this file."
     )
-    time: ClockEntry = Field(description="Clock of all its signals that have none of their own.")
+    time: ClockEntry = Field(description="Clock of all signals that state none.")
     input: InputEntry = Field(description="What commands it.")
     channels: dict[str, ChannelEntry] = Field(
-        min_length=1, description="What was measured, by a name of your choice."
+        min_length=1, description="Measured signals, by names of your choice."
     )
     start: InitialState = Field("rest", description="State at the first sample.")
     ignore: tuple[TimeWindow, ...] = Field((), description="Windows left out of every channel.")
@@ -355,8 +364,10 @@ class AxisEntry(FileTable):
 class RunEntry(FileTable):
     """One log: a run of the machine."""
 
-    file: str = Field(description="The log, beside this file.")
-    name: str | None = Field(None, description="For tables; the file's name without its ending.")
+    file: str = Field(description="Log, next to this file.")
+    name: str | None = Field(
+        None, description="Name in tables (default: the file's name without its ending)."
+    )
     role: Role = Field(
         "fit", description="fit, validate or ignore: the log of an ignored run is not opened."
     )
@@ -369,13 +380,13 @@ class RunEntry(FileTable):
     )
     recorded: datetime | None = Field(
         None,
-        description="When its log begins, 2026-05-04T13:20:00; by default as its stamps say, if "
-        "they are of a calendar. Runs stand in this order.",
+        description="Start of its log, 2026-05-04T13:20:00 (default: from its time stamps, if they "
+        "are dates). Runs are sorted by it.",
     )
-    span: TimeWindow | None = Field(None, description="The part of the log to take.")
-    only: tuple[str, ...] = Field((), description="The axes that this run tests; all if empty.")
+    span: TimeWindow | None = Field(None, description="Part of the log to use.")
+    only: tuple[str, ...] = Field((), description="Axes that this run tests (empty: all).")
     ignore: tuple[TimeWindow, ...] = Field((), description="Windows left out of every channel.")
-    weights: tuple[WeightWindow, ...] = Field((), description="Windows that count more or less.")
+    weights: tuple[WeightWindow, ...] = Field((), description="Windows with another weight.")
     weight: NotNegative = Field(1.0, description="Factor on the run's squared errors.")
     maneuver: str | None = Field(None, description="Name of the maneuver, if not recognised.")
     axes: dict[str, dict[str, Any]] = Field(
@@ -387,7 +398,7 @@ class RunEntry(FileTable):
     @model_validator(mode="after")
     def _given(self) -> RunEntry:
         if (self.start == "given") != (self.start_pressure is not None):
-            raise ValueError("start = 'given' and start_pressure belong together")
+            raise ValueError("start = 'given' and start_pressure go together")
         return self
 
 
@@ -397,15 +408,15 @@ class CampaignFile(FileTable):
     title: str = Field("", description="For the report.")
     virtual: Flag = Field(False, description="Whether the tests are simulated.")
     format: TextOptions = Field(
-        TextOptions(), description="How text logs are written, if that cannot be recognised."
+        TextOptions(), description="Format of text logs, if it cannot be recognised."
     )
     axes: dict[str, AxisEntry] = Field(min_length=1, description="The drives, by name.")
-    runs: tuple[RunEntry, ...] = Field(min_length=1, description="Their tests, a log each.")
+    runs: tuple[RunEntry, ...] = Field(min_length=1, description="Tests, one log each.")
 
     @field_validator("format", mode="before")
     @classmethod
     def _whole_row(cls, format: Any) -> Any:
         row = format.get("header_row") if isinstance(format, Mapping) else None
         if isinstance(row, bool | str):
-            raise ValueError(f"header_row is {row!r}, but should be the number of a line")
+            raise ValueError(f"header_row is {row!r}, but must be a line number")
         return format

@@ -27,7 +27,7 @@ Hydrostatic drives: from a joystick's voltage to the speed of the shaft.
 
 A drive is a proportional amplifier (the control card), a pump and a motor.
 Included: three identified drives, the hoist, slew and luff axes of a crane,
-and a neutral one to start your own from. A command is a file of measured
+and a neutral one as a starting point. A command is a file of measured
 voltages or a maneuver: a name and its numbers in V, s and Hz.
 
 Maneuvers, and some of the options that may follow their numbers:
@@ -46,7 +46,7 @@ Examples:
   swashplate simulate hoist step:9 --plot step.png    one run, with a figure
   swashplate simulate hoist step:9 --units rpm,bar    in other units
   swashplate simulate hoist log.csv --interpolation previous --out run.csv
-  swashplate show hoist --toml > mine.toml            a drive of your own
+  swashplate show hoist --toml > mine.toml            its file, to edit
   swashplate compare hoist mine.toml                  its differences
   swashplate campaign init logs/*.csv                 tests of your machine
   swashplate rig hoist --out virtual                  tests of a virtual one
@@ -56,7 +56,7 @@ Examples:
   swashplate full-order hoist step:9                  is one state enough
   swashplate crane run tg3637 --slew 1 --until slew_deg=45
   swashplate export hoist --fmu hoist.fmu             for other programs
-  swashplate demo                                     all of it, virtually
+  swashplate demo                                     all steps, on a virtual hoist
 
 Files are in SI units and written atomically. Errors: one sentence on standard
 error, exit code 2. Other exit codes: 0 done, 1 not usable or does not fit,
@@ -193,7 +193,7 @@ def _check_surroundings() -> None:
     try:
         Path.cwd()
     except OSError:
-        raise InputError("The current folder does not exist any more; go to another") from None
+        raise InputError("The current folder no longer exists; change to another") from None
 
 
 def main() -> None:

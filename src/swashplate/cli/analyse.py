@@ -335,7 +335,7 @@ def sensitivity(
         result = one_at_a_time(drive.chosen, ranges, trial, outcomes=tuple(outcomes or OUTCOMES))
     title = f"{drive.title}, {name}"
     save(out, "All numbers, in SI", joined(result.tables(every=True)).write)
-    draw_figure(plot, "plot_tornado", result, title=f"{title}: each design variable by itself")
+    draw_figure(plot, "plot_tornado", result, title=f"{title}: one design variable at a time")
     drive.note(title)
     show(*result.tables())
     bullets(dict.fromkeys(result.sentences))
@@ -358,7 +358,7 @@ def compensate(
             metavar="MANEUVER|FILE",
             help=(
                 "Position of the joystick over time, as a maneuver or a log: ±10 V requests full "
-                "speed in that direction. Shows what the map gains."
+                "speed in that direction. Shows the effect of the map."
             ),
         ),
     ] = None,

@@ -384,7 +384,7 @@ def rig(
         table.add(f"{run.stem}.csv", run.name, run.role, time.size, float(time[-1] - time[0]))
     show(table)
     note(f"Campaign: {path}")
-    note(f"Truth:    {path.parent / 'truth'} (to be opened after the fit)")
+    note(f"Truth:    {path.parent / 'truth'} (open it only after the fit)")
 
 
 # --- before a fit, and between fits ---------------------------------------------------------------
@@ -448,7 +448,8 @@ def guess(
     for sentence, _ in spiked(runs).values():
         note(f"! {sentence}.")
     note(
-        f"These numbers alone: fit {guessed.fit_percent:.1f} % of the mean speeds (100 % is best)."
+        f"With these numbers alone: fit {guessed.fit_percent:.1f} % of the mean speeds (100 % is "
+        "best)."
     )
     note(f"Start:             {start}")
     note(f"Fit setup: {setup}")
@@ -590,7 +591,7 @@ def advise(
             note(f"run {number}: {name}")
         say(INFORMATION)
         if all(information.identifiability.complete for information in run_informations):
-            note("The fit setup can stay as it is.")
+            note("The fit setup needs no change.")
     show(advice_table("Tests", ranked[:top]))
     if plan_of_tests:
         show(advice_table("Plan, each test in addition to those before it", plan_of_tests))

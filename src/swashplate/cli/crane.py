@@ -158,7 +158,7 @@ def run(
     runs = {}
     last = ""
     if out is not None and len(variant or ()) > 1:
-        raise InputError("--out writes one run's signals: take one --variant.")
+        raise InputError("--out writes one run's signals: use one --variant.")
     with spinner("Simulating"):
         from swashplate.crane import RATE, OperatorCommand, run_tables, simulate
 
@@ -252,7 +252,7 @@ def assess(
     """
     if 0.0 < allowed < LEAST_ALLOWED:
         raise InputError(
-            f"--allowed is in percent, and {allowed:g} % of the seaways would ask for thousands of "
+            f"--allowed is in percent, and {allowed:g} % of the seaways would need thousands of "
             f"them: did you mean --allowed {100.0 * allowed:g}?"
         )
     keywords: dict[str, Any] = {
@@ -510,7 +510,7 @@ def _stationary_words(operated: Operated, seaway: Seaway, damping: float) -> str
     hung = start | {name: options[name] for name in names if name in options}
     response = linear_response(operated.chosen, seaway, **hung)
     return (
-        f"Without control the load swings by {degrees(response.values['swing'].rms):.2f} deg RMS "
-        f"in the long run, by the sea's spectrum and a damping of {100.0 * damping:g} %; a run "
-        "begins at rest."
+        f"Without control the long-run swing is {degrees(response.values['swing'].rms):.2f} deg "
+        f"RMS, from the sea's spectrum and a damping of {100.0 * damping:g} %; a run begins at "
+        "rest."
     )

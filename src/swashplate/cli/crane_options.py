@@ -207,8 +207,8 @@ class AtSea(Placed):
             return replace(CRANE_SHIP, **roll)
         if roll:
             raise InputError(
-                f"--ship {self.ship} has its own roll: leave --roll-period and --roll-damping out, "
-                "which belong to the packaged hull."
+                f"--ship {self.ship} has its own roll: leave --roll-period and --roll-damping out: "
+                "they apply only to the packaged hull."
             )
         path, _, unit = self.ship.partition(",")
         return read_ship(path, number_of(f"--ship {self.ship}", unit) if unit else None)

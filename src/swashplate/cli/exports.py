@@ -87,11 +87,11 @@ def export(
     the package contains its libraries.
     """
     if fmu is None and c is None and wasm is None:
-        raise InputError("Say what to export: --fmu FILE.fmu, --c DIR or --wasm FILE.wasm.")
+        raise InputError("Choose what to export: --fmu FILE.fmu, --c DIR or --wasm FILE.wasm.")
     if compile and c is None:
         raise InputError("--compile compiles the C source; name its folder with --c DIR.")
     if fmu is None and platforms is not None:
-        raise InputError("--platforms is of an FMU; name it with --fmu FILE.fmu.")
+        raise InputError("--platforms applies only to an FMU; name it with --fmu FILE.fmu.")
     if c is not None:
         check_folder(c)
         check_free(c, force=force)

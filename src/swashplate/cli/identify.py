@@ -60,8 +60,8 @@ FILES = {
 }
 """What `Identification.save` writes, of a drive or of a user-defined model."""
 MEASURES = (
-    "NRMSE is the RMSE over the standard deviation of what was measured, fit % is 100 (1 - NRMSE); "
-    "'of range' below: over the range of the signal, its largest less its smallest value."
+    "NRMSE is the RMSE over the standard deviation of what was measured, fit % is 100 (1 - "
+    "NRMSE); 'of range' below: over the range of the signal, its largest minus its smallest value."
 )
 
 Loss = Literal["linear", "soft_l1", "cauchy"]
@@ -118,7 +118,7 @@ def fit(
         typer.Option(
             "--joint",
             metavar=NO_VALUE,
-            help="Finally estimate all parameters at the same time, through the whole drive.",
+            help="Finally, estimate all parameters together, through the complete drive.",
         ),
     ] = False,
     begin: InitialDrive = None,
@@ -428,8 +428,8 @@ def report(
         result = Identification.load(fitted, path, model=model)
         if true is not None and not result.campaign.virtual:
             raise InputError(
-                f"{result.campaign.path} is not virtual, so that its true parameters are unknown: "
-                "leave out --truth."
+                f"{result.campaign.path} is not virtual, so its true parameters are unknown: leave "
+                "out --truth."
             )
         if fitted.suffix.lower() == ".toml":
             fitted_numbers, numbers = (

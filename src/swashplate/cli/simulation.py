@@ -133,7 +133,7 @@ def compare(
     examples="""
         swashplate show
         swashplate show hoist
-        swashplate show hoist --toml > mine.toml    (a start for a drive of your own)
+        swashplate show hoist --toml > mine.toml    (a file to edit)
     """,
 )
 def show_parameters(

@@ -254,7 +254,7 @@ def check_free(*paths: Path, force: bool = False) -> None:
     for path in paths:
         if path.is_file() or (path.is_dir() and any(path.iterdir())):
             what = "is not empty" if path.is_dir() else "exists already"
-            raise FileError(f"{path} {what}; name another place, or replace it with --force.")
+            raise FileError(f"{path} {what}; choose another path, or replace it with --force.")
 
 
 def lock(folder: Path) -> None:

@@ -314,7 +314,7 @@ class Sensors(Control):
                 )
         if type(self.seed) is not int or self.seed < 0:
             raise InputError(
-                f"The seed of sensors is {self.seed!r}, but must be a whole number from 0 on."
+                f"The seed of sensors is {self.seed!r}, but must be a whole number of at least 0."
             )
 
     def sensing(self) -> Sensing:
@@ -348,8 +348,8 @@ class Controller(Control):
         unknown = [name for name in self.model.external if name not in SEEN]
         if unknown:
             raise InputError(
-                f"The controller {self.model.name} asks for '{unknown[0]}', but a crane's "
-                f"controller sees {', '.join(SEEN)}."
+                f"The controller {self.model.name} needs '{unknown[0]}', but a crane's controller "
+                f"has {', '.join(SEEN)}."
             )
         missing = [name for name in GIVES if name not in self.model.signal_names]
         if missing:
@@ -372,7 +372,7 @@ def stages_of(control: Control | None) -> Stages:
     if control is None:
         return Stages(Settings(), None, None)
     if not isinstance(control, Control):
-        raise InputError(f"{control!r} is not a control of a crane; see swashplate.crane.control.")
+        raise InputError(f"{control!r} is not a crane control; see swashplate.crane.control.")
     settings: dict[str, Any] = {
         "path": any(not isinstance(stage, Sensors) for stage in control.stages)
     }

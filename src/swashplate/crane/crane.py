@@ -398,8 +398,8 @@ class Crane:
         low, high = map(degrees, self.boom_limits)
         if not low - 1e-9 <= boom_deg <= high + 1e-9:
             raise InputError(
-                f"The boom of {self.name} stands at {boom_deg:g} deg, but moves between {low:g} "
-                f"and {high:g} deg."
+                f"The boom of {self.name} is at {boom_deg:g} deg, but moves between {low:g} and "
+                f"{high:g} deg."
             )
         short, long = self.rope_limits
         if not short <= rope_m <= long:
@@ -464,7 +464,7 @@ def _geometry_of(content: CraneFile, origin: str) -> dict[str, CraneQuantity]:
     missing = [name for name in GEOMETRY if name not in quantities and name not in MAY_LACK]
     unknown = [name for name in content.geometry if name not in GEOMETRY]
     if missing or unknown:
-        extra = f", and knows no '{unknown[0]}'" if unknown else ""
+        extra = f", and has no entry '{unknown[0]}'" if unknown else ""
         need = f"needs an entry '{missing[0]}'" if missing else f"has {len(GEOMETRY)} quantities"
         raise ParameterError(f"{origin}: geometry {need}{extra}.")
     return {name: quantities[name] for name in GEOMETRY if name in quantities}

@@ -60,7 +60,7 @@ class DriveSource(NamedTuple):
         It ends a sentence, and may go on with another one.
         """
         if self.fit_usable is None:
-            return f"{self.origin}; no verdict on it is known, as {self.verdict}."
+            return f"{self.origin}; its verdict is not known: {self.verdict}."
         return f"{self.origin}; the verdict on its fit is: {self.verdict} {self.validity}".rstrip()
 
     def sentence(self, axis: str) -> str:
@@ -162,7 +162,7 @@ def _source_of_file(path: Path, drive: Drive) -> DriveSource:
     """The source of a drive's file, with the verdict of the fit beside it."""
     stored = path.with_name(FIT_FILE)
     fit = None
-    unknown_because = "there is no fit beside it"
+    unknown_because = "there is no fit next to it"
     if path.name == DRIVE_FILE and stored.is_file():
         fit = path.parent
         verdict, unknown_because = _stored_verdict(stored, drive)
@@ -182,7 +182,7 @@ def _stored_verdict(path: Path, drive: Drive) -> tuple[Verdict | None, str]:
     try:
         stored = read_verdict(path)
     except SwashplateError as error:
-        return None, f"the fit beside it cannot be read ({str(error).rstrip('.')})"
+        return None, f"the fit next to it cannot be read ({str(error).rstrip('.')})"
     if stored is None:
         return None, f"{path} has none: fit again"
     if stored.numbers != dict(drive.parameters.numbers):

@@ -93,8 +93,8 @@ def swing_damping(time: ArrayLike, angle: ArrayLike, *, rope: float | None = Non
     explained = 1.0 - float(np.var(residuals) / np.var(swing))
     if explained < EXPLAINED:
         raise InputError(
-            f"A decaying sine explains {100.0 * max(explained, 0.0):.0f} % of what the log holds, "
-            "which is not a free swing: cut the log to where the crane is at rest."
+            f"A decaying sine explains {100.0 * max(explained, 0.0):.0f} % of the log, so it is "
+            "not a free swing: cut the log to the part with the crane at rest."
         )
     period = 2.0 * pi / frequency
     if rope is not None:
@@ -103,24 +103,24 @@ def swing_damping(time: ArrayLike, angle: ArrayLike, *, rope: float | None = Non
         expected = 2.0 * pi * sqrt(rope / GRAVITY)
         if abs(period / expected - 1.0) > NEAR:
             raise InputError(
-                f"The log swings once in {period:.3g} s, but a load on {rope:g} m of rope in "
-                f"{expected:.3g} s: look at the column and at the unit of the time."
+                f"The log swings once in {period:.3g} s, but a load on {rope:g} m of rope once in "
+                f"{expected:.3g} s: check the column and the unit of the time."
             )
     correlation = _correlation_time(residuals)
     freedom = residuals.size / correlation - UNKNOWNS
     if freedom < 1.0:
         raise InputError(
-            "What the log holds beside the swing changes too slowly to tell the swing's damping: "
-            "take a drift off, or a longer log."
+            "The log contains changes that are too slow to separate from the swing's damping: "
+            "remove any drift, or use a longer log."
         )
     variance = float(residuals @ residuals) / freedom
     covariance = np.linalg.inv(fit.jac.T @ fit.jac)
     half = float(stdtrit(freedom, 0.975)) * sqrt(variance * covariance[4, 4])
     if ratio - half <= 0.0:
         raise InputError(
-            f"The log does not show that the swing falls: its damping ratio would be {ratio:.2g}, "
-            f"within {ratio - half:.2g} and {ratio + half:.2g}: take a longer log of a load that "
-            "is left alone."
+            f"The log does not show that the swing decays: its damping ratio would be {ratio:.2g}, "
+            f"within {ratio - half:.2g} and {ratio + half:.2g}: use a longer log of a load that "
+            "swings freely."
         )
     return FreeSwing(ratio, ratio - half, ratio + half, period)
 
@@ -130,7 +130,7 @@ def _checked(time: ArrayLike, angle: ArrayLike) -> tuple[Array, Array]:
     stamps, swing = (np.asarray(values, dtype=np.float64) for values in (time, angle))
     if stamps.ndim != 1 or stamps.shape != swing.shape or stamps.size <= UNKNOWNS:
         raise InputError(
-            "Time and angle of a swing must be two rows of as many numbers, more than "
+            "Time and angle of a swing must be two rows of equal length, with more than "
             f"{UNKNOWNS}, not of shapes {stamps.shape} and {swing.shape}."
         )
     if not (np.isfinite(stamps).all() and np.isfinite(swing).all() and (np.diff(stamps) > 0).all()):
@@ -143,8 +143,8 @@ def _checked(time: ArrayLike, angle: ArrayLike) -> tuple[Array, Array]:
         )
     if swing.min() >= 0.0 or swing.max() <= 0.0:
         raise InputError(
-            "The swing never changes its sign: take the signed angle in one plane, or take a "
-            "constant off."
+            "The swing never changes its sign: use the signed angle in one plane, or subtract a "
+            "constant."
         )
     return stamps - stamps[0], swing
 
@@ -163,8 +163,8 @@ def _start(time: Array, swing: Array) -> Array:
     # of a pure offset or a drift the largest line is the lowest one
     if swings < FEWEST:
         raise InputError(
-            f"The log has {swings:.1f} swings, but {FEWEST:g} are needed: take a longer one, from "
-            "where the crane comes to rest."
+            f"The log has {swings:.1f} swings, but {FEWEST:g} are needed: use a longer one, "
+            "beginning when the crane is at rest."
         )
     basis = np.stack(
         [np.ones(time.size), np.cos(frequency * time), np.sin(frequency * time)], axis=1

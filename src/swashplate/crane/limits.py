@@ -43,10 +43,10 @@ LIMITED: Mapping[str, Limited] = {
         "hoist demand", "1", "vertical speed of the hook over the hoist's full speed", 0.01, 10.0
     ),
     "placement": Limited(
-        "place", "m", "horizontal distance of the load from where it shall be", 0.01, 100.0
+        "place", "m", "horizontal distance of the load from its target", 0.01, 100.0
     ),
     "saturation": Limited(
-        "saturation", "1", "share of time for which a drive is at a limit of its own", 0.0, 1.0
+        "saturation", "1", "share of time for which a drive is at one of its limits", 0.0, 1.0
     ),
 }
 """Quantities that have a limit, by name. All but `saturation` are assessed by their most probable
@@ -78,7 +78,7 @@ def limits_of(limits: Mapping[str, CraneQuantity], origin: str) -> dict[str, flo
     unknown = [name for name in limits if name not in LIMITED]
     if unknown:
         raise ParameterError(
-            f"{origin}: limits knows no '{unknown[0]}'; it has {', '.join(LIMITED)}."
+            f"{origin}: limits has no entry '{unknown[0]}'; it has {', '.join(LIMITED)}."
         )
     values = {}
     for name, quantity in limits.items():

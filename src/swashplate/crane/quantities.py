@@ -142,7 +142,7 @@ def values_in_si(
             raise ParameterError(
                 f"{origin}: {name} is {written}, but on a crane it is {definition.low:g} to "
                 f"{definition.high:g} {unit}".rstrip()
-                + ": look at the number and its unit."
+                + ": check the number and its unit."
             )
     return tuple(values)
 
@@ -223,8 +223,8 @@ def check_sources(
     if changed:
         raise ParameterError(
             f"{origin}: {listed(changed)} {'has' if len(changed) == 1 else 'have'} another value "
-            f"than {name}, but still its source: write where the new value comes from, and the "
-            "status that fits, or delete source and status."
+            f"than {name}, but the same source: give the source of the new value and its status, "
+            "or delete both."
         )
 
 

@@ -125,7 +125,7 @@ class Suspension(Result):
             raise InputError(
                 f"{self.hook or load:g} kg on {shortest:g} m of rope with {self.stiffness:g} N "
                 f"bounce at {fastest / (2.0 * pi):.3g} Hz, too fast for {rate:g} samples a second: "
-                "take a rigid rope."
+                "use a rigid rope."
             )
         along, across, up = map(float, np.asarray(wind))
         return Hanging(
@@ -544,7 +544,7 @@ def _in_ship_axes(points: Array, ship: Array, out: Array) -> None:
 def too_fast_sentence(length: float, time: float, rate: float) -> str:
     """Sentence for a rope that is too short for the step."""
     return (
-        f"At {time:g} s the boom's tip moves within one sample by more than a rope of "
-        f"{length:.3g} m lets the load follow: take a longer rope, a smoother path or more than "
-        f"{rate:g} samples a second."
+        f"At {time:g} s the boom's tip moves within one sample by more than a rope of {length:.3g} "
+        f"m lets the load follow: use a longer rope, a smoother path or more than {rate:g} samples "
+        "a second."
     )

@@ -44,17 +44,17 @@ Array = NDArray[np.float64]
 
 HEADER = """\
 # A draft, made from the headers of the logs: check each line that says "guessed", and fill in each
-# that says "FIXME". What a signal is: sign * (scale * number + offset), in its unit.
+# that says "FIXME". Value of a signal: sign * (scale * number + offset), in its unit.
 # Every entry is explained in the reference, "Campaign file"; `swashplate campaign check` reads
 # all logs and says what is wrong with them.
 """
 UNUSED = "# Columns that are not used"
-BETWEEN = '# interpolation = "previous"    # held, "linear" or "jumps"; without it a fit tries all'
+BETWEEN = '# interpolation = "previous"    # held, "linear" or "jumps"; if omitted, a fit tries all'
 NO_TIME = "# time = { rate = 512 }"
 NO_ENCODER = "# No column looks like an encoder's counts"
 UNORDERED = (
-    "# No clock tells when each run was recorded. A drift over the campaign is found only in the\n"
-    "# order of time: sort the runs, or state recorded = 2026-05-04T13:20:00 in each."
+    "# No clock gives the time at which each run was recorded. A drift over the campaign is found "
+    "only in the\n# order of time: sort the runs, or state recorded = 2026-05-04T13:20:00 in each."
 )
 FIXME = "FIXME"
 """What the lines hold that say what the draft leaves out or open."""
@@ -492,17 +492,17 @@ def _signal_lines(
     ]
     if percent:
         scale = 0.1
-        lines += ['unit = "V"', "scale = 0.1    # guessed: 100 % stand for the 10 V of a card"]
+        lines += ['unit = "V"', "scale = 0.1    # guessed: 100 % is taken as the 10 V of a card"]
     elif command:
         # rounded down, or the largest word would be beyond the 10 V that a card takes
         scale = floor(1e12 * 10.0 / guess.full_scale) / 1e12
         why = f"guessed: 10 V over {guess.full_scale}, a PLC's word at full scale"
         lines += ['unit = "V"', f"scale = {scale:.9g}    # {why}"]
     elif kind == "encoder_counts":
-        unknown = f"# counts_per_turn = 1000    # {FIXME}: for one turn, quadrature included"
+        unknown = f"# counts_per_turn = 1000    # {FIXME}: per turn, quadrature included"
         stated = f"counts_per_turn = {counts_per_turn or 0:.12g}"
         lines.append(unknown if counts_per_turn is None else stated)
-        lines.append("gear_ratio = 1.0    # turns of the encoder for one turn of the shaft")
+        lines.append("gear_ratio = 1.0    # turns of the encoder per turn of the shaft")
     else:
         lines += _unit_lines(guess)
     if guess.full_scale and not command:
@@ -668,7 +668,7 @@ def _dated(run: _Run) -> _Run:
     """A run with the entry of when it was recorded, by its file."""
     began = datetime.fromtimestamp(run.written - (run.duration or 0.0), UTC)
     words = began.isoformat(timespec="seconds").replace("+00:00", "Z")
-    line = f"recorded = {words}    # guessed: when its file was written, less its length"
+    line = f"recorded = {words}    # guessed: time of writing of its file, minus its duration"
     return run._replace(more=[line, *run.more])
 
 

@@ -143,8 +143,8 @@ def guess_drive(tests: Campaign | Sequence[Experiment]) -> Guess:
     Raises
     ------
     InputError
-        If no run has such a channel, the input is no voltage, the speed of a run or of all goes
-        against the command, a channel has gross spikes, or too little moves.
+        If no run has such a channel, the input is no voltage, the speed of a run or of all moves
+        opposite to the command, a channel has gross spikes, or too little moves.
     """
     experiments = tests.select(role="fit") if isinstance(tests, Campaign) else tuple(tests)
     runs, unit, spoilt = list[MovingRun](), "", spiked(experiments)
@@ -178,7 +178,8 @@ def guess_drive(tests: Campaign | Sequence[Experiment]) -> Guess:
     if 0 < len(reversed_runs) < len(runs):
         run, name = reversed_runs[0]
         raise InputError(
-            f"In {run} '{name}' goes against the command, in other runs with it: reverse it with "
+            f"In {run} '{name}' moves opposite to the command, in other runs with it: reverse it "
+            "with "
             'sign = -1 for this run, or leave the run out with role = "ignore".'
         )
     speeds = np.concatenate([np.zeros(0), *(run.speeds for run in runs)])
@@ -192,8 +193,8 @@ def guess_drive(tests: Campaign | Sequence[Experiment]) -> Guess:
         )
     if not speeds.size:
         raise InputError(
-            "No run measures a motion that a guess could be read off: it needs a channel of the "
-            "kind shaft_speed, position or encoder_counts that is not ignored."
+            "No run measures a motion to guess from: it needs a channel of the kind shaft_speed, "
+            "position or encoder_counts that is not ignored."
         )
     commands = np.concatenate([run.command for run in runs])
     size = np.maximum([commands.max(), -commands.min()], 0.0)
@@ -252,7 +253,7 @@ def steady_speed(guess: Guess, side: int) -> float:
 def guess_table(guess: Guess) -> Table:
     """What was guessed, each way."""
     columns = (Column(side, ".4g", none="not seen") for side in ("plus", "minus"))
-    table = Table(f"Axis {guess.axis}, at first sight", (Column(""), *columns, UNIT))
+    table = Table(f"Axis {guess.axis}, first guess", (Column(""), *columns, UNIT))
     rows = (
         ("dead zone", guess.dead_zone, "V", ".3g"),
         ("gain beyond it", guess.gain, f"{guess.unit}/V", ""),

@@ -144,7 +144,7 @@ def searched_numbers(
     candidates.sort(key=lambda candidate: candidate[0])
     if (candidates[0][2][tried] <= 0.0).any():
         raise InputError(
-            "The speed goes against the command: reverse it with sign = -1 in its channel."
+            "The speed is opposite to the command: reverse it with sign = -1 in its channel."
         )
     free = np.concatenate([tried, tried, [True, True], tried, tried, tried])
     _, plain = best((vector for _, vector, _ in candidates[:3]), free & (np.arange(12) < 6))

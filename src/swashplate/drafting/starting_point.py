@@ -34,9 +34,9 @@ STEEPEST = 30.0
 """Volts that a radian takes at least, so that at 10 V and at the upper bounds of all gains the
 solenoids do not overpower the feedback spring. [V/rad]"""
 SETUP_TEMPLATE = """\
-# Read off the logs of the axis '{0}' by `swashplate guess`: what they show is
-# free, within bounds about the first guess. A limit that the guess did not see is
-# free as well, within wide ones: a fit tells it from a lag.
+# Written by `swashplate guess` from the logs of the axis '{0}'. Parameters that they
+# show are free, within bounds about the first guess. A limit that the guess did not see
+# is also free, within wide bounds: a fit distinguishes it from a lag.
 title = "{0}, guessed"
 """
 CHAIN = """
@@ -65,7 +65,7 @@ channels = ["shaft_speed", "position", "encoder_counts"]
 [stages.free]
 """
 NO_CREEP = "# {}: Z18 is 0, fixed"
-NOT_TRIED = "# no run goes {}: its numbers are those of the other way, fixed"
+NOT_TRIED = "# no run goes {}: its numbers are those of the other direction, fixed"
 
 
 def guessed_set(guess: Guess, source: str) -> ParameterSet:
@@ -128,7 +128,7 @@ def guessed_set(guess: Guess, source: str) -> ParameterSet:
         drive = base.replace(changed)
     except ParameterError as error:
         raise ParameterError(
-            f"The guess of {guess.axis} from {source} fails; look at units and scales of its "
+            f"The guess of {guess.axis} from {source} fails; check units and scales of its "
             f"signals: {error}"
         ) from None
     parameters = {

@@ -25,12 +25,12 @@ CURRENTS = ("current", "current_sum", "current_positive", "current_negative")
 
 @lru_cache(maxsize=256)
 def requested_columns(definitions: Definitions, names: tuple[str, ...]) -> tuple[str, ...]:
-    """Columns that names stand for, symbols taken apart; refused if one is asked for twice."""
+    """Columns that names stand for, symbols taken apart; refused if one is requested twice."""
     columns: list[str] = []
     for name in names:
         for column in [name] if name.startswith(START) else definitions.columns_of([name]):
             if column in columns:
-                raise InputError(f"{column} is asked for twice.")
+                raise InputError(f"{column} is requested twice.")
             columns.append(column)
     return tuple(columns)
 

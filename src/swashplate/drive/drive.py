@@ -78,7 +78,7 @@ class Drive(Result, Mapping[str, Parameter]):
             way = f'the packaged drive is Drive.preset("{parameters}")'
         elif isinstance(parameters, str | Path):
             way = f'a parameter file is read with Drive.from_toml("{parameters}")'
-        raise InputError(f"A Drive cannot be made of {parameters!r}: {way}.")
+        raise InputError(f"A Drive cannot be made from {parameters!r}: {way}.")
 
     @classmethod
     def preset(cls, name: str) -> Drive:

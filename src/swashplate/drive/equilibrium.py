@@ -124,15 +124,16 @@ def operating_point(
         if channel.V_dz == channel.J == voltage == 0.0:
             sides.append("card at 0 V: the side of positive voltage")
         elif abs(voltage) <= channel.V_dz:
-            zone = f"{voltage:g} V lies in the card's dead zone"
+            zone = f"{voltage:g} V is in the card's dead zone"
             raise DomainError(f"{name}: {zone}, so the gain is 0; {_beyond(parameters, voltage)}.")
     if input in ("voltage", "current"):
         if options.hysteresis is not None:
             raise DomainError(
                 f"{name}: a current that moves by less than the solenoids' hysteresis of "
-                f"±{pump.solenoid_hysteresis:g} A moves no force, so the gain is 0; linearise the "
-                "drive without it (solenoid_hysteresis=0) for larger motions, or the pump alone "
-                "with input solenoid_force, or sweep sines of a size with frequency_response."
+                f"±{pump.solenoid_hysteresis:g} A produces no force, so the gain is 0; linearise "
+                "the drive without it (solenoid_hysteresis=0) for larger motions, or the pump "
+                "alone with input solenoid_force, or sweep sines of a size with "
+                "frequency_response."
             )
         if pump.Z17 == current == 0.0:
             sides.append("solenoids at 0 A: the side of positive current")
@@ -140,15 +141,15 @@ def operating_point(
             at = "" if voltage is None else f"{voltage:g} V gives "
             instead = f"linearise beyond ±{pump.Z17:g} A"
             raise DomainError(
-                f"{name}: {at}{current:.6g} A, which lies in the solenoids' dead zone of Z17 = "
+                f"{name}: {at}{current:.6g} A, which is in the solenoids' dead zone of Z17 = "
                 f"±{pump.Z17:g} A, so the gain is 0; "
                 f"{instead if voltage is None else _beyond(parameters, voltage)}."
             )
     if options.friction is not None and pump.spool_presliding == 0.0:
         raise DomainError(
             f"{name}: without spool_presliding the spool_friction of {pump.spool_friction:g} N "
-            "holds the spool fast under small motions, so the gain is 0; give a presliding, or "
-            "sweep sines of a size with frequency_response."
+            "prevents small motions of the spool, so the gain is 0; give a presliding, or sweep "
+            "sines of a size with frequency_response."
         )
     known = instance.start({"current": current}, 1.0 / SOURCE_RATE, "steady").arguments[1]
     equations: Any = instance.model.parts[1]
@@ -156,8 +157,8 @@ def operating_point(
     for limit, what in NO_GAIN.items():
         if getattr(limits, limit):
             raise DomainError(
-                f"{name}: {what}, so the gain is 0; linearise at a smaller command, where the "
-                "speed still follows."
+                f"{name}: {what}, so the gain is 0; linearise at a smaller command, at which the "
+                "speed still changes."
             )
     signals = known["signals"]
     # without leakage the spool is closed, but for rounding

@@ -98,7 +98,7 @@ def response_table(response: FrequencyResponse, frequency: float) -> Table:
     nearest = float(response.frequencies[at])
     if not abs(nearest - frequency) <= 1e-9 * nearest:
         raise InputError(
-            f"The response was not taken at {frequency:g} Hz; the nearest frequency is "
+            f"The response was not computed at {frequency:g} Hz; the nearest frequency is "
             f"{nearest:.6g} Hz."
         )
     heads = (

@@ -85,8 +85,9 @@ def with_equation(parameters: ParameterSet, replacement: Replacement) -> Paramet
         )
     if replacement.parameters is not None and not uses(models.pump_drive, replacement.old):
         raise InputError(
-            f"{plain(replacement.old).__name__} is an equation of the card: one of your own in its "
-            "place has the same arguments; parameters of your own go with the pump's equations."
+            f"{plain(replacement.old).__name__} is an equation of the card: its replacement must "
+            "take the same arguments; only replacements of the pump's equations can add "
+            "parameters."
         )
     models_of(equations)  # refuses what does not fit
     changed = replace(parameters, equations=equations)

@@ -73,7 +73,7 @@ class LinearDrive(LinearModel, Result):
         if not 0.0 < pole < 1.0:
             raise DomainError(
                 f"{self.name}: sampled at {self.rate:g} Hz the pump's pole is at z = {pole:g}, "
-                "which is not that of a lag; take a higher rate."
+                "which is not that of a lag; use a higher rate."
             )
         return -1.0 / (self.rate * log(pole))
 

@@ -36,7 +36,7 @@ def linearize_drive(
             raise InputError(f"The input is '{name}', but must be one of {', '.join(INPUTS)}.")
     if not inputs or len(set(inputs)) != len(inputs) or set(inputs[1:]) & set(COMMANDS):
         raise InputError(
-            "A linear model needs one input or several different ones, of which the first alone "
+            "A linear model needs one input or several different ones, of which only the first "
             f"may be a command: {', '.join(COMMANDS)}."
         )
     names = (outputs,) if isinstance(outputs, str) else tuple(outputs)

@@ -17,8 +17,8 @@ CHAIN = {
 }
 """SI unit and meaning of each signal of a simulation, in the order of the chain."""
 MOTOR = {
-    "motor_torque": ("N m", "torque of the motor, positive where it drives to positive speed"),
-    "motor_pressure_drop": ("Pa", "drop over the motor, 0 where motor_constant is not known"),
+    "motor_torque": ("N m", "torque of the motor, positive if it drives towards positive speed"),
+    "motor_pressure_drop": ("Pa", "pressure drop over the motor, 0 if motor_constant is not known"),
 }
 MEASURED = {
     "load_torque": ("N m", "static torque of the load, positive against positive speed"),

@@ -41,8 +41,8 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 UNCACHED = (
-    "swashplate's compiled kernels cannot be kept, so that every session compiles them again; set "
-    "NUMBA_CACHE_DIR to a folder that can be written."
+    "swashplate's compiled kernels cannot be stored, so every session compiles them again; set "
+    "NUMBA_CACHE_DIR to a writable folder."
 )
 COMPILING = "Compiling equations, once on this machine"
 GENERATED = "swashplate_generated"
@@ -76,8 +76,8 @@ class _Index(IndexDataCacheFile):
         except OSError as error:  # a full disk, or a folder of that name
             path = error.filename2 or error.filename or self._cache_path
             warn(
-                f"swashplate cannot keep the compiled kernel {path}: {error.strerror or error}. It "
-                "is compiled anew in every session; remove what is in the way.",
+                f"swashplate cannot store the compiled kernel {path}: {error.strerror or error}. "
+                "It is compiled again in every session; remove what blocks this path.",
                 RuntimeWarning,
                 stacklevel=2,
             )

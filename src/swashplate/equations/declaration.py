@@ -104,7 +104,7 @@ def source(function: Any) -> str:
     try:
         return inspect.getsource(plain(function))
     except (OSError, TypeError):
-        raise EquationError(f"{function!r} has no source that could be read.") from None
+        raise EquationError(f"{function!r} has no source that can be read.") from None
 
 
 def remember_text(name: str, text: str) -> str:

@@ -34,19 +34,19 @@ COMPARISONS = {
 # --- what is refused ------------------------------------------------------------------------------
 
 TUPLES, ABOVE = "use a tuple or a named tuple", "import at the top of the file"
-GLOBAL = "an equation only depends on its arguments and on constants"
-NUMBERS = "an equation knows real numbers only; use options for choices"
+GLOBAL = "an equation depends only on its arguments and on constants"
+NUMBERS = "an equation handles only real numbers; use options for choices"
 TERMS = "write the terms out, or a loop over a literal range"
 
 INSTEAD: dict[type[ast.AST], tuple[str, str]] = {
     ast.While: ("a while loop", "write `for i in range(4):` with a literal number of steps"),
     ast.Try: ("try", "test the arguments with if"),
     ast.With: ("with", "an equation only computes"),
-    ast.Raise: ("raise", "return a value; models state their domain apart"),
-    ast.Assert: ("assert", "models state their domain apart"),
-    ast.FunctionDef: ("a function within an equation", "write an equation of its own beside it"),
+    ast.Raise: ("raise", "return a value; models state their domain separately"),
+    ast.Assert: ("assert", "models state their domain separately"),
+    ast.FunctionDef: ("a function within an equation", "write a separate equation next to it"),
     ast.AsyncFunctionDef: ("async", "write an ordinary function"),
-    ast.ClassDef: ("a class within an equation", "define the named tuple beside the equation"),
+    ast.ClassDef: ("a class within an equation", "define the named tuple next to the equation"),
     ast.Import: ("an import within an equation", ABOVE),
     ast.ImportFrom: ("an import within an equation", ABOVE),
     ast.Global: ("global", GLOBAL),
@@ -55,8 +55,8 @@ INSTEAD: dict[type[ast.AST], tuple[str, str]] = {
     ast.Break: ("break", "use if within the loop"),
     ast.Continue: ("continue", "use if within the loop"),
     ast.Match: ("match", "use if and elif"),
-    ast.Expr: ("a statement that does nothing to the result", "leave it out"),
-    ast.Lambda: ("lambda", "write an equation of its own"),
+    ast.Expr: ("a statement without effect on the result", "leave it out"),
+    ast.Lambda: ("lambda", "write a separate equation"),
     ast.ListComp: ("a comprehension", TERMS),
     ast.SetComp: ("a comprehension", TERMS),
     ast.DictComp: ("a comprehension", TERMS),
@@ -65,7 +65,7 @@ INSTEAD: dict[type[ast.AST], tuple[str, str]] = {
     ast.Set: ("a set", TUPLES),
     ast.Dict: ("a dictionary", "use a named tuple"),
     ast.JoinedStr: ("a string", NUMBERS),
-    ast.NamedExpr: (":=", "write an assignment of its own"),
+    ast.NamedExpr: (":=", "write a separate assignment"),
     ast.Yield: ("yield", "return a tuple"),
     ast.YieldFrom: ("yield", "return a tuple"),
     ast.Await: ("await", "call the equation"),
@@ -82,7 +82,7 @@ INSTEAD: dict[type[ast.AST], tuple[str, str]] = {
 }
 """What to write in place of statements, expressions and operators that an equation may not use."""
 INSTEAD_OF_BUILTIN = {
-    "print": "look at results outside the equation",
+    "print": "inspect results outside the equation",
     "len": "write the number",
     "sum": "write the terms out",
     "float": "write the number as a float",
@@ -105,15 +105,15 @@ def _refused(node: ast.AST) -> tuple[str, str] | None:
         case ast.BinOp(op=ast.Pow(), right=power) | ast.AugAssign(op=ast.Pow(), value=power) if (
             whole(power) is None
         ):
-            what = "a power with anything but a whole number"
+            what = "a power other than a whole number"
             return what, "write sqrt(a), or exp(b * log(a))"
         case ast.Return(value=None):
-            return "a return of nothing", "return a value"
+            return "a return without a value", "return a value"
         case ast.For() if not is_range(node):
-            what = "a loop over anything but a literal range"
+            what = "a loop over something other than a literal range"
             return what, "write `for i in range(4):`, which is unrolled"
         case ast.Attribute(ctx=ast.Store()):
-            instead = "named tuples do not change; make a new one, as in State(t.a, b)"
+            instead = "named tuples cannot be changed; make a new one, as in State(t.a, b)"
             return "an assignment to a field", instead
         case ast.Subscript(ctx=ast.Store()):
             return "an assignment to an element", "assign to a name"
@@ -123,7 +123,7 @@ def _refused(node: ast.AST) -> tuple[str, str] | None:
             for op, right in zip(ops, rights, strict=True):
                 none = isinstance(right, ast.Constant) and right.value is None
                 if isinstance(op, ast.Is | ast.IsNot) and not none:
-                    return "`is` with anything but None", "write `==`"
+                    return "`is` with something other than None", "write `==`"
                 if type(op) not in (*COMPARISONS, ast.Is, ast.IsNot):
                     return "`in`", "compare with == and or"
         case ast.Call(keywords=keywords) if any(each.arg is None for each in keywords):
@@ -308,13 +308,13 @@ def _check(source: Parsed) -> None:
             if (refused := _refused(part)) is not None:
                 refuse(each, *refused)
         if isinstance(each, ast.Subscript) and not _is_index(each.slice, counters):
-            refuse(each, "an index that is no whole number", "write the number, as in s[0]")
+            refuse(each, "an index that is not a whole number", "write the number, as in s[0]")
         if isinstance(each, ast.Call) and each not in ranges:
             if isinstance(each.func, ast.Name) and each.func.id == source.node.name:
-                refuse(each, "a call of itself", "write a loop over a literal range")
+                refuse(each, "a recursive call", "write a loop over a literal range")
             _check_call(source, each)
     if not _returns(body):
-        refuse(node, "an end without return", "return a value on every way")
+        refuse(node, "an end without return", "return a value on every path")
 
 
 def _check_call(source: Parsed, node: ast.Call) -> None:
@@ -323,7 +323,7 @@ def _check_call(source: Parsed, node: ast.Call) -> None:
     base = function.value if isinstance(function, ast.Attribute) else function
     if not isinstance(base, ast.Name) or base.id in source.local:
         if isinstance(function, ast.Attribute):
-            instead = "call equations; a named tuple is made anew, as in State(t.a, b)"
+            instead = "call equations; make a new named tuple, as in State(t.a, b)"
             source.refuse(node, f"the method {function.attr}", instead)
         name = ast.unparse(function)
         source.refuse(node, f"a call of the argument {name}", "call equations by their names")
@@ -335,10 +335,10 @@ def _check_call(source: Parsed, node: ast.Call) -> None:
         return
     if isinstance(plain(found), FunctionType):
         return
-    instead, short = "call equations and functions of math only", ast.unparse(function)
+    instead, short = "call only equations and functions of math", ast.unparse(function)
     short = short.rpartition(".")[2]
     if hasattr(math, short):
-        instead = f"of math an equation may call {', '.join(MATH.values())}"
+        instead = f"an equation may call these functions of math: {', '.join(MATH.values())}"
     if getattr(builtins, short, None) is found:
         instead = INSTEAD_OF_BUILTIN.get(short, instead)
     source.refuse(node, f"a call of {ast.unparse(function)}", instead)

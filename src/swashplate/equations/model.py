@@ -343,7 +343,7 @@ def _wrong(model: Model) -> Iterator[str]:
     """What keeps a single model from being marched, in sentences."""
     says = f"Model {model.name}: "
     if not str(model.name).isidentifier():
-        yield f"A model is called by one word, as 'valve', not {model.name!r}."
+        yield f"The name of a model is one word, such as 'valve', not {model.name!r}."
     for type_ in (model.parameters, model.state, model.inputs, model.options, model.given):
         if type_ is not None and not is_named_tuple(type_):
             yield (
@@ -366,12 +366,13 @@ def _wrong(model: Model) -> Iterator[str]:
             if name not in (*ARGUMENTS, *input_names):
                 choice = ", ".join((*ARGUMENTS, *input_names))
                 name_of = plain(asking).__name__
-                yield f"{says}{name_of} asks for '{name}', which is none of {choice}."
+                yield f"{says}{name_of} needs '{name}', which is not one of {choice}."
     for name, tap in model.taps.items():
         if name not in input_names:
             yield f"{says}there is a tap on '{name}', but no input."
         if tap.hold not in get_args(Hold):
-            yield f"{says}'{name}' is held as '{tap.hold}'; there are {', '.join(get_args(Hold))}."
+            choice = ", ".join(get_args(Hold))
+            yield f"{says}'{name}' has the hold '{tap.hold}'; there are {choice}."
         if tap.delay and tap.delay not in parameters:
             choice = ", ".join(parameters)
             yield f"{says}the delay of '{name}' is '{tap.delay}', but the parameters are {choice}."
@@ -381,7 +382,7 @@ def _wrong(model: Model) -> Iterator[str]:
             yield f"{says}free_start names '{name}', but the state has {', '.join(states)}."
     inputs = {model.tap(name).signal for name in input_names}
     if "time" in inputs:
-        yield f"{says}an input cannot be called 'time', as the time stamps are: rename it."
+        yield f"{says}an input cannot be called 'time', the name of the time stamps: rename it."
     for name, where in _own_names(model):
         if name in inputs:
             yield f"{says}'{name}' is both an input and in {where}: rename one of them."
@@ -488,11 +489,11 @@ def join(
     """
     for part in parts:
         if not isinstance(part, Model):
-            raise InputError(f"Model {name} is joined of models, not of {part!r}.")
+            raise InputError(f"Model {name} is joined from models, not from {part!r}.")
     single = tuple(inner for part in parts for inner in part.parts)
     names = [part.name for part in single]
     if len(set(names)) != len(names):
-        raise InputError(f"Joined models need names of their own, not {', '.join(names)}.")
+        raise InputError(f"Joined models need different names, not {', '.join(names)}.")
     linked = {}
     for signal, link_equation in (links or {}).items():
         sources = []
@@ -501,8 +502,7 @@ def join(
             if source is None:
                 names_of_parts = ", ".join(name for part in single for name in part.signal_names)
                 raise InputError(
-                    f"Model {name}: a link asks for '{argument}', but the parts have "
-                    f"{names_of_parts}."
+                    f"Model {name}: a link needs '{argument}', but the parts have {names_of_parts}."
                 )
             sources.append(source)
         linked[signal] = Link(signal, tuple(sources), link_equation)
@@ -544,7 +544,7 @@ def _too_late(model: Model) -> Iterator[str]:
         if i in {after, *before[after]}:
             instead = "a loop must be one model, or be closed sample by sample with steppers"
         yield (
-            f"Model {model.name}: {part} needs '{signal}', which is known only behind {giver}: "
+            f"Model {model.name}: {part} needs '{signal}', which is known only after {giver}: "
             f"{instead}."
         )
 
@@ -716,10 +716,10 @@ def _state_of(equation: Equation) -> type[Any]:
     for each in ("h", "signals"):
         if each in arguments:
             raise InputError(
-                f"{name} asks for '{each}', which is known at samples only: a rate of change "
+                f"{name} asks for '{each}', which is known only at samples: a rate of change "
                 "depends on the state at any instant."
             )
     for each in arguments:
         if each == "sub_step" or each.startswith("slope_"):
-            raise InputError(f"{name}: the name '{each}' is taken; call the argument otherwise.")
+            raise InputError(f"{name}: the name '{each}' is taken; rename the argument.")
     return kind

@@ -156,7 +156,7 @@ def replaced(
     if parameters is not None and all(map(operator.is_, parts, model.parts)):
         raise InputError(
             f"{plain(old).__name__} is an equation of a link between models, which has no "
-            "parameters: one in its place has the same arguments and brings none along."
+            "parameters: its replacement must take the same arguments and cannot add any."
         )
     if _calls(links.values(), replacements, old):
         in_links = _called_like(old, new, model.name, model.parameters)
@@ -226,7 +226,9 @@ def _extended(kind: Any, further: Any) -> type[Any]:
         defaults |= part._field_defaults
     bare = [name for name in further._fields if name not in further._field_defaults]
     if bare:
-        raise InputError(f"{further.__name__}.{bare[0]} needs a default: old numbers lack it.")
+        raise InputError(
+            f"{further.__name__}.{bare[0]} needs a default: existing parameter sets lack it."
+        )
     order = sorted(hints, key=lambda name: name in defaults)
     make: Any = namedtuple
     extended = make(kind.__name__, order, defaults=[defaults[n] for n in order if n in defaults])
@@ -249,7 +251,9 @@ def _called_like(old: Equation, new: Equation, part: str, kind: type[Any]) -> Eq
         return new
     unknown = [path for path in further if path not in kind._fields]
     if unknown:
-        raise InputError(f"{plain(new).__name__} asks for {unknown[0]}, no parameter of {part}.")
+        raise InputError(
+            f"{plain(new).__name__} needs {unknown[0]}, which is not a parameter of {part}."
+        )
     if "p" not in taken:
         raise InputError(
             f"{name} does not take the parameters p, so {plain(new).__name__} cannot have "

@@ -157,14 +157,14 @@ def content_of(
         if not step <= LONGEST_STEP:
             raise InputError(
                 f"The step is {step:g} s, but must be above 0 and at most 1/{SOURCE_RATE:g} s: an "
-                "FMU's master may take longer ones, in C call swp_step several times a sample."
+                "FMU's master may use longer steps; in C, call swp_step several times per sample."
             )
         rate = what.parameters.rate
         if rate is not None and abs(rate * step - 1.0) > 1e-9:
             what = what.at_every_rate()
             warnings.warn(
                 f"{what.name}: the card's filter is a recursion for {rate:g} Hz; for a step of "
-                f"{step:g} s the differential equation with the same poles takes its place.",
+                f"{step:g} s the differential equation with the same poles is used instead.",
                 stacklevel=3,
             )
         check_filter_stability(what.parameters, step)
@@ -274,7 +274,7 @@ def c(
     try:
         to.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise FileError(f"The folder {to} cannot be made ({error.strerror}).") from None
+        raise FileError(f"The folder {to} cannot be created ({error.strerror}).") from None
     for file, text in texts.items():
         write_text(text, to / file)
     return [to / file for file in texts]

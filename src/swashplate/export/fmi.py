@@ -147,7 +147,7 @@ def exportable(what: Drive | Model, step: float, **numbers: Any) -> Content:
         words = "tau" if isinstance(what, Drive) else f"the delay of {signal}"
         warnings.warn(
             f"{what.name}: {words} is {delay:g} s, below {steps:g} steps of {step:g} s, so that "
-            f"outputs depend on the {signal} of their own instant and may be a sample late; "
+            f"outputs depend on the {signal} at the same instant and may be one sample late; "
             f"{advice}.",
             stacklevel=3,
         )
@@ -413,8 +413,8 @@ def compare(path: str | Path, drive: Drive, voltage: ArrayLike) -> FmuComparison
     """
     if not isinstance(drive, Drive):
         raise InputError(
-            f"An FMU is compared with a drive, not with {drive!r}; run that of a model of one's "
-            "own with FMPy, beside simulate."
+            f"An FMU is compared with a drive, not with {drive!r}; run that of a user-defined "
+            "model with FMPy, and compare it with simulate."
         )
     try:
         import fmpy

@@ -281,7 +281,7 @@ def compiled_library(sources: Sources, platform: Platform) -> bytes:
                 raise InputError(
                     f"A library {platform.library} needs a compiler: install the extra binaries "
                     "(pip install 'swashplate[binaries]'), or choose the platform of this machine "
-                    "and have a C compiler there."
+                    "and install a C compiler there."
                 )
             compilers = [["cc"]]
         # the libraries name themselves: one name for all, and the same bytes each time

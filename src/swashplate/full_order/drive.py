@@ -211,8 +211,8 @@ class FullOrderDrive:
         if self.drive.parameters.refinements:
             listed = ", ".join(self.drive.parameters.refinements)
             raise InputError(
-                f"{self.drive.name}: five states do not know refinements, but this drive has "
-                f"{listed}; take it without (its .plain)."
+                f"{self.drive.name}: the five-state model has no refinements, but this drive has "
+                f"{listed}; use it without them (its .plain)."
             )
 
     @classmethod
@@ -345,7 +345,7 @@ class FullOrderDrive:
         if needed > MOST_SUBSTEPS:
             raise DomainError(
                 f"{self.physical.name}: the fastest mode, at {fastest:.3g} rad/s, would take "
-                f"{needed} steps a sample, more than {MOST_SUBSTEPS}; take a larger mass or "
+                f"{needed} steps a sample, more than {MOST_SUBSTEPS}; use a larger mass or "
                 "oil_volume."
             )
         return needed
@@ -733,7 +733,7 @@ def validity_verdict(table: Table) -> str:
     found = table.to_polars()
     moving = found.filter(found["within_1_percent"].is_not_null())
     if not moving.height:
-        return "The shaft does not move, so nothing can be said of one state."
+        return "The shaft does not move, so the one-state model cannot be assessed."
     beyond = moving.filter(~moving["within_1_percent"])["maneuver"].to_list()
     within = moving.height - len(beyond)
     if not beyond:

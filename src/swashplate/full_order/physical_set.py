@@ -237,7 +237,7 @@ def quantity_of(name: str) -> Definition:
     close = get_close_matches(name, QUANTITIES, n=1)
     hint = f" (did you mean {close[0]}?)" if close else ""
     if name in CHOICES:
-        advice = "; it is chosen only where a set is completed from lumped parameters"
+        advice = "; it is chosen only if a set is completed from lumped parameters"
     else:
         advice = f"{hint}; the quantities are {', '.join(QUANTITIES)}"
     raise UnknownParameterError(f"A physical set has no quantity '{name}'{advice}.")
@@ -334,7 +334,7 @@ def from_lumped(
     for quantity, choice in IN_PLACE_OF.items():
         if quantity in entries and choice in entries:
             raise ParameterError(
-                f"{owner}: {quantity} and {choice} are both given, but either follows from the "
+                f"{owner}: {quantity} and {choice} are both given, but each follows from the "
                 "other; leave one out."
             )
     refuse(owner, _broken_rules(entries))
@@ -521,7 +521,7 @@ SHOWN = {
 def choices_table(axis: str, given: Mapping[str, Change]) -> Table:
     """What a physical set is completed from: assumed values, and given ones, counted."""
     columns = (Column("Physical value"), Column("", "s"), Column(""), Column(""))
-    made = Table("What the drive's parameters do not say", columns)
+    made = Table("Physical values not given by the drive's parameters", columns)
     entries = chosen_over(_assumed(axis)[1], given)
     for name, entry in entries.items():
         unit, factor = SHOWN.get(entry.unit, (unit_text(entry.unit), 1.0))
@@ -533,6 +533,6 @@ def choices_table(axis: str, given: Mapping[str, Change]) -> Table:
     if assumed:
         made.caption = (
             f"{assumed} of {len(entries)} physical values are assumed, as of the packaged {axis}; "
-            "--physical gives what you know"
+            "set known ones with --physical"
         )
     return made

@@ -541,7 +541,7 @@ def _campaign_of(path: Path, file: FitFile, tests: str | Path | Campaign | None)
         tests = Path(os.path.normpath(path.parent / file.campaign))
         if not tests.is_file():
             raise MissingFileError(
-                f"{path} was fitted to {tests}, which is not there: name the campaign."
+                f"{path} was fitted to {tests}, which does not exist: name the campaign."
             )
     campaign = tests if isinstance(tests, Campaign) else Campaign.from_toml(tests)
     if all(run.input.settled for run in campaign if run.axis == file.axis):
@@ -555,12 +555,12 @@ def _runs_of(path: Path, file: FitFile, campaign: Campaign) -> tuple[Experiment,
     for name, mark in file.runs.items():
         if name not in runs:
             raise InputError(
-                f"{path} was fitted to the run '{name}', which {campaign.path} has not: give the "
-                "campaign of the fit, or fit again."
+                f"{path} was fitted to the run '{name}', which {campaign.path} does not have: give "
+                "the campaign of the fit, or fit again."
             )
         if fingerprint(runs[name]) != mark:
             raise InputError(
-                f"The run '{name}' of {campaign.path} is not as it was when {path} was fitted (its "
+                f"The run '{name}' of {campaign.path} has changed since {path} was fitted (its "
                 "samples, weights or ignored windows differ): name the campaign that was fitted, "
                 "or fit again."
             )
@@ -575,12 +575,12 @@ def _nominal_of(
         return read_set(file.nominal, str(path))
     if model is None:
         raise InputError(
-            f"{path} is the fit of a user-defined model, which it does not hold: give the model, "
-            "in Python by model=, on the command line by --model FILE."
+            f"{path} is the fit of a user-defined model, which it does not contain: give the "
+            "model, in Python as model=, on the command line as --model FILE."
         )
     nominal = model.nominal(runs)
     if nominal.setup != file.setup:
-        raise InputError(f"{path} is the fit of another model, or of other bounds: fit again.")
+        raise InputError(f"{path} belongs to another model or other bounds: fit again.")
     return nominal
 
 
@@ -592,7 +592,7 @@ def _stored_stage(path: Path, entry: StoredStage, stage: Stage, problem: Problem
     same = entry.name == stage.name and _identities(entry.unknowns) == _identities(problem.unknowns)
     if not same or len(sizes) > 1:
         raise FileError(
-            f"{path}: stage {entry.name} has other parameters than its fit setup makes: fit again."
+            f"{path}: stage {entry.name} has other parameters than its fit setup: fit again."
         )
     return Solved(
         problem=replace(problem, unknowns=Unknowns(entry.unknowns)),

@@ -137,7 +137,7 @@ class Estimated(Tabular, ABC):
             return self.estimates[name]
         sides = [f"{name}_{side}" for side in SIDES]
         if all(side in self.estimates for side in sides):
-            raise UnknownNameError(f"{name} has two directions: ask for {' or '.join(sides)}.")
+            raise UnknownNameError(f"{name} has two directions: name {' or '.join(sides)}.")
         near = get_close_matches(str(name), self.estimates, 1)
         meant = f" (did you mean {near[0]}?)" if near else ""
         names = ", ".join(key for key, estimate in self.estimates.items() if estimate.run is None)
@@ -221,7 +221,9 @@ class Fit(Estimated):
         jumps = {unknown.label for unknown in unknowns if unknown.kind == "instant"}
         if jumps:
             times = count(len(jumps), "time")
-            sentences.append(f"Commands jump {times} between two samples: when is estimated.")
+            sentences.append(
+                f"Commands jump {times} between two samples: the instant is estimated."
+            )
         sentences += tables.single_runs_line(self.stages)
         fixed = tables.fixed_part(self.stages, self.nominal)
         return (*sentences, *fixed.remarks, *fixed.sentences)
@@ -356,7 +358,7 @@ def _of_drive(
     """A drive, the card's filter in the form that is fitted; unsound runs are refused."""
     if free is None:
         raise InputError(
-            "A fit of a drive needs to know what is free, such as 'hoist' or {'Z8': (0.5, 2)}; "
+            "A fit of a drive needs its free parameters, such as 'hoist' or {'Z8': (0.5, 2)}; "
             "swashplate.identify takes drive and fit setup from the campaign."
         )
     setup = as_fit_setup(free, runs, parameters.definitions)
@@ -578,11 +580,11 @@ def _no_fit(
     channels, percentage = listed(problem.channels), 100.0 * max(share, 0.0)
     best = f"the best of {starts} starts" if starts > 1 else "the search"
     sentence = (
-        f"Stage {stage.name} does not fit: {best} explains "
-        f"{percentage:.0f} % of the variance of {channels}. Look at the runs with 'swashplate "
-        "campaign plot': is it this command that moved the machine, do jumps or resets cut a "
-        "signal, are kinds, units and signs right? Begin at another drive with --from, or search "
-        "on all the same with --starts 20 (in Python search = Search(20))."
+        f"Stage {stage.name} does not fit: {best} explains {percentage:.0f} % of the variance of "
+        f"{channels}. Inspect the runs with 'swashplate campaign plot': did this command move the "
+        "machine, do jumps or resets cut a signal, are kinds, units and signs right? Start from "
+        "another drive with --from, or search anyway with --starts 20 (in Python search = "
+        "Search(20))."
     )
     return " ".join([sentence, *(f"Seen in the runs: {doubt}" for doubt in doubts[:1])])
 

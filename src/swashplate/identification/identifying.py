@@ -244,7 +244,7 @@ def _stated(
         model = ModelSetup.from_file(model)
     if isinstance(model, ModelSetup):
         if free is not None:
-            raise InputError(f"{model.name} says what is free: leave out the other 'free'.")
+            raise InputError(f"{model.name} defines its free parameters: leave out 'free'.")
         nominal = model.nominal(runs)
         return nominal, nominal.setup
     drive: object = model
@@ -263,7 +263,7 @@ def _stated(
         )
     if not isinstance(free, Mapping):
         raise InputError(
-            "A user-defined model needs a mapping of what is free of it, by name: "
+            "A user-defined model needs a mapping of its free parameters, by name: "
             "{'lag': (0.005, 0.06, 0.5)}, lower bound, nominal value and upper bound."
         )
     nominal = ModelSetup(drive, free).nominal(runs)

@@ -195,8 +195,7 @@ class NoiseColour(Result):
             return f"{start}, but intervals are those of independent samples: correlations cancel."
         wider = sqrt(self.inflation)
         return (
-            f"{start}, so that intervals are about {wider:.2g} times as wide as for independent "
-            "samples."
+            f"{start}, so intervals are about {wider:.2g} times as wide as for independent samples."
         )
 
 

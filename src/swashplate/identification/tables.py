@@ -303,9 +303,9 @@ def unvalued_lines(stages: Sequence[StageFit]) -> list[str]:
     if not lost:
         return []
     return [
-        f"Without a value of their own, at a bound or not determined: {listed(lost)}. Fix them in "
-        "the fit setup, widen their bounds, or add tests that determine them; for a drive "
-        "'swashplate advise' names some."
+        f"Not estimated (at a bound or not determined): {listed(lost)}. Fix them in the fit setup, "
+        "widen their bounds, or add tests that determine them; for a drive 'swashplate advise' "
+        "names some."
     ]
 
 
@@ -430,7 +430,7 @@ def stage_part(stage: StageFit) -> FitPart:
     """Estimates of a stage, how it ended, and what its estimates lack."""
     name, solution = stage.stage.name, stage.solution
     return FitPart(
-        f"How stage {name} ended, and what its intervals are worth",
+        f"Convergence of stage {name}, and validity of its intervals",
         [estimates_table(stage)],
         [f"{name}: {solution.message} after {solution.evaluations} evaluations."],
         [

@@ -183,7 +183,7 @@ def measures(*runs: tuple[Array, Array, Array | None]) -> Measures:
         parts.append(np.stack([values[used], simulated[used]]))
     measured, errors = np.hstack(parts)
     if not measured.size:
-        raise InputError("No sample counts: all are ignored or have weight 0.")
+        raise InputError("No sample is used: all are ignored or have weight 0.")
     errors = errors - measured
     mean = float(measured.mean())
     # a constant channel's own mean is off by rounding

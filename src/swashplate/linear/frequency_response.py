@@ -296,10 +296,9 @@ def sweep(
                     break
                 if count >= LONGEST * least:
                     raise DomainError(
-                        f"{instance.name}: at {frequency:g} Hz and an amplitude of "
-                        f"{amplitude:g} the answer has not settled to {tolerance:g} within "
-                        f"{count} cycles; allow a larger tolerance, or look at it with a "
-                        "simulation."
+                        f"{instance.name}: at {frequency:g} Hz and an amplitude of {amplitude:g} "
+                        f"the response has not settled to {tolerance:g} within {count} cycles; "
+                        "allow a larger tolerance, or examine it in a simulation."
                     )
                 count *= 2
             ratio[i, j] = last / amplitude
@@ -307,7 +306,7 @@ def sweep(
         middle_of = f"{bias:g} {units.get(input, '')}".rstrip()
         raise DomainError(
             f"{instance.name}: nothing moves about {middle_of} with amplitudes up to {a.max():g}: "
-            "all stay in a dead zone or at a stop; take larger ones or another bias."
+            "all stay in a dead zone or at a stop; use larger ones or another bias."
         )
     return FrequencyResponse(
         name=instance.name,

@@ -82,7 +82,9 @@ def linearize(
             raise InputError(f"{instance.name}: {name} is {value!r}, but must be a finite number.")
     moving = tuple(at if inputs is None else inputs)
     if not moving:
-        raise InputError(f"{instance.name}: a linear model needs an input that moves, of at.")
+        raise InputError(
+            f"{instance.name}: a linear model needs at least one varying input, named in at."
+        )
     for name in moving:
         if name not in at or name not in instance.model.external:
             raise InputError(
@@ -164,7 +166,7 @@ def _linear_model(
         if name in model.integrals:
             raise InputError(
                 f"{instance.name}: '{name}' is an integral of a signal, which a linear model does "
-                f"not have; ask for '{model.integrals[name]}'."
+                f"not have; use '{model.integrals[name]}'."
             )
     seen = tuple(output_of(model, name)[0] for name in outputs)
     arguments, derived = step_derivatives(model, signals, instance.options, seen)

@@ -192,8 +192,8 @@ class LinearModel:
         integrates = np.abs(self.poles - sampled) <= INTEGRATES * self._scale
         if (growth[~integrates] >= 0.0).any():
             raise DomainError(
-                f"{self.name}: the linear model is unstable (poles {self.poles}), so that a "
-                "bandwidth or margin means nothing."
+                f"{self.name}: the linear model is unstable (poles {self.poles}), so bandwidth and "
+                "margins are meaningless."
             )
 
     def _search_end(self) -> float:
@@ -209,7 +209,7 @@ class LinearModel:
         if abs(self.gain) <= 1e-9 * largest:
             raise DomainError(
                 "The output does not follow a steady input (its gain is 0), so it has neither a "
-                "bandwidth nor a largest gain; ask for another output."
+                "bandwidth nor a largest gain; choose another output."
             )
 
     @property
@@ -230,7 +230,7 @@ class LinearModel:
         if level == inf:
             raise DomainError(
                 f"{self.name}: {self.outputs[0]} integrates {self.input}, with an infinite gain, "
-                "so it has no bandwidth; ask for the margins of a loop around it."
+                "so it has no bandwidth; use the margins of a loop around it."
             )
         falls = _roots(lambda f: np.abs(self.response(f)[0]) - level, grid)
         return falls[0] if falls else inf
@@ -310,9 +310,10 @@ class LinearModel:
             return StateSpace(*with_delay_line(matrices, late), dt=1.0 / self.rate)
         if self.delay != 0.0 and not without_delay:
             raise InputError(
-                f"The model has a delay of {self.delay:g} s, which no state space holds exactly; "
-                "say without_delay=True and put an approximant before it, python-control's pade "
-                "for example, or take a sampled model (discrete), which has it as states."
+                f"The model has a delay of {self.delay:g} s, which no state space represents "
+                "exactly; pass without_delay=True and put an approximant before it, "
+                "python-control's pade for example, or use a sampled model (discrete), which has "
+                "it as states."
             )
         return StateSpace(*matrices)
 

@@ -57,8 +57,8 @@ def look(
             claimed = len(range(item.rows)[first:last])
             if numbers.size != claimed:
                 raise FileError(
-                    f"{path}: '{item.name}' has {numbers.size} numbers where it claims {claimed}; "
-                    "the file was cut off or is damaged."
+                    f"{path}: '{item.name}' has {numbers.size} numbers, but claims {claimed}; the "
+                    "file is truncated or damaged."
                 )
             arrays.append(numbers)
     lengths = [signal.rows for signal in readable]
@@ -93,8 +93,8 @@ def _form_of(reader: str, path: Path) -> str:
         return "MATLAB 7.3"
     if size > _LARGEST:
         raise FileError(
-            f"{path} has {size >> 20} MB, and MATLAB files up to version 7 are read as a whole, up "
-            f"to {_LARGEST >> 20} MB: save it with -v7.3, or as CSV."
+            f"{path} has {size >> 20} MB, and MATLAB files up to version 7 are read at once, up to "
+            f"{_LARGEST >> 20} MB: save it with -v7.3, or as CSV."
         )
     return "MATLAB 5" if head[126:128] in (b"IM", b"MI") else "MATLAB 4"
 

@@ -70,7 +70,7 @@ class TextOptions:
         try:
             "".encode(self.encoding or "utf-8")  # zlib and the like are codecs, but not of text
         except (LookupError, UnicodeError, ValueError):
-            wrong = f"encoding {self.encoding!r} is unknown; take 'utf-8', 'latin-1' or 'utf-16'"
+            wrong = f"encoding {self.encoding!r} is unknown; use 'utf-8', 'latin-1' or 'utf-16'"
         if wrong:
             raise InputError(f"{wrong}.")
 
@@ -115,7 +115,7 @@ def encoding_of(path: Path, stated: str | None) -> tuple[str, int]:
         check_kind(path)
         line = len(re.findall(r"\r\n|\n|\r", text[: control.start()])) + 1
         what = "a NUL byte" if control[0] == "\0" else f"the byte {ord(control[0]):#04x}"
-        raise FileError(f"{path} has {what} in line {line}; it is damaged or no text file.")
+        raise FileError(f"{path} has {what} in line {line}; it is damaged or not a text file.")
     return name, len(mark)
 
 
@@ -274,8 +274,8 @@ def find_layout(lines: Sequence[str], options: TextOptions, path: Path) -> TextL
         cells = [cell for cell in cells if is_number_text(cell, ",")]
         if cells and all(_THREE.fullmatch(cell) for cell in cells):
             raise FileError(
-                f"{path} has numbers like '{cells[0]}', where the comma may be a decimal sign or "
-                "separate thousands; give 'decimal' as an option."
+                f"{path} has numbers like '{cells[0]}', in which the comma may be a decimal sign "
+                "or a thousands separator; give 'decimal' as an option."
             )
     return layout
 
@@ -406,7 +406,7 @@ def _names_and_units(above: Sequence[str], layout: TextLayout) -> tuple[list[str
 def _wrong_header(number: int, line: str, layout: TextLayout, path: Path) -> FileError:
     count, hint = len(layout.names(line)), ""
     if layout.delimiter == "," and layout.width >= 2 * count - 1:
-        hint = " Do decimal commas stand between commas? Export it with semicolons."
+        hint = " Are decimal commas mixed with commas between columns? Export it with semicolons."
     return FileError(
         f"{path} has {count} names in line {number}, but {layout.width} fields in the rows "
         f"below.{hint}"

@@ -132,9 +132,9 @@ class Log:
         count = sum(self.lengths[position] for position in unique) if self.lengths else 0
         if self.last is None and count > MOST:
             raise FileError(
-                f"{self.path} has {count} numbers in the {len(unique)} columns that are wanted,"
-                f" more than the {MOST} that are read at once; cut it into shorter logs, or "
-                "sample it more slowly."
+                f"{self.path} has {count} numbers in the {len(unique)} requested columns, more "
+                f"than the {MOST} that are read at once; cut it into shorter logs, or sample it "
+                "more slowly."
             )
         arrays = dict(zip(unique, self.load(unique, self.first, self.last), strict=True))
         return {name: arrays[position] for name, position in positions.items()}
@@ -161,7 +161,7 @@ def printable(text: str) -> str:
 def said(error: BaseException) -> str:
     """The first sentence of an error's message, or what it is."""
     if isinstance(error, MemoryError):
-        return "it asks for more memory than there is"
+        return "it needs more memory than there is"
     lines = str(error).strip().splitlines()
     first = printable(lines[0]) if lines else ""
     sentence = re.split(r"[.!?;](?:\s|$)", first, maxsplit=1)[0].strip()[:200]

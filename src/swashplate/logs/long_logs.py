@@ -44,7 +44,7 @@ def in_parts(log: Log, names: Sequence[str]) -> Log:
         # size, time and format of the log that a table was made of, and places of its columns
         made_of = json.loads(pl.read_parquet_metadata(table).get(_KEY, "null"))
     if made_of is None:
-        raise FileError(f"{table} stands where the table of a long log belongs; rename it.")
+        raise FileError(f"{table} has the name of the table of a long log; rename it.")
     stored: list[int] = made_of[-1] if made_of[:-1] == stamp else []
     if not columns <= {*stored}:
         stored = sorted(columns.union(stored))
@@ -99,8 +99,8 @@ def _convert(log: Log, columns: Sequence[int], table: Path, stamp: str) -> None:
         if failed:
             raise failed[0] from None
         raise FileError(
-            f"{log.path} has about {max(log.lengths)} rows, more than are held at once, and its "
-            f"table {table.name} cannot be written beside it: {said(error)}."
+            f"{log.path} has about {max(log.lengths)} rows, more than are kept in memory, and its "
+            f"table {table.name} cannot be written next to it: {said(error)}."
         ) from None
     finally:
         partial.unlink(missing_ok=True)

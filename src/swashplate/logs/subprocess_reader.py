@@ -95,7 +95,7 @@ class _ReaderProcess:
                 cls.running = process = cls.running or cls()
             except OSError as error:
                 raise FileError(
-                    f"{path} is read in a process of its own, which cannot be started: "
+                    f"{path} is read in a separate process, which cannot be started: "
                     f"{error.strerror}."
                 ) from None
             try:
@@ -141,7 +141,7 @@ class _ReaderProcess:
             last = next((line for line in reversed(lines) if line[:1].isalpha()), "")
             reason = printable(last).strip().rstrip(".")[:200]
             why = f": {reason}" if reason else ""
-            raise FileError(f"{path} is damaged so that reading it breaks off{why}.")
+            raise FileError(f"{path} is damaged: reading it stops{why}.")
         return answer, arrays
 
 

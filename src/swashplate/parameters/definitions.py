@@ -182,7 +182,7 @@ def definitions_of(kinds: tuple[type, ...]) -> Definitions:
             if earlier != definition:
                 raise ParameterError(
                     f"{kind.__name__}.{declared.symbol}: there is another parameter "
-                    f"{declared.symbol}, {earlier.name}; give yours a name of its own."
+                    f"{declared.symbol}, {earlier.name}; give yours another name."
                 )
     added = by_symbol.keys() - DEFINITIONS.by_symbol.keys()
     return Definitions(by_symbol, {**DEFINITIONS.paths, **{name: f"pump.{name}" for name in added}})

@@ -143,8 +143,8 @@ def fitted_drive(folder: str | Path) -> Path:
         return file
     if (Path(folder) / FITTED_NUMBERS).is_file():
         raise MissingFileError(
-            f"{folder} is the fit of a user-defined model: give its file by --model where the "
-            "command has that option. In Python swashplate.equations.simulate(model, ...) runs it, "
+            f"{folder} is the fit of a user-defined model: give its file by --model if the command "
+            "has that option. In Python swashplate.equations.simulate(model, ...) runs it, "
             'and swashplate.export.fmu(model, "model.fmu", parameters=..., step=...) writes an FMU '
             f"of it, with the numbers in {Path(folder) / FITTED_NUMBERS}."
         )
@@ -168,9 +168,8 @@ def set_file(name: str | Path) -> Path | None:
     if path.suffix.lower() == ".toml" or len(path.parts) > 1 or path.is_file():
         return path
     raise MissingFileError(
-        f"There is no packaged set, file or folder '{name}'{meant(str(name), preset_names())}; "
-        "packaged are "
-        f"{', '.join(preset_names())}."
+        f"There is no packaged set, file or folder '{name}'{meant(str(name), preset_names())}; the "
+        f"packaged sets are {', '.join(preset_names())}."
     )
 
 

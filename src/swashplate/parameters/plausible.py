@@ -83,4 +83,4 @@ def _slip(definition: Definition, value: float) -> str:
             return f"perhaps it is in {unit} instead of {definition.unit}"
     if definition.unit == "1" and high <= LARGEST_SHARE and low <= abs(value) / 100.0 <= high:
         return "perhaps it is in per cent"
-    return "look at the number and its unit"
+    return "check the number and its unit"

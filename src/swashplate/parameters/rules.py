@@ -54,8 +54,8 @@ OF_REFINEMENTS: tuple[Rule, ...] = (
             & np.isfinite(n["dither_time"])
             & (n["spool_presliding"] == 0.0)
         ),
-        "dither_time is {dither_time:g} s, but spool_presliding is 0: dither frees a spool that "
-        "friction lets give a little; give that travel, of the order of 5e-5 m.",
+        "dither_time is {dither_time:g} s, but spool_presliding is 0: dither acts on the small "
+        "travel that friction permits; give that travel, of the order of 5e-5 m.",
     ),
     (
         lambda n: (n["line_stiffness"] > 0.0) & (n["load_inertia"] == 0.0),

@@ -49,8 +49,8 @@ def rows_within(time: Array, window: tuple[float, float] | None, what: str) -> s
     if after - first < 2:
         raise InputError(
             f"The window from {window[0]:g} s to {window[1]:g} s holds {max(after - first, 0)} "
-            f"samples of {what}, which goes from {time[0]:g} s to {time[-1]:g} s; choose one that "
-            "holds two at least."
+            f"samples of {what}, which goes from {time[0]:g} s to {time[-1]:g} s; choose one with "
+            "at least two."
         )
     return slice(first, after)
 

@@ -100,7 +100,7 @@ class OperatorCommand(Result):
         for axis, part in parts.items():
             target = TARGETS[axis]
             if not -1.0 <= part <= 1.0:
-                raise InputError(f"The stick of the {axis} is {part:g}, but reaches from -1 to 1.")
+                raise InputError(f"The stick of the {axis} is {part:g}, but must be from -1 to 1.")
             if part == 0.0 and target in targets:
                 raise InputError(f"There is a target {target}, but no command {axis}.")
             if part != 0.0 and target not in targets and duration is None:
@@ -110,8 +110,8 @@ class OperatorCommand(Result):
                 )
         if not (start >= 0.0 and ramp > 0.0 and 0.0 < length <= LONGEST):
             raise InputError(
-                f"A stick starts at 0 s or later, with ramps above 0 s and a length above 0 and at "
-                f"most {LONGEST:g} s, not {start:g}, {ramp:g} and {length:g} s."
+                "A stick needs a start of 0 s or later, ramps above 0 s, and a length above 0 and "
+                f"at most {LONGEST:g} s, not {start:g}, {ramp:g} and {length:g} s."
             )
         moving = {axis: part for axis, part in parts.items() if part != 0.0}
         return cls(length, start, ramp, moving, targets, duration)
@@ -155,7 +155,7 @@ class OperatorCommand(Result):
         if not length <= LONGEST:
             raise InputError(
                 f"The recorded stick lasts {length:g} s at {rate:g} Hz, but a run at most "
-                f"{LONGEST:g} s: look at its rate."
+                f"{LONGEST:g} s: check its rate."
             )
         wrong = np.flatnonzero(~(np.abs(samples) <= 1.0).all(axis=1))
         if wrong.size:
@@ -266,19 +266,19 @@ class OperatorCommand(Result):
             angle = _angle_to(axis, self.until[target], crane, home, luff_angle)
             if angle * speed <= 0.0:
                 raise InputError(
-                    f"The {axis} leads away from {target} = {self.until[target]:g}, or is there "
-                    "already: change the sign of its command or the target."
+                    f"The {axis} moves away from {target} = {self.until[target]:g}, or is already "
+                    "there: change the sign of its command or the target."
                 )
             duration = angle / speed + self.ramp
         if duration < 2.0 * self.ramp:
             raise InputError(
-                f"The {axis} moves for {duration:.3g} s, less than its two ramps of "
-                f"{self.ramp:g} s: take a smaller command or shorter ramps."
+                f"The {axis} moves for {duration:.3g} s, less than its two ramps of {self.ramp:g} "
+                "s: use a smaller command or shorter ramps."
             )
         if self.start + duration > self.length:
             raise InputError(
-                f"The stick of the {axis} ends at {self.start + duration:.4g} s, but the record "
-                f"at {self.length:g} s: take a longer record."
+                f"The stick of the {axis} ends at {self.start + duration:.4g} s, but the record at "
+                f"{self.length:g} s: use a longer record."
             )
         return duration
 

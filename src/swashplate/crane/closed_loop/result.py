@@ -253,7 +253,7 @@ class CraneRun(Tabular):
         beyond = np.degrees(swing_of(load, tip)) > FARTHEST_SWING
         times = {
             f"the load swings beyond {FARTHEST_SWING:g} deg": _first(beyond, LOOK),
-            "the rope lies on the boom": _first(inboard >= 0.5 * pi - boom, LOOK),
+            "the rope touches the boom": _first(inboard >= 0.5 * pi - boom, LOOK),
             IN_WATER: _first(load[:, 2] < 0.0, LOOK),
         }
         deck = self.crane.deck
@@ -278,8 +278,8 @@ class CraneRun(Tabular):
         first = round(starts * RATE)
         if first >= len(self.stored):
             raise InputError(
-                f"The run is {self.time[-1]:g} s long, but its residual swing counts from "
-                f"{starts:.4g} s on: take a longer stick."
+                f"The run is {self.time[-1]:g} s long, but its residual swing is evaluated from "
+                f"{starts:.4g} s on: use a longer stick."
             )
         return slice(first, first + round(WATCHED * RATE))
 
@@ -327,20 +327,20 @@ class CraneRun(Tabular):
         lowest = float(self.load[:, 2].min())
         if lowest < 0.0:
             sentences.append(
-                f"The load is down to z = {lowest:.1f} m, below the point of the ship that its "
-                "motion is given for, near the waterline. Water is not in the model."
+                f"The load is down to z = {lowest:.1f} m, below the reference point of the ship's "
+                "motion, near the waterline. The model has no water."
             )
         departure = self.departure
         if departure is not None and departure.reason != IN_WATER:
             sentences.append(
-                f"From {departure.time:.2f} s on the run is not an operation any more: "
+                f"From {departure.time:.2f} s on the run is no longer a valid operation: "
                 f"{departure.reason}."
             )
         jumps = self.actuation == "ideal" and self.fixed.settings.path
         if self.snap is None and not jumps:
             sentences.append(
                 f"The slack rope snaps taut at {self.time[self._snaps[0]]:.2f} s. With a rigid "
-                "rope the tension of that is not computed: take an elastic rope, "
+                "rope the resulting tension is not computed: use an elastic rope, "
                 "suspension=Suspension(stiffness=6e7)."
             )
         return tuple(sentences)
@@ -403,7 +403,7 @@ def run_tables(runs: Mapping[str, CraneRun]) -> list[Table]:
         Column("rope", ".2f", "m"),
         Column("slack", ".1%", of="pf"),
     )
-    table = Table("", columns, "Swing, and where slew, boom and rope end")
+    table = Table("", columns, "Swing, and final position of slew, boom and rope")
     shares = []
     for name, run in runs.items():
         try:

@@ -88,8 +88,8 @@ def prepare(crane: Crane, stick: OperatorCommand, options: RunOptions) -> Prepar
     stepper = CraneStepper(crane, **options)
     if stepper.fixed.actuation == DIRECT:
         raise InputError(
-            "With direct actuation commands are voltages, but a stick gives parts of the full "
-            "speed: take a CraneStepper, or actuation='volts'."
+            "With direct actuation commands are voltages, but a stick gives fractions of full "
+            "speed: use a CraneStepper, or actuation='volts'."
         )
     if not isinstance(stick, OperatorCommand):
         raise InputError(

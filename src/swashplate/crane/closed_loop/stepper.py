@@ -312,7 +312,7 @@ class CraneStepper:
         low, high = map(degrees, crane.boom_limits)
         reasons = {
             loop.NO_NUMBER: "the controller gives an offset of the tip that is not a finite "
-            "number; look for a division by zero or a root of a negative number in it",
+            "number; check it for a division by zero or a root of a negative number in it",
             loop.ROPE_OUT: f"the rope is {rope:.2f} m long, but can be {short:g} to {long:g} m; "
             "hoist or lower less, or start elsewhere",
             loop.BOOM_OUT: f"the boom meets the limits of its travel, {low:g} to {high:g} deg; "
@@ -377,8 +377,8 @@ def _fixed(
         )
     if load > crane.safe_load:
         raise InputError(
-            f"The load is {load:g} kg, but {crane.name} lifts {crane.safe_load:g} kg: take less, "
-            "or a crane with another safe_load."
+            f"The load is {load:g} kg, but {crane.name} lifts {crane.safe_load:g} kg: use a "
+            "smaller load, or a crane with another safe_load."
         )
     # the suspension refuses a load of 0
     drag = AIR * drag_area / (2.0 * load) if load > 0.0 else 0.0
@@ -441,8 +441,8 @@ def _check_loaded(crane: Crane, actuation: str, mass: float, suspension: Suspens
         if suspension.stiffness == inf and gives > QUICKEST:
             raise InputError(
                 f"The {axis} of {crane.name} gives way to {mass:g} kg on a rigid rope within a "
-                f"sample, since its motor_leakage costs {lost[axis]:.3g} rad/s for each N m: "
-                "take an elastic rope, suspension=Suspension(stiffness=6e7)."
+                f"sample, since its motor_leakage costs {lost[axis]:.3g} rad/s per N m: use an "
+                "elastic rope, suspension=Suspension(stiffness=6e7)."
             )
 
 

@@ -84,7 +84,7 @@ class Scatter(Result):
         """A made-up diagram, of no place: for a first look, never for an answer."""
         text = (files("swashplate.crane") / "sets" / f"{SYNTHETIC}.csv").read_text("utf-8")
         return _parsed(
-            text, SYNTHETIC, "The scatter diagram is made up, of no place: give your own."
+            text, SYNTHETIC, "The scatter diagram is fictitious: supply one of your site."
         )
 
 

@@ -94,7 +94,7 @@ class Spectrum:
             low, high = (2.0 * np.pi / omega for omega in BAND[::-1])
             raise InputError(
                 f"A sea with a peak at {self.period:g} s has little energy between waves of "
-                f"{low:.3g} and {high:.3g} s, which are simulated: take a period between."
+                f"{low:.3g} and {high:.3g} s, which are simulated: use a period between."
             )
 
     def density(self, omega: ArrayLike) -> Array:
@@ -247,7 +247,7 @@ class Seaway(Result):
             raise InputError(
                 f"{self.ship.name} has waves of {low:.3g} to {high:.3g} rad/s, but "
                 f"{100.0 * lost:.0f} % of the energy of the sea ({self.title}) lies beyond, more "
-                f"than {100.0 * MOST_LOST:.0f} %: take a file that reaches further, or another sea."
+                f"than {100.0 * MOST_LOST:.0f} %: use a file that reaches further, or another sea."
             )
 
     @property
@@ -279,15 +279,15 @@ class Seaway(Result):
             shortest, longest = (2.0 * np.pi / omega for omega in BAND[::-1])
             sentences.append(
                 f"{100.0 * outside:.0f} % of the energy of the sea ({self.title}) lies outside the "
-                f"waves of {shortest:.3g} to {longest:.3g} s that are simulated: these are made "
-                "larger, so that the significant height is the one asked for."
+                f"waves of {shortest:.3g} to {longest:.3g} s that are simulated: these are scaled "
+                "up to keep the requested significant height."
             )
         if lost > LOST and isinstance(self.ship, TransferFunctions):
             low, high = self.ship.frequencies[[0, -1]]
             sentences.append(
                 f"{self.ship.name} has waves of {low:.3g} to {high:.3g} rad/s: for the "
                 f"{100.0 * lost:.1f} % of the energy of the sea ({self.title}) that lies beyond, "
-                "the motions in the nearest of them are taken."
+                "the motions in the nearest of them are used."
             )
         return tuple(sentences)
 
@@ -368,13 +368,13 @@ class Seaway(Result):
         """
         inner = round(rate / COARSE)
         if inner < 1 or abs(inner * COARSE - rate) > 1e-9 * rate:
-            raise InputError(f"A ship's motion has a multiple of {COARSE:g} samples a second.")
+            raise InputError(f"The rate of a ship's motion must be a multiple of {COARSE:g} Hz.")
         intervals = max(-(-(count - 1) // inner), 1)
         if intervals > self._samples:
             enough = (1 << (intervals - 1).bit_length()) / COARSE
             raise InputError(
-                f"The seaway comes again after {self.period:g} s, but {(count - 1) / rate:g} s of "
-                f"it are asked for: take a longer record, Seaway(..., record={enough:g})."
+                f"The seaway repeats after {self.period:g} s, but {(count - 1) / rate:g} s are "
+                f"requested: use a longer record, Seaway(..., record={enough:g})."
             )
         points = self._points(intervals + 1)
         points[:, :6] += self.lean
@@ -462,8 +462,8 @@ def ship_motion(
             seconds = float(series.time[-1] - series.time[0])
             if 6.0 * seconds * rate > LARGEST:
                 raise InputError(
-                    f"{path} lasts {seconds:g} s: at {rate:g} Hz that are more than the "
-                    f"{LARGEST} numbers that are taken together; cut the log, or take a lower rate."
+                    f"{path} lasts {seconds:g} s: at {rate:g} Hz that is more than the {LARGEST} "
+                    "numbers that can be read at once; cut the log, or use a lower rate."
                 )
             motions = np.zeros((int(seconds * rate + 1e-6) + 1, 6))
         grid = series.time[0] + np.arange(len(motions)) / rate
@@ -475,25 +475,25 @@ def ship_motion(
 def _check_sampling(time: Array, column: str, of: str) -> None:
     """Refuse stamps that no curve of a ship's motion can be drawn through."""
     if time.size < 4:
-        raise InputError(f"{of} has {time.size} samples of {column}, but needs four.")
+        raise InputError(f"{of} has {time.size} samples of {column}, but needs at least four.")
     steps = np.diff(time)
     median = float(np.median(steps))
     if median > SPARSEST:
         raise InputError(
             f"{of}: samples of {column} are {median:g} s apart, but a ship's motion needs one "
-            f"every {SPARSEST:g} s at least; look at the unit of the time."
+            f"every {SPARSEST:g} s or less; check the unit of the time."
         )
     hole = int(np.argmax(steps))
     narrow = int(np.argmin(steps))
     if steps[hole] > max(LONGEST_HOLE, 5.0 * median):
         raise InputError(
             f"{of} has no {column} from {time[hole]:g} to {time[hole + 1]:g} s: cut the log to a "
-            "part without holes."
+            "part without gaps."
         )
     if steps[narrow] < ALIKE * median:
         raise InputError(
             f"{of}: data rows {narrow + 1} and {narrow + 2} are only {steps[narrow]:.2g} s apart, "
-            f"others {median:.2g} s: take one of them out, or mend its stamp."
+            f"others {median:.2g} s: delete one of them, or correct its time stamp."
         )
 
 
@@ -511,7 +511,7 @@ def _curve(series: Series, grid: Array, column: str, of: str) -> Array:
         row = int(np.argmin(np.abs(time - grid[worst])))
         raise InputError(
             f"{of}: a curve through the samples of {column} swings to {curve[worst]:.3g} at "
-            f"{grid[worst]:g} s, far beyond them, {low:.3g} to {high:.3g}: look for a spike or a "
+            f"{grid[worst]:g} s, far beyond them, {low:.3g} to {high:.3g}: check for a spike or a "
             f"wrong stamp near data row {row + 1}."
         )
     return curve
@@ -528,8 +528,8 @@ def _check_sizes(motions: Mapping[str, Array], of: str) -> None:
             )
         if largest > FARTHEST:
             raise InputError(
-                f"{of}: {motion} reaches {largest:.3g} m, but is counted from the ship's mean "
-                f"place, within {FARTHEST:g} m: look at its unit, or take the mean off."
+                f"{of}: {motion} reaches {largest:.3g} m, but must be measured from the ship's "
+                f"mean position, within {FARTHEST:g} m: check its unit, or subtract the mean."
             )
 
 

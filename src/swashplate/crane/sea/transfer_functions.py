@@ -194,8 +194,8 @@ class TransferFunctions(Result):
                 raise InputError(
                     f"{self.name}: in the longest wave of {wave.heading_deg:g} deg {wave.motion} "
                     f"is {amplitude:.3g} for each metre, but must go with the water, "
-                    f"{wave.water:g} times what it is: axes, headings or phases are counted "
-                    "otherwise; convert the file."
+                    f"{wave.water:g} times what it is: axes, headings or phases follow another "
+                    "convention; convert the file."
                 )
 
     def response(self, omega: Array, heading: Array, speed: float = 0.0) -> Complex:
@@ -208,8 +208,8 @@ class TransferFunctions(Result):
         low, high = self.speeds[0], self.speeds[-1]
         if not low <= speed <= high:
             raise InputError(
-                f"{self.name} has speeds from {low:g} to {high:g} m/s, but {speed:g} m/s is asked "
-                "for."
+                f"{self.name} has speeds from {low:g} to {high:g} m/s, but {speed:g} m/s is "
+                "requested."
             )
         response = np.zeros((6, omega.size), dtype=np.complex128)
         folded = np.arccos(np.clip(np.cos(heading), -1.0, 1.0))
@@ -217,7 +217,7 @@ class TransferFunctions(Result):
         if self.headings.size == 1 and aside > ASIDE:
             raise InputError(
                 f"{self.name} has waves of {np.degrees(self.headings[0]):g} deg only, but others "
-                "are asked for."
+                "are requested."
             )
         for v, weight_v in _weights(self.speeds, np.array([speed])):
             for m, weight_m in _weights(self.headings, folded):
@@ -362,7 +362,8 @@ def _numbers(
         if not _is_plausible(name, number):
             raise FileError(
                 f"{path}, line {line}: {name} is {'missing' if word is None else repr(word)}, but "
-                f"must be {_expected(name)}; needed are {required}: the file is cut or another one."
+                f"must be {_expected(name)}; needed are {required}: the file is truncated or of "
+                "another kind."
             )
         numbers.append(number)
     return numbers
@@ -428,7 +429,8 @@ def _csv_rows(path: str | Path) -> Iterator[Amplitude]:
                 yield speed, heading, omega, motion, complex(real, imaginary)
     except csv.Error as error:
         raise FileError(
-            f"{path}, line {table.line_num}: {error}: look for a quotation mark that is not closed."
+            f"{path}, line {table.line_num}: {error}: check for a quotation mark that is not "
+            "closed."
         ) from None
 
 
@@ -480,8 +482,9 @@ def _gathered(path: str | Path, rows: Amplitudes, length: float) -> TransferFunc
         _, i, j, missing = np.unravel_index(first, shape)
         raise FileError(
             f"{path}: there is no {MOTIONS[missing]} for {omega[j]:g} rad/s and {headings[i]:g} "
-            f"deg; the file is cut, or its waves are on no grid: it has {present.size} of the "
-            f"{prod(shape)} amplitudes of {headings.size} headings and {omega.size} frequencies."
+            f"deg; the file is truncated, or its waves are not on a grid: it has {present.size} of "
+            f"the {prod(shape)} amplitudes of {headings.size} headings and {omega.size} "
+            "frequencies."
         )
     values = np.full(shape, np.nan, dtype=np.complex128)
     # waves from the other side count, by symmetry, if this side lacks them
@@ -495,8 +498,8 @@ def _gathered(path: str | Path, rows: Amplitudes, length: float) -> TransferFunc
     if twice.any():
         _, i, j, which = at_this_side[:, twice][:, 0]
         raise FileError(
-            f"{path}: motion {which + 1} in waves of {omega[j]:g} rad/s and {headings[i]:g} deg is "
-            "there twice, with other values."
+            f"{path}: motion {which + 1} in waves of {omega[j]:g} rad/s and {headings[i]:g} deg "
+            "occurs twice, with different values."
         )
     values[..., 3:] /= length
     if headings.size > 1 and (headings[0] > 1e-6 or headings[-1] < 180.0 - 1e-6):
@@ -504,6 +507,6 @@ def _gathered(path: str | Path, rows: Amplitudes, length: float) -> TransferFunc
     if headings.size > 1 and np.diff(headings).max() > WIDEST:
         raise FileError(
             f"{path}: its headings are up to {np.diff(headings).max():g} deg apart, but must be "
-            f"within {WIDEST:g} deg, as motions are straight between them."
+            f"within {WIDEST:g} deg, because motions are interpolated linearly between them."
         )
     return TransferFunctions(str(path), speeds, np.radians(headings), omega, values)

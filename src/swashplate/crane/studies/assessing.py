@@ -122,7 +122,8 @@ def _questions(crane: Crane, questions: Sequence[Question] | None) -> tuple[Ques
     check_names("There is no question", questions, QUESTIONS)
     if "sufficiency" in questions and not crane.limits:
         raise InputError(
-            f"{crane.name} has no limits to suffice for: give its file a table [limits], as "
+            f"{crane.name} has no limits by which control could be sufficient: give its file a "
+            "table [limits], as "
             '[limits] with side_lead = { value = 4, unit = "deg" }.'
         )
     return tuple(questions)
@@ -134,12 +135,12 @@ def seaways_needed(seaways: int, allowed: float) -> str:
     needed = fewest_seaways(allowed)
     if seaways >= needed:
         return (
-            f"{count(seaways, 'seaway')} can show that control does no harm: {needed} are needed "
-            f"at least for {100.0 * allowed:g} %."
+            f"{count(seaways, 'seaway')} can show that control does no harm: {needed} or more are "
+            f"needed for {100.0 * allowed:g} %."
         )
     return (
-        f"{count(seaways, 'seaway')} cannot show that control does no harm: {needed} are needed at "
-        f"least for {100.0 * allowed:g} %."
+        f"{count(seaways, 'seaway')} cannot show that control does no harm: {needed} or more are "
+        f"needed for {100.0 * allowed:g} %."
     )
 
 

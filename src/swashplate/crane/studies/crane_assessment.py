@@ -47,8 +47,8 @@ Decision = Literal["yes", "no", "not decided"]
 LOOP = PositionLoop()
 """What a clip is tried with: a stiffer loop brings back what the clip takes."""
 NO_TIPPING_POINT = (
-    "No other damping, roll period, height, period, peak factor, heading or drum that was tried, "
-    "each alone, surely turns the answer, by short runs."
+    "In short runs, no other value tried for damping, roll period, height, period, peak factor, "
+    "heading or drum, each alone, clearly changes the answer."
 )
 IDLE = 1e-3
 """Relative difference of the swing below which control changes nothing."""
@@ -81,7 +81,7 @@ class AssessedQuantity(NamedTuple):
         """In a sentence: ``"off-lead 9.1 deg (8.7 to 9.5), limit 8 deg"``."""
         unit, factor = self.shown
         if not all(map(isfinite, self.largest)):
-            return f"{LIMITED[self.name].label} not known from so few peaks"
+            return f"{LIMITED[self.name].label} unknown: too few peaks"
         value, low, high = (factor * number for number in self.largest)
         what = f"{LIMITED[self.name].label} {value:.3g} {unit}".rstrip()
         return f"{what} ({low:.3g} to {high:.3g}), limit {factor * self.limit:.3g} {unit}".rstrip()
@@ -257,7 +257,7 @@ class Assessment(Tabular, Drawn):
         if not unusable:
             return ""
         axes = listed([axis for axis in AXES if axis in unusable])
-        return f"It rests on the fit of the {axes}, which is not usable."
+        return f"It is based on the fit of the {axes}, which is not usable."
 
     def verdict(self) -> str:
         """Both answers on the assessed variant, and what would do if it fails."""
@@ -287,11 +287,11 @@ class Assessment(Tabular, Drawn):
         undecided = sum(bool(run.departure_reason and none.departure_reason) for run, none in pairs)
         if undecided:
             return (
-                f"{drives} makes {worse}; in {undecided} both leave the model, so that it is not "
-                "decided whether control harms: take a smaller sea."
+                f"{drives} makes {worse}; in {undecided} both leave the model, so whether control "
+                "harms is not decided: use a smaller sea."
             )
         return (
-            f"{drives} makes {worse}: that does not say whether it is more than the "
+            f"{drives} makes {worse}: too few to decide whether it is more than the "
             f"{100.0 * self.allowed_share_worse:g} % allowed. Run more seaways "
             f"({more_seaways(share.value, seaways, self.allowed_share_worse)})."
         )
@@ -304,7 +304,7 @@ class Assessment(Tabular, Drawn):
         beyond = [quantity.words() for quantity in limited if quantity.within == "no"]
         undecided = [quantity.words() for quantity in limited if quantity.within == "not decided"]
         if self.sufficient == "yes":
-            return "It suffices: in 3 h all stays within its limits."
+            return "It suffices: in 3 h all quantities stay within their limits."
         if self.sufficient == "no":
             departures = sum(self.departures(self.assessed_variant).values())
             causes = beyond or [f"it leaves the model in {count(departures, 'seaway')}"]
@@ -316,10 +316,10 @@ class Assessment(Tabular, Drawn):
     def remedy_sentences(self) -> list[str]:
         """What would do, or that nothing that was tried would; none if nothing was."""
         if self.tried and not self.remedies:
-            return [f"None of these would do: {listed(self.tried)}."]
+            return [f"None of these is sufficient: {listed(self.tried)}."]
         sentences = [self._remedy_sentence(remedy) for remedy in self.remedies]
         if self.remedies and not any(remedy.passes for remedy in self.remedies):
-            sentences.append("Nothing that was tried surely does all that is asked.")
+            sentences.append("No change that was tried certainly meets all requirements.")
         return sentences
 
     def _remedy_sentence(self, remedy: Remedy) -> str:
@@ -330,7 +330,7 @@ class Assessment(Tabular, Drawn):
             if remedy.sufficient == "no":
                 beyond = "; ".join(remedy.beyond)
                 return f"{what} may do no harm, but would not suffice: in 3 h {beyond}."
-            return f"{what} may do: run more seaways ({more})."
+            return f"{what} may be sufficient: run more seaways ({more})."
         if remedy.passes:
             return f"{what} would do."
         if remedy.sufficient == "not decided":
@@ -489,7 +489,9 @@ class Assessment(Tabular, Drawn):
         for name in self.names:
             for reason, seaways in self.departures(name).items():
                 of = count(len(study.seeds), "seaway")
-                sentences.append(f"'{name}' is not an operation in {seaways} of {of}: {reason}.")
+                sentences.append(
+                    f"'{name}' is not a valid operation in {seaways} of {of}: {reason}."
+                )
         if self.tipping_points is not None:
             sentences += [point.words() for point in self.tipping_points] or [NO_TIPPING_POINT]
         sentences += study.seaway.sentences()
@@ -502,8 +504,8 @@ class Assessment(Tabular, Drawn):
         none = study.cases[NONE]
         start = "a stationary swing" if none.swing_damping > 0.0 else "rest, as it is undamped"
         rule = (
-            f"Each seaway counts for {study.length:g} s after {study.run_in:g} s from {start}. "
-            "Control harms if it is worse than none in more than "
+            f"Each seaway is evaluated for {study.length:g} s after {study.run_in:g} s from "
+            f"{start}. Control harms if it is worse than none in more than "
             f"{100.0 * self.allowed_share_worse:g} % of them; the 95 % interval of that share "
             "decides."
         )

@@ -56,7 +56,7 @@ class Followable(Drawn):
         largest = Table("Largest sine an axis can follow", heads)
         for period, amplitudes in zip(self.periods.tolist(), self.amplitude.tolist(), strict=True):
             largest.add(period, *amplitudes)
-        demands = Table("What seas ask, significant amplitudes", [Column("sea"), *heads])
+        demands = Table("Demand of the seas, significant amplitudes", [Column("sea"), *heads])
         for name, demand in self.seas.items():
             demands.add(name, demand.period, *demand.amplitude)
         return [largest, demands]

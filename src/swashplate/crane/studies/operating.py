@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 HEADINGS = tuple(range(0, 360, 45))
-"""Headings of the waves by default, as likely as each other. [deg]"""
+"""Headings of the waves by default, equally likely. [deg]"""
 NEAR = 1.3
 """Factor on a limit, and from it, within which the frequency domain is not relied on."""
 SEEDS = (0, 1)
@@ -156,14 +156,14 @@ class Operability(Tabular):
         headings = listed([f"{heading:g}" for heading in self.headings])
         sentences = [
             self.case,
-            f"Headings as likely as each other: {headings} deg.",
+            f"Equally likely headings: {headings} deg.",
             f"Of {every} cells {simulated} were simulated or lie beyond one that was; the others "
             "are from the frequency domain.",
         ]
         height, period, heading = self.hoist_limit
         if np.isfinite(height):
             sentences.append(
-                f"The hoist is slower than the hook moves up and down from {height:.2g} m on, at "
+                f"The hoist is slower than the hook's vertical motion from {height:.2g} m on, at "
                 f"{period:g} s and a heading of {heading:g} deg."
             )
         if self.scatter.note:
@@ -198,7 +198,7 @@ def operability(
     scatter : Scatter
         Seas and their shares of the year.
     headings : sequence of float
-        Of the waves, as likely as each other. [deg]
+        Of the waves, equally likely. [deg]
     drives
         As of `assess`.
     sea : Seaway, optional
@@ -220,13 +220,13 @@ def operability(
             'side_lead = { value = 4, unit = "deg" }.'
         )
     if not headings:
-        raise InputError("Operability needs one heading of the waves at least.")
+        raise InputError("Operability needs at least one heading of the waves.")
     base = Seaway() if sea is None else sea
     study = Study.of(crane, control, sea=base, drives=drives, **{"seeds": SEEDS, **options})
     if study.length < SHORTEST:
         raise InputError(
             f"A sea is simulated for {study.length:g} s, but its largest values in three hours "
-            f"need {SHORTEST:g} s at least."
+            f"need at least {SHORTEST:g} s."
         )
     for height, period in zip(scatter.height.tolist(), scatter.period.tolist(), strict=True):
         replace(base, sea=Spectrum(height, period, base.spectrum.peak_factor))  # or it is refused

@@ -147,14 +147,14 @@ def linear_response(
     settings, controller, _ = stages_of(control)
     if controller is not None:
         raise InputError(
-            "The frequency domain knows delayed feedback and ship compensation, not the "
+            "The frequency domain supports delayed feedback and ship compensation, not the "
             f"user-defined controller {controller.model.name}: simulate it."
         )
     damping = crane.swing_damping if swing_damping is None else swing_damping
     if damping <= 0.0 and settings.feedback <= 0.0 and not settings.ship:
         raise InputError(
-            "Without damping the swing in waves grows without end: swing_damping must be above 0, "
-            "as 0.005."
+            "Without damping the swing in waves grows without bound: swing_damping must be above "
+            "0, as 0.005."
         )
     home = crane.home(slew_deg, boom_deg, rope_m)
     g = crane.geometry

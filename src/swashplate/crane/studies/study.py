@@ -222,22 +222,25 @@ class Study(Result):
         if isinstance(seeds, int):
             raise InputError(f"seeds is {seeds}, but must be a sequence, as range({seeds}).")
         if not (controllers and sets and seeds):
-            raise InputError("A study needs a controller, a set of drives and a seed at least.")
+            raise InputError(
+                "A study needs at least one controller, one set of drives and one seed."
+            )
         set_here = ("control", "actuation", "load_offset", "load_velocity")
         run_options = [name for name in RunOptions.__annotations__ if name not in set_here]
         keywords = ("seeds", "sea", "drives", "stick", "length", "run_in", *run_options)
         check_names("A study has no", options, keywords, "it has")
         if not (length >= SHORTEST and run_in >= 0.0):
             raise InputError(
-                f"A run counts for {length:g} s after a run-in of {run_in:g} s, but must count for "
-                f"at least {SHORTEST:g} s, eight swings, after a run-in of 0 s or more."
+                f"A run is evaluated for {length:g} s after a run-in of {run_in:g} s, but must be "
+                f"evaluated for at least {SHORTEST:g} s, eight swings, after a run-in of 0 s or "
+                "more."
             )
         if stick is None:
             stick = OperatorCommand.rest(run_in + length)
         elif stick.length < run_in + SHORTEST:
             raise InputError(
-                f"The stick is {stick.length:g} s long, but a run counts from {run_in:g} s on for "
-                f"at least {SHORTEST:g} s: take a longer stick, or a shorter run_in."
+                f"The stick is {stick.length:g} s long, but a run is evaluated from {run_in:g} s "
+                f"on for at least {SHORTEST:g} s: use a longer stick, or a shorter run_in."
             )
         pose: Any = {"slew_deg": 90.0, "boom_deg": 45.0, "rope_m": 27.0, **options}
         none = Case((crane,), pose | {"control": None, "actuation": "inverse"}, stick)

@@ -107,8 +107,8 @@ def not_lowered(node: ast.AST) -> TypeError:
     What users write is checked by `language` long before, in sentences.
     """
     return TypeError(
-        f"'{ast.unparse(node)}' has no counterpart in LLVM's language here: generate other text, "
-        "or teach it to swashplate.equations.code_generation.lowering."
+        f"'{ast.unparse(node)}' cannot be lowered to LLVM: generate other text, or add it to "
+        "swashplate.equations.code_generation.lowering."
     )
 
 

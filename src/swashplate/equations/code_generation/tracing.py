@@ -115,7 +115,7 @@ class Trace:
         """What an equation returns, and not what might stand for it."""
         source = callee.source
         if callee in self.under_way:
-            source.refuse(None, "a call of itself", "write a loop over a literal range")
+            source.refuse(None, "a recursive call", "write a loop over a literal range")
         values: dict[str, Value] = {}
         for argument in source.arguments:
             name = argument.arg
@@ -324,7 +324,7 @@ class _Tracer:
     def select(self, at: ast.AST, test: Node, if_true: Value, if_false: Value) -> Value:
         """The value of one of two ways."""
         if not alike(if_true, if_false):
-            self.refuse(at, "results of different structure", "give the same tuple on every way")
+            self.refuse(at, "results of different structure", "give the same tuple on every path")
         pairs = zip(leaves(if_true), leaves(if_false), strict=True)
         choices = (self.trace.noted(choose(test, a, b)) for (_, a), (_, b) in pairs)
         return rebuilt(if_true, choices)
@@ -384,8 +384,8 @@ class _Tracer:
                 return self.names[name]
             case ast.Name(id=name):
                 if name in self.local:
-                    instead = "give it a value on every way"
-                    self.refuse(node, f"{name} without a value on some way", instead)
+                    instead = "give it a value on every path"
+                    self.refuse(node, f"{name} without a value on some path", instead)
                 return self.constant(node, name, self.outside(node))
             case ast.Attribute():
                 return self.field(node)
@@ -428,7 +428,7 @@ class _Tracer:
         value = fixed(constant)
         if value is None:
             what = f"{text}, which is {type(constant).__name__}"
-            self.refuse(node, what, "of what stands outside, an equation reads numbers only")
+            self.refuse(node, what, "from outside, an equation reads only numbers")
         return value
 
     def field(self, node: ast.Attribute) -> Value:
@@ -447,9 +447,9 @@ class _Tracer:
         """Value of an element of a tuple."""
         index, value = self.scalar(node.slice), self.value(node.value)
         if index.op != "number" or index.kind != "int":
-            self.refuse(node.slice, "an index that is no whole number", "write the number")
+            self.refuse(node.slice, "an index that is not a whole number", "write the number")
         if not isinstance(value, Tuple) or not -len(value.items) <= index.value < len(value.items):
-            self.refuse(node, f"the element {index.value}, which is not there", "count from 0")
+            self.refuse(node, f"the element {index.value}, which does not exist", "count from 0")
         element: Value = value.items[index.value]
         return element
 

@@ -67,7 +67,7 @@ class Observation:
         if bad.any():
             raise InputError(
                 f"{what}: value or weight is not finite, or the weight negative, at sample "
-                f"{int(np.argmax(bad))}; give weight 0 to samples that are not to count."
+                f"{int(np.argmax(bad))}; give weight 0 to samples that are to be ignored."
             )
         alike = weight.size > 0 and weight.min() == weight.max()
         weight = _alike(float(weight[0]), weight.size) if alike else np.array(weight)

@@ -117,8 +117,8 @@ class PartCode:
         numbers = tuple(path for path, n in leaves(self.following) if n.kind in ("float", "int"))
         if cls is not own.state or numbers != floats_of(own.state):
             raise InputError(
-                f"Model {own.name}: {plain(own.step).__name__} must return a "
-                f"{own.state.__name__} of numbers on every way."
+                f"Model {own.name}: {plain(own.step).__name__} must return a {own.state.__name__} "
+                "of numbers on every path."
             )
 
     def fresh(self, stem: str) -> str:

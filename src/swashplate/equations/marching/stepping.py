@@ -208,8 +208,8 @@ def stored_of(model: Model, outputs: Sequence[str]) -> tuple[SignalId, ...]:
         stored, integral = output_of(model, output)
         if integral:
             raise InputError(
-                f"{output} is the integral of {stored.path}, and not known within a step: take "
-                f"{stored.path} and add it up in the loop."
+                f"{output} is the integral of {stored.path}, which is not known within a step: use "
+                f"{stored.path} and integrate it in the loop."
             )
         ids.append(stored)
     return tuple(ids)

@@ -392,7 +392,7 @@ def _of_readings(stage: StageFit, name: str) -> Iterator[CandidateCause]:
         most=LATEST,
         freed=partial(read, _late),
         states=lambda size: f"{name} is {_time(abs(size))} {'late' if size > 0.0 else 'early'}",
-        advice="compare its clock with that of the command, and look for a delay of the machine",
+        advice="compare its clock with that of the command, and check for a delay of the machine",
     )
     yield CandidateCause(
         name=f"lag of {name}",
@@ -413,7 +413,7 @@ def _of_readings(stage: StageFit, name: str) -> Iterator[CandidateCause]:
             f"{name} {'rises' if size > 0.0 else 'falls'} by {percent(abs(size))} from the first "
             "run to the last"
         ),
-        advice="warm the oil as it is in use, and test again",
+        advice="warm the oil to its working temperature, and test again",
     )
     unit = channels[0].unit
     unit = unit if unit.endswith("/s") else f"{unit}/s"
@@ -427,7 +427,7 @@ def _of_readings(stage: StageFit, name: str) -> Iterator[CandidateCause]:
             most=np.inf,
             freed=partial(read, partial(_undone_loss, resisting=resisting)),
             states=partial(_lost_speed, unit, load),
-            advice="look for that load, and for a leaking motor",
+            advice="check for that load, and for a leaking motor",
         )
 
 
@@ -459,7 +459,7 @@ def _of_commands(stage: StageFit) -> Iterator[CandidateCause]:
         most=LATEST,
         freed=partial(_with_command, stage, _lagging),
         states=lambda size: f"the command lags by {_time(size)} on its way to the amplifier",
-        advice="look for a filter or delay there",
+        advice="check for a filter or delay there",
     )
 
 
@@ -477,7 +477,7 @@ def _of_numbers(stage: StageFit) -> Iterator[CandidateCause]:
             f"spool and solenoids have a friction or hysteresis of ±{1e3 * size:.3g} mA, "
             f"{percent(size / largest)} of the largest current"
         ),
-        advice=f"look at the dither; let the fit setup estimate {name}",
+        advice=f"check the dither; let the fit setup estimate {name}",
         free=name,
     )
     numbers = stage.parameters.numbers

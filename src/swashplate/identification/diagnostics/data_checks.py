@@ -112,9 +112,9 @@ def unfitted_currents(experiments: Sequence[Experiment], setup: FitSetup) -> lis
         warning(
             None,
             name,
-            f"'{name}' is measured, but no stage fits it, so that the amplifier is not known: let "
-            "'swashplate guess' write a start and a fit setup whose first stage fits the "
-            "amplifier to it, and give them by --from and --setup.",
+            f"'{name}' is measured, but no stage fits it, so the amplifier is not known: let "
+            "'swashplate guess' write an initial drive and a fit setup whose first stage fits the "
+            "amplifier to it, and give them as --from and --setup.",
         )
         for name in unfitted
     ]
@@ -175,8 +175,8 @@ def _unchanging(run: Experiment, names: Sequence[str]) -> Iterator[Finding]:
             yield warning(
                 run.name,
                 name,
-                f"{run.name}: '{name}' never changes, though the input does and it moves in other "
-                "runs; look at the sensor, or ignore the channel in this run.",
+                f"{run.name}: '{name}' never changes, although the input does and it moves in "
+                "other runs; check the sensor, or ignore the channel in this run.",
             )
 
 
@@ -204,7 +204,7 @@ def refuse_unsound(
         others = len(refused) - 1
         remark = ""
         if others:
-            remark = f" ({others} more finding{'s' if others > 1 else ''} of this weight.)"
+            remark = f" ({others} more finding{'s' if others > 1 else ''} of this severity.)"
         raise error(refused[0].sentence + remark)
     return tuple(finding.sentence for finding in findings)
 
@@ -242,7 +242,7 @@ def _samples(experiment: Experiment, fitted: Collection[str]) -> Iterator[Findin
         yield refusal(
             run,
             None,
-            f"{run}: its input is not finite at sample {int(np.argmax(bad))}; mend the log or "
+            f"{run}: its input is not finite at sample {int(np.argmax(bad))}; correct the log or "
             "cut the run with a span.",
         )
         return
@@ -257,15 +257,15 @@ def _samples(experiment: Experiment, fitted: Collection[str]) -> Iterator[Findin
                 run,
                 name,
                 f"{run}: '{name}' is not finite in {samples}, the first at "
-                f'{channel.time[np.argmax(bad)]:.6g} s; say missing = "drop", or ignore a '
+                f'{channel.time[np.argmax(bad)]:.6g} s; write missing = "drop", or ignore a '
                 "window, the channel or the run.",
             )
         elif used < 2:
             yield refusal(
                 run,
                 name,
-                f"{run}: '{name}' has {count(used, 'sample')} that can count, which shows no "
-                'motion; leave the run out with role = "ignore".',
+                f"{run}: '{name}' has {count(used, 'sample')} in use, too few to show "
+                'a motion; leave the run out with role = "ignore".',
             )
 
 
@@ -278,7 +278,7 @@ def _idle_commands(experiments: Sequence[Experiment], nominal: ParameterSet) -> 
             clauses[run.name] = clause
     if not clauses or len(clauses) < len(experiments):
         return [
-            warning(name, None, f"{name}: its command {clause}; it shows the drive at rest only.")
+            warning(name, None, f"{name}: its command {clause}; it shows the drive only at rest.")
             for name, clause in clauses.items()
         ]
     first, clause = next(iter(clauses.items()))
@@ -393,9 +393,9 @@ def _still(name: str, runs: Sequence[SimulatedReadings]) -> Iterator[Finding]:
             yield refusal(
                 readings.run,
                 name,
-                f"{readings.run}: '{name}' never changes, though the drive should move it by about "
-                f"{simulated_range:.3g} {unit}; look at the sensor, and ignore the channel in this "
-                "run.",
+                f"{readings.run}: '{name}' never changes, although the drive should move it by "
+                f"about {simulated_range:.3g} {unit}; check the sensor, and ignore the channel in "
+                "this run.",
             )
         elif channel.is_position:
             yield from _frozen(name, readings, DEAD * fastest)
@@ -412,9 +412,9 @@ def _frozen(name: str, readings: SimulatedReadings, least: float) -> Iterator[Fi
             yield warning(
                 readings.run,
                 name,
-                f"{readings.run}: '{name}' stands still from {begin:.4g} to {end:.4g} s, though "
-                "the drive should move it; look at the sensor and at the machine's stops, and "
-                "ignore that window.",
+                f"{readings.run}: '{name}' does not move from {begin:.4g} to {end:.4g} s, although "
+                "the drive should move it; check the sensor and the machine's stops, and ignore "
+                "that window.",
             )
             return
 
@@ -426,8 +426,8 @@ def contradictions(name: str, runs: Sequence[SimulatedReadings]) -> Iterator[Fin
         yield refusal(
             None,
             name,
-            f"In all {len(runs)} runs '{name}' goes against the command: reverse it with "
-            "sign = -1 in its channel, or the input's.",
+            f"In all {len(runs)} runs '{name}' moves opposite to the command: reverse it with sign "
+            "= -1 in its channel, or the input's.",
         )
         return
     others = "" if len(runs) == 1 else ", in the other runs with it"
@@ -439,7 +439,7 @@ def contradictions(name: str, runs: Sequence[SimulatedReadings]) -> Iterator[Fin
         yield refusal(
             readings.run,
             name,
-            f"In {readings.run} '{name}' goes against the command{others}: reverse it with "
+            f"In {readings.run} '{name}' moves opposite to the command{others}: reverse it with "
             'sign = -1 for this run, or leave the run out with role = "ignore".',
         )
     yield from _far_off_gains(name, along)
@@ -508,10 +508,9 @@ def clipped_channels(experiments: Sequence[Experiment]) -> Iterator[Finding]:
                 yield refusal(
                     None,
                     name,
-                    f"'{name}' stands at exactly {end:.6g} {runs[0][name].unit} at inputs that "
-                    f"differ by {moved:.3g} {runs[0].input.unit}: it is clipped there. "
-                    f"Set limits = [{low:.6g}, {high:.6g}] in its channel, and such samples are "
-                    "ignored.",
+                    f"'{name}' reads exactly {end:.6g} {runs[0][name].unit} at inputs that differ "
+                    f"by {moved:.3g} {runs[0].input.unit}: it is clipped there. Set limits = "
+                    f"[{low:.6g}, {high:.6g}] in its channel, and such samples are ignored.",
                 )
 
 
@@ -556,7 +555,9 @@ def check_rank(where: str, problem: Problem) -> list[Finding]:
     exact = isinstance(problem.model, EquationModel)  # any other may take minutes
     if exact and not problem.evaluate(problem.start).jacobian.any():
         said = f"no run depends on any of {', '.join(unknowns.names[:NAMED])}; free what the runs "
-        return [refusal(None, None, f"{where}: {said}exercise, or test what exercises these.")]
+        return [
+            refusal(None, None, f"{where}: {said}exercise, or add a test that exercises these.")
+        ]
     return []
 
 

@@ -233,7 +233,7 @@ def _sentence(
 ) -> str:
     """What is wrong with a run, if that can be found out, and the line to write."""
     fault = (
-        f"{record.run}: '{channel}' is {times:.2g} times as far from what is simulated as in the "
+        f"{record.run}: '{channel}' is {times:.2g} times as far from the simulation as in the "
         "other runs"
     )
     measured, simulated = _motion(record)
@@ -243,15 +243,15 @@ def _sentence(
     if span is not None:
         first, last = span
         return (
-            f"{fault}: it stands still from {first:.4g} to {last:.4g} s. Look at the sensor; "
-            f"ignore this window, or {ignored}."
+            f"{fault}: it does not move from {first:.4g} to {last:.4g} s. Check the sensor; ignore "
+            f"this window, or {ignored}."
         )
     delay, mean_square_delayed = _delayed(record, measured, simulated)
     if mean_square_delayed < EXPLAINED * mean_square:
         side = "late" if delay > 0.0 else "early"
         return (
-            f"{fault}: it comes {1e3 * abs(delay):.3g} ms {side} beside its command. Look at the "
-            f"logger's clock in this run, shift the log, or {ignored}."
+            f"{fault}: it comes {1e3 * abs(delay):.3g} ms {side} relative to its command. Check "
+            f"the logger's clock in this run, shift the log, or {ignored}."
         )
     gain = float(measured @ simulated) / float(simulated @ simulated or 1.0)
     if np.mean((gain * simulated - measured) ** 2) < EXPLAINED * mean_square:

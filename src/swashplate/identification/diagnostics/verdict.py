@@ -119,7 +119,7 @@ class Verdict(Result):
             return f"Not usable, as the data are not sound: {self.unsound[0].sentence}{more}"
         error = self.error
         if error is None:
-            return "Not usable: no channel moves, so that no prediction can be judged."
+            return "Not usable: no channel moves, so no prediction can be assessed."
         within = f"{error.signal} within {percent(error.worst.error)} of its range"
         if not self.predicts:
             return (
@@ -135,7 +135,7 @@ class Verdict(Result):
         if self.unsound:
             return f"Not sound: {' '.join(finding.sentence for finding in self.unsound)}"
         if not self.fitted:
-            return "Not judged: a drive that was not fitted to these runs says little of them."
+            return "Not assessed: a drive that was not fitted to these runs says little about them."
         return "Sound: no run stands out from the others, none is clipped."
 
     @property
@@ -179,10 +179,13 @@ class Verdict(Result):
         if self.causes is None:
             return ""
         if not self.causes:
-            return "No single thing that was tried explains half of it; the runs' curves show when."
+            return (
+                "No single cause that was tried explains half of it; the curves of the runs show "
+                "when it occurs."
+            )
         causes = "; ".join(cause.words for cause in self.causes)
         if len(self.causes) > 1:
-            return f"one of these, which these data do not tell apart: {causes}."
+            return f"one of these, which these data cannot distinguish: {causes}."
         return f"{causes}."
 
     def answers(self) -> dict[str, str]:

@@ -59,8 +59,8 @@ def settle(
     costs = _costs(runs, nominal, setup, loss, threads)
     if costs is None:
         return joined(runs, "linear"), (
-            "The command is taken as a straight line between samples, which was not tried: state "
-            f"interpolation in [axes.{runs[0].axis}.input] if it is held.",
+            "The command is taken as a straight line between samples, without trying others: "
+            f"state interpolation in [axes.{runs[0].axis}.input] if it is held.",
         )
     better = min(costs, key=lambda between: costs[between])
     if _smaller(costs[better], max(costs.values())) < ALIKE:

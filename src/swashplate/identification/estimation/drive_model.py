@@ -266,7 +266,7 @@ def with_card_filter(
         return fitted, changed
     return fitted, (
         f"zeta, omega and C belong to a recursion at {fitted.rate:g} Hz, as the fit setup "
-        'asks for by card_filter = "recursion": they are not those of the card\'s filter, which '
+        'requires by card_filter = "recursion": they are not those of the card\'s filter, which '
         "`Drive.at_every_rate` gives.",
     )
 
@@ -290,8 +290,8 @@ def at_rate_of(
         if abs(rate / own - 1.0) > OTHER_RATE:
             return at_every_rate(parameters), (
                 f"{run.name} is simulated at {rate:.4g} Hz, but the card's filter of "
-                f"{parameters.name} is a recursion for {own:g} Hz: the fit takes the "
-                "differential equation with the same poles, which holds at every rate.",
+                f"{parameters.name} is a recursion for {own:g} Hz: the fit takes the differential "
+                "equation with the same poles, which is valid at every rate.",
             )
     return parameters, ()
 

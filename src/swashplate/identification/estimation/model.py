@@ -153,7 +153,7 @@ def _check(outputs: object, experiment: Experiment, names: int | None = None) ->
                 raise refused(f"a NumPy array of real numbers for {name}", array)
             shape = experiment[name].time.shape + ((names,) if k else ())
             if array.shape != shape:
-                columns = ", and a column for each name asked for" if k else ""
+                columns = ", and a column for each requested name" if k else ""
                 raise InputError(
                     f"{experiment.name}: {method} returns an array of shape {array.shape} for "
                     f"{name}, but must return {shape}: a row for each of the channel's own time "

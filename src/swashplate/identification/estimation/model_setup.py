@@ -111,7 +111,7 @@ class ModelSetup(Result):
     def _check_free_and_fixed(self, name: str) -> None:
         """Refuse a setup without anything free, or with a name in two tables."""
         if not self.free:
-            raise InputError(f"Nothing of {name} is free: name what is to be found.")
+            raise InputError(f"Nothing of {name} is free: name the parameters to estimate.")
         without_value = [key for key in self.standard_uncertainty if key not in self.fixed]
         if without_value:
             raise InputError(
@@ -149,8 +149,8 @@ class ModelSetup(Result):
         except SystemExit as error:
             sys.modules.pop(file.stem, None)
             raise FileError(
-                f"{path} ended Python with sys.exit({error.code!r}) as it was loaded: guard what "
-                "the file does as a script by if __name__ == '__main__'."
+                f"{path} ended Python with sys.exit({error.code!r}) when it was loaded: guard the "
+                "part of the file that runs as a script by if __name__ == '__main__'."
             ) from None
         except Exception as error:  # the user's own code, which can raise anything
             sys.modules.pop(file.stem, None)

@@ -128,8 +128,8 @@ class Problem(Result):
                 raise InputError(f"A fit needs at least one {what}.")
         if not self.samples:
             raise InputError(
-                f"No sample of {', '.join(self.channels) or 'any channel'} counts: all are ignored "
-                "or there are none."
+                f"No sample of {', '.join(self.channels) or 'any channel'} is used: all are "
+                "ignored or there are none."
             )
 
     @property
@@ -475,8 +475,8 @@ class LinearisedFit(Result):
         if spare < 1:
             had, wanted = count(self.samples, "sample"), count(self.rank, "parameter")
             raise InputError(
-                f"{had} for {wanted} leave nothing to estimate the noise from; take more samples "
-                "or fewer parameters."
+                f"{had} for {wanted} leave nothing to estimate the noise from; use more samples or "
+                "fewer parameters."
             )
         return spare
 
@@ -585,8 +585,8 @@ def linearised_fit(problem: Problem, vector: Array, loss: Loss = "linear") -> Li
         slope = float(np.mean(np.concatenate([slopes for _, slopes in parts] or [np.ones(1)])))
         if not slope > 0.0:
             raise InputError(
-                f"Most residuals of {name} lie in the tails of the loss '{loss}', which says "
-                "nothing of them: state a larger noise for it, or take the loss 'linear'."
+                f"Most residuals of {name} lie in the tails of the loss '{loss}', which gives them "
+                "almost no weight: state a larger noise for it, or use the loss 'linear'."
             )
         for k, (bounded, _) in zip(mine, parts, strict=True):
             runs[k] = runs[k]._replace(residual=bounded / slope)

@@ -41,7 +41,7 @@ def rising(pair: tuple[float, float]) -> tuple[float, float]:
     """A pair of bounds; refused, in a ValueError, unless the lower one stands first."""
     if pair[0] < pair[1]:
         return pair
-    turned = "leaves nothing between its ends"
+    turned = "is empty: both ends are equal"
     if pair[0] > pair[1]:
         turned = f"must rise: write [{pair[1]:g}, {pair[0]:g}]"
     raise ValueError(f"[{pair[0]:g}, {pair[1]:g}] {turned}")
@@ -55,7 +55,7 @@ class Free(FileTable):
 
     relative: Bounds | None = Field(None, description="Bounds as factors on the nominal value.")
     bounds: Bounds | None = Field(None, description="Bounds in SI units.")
-    log: Flag = Field(False, description="Move the logarithm: for positive numbers.")
+    log: Flag = Field(False, description="Estimate the logarithm: for positive values.")
     tied: Flag = Field(False, description="One value for both directions.")
     prior: Prior | None = Field(None, description="A normal distribution, of the logarithm if log.")
 
@@ -149,36 +149,37 @@ class Stage(FileTable):
 
     name: str
     part: Literal["card", "pump", "chain", "model"] = Field(
-        description="What is simulated: the control card, pump and motor, the whole chain; 'model' "
+        description="Simulated part: the control card, pump and motor, the complete chain; 'model' "
         "is for user-defined models, given by --model."
     )
     current: Literal["simulated", "measured"] = Field(
         "simulated",
-        description="What drives the pump alone: the fitted card's current, or what was measured: "
-        "the input, where that is a current, or else the channel of the current, an ammeter around "
-        "both leads with the command's sign.",
+        description="Current that drives the pump alone: that of the fitted card, or the "
+        "measured one: the input if it is a current, otherwise the channel of the current, an "
+        "ammeter around both leads with the command's sign.",
     )
     current_scale: Positive = Field(1.0, description="Factor on the measured current.")
     current_hysteresis: NotNegative = Field(
         0.0005,
-        description="Hysteresis that the dither leaves of solenoids and spool, as a full width of "
-        "the current, a standard uncertainty [A], which intervals take in; not if the drive has "
-        "friction or hysteresis of its own.",
+        description="Hysteresis of solenoids and spool that remains with dither, as a full width "
+        "of "
+        "the current: a standard uncertainty [A] that intervals include, unless the drive models "
+        "friction or hysteresis.",
     )
     channels: tuple[ChannelKind, ...] = Field((), description="Kinds to fit; all if empty.")
     free: dict[str, Free] = Field(min_length=1)
     forces: Forces | None = None
     weights: dict[ChannelKind, tuple[WeightWindow, ...]] = Field(
-        {}, description="Windows that count more or less, besides those of the campaign."
+        {}, description="Windows with another weight, in addition to those of the campaign."
     )
     weights_by_input: dict[ChannelKind, tuple[InputWeight, ...]] = Field(
-        {}, description="Weights by the size of the command, besides those of the campaign."
+        {}, description="Weights by the size of the command, in addition to those of the campaign."
     )
     start_pressure: Positive | None = Field(
         None,
         le=LARGEST_PRESSURE,
-        description="Largest stroking pressure at the first sample, free in each run [Pa]; where "
-        "none is given, it is free in runs with start = 'estimated' alone.",
+        description="Largest stroking pressure at the first sample, free in each run [Pa]; if "
+        "none is given, it is free only in runs with start = 'estimated'.",
     )
 
     @model_validator(mode="after")
@@ -196,7 +197,7 @@ class Stage(FileTable):
         """
         name = unknown.name
         if self.part == "model":
-            return f"to let it go on, widen '{name}' in free of the model and fit again"
+            return f"to extend the search, widen '{name}' in free of the model and fit again"
         if self.forces is not None and name in self.forces.names:
             where = "relative under [stages.forces]"
         else:
@@ -205,7 +206,7 @@ class Stage(FileTable):
             if unknown.high >= limits.upper if side > 0 else unknown.low <= least:
                 return f"the {'greatest' if side > 0 else 'least'} value that it may have"
             where = f"{name if name in self.free else _symbol(name)} under [stages.free]"
-        return f"to let it go on, widen {where} of the stage '{self.name}' and fit again"
+        return f"to extend the search, widen {where} of the stage '{self.name}' and fit again"
 
 
 class FitSetup(FileTable):
@@ -215,13 +216,13 @@ class FitSetup(FileTable):
     stages: tuple[Stage, ...] = Field(min_length=1)
     standard_uncertainty: dict[str, StandardUncertainty] = Field(
         {},
-        description="Of parameters that stay fixed: a standard deviation of what their values may "
-        "be off by, in SI units or as '5 %' of the value; the intervals of all estimates take it "
-        "in. Both directions of a symbol are off together.",
+        description="Standard uncertainty of fixed parameters, in SI units or as '5 %' of "
+        "the value; the intervals of all estimates include it. Both directions of a symbol "
+        "deviate together.",
     )
     card_filter: Literal["equation", "recursion"] = Field(
         "equation",
-        description="The filter of a card whose set states a recursion for one rate, as the "
+        description="Filter of a card whose set states a recursion for one rate, as the "
         "packaged ones do: the differential equation with the same poles, as real cards have it, "
         "or the recursion, to which published zeta and omega belong.",
     )
@@ -237,7 +238,7 @@ class FitSetup(FileTable):
                 if free or (stage.forces is not None and symbol in COEFFICIENTS):
                     raise ValueError(
                         f"{name} is free in the stage '{stage.name}': only what stays fixed has a "
-                        "standard_uncertainty; what is known of a free parameter is its prior"
+                        "standard_uncertainty; for a free parameter state a prior"
                     )
         return self
 
@@ -252,7 +253,7 @@ class FitSetup(FileTable):
             if stage.current_scale != 1.0:
                 raise ParameterError(
                     f"The stage '{stage.name}' is driven by {stage.current_scale:g} times the "
-                    "measured current, so no joint fit through the card can stand for it."
+                    "measured current, so a joint fit through the card cannot replace it."
                 )
             if twice := sorted(set(merged["free"]) & set(stage.free)):
                 raise ParameterError(f"{twice[0]} is free in two stages; a joint fit needs one.")

@@ -456,7 +456,7 @@ def _stored(
         if differing:
             raise FileError(
                 f"{path} belongs to another fit: its {' and '.join(differing)} differ. Resume with "
-                f"what it began with, or remove the folder {store}."
+                f"the original ones, or remove the folder {store}."
             )
         done[result.number] = result
     return done

@@ -115,7 +115,7 @@ def as_fit_setup(
     entries_given: object = free
     if not isinstance(entries_given, Mapping) or not entries_given:
         raise InputError(
-            f"What is free is {free!r}, but must be a fit setup, its name or file, or a "
+            f"The free parameters are {free!r}, but must be a fit setup, its name or file, or a "
             "mapping such as {'Z8': (0.5, 2)}."
         )
     if "stages" in free:
@@ -165,7 +165,8 @@ def setup_of(
     if name not in setup_names():
         raise InputError(
             f"There is no packaged fit setup for the drive '{name}': give a user-defined one, a "
-            ".toml file with stages and free parameters; 'swashplate guess' reads one off the logs."
+            ".toml file with stages and free parameters; 'swashplate guess' derives one from the "
+            "logs."
         )
     return load_setup(name)
 
@@ -274,8 +275,7 @@ def _channels_of(stage: Stage, experiments: Sequence[Experiment]) -> tuple[str, 
     if weighed and not fitted & set(weighed):
         raise InputError(
             f"The stage '{stage.name}' weighs {', '.join(weighed)}, but the runs have "
-            f"{', '.join(sorted(fitted))}: add weights for that, or take a fit setup "
-            "without."
+            f"{', '.join(sorted(fitted))}: add weights for that, or use a fit setup without."
         )
     return tuple(dict.fromkeys(name for name, kind in measured if kind in kinds))
 

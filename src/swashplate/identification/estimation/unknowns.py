@@ -113,7 +113,7 @@ class Unknown:
                 "first, are needed."
             )
         if not low <= self.start <= high:
-            hint = "; 'swashplate guess' reads those of a drive off its logs"
+            hint = "; 'swashplate guess' estimates those of a drive from its logs"
             raise ParameterError(
                 f"{name} begins at {self.start:g}, outside its bounds {low:g} and {high:g}; let "
                 f"the fit begin from another value{'' if isfinite(self.start) else hint}."
@@ -169,7 +169,9 @@ def bounded(
     which no factor moves, is refused in a `ParameterError`.
     """
     if factors is not None and nominal == 0.0:
-        raise ParameterError(f"{name} is nominally 0, which no factor moves: give absolute bounds.")
+        raise ParameterError(
+            f"{name} is nominally 0, which no factor changes: give absolute bounds."
+        )
     low, high = bounds or sorted(factor * nominal for factor in factors or ())
     return Unknown(name, max(nominal, least), max(low, least), high, **fields)
 

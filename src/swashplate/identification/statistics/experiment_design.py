@@ -321,8 +321,8 @@ def _of_residuals(
     noise = stated.noise * float(np.sqrt(np.mean(square)))
     if not NOISELESS * stated.noise < noise or noise > FARTHEST * largest:
         raise InputError(
-            f"The drive misses '{name}' by {100.0 * noise / largest:.2g} % of its range, so that "
-            "its residuals are not noise; give a drive that was fitted to these tests, or none."
+            f"The drive misses '{name}' by {100.0 * noise / largest:.2g} % of its range, so its "
+            "residuals are not noise; give a drive that was fitted to these tests, or none."
         )
     factor = factor_of(zip(runs, derivatives, strict=True), fit.variables)
     noisy = replace(fit, runs=tuple(runs), derivatives=derivatives, factor=factor)
@@ -448,7 +448,7 @@ def advise(
     for name, rows in (("the present", present), *((c.name, c.derivatives) for c in candidates)):
         if rows.ndim != 2 or rows.shape[1] != len(variables) or not np.isfinite(rows).all():
             raise InputError(
-                f"{name}: derivatives by {len(variables)} parameters are so many columns of "
+                f"{name}: derivatives by {len(variables)} parameters must be as many columns of "
                 f"finite numbers, not {rows.shape}."
             )
     free = variables.free

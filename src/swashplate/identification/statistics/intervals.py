@@ -326,7 +326,7 @@ class Uncertainty(Result):
             if colour.drifting:
                 sentences.append(
                     f"That is a large part of a run: residuals of {colour.channel} are model error "
-                    "or a spectral line rather than noise, of which intervals know little."
+                    "or a spectral line rather than noise, which intervals hardly cover."
                 )
         sentences += self.priors
         sentences += [_end_sentence(self.own.variables.names[end.number], end) for end in self.ends]
@@ -345,7 +345,7 @@ class Uncertainty(Result):
             return
         causes = ["the uncertainty of earlier stages"] if self.earlier_stages else []
         if self.systematic:
-            causes.append("what instruments, fixed parameters and the model may be off by")
+            causes.append("possible errors of instruments, fixed parameters and the model")
         wider = np.ones(known.size)
         wider[known] = self.quoted.standard_errors[known] / self.own.standard_errors[known]
         most = int(np.argmax(wider))

@@ -74,7 +74,7 @@ class Profile(Result):
         """What stands in the way of an interval, if anything does."""
         if self.better is not None:
             return (
-                f"The profile of {self.name} met a better optimum, cost {self.better.cost:.6g} "
+                f"The profile of {self.name} found a better optimum, cost {self.better.cost:.6g} "
                 f"against {self.cost:.6g}: fit again with --starts 20 (in Python search = "
                 "Search(20)).",
             )
@@ -85,7 +85,7 @@ class Profile(Result):
         }
         return tuple(
             f"{self.name} reaches {reasons[ending]} before the cost rises enough on its {side} "
-            "side: no end of the interval there."
+            "side: the interval has no end there."
             for side, ending in zip(("lower", "upper"), self.endings, strict=True)
             if ending in reasons
         )
@@ -109,7 +109,7 @@ def profile(
     """
     if not rise > 0.0:
         raise InputError(
-            "The residuals are exactly zero: there is no noise that a profile could weigh against."
+            "The residuals are exactly zero: there is no noise to compare a profile with."
         )
     optimum = Point(float(vector[index]), cost, vector)
     lower = side_of(minimise, optimum, index, rise, -step, bounds[0])

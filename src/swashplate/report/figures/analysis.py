@@ -512,7 +512,7 @@ def plot_compensation(
     legend = [handle("inverse map", INK), handle("straight line", GREY, "dashed")]
     if ax is not None:
         if improvement is not None:
-            raise InputError("The runs of an improvement need a figure of their own: leave out ax.")
+            raise InputError("The runs of an improvement need a separate figure: leave out ax.")
         axes = given_axes(ax, min(max(np.size(np.asarray(ax, dtype=object)), 1), 2), "panels")
         _draw_map(inverse, *axes)
         legend_within(axes[0], legend)

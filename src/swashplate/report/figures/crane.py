@@ -330,7 +330,7 @@ def _polar(result: Sweep, title: str, looks: dict[str, style.Stroke], *texts: st
 
 
 AXIS_LINES = ("hoist, up", "slew, across the boom", "luff, along the boom")
-DEMANDED = "diamonds: what holding the tip asks of each, filled if that is more than it has"
+DEMANDED = "diamonds: demand on each for holding the tip, filled if it exceeds the limit"
 APART = 0.006
 """Distance of the diamonds of the three axes, in parts of the abscissa."""
 LOWEST_DEMAND = 0.2

@@ -106,8 +106,8 @@ def plot_bode(
     ends = (response.input, response.output)
     if linear is not None and (linear.input, linear.outputs[0]) != ends:
         raise InputError(
-            f"The sweep leads from {response.input} to {response.output}, but the linear model "
-            f"from {linear.input} to {linear.outputs[0]}."
+            f"The sweep is from {response.input} to {response.output}, but the linear model from "
+            f"{linear.input} to {linear.outputs[0]}."
         )
     unit = response.units.get(response.input, "")
     looks = strokes(f"{amplitude:g} {unit}" for amplitude in response.amplitudes)

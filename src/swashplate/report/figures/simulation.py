@@ -551,7 +551,7 @@ def plot_comparison(simulations: Mapping[str, Simulation], *, title: str | None 
             difference = np.interp(at, run.time, run.shaft_speed) - first.shaft_speed[common]
             draw(axes[2], at, speed.factor * difference, color, dashes=dashes)
     if len(simulations) > 1:
-        label = f"speed less that of {reference}"
+        label = f"speed minus that of {reference}"
         write_words(axes[2], label, (0.0, 1.0), color=looks[reference].color)
     fit_time(axes[-1], *(simulation.time for simulation in simulations.values()))
     return figure

@@ -57,7 +57,7 @@ from swashplate.units import chosen_unit, show_rod, shown_in, unit_text
 
 MOST_PAIRS = 12
 """Correlations that are listed."""
-NO_FINDINGS = "The check of the logs finds nothing to look into."
+NO_FINDINGS = "The check of the logs has no findings."
 _PARTS = {
     "card": "the control card alone, from the command to the currents",
     "pump": "pump and motor, driven by the current",
@@ -255,8 +255,9 @@ def _agreement_section(
     agreement = [t for role in ("fit", "validate") for t in runs_tables(_qualities(runs, role))]
     words = (
         "RMSE is the root of the mean squared difference of the samples that count; NRMSE is RMSE "
-        "over the standard deviation of what was measured; fit % is 100 (1 − NRMSE). Error / range "
-        "is RMSE over the largest less the smallest value measured in all runs of that role."
+        "over the standard deviation of what was measured; fit % is 100 (1 − NRMSE). Error / "
+        "range is RMSE over the largest minus the smallest value measured in all runs of that "
+        "role."
     )
     measures = PageBlock("table", joined(agreement), "agreement")
     blocks = [
@@ -270,7 +271,7 @@ def _curves_section(runs: Sequence[ShownRun], virtual: bool) -> Section:
     measured = "virtual test" if virtual else "measured"
     words = (
         "Drag to zoom in time, Ctrl and wheel to zoom about the pointer, double-click for all of "
-        f"it. Residuals are simulated less {measured}. Grey stretches do not count."
+        f"it. Residuals are simulated minus {measured}. Grey stretches are ignored."
     )
     blocks = [text(words, "screen")]
     for number, run in enumerate(runs):
@@ -298,15 +299,16 @@ def _live_section(fit: Fit, campaign: Campaign, runs: Sequence[ShownRun]) -> Sec
         if can_run(drive, worst):
             shown = run_of(at_instants(drive, worst))
             page = live_page(drive, [shown], campaign.title, campaign.virtual, "drive.toml")
-            words = f"Sliders for every parameter beside {worst.name}"
+            words = f"Sliders for every parameter, next to {worst.name}"
             blocks = [PageBlock("live", page, words)]
     return Section("live", "Try other values", blocks)
 
 
 def _residual_section(runs: Sequence[ShownRun]) -> Section:
     words = (
-        "Correlation of the residuals with the input, positive lags where the residual comes after "
-        "it, and the 95 % band of residuals, coloured as these are, that have no relation to it."
+        "Correlation of the residuals with the input, positive lags where the residual comes "
+        "after it, and the 95 % band of residuals, coloured as these are, that are unrelated to "
+        "it."
     )
     heads = ("run", "role", "channel", "correlation with the input")
     table = Table("", tuple(map(Column, (*heads, "verdict"))))
@@ -373,7 +375,9 @@ def _stage_words(fit: StageFit) -> list[str]:
         words += [f"Weight on {kind.replace('_', ' ')}: {_window(window)}." for window in windows]
     of_runs = sum(unknown.run is not None for unknown in problem.unknowns)
     if of_runs:
-        words.append(f"Besides there are {of_runs} parameters of single runs, with wide bounds.")
+        words.append(
+            f"In addition, there are {of_runs} parameters of single runs, with wide bounds."
+        )
     return words
 
 
@@ -423,7 +427,7 @@ def _parameter_section(fit: Fit, stages: Sequence[StageFit], truth: ParameterSet
         inside, counted = truth_count(estimates)
         blocks.append(
             text(
-                "Truth is what was simulated. Fixed parameters that are not true shift the "
+                "Truth is the simulated value. Fixed parameters with other values shift the "
                 f"estimates. {inside} of {counted} intervals contain it."
             )
         )
@@ -463,7 +467,7 @@ def _identifiability_section(stages: Sequence[StageFit]) -> Section:
             )
         if directions.rows:
             blocks.append(PageBlock("table", directions, "directions"))
-        blocks.append(PageBlock("heading", "What the intervals rest on", "h4"))
+        blocks.append(PageBlock("heading", "Basis of the intervals", "h4"))
         try:
             blocks += listed_block(uncertainty_of(stage).sentences())
         except InputError as error:
@@ -542,9 +546,9 @@ def _folds_section(folds: CrossValidation | None, stages: Sequence[StageFit]) ->
         return Section("folds", "Cross-validation", [])
     held_out, fold_tables = folds_tables(folds, stages)
     words = (
-        f"The runs were dealt into {folds.planned} folds, kinds of test and directions apart (seed "
-        f"{folds.seed}). Each fold was predicted from the command alone by a fit to the others "
-        "that began at the nominal values."
+        f"The runs were assigned to {folds.planned} folds, with kinds of test and directions "
+        f"spread over them (seed {folds.seed}). Each fold was predicted from the command alone by "
+        "a fit to the others that began at the nominal values."
     )
     blocks = [
         text(words),

@@ -162,8 +162,7 @@ def numbers_table(drive: Drive, stages: Sequence[StageFit]) -> tuple[Table, list
         table.add(words, *cells, unit=unit, spec=".3f")
     if stages and assumed_parameters(stages):
         sentences.append(
-            f"Parameters that were assumed count as known to {percent(ASSUMED)}, their standard "
-            "deviation."
+            f"Assumed parameters are taken as known to {percent(ASSUMED)} (standard deviation)."
         )
     if largest != FULL:
         sentences.append(
@@ -214,18 +213,16 @@ def _range_of(drive: Drive, stages: Sequence[StageFit], values: Array, largest: 
     return _Range(half, doubt, near, far)
 
 
-INTERVALS = (
-    "With 95 % intervals of the fit, rounded up, which do not cover what the model leaves out."
-)
+INTERVALS = "With 95 % intervals of the fit, rounded up, which do not cover unmodelled effects."
 AT_BOUND = "at its bound"
 MEANINGS = {
     "not seen": "Not seen: no test reached the limit that decides it.",
-    "not tested": "Not tested: no run goes that way.",
-    "not determined": "Not determined: the tests leave open what it follows from.",
-    AT_BOUND: "At its bound: follows from an estimate that ended at a bound of its search; how far "
-    "off it is, and to which side, is not known.",
-    "(fixed)": "Fixed: follows from parameters that were not fitted.",
-    "Z16_": "Z16 fixed: an orifice that the fit did not look for can be mistaken for a lag.",
+    "not tested": "Not tested: no run moves in that direction.",
+    "not determined": "Not determined: it depends on parameters that the tests do not determine.",
+    AT_BOUND: "At its bound: depends on an estimate that ended at a bound of its search; size and "
+    "sign of its error are not known.",
+    "(fixed)": "Fixed: depends on parameters that were not fitted.",
+    "Z16_": "Z16 fixed: the fit did not estimate an orifice, which can be mistaken for a lag.",
 }
 """What words beside a number mean."""
 

@@ -39,18 +39,18 @@ SUFFICES: dict[Decision, str] = {
     "no": "does not suffice",
 }
 IN_WORDS = (
-    "No control: the crane as it is, under the operator's stick alone. Every variant goes through "
-    "the same seaways, so that differences are within each seaway. Swing is the angle between rope "
-    "and plumb line, RMS its root mean square over a seaway."
+    "No control: the crane as it is, moved only by the operator's stick. Every variant goes "
+    "through the same seaways, so differences are within each seaway. Swing is the angle between "
+    "rope and plumb line, RMS its root mean square over a seaway."
 )
 LIMITS_IN_WORDS = (
-    "Orifice: the in-line orifice limits the flow to the stroking piston, so that the shaft cannot "
-    "accelerate faster. Swash stop: the pump is at full stroke, so that it cannot turn faster. A "
-    "controller that counts on more comes late, and late it feeds the swing."
+    "Orifice: the in-line orifice limits the flow to the stroking piston, so the shaft cannot "
+    "accelerate faster. Swash stop: the pump is at full stroke, so the motor cannot turn faster. "
+    "A controller that demands more acts late, and late action increases the swing."
 )
 FOLLOWED = (
-    "Largest sine of the tip that each axis can follow, and what the sea asks of it: a filled "
-    "diamond above the line of its colour is more than the axis has"
+    "Largest sine of the tip that each axis can follow, and the demand of the sea: a filled "
+    "diamond above the line of its colour exceeds what the axis can do"
 )
 ASSUMED = "Shaded rows are assumed: measure or agree them before you rely on a number."
 PERIODS = np.linspace(4.0, 16.0, 25)
@@ -87,7 +87,7 @@ def write_assessment(assessment: Assessment, path: str | Path) -> None:
     swing_tables = [block for table in (swings, worse, differences) for block in titled(table)]
     sections = [
         Section("summary", "Summary", summary),
-        Section("hangs", "What the answer hangs on", listed_block(hangs)),
+        Section("hangs", "Sensitivity of the answer to assumptions", listed_block(hangs)),
         Section("swing", "Swing", [text(IN_WORDS), *swing_tables]),
         Section("limits", "Limits of the drives", _drives_limits(assessment, acting)),
         Section("example", "One of the seaways", _example(assessment)),
@@ -96,7 +96,7 @@ def write_assessment(assessment: Assessment, path: str | Path) -> None:
     facts = [
         seaway_words(study.seaway),
         f"{count(len(study.seeds), 'seaway')} of {study.length / 60.0:g} min",
-        f"{count(len(assessment.names) - 1, 'variant')} beside no control",
+        f"{count(len(assessment.names) - 1, 'variant')} besides no control",
     ]
     title = crane.title or crane.name
     write_text(page(sections, what="Crane", title=title, facts=" · ".join(facts)), path)
@@ -126,7 +126,7 @@ def _answers(assessment: Assessment) -> list[PageBlock]:
         terms.append(("Sufficiency", LIGHTS[assessment.sufficient], [sentence]))
     for subject, _, sentences in terms:
         if subject.lower() not in assessment.questions:
-            sentences.append("This was not asked: it does not count for the outcome.")
+            sentences.append("This was not requested: it does not affect the outcome.")
     return [PageBlock("terms", terms, "verdict")]
 
 
@@ -177,7 +177,7 @@ def _example(assessment: Assessment) -> list[PageBlock]:
     except (DomainError, InputError):  # a run that was stopped has no signals
         return []
     caption = (
-        f"Seaway {seed}, in which '{assessed}' swings as in half of all seaways; it counts from "
+        f"Seaway {seed}, in which '{assessed}' swings as in half of all seaways; evaluated from "
         f"{assessment.study.run_in:g} s on"
     )
     return [_drawn(plot_crane(runs, title=f"Swing in seaway {seed}"), caption)]
@@ -255,7 +255,7 @@ def write_operability(operability: Operability, path: str | Path) -> None:
     ]
     facts = [
         f"{count(operability.scatter.height.size, 'sea')} of the scatter diagram",
-        f"{count(len(operability.headings), 'heading')}, as likely as each other",
+        f"{count(len(operability.headings), 'heading')}, equally likely",
     ]
     title = crane.title or crane.name
     write_text(page(sections, what="Operability", title=title, facts=" · ".join(facts)), path)
