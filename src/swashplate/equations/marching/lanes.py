@@ -33,7 +33,7 @@ from swashplate.equations.code_generation.scheduling import VECTOR, all_vector
 from swashplate.equations.code_generation.values import leaves
 from swashplate.equations.declaration import JIT_OFF
 from swashplate.equations.graph import Node
-from swashplate.equations.keeping import kept, key_of
+from swashplate.equations.keeping import cached_on_disk, key_of
 from swashplate.equations.marching.kernels import FLOATS, INTS, pointers
 from swashplate.equations.marching.march import SampleCode, lower, output_of
 from swashplate.equations.marching.part_code import PartCode, SignalId, taps_of
@@ -175,7 +175,7 @@ def vectorisation_report(model: Model, output: str | None = None, *, options: An
     for used in sample_code.used:
         ends = sample_code.ends[used.part]
         _, known = sample_code.ahead(used, ends, still=fractions_of(used))
-        block = sample_code.printed(used, ends, known=known, flat=all_vector)
+        block = sample_code.printed(used, ends, available=known, flat=all_vector)
         for statement in block.statements:
             if is_vector(statement):
                 continue
@@ -347,7 +347,7 @@ class _Writer:
         states = dict(leaves(part.state))
         carried = {states[path].value: steps[path] for path in sample_code.carried[part.part]}
         block = sample_code.printed(
-            part, [*results.values(), *carried.values()], known=head.names, flat=all_vector
+            part, [*results.values(), *carried.values()], available=head.names, flat=all_vector
         )
         for statement in block.statements:
             straight.add(statement)
@@ -356,7 +356,7 @@ class _Writer:
             straight.let(name, *next(texts))
         if signal.part == part.part and signal.kind == "link":
             observed = sample_code.printed(
-                part, [sample_code.observed(part, signal)], known=block.names
+                part, [sample_code.observed(part, signal)], available=block.names
             )
             for statement in observed.statements:
                 straight.add(statement)
@@ -378,7 +378,7 @@ class _Writer:
             initial = dict(leaves(part.initial_state()))
             carried = sample_code.carried[part.part]
             at_rest = sample_code.printed(
-                part, [initial[path] for path in carried], known=head.names
+                part, [initial[path] for path in carried], available=head.names
             )
             lines += at_rest.lines
             for path, (text, reads) in zip(carried, at_rest.results, strict=True):
@@ -476,7 +476,7 @@ def lanes_of(
     model: Model, signals: tuple[str, ...], options: tuple[Any, ...], output: str
 ) -> Lanes:
     """The compiled lanes of a model for one output."""
-    facts = kept(
+    facts = cached_on_disk(
         f"{model.name}_lanes",
         (key_of(model), signals, options, output),
         lambda: _Writer(model, signals, options, output).facts,

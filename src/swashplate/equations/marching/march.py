@@ -166,7 +166,7 @@ class SampleCode:
         part: PartCode,
         results: Sequence[Node],
         *,
-        known: Mapping[Node, str] | None = None,
+        available: Mapping[Node, str] | None = None,
         hints: Mapping[Node, str] | None = None,
         named: bool = False,
         flat: Flat | None = None,
@@ -180,7 +180,13 @@ class SampleCode:
         labels = {**part.trace.labels, **(hints or {})}
         language = BRANCHING if branches and flat is None else PYTHON
         block = CodeBlock(
-            results, labels, part.taken, known=known, named=named, flat=flat, language=language
+            results,
+            labels,
+            part.taken,
+            available=available,
+            named=named,
+            flat=flat,
+            language=language,
         )
         self.functions |= block.functions
         return block
@@ -262,7 +268,7 @@ class SampleCode:
         results = [*sources.values(), *margin]
         results += [node for output in outputs for node in self.kept_nodes(part, output)]
         results += [steps[path] for path in self.carried[part.part]]
-        block = self.printed(part, results, known=known)
+        block = self.printed(part, results, available=known)
         texts = iter(block.texts)
         lines = block.lines
         lines += [f"{part.source(source)} = {next(texts)}" for source in sources]
@@ -290,7 +296,7 @@ class SampleCode:
         """Lines that keep some numbers of a part, after its sample."""
         nodes = [node for output in outputs for node in self.kept_nodes(part, output)]
         # nothing waits for these, and branches take long to compile
-        block = self.printed(part, nodes, known=known, branches=False)
+        block = self.printed(part, nodes, available=known, branches=False)
         lines = block.lines
         texts = iter(block.texts)
         for output in outputs:

@@ -9,7 +9,7 @@ from swashplate.equations.code_generation.functions import generating
 from swashplate.equations.code_generation.gradients import Derived, derived_function
 from swashplate.equations.code_generation.values import leaves
 from swashplate.equations.graph import Node, names_in, rewritten
-from swashplate.equations.keeping import kept, key_of
+from swashplate.equations.keeping import cached_on_disk, key_of
 from swashplate.equations.marching.march import SampleCode
 from swashplate.equations.marching.part_code import SignalId
 from swashplate.equations.model import Model
@@ -29,7 +29,7 @@ def step_derivatives(
     model: Model, signals: tuple[str, ...], options: tuple[Any, ...], outputs: tuple[SignalId, ...]
 ) -> StepDerivatives:
     """A model's next states, then its `outputs`, with their derivatives."""
-    return kept(
+    return cached_on_disk(
         f"{model.name}_linear",
         (key_of(model), signals, options, outputs),
         lambda: _derived(model, signals, options, outputs),

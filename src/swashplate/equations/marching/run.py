@@ -25,7 +25,7 @@ from swashplate.equations.fields import (
     numbers_of,
     value_at,
 )
-from swashplate.equations.keeping import kept, key_of
+from swashplate.equations.keeping import cached_on_disk, key_of
 from swashplate.equations.language import plain
 from swashplate.equations.marching.kernels import (
     KERNEL_KINDS,
@@ -421,7 +421,7 @@ def planned_march(
     rows = {signal: f"flat[{row} * count + n]" for row, signal in enumerate((*stored, *further))}
     always = {signal: rows[signal] for signal in stored}
     if_everything = {signal: rows[signal] for signal in further}
-    text = kept(
+    text = cached_on_disk(
         f"{model.name}_march",
         (key_of(model), signals, options, stored, further),
         lambda: march_source(model, signals, options, always, if_everything),

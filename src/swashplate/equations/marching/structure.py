@@ -24,7 +24,7 @@ from swashplate.equations.code_generation.scheduling import all_vector
 from swashplate.equations.code_generation.values import leaves
 from swashplate.equations.declaration import JIT_OFF
 from swashplate.equations.graph import Node, names_in, rewritten
-from swashplate.equations.keeping import kept, key_of
+from swashplate.equations.keeping import cached_on_disk, key_of
 from swashplate.equations.marching.kernels import KERNEL_ARGUMENTS
 from swashplate.equations.marching.march import SampleCode, march_source, output_of
 from swashplate.equations.marching.part_code import PartCode, SignalId
@@ -126,7 +126,7 @@ class Structure:
         to be called within `generating`.
         """
         if start not in self._start_codes:
-            self._start_codes[start] = kept(
+            self._start_codes[start] = cached_on_disk(
                 f"{self.model.name}_start",
                 (key_of(self.model), self.signals, self.options, self.outputs, start),
                 lambda: self._generated_start(start),
@@ -147,7 +147,7 @@ def structure_of(
     model: Model, signals: tuple[str, ...], options: tuple[Any, ...], observed: tuple[str, ...]
 ) -> Structure:
     """A model's structure for some observed signals, made once."""
-    facts = kept(
+    facts = cached_on_disk(
         f"{model.name}_jacobian",
         (key_of(model), signals, options, observed),
         lambda: _structured(model, signals, options, observed).facts,
@@ -309,7 +309,7 @@ class _Structuring:
         # a loop without branches becomes vector instructions; plain Python refuses roots and
         # quotients that nobody asks for
         flat = None if JIT_OFF else all_vector
-        block = self.sample_code.printed(part, nodes, known=known, hints=hints, flat=flat)
+        block = self.sample_code.printed(part, nodes, available=known, hints=hints, flat=flat)
         read = names_in(nodes)
         lines = ahead
         lines += [

@@ -209,7 +209,7 @@ class PartInC:
         nodes += [last] if last is not None else []
         language = C(self.w.loops, trace.origins, taken)
         labels = self.labels(trace, nodes)
-        block = CodeBlock(nodes, labels, taken, known={**known, **names}, language=language)
+        block = CodeBlock(nodes, labels, taken, available={**known, **names}, language=language)
         lines, texts = language.headed(block.lines), iter(block.texts)
         for word, each in results.items():
             lines += [""] if each and lines else []
@@ -262,7 +262,7 @@ class PartInC:
 
     def _looked(self, value: Node, places: Mapping[Node, str]) -> str:
         """What a tap makes of its window, as one expression."""
-        block = CodeBlock([value], {}, set(), known=places, language=C(self.w.loops, {}, set()))
+        block = CodeBlock([value], {}, set(), available=places, language=C(self.w.loops, {}, set()))
         assert not block.lines
         return block.texts[0]
 
@@ -351,7 +351,7 @@ class PartInC:
                 known[node] = f"{array}[{places.index((self.number, path))}]"
         for name, node in self.options.items():
             known[node] = f"options[{self.w.e.options.index((self.number, name))}]"
-        block = CodeBlock([*self.constants], self._labels, taken, known=known)
+        block = CodeBlock([*self.constants], self._labels, taken, available=known)
         first = self.w.first_constant(self.number)
         lines = [*block.lines]
         for k, text in enumerate(block.texts):
