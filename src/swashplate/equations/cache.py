@@ -30,9 +30,9 @@ from swashplate import progress
 from swashplate.equations.declaration import (
     JIT_OFF,
     closure_hash,
+    compiled_functions,
     hash_of,
     is_function,
-    known,
     remember_text,
 )
 from swashplate.equations.language import plain
@@ -191,7 +191,7 @@ def kernel(function: Callable[P, R]) -> Callable[P, R]:
     RuntimeWarning
         If there is no place for the cache; the function works all the same.
     """
-    known[plain(function)] = None
+    compiled_functions[plain(function)] = None
     options: dict[str, Any] = {"no_cfunc_wrapper": True}
     compiled: Any = njit(nogil=True, error_model="numpy", **options)(function)
     if not JIT_OFF:

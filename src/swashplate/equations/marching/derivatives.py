@@ -240,13 +240,15 @@ def _march(
     h = observed.record.step
     start = observed.start
     signals = tuple(records)
-    outputs = tuple(dict.fromkeys(o.signal for o in observed.observations))
-    missing = [c for c in columns if c.startswith("start.") and c[6:] not in own.start]
+    outputs = tuple(dict.fromkeys(observation.signal for observation in observed.observations))
+    missing = [
+        column for column in columns if column.startswith("start.") and column[6:] not in own.start
+    ]
     if missing:
         raise InputError(f"{missing[0]} is a column, so RunValues needs a value of it.")
     structure = structure_of(instance.model, signals, instance.options, outputs)
     plan = observed.plan
-    numbers = tuple(outputs.index(each.signal) for each in observed.observations)
+    numbers = tuple(outputs.index(observation.signal) for observation in observed.observations)
     layout = layout_of(structure, tuple(columns), numbers, start)
     first = {name: float(values[0]) for name, values in records.items()}
     initial = instance.start(first, h, start)

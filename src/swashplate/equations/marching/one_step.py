@@ -40,7 +40,7 @@ def _derived(
     model: Model, signals: tuple[str, ...], options: tuple[Any, ...], outputs: tuple[SignalId, ...]
 ) -> StepDerivatives:
     """The same, made of the equations."""
-    states = [SignalId(i, "state", path) for i, path in model.places("state")]
+    states = [SignalId(part_index, "state", path) for part_index, path in model.places("state")]
     sample_code = SampleCode(model, signals, options, [*states, *outputs])
     results = list[Node]()
     labels = dict[Node, str]()
@@ -57,13 +57,15 @@ def _derived(
         results += rewritten([sample_code.observed(part, signal)], passed)
     outside = sample_code.outside()
     arguments = {name: outside[name] for name in sorted(names_in(results) & outside.keys())}
-    by = [name for name, signal in arguments.items() if signal.kind in ("state", "tap", "input")]
+    moving = [
+        name for name, signal in arguments.items() if signal.kind in ("state", "tap", "input")
+    ]
     derived = derived_function(
         f"{model.name}_linear",
         f"Next states and outputs of {model.name}.",
         [*arguments],
-        [(str(k), node) for k, node in enumerate(results)],
-        [(name, name) for name in by],
+        [(str(index), node) for index, node in enumerate(results)],
+        [(name, name) for name in moving],
         labels,
         chained=True,
     )

@@ -60,12 +60,12 @@ class TapOf(NamedTuple):
 def taps_of(model: Model, signals: tuple[str, ...]) -> tuple[TapOf, ...]:
     """All taps on signals that are given as records, numbered."""
     taps: list[TapOf] = []
-    for i, part in enumerate(model.parts):
+    for index, part in enumerate(model.parts):
         for name in part.input_types:
             tap = part.tap(name)
-            outside = model.link_of(i, name) is None and tap.signal in signals
+            outside = model.link_of(index, name) is None and tap.signal in signals
             if outside and name in part.taps:
-                taps.append(TapOf(i, name, len(taps), tap))
+                taps.append(TapOf(index, name, len(taps), tap))
     return tuple(taps)
 
 
@@ -114,7 +114,9 @@ class PartCode:
             self.arguments["signals"] = self._call(own.sample)
         self.following = self._call(own.step)
         cls = self.following.cls if isinstance(self.following, Tuple) else None
-        numbers = tuple(path for path, n in leaves(self.following) if n.kind in ("float", "int"))
+        numbers = tuple(
+            path for path, node in leaves(self.following) if node.kind in ("float", "int")
+        )
         if cls is not own.state or numbers != floats_of(own.state):
             raise InputError(
                 f"Model {own.name}: {plain(own.step).__name__} must return a "
@@ -135,9 +137,9 @@ class PartCode:
         arguments = {name: values[name] for name in arguments_of(equation) if name in values}
         if "options" in arguments_of(equation):
             arguments["options"] = fixed(self.options) or Flag("unknown", "options")
-        result = self.trace.call(equation, arguments)
-        self.trace.label(result, plain(equation).__name__ if isinstance(result, Node) else "")
-        return result
+        returned = self.trace.call(equation, arguments)
+        self.trace.label(returned, plain(equation).__name__ if isinstance(returned, Node) else "")
+        return returned
 
     def _input(self, name: str) -> Value:
         """An input as a name, a window of names, or what a hold makes of one."""
@@ -145,7 +147,8 @@ class PartCode:
         if link is not None:
             return self._linked(link)
         tap = self.own.tap(name)
-        record_tap = next((each for each in self.taps if each.input == name), None)
+        record_taps = {tap.input: tap for tap in self.taps}
+        record_tap = record_taps.get(name)
         if record_tap is None:
             if tap.signal in self.records:
                 return graph.name(f"x_{tap.signal}")
@@ -178,7 +181,7 @@ class PartCode:
 
     def tap_samples(self, tap: TapOf) -> list[str]:
         """Names of a tap's samples, newest first."""
-        return [f"{self.prefix}{tap.input}_{j}" for j in range(tap.tap.samples)]
+        return [f"{self.prefix}{tap.input}_{age}" for age in range(tap.tap.samples)]
 
     def delay_fraction(self, tap: TapOf) -> str:
         """Name of the fraction of a sample in a tap's delay."""
@@ -234,8 +237,8 @@ class PartCode:
         """Names of what is read of records: samples of taps, and inputs as they come."""
         signals = {}
         for tap in self.taps:
-            for j, name in enumerate(self.tap_samples(tap)):
-                signals[name] = SignalId(self.part, "tap", f"{tap.input}.{j}")
+            for age, name in enumerate(self.tap_samples(tap)):
+                signals[name] = SignalId(self.part, "tap", f"{tap.input}.{age}")
         for name, node in self.inputs.items():
             if node == graph.name(f"x_{self.own.tap(name).signal}"):
                 signals[node.value] = SignalId(self.part, "input", name)
@@ -249,7 +252,9 @@ class PartCode:
     def node(self, stored: SignalId) -> Node:
         """A number that is kept."""
         if stored.kind in ("tap", "input"):
-            return next(graph.name(n) for n, signal in self.outside.items() if signal == stored)
+            return next(
+                graph.name(name) for name, signal in self.outside.items() if signal == stored
+            )
         if stored.kind == "state":
             return dict(leaves(self.state))[stored.path]
         return self.signal(stored.path)
@@ -266,7 +271,7 @@ class PartCode:
         if own.rest is None:
             defaults = own.state._field_defaults
             first = [defaults.get(path.split(".")[0], 0.0) for path, _ in leaves(self.state)]
-            return rebuilt(self.state, (graph.number(float(each)) for each in first))
+            return rebuilt(self.state, (graph.number(float(number)) for number in first))
         inputs: dict[str, Value] = {}
         for name in own.input_types:
             if name in own.defaults:
@@ -284,10 +289,10 @@ class PartCode:
 def _named(kind: Any, name_of: Callable[[str], str], path: str = "") -> Value:
     """A named tuple of names; `name_of` gives one for the words of a path."""
     hints = get_type_hints(kind)
-    items: list[Value] = []
+    elements: list[Value] = []
     for name in kind._fields:
         if is_named_tuple(hints[name]):
-            items.append(_named(hints[name], name_of, f"{path}{name}_"))
+            elements.append(_named(hints[name], name_of, f"{path}{name}_"))
         else:
-            items.append(graph.name(name_of(f"{path}{name}")))
-    return Tuple(kind, tuple(items))
+            elements.append(graph.name(name_of(f"{path}{name}")))
+    return Tuple(kind, tuple(elements))

@@ -200,7 +200,7 @@ def compiled_step(
 def stored_of(model: Model, outputs: Sequence[str]) -> tuple[SignalId, ...]:
     """Where the outputs of a step come from; ``"limits"`` of the last part that has any."""
     ids = []
-    limited = [i for i, part in enumerate(model.parts) if part.limits is not None]
+    limited = [index for index, part in enumerate(model.parts) if part.limits is not None]
     for output in outputs:
         if output == "limits" and limited:
             ids.append(SignalId(limited[-1], "limits"))
