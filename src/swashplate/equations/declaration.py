@@ -207,18 +207,17 @@ def _is_constant(thing: Any) -> bool:
 
 def is_function(thing: Any) -> bool:
     """Whether something is a function that compiled code can call."""
-    is_compiled = plain(thing) is not thing or thing in compiled_functions
-    return isinstance(plain(thing), FunctionType) and is_compiled
+    if not isinstance(plain(thing), FunctionType):
+        return False
+    return plain(thing) is not thing or thing in compiled_functions
 
 
 def _reached(reaching: Any) -> Iterator[tuple[str, Any]]:
     """What a function's own code, or the types of its arguments or fields, name outside."""
     python_function = plain(reaching)
-    names = (
-        []
-        if is_named_tuple(python_function)
-        else list(dict.fromkeys(_names(python_function.__code__)))
-    )
+    names: list[str] = []
+    if not is_named_tuple(python_function):
+        names = list(dict.fromkeys(_names(python_function.__code__)))
     for name in names:
         try:
             member = resolved(python_function, name)

@@ -182,7 +182,7 @@ def vectorisation_report(model: Model, output: str | None = None, *, options: An
             for node in statement.nodes:
                 if node.op not in VECTOR:
                     source = used.trace.origins.get(node)
-                    where = used.own.name if source is None else source.name
+                    where = used.part_model.name if source is None else source.name
                     calls[f"{where} calls {_called(node)}"] = None
     if not calls:
         return f"Nothing keeps {model.name} from vector instructions."

@@ -124,7 +124,7 @@ class SampleCode:
             carried |= new
             ends += [following[path] for path in state if path in new]
         self.carried[part.part] = [path for path in state if path in carried]
-        for name in part.own.input_types:
+        for name in part.part_model.input_types:
             link = self.model.link_of(part.part, name)
             if link is not None and any(part.source(source) in read for source in link.sources):
                 self._need(link.sources)
@@ -239,7 +239,7 @@ class SampleCode:
                 if name in read:
                     back = f"{part.delay_samples(tap)} + {age}" if age else part.delay_samples(tap)
                     lines.append(f"{name} = {past(tap.tap.signal, back)}")
-        inputs = [part.own.tap(name).signal for name in part.own.input_types]
+        inputs = [part.part_model.tap(name).signal for name in part.part_model.input_types]
         lines += [
             f"x_{signal} = {now(signal)}"
             for signal in dict.fromkeys(inputs)

@@ -85,11 +85,11 @@ class PartCode:
         taken: set[str] | None = None,
         trace: Trace | None = None,
     ) -> None:
-        self.model, self.part, self.own = model, part, model.parts[part]
+        self.model, self.part, self.part_model = model, part, model.parts[part]
         self.records, self.options = tuple(signals), options
-        self.trace = Trace(replacements=self.own.replacements) if trace is None else trace
+        self.trace = Trace(replacements=self.part_model.replacements) if trace is None else trace
         self.taken: set[str] = set() if taken is None else taken
-        self.prefix = f"{self.own.name}_" if len(model.parts) > 1 else ""
+        self.prefix = f"{self.part_model.name}_" if len(model.parts) > 1 else ""
         self.taken.add("h")
         self.taps = [tap for tap in taps_of(model, self.records) if tap.part == part]
         for tap in self.taps:
@@ -98,7 +98,7 @@ class PartCode:
                 self.delay_fraction(tap),
                 self.delay_samples(tap),
             }
-        own = self.own
+        own = self.part_model
         self.p = _named(own.parameters, self._fresh("p"))
         self.given = _named(own.given, self._fresh("given")) if own.given else Tuple(None, ())
         self.state = _named(own.state, self._fresh("s"))
@@ -146,16 +146,16 @@ class PartCode:
         link = self.model.link_of(self.part, name)
         if link is not None:
             return self._linked(link)
-        tap = self.own.tap(name)
+        tap = self.part_model.tap(name)
         record_taps = {tap.input: tap for tap in self.taps}
         record_tap = record_taps.get(name)
         if record_tap is None:
             if tap.signal in self.records:
                 return graph.name(f"x_{tap.signal}")
-            if name not in self.own.defaults:
+            if name not in self.part_model.defaults:
                 # refused when the model gets its numbers; until then a constant stands for it
                 return graph.ZERO
-            return dict(leaves(self.p))[self.own.defaults[name]]
+            return dict(leaves(self.p))[self.part_model.defaults[name]]
         samples = tuple(map(graph.name, self.tap_samples(record_tap)))
         fraction = graph.name(self.delay_fraction(record_tap))
         window = Tuple(Window, (Tuple(None, samples), fraction))
@@ -194,22 +194,22 @@ class PartCode:
     @cached_property
     def margin(self) -> Node | None:
         """Margin of the domain."""
-        if self.own.domain is None:
+        if self.part_model.domain is None:
             return None
-        margin = self._call(self.own.domain)
+        margin = self._call(self.part_model.domain)
         if not isinstance(margin, Node):
+            domain = plain(self.part_model.domain).__name__
             raise InputError(
-                f"Model {self.own.name}: {plain(self.own.domain).__name__} must return one number, "
-                "the margin."
+                f"Model {self.part_model.name}: {domain} must return one number, the margin."
             )
         return margin
 
     @cached_property
     def limits(self) -> list[Node]:
         """The limits, in their order."""
-        if self.own.limits is None:
+        if self.part_model.limits is None:
             return []
-        return [node for _, node in leaves(self._call(self.own.limits))]
+        return [node for _, node in leaves(self._call(self.part_model.limits))]
 
     def ahead(self, ends: Iterable[Node], still: Collection[str] = ()) -> list[Node]:
         """What some ends need that follows from parameters, givens and the step alone.
@@ -240,7 +240,7 @@ class PartCode:
             for age, name in enumerate(self.tap_samples(tap)):
                 signals[name] = SignalId(self.part, "tap", f"{tap.input}.{age}")
         for name, node in self.inputs.items():
-            if node == graph.name(f"x_{self.own.tap(name).signal}"):
+            if node == graph.name(f"x_{self.part_model.tap(name).signal}"):
                 signals[node.value] = SignalId(self.part, "input", name)
         return signals
 
@@ -265,7 +265,7 @@ class PartCode:
         At rest every signal is zero, or what its default parameter is; ``steady`` is the steady
         state under the inputs as they come. A part without an equation for that has no state.
         """
-        own = self.own
+        own = self.part_model
         if start == "steady" and own.settled is not None:
             return self._call(own.settled)
         if own.rest is None:

@@ -339,7 +339,7 @@ class _Structuring:
             f"flat[{row} + m] = {text}" for row, text in zip(node_of_row, block.texts, strict=True)
         ]
         lines += ["for m in range(count):", *indented(inner)]
-        name = f"fill_{part.own.name}"
+        name = f"fill_{part.part_model.name}"
         text = function_source(
             f"{name}({KERNEL_ARGUMENTS})", "Partial derivatives at known states.", lines, ""
         )
