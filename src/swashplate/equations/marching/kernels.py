@@ -134,13 +134,13 @@ def _word(field: Any, kind: str) -> int:
 # --- what routines call ---------------------------------------------------------------------------
 
 
-def behind(array: Any, start: int) -> Any:
+def row_from(array: Any, start: int) -> Any:
     """Numbers of an array from an index on, as one row."""
     return array.reshape(-1)[start:]
 
 
-@lowers(behind)
-def _behind(code: Lowering, array: Operand, start: Operand) -> Operand:
+@lowers(row_from)
+def _row_from(code: Lowering, array: Operand, start: Operand) -> Operand:
     return code.offset(array, start)
 
 
