@@ -230,6 +230,11 @@ def _reached(reaching: Any) -> Iterator[tuple[str, Any]]:
                     yield attribute, value
         elif is_function(member) or is_named_tuple(member) or _is_constant(member):
             yield name, member
+    yield from _types_named(python_function)
+
+
+def _types_named(python_function: Any) -> Iterator[tuple[str, Any]]:
+    """Classes of named tuples that types of arguments or fields name, by their names."""
     for hint in python_function.__annotations__.values():
         if isinstance(hint, str) and not is_named_tuple(python_function):
             try:
