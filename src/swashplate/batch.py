@@ -192,15 +192,21 @@ def simulate_many(
 def _numbers_of(instance: Instance) -> dict[str, float]:
     """Parameters by path, and givens by ``"given "`` and their path, as `Lanes` takes them."""
     model = instance.model
-    givens = [f"given {model.prefix(i)}{path}" for i, path in model.places("given")]
+    givens = [
+        f"given {model.prefix(part_index)}{path}" for part_index, path in model.places("given")
+    ]
     paths = (*parameter_paths(model), *givens)
     return dict(zip(paths, (*instance.params, *instance.given), strict=True))
 
 
 def _rules(model: Model, values: Mapping[str, Array]) -> Iterator[Broken]:
     """What values of a model's parameters must satisfy: their ranges, and that they are finite."""
-    taps = [(i, tap) for i, part in enumerate(model.parts) for tap in part.taps.values()]
-    delays = {f"{model.prefix(i)}{tap.delay}" for i, tap in taps if tap.delay}
+    taps = [
+        (part_index, tap)
+        for part_index, part in enumerate(model.parts)
+        for tap in part.taps.values()
+    ]
+    delays = {f"{model.prefix(part_index)}{tap.delay}" for part_index, tap in taps if tap.delay}
     for path, column in values.items():
         if path in model.ranges:
             yield _range_rule(path, model.ranges[path], column)
@@ -223,8 +229,8 @@ def set_columns(changes: Mapping[str, ArrayLike]) -> tuple[dict[str, Array], int
     """Values as columns, one number a set, and how many sets there are."""
     check_mapping("changes", changes)
     values: dict[str, Array] = {}
-    for name, given in changes.items():
-        column = np.asarray(given)
+    for name, numbers in changes.items():
+        column = np.asarray(numbers)
         if column.ndim != 1 or column.size == 0 or column.dtype.kind not in "fiub":
             raise InputError(f"The values of {name} must be one number per set, in one row.")
         values[name] = column.astype(np.float64)
@@ -285,12 +291,13 @@ def march_sets(
     """
     failures: dict[int, str] = {}
     for mask, sentence in rules:
-        for i in np.flatnonzero(mask):
-            failures.setdefault(int(i), f"{name}: {sentence(int(i))}")
+        for number in np.flatnonzero(mask):
+            failures.setdefault(int(number), f"{name}: {sentence(int(number))}")
     blocks: list[Block] = []
     for group in groups:
         members = np.setdiff1d(np.flatnonzero(group.sets), list(failures))
-        blocks += [(members[k : k + LANES], group.options) for k in range(0, members.size, LANES)]
+        starts = range(0, members.size, LANES)
+        blocks += [Block(members[first : first + LANES], group.options) for first in starts]
     sets = _Sets(
         model=model,
         numbers=numbers,
@@ -300,13 +307,18 @@ def march_sets(
         to=to,
     )
     count = groups[0].sets.size
-    return _run(sets, blocks, count, failures, name, executor)
+    return _march_all(sets, blocks, count, failures, name, executor)
 
 
 # --- blocks of sets -------------------------------------------------------------------------------
 
-Block = tuple[Indices, tuple[Any, ...]]
-"""Up to LANES sets, and the options that they share: kernels are compiled for those."""
+
+class Block(NamedTuple):
+    """Up to LANES sets that share their options."""
+
+    sets: Indices
+    options: tuple[Any, ...]
+    """Kernels are compiled for those."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -327,7 +339,7 @@ class _Sets:
 
     def file(self, blocks: Sequence[Block]) -> Path:
         """Where outputs of some blocks go."""
-        return Path(self.to or "") / f"{blocks[0][0][0]:08d}.parquet"
+        return Path(self.to or "") / f"{blocks[0].sets[0]:08d}.parquet"
 
     @cached_property
     def compared(self) -> tuple[Array, Array]:
@@ -335,10 +347,11 @@ class _Sets:
         # zeros that nobody writes to take no memory
         measured, weight = np.zeros(self.record.values.size), np.zeros(self.record.values.size)
         if self.cost is not None:
-            time, every = self.record.time, slice(None, None, self.record.substeps)
-            seen = Observation(self.cost.output, time, self.cost.measured, self.cost.weight)
-            weight[every] = seen.weight
-            measured[every] = np.where(weight[every] > 0.0, seen.values, 0.0)
+            time = self.record.time
+            samples = slice(None, None, self.record.substeps)
+            observation = Observation(self.cost.output, time, self.cost.measured, self.cost.weight)
+            weight[samples] = observation.weight
+            measured[samples] = np.where(weight[samples] > 0.0, observation.values, 0.0)
         return measured, weight
 
 
@@ -353,15 +366,17 @@ class _Marched(NamedTuple):
     """Their costs or outputs."""
 
 
-def _march(shared: _Sets, blocks: Sequence[Block]) -> list[_Marched]:
+def _march_blocks(shared: _Sets, blocks: Sequence[Block]) -> list[_Marched]:
     """March blocks of sets; their outputs go into one file if into any."""
-    record, keep = shared.record, shared.cost is None
+    record = shared.record
+    keep = shared.cost is None
     measured, weight = shared.compared
     inputs = {name: record.values for name, record in shared.records.items()}
     table = {"time": record.time} if shared.to is not None else {}
     marched = []
     for sets, options in blocks:
-        padded, size = np.resize(sets, LANES), sets.size
+        padded = np.resize(sets, LANES)
+        size = sets.size
         march = lanes_of(shared.model, tuple(inputs), options, shared.output)
         lanes = march(
             {path: values[padded] for path, values in shared.numbers.items()},
@@ -371,7 +386,8 @@ def _march(shared: _Sets, blocks: Sequence[Block]) -> list[_Marched]:
             weight=weight,
             keep=keep,
         )
-        worst, values = lanes.worst[:size], lanes.cost[:size]
+        worst = lanes.worst[:size]
+        values = lanes.cost[:size]
         good = np.isfinite(lanes.end[:size]) & (worst > 0.0)
         if keep:
             values = lanes.outputs[:size, :: record.substeps]
@@ -388,7 +404,7 @@ def _march(shared: _Sets, blocks: Sequence[Block]) -> list[_Marched]:
     return marched
 
 
-def _run(
+def _march_all(
     shared: _Sets,
     blocks: Sequence[Block],
     count: int,
@@ -399,8 +415,9 @@ def _run(
     """March all blocks wherever the executor runs them; `name` is for messages."""
     output_of(shared.model, shared.output)
     driver = next(iter(shared.records))
-    samples, keep = shared.record.time.size, shared.cost is None
-    blocks_an_item = 1
+    samples = shared.record.time.size
+    keep = shared.cost is None
+    blocks_per_file = 1
     values = None if keep else np.full(count, np.inf)
     if shared.to is not None:
         if not keep:
@@ -408,11 +425,13 @@ def _run(
                 "Outputs are written to files, costs are not: leave out one of to and cost."
             )
         _make_folder(Path(shared.to))
-        blocks_an_item = max(SAMPLES_A_FILE // (samples * LANES), 1)
+        blocks_per_file = max(SAMPLES_A_FILE // (samples * LANES), 1)
     elif keep:
         values = _outputs(count, samples)
-    items = [blocks[k : k + blocks_an_item] for k in range(0, len(blocks), blocks_an_item)]
-    for _, marched in (executor or Threads()).run(_march, shared, items):
+    groups_of_blocks = [
+        blocks[first : first + blocks_per_file] for first in range(0, len(blocks), blocks_per_file)
+    ]
+    for _, marched in (executor or Threads()).run(_march_blocks, shared, groups_of_blocks):
         for block in marched:
             for number, worst in block.failed.items():
                 why = f"the numbers overflow under this {driver}."
@@ -425,7 +444,7 @@ def _run(
         cost=None if keep else values,
         output=values if keep else None,
         failures=dict(sorted(failures.items())),
-        files=tuple(map(shared.file, items)) if shared.to else (),
+        files=tuple(map(shared.file, groups_of_blocks)) if shared.to else (),
     )
 
 
@@ -449,10 +468,10 @@ def _make_folder(folder: Path) -> None:
     """A folder without outputs of an earlier batch."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        there = next(folder.glob("*.parquet"), None)
+        present = next(folder.glob("*.parquet"), None)
     except OSError as error:
         raise FileError(f"{folder} cannot be created: {error.strerror or error}.") from None
-    if there is not None:
+    if present is not None:
         raise FileError(
-            f"{folder} already contains {there.name}; name an empty folder for the outputs."
+            f"{folder} already contains {present.name}; name an empty folder for the outputs."
         )

@@ -30,9 +30,9 @@ from swashplate import progress
 from swashplate.equations.declaration import (
     JIT_OFF,
     closure_hash,
+    compiled_functions,
     hash_of,
     is_function,
-    known,
     remember_text,
 )
 from swashplate.equations.language import plain
@@ -143,12 +143,12 @@ class _KernelCache(FunctionCache):
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         try:
-            kept = super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
+            overload = super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
         except Exception:  # whole, and yet nothing that this Numba can use
-            kept = None
-        if kept is None:  # what Numba does next, up to `save_overload`, takes up to 3 s
+            overload = None
+        if overload is None:  # what Numba does next, up to `save_overload`, takes up to 3 s
             self._compiling.append(progress.begin(COMPILING, self._title))
-        return kept
+        return overload
 
     def save_overload(self, sig: Any, data: Any) -> None:
         try:
@@ -168,9 +168,9 @@ def _cells(function: Any) -> list[tuple[str, str]]:
 
     The hash of a closure knows each function once, but not which of several names it has.
     """
-    cells = [each.cell_contents for each in function.__closure__]
-    known_by = [closure_hash(each) if is_function(each) else repr(each) for each in cells]
-    return list(zip(function.__code__.co_freevars, known_by, strict=True))
+    cells = [cell.cell_contents for cell in function.__closure__]
+    identities = [closure_hash(cell) if is_function(cell) else repr(cell) for cell in cells]
+    return list(zip(function.__code__.co_freevars, identities, strict=True))
 
 
 def kernel(function: Callable[P, R]) -> Callable[P, R]:
@@ -191,7 +191,7 @@ def kernel(function: Callable[P, R]) -> Callable[P, R]:
     RuntimeWarning
         If there is no place for the cache; the function works all the same.
     """
-    known[plain(function)] = None
+    compiled_functions[plain(function)] = None
     options: dict[str, Any] = {"no_cfunc_wrapper": True}
     compiled: Any = njit(nogil=True, error_model="numpy", **options)(function)
     if not JIT_OFF:
@@ -208,20 +208,20 @@ def kernel(function: Callable[P, R]) -> Callable[P, R]:
 
 
 @cache
-def _folder(chosen: str) -> Path | None:
+def _folder(numba_cache_dir: str) -> Path | None:
     """Where generated modules are kept, None if no folder can be written."""
-    if chosen:
-        wanted = Path(chosen) / "swashplate_generated"
+    if numba_cache_dir:
+        folder = Path(numba_cache_dir) / "swashplate_generated"
     else:
         user = AppDirs(appname="swashplate", appauthor=False).user_cache_dir  # type: ignore[no-untyped-call]
-        wanted = Path(user) / "generated"
+        folder = Path(user) / "generated"
     try:
-        wanted.mkdir(parents=True, exist_ok=True)
-        tempfile.TemporaryFile(dir=wanted).close()
+        folder.mkdir(parents=True, exist_ok=True)
+        tempfile.TemporaryFile(dir=folder).close()
     except OSError:
         warn(UNCACHED, RuntimeWarning, stacklevel=3)
         return None
-    return wanted
+    return folder
 
 
 def generated_folder() -> Path | None:
@@ -246,8 +246,11 @@ def generated(name: str, text: str, names: Mapping[str, Any]) -> dict[str, Any]:
     memory alone, and its kernels are compiled in every session.
     """
     words = set(re.findall(r"\w+", text))
-    used = {n: v for n, v in names.items() if n in words}
-    reached = {n: closure_hash(v) if is_function(v) else v for n, v in used.items()}
+    used = {word: meaning for word, meaning in names.items() if word in words}
+    reached = {
+        word: closure_hash(meaning) if is_function(meaning) else meaning
+        for word, meaning in used.items()
+    }
     digest = blake2b(digest_size=8)
     digest.update(DOCSTRING.sub("", text).encode())
     digest.update(hash_of(reached).encode())
@@ -304,9 +307,10 @@ def _tidy(folder: Path) -> None:
             return
         mark.touch()
         # Numba keeps machine code beside the modules, or in folders beside theirs
-        places = [folder, folder / "__pycache__", *folder.parent.glob(f"{escape(folder.name)}_*")]
-        for path in [each for place in places for each in place.glob("*.*")]:
-            if time() - path.stat().st_mtime > UNUSED:
-                path.unlink()
+        beside = folder.parent.glob(f"{escape(folder.name)}_*")
+        for swept in [folder, folder / "__pycache__", *beside]:
+            for path in [*swept.glob("*.*")]:
+                if time() - path.stat().st_mtime > UNUSED:
+                    path.unlink()
     except OSError:  # another process tidies at once, or the folder is no longer ours
         return

@@ -31,7 +31,7 @@ JIT_OFF = bool(config.DISABLE_JIT)  # type: ignore[attr-defined]
 """Whether nothing is compiled: ``NUMBA_DISABLE_JIT=1``."""
 RULES: WeakKeyDictionary[FunctionType, Any] = WeakKeyDictionary()
 """Equations that return the derivatives of others, see `declared`."""
-known: dict[Any, None] = {}
+compiled_functions: dict[Any, None] = {}
 """Plain functions that were given to `inlined`, for when nothing is compiled."""
 
 
@@ -40,7 +40,7 @@ def inlined(function: F) -> F:
 
     Under ``NUMBA_DISABLE_JIT=1`` it is the plain function.
     """
-    known[plain(function)] = None
+    compiled_functions[plain(function)] = None
     compiled: Any = njit(forceinline=True, error_model="numpy")(function)
     return compiled  # type: ignore[no-any-return]
 
@@ -153,35 +153,45 @@ _uncompiled: dict[tuple[Any, ...], Any] = {}
 def interpreted(function: Any, replacements: Replacements = NO_REPLACEMENTS) -> Any:
     """A function and all that it calls as plain Python, for one call where compiling costs more."""
     function, replacements = standing(function, replacements)
-    f = plain(function)
-    if not isinstance(f, FunctionType):
+    python_function = plain(function)
+    if not isinstance(python_function, FunctionType):
         return function
-    key = (f, *(each for each in replacements.items() if each[1]))
+    changed = [(old, chain) for old, chain in replacements.items() if chain]
+    key = (python_function, *changed)
     if key not in _uncompiled:
-        space, cells = dict(f.__globals__), tuple(CellType() for _ in f.__closure__ or ())
-        made = FunctionType(f.__code__, space, f.__name__, f.__defaults__, cells or None)
-        made.__kwdefaults__ = f.__kwdefaults__
-        _uncompiled[key] = made
-        names = dict.fromkeys(_names(f.__code__))
+        space = dict(python_function.__globals__)
+        cells = tuple(CellType() for _ in python_function.__closure__ or ())
+        uncompiled = FunctionType(
+            python_function.__code__,
+            space,
+            python_function.__name__,
+            python_function.__defaults__,
+            cells or None,
+        )
+        uncompiled.__kwdefaults__ = python_function.__kwdefaults__
+        _uncompiled[key] = uncompiled
+        names = dict.fromkeys(_names(python_function.__code__))
         for name in names:
             if name in space:
                 space[name] = _interpreted(space[name], names, replacements)
-        for cell, original in zip(cells, f.__closure__ or (), strict=True):
+        for cell, original in zip(cells, python_function.__closure__ or (), strict=True):
             cell.cell_contents = _interpreted(original.cell_contents, names, replacements)
     return _uncompiled[key]
 
 
-def _interpreted(thing: Any, names: Iterable[str], replacements: Replacements) -> Any:
+def _interpreted(member: Any, names: Iterable[str], replacements: Replacements) -> Any:
     """What a function names, with all equations of these names as plain Python."""
-    if is_function(thing):
-        return interpreted(thing, replacements)
-    if not isinstance(thing, ModuleType):
-        return thing
-    members = {name: getattr(thing, name) for name in names if hasattr(thing, name)}
+    if is_function(member):
+        return interpreted(member, replacements)
+    if not isinstance(member, ModuleType):
+        return member
+    members = {name: getattr(member, name) for name in names if hasattr(member, name)}
     equations = {
-        name: interpreted(each, replacements) for name, each in members.items() if is_function(each)
+        name: interpreted(function, replacements)
+        for name, function in members.items()
+        if is_function(function)
     }
-    return SimpleNamespace(**{**vars(thing), **equations}) if equations else thing
+    return SimpleNamespace(**{**vars(member), **equations}) if equations else member
 
 
 # --- what a function reaches ----------------------------------------------------------------------
@@ -189,9 +199,9 @@ def _interpreted(thing: Any, names: Iterable[str], replacements: Replacements) -
 
 def _names(code: CodeType) -> Iterator[str]:
     yield from (*code.co_names, *code.co_freevars)
-    for each in code.co_consts:
-        if isinstance(each, CodeType):
-            yield from _names(each)
+    for constant in code.co_consts:
+        if isinstance(constant, CodeType):
+            yield from _names(constant)
 
 
 def _is_constant(thing: Any) -> bool:
@@ -203,27 +213,38 @@ def _is_constant(thing: Any) -> bool:
 
 def is_function(thing: Any) -> bool:
     """Whether something is a function that compiled code can call."""
-    return isinstance(plain(thing), FunctionType) and (plain(thing) is not thing or thing in known)
+    if not isinstance(plain(thing), FunctionType):
+        return False
+    return plain(thing) is not thing or thing in compiled_functions
 
 
-def _reached(thing: Any) -> Iterator[tuple[str, Any]]:
+def _reached(reaching: Any) -> Iterator[tuple[str, Any]]:
     """What a function's own code, or the types of its arguments or fields, name outside."""
-    f = plain(thing)
-    names = [] if is_named_tuple(f) else list(dict.fromkeys(_names(f.__code__)))
+    python_function = plain(reaching)
+    names: list[str] = []
+    if not is_named_tuple(python_function):
+        names = list(dict.fromkeys(_names(python_function.__code__)))
     for name in names:
         try:
-            found = resolved(f, name)
+            member = resolved(python_function, name)
         except NameError:
             continue
-        if isinstance(found, ModuleType):
-            inner = ((each, getattr(found, each, None)) for each in names)
-            yield from ((k, v) for k, v in inner if is_function(v) or isinstance(v, int | float))
-        elif is_function(found) or is_named_tuple(found) or _is_constant(found):
-            yield name, found
-    for hint in f.__annotations__.values():
-        if isinstance(hint, str) and not is_named_tuple(f):
+        if isinstance(member, ModuleType):
+            for attribute in names:
+                value = getattr(member, attribute, None)
+                if is_function(value) or isinstance(value, int | float):
+                    yield attribute, value
+        elif is_function(member) or is_named_tuple(member) or _is_constant(member):
+            yield name, member
+    yield from _types_named(python_function)
+
+
+def _types_named(python_function: Any) -> Iterator[tuple[str, Any]]:
+    """Classes of named tuples that types of arguments or fields name, by their names."""
+    for hint in python_function.__annotations__.values():
+        if isinstance(hint, str) and not is_named_tuple(python_function):
             try:
-                hint = resolved(f, hint)
+                hint = resolved(python_function, hint)
             except NameError:
                 continue
         for kind in (hint, *get_args(hint)):
@@ -288,15 +309,21 @@ def hash_of(things: dict[str, Any]) -> str:
 
 def _fingerprint(thing: Any) -> str:
     """What of one thing matters to compiled code."""
-    f = plain(thing)
-    if isinstance(f, FunctionType) or is_named_tuple(f):
-        hints = {k: getattr(v, "__name__", str(v)) for k, v in f.__annotations__.items()}
-    if is_named_tuple(f):
-        return repr((f.__name__, f._fields, f._field_defaults, hints))
-    if isinstance(f, FunctionType):
+    python_function = plain(thing)
+    if isinstance(python_function, FunctionType) or is_named_tuple(python_function):
+        hints = {
+            name: getattr(hint, "__name__", str(hint))
+            for name, hint in python_function.__annotations__.items()
+        }
+    if is_named_tuple(python_function):
+        kind = python_function
+        return repr((kind.__name__, kind._fields, kind._field_defaults, hints))
+    if isinstance(python_function, FunctionType):
         options = sorted(map(str, getattr(thing, "targetoptions", {}).items()))
-        code = _code(f.__code__, f.__doc__)
-        return repr((code, f.__defaults__, f.__kwdefaults__, options, hints))
+        code = _code(python_function.__code__, python_function.__doc__)
+        return repr(
+            (code, python_function.__defaults__, python_function.__kwdefaults__, options, hints)
+        )
     if hasattr(thing, "tobytes"):
         return repr((thing.dtype, thing.shape, blake2b(thing.tobytes()).hexdigest()))
     return repr(thing)
@@ -305,12 +332,14 @@ def _fingerprint(thing: Any) -> str:
 def _code(code: CodeType, doc: str | None) -> tuple[Any, ...]:
     """All of a code object apart from its place in the file and its docstring."""
 
-    def written(each: Any) -> Any:
-        if isinstance(each, CodeType):
-            return _code(each, None)
-        return repr(sorted(map(repr, each)) if isinstance(each, frozenset) else each)
+    def comparable(constant: Any) -> Any:
+        if isinstance(constant, CodeType):
+            return _code(constant, None)
+        if isinstance(constant, frozenset):
+            return repr(sorted(map(repr, constant)))
+        return repr(constant)
 
-    constants = [*map(written, code.co_consts)]
+    constants = [*map(comparable, code.co_consts)]
     if doc is not None and code.co_consts and code.co_consts[0] == doc:
         constants[0] = "None"
     counts = code.co_argcount, code.co_kwonlyargcount

@@ -148,9 +148,11 @@ def declared_by(parameters: Any) -> Iterator[Definition]:
         if hasattr(hint, "_fields"):
             directed = name in ("plus", "minus") and both is not None
             prefixes = ("plus", "minus") if directed else (name,)
-            for each in declared_by(hint) if prefixes[0] == name else ():
-                paths = tuple(f"{prefix}.{path}" for prefix in prefixes for path in each.fields)
-                yield replace(each, fields=paths)
+            if prefixes[0] != name:
+                continue
+            for inner in declared_by(hint):
+                paths = tuple(f"{prefix}.{path}" for prefix in prefixes for path in inner.fields)
+                yield replace(inner, fields=paths)
             continue
         definition: Any = next(iter(getattr(hint, "__metadata__", ())), Definition(name, ""))
         if definition is MINUS:
@@ -188,10 +190,10 @@ def ranges_of(kind: Any) -> dict[str, Definition]:
     By dotted path.
     """
     return {
-        path: each
-        for each in declared_by(kind)
-        for path in each.fields
-        if each.range != Definition("", "").range or each.plausible is not None
+        path: definition
+        for definition in declared_by(kind)
+        for path in definition.fields
+        if definition.range != Definition("", "").range or definition.plausible is not None
     }
 
 
@@ -201,9 +203,9 @@ def ranges_of(kind: Any) -> dict[str, Definition]:
 def _floats_of(kind: Any) -> tuple[str, ...]:
     """Dotted paths of all floats below a named tuple, e.g. ``plus.V_dz``, in its order."""
     hints = get_type_hints(kind)
-    below = {n: floats_of(hints[n]) for n in kind._fields if is_named_tuple(hints[n])}
-    own = {n: ("",) for n in kind._fields if hints[n] is float}
-    paths = [(name, path) for name in kind._fields for path in {**below, **own}.get(name, ())]
+    below = {name: floats_of(hints[name]) for name in kind._fields if is_named_tuple(hints[name])}
+    floats = {name: ("",) for name in kind._fields if hints[name] is float}
+    paths = [(name, path) for name in kind._fields for path in {**below, **floats}.get(name, ())]
     return tuple(f"{name}.{path}".rstrip(".") for name, path in paths)
 
 
@@ -215,10 +217,10 @@ def is_real(value: object) -> TypeGuard[float]:
     return isinstance(value, int | float | np.integer | np.floating)
 
 
-def check_mapping(what: str, given: object) -> None:
+def check_mapping(what: str, mapping: object) -> None:
     """Refuse what is no mapping of names to values."""
-    if not isinstance(given, Mapping):
-        raise InputError(f"{what} is {given!r}, but must be a mapping of names to values.")
+    if not isinstance(mapping, Mapping):
+        raise InputError(f"{what} is {mapping!r}, but must be a mapping of names to values.")
 
 
 def value_at(value: Any, path: str) -> Any:
@@ -230,13 +232,16 @@ def value_at(value: Any, path: str) -> Any:
 
 def numbers_of(value: Any) -> list[float]:
     """All floats of a nested named tuple, in the order of `floats_of`."""
-    nested = (numbers_of(each) if isinstance(each, tuple) else (float(each),) for each in value)
-    return [number for numbers in nested for number in numbers]
+    numbers: list[float] = []
+    for element in value:
+        numbers += numbers_of(element) if isinstance(element, tuple) else [float(element)]
+    return numbers
 
 
 def made(kind: Any, numbers: Mapping[str, float], prefix: str = "") -> Any:
     """A nested named tuple from numbers by path, behind a prefix; others keep their defaults."""
-    hints, values = get_type_hints(kind), []
+    hints = get_type_hints(kind)
+    values = []
     for name in kind._fields:
         path = f"{prefix}{name}"
         if is_named_tuple(hints[name]):

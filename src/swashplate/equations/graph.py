@@ -46,12 +46,12 @@ class Node:
 
     __slots__ = ("args", "kind", "op", "value")
 
-    def __init__(self, op: str, args: tuple[Node, ...], value: Any, kind: str) -> None:
-        self.op, self.args, self.value, self.kind = op, args, value, kind
+    def __init__(self, op: str, operands: tuple[Node, ...], value: Any, kind: str) -> None:
+        self.op, self.args, self.value, self.kind = op, operands, value, kind
 
     def __repr__(self) -> str:
-        operands = ", ".join(map(repr, self.args))
-        return f"{self.op}({operands})" if self.args else str(self.value)
+        printed = ", ".join(map(repr, self.args))
+        return f"{self.op}({printed})" if self.args else str(self.value)
 
 
 class Rule:
@@ -93,30 +93,30 @@ class Call:
         self.loop = loop
 
 
-_known: dict[tuple[Any, ...], Node] = {}
+_nodes: dict[tuple[Any, ...], Node] = {}
 
 
-def _kind(op: str, args: tuple[Node, ...]) -> str:
+def _kind(op: str, operands: tuple[Node, ...]) -> str:
     if op in COMPARISONS or op == "not":
         return "bool"
     if op == "ruled":
-        return args[0].kind
+        return operands[0].kind
     if op in ("call", "result"):
         return "float"
-    kinds = {a.kind for a in (args[1:] if op == "if" else args)}
+    kinds = {operand.kind for operand in (operands[1:] if op == "if" else operands)}
     if op == "floor" or (kinds == {"int"} and op not in ("/", *MATH_FUNCTIONS)):
         return "int"
     return "bool" if op == "if" and kinds == {"bool"} else "float"
 
 
-def make(op: str, *args: Node, value: Any = None, kind: str | None = None) -> Node:
+def make(op: str, *operands: Node, value: Any = None, kind: str | None = None) -> Node:
     """The expression of an operation and its operands."""
     text = repr(value) if op == "number" else value
-    kind = kind or _kind(op, args)
-    key = (op, args, text, kind)
-    node = _known.get(key)
+    kind = kind or _kind(op, operands)
+    key = (op, operands, text, kind)
+    node = _nodes.get(key)
     if node is None:
-        node = _known[key] = Node(op, args, value, kind)
+        node = _nodes[key] = Node(op, operands, value, kind)
     return node
 
 
@@ -136,9 +136,9 @@ ZERO, ONE = number(0.0), number(1.0)
 TRUE, FALSE = number(True), number(False)
 
 
-def is_number(node: Node, value: float | None = None) -> bool:
+def is_number(node: Node, expected: float | None = None) -> bool:
     """Whether an expression is a literal number, or that one."""
-    return node.op == "number" and (value is None or node.value == value)
+    return node.op == "number" and (expected is None or node.value == expected)
 
 
 # --- walks ----------------------------------------------------------------------------------------
@@ -151,18 +151,21 @@ def operands_of(node: Node) -> Sequence[Node]:
 
 def ordered(
     ends: Iterable[Node],
-    known: Collection[Node] = (),
+    available: Collection[Node] = (),
     operands: Callable[[Node], Sequence[Node]] = operands_of,
 ) -> list[Node]:
-    """Nodes that some ends are computed from, each after its operands; none below `known` ones."""
-    done, order = set(known), list[Node]()
+    """Nodes that some ends are computed from, each after its operands.
+
+    Those that are `available`, and what only they need, are left out.
+    """
+    done, order = set(available), list[Node]()
     stack = [*ends][::-1]
     while stack:
         node = stack[-1]
         if node in done:
             stack.pop()
             continue
-        waiting = [a for a in operands(node) if a not in done]
+        waiting = [operand for operand in operands(node) if operand not in done]
         if waiting:
             stack += waiting[::-1]
             continue
@@ -172,9 +175,9 @@ def ordered(
     return order
 
 
-def names_in(ends: Iterable[Node], known: Collection[Node] = ()) -> set[str]:
+def names_in(ends: Iterable[Node], available: Collection[Node] = ()) -> set[str]:
     """Names that some ends are computed from."""
-    return {node.value for node in ordered(ends, known) if node.op == "name"}
+    return {node.value for node in ordered(ends, available) if node.op == "name"}
 
 
 def dependencies(node: Node) -> Sequence[Node]:
@@ -182,23 +185,28 @@ def dependencies(node: Node) -> Sequence[Node]:
     return (*node.args, *node.value.arguments) if node.op == "ruled" else node.args
 
 
-def rewritten(ends: Iterable[Node], by: Mapping[Node, Node]) -> list[Node]:
+def rewritten(ends: Iterable[Node], replacements: Mapping[Node, Node]) -> list[Node]:
     """The ends with other nodes in place of some."""
     ends = [*ends]
-    made = dict(by)
-    for node in ordered(ends, by, dependencies):
-        args, value = tuple(made[a] for a in node.args), node.value
-        again = args == node.args
+    replaced = dict(replacements)
+    for node in ordered(ends, replacements, dependencies):
+        operands = tuple(replaced[operand] for operand in node.args)
+        value = node.value
+        unchanged = operands == node.args
         if node.op == "ruled":
-            arguments = tuple(made[a] for a in value.arguments)
-            again = again and arguments == value.arguments
-            value = _rewritten_rule(value, arguments, by)
-        made[node] = node if again else make(node.op, *args, value=value, kind=node.kind)
-    return [made[node] for node in ends]
+            arguments = tuple(replaced[operand] for operand in value.arguments)
+            unchanged = unchanged and arguments == value.arguments
+            value = _rewritten_rule(value, arguments, replacements)
+        replaced[node] = (
+            node if unchanged else make(node.op, *operands, value=value, kind=node.kind)
+        )
+    return [replaced[node] for node in ends]
 
 
-def _rewritten_rule(rule: Rule, arguments: tuple[Node, ...], by: Mapping[Node, Node]) -> Rule:
-    return Rule(arguments, lambda: tuple(rewritten(rule.slopes, by)))
+def _rewritten_rule(
+    rule: Rule, arguments: tuple[Node, ...], replacements: Mapping[Node, Node]
+) -> Rule:
+    return Rule(arguments, lambda: tuple(rewritten(rule.slopes, replacements)))
 
 
 def plain_value(node: Node) -> Node:
@@ -211,25 +219,25 @@ def plain_value(node: Node) -> Node:
 # --- choices --------------------------------------------------------------------------------------
 
 
-def choose(test: Node, one: Node, two: Node) -> Node:
+def choose(test: Node, if_true: Node, if_false: Node) -> Node:
     """`one if test else two`."""
     if test.op == "number":
-        return one if test.value else two
-    if one is TRUE and two is FALSE:
+        return if_true if test.value else if_false
+    if if_true is TRUE and if_false is FALSE:
         return test
     if test.op == "not":
-        return choose(test.args[0], two, one)
-    return one if one is two else make("if", test, one, two)
+        return choose(test.args[0], if_false, if_true)
+    return if_true if if_true is if_false else make("if", test, if_true, if_false)
 
 
-def both(one: Node, two: Node) -> Node:
+def both(first: Node, second: Node) -> Node:
     """`one and two`."""
-    return choose(one, two, FALSE)
+    return choose(first, second, FALSE)
 
 
-def either(one: Node, two: Node) -> Node:
+def either(first: Node, second: Node) -> Node:
     """`one or two`."""
-    return choose(one, TRUE, two)
+    return choose(first, TRUE, second)
 
 
 # --- derivatives: zeros and ones are structural ---------------------------------------------------
@@ -261,10 +269,13 @@ def plus(a: Node, b: Node) -> Node:
     if a.op == "+" and a.args[1] is b:
         return plus(a.args[0], times(number(2.0), b))
     if a.op == "if" == b.op and a.args[0] is b.args[0]:
-        test, one, two = a.args
-        _, three, four = b.args
-        if ZERO in (one, three) and ZERO in (two, four):  # the two halves of one choice
-            return choose(test, plus(one, three), plus(two, four))
+        test, a_if_true, a_if_false = a.args
+        _, b_if_true, b_if_false = b.args
+        if ZERO in (a_if_true, b_if_true) and ZERO in (
+            a_if_false,
+            b_if_false,
+        ):  # the two halves of one choice
+            return choose(test, plus(a_if_true, b_if_true), plus(a_if_false, b_if_false))
     return make("+", a, b)
 
 

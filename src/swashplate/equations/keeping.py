@@ -32,7 +32,7 @@ SIZE = 16
 """Bytes of the hash that a file begins with."""
 
 
-def kept(name: str, key: tuple[Any, ...], make: Callable[[], T]) -> T:
+def cached_on_disk(name: str, key: tuple[Any, ...], make: Callable[[], T]) -> T:
     """What was made before under this key, or what is made now.
 
     Parameters
@@ -53,9 +53,9 @@ def kept(name: str, key: tuple[Any, ...], make: Callable[[], T]) -> T:
     digest = blake2b(f"{engine_hash()} {key!r}".encode(), digest_size=10).hexdigest()
     folder = generated_folder()
     path = None if folder is None else folder / f"{name}_{digest}.kept"
-    found = _read(path)
-    if found is not None:
-        result: T = found[0]
+    content = _read(path)
+    if content is not None:
+        result: T = content[0]
         return result
     result = make()
     if path is not None:
@@ -73,14 +73,14 @@ def _read(path: Path | None) -> tuple[Any, ...] | None:
     if path is None:
         return None
     try:
-        content = path.read_bytes()
-        if _hash(content[SIZE:]) != content[:SIZE]:
+        framed = path.read_bytes()
+        if _hash(framed[SIZE:]) != framed[:SIZE]:
             return None
         mark_used(path)
-        found: tuple[Any, ...] = pickle.loads(content[SIZE:])
+        content: tuple[Any, ...] = pickle.loads(framed[SIZE:])
     except Exception:  # no file, or whatever unpickling garbage may raise
         return None
-    return found
+    return content
 
 
 @cache
@@ -100,12 +100,12 @@ def engine_hash() -> str:
 def fingerprint(equations: Iterable[Any]) -> str:
     """Hash of some equations, of all that they reach, and of derivatives that are declared."""
     digest = blake2b(digest_size=16)
-    pending, met = [*equations], set[Any]()
+    pending, visited = [*equations], set[Any]()
     while pending:
         equation = pending.pop()
-        if plain(equation) in met:
+        if plain(equation) in visited:
             continue
-        met.add(plain(equation))
+        visited.add(plain(equation))
         digest.update(f"{plain(equation).__name__} {closure_hash(equation)}\0".encode())
         for reached in closure(equation).values():
             rule = RULES.get(plain(reached)) if is_function(reached) else None
@@ -121,16 +121,16 @@ def key_of(model: Model) -> str:
     equations: list[Any] = [link.equation for link in model.links.values() if link.equation]
     for part in model.parts:
         kinds = (part.parameters, part.state, part.inputs, part.options, part.given)
-        said = (
+        description = (
             part.name,
             [None if kind is None else _shape(kind) for kind in kinds],
             sorted(part.taps.items()),
             sorted(part.defaults.items()),
         )
-        digest.update(f"{said!r}\0".encode())
+        digest.update(f"{description!r}\0".encode())
         roles = (part.step, part.sample, part.rest, part.settled, part.limits, part.domain)
-        digest.update(f"{[_hash_of(each) for each in roles]}\0".encode())
-        equations += [each for each in roles if each is not None]
+        digest.update(f"{[_hash_of(role) for role in roles]}\0".encode())
+        equations += [role for role in roles if role is not None]
         digest.update(f"{_replacement_hashes(part.replacements)!r}\0".encode())
         equations += _new_equations(part.replacements)
     links = [(name, link.sources, _hash_of(link.equation)) for name, link in model.links.items()]

@@ -126,7 +126,7 @@ def _refused(node: ast.AST) -> tuple[str, str] | None:
                     return "`is` with something other than None", "write `==`"
                 if type(op) not in (*COMPARISONS, ast.Is, ast.IsNot):
                     return "`in`", "compare with == and or"
-        case ast.Call(keywords=keywords) if any(each.arg is None for each in keywords):
+        case ast.Call(keywords=keywords) if any(keyword.arg is None for keyword in keywords):
             return "an argument with **", "write the arguments out"
         case ast.Call(func=called) if not isinstance(called, ast.Name | ast.Attribute):
             return "a call of an expression", "call equations by their names"
@@ -136,8 +136,8 @@ def _refused(node: ast.AST) -> tuple[str, str] | None:
 def whole(node: ast.expr) -> int | None:
     """Value of a literal whole number, or nothing."""
     match node:
-        case ast.UnaryOp(op=ast.USub(), operand=inner):
-            value = whole(inner)
+        case ast.UnaryOp(op=ast.USub(), operand=operand):
+            value = whole(operand)
             return None if value is None else -value
         case ast.Constant(value=int(value)) if type(value) is int:
             return value
@@ -171,16 +171,19 @@ class Parsed:
     @property
     def arguments(self) -> list[ast.arg]:
         """Its arguments, in order."""
-        a = self.node.args
-        return [*a.posonlyargs, *a.args, *a.kwonlyargs]
+        arguments = self.node.args
+        return [*arguments.posonlyargs, *arguments.args, *arguments.kwonlyargs]
 
     @property
     def defaults(self) -> dict[str, Any]:
         """Values of arguments that need not be given."""
-        given, taken = self.function.__defaults__ or (), self.node.args
-        last = [*taken.posonlyargs, *taken.args][-len(given) :] if given else []
-        by_name = self.function.__kwdefaults__ or {}
-        return {e.arg: value for e, value in zip(last, given, strict=True)} | by_name
+        values = self.function.__defaults__ or ()
+        positional = [*self.node.args.posonlyargs, *self.node.args.args]
+        with_default = positional[len(positional) - len(values) :]
+        by_position = {
+            argument.arg: value for argument, value in zip(with_default, values, strict=True)
+        }
+        return by_position | (self.function.__kwdefaults__ or {})
 
     @property
     def local(self) -> set[str]:
@@ -245,9 +248,12 @@ def is_named_tuple(thing: Any) -> bool:
 @lru_cache(maxsize=8)
 def _functions(text: str) -> dict[int, ast.FunctionDef]:
     """All functions of a file's text by the line that they begin in, decorators included."""
-    nodes = [each for each in ast.walk(ast.parse(text)) if isinstance(each, ast.FunctionDef)]
+    nodes = [
+        function for function in ast.walk(ast.parse(text)) if isinstance(function, ast.FunctionDef)
+    ]
     return {
-        min([each.lineno, *(mark.lineno for mark in each.decorator_list)]): each for each in nodes
+        min([function.lineno, *(mark.lineno for mark in function.decorator_list)]): function
+        for function in nodes
     }
 
 
@@ -269,8 +275,8 @@ def unchecked(function: Any) -> Parsed:
             "file or in a notebook's cell, not at a bare prompt."
         )
     full = os.path.abspath(file)  # noqa: PTH100 - the name of a notebook's cell is no path
-    starts = [os.path.abspath(each) + os.sep for each in sys.path if each]  # noqa: PTH100
-    longest = max((each for each in starts if full.startswith(each)), key=len, default="")
+    starts = [os.path.abspath(folder) + os.sep for folder in sys.path if folder]  # noqa: PTH100
+    longest = max((folder for folder in starts if full.startswith(folder)), key=len, default="")
     return Parsed(f, node, full[len(longest) :].replace(os.sep, "/") if longest else file)
 
 
@@ -280,12 +286,12 @@ _parsed: "WeakKeyDictionary[FunctionType, Parsed]" = WeakKeyDictionary()
 def parsed(function: Any) -> Parsed:
     """Source of an equation, compiled or plain, checked once."""
     f = plain(function)
-    known = _parsed.get(f) if isinstance(f, FunctionType) else None
-    if known is None:
-        known = unchecked(f)
-        _check(known)
-        _parsed[f] = known
-    return known
+    source = _parsed.get(f) if isinstance(f, FunctionType) else None
+    if source is None:
+        source = unchecked(f)
+        _check(source)
+        _parsed[f] = source
+    return source
 
 
 def _check(source: Parsed) -> None:
@@ -298,21 +304,21 @@ def _check(source: Parsed) -> None:
             instead = f"write `{argument.arg}: float`, or the named tuple that it is"
             refuse(argument, f"{argument.arg} without a type", instead)
     body = node.body[1:] if ast.get_docstring(node, clean=False) is not None else node.body
-    nodes = [each for statement in body for each in ast.walk(statement)]
-    loops = [each for each in nodes if isinstance(each, ast.For) and is_range(each)]
-    ranges = {each.iter for each in loops}
-    counters = {each.target.id for each in loops if isinstance(each.target, ast.Name)}
-    for each in nodes:  # what stands outside comes before what is in it
-        marks = [part for part in ast.iter_child_nodes(each) if not hasattr(part, "lineno")]
-        for part in (each, *marks):  # operators have no line of their own
+    nodes = [inner for statement in body for inner in ast.walk(statement)]
+    loops = [inner for inner in nodes if isinstance(inner, ast.For) and is_range(inner)]
+    ranges = {loop.iter for loop in loops}
+    counters = {loop.target.id for loop in loops if isinstance(loop.target, ast.Name)}
+    for inner in nodes:  # what stands outside comes before what is in it
+        marks = [part for part in ast.iter_child_nodes(inner) if not hasattr(part, "lineno")]
+        for part in (inner, *marks):  # operators have no line of their own
             if (refused := _refused(part)) is not None:
-                refuse(each, *refused)
-        if isinstance(each, ast.Subscript) and not _is_index(each.slice, counters):
-            refuse(each, "an index that is not a whole number", "write the number, as in s[0]")
-        if isinstance(each, ast.Call) and each not in ranges:
-            if isinstance(each.func, ast.Name) and each.func.id == source.node.name:
-                refuse(each, "a recursive call", "write a loop over a literal range")
-            _check_call(source, each)
+                refuse(inner, *refused)
+        if isinstance(inner, ast.Subscript) and not _is_index(inner.slice, counters):
+            refuse(inner, "an index that is not a whole number", "write the number, as in s[0]")
+        if isinstance(inner, ast.Call) and inner not in ranges:
+            if isinstance(inner.func, ast.Name) and inner.func.id == source.node.name:
+                refuse(inner, "a recursive call", "write a loop over a literal range")
+            _check_call(source, inner)
     if not _returns(body):
         refuse(node, "an end without return", "return a value on every path")
 
@@ -328,18 +334,18 @@ def _check_call(source: Parsed, node: ast.Call) -> None:
         name = ast.unparse(function)
         source.refuse(node, f"a call of the argument {name}", "call equations by their names")
     try:
-        found = source.called(function)
+        called = source.called(function)
     except (NameError, AttributeError):
         return  # defined further down, or missing: seen when it is wanted
-    if found in MATH or found in CHOICES or is_named_tuple(found) or not callable(found):
+    if called in MATH or called in CHOICES or is_named_tuple(called) or not callable(called):
         return
-    if isinstance(plain(found), FunctionType):
+    if isinstance(plain(called), FunctionType):
         return
     instead, short = "call only equations and functions of math", ast.unparse(function)
     short = short.rpartition(".")[2]
     if hasattr(math, short):
         instead = f"an equation may call these functions of math: {', '.join(MATH.values())}"
-    if getattr(builtins, short, None) is found:
+    if getattr(builtins, short, None) is called:
         instead = INSTEAD_OF_BUILTIN.get(short, instead)
     source.refuse(node, f"a call of {ast.unparse(function)}", instead)
 
@@ -347,20 +353,26 @@ def _check_call(source: Parsed, node: ast.Call) -> None:
 def _is_index(index: ast.expr, counters: set[str]) -> bool:
     """Whether an index is arithmetic of whole numbers and counters of loops."""
     if isinstance(index, ast.BinOp):
-        known = isinstance(index.op, ast.Add | ast.Sub | ast.Mult)
-        return known and _is_index(index.left, counters) and _is_index(index.right, counters)
+        is_arithmetic = isinstance(index.op, ast.Add | ast.Sub | ast.Mult)
+        return (
+            is_arithmetic and _is_index(index.left, counters) and _is_index(index.right, counters)
+        )
     return whole(index) is not None or (isinstance(index, ast.Name) and index.id in counters)
 
 
 def _returns(body: list[ast.stmt]) -> bool:
     """Whether every way through some statements ends in a return."""
     return any(
-        isinstance(each, ast.Return)
-        or (isinstance(each, ast.If) and _returns(each.body) and _returns(each.orelse))
-        for each in body
+        isinstance(statement, ast.Return)
+        or (
+            isinstance(statement, ast.If)
+            and _returns(statement.body)
+            and _returns(statement.orelse)
+        )
+        for statement in body
     )
 
 
 def has_return(statements: Iterable[ast.stmt]) -> bool:
     """Whether a return stands anywhere in the statements."""
-    return any(isinstance(each, ast.Return) for body in statements for each in ast.walk(body))
+    return any(isinstance(node, ast.Return) for body in statements for node in ast.walk(body))

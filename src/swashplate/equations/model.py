@@ -236,7 +236,9 @@ class Model:
             return dict(get_type_hints(self.inputs))
         names = [name for equation in self.equations for name in arguments_of(equation)]
         windows = {name for name, tap in self.taps.items() if tap.width}
-        return {n: Window if n in windows else float for n in names if n not in ARGUMENTS}
+        return {
+            name: Window if name in windows else float for name in names if name not in ARGUMENTS
+        }
 
     @cached_property
     def signals(self) -> type[Any] | None:
@@ -508,7 +510,9 @@ def join(
         linked[signal] = Link(signal, tuple(sources), link_equation)
 
     def gathered(attribute: str) -> Any:
-        present = [(p.name, getattr(p, attribute)) for p in single if getattr(p, attribute)]
+        present = [
+            (part.name, getattr(part, attribute)) for part in single if getattr(part, attribute)
+        ]
         return NamedTuple(f"{name.title()}{attribute.title()}", present)
 
     kinds = {kind: gathered(kind) for kind in ("parameters", "state", "options", "given")}
@@ -521,27 +525,27 @@ def join(
 def _too_late(model: Model) -> Iterator[str]:
     """What a part of a joined model would take from outside, although it is known after it."""
     before = [set[int]() for _ in model.parts]
-    inputs = [(i, name) for i, part in enumerate(model.parts) for name in part.input_types]
-    for i, name in inputs:
-        link = model.link_of(i, name)
+    inputs = [(index, name) for index, part in enumerate(model.parts) for name in part.input_types]
+    for index, name in inputs:
+        link = model.link_of(index, name)
         for source in link.sources if link else ():
-            before[i] |= {source.part, *before[source.part]}
-    for i, name in inputs:
-        signal = model.parts[i].tap(name).signal
-        part = model.parts[i].name
+            before[index] |= {source.part, *before[source.part]}
+    for index, name in inputs:
+        signal = model.parts[index].tap(name).signal
+        part = model.parts[index].name
         signal_link = model.links.get(signal)
-        later = _source(model.parts[i + 1 :], signal)
+        later = _source(model.parts[index + 1 :], signal)
         after = -1
         if signal_link:
             after = signal_link.after
         elif later:
-            after = i + 1 + later.part
-        passed_on = signal in model.parts[i].signal_names and _packaged(model.parts[after])
-        if after < i or passed_on or model.link_of(i, name) is not None:
+            after = index + 1 + later.part
+        passed_on = signal in model.parts[index].signal_names and _packaged(model.parts[after])
+        if after < index or passed_on or model.link_of(index, name) is not None:
             continue
         giver = model.parts[after].name
         instead = f"put {giver} before {part}"
-        if i in {after, *before[after]}:
+        if index in {after, *before[after]}:
             instead = "a loop must be one model, or be closed sample by sample with steppers"
         yield (
             f"Model {model.name}: {part} needs '{signal}', which is known only after {giver}: "
@@ -551,9 +555,9 @@ def _too_late(model: Model) -> Iterator[str]:
 
 def _source(parts: Sequence[Model], signal: str) -> SignalSource | None:
     """Where a signal of some parts comes from: of the last that has it."""
-    for j in range(len(parts) - 1, -1, -1):
-        if signal in parts[j].signal_names:
-            return SignalSource(j, signal)
+    for index in range(len(parts) - 1, -1, -1):
+        if signal in parts[index].signal_names:
+            return SignalSource(index, signal)
     return None
 
 
@@ -669,22 +673,28 @@ def discretised(
     def state(weights: tuple[float, ...], kind: Any = kind, path: str = "") -> str:
         """Text of the state at the beginning of a sub-step, moved by weighted slopes."""
         if not is_named_tuple(kind):
-            factors = ["" if each == 1.0 else f"{each!r} * " for each in weights]
+            factors = ["" if weight == 1.0 else f"{weight!r} * " for weight in weights]
             moves = zip(factors, weights, range(1, len(weights) + 1), strict=True)
-            terms = [f" + sub_step * {f}slope_{j}{path}" for f, each, j in moves if each != 0.0]
+            terms = [
+                f" + sub_step * {field}slope_{stage}{path}"
+                for field, weight, stage in moves
+                if weight != 0.0
+            ]
             return f"state{path}{''.join(terms)}"
         word = f"{kind.__name__}_at{path.replace('.', '_')}"
-        names[word], inner = kind, get_type_hints(kind)
-        return f"{word}({', '.join(state(weights, inner[f], f'{path}.{f}') for f in kind._fields)})"
+        names[word] = kind
+        inner = get_type_hints(kind)
+        fields = [state(weights, inner[field], f"{path}.{field}") for field in kind._fields]
+        return f"{word}({', '.join(fields)})"
 
     def call(word: str, equation: Equation, at: str) -> str:
-        given = [at if name == "state" else name for name in arguments_of(equation)]
-        return f"{word}({', '.join(given)})"
+        passed = [at if name == "state" else name for name in arguments_of(equation)]
+        return f"{word}({', '.join(passed)})"
 
     tableau = TABLEAUS[method]
     lines = [f"slope_1 = {call('rates', rates, 'state')}"]
-    for i, row in enumerate(tableau.stages):
-        lines.append(f"slope_{i + 2} = {call('rates', rates, state(row))}")
+    for stage, row in enumerate(tableau.stages):
+        lines.append(f"slope_{stage + 2} = {call('rates', rates, state(row))}")
     lines.append(f"state = {state(tableau.weights)}")
     if project is not None:
         lines.append(f"state = {call('project', project, 'state')}")
@@ -699,8 +709,8 @@ def discretised(
         "    return state",
         "",
     ]
-    made: Equation = equation_of_text("\n".join(text), name, names)
-    return made
+    step: Equation = equation_of_text("\n".join(text), name, names)
+    return step
 
 
 def _state_of(equation: Equation) -> type[Any]:
@@ -713,13 +723,13 @@ def _state_of(equation: Equation) -> type[Any]:
             f"{name} must take the state and return its type, as in 'def {name}(state: State, ...) "
             "-> State'."
         )
-    for each in ("h", "signals"):
-        if each in arguments:
+    for argument in ("h", "signals"):
+        if argument in arguments:
             raise InputError(
-                f"{name} asks for '{each}', which is known only at samples: a rate of change "
+                f"{name} asks for '{argument}', which is known only at samples: a rate of change "
                 "depends on the state at any instant."
             )
-    for each in arguments:
-        if each == "sub_step" or each.startswith("slope_"):
-            raise InputError(f"{name}: the name '{each}' is taken; rename the argument.")
+    for argument in arguments:
+        if argument == "sub_step" or argument.startswith("slope_"):
+            raise InputError(f"{name}: the name '{argument}' is taken; rename the argument.")
     return kind

@@ -39,8 +39,12 @@ class Replacement(NamedTuple):
     @property
     def places(self) -> dict[str, str]:
         """Where its members stand, as ``module:name``."""
-        present = {name: plain(each) for name, each in self._asdict().items() if each is not None}
-        return {name: f"{each.__module__}:{each.__qualname__}" for name, each in present.items()}
+        present = {
+            name: plain(member) for name, member in self._asdict().items() if member is not None
+        }
+        return {
+            name: f"{member.__module__}:{member.__qualname__}" for name, member in present.items()
+        }
 
     def __reduce__(self) -> tuple[Any, ...]:
         # by name: another process must find the very equation that its model uses
@@ -231,7 +235,9 @@ def _extended(kind: Any, further: Any) -> type[Any]:
         )
     order = sorted(hints, key=lambda name: name in defaults)
     make: Any = namedtuple
-    extended = make(kind.__name__, order, defaults=[defaults[n] for n in order if n in defaults])
+    extended = make(
+        kind.__name__, order, defaults=[defaults[name] for name in order if name in defaults]
+    )
     extended.__annotations__ = {name: hints[name] for name in order}
     extended.__module__ = further.__module__
     return extended  # type: ignore[no-any-return]

@@ -50,8 +50,8 @@ def exported_drive(drive: Drive | None = None) -> Exported:
 def _exported(equations: tuple[Any, ...]) -> Exported:
     model = models_of(equations).drive
     columns = {
-        f"{model.prefix(i)}{path}": column
-        for i, part in enumerate(model.parts)
+        f"{model.prefix(part_index)}{path}": column
+        for part_index, part in enumerate(model.parts)
         for definition in declared_by(part.parameters)
         for path, column in zip(definition.fields, definition.columns, strict=True)
     }
@@ -292,6 +292,6 @@ def _initialiser(exported: Exported, values: Array, name: str, title: str) -> st
     lines = [f"/* {comment_line(f'{head} {title}'.strip())} */",
              f"#ifndef {guard}", f"#define {guard}", "", "#include <math.h>", "",
              f"static const double {name}_values[{len(values)}] = {{"]  # fmt: skip
-    for value, what in zip(values.tolist(), names, strict=True):
-        lines.append(f"    {literal(value)}, /* {comment_line(what)} */")
+    for number, what in zip(values.tolist(), names, strict=True):
+        lines.append(f"    {literal(number)}, /* {comment_line(what)} */")
     return "\n".join([*lines, "};", "", "#endif", ""])

@@ -133,8 +133,8 @@ def fmu(
 def exportable(what: Drive | Model, step: float, **numbers: Any) -> Content:
     """What runs at a step, its delays checked; see `content_of`."""
     content = content_of(what, step, **numbers)
-    for i, _, _, tap in content.exported.taps:
-        delay = value_at(content.instance.parts[i].p, tap.delay) if tap.delay else 0.0
+    for part_index, _, _, tap in content.exported.taps:
+        delay = value_at(content.instance.parts[part_index].p, tap.delay) if tap.delay else 0.0
         if delay > LONGEST_LINE * step:
             raise InputError(
                 f"{what.name}: {tap.delay} is {delay:g} s, but the library's line holds "
@@ -166,7 +166,9 @@ def packed(content: Content, fmi: Version, platforms: Collection[Platform]) -> b
     }
     unused = ("wasm.c", "fmi3.c" if fmi == "2.0" else "fmi2.c")
     members |= {
-        f"sources/{n}": text.encode() for n, text in source_files.texts.items() if n not in unused
+        f"sources/{file}": text.encode()
+        for file, text in source_files.texts.items()
+        if file not in unused
     }
     if fmi == "3.0":
         members["sources/buildDescription.xml"] = _build_description(name)
@@ -204,8 +206,8 @@ def _token(fmi: Version, sources: Sources, numbers: Array, table: Sequence[Varia
     digest.update(
         repr([(variable.name, variable.reference, variable.start) for variable in table]).encode()
     )
-    h = digest.hexdigest()
-    return f"{{{h[:8]}-{h[8:12]}-{h[12:16]}-{h[16:20]}-{h[20:32]}}}"
+    digits = digest.hexdigest()
+    return f"{{{digits[:8]}-{digits[8:12]}-{digits[12:16]}-{digits[16:20]}-{digits[20:32]}}}"
 
 
 def _zipped(members: Mapping[str, bytes]) -> bytes:
@@ -292,7 +294,7 @@ def _head(content: Content, table: Sequence[Variable], fmi: Version, token: str)
 
 
 def _attributes(variable: Variable) -> dict[str, str]:
-    made = {
+    attributes = {
         "name": variable.name,
         "valueReference": str(variable.reference),
         "description": variable.description,
@@ -300,8 +302,8 @@ def _attributes(variable: Variable) -> dict[str, str]:
         "variability": variable.variability,
     }
     if variable.causality == "parameter":
-        made["initial"] = "exact"
-    return made
+        attributes["initial"] = "exact"
+    return attributes
 
 
 def _number(variable: Variable) -> dict[str, str]:
@@ -320,13 +322,14 @@ def _number(variable: Variable) -> dict[str, str]:
 def _add_structure(structure: ET.Element, table: Sequence[Variable], two: bool) -> None:
     """Outputs with the inputs that they follow instantaneously; in FMI 2 by number in the table."""
     numbers = {
-        variable.name: i if two else variable.reference for i, variable in enumerate(table, 1)
+        variable.name: index if two else variable.reference
+        for index, variable in enumerate(table, 1)
     }
     key = "index" if two else "valueReference"
     names = [variable for variable in table if variable.causality == "output"]
     listed, initial = structure, structure
     if two:
-        listed, initial = (ET.SubElement(structure, n) for n in ("Outputs", "InitialUnknowns"))
+        listed, initial = (ET.SubElement(structure, tag) for tag in ("Outputs", "InitialUnknowns"))
     for output in names:
         read = sorted(numbers[name] for name in output.feedthrough)
         dependency = {key: str(numbers[output.name]), "dependencies": " ".join(map(str, read))}
@@ -351,7 +354,9 @@ def _add_units(root: ET.Element, table: Sequence[Variable]) -> None:
         element = ET.SubElement(definitions, "Unit", {"name": unit})
         exponents = si_exponents(unit)
         if exponents is not None:  # FMI cannot say fractions
-            ET.SubElement(element, "BaseUnit", {name: str(n) for name, n in exponents.items()})
+            ET.SubElement(
+                element, "BaseUnit", {name: str(exponent) for name, exponent in exponents.items()}
+            )
         for shown in DISPLAYED.get(unit, ()):
             factor = 1.0 / to_si(1.0, shown, unit, "a display unit")
             ET.SubElement(element, "DisplayUnit", {"name": shown, "factor": repr(factor)})

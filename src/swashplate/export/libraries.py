@@ -285,14 +285,14 @@ def compiled_library(sources: Sources, platform: Platform) -> bytes:
                 )
             compilers = [["cc"]]
         # the libraries name themselves: one name for all, and the same bytes each time
-        out = f"{NAME}{platform.ending}"
+        file = f"{NAME}{platform.ending}"
         linker_options = (
-            ["-Wl,-install_name,@rpath/" + out] if platform.ending == ".dylib" else ["-lm"]
+            ["-Wl,-install_name,@rpath/" + file] if platform.ending == ".dylib" else ["-lm"]
         )
         objects = []
         for compiler in compilers:
-            _run([*compiler, *_options(platform), "-o", out, *units, *linker_options], folder)
-            objects.append((folder / out).read_bytes())
+            _run([*compiler, *_options(platform), "-o", file, *units, *linker_options], folder)
+            objects.append((folder / file).read_bytes())
     return objects[0] if len(objects) == 1 else universal(objects)
 
 

@@ -117,9 +117,8 @@ def variables(
     `feedthrough` has the inputs that each output depends on at the same instant, `words` meaning
     and unit of signals and options.
     """
-    r = references
     parameters = exported.named("parameters")
-    starts = {name: min(values[1 + k], NONE) for k, (_, _, name) in enumerate(parameters)}
+    starts = {name: min(values[1 + index], NONE) for index, (_, _, name) in enumerate(parameters)}
     defaults, ranges = defaults_of(exported), exported.ranges
 
     def signal(
@@ -139,25 +138,27 @@ def variables(
             lower=ranges.get(name, (None, None))[0],
             upper=ranges.get(name, (None, None))[1],
         )
-        for number, name in enumerate((*exported.signals, *exported.measured), r.INPUT)
+        for number, name in enumerate((*exported.signals, *exported.measured), references.INPUT)
     ]
     listed += [
         signal(name, number, "output", feedthrough=feedthrough[name])
-        for number, name in enumerate(exported.names, r.OUTPUT)
+        for number, name in enumerate(exported.names, references.OUTPUT)
     ]
-    taken = {entry.name for entry in listed}
+    signal_names = {entry.name for entry in listed}
     declared = {
-        (i, path): entry
-        for i, part in enumerate(exported.model.parts)
+        (index, path): entry
+        for index, part in enumerate(exported.model.parts)
         for entry, path in _declared(part.parameters)
     }
     delays = {(part, tap.delay) for part, _, _, tap in exported.taps}
-    for i, (part_number, path, name) in enumerate(parameters):
+    for index, (part_number, path, name) in enumerate(parameters):
         if defaults.get(name) == name:  # an input of that name has its value
             continue
-        unique_name = f"{name}_parameter" if name in taken else name
+        unique_name = f"{name}_parameter" if name in signal_names else name
         definition = declared[part_number, path]
-        variable = _parameter(unique_name, r.PARAMETER + i, definition, path, starts[name])
+        variable = _parameter(
+            unique_name, references.PARAMETER + index, definition, path, starts[name]
+        )
         if (part_number, path) in delays:
             most = LONGEST_LINE * values[0]
             variable = replace(variable, upper=min(variable.upper or most, most))
@@ -165,22 +166,29 @@ def variables(
     longest = exported.longest if isfinite(exported.longest) else None
     meaning = "step of the model's own grid, whatever the master's steps are"
     listed.append(
-        Variable("step", r.STEP, "parameter", "fixed", meaning, "s", values[0], 0.0, longest)
+        Variable(
+            "step", references.STEP, "parameter", "fixed", meaning, "s", values[0], 0.0, longest
+        )
     )
     settings = []
     if exported.settles:
         meaning = "start settled under the first inputs, not at rest"
-        settings.append(("start_steady", r.START_STEADY, meaning, False))
+        settings.append(("start_steady", references.START_STEADY, meaning, False))
     if exported.bounds:
         bounds = ", ".join(f"{name} beyond ±{bound:g}" for name, bound in exported.bounds.items())
-        settings.append(("clip", r.CLIP, f"clip a {bounds} instead of failing", True))
+        settings.append(("clip", references.CLIP, f"clip a {bounds} instead of failing", True))
     behind = 1 + len(parameters) + len(exported.named("given"))
-    for i, option in enumerate(exported.settable):
+    for index, option in enumerate(exported.settable):
         option_words = words.get(option[1], Words(f"option {option[1]}"))
         if option[1] != exported.free_step:
             on = values[behind + exported.options.index(option)] != 0.0
             settings.append(
-                (option_words.name or option[1], r.OPTION + i, option_words.meaning, on)
+                (
+                    option_words.name or option[1],
+                    references.OPTION + index,
+                    option_words.meaning,
+                    on,
+                )
             )
     for name, reference, meaning, on in settings:
         listed.append(Variable(name, reference, "parameter", "fixed", meaning, start=on))
@@ -189,10 +197,10 @@ def variables(
 
 def defaults_of(exported: Exported) -> dict[str, str]:
     """Name of the parameter that counts while an input is not set, by the input's name."""
-    named = {(i, path): name for i, path, name in exported.named("parameters")}
+    named = {(part_index, path): name for part_index, path, name in exported.named("parameters")}
     return {
-        part.tap(name).signal: named[i, path]
-        for i, part in enumerate(exported.model.parts)
+        part.tap(name).signal: named[part_index, path]
+        for part_index, part in enumerate(exported.model.parts)
         for name, path in part.defaults.items()
         if part.tap(name).signal in exported.measured
     }
@@ -219,11 +227,13 @@ def c_header(exported: Exported, layout: int, references: References) -> str:
 
     `layout` is a hash of the model's C sources, 64 bits: whose numbers the library can read.
     """
-    numbers = "\n".join(f"#define SWP_FMI_{n} {k}u" for n, k in references._asdict().items())
+    numbers = "\n".join(
+        f"#define SWP_FMI_{kind} {reference}u" for kind, reference in references._asdict().items()
+    )
     signals = exported.signals
-    given = "".join(f", (u)[{i}]" for i in range(len(signals)))
+    arguments = "".join(f", (u)[{index}]" for index in range(len(signals)))
     defaults = defaults_of(exported)
-    places = ", ".join(f"SWP_PARAMETER_{c_name(defaults[name])}" for name in exported.measured)
+    defaulted = ", ".join(f"SWP_PARAMETER_{c_name(defaults[name])}" for name in exported.measured)
     names = ", ".join(f'"{name}"' for name in (*signals, *exported.measured))
     bounds = ", ".join(literal(exported.bounds.get(name, 0.0)) for name in signals)
     pairs = [exported.ranges.get(name, (-inf, inf)) for name in (*signals, *exported.measured)]
@@ -241,13 +251,13 @@ typedef {exported.type} swp_model;
 {numbers}
 #define SWP_FMI_LAYOUT {layout:#018x}u /* hash of the model's sources */
 #define SWP_FMI_SIGNALS {len(signals)} /* inputs of a step; the others follow them */
-#define SWP_FMI_CALL(f, m, u) f(m{given})
+#define SWP_FMI_CALL(f, m, u) f(m{arguments})
 #define SWP_FMI_SETTLES {int(exported.settles)}
 #define SWP_FMI_FREE_STEP(m) {free}
 #define SWP_FMI_BOUNDS {{{bounds or "0.0"}}} /* largest magnitudes of inputs, 0 for none */
 #define SWP_FMI_INPUT_RANGES {{{ranges or "{0.0, 0.0}"}}} /* of all inputs, lowest and highest */
 #define SWP_FMI_INPUT_NAMES {{{names or "NULL"}}}
-#define SWP_FMI_INPUT_DEFAULTS {{{places or "-1"}}} /* parameters */
+#define SWP_FMI_INPUT_DEFAULTS {{{defaulted or "-1"}}} /* parameters */
 
 #endif
 """

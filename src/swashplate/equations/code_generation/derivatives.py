@@ -15,7 +15,7 @@ from swashplate.equations.language import parsed, plain
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-_made: dict[Any, Derived] = {}
+_derived_functions: dict[Any, Derived] = {}
 
 
 def declared(function: Any) -> Callable[[F], F]:
@@ -44,7 +44,7 @@ def declared(function: Any) -> Callable[[F], F]:
         parsed(rule)
         compiled: F = inlined(rule)
         RULES[plain(function)] = compiled
-        _made.clear()
+        _derived_functions.clear()
         return compiled
 
     return decorate
@@ -85,35 +85,43 @@ def derive(
     by = (by,) if isinstance(by, str) else by
     options, lengths = dict(options or {}), dict(lengths or {})
     with GENERATING:
-        said = repr((by, sorted(options.items()), sorted(lengths.items())))
-        key = (plain(function), said)
-        if key not in _made:
-            given = arguments(parsed(function), options, lengths)
-            digest = blake2b(said.encode(), digest_size=3).hexdigest()
-            _made[key] = _derived(function, by, given, f"_{digest}" if options else "")
-        return _made[key]
+        settings = repr((by, sorted(options.items()), sorted(lengths.items())))
+        key = (plain(function), settings)
+        if key not in _derived_functions:
+            values = arguments(parsed(function), options, lengths)
+            digest = blake2b(settings.encode(), digest_size=3).hexdigest()
+            _derived_functions[key] = _derived(
+                function, by, values, f"_{digest}" if options else ""
+            )
+        return _derived_functions[key]
 
 
-def _derived(function: Any, by: tuple[str, ...], given: Mapping[str, Value], mark: str) -> Derived:
+def _derived(function: Any, by: tuple[str, ...], values: Mapping[str, Value], mark: str) -> Derived:
     """What `derive` makes for some arguments; `mark` ends its name."""
     source = parsed(function)
     floats = {
         f"{name}.{path}" if path else name: node.value
-        for name, value in given.items()
-        for path, node in leaves(value)
+        for name, argument in values.items()
+        for path, node in leaves(argument)
         if node.kind == "float"
     }
     inputs: dict[str, str] = {}
     for path in by:
-        below = {p: n for p, n in floats.items() if p == path or p.startswith(f"{path}.")}
+        below = {
+            below_path: below_name
+            for below_path, below_name in floats.items()
+            if below_path == path or below_path.startswith(f"{path}.")
+        }
         if not below:
             first = path.split(".")[0]
-            offer = [p for p in floats if p.startswith(f"{first}.")] if first in given else given
-            said = ", ".join(offer) or "none below it"
-            source.refuse(None, f"no float at {path}", f"there are {said}")
+            offer = [*values]
+            if first in values:
+                offer = [candidate for candidate in floats if candidate.startswith(f"{first}.")]
+            offered = ", ".join(offer) or "none below it"
+            source.refuse(None, f"no float at {path}", f"there are {offered}")
         inputs |= below
     trace = Trace()
-    results = [(path or "value", node) for path, node in leaves(trace.call(function, given))]
+    results = [(path or "value", node) for path, node in leaves(trace.call(function, values))]
     label = "_".join(path.rpartition(".")[2] for path in inputs)
     label = label if len(label) <= 32 else f"{len(inputs)}"
     name = f"{source.name}_by_{label}{mark}" if inputs else f"{source.name}_decided{mark}"
@@ -121,7 +129,7 @@ def _derived(function: Any, by: tuple[str, ...], given: Mapping[str, Value], mar
     return derived_function(
         name,
         f"{source.name} with its {says} ({module_of(source.function)}, line {source.node.lineno}).",
-        [each.arg for each in source.arguments],
+        [argument.arg for argument in source.arguments],
         results,
         [*inputs.items()],
         trace.labels,

@@ -24,18 +24,18 @@ GENERATING = RLock()
 """Held while equations are read or code is written: nodes are compared by identity."""
 
 
-def _choose(test: bool, a: Any, b: Any) -> Any:
-    return a if test else b
+def _choose(test: bool, if_true: Any, if_false: Any) -> Any:
+    return if_true if test else if_false
 
 
-def _selected(typing: Any, test: Any, a: Any, b: Any) -> Any:
-    kind = typing.unify_types(a, b)
+def _selected(typing: Any, test: Any, if_true: Any, if_false: Any) -> Any:
+    kind = typing.unify_types(if_true, if_false)
 
     def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        sides = (context.cast(builder, values[k], signature.args[k], kind) for k in (1, 2))
+        sides = (context.cast(builder, values[side], signature.args[side], kind) for side in (1, 2))
         return builder.select(values[0], *sides)
 
-    return kind(types.boolean, a, b), generate
+    return kind(types.boolean, if_true, if_false), generate
 
 
 choose: Any = _choose if JIT_OFF else intrinsic(_selected)
@@ -44,11 +44,11 @@ b`` the compiler makes branches, or a choice between two addresses, and gathers.
 
 
 @lowers(choose)
-def _lowered_choice(code: Lowering, test: Operand, a: Operand, b: Operand) -> Operand:
-    return code.choice(test, a, b)
+def _lowered_choice(code: Lowering, test: Operand, if_true: Operand, if_false: Operand) -> Operand:
+    return code.choice(test, if_true, if_false)
 
 
-FUNCTIONS: dict[str, Any] = {name: each for each, name in [*MATH.items(), *CHOICES.items()]}
+FUNCTIONS: dict[str, Any] = {name: function for function, name in [*MATH.items(), *CHOICES.items()]}
 """What texts call."""
 FUNCTIONS["choose"] = choose
 RESERVED = {*FUNCTIONS, "inf", "nan", "range", "int", "float", "None", "True", "False"}
@@ -93,7 +93,7 @@ class Function:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """As it was made, without what is compiled."""
-        return type(self), tuple(getattr(self, each.name) for each in fields(self))
+        return type(self), tuple(getattr(self, attribute.name) for attribute in fields(self))
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self.name!r})"

@@ -147,25 +147,25 @@ class Gradients:
         """Calls that move something: with derivatives, and these by indices of result and argument.
         """
         self._tame: dict[Node, bool] = {}
-        index = {node: k for k, node in enumerate(self._order)}
+        order_of = {node: index for index, node in enumerate(self._order)}
         self._links: dict[Node, dict[Node, Node]] = {}
-        self.adjoints: list[dict[Node, Node]] = [{}] * len(results)
+        self.adjoints: list[dict[Node, Node]] = [{} for _ in results]
         # a result that others follow comes first: their adjoints end at it
-        for k in sorted(range(len(results)), key=lambda k: index[results[k]]):
-            self.adjoints[k] = self._swept(results[k])
-            if chained and results[k] not in self._by:
-                self._links.setdefault(results[k], self.adjoints[k])
+        for index in sorted(range(len(results)), key=lambda index: order_of[results[index]]):
+            self.adjoints[index] = self._swept(results[index])
+            if chained and results[index] not in self._by:
+                self._links.setdefault(results[index], self.adjoints[index])
         plain = {node: derived for node, (derived, _) in self._calls.items()}
-        pairs = [
-            (o, i)
-            for o in range(len(results))
-            for i, node in enumerate(by)
-            if self.adjoints[o].get(node, ZERO) is not ZERO
+        entries = [
+            (result, argument)
+            for result in range(len(results))
+            for argument, node in enumerate(by)
+            if self.adjoints[result].get(node, ZERO) is not ZERO
         ]
-        partials = [self.adjoints[o][by[i]] for o, i in pairs]
+        partials = [self.adjoints[result][by[argument]] for result, argument in entries]
         nodes = graph.rewritten([*results, *partials], plain)
         self.values = nodes[: len(results)]
-        self.partials = dict(zip(pairs, nodes[len(results) :], strict=True))
+        self.partials = dict(zip(entries, nodes[len(results) :], strict=True))
 
     def hints(
         self, outputs: Sequence[str], inputs: Sequence[str], labels: Mapping[Node, str]
@@ -173,12 +173,12 @@ class Gradients:
         """Names for derivatives, should they need one."""
         names: dict[Node, str] = {}
         computed = {*self._order}
-        for (o, i), node in self.partials.items():
-            label = "" if len(outputs) == 1 else f"{word(outputs[o])}_"
+        for (result, argument), node in self.partials.items():
+            label = "" if len(outputs) == 1 else f"{word(outputs[result])}_"
             if node not in computed:
-                names.setdefault(node, f"d_{label}{word(inputs[i])}")
-        for o, pending in enumerate(self.adjoints):
-            label = "" if len(outputs) == 1 else f"{word(outputs[o])}_"
+                names.setdefault(node, f"d_{label}{word(inputs[argument])}")
+        for result, pending in enumerate(self.adjoints):
+            label = "" if len(outputs) == 1 else f"{word(outputs[result])}_"
             for node, contribution in pending.items():
                 name = labels.get(graph.plain_value(node))
                 if name and contribution not in computed:
@@ -191,7 +191,7 @@ class Gradients:
         """Nodes that follow, continuously, what is differentiated by."""
         moves = set(self._by)
         for node in self._order:
-            if node not in moves and any(a in moves for a in _followed(node)):
+            if node not in moves and any(operand in moves for operand in _followed(node)):
                 moves.add(node)
         return moves
 
@@ -201,7 +201,8 @@ class Gradients:
         """Derivatives of a result by all that it follows."""
         if result in self._links:
             return self._links[result]
-        pending: dict[Node, list[Contribution]] = {result: [Contribution(TRUE, ONE, False)]}
+        of_itself = Contribution(test=TRUE, amount=ONE, masked=False)
+        pending: dict[Node, list[Contribution]] = {result: [of_itself]}
         adjoints: dict[Node, Node] = {}
         for node in reversed(self._order):
             if node not in pending or node not in self._active:
@@ -210,25 +211,31 @@ class Gradients:
             adjoints[node] = total.zero_elsewhere
             if adjoints[node] is ZERO or node in self._by:
                 continue
-            if node in self._links:
-                for below, slope in self._links[node].items():
-                    if below in self._by:
-                        contribution = Contribution(total.test, times(total.amount, slope), False)
-                        pending.setdefault(below, []).append(contribution)
-                continue
-            for argument, push in self._pushed(node):
-                if argument in self._active:
-                    contribution = push(total)
-                    if contribution.amount is not ZERO:
-                        pending.setdefault(argument, []).append(contribution)
+            for below, contribution in self._contributions(node, total):
+                pending.setdefault(below, []).append(contribution)
         return adjoints
+
+    def _contributions(
+        self, node: Node, total: Contribution
+    ) -> Iterator[tuple[Node, Contribution]]:
+        """What an adjoint gives on, with the nodes that it goes to."""
+        if node in self._links:
+            for below, slope in self._links[node].items():
+                if below in self._by:
+                    yield below, Contribution(total.test, times(total.amount, slope), masked=False)
+            return
+        for argument, push in self._pushed(node):
+            if argument in self._active:
+                contribution = push(total)
+                if contribution.amount is not ZERO:
+                    yield argument, contribution
 
     def _pushed(self, node: Node) -> Iterator[tuple[Node, Callable[[Contribution], Contribution]]]:
         """Operands of a node, each with what an adjoint becomes on the way to it."""
         if node.op in ("min", "max", "if"):
-            test, one, two = node.args if node.op == "if" else _sides(node)
-            yield one, lambda contribution: _restricted(contribution, test)
-            yield two, lambda contribution: _restricted(contribution, _opposite(test))
+            test, first, second = node.args if node.op == "if" else _sides(node)
+            yield first, lambda contribution: _restricted(contribution, test)
+            yield second, lambda contribution: _restricted(contribution, _opposite(test))
             return
         for argument, slope in self._slopes(node):
             yield argument, partial(self._multiplied, slope)
@@ -243,53 +250,55 @@ class Gradients:
 
     def _stays_finite(self, node: Node) -> bool:
         """Whether a node is finite wherever the names in it are moderate."""
-        for each in ordered([node], self._tame):
-            tame = each.op in TAME and all(self._tame[a] for a in each.args)
-            self._tame[each] = tame
+        for operand in ordered([node], self._tame):
+            tame = operand.op in TAME and all(self._tame[argument] for argument in operand.args)
+            self._tame[operand] = tame
         return self._tame[node]
 
     def _slopes(self, node: Node) -> Iterator[tuple[Node, Callable[[Node], Node]]]:
         """Operands of an operation, each with what a weight becomes on the way to it."""
-        op, args = node.op, node.args
+        op, operands = node.op, node.args
         if op == "ruled":
             for argument, slope in zip(node.value.arguments, node.value.slopes, strict=True):
                 if slope is not ZERO and not graph.is_number(slope, 0.0):
                     yield argument, partial(times, slope)
         elif op == "result":
-            call = args[0]
-            for (k, i), slope in self._derivatives_of(call).items():
-                if k == node.value:
-                    yield call.args[i], partial(times, slope)
+            call = operands[0]
+            for (result, index), slope in self._derivatives_of(call).items():
+                if result == node.value:
+                    yield call.args[index], partial(times, slope)
         elif op == "neg":
-            yield args[0], negative
+            yield operands[0], negative
         elif op in ("+", "-"):
-            yield args[0], lambda w: w
-            yield args[1], (lambda w: w) if op == "+" else negative
-        elif op == "*" and args[0] is args[1]:
-            yield args[0], lambda w: times(graph.number(2.0), times(w, args[0]))
+            yield operands[0], lambda weight: weight
+            yield operands[1], (lambda weight: weight) if op == "+" else negative
+        elif op == "*" and operands[0] is operands[1]:
+            yield operands[0], lambda weight: times(graph.number(2.0), times(weight, operands[0]))
         elif op == "*":
-            yield args[0], lambda w: times(w, args[1])
-            yield args[1], lambda w: times(w, args[0])
+            yield operands[0], lambda weight: times(weight, operands[1])
+            yield operands[1], lambda weight: times(weight, operands[0])
         elif op == "/":
-            by = graph.inverse(args[1])
-            yield args[0], lambda w: times(w, by)
-            yield args[1], lambda w: negative(times(times(w, by), node))
+            inverse = graph.inverse(operands[1])
+            yield operands[0], lambda weight: times(weight, inverse)
+            yield operands[1], lambda weight: negative(times(times(weight, inverse), node))
         elif op == "**" and node.value:
-            yield args[0], lambda w: times(times(graph.number(float(node.value)), w), _power(node))
+            exponent = graph.number(float(node.value))
+            yield operands[0], lambda weight: times(times(exponent, weight), _power(node))
         elif op == "abs":
-            test = make(">=", args[0], ZERO)
-            yield args[0], lambda w: choose(test, w, negative(w))
+            test = make(">=", operands[0], ZERO)
+            yield operands[0], lambda weight: choose(test, weight, negative(weight))
         elif op == "atan2":
-            by = self._over(graph.plus(make("*", args[0], args[0]), make("*", args[1], args[1])))
-            yield args[0], lambda w: times(w, times(args[1], by))
-            yield args[1], lambda w: negative(times(w, times(args[0], by)))
+            squares = [make("*", operand, operand) for operand in operands]
+            inverse = self._over(graph.plus(squares[0], squares[1]))
+            yield operands[0], lambda weight: times(weight, times(operands[1], inverse))
+            yield operands[1], lambda weight: negative(times(weight, times(operands[0], inverse)))
         elif op == "hypot":
-            by = self._over(node)
-            yield args[0], lambda w: times(w, times(args[0], by))
-            yield args[1], lambda w: times(w, times(args[1], by))
+            inverse = self._over(node)
+            yield operands[0], lambda weight: times(weight, times(operands[0], inverse))
+            yield operands[1], lambda weight: times(weight, times(operands[1], inverse))
         elif op in ELEMENTARY:
-            slope = ELEMENTARY[op](args[0], node, self._over)
-            yield args[0], lambda w: times(w, slope)
+            slope = ELEMENTARY[op](operands[0], node, self._over)
+            yield operands[0], lambda weight: times(weight, slope)
 
     def _over(self, node: Node) -> Node:
         """1 over something not negative; 0 where it is zero, if it can be."""
@@ -298,17 +307,17 @@ class Gradients:
     def _derivatives_of(self, call: Node) -> dict[tuple[int, int], Node]:
         """Derivatives of a call's results by its arguments that move, by their indices."""
         if call not in self._calls:
-            by = tuple(k for k, node in enumerate(call.args) if node in self._active)
+            moving = tuple(index for index, node in enumerate(call.args) if node in self._active)
             function: Call = call.value
-            if not by or function.derivative is None:
+            if not moving or function.derivative is None:
                 return {}
-            derived = function.derivative(by)
+            derived = function.derivative(moving)
             count = len(derived.outputs)
             with_derivatives = Call(derived, count + len(derived.entries))
             again = make("call", *call.args, value=with_derivatives)
             partials = {
-                (o, by[i]): make("result", again, value=count + k)
-                for k, (o, i) in enumerate(derived.entries)
+                (result, moving[argument]): make("result", again, value=count + index)
+                for index, (result, argument) in enumerate(derived.entries)
             }
             self._calls[call] = again, partials
         return self._calls[call][1]
@@ -335,13 +344,13 @@ def _always(node: Node) -> Sequence[Node]:
 
 def _sides(node: Node) -> tuple[Node, Node, Node]:
     """`min` or `max` as a choice: at a tie the last operand counts."""
-    one, two = node.args
-    return make("<" if node.op == "min" else ">", one, two), one, two
+    first, second = node.args
+    return make("<" if node.op == "min" else ">", first, second), first, second
 
 
 def _restricted(contribution: Contribution, test: Node) -> Contribution:
     """A contribution that only counts on one side of a choice."""
-    return Contribution(graph.both(contribution.test, test), contribution.amount, False)
+    return Contribution(graph.both(contribution.test, test), contribution.amount, masked=False)
 
 
 def _total(pending: Sequence[Contribution]) -> Contribution:
@@ -353,7 +362,7 @@ def _total(pending: Sequence[Contribution]) -> Contribution:
             total = Contribution(contribution.test, amount, total.masked and contribution.masked)
         else:
             amount = graph.plus(total.zero_elsewhere, contribution.zero_elsewhere)
-            total = Contribution(_union(total.test, contribution.test), amount, True)
+            total = Contribution(_union(total.test, contribution.test), amount, masked=True)
     return total
 
 
@@ -366,16 +375,19 @@ def _masked(test: Node, amount: Node) -> Node:
     return choose(test, amount, ZERO)
 
 
-def _union(one: Node, two: Node) -> Node:
+def _union(first: Node, second: Node) -> Node:
     """Whether one or the other is true."""
-    if one is two or one is TRUE:
-        return one
-    if two is TRUE or _opposite(one) is two:
+    if first is second or first is TRUE:
+        return first
+    if second is TRUE or _opposite(first) is second:
         return TRUE
-    if one.op == "if" == two.op and one.args[0] is two.args[0]:
-        test, *sides = zip(one.args, two.args, strict=True)
-        return choose(test[0], *(_union(*side) for side in sides))
-    return graph.either(one, two)
+    if first.op == "if" == second.op and first.args[0] is second.args[0]:
+        test, first_if_true, first_if_false = first.args
+        _, second_if_true, second_if_false = second.args
+        return choose(
+            test, _union(first_if_true, second_if_true), _union(first_if_false, second_if_false)
+        )
+    return graph.either(first, second)
 
 
 def _opposite(test: Node) -> Node:
@@ -386,26 +398,31 @@ def _opposite(test: Node) -> Node:
 def _power(node: Node) -> Node:
     """A power with an exponent that is less by one."""
     base, exponent = node.args[0], node.value
-    if exponent in (1, 2):
-        return ONE if exponent == 1 else base
+    if exponent == 1:
+        return ONE
+    if exponent == 2:
+        return base
     return make("**", base, value=exponent - 1)
 
 
-def _arc(a: Node, over: Callable[[Node], Node]) -> Node:
-    return over(make("sqrt", minus(ONE, make("*", a, a))))
+def _arc(argument: Node, over: Callable[[Node], Node]) -> Node:
+    """Derivative of the inverse sine."""
+    return over(make("sqrt", minus(ONE, make("*", argument, argument))))
 
 
 ELEMENTARY: dict[str, Callable[[Node, Node, Callable[[Node], Node]], Node]] = {
-    "sqrt": lambda a, value, over: times(graph.number(0.5), over(value)),
-    "exp": lambda a, value, over: value,
-    "log": lambda a, value, over: graph.inverse(a),
-    "sin": lambda a, value, over: make("cos", a),
-    "cos": lambda a, value, over: negative(make("sin", a)),
-    "tan": lambda a, value, over: graph.plus(ONE, make("*", value, value)),
-    "atan": lambda a, value, over: graph.inverse(graph.plus(ONE, make("*", a, a))),
-    "tanh": lambda a, value, over: minus(ONE, make("*", value, value)),
-    "asin": lambda a, value, over: _arc(a, over),
-    "acos": lambda a, value, over: negative(_arc(a, over)),
+    "sqrt": lambda argument, value, over: times(graph.number(0.5), over(value)),
+    "exp": lambda argument, value, over: value,
+    "log": lambda argument, value, over: graph.inverse(argument),
+    "sin": lambda argument, value, over: make("cos", argument),
+    "cos": lambda argument, value, over: negative(make("sin", argument)),
+    "tan": lambda argument, value, over: graph.plus(ONE, make("*", value, value)),
+    "atan": lambda argument, value, over: graph.inverse(
+        graph.plus(ONE, make("*", argument, argument))
+    ),
+    "tanh": lambda argument, value, over: minus(ONE, make("*", value, value)),
+    "asin": lambda argument, value, over: _arc(argument, over),
+    "acos": lambda argument, value, over: negative(_arc(argument, over)),
 }
 """Derivatives of functions of one number, from its argument, its value and `Gradients._over`."""
 

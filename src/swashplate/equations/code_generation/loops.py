@@ -190,10 +190,10 @@ class Inner(NamedTuple):
     def function(self, *, flat: bool = False) -> Function:
         """The equation as a function of scalars, which returns a tuple if it is to be `flat`."""
         nodes = [node for _, node in leaves(self.result)]
-        given = [*self.leading, *self.formals]
+        formals = [*self.leading, *self.formals]
         name = f"{self.name}_{UNNAMED}"
         says = f"{self.name} of scalars."
-        text, names = function_text(name, says, given, nodes, self.labels, flat=flat)
+        text, names = function_text(name, says, formals, nodes, self.labels, flat=flat)
         return Function(*named_by_text(name, text), dict(names))
 
 
@@ -211,18 +211,21 @@ def _inner(outer: Runner, callee: Callee, leading: Sequence[Value], rest: Sequen
     source = callee.source
     trace = outer.inner(source)
     taken = {*FUNCTIONS, *RESERVED}
-    names = [each.arg for each in source.arguments]
-    given, stands_for = dict[str, Value](), dict[Node, Node]()
+    names = [argument.arg for argument in source.arguments]
+    values, stands_for = dict[str, Value](), dict[Node, Node]()
 
     def formal(value: Value, stem: str, *, always: bool) -> Value:
         """The value with a name for each scalar, and each option that is decided at run time."""
         if isinstance(value, Tuple):
-            pairs = zip(value.fields, value.items, strict=True)
-            items = [formal(each, f"{stem}_{field}", always=always) for field, each in pairs]
-            return Tuple(value.cls, tuple(items))
+            elements = tuple(
+                formal(element, f"{stem}_{field}", always=always)
+                for field, element in zip(value.fields, value.items, strict=True)
+            )
+            return Tuple(value.cls, elements)
         if isinstance(value, Flag):
-            symbolic = isinstance(value.value, Node)
-            return Flag(formal(value.value, stem, always=False), value.text) if symbolic else value
+            if not isinstance(value.value, Node):
+                return value
+            return Flag(formal(value.value, stem, always=False), value.text)
         if value.op == "number" and not always:
             return value
         kind = "float" if always and value.kind == "int" else value.kind
@@ -230,22 +233,22 @@ def _inner(outer: Runner, callee: Callee, leading: Sequence[Value], rest: Sequen
         stands_for[node] = value
         return node
 
-    for k, (name, value) in enumerate(zip(names, [*leading, *rest], strict=True)):
-        given[name] = formal(value, name, always=k < len(leading))
-    result = trace.run(callee, given)
+    for index, (name, value) in enumerate(zip(names, [*leading, *rest], strict=True)):
+        values[name] = formal(value, name, always=index < len(leading))
+    result = trace.run(callee, values)
     used = names_in(node for _, node in leaves(result))
     count = sum(1 for value in leading for _ in leaves(value))
     first, others = list(stands_for)[:count], list(stands_for)[count:]
     read = [node for node in others if node.value in used]
     return Inner(
-        source,
-        trace.labels,
-        trace.origins,
-        taken,
-        {node.value: node.kind for node in first},
-        {node.value: node.kind for node in read},
-        [stands_for[node] for node in read],
-        result,
+        source=source,
+        labels=trace.labels,
+        origins=trace.origins,
+        taken=taken,
+        leading={node.value: node.kind for node in first},
+        formals={node.value: node.kind for node in read},
+        actuals=[stands_for[node] for node in read],
+        result=result,
     )
 
 
@@ -254,9 +257,9 @@ def called_apart(trace: Runner, callee: Callee, values: Sequence[Value]) -> Valu
     inner = _inner(trace, callee, [], values)
     function = inner.function(flat=True)
     count = sum(1 for _ in leaves(inner.result))
-    value = Call(function, count, loop=Loop(function.name, "once", inner))
-    call = make("call", *inner.actuals, value=value)
-    results = [trace.make("result", call, value=k) for k in range(count)]
+    called = Call(function, count, loop=Loop(function.name, "once", inner))
+    call = make("call", *inner.actuals, value=called)
+    results = [trace.make("result", call, value=index) for index in range(count)]
     if count == 1:
         trace.label(results[0], inner.name)
     return rebuilt(inner.result, iter(results))
@@ -271,27 +274,27 @@ def solved(trace: Runner, callee: Callee, low: Value, high: Value, rest: Sequenc
             None, "a residual or a bracket that is a tuple", "let each be one float"
         )
     function = inner.function()
-    ends = [fresh_name(each, inner.taken) for each in ("low", "high")]
-    given = ", ".join([*ends, *inner.formals])
+    ends = [fresh_name(end_name, inner.taken) for end_name in ("low", "high")]
+    arguments = ", ".join([*ends, *inner.formals])
     name = f"root_of_{function.name}"
-    line = f"return (root({function.name}, {given}),)"
-    text = function_source(f"{name}({given})", f"Root of {residual.name}.", [line], "")
+    return_line = f"return (root({function.name}, {arguments}),)"
+    text = function_source(f"{name}({arguments})", f"Root of {residual.name}.", [return_line], "")
     solver = Function(name, text, {function.name: function})
-    value = Call(solver, 1, loop=Loop(name, "root", inner))
-    call = make("call", low, high, *inner.actuals, value=value)
+    called = Call(solver, 1, loop=Loop(name, "root", inner))
+    call = make("call", low, high, *inner.actuals, value=called)
     x = trace.make("result", call, value=0)
     trace.label(x, "root")
-    by = list(dict.fromkeys(node for value in rest for _, node in leaves(value)))
-    moving = [node for node in by if node.op != "number" and node.kind == "float"]
+    scalars = list(dict.fromkeys(node for value in rest for _, node in leaves(value)))
+    moving = [node for node in scalars if node.op != "number" and node.kind == "float"]
     chain = tuple(trace.under_way)
 
     def slopes() -> tuple[Node, ...]:
         # the implicit function theorem within the bracket
-        names = [each.arg for each in residual.arguments]
+        names = [argument.arg for argument in residual.arguments]
         with trace.within(chain):
-            value = trace.run(callee, dict(zip(names, [x, *rest], strict=True)))
-        assert isinstance(value, Node)
-        partials = partials_of([value], [x, *moving])
+            difference = trace.run(callee, dict(zip(names, [x, *rest], strict=True)))
+        assert isinstance(difference, Node)
+        partials = partials_of([difference], [x, *moving])
         if (0, 0) not in partials:
             residual.refuse(None, f"no derivative by {names[0]}", "use the unknown in it")
         lowest, highest = make("min", low, high), make("max", low, high)
@@ -299,16 +302,16 @@ def solved(trace: Runner, callee: Callee, low: Value, high: Value, rest: Sequenc
         at_low = make("==", x, low)
         divisible = graph.both(inside, make("!=", partials[0, 0], ZERO))
         inverse = make("/", ONE, choose(divisible, partials[0, 0], graph.number(inf)))
-        found = [
+        derivatives = [
             choose(inside, ZERO, choose(at_low, ONE, ZERO)),
             choose(inside, ZERO, choose(at_low, ZERO, ONE)),
         ]
-        for i in range(1, len(moving) + 1):
+        for index in range(1, len(moving) + 1):
             slope = ZERO
-            if (0, i) in partials:
-                slope = make("*", graph.negative(partials[0, i]), inverse)
-            found.append(choose(inside, slope, ZERO))
-        return tuple(found)
+            if (0, index) in partials:
+                slope = make("*", graph.negative(partials[0, index]), inverse)
+            derivatives.append(choose(inside, slope, ZERO))
+        return tuple(derivatives)
 
     return trace.make("ruled", x, value=Rule((low, high, *moving), slopes))
 
@@ -320,112 +323,132 @@ def repetition(
     step = callee.source
     inner = _inner(trace, callee, [state, graph.name("number")], rest)
     names: tuple[str, ...] = ("state",)
-    items: tuple[Value, ...] = (state,)
+    components: tuple[Value, ...] = (state,)
     if isinstance(state, Tuple) and state.cls:
-        names, items = state.fields, state.items
-    numbers = all(isinstance(each, Node) for each in items)
+        names, components = state.fields, state.items
+    numbers = all(isinstance(component, Node) for component in components)
     if not (numbers and isinstance(count, Node) and alike(inner.result, state)):
         what = f"repeated of {step.name}, which does not return a state"
         instead = "let it take and return the same named tuple of floats, or a float"
         trace.under_way[-1].source.refuse(None, what, instead)
-    *now, number = inner.leading
+    *state_names, number = inner.leading
     count_name = fresh_name("count", inner.taken)
-    given = [count_name, *now, *inner.formals]
-    states = ", ".join(now)
-    called = ", ".join([*now, f"float({number})", *inner.formals])
+    formals = [count_name, *state_names, *inner.formals]
+    states = ", ".join(state_names)
+    step_arguments = ", ".join([*state_names, f"float({number})", *inner.formals])
     function = inner.function()
     lines = [
         f"for {number} in range(int({count_name})):",
-        f"    {states} = {function.name}({called})",
+        f"    {states} = {function.name}({step_arguments})",
         f"return {states},",
     ]
     name = f"repeated_{function.name}"
-    text = function_source(f"{name}({', '.join(given)})", f"{step.name}, repeated.", lines, "")
+    text = function_source(f"{name}({', '.join(formals)})", f"{step.name}, repeated.", lines, "")
     loop = Function(name, text, {function.name: function})
 
-    def derivative(by: tuple[int, ...]) -> Derived:
-        return _tangent_loop(inner, name, given, called, [given[k] for k in by if k > 0], by)
+    def derivative(moving: tuple[int, ...]) -> Derived:
+        return _tangent_loop(inner, name, formals, step_arguments, moving)
 
     arguments = (count, *(node for _, node in leaves(state)), *inner.actuals)
-    value = Call(loop, len(names), derivative, Loop(name, "repeated", inner))
-    call = make("call", *arguments, value=value)
+    called = Call(loop, len(names), derivative, Loop(name, "repeated", inner))
+    call = make("call", *arguments, value=called)
     results = []
-    for index, word in enumerate(names):
+    for index, field in enumerate(names):
         results.append(trace.make("result", call, value=index))
-        trace.label(results[-1], word)
+        trace.label(results[-1], field)
     return rebuilt(state, iter(results))
 
 
 def _tangent_loop(
     inner: Inner,
     loop: str,
-    given: list[str],
-    called: str,
-    inputs: list[str],
-    by: tuple[int, ...],
+    formals: list[str],
+    step_arguments: str,
+    moving: tuple[int, ...],
 ) -> Derived:
     """A loop with the derivatives of its state by some inputs, carried along step by step.
 
-    `given` are the loop's arguments, `called` those of its step, and `by` the numbers of the
-    `inputs` among them.
+    `formals` are the loop's arguments, `step_arguments` those of its step, and `moving` the indices
+    of the inputs among the first. Nothing follows the count, which is the argument 0.
     """
-    *now, number = inner.leading
-    width, taken = len(inputs), {*inner.taken}
-    every = [*now, *(each for each in inputs if each not in now)]
+    inputs = [formals[index] for index in moving if index > 0]
+    *state_names, number = inner.leading
+    width = len(inputs)
+    taken = {*inner.taken}
+    differentiated_by = [*state_names, *(name for name in inputs if name not in state_names)]
     step = derived_function(
         f"{inner.name}_{UNNAMED}",
-        f"{inner.name} of scalars with its derivatives by {listed(every)}.",
+        f"{inner.name} of scalars with its derivatives by {listed(differentiated_by)}.",
         [*inner.leading, *inner.formals],
         [*leaves(inner.result)],
-        [(each, each) for each in every],
+        [(name, name) for name in differentiated_by],
         inner.labels,
         chained=True,
     )
-    slopes, c = fresh_name("slopes", taken), fresh_name("c", taken)
-    new = [fresh_name(f"new_{each}", taken) for each in now]
-    before = [fresh_name(f"by_{each}", taken) for each in now]
-    partials = [fresh_name(f"d_{new[o]}_{every[i]}", taken) for o, i in step.entries]
-    place = {
-        (o, each): f"{slopes}[{o * width + k}"
-        for o in range(len(now))
-        for k, each in enumerate(inputs)
-    }
-    carried, direct = [list[str]() for _ in now], []
-    follows = [{each} for each in now]  # Inputs that a state follows, at first itself.
-    for partial, (o, i) in zip(partials, step.entries, strict=True):
-        if i < len(now):
-            carried[o].append(f"{partial} * {before[i]}")
-        else:
-            direct.append(f"{place[o, every[i]]}] += {partial}")
-        follows[o].add(every[i])
-    for _ in now:
-        follows = [
-            each.union(*(follows[now.index(s)] for s in each if s in now)) for each in follows
-        ]
-    entries = [(o, each) for o in range(len(now)) for each in inputs if each in follows[o]]
-    lines = [
-        f"{slopes} = blank({len(now) * width})",
-        *(f"{place[k, each]}] = 1.0" for k, each in enumerate(now) if each in inputs),
-        f"for {number} in range(int({given[0]})):",
-        f"    {', '.join([*new, *partials])}, = {step.name}({called})",
-        f"    for {c} in range({width}):",
-        *(f"        {each} = {slopes}[{k * width} + {c}]" for k, each in enumerate(before)),
-        *(
-            f"        {slopes}[{k * width} + {c}] = {' + '.join(terms) or '0.0'}"
-            for k, terms in enumerate(carried)
-        ),
-        *(f"    {line}" for line in direct),
-        f"    {', '.join(now)}, = {', '.join(new)},",
-        f"return {', '.join([*now, *(f'{place[each]}]' for each in entries)])},",
+    slopes, column = fresh_name("slopes", taken), fresh_name("c", taken)
+    next_names = [fresh_name(f"new_{name}", taken) for name in state_names]
+    slopes_before = [fresh_name(f"by_{name}", taken) for name in state_names]
+    partials = [
+        fresh_name(f"d_{next_names[output]}_{differentiated_by[source]}", taken)
+        for output, source in step.entries
     ]
-    moved = [given[k] for k in by]
+    slope_of = {
+        (state, name): f"{slopes}[{state * width + index}]"
+        for state in range(len(state_names))
+        for index, name in enumerate(inputs)
+    }
+    carried: list[list[str]] = [[] for _ in state_names]
+    direct: list[str] = []
+    followed = [{name} for name in state_names]  # Inputs that a state follows, at first itself.
+    for partial, (output, source) in zip(partials, step.entries, strict=True):
+        name = differentiated_by[source]
+        if source < len(state_names):
+            carried[output].append(f"{partial} * {slopes_before[source]}")
+        else:
+            direct.append(f"{slope_of[output, name]} += {partial}")
+        followed[output].add(name)
+    for _ in state_names:
+        by_state = dict(zip(state_names, followed, strict=True))
+        followed = [
+            names.union(*(by_state[name] for name in names if name in by_state))
+            for names in followed
+        ]
+    entries = [
+        (state, name)
+        for state in range(len(state_names))
+        for name in inputs
+        if name in followed[state]
+    ]
+    started = [
+        f"{slope_of[state, name]} = 1.0" for state, name in enumerate(state_names) if name in inputs
+    ]
+    read = [
+        f"{name} = {slopes}[{state * width} + {column}]" for state, name in enumerate(slopes_before)
+    ]
+    stored = [
+        f"{slopes}[{state * width} + {column}] = {' + '.join(terms) or '0.0'}"
+        for state, terms in enumerate(carried)
+    ]
+    returned = [*state_names, *(slope_of[entry] for entry in entries)]
+    lines = [
+        f"{slopes} = blank({len(state_names) * width})",
+        *started,
+        f"for {number} in range(int({formals[0]})):",
+        f"    {', '.join([*next_names, *partials])}, = {step.name}({step_arguments})",
+        f"    for {column} in range({width}):",
+        *(f"        {line}" for line in [*read, *stored]),
+        *(f"    {line}" for line in direct),
+        f"    {', '.join(state_names)}, = {', '.join(next_names)},",
+        f"return {', '.join(returned)},",
+    ]
+    moved = [formals[index] for index in moving]
     says = f"{inner.name}, repeated, with its derivatives by {listed(moved)}."
     name = f"{loop}_{UNNAMED}"
-    text = function_source(f"{name}({', '.join(given)})", says, lines, "")
+    text = function_source(f"{name}({', '.join(formals)})", says, lines, "")
     return Derived(
         *named_by_text(name, text),
         {step.name: step},
-        tuple(now),
+        tuple(state_names),
         tuple(moved),
-        tuple((o, moved.index(each)) for o, each in entries),
+        tuple((state, moved.index(name)) for state, name in entries),
     )

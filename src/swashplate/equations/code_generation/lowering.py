@@ -77,8 +77,8 @@ def definition_in(text: str, name: str, library: Mapping[str, Any]) -> FunctionD
     for node in ast.parse(text).body:
         if isinstance(node, ast.FunctionDef):
             space[node.name] = FunctionDefinition(node, space)
-    found: FunctionDefinition = space[name]
-    return found
+    definition: FunctionDefinition = space[name]
+    return definition
 
 
 def lowered(function: FunctionDefinition, kinds: Sequence[str], symbol: str) -> str:
@@ -93,10 +93,10 @@ def lowered(function: FunctionDefinition, kinds: Sequence[str], symbol: str) -> 
     symbol : str
         Its name in the module.
     """
-    known: dict[str, str] = {}
+    variable_kinds: dict[str, str] = {}
     while True:
         try:
-            return Lowering(known).function(function, kinds, symbol)
+            return Lowering(variable_kinds).function(function, kinds, symbol)
         except _WidenedError:
             continue
 
@@ -226,8 +226,8 @@ class Lowering:
     def _jump(self, label: str) -> None:
         self.emit(f"br label %{label}")
 
-    def _fork(self, test: Operand, one: str, two: str) -> None:
-        self.emit(f"br i1 {test.text}, label %{one}, label %{two}")
+    def _fork(self, test: Operand, if_true: str, if_false: str) -> None:
+        self.emit(f"br i1 {test.text}, label %{if_true}, label %{if_false}")
 
     # -- variables ---------------------------------------------------------------------------------
 
@@ -261,7 +261,7 @@ class Lowering:
 
     def _body(self, statements: Sequence[ast.stmt], scope: Scope) -> bool:
         """Write statements; whether their end is reached."""
-        return all(self._statement(each, scope) for each in statements)
+        return all(self._statement(statement, scope) for statement in statements)
 
     def _statement(self, node: ast.stmt, scope: Scope) -> bool:
         match node:
@@ -291,27 +291,27 @@ class Lowering:
     def _put(self, target: ast.expr, value: Any, scope: Scope) -> None:
         match target:
             case ast.Tuple(targets):
-                for each, item in zip(targets, value, strict=True):
-                    self._put(each, item, scope)
+                for element, element_value in zip(targets, value, strict=True):
+                    self._put(element, element_value, scope)
             case ast.Name(name) if isinstance(value, Operand):
                 self._store(scope.key(name), value)
             case ast.Name(name):
                 scope.local[name] = value
             case ast.Subscript(array, index):
-                place = self.offset(self._value(array, scope), self._value(index, scope))
-                kind = place.kind[1:]
+                address = self.offset(self._value(array, scope), self._value(index, scope))
+                kind = address.kind[1:]
                 value = self.cast(value, kind)
-                self.emit(f"store {llvm_type(kind)} {value.text}, ptr {place.text}")
+                self.emit(f"store {llvm_type(kind)} {value.text}, ptr {address.text}")
             case _:
                 raise not_lowered(target)
 
     def _if(
         self, test: ast.expr, then: list[ast.stmt], other: list[ast.stmt], scope: Scope
     ) -> bool:
-        one, two, end = self._label("then"), self._label("else"), self._label("end")
-        self._fork(self._test(test, scope), one, two)
+        then_label, else_label, end = self._label("then"), self._label("else"), self._label("end")
+        self._fork(self._test(test, scope), then_label, else_label)
         reached = False
-        for label, statements in ((one, then), (two, other)):
+        for label, statements in ((then_label, then), (else_label, other)):
             self._begin(label)
             if self._body(statements, scope):
                 self._jump(end)
@@ -321,7 +321,7 @@ class Lowering:
         return reached
 
     def _for(self, name: str, bounds: list[ast.expr], body: list[ast.stmt], scope: Scope) -> None:
-        values = [self._value(each, scope) for each in bounds]
+        values = [self._value(bound, scope) for bound in bounds]
         start = values[0] if len(values) > 1 else number(0)
         stop = values[min(len(values), 2) - 1]
         step = values[2].text if len(values) > 2 else "1"
@@ -371,8 +371,8 @@ class Lowering:
             case ast.Name(name):
                 key = scope.key(name)
                 return self._load(key) if key in self._kinds else _constant(scope.find(name))
-            case ast.Tuple(items):
-                return tuple(self._values_of(items, scope))
+            case ast.Tuple(elements):
+                return tuple(self._values_of(elements, scope))
             case ast.UnaryOp(ast.Not(), operand):
                 return self.operand("bool", f"xor i1 {self._test(operand, scope).text}, true")
             case ast.UnaryOp(ast.USub(), ast.Constant(int() | float() as value)):
@@ -384,8 +384,8 @@ class Lowering:
             case ast.BinOp(left, op, right):
                 return self._operation(op, self._value(left, scope), self._value(right, scope))
             case ast.Compare(left, [op], [right]):
-                one, two = self._value(left, scope), self._value(right, scope)
-                return self.compared(COMPARISONS[type(op)], one, two)
+                first, second = self._value(left, scope), self._value(right, scope)
+                return self.compared(COMPARISONS[type(op)], first, second)
             case ast.BoolOp(op, tests):
                 return self._joined(tests, scope, every=isinstance(op, ast.And))
             case ast.IfExp(test, then, other):
@@ -417,61 +417,67 @@ class Lowering:
         if kind == "bool":
             return self.compared("!=", value, number(0))
         if kind == "int":
-            how = "fptosi double" if value.kind == "float" else "zext i1"
+            instruction = "fptosi double" if value.kind == "float" else "zext i1"
         else:
-            how = "sitofp i64" if value.kind == "int" else "uitofp i1"
-        return self.operand(kind, f"{how} {value.text} to {TYPES[kind]}")
+            instruction = "sitofp i64" if value.kind == "int" else "uitofp i1"
+        return self.operand(kind, f"{instruction} {value.text} to {TYPES[kind]}")
 
-    def alike(self, one: Operand, two: Operand, least: str = "bool") -> tuple[Operand, Operand]:
+    def alike(
+        self, first: Operand, second: Operand, least: str = "bool"
+    ) -> tuple[Operand, Operand]:
         """Two numbers as the wider one of their kinds, or one that is no less wide."""
-        kind = KINDS[max(map(KINDS.index, (one.kind, two.kind, least)))]
-        return self.cast(one, kind), self.cast(two, kind)
+        kind = KINDS[max(map(KINDS.index, (first.kind, second.kind, least)))]
+        return self.cast(first, kind), self.cast(second, kind)
 
-    def compared(self, op: str, one: Operand, two: Operand) -> Operand:
+    def compared(self, op: str, first: Operand, second: Operand) -> Operand:
         """A comparison."""
-        one, two = self.alike(one, two)
-        if one.kind == "float":  # true of what is no number only if it is `!=`
-            how = f"fcmp {'u' if op == '!=' else 'o'}{TESTS[op]}"
+        first, second = self.alike(first, second)
+        if first.kind == "float":  # true of what is no number only if it is `!=`
+            instruction = f"fcmp {'u' if op == '!=' else 'o'}{TESTS[op]}"
         else:
-            how = f"icmp {'' if op in ('==', '!=') else 's'}{TESTS[op]}"
-        return self.operand("bool", f"{how} {TYPES[one.kind]} {one.text}, {two.text}")
+            instruction = f"icmp {'' if op in ('==', '!=') else 's'}{TESTS[op]}"
+        return self.operand(
+            "bool", f"{instruction} {TYPES[first.kind]} {first.text}, {second.text}"
+        )
 
     def _negative(self, value: Operand) -> Operand:
         if value.kind == "float":
             return self.operand("float", f"fneg double {value.text}")
         return self.operand("int", f"sub i64 0, {self.cast(value, 'int').text}")
 
-    def _operation(self, op: ast.operator, one: Operand, two: Operand) -> Operand:
+    def _operation(self, op: ast.operator, first: Operand, second: Operand) -> Operand:
         if isinstance(op, ast.BitAnd | ast.BitOr):
-            one, two = self.alike(one, two)
-            how = "and" if isinstance(op, ast.BitAnd) else "or"
+            first, second = self.alike(first, second)
+            instruction = "and" if isinstance(op, ast.BitAnd) else "or"
         elif isinstance(op, ast.FloorDiv):  # of whole numbers that are not negative
-            how = "sdiv"
+            instruction = "sdiv"
         else:
-            one, two = self.alike(one, two, "float" if isinstance(op, ast.Div) else "int")
-            how = OPERATIONS[ARITHMETIC[type(op)]]
-            how = f"f{how}" if one.kind == "float" else how
-        return self.operand(one.kind, f"{how} {TYPES[one.kind]} {one.text}, {two.text}")
+            first, second = self.alike(first, second, "float" if isinstance(op, ast.Div) else "int")
+            instruction = OPERATIONS[ARITHMETIC[type(op)]]
+            instruction = f"f{instruction}" if first.kind == "float" else instruction
+        return self.operand(
+            first.kind, f"{instruction} {TYPES[first.kind]} {first.text}, {second.text}"
+        )
 
     def _power(self, base: Operand, exponent: int) -> Operand:
         """By squaring, as compilers do."""
-        result, left = number(1), abs(exponent)
-        while left:
-            if left % 2:
-                result = self._operation(ast.Mult(), result, base)
-            base, left = self._operation(ast.Mult(), base, base), left // 2
+        product, remaining = number(1), abs(exponent)
+        while remaining:
+            if remaining % 2:
+                product = self._operation(ast.Mult(), product, base)
+            base, remaining = self._operation(ast.Mult(), base, base), remaining // 2
         one = number(1.0)
-        return result if exponent >= 0 else self._operation(ast.Div(), one, result)
+        return product if exponent >= 0 else self._operation(ast.Div(), one, product)
 
     def _joined(self, tests: list[ast.expr], scope: Scope, *, every: bool) -> Operand:
         """Tests that are made until one decides."""
         key, onwards, end = self._label("test$"), "", self._label("end")
-        for k, test in enumerate(tests):
-            value = self._test(test, scope)
-            self._store(key, value)
-            if k < len(tests) - 1:
+        for index, test in enumerate(tests):
+            decision = self._test(test, scope)
+            self._store(key, decision)
+            if index < len(tests) - 1:
                 onwards = self._label("and" if every else "or")
-                self._fork(value, *((onwards, end) if every else (end, onwards)))
+                self._fork(decision, *((onwards, end) if every else (end, onwards)))
                 self._begin(onwards)
         self._jump(end)
         self._begin(end)
@@ -480,73 +486,73 @@ class Lowering:
     def _chosen(self, test: ast.expr, then: ast.expr, other: ast.expr, scope: Scope) -> Any:
         """One of two numbers, or tuples of them, of which only that one is computed."""
         key = self._label("chosen$")
-        one, two, end = self._label("then"), self._label("else"), self._label("end")
-        self._fork(self._test(test, scope), one, two)
-        value: Any = None
-        for label, node in ((one, then), (two, other)):
+        then_label, else_label, end = self._label("then"), self._label("else"), self._label("end")
+        self._fork(self._test(test, scope), then_label, else_label)
+        chosen: Any = None
+        for label, node in ((then_label, then), (else_label, other)):
             self._begin(label)
-            value = self._value(node, scope)
-            self._keep(key, value)
+            chosen = self._value(node, scope)
+            self._keep(key, chosen)
             self._jump(end)
         self._begin(end)
-        return self._kept(key, value)
+        return self._kept(key, chosen)
 
     def _keep(self, key: str, value: Any) -> None:
         """Store a number, or each of a tuple."""
         if isinstance(value, Operand):
             self._store(key, value)
             return
-        for k, item in enumerate(value):
-            self._store(f"{key}.{k}", item)
+        for index, element in enumerate(value):
+            self._store(f"{key}.{index}", element)
 
     def _kept(self, key: str, like: Any) -> Any:
         """What was stored: a number, or a tuple as long as another."""
         if isinstance(like, Operand):
             return self._load(key)
-        return tuple(self._load(f"{key}.{k}") for k in range(len(like)))
+        return tuple(self._load(f"{key}.{index}") for index in range(len(like)))
 
-    def choice(self, test: Operand, one: Operand, two: Operand) -> Operand:
+    def choice(self, test: Operand, if_true: Operand, if_false: Operand) -> Operand:
         """One of two numbers that both have been computed."""
-        one, two = self.alike(one, two)
-        kind, test = TYPES[one.kind], self.cast(test, "bool")
-        text = f"select i1 {test.text}, {kind} {one.text}, {kind} {two.text}"
-        return self.operand(one.kind, text)
+        if_true, if_false = self.alike(if_true, if_false)
+        kind, test = TYPES[if_true.kind], self.cast(test, "bool")
+        text = f"select i1 {test.text}, {kind} {if_true.text}, {kind} {if_false.text}"
+        return self.operand(if_true.kind, text)
 
     # -- calls -------------------------------------------------------------------------------------
 
-    def _call(self, function: Any, given: list[Any]) -> Any:
+    def _call(self, function: Any, arguments: list[Any]) -> Any:
         if isinstance(function, FunctionDefinition):
-            return self._written_out(function, given)
+            return self._written_out(function, arguments)
         if function in LOWERED:
-            return LOWERED[function](self, *given)
-        return self._written_out(function_definition_of(function), given)
+            return LOWERED[function](self, *arguments)
+        return self._written_out(function_definition_of(function), arguments)
 
-    def _written_out(self, function: FunctionDefinition, given: list[Any]) -> Any:
+    def _written_out(self, function: FunctionDefinition, arguments: list[Any]) -> Any:
         """A function in the place of its call."""
         self._scopes += 1
         scope, formals = Scope(self._scopes, function.space, self._label("end")), function.tree.args
-        for k, argument in enumerate(formals.args):
-            self._put(ast.Name(argument.arg), given[k], scope)
+        for index, argument in enumerate(formals.args):
+            self._put(ast.Name(argument.arg), arguments[index], scope)
         if formals.vararg is not None:
-            scope.local[formals.vararg.arg] = tuple(given[len(formals.args) :])
+            scope.local[formals.vararg.arg] = tuple(arguments[len(formals.args) :])
         if self._body(function.tree.body, scope):
             self._jump(scope.end)
         self._begin(scope.end)
         return None if scope.result is None else self._kept(scope.key("result$"), scope.result)
 
-    def called(self, name: str, *given: Operand) -> Operand:
+    def called(self, name: str, *arguments: Operand) -> Operand:
         """A function of floats, of LLVM or of C."""
         symbol = f"llvm.{name}.f64" if name in OWN else name
         effect = "" if name in OWN else " nounwind willreturn memory(none)"
-        formals = ", ".join("double" for _ in given)
+        formals = ", ".join("double" for _ in arguments)
         self.declare(symbol, f"double @{symbol}({formals}){effect}")
-        texts = ", ".join(f"double {self.cast(each, 'float').text}" for each in given)
+        texts = ", ".join(f"double {self.cast(argument, 'float').text}" for argument in arguments)
         return self.operand("float", f"call double @{symbol}({texts})")
 
 
-def _constant(found: Any) -> Any:
+def _constant(meaning: Any) -> Any:
     """A number that a name stands for; anything else as it is."""
-    return number(found) if isinstance(found, bool | int | float) else found
+    return number(meaning) if isinstance(meaning, bool | int | float) else meaning
 
 
 # --- what Python has by itself --------------------------------------------------------------------
@@ -575,13 +581,13 @@ def _magnitude(code: Lowering, value: Operand) -> Operand:
 def _extreme(op: str, code: Lowering, first: Operand, *others: Operand) -> Operand:
     """As Python does it: a later one only counts if it is beyond those before it."""
     for other in others:
-        one, two = code.alike(first, other)
-        first = code.choice(code.compared(op, two, one), two, one)
+        earlier, later = code.alike(first, other)
+        first = code.choice(code.compared(op, later, earlier), later, earlier)
     return first
 
 
 for _function, _name in MATH.items():
-    LOWERED[_function] = lambda code, *given, name=_name: code.called(name, *given)
+    LOWERED[_function] = lambda code, *operands, name=_name: code.called(name, *operands)
 LOWERED |= {int: _whole, float: _float, abs: _magnitude}
 LOWERED |= {min: partial(_extreme, "<"), max: partial(_extreme, ">")}
 LOWERED |= {function: _floor for function, name in MATH.items() if name == "floor"}

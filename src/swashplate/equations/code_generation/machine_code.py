@@ -20,7 +20,7 @@ from numba.core.registry import cpu_target
 from swashplate import progress
 from swashplate.equations.cache import COMPILING
 from swashplate.equations.code_generation.lowering import FunctionDefinition, lowered
-from swashplate.equations.keeping import kept
+from swashplate.equations.keeping import cached_on_disk
 
 SYMBOL = "code"
 """Name of every function within its own module."""
@@ -47,7 +47,10 @@ class Code:
     def __call__(self, *arguments: Any) -> None:
         """Run it, without the interpreter's lock."""
         self._function(
-            *(each.ctypes.data if isinstance(each, np.ndarray) else each for each in arguments)
+            *(
+                argument.ctypes.data if isinstance(argument, np.ndarray) else argument
+                for argument in arguments
+            )
         )
 
 
@@ -72,7 +75,7 @@ def code_of_function(
     """
     key = (name, text, kinds)
     if key not in _loaded:
-        content = kept(
+        content = cached_on_disk(
             f"{name}_code",
             (*key, llvmlite_version, llvm.llvm_version_info, *_host()),
             lambda: _compiled(name, lowered(definition(), kinds, SYMBOL)),

@@ -34,7 +34,7 @@ STEMS = {
 Text = tuple[str, int]
 """An expression, and how tightly it binds: `ATOM` needs no brackets anywhere."""
 _LEVELS = (("if",), ("or",), ("and",), ("not",), COMPARISONS, ("+", "-"), ("*", "/"), ("neg",))
-PRECEDENCE = {op: level for level, each in enumerate(_LEVELS, 1) for op in each}
+PRECEDENCE = {op: level for level, ops in enumerate(_LEVELS, 1) for op in ops}
 POWER = 9
 ATOM = 10
 ONCE, ALL = 1, 2
@@ -52,7 +52,7 @@ class Language(ABC):
         """A literal number."""
 
     @abstractmethod
-    def operation(self, node: Node, args: Sequence[Text], computed: int) -> Text:
+    def operation(self, node: Node, operands: Sequence[Text], computed: int) -> Text:
         """An operation on texts; of a choice `computed` says whether both sides may be."""
 
     @abstractmethod
@@ -61,7 +61,12 @@ class Language(ABC):
 
     @abstractmethod
     def called(
-        self, call: Node, targets: Sequence[str], given: Sequence[str], declared: set[str], pad: str
+        self,
+        call: Node,
+        targets: Sequence[str],
+        arguments: Sequence[str],
+        declared: set[str],
+        pad: str,
     ) -> list[str]:
         """Lines of a call, whose results get their names; an empty one is not needed.
 
@@ -103,44 +108,61 @@ class Python(Language):
         text = repr(value)
         return text, ATOM if text[0] != "-" else PRECEDENCE["neg"]
 
-    def operation(self, node: Node, args: Sequence[Text], computed: int) -> Text:
+    def operation(self, node: Node, operands: Sequence[Text], computed: int) -> Text:
         """An operation on texts."""
         op, level = node.op, PRECEDENCE.get(node.op, ATOM)
         if op == "if":
-            return self._choice(node, args, min(computed, self._all))
+            return self._choice(node, operands, min(computed, self._all))
         if op == "not":
-            return f"not {grouped(args[0], level)}", level
+            return f"not {grouped(operands[0], level)}", level
         if op == "neg":
-            return f"-{grouped(args[0], level + 1)}", level
+            return f"-{grouped(operands[0], level + 1)}", level
         if op == "**":
-            return f"{grouped(args[0], ATOM)}**{node.value!r}", POWER
+            return f"{grouped(operands[0], ATOM)}**{node.value!r}", POWER
         if level < ATOM:
-            left = level + 1 if op in COMPARISONS else level
-            return f"{grouped(args[0], left)} {op} {grouped(args[1], level + 1)}", level
-        return f"{op}({', '.join(text for text, _ in args)})", ATOM
+            left_level = level + 1 if op in COMPARISONS else level
+            return (
+                f"{grouped(operands[0], left_level)} {op} {grouped(operands[1], level + 1)}",
+                level,
+            )
+        return f"{op}({', '.join(text for text, _ in operands)})", ATOM
 
-    def _choice(self, node: Node, args: Sequence[Text], computed: int) -> Text:
-        (test, one, two), (_, then, other) = args, node.args
-        if other is FALSE or then is TRUE:
-            word, second = ("and", one) if other is FALSE else ("or", two)
+    def _choice(self, node: Node, texts: Sequence[Text], computed: int) -> Text:
+        _, if_true, if_false = node.args
+        test, text_if_true, text_if_false = texts
+        if if_false is FALSE or if_true is TRUE:
+            if if_false is FALSE:
+                word, sign, second = "and", "&", text_if_true
+            else:
+                word, sign, second = "or", "|", text_if_false
             if computed == ALL:
-                return f"{grouped(test, ATOM)} {'&|'[word == 'or']} {grouped(second, ATOM)}", 4
+                return f"{grouped(test, ATOM)} {sign} {grouped(second, ATOM)}", 4
             level = PRECEDENCE[word]
             return f"{grouped(test, level + 1)} {word} {grouped(second, level)}", level
         if computed == ALL:
-            return f"choose({test[0]}, {one[0]}, {two[0]})", ATOM
-        return f"{grouped(one, 2)} if {grouped(test, 2)} else {grouped(two, 1)}", PRECEDENCE["if"]
+            return f"choose({test[0]}, {text_if_true[0]}, {text_if_false[0]})", ATOM
+        return (
+            f"{grouped(text_if_true, 2)} if {grouped(test, 2)} else {grouped(text_if_false, 1)}",
+            PRECEDENCE["if"],
+        )
 
     def assigned(self, name: str, node: Node, text: str, pad: str, *, new: bool) -> list[str]:
         """Lines of an assignment."""
         return assigned(name, text, pad)
 
     def called(
-        self, call: Node, targets: Sequence[str], given: Sequence[str], declared: set[str], pad: str
+        self,
+        call: Node,
+        targets: Sequence[str],
+        arguments: Sequence[str],
+        declared: set[str],
+        pad: str,
     ) -> list[str]:
         """A call whose tuple comes apart."""
-        left = ", ".join(each or "_" for each in targets) + ("," if len(targets) == 1 else "")
-        return assigned(left, f"{call.value.function.name}({', '.join(given)})", pad)
+        unpacked = ", ".join(target or "_" for target in targets) + (
+            "," if len(targets) == 1 else ""
+        )
+        return assigned(unpacked, f"{call.value.function.name}({', '.join(arguments)})", pad)
 
     def branch(self, test: str, then: list[str], other: list[str], pad: str) -> list[str]:
         """Lines of an `if` and its `else`."""
@@ -178,7 +200,7 @@ class CodeBlock:
         What equations call a value.
     taken : set of str
         Names that stand for something else; those of the block are added.
-    known : mapping of Node to str, optional
+    available : mapping of Node to str, optional
         Values that are there already, with their names.
     flat : callable, optional
         Which branches are not worth one, see `scheduling.Schedule`.
@@ -205,27 +227,27 @@ class CodeBlock:
         labels: Mapping[Node, str],
         taken: set[str],
         *,
-        known: Mapping[Node, str] | None = None,
+        available: Mapping[Node, str] | None = None,
         flat: Flat | None = None,
         language: Language = PYTHON,
         named: bool = False,
     ) -> None:
-        self._labels, self._taken, self._known = labels, taken, dict(known or {})
+        self._labels, self._taken, self._available = labels, taken, dict(available or {})
         self._language = language
         self.functions: dict[str, Function] = {}
-        self._schedule = Schedule(results, self._known, flat)
+        self._schedule = Schedule(results, self._available, flat)
         self._reads: set[str] = set()
         self._written_nodes: list[Node] = []
         self._named: dict[tuple[Node, Region], str] = {}
         self._outlive: dict[Conditional | None, dict[str, Node]] = {}
         """Names of each branch that are read after it, while its test is known to hold."""
         self._uses = self._counted(results)
-        whole = self._schedule.whole
-        self.statements = [*self._steps(whole, "")]
+        outermost = self._schedule.whole
+        self.statements = [*self._steps(outermost, "")]
         self.results = [self._result(node, named=named) for node in results]
         self.names = {
-            **self._known,
-            **{node: name for (node, region), name in self._named.items() if region is whole},
+            **self._available,
+            **{node: name for (node, region), name in self._named.items() if region is outermost},
         }
 
     @property
@@ -256,9 +278,9 @@ class CodeBlock:
                     read(operand, region)
             for branch in region.branches:
                 read(branch.test, region)
-                for k, side in enumerate(branch.sides):
+                for index, side in enumerate(branch.sides):
                     for member in branch.members:
-                        read(member.args[1 + k], side)
+                        read(member.args[1 + index], side)
                     walk(side)
 
         for node in results:
@@ -365,18 +387,18 @@ class CodeBlock:
                 name = targets[node.value] = self._fresh(node)
                 if self._name(node, region, name):
                     declared.add(name)
-        given = [self._text(node, region)[0] for node in call.args]
+        arguments = [self._text(node, region)[0] for node in call.args]
         self._written_nodes.append(call)
-        lines = self._language.called(call, targets, given, declared, pad)
-        return lines, [each for each in targets if each]
+        lines = self._language.called(call, targets, arguments, declared, pad)
+        return lines, [target for target in targets if target]
 
     def _branch(self, branch: Conditional, region: Region, pad: str) -> tuple[list[str], list[str]]:
         """Lines of a branch; none if it is a choice that stands in an expression."""
         if len(branch.members) == 1 and not any(map(self._has_lines, branch.sides)):
             (member,) = branch.members
-            return (
-                self._define(member, region, pad) if self._wants_name(member, region) else ([], [])
-            )
+            if not self._wants_name(member, region):
+                return [], []
+            return self._define(member, region, pad)
         names, declared = {}, {}
         for member in reversed(branch.members):  # in the order in which they were computed
             around = self._choice(member, region)
@@ -390,15 +412,15 @@ class CodeBlock:
                 declared[names[member]] = member
         inner = f"{pad}    "
         sides = [self._region(branch.sides[0], inner), self._region(branch.sides[1], inner)]
-        for k, side in enumerate(branch.sides):
+        for index, side in enumerate(branch.sides):
             for member in names:
-                value, name = plain_value(member.args[1 + k]), names[member]
+                value, name = plain_value(member.args[1 + index]), names[member]
                 text = self._text(value, side)[0]
                 if text == name:
                     continue
                 if (value, side) in self._uses and self._becomes(value, side):
-                    sides[k] += self._language.heading(value, inner)
-                sides[k] += self._language.assigned(name, member, text, inner, new=False)
+                    sides[index] += self._language.heading(value, inner)
+                sides[index] += self._language.assigned(name, member, text, inner, new=False)
         test = self._text(branch.test, region)[0]
         self._written_nodes += branch.members
         ahead = [
@@ -409,14 +431,16 @@ class CodeBlock:
 
     def _result(self, node: Node, *, named: bool) -> tuple[str, frozenset[str]]:
         """Text of a result, by a name if it is long or must have one, and what that reads."""
-        node, whole = plain_value(node), self._schedule.whole
+        node, outermost = plain_value(node), self._schedule.whole
         self._reads = set()
-        text = self._text(node, whole)[0]
-        done = (node, whole) in self._named or node in self._known or node.op in LEAVES
-        if done or (not named and (len(text) <= self._language.short or _is_trivial(node))):
+        text = self._text(node, outermost)[0]
+        is_written = (
+            (node, outermost) in self._named or node in self._available or node.op in LEAVES
+        )
+        if is_written or (not named and (len(text) <= self._language.short or _is_trivial(node))):
             return text, frozenset(self._reads)
-        self.statements += self._statement(node, partial(self._define, node, whole, ""), "")
-        name = self._named[node, whole]
+        self.statements += self._statement(node, partial(self._define, node, outermost, ""), "")
+        name = self._named[node, outermost]
         return name, frozenset((name,))
 
     # -- expressions -------------------------------------------------------------------------------
@@ -424,9 +448,9 @@ class CodeBlock:
     def _text(self, node: Node, region: Region) -> Text:
         """A value as it is read in a region: by its name, or written out."""
         node = plain_value(node)
-        if node in self._known:
-            self._reads.add(self._known[node])
-            return self._known[node], ATOM
+        if node in self._available:
+            self._reads.add(self._available[node])
+            return self._available[node], ATOM
         if node.op in LEAVES:
             return self._written(node, region)
         where = self._schedule.region_of(node, region)
@@ -448,12 +472,12 @@ class CodeBlock:
         where = self._schedule.region_of(node, region)
         branch = None if where is None else self._schedule.branch_of(node, where)
         if branch is None:
-            args = [self._text(each, region) for each in node.args]
-            return self._language.operation(node, args, ALL)
-        args = [self._text(branch.test, region)]
+            operands = [self._text(operand, region) for operand in node.args]
+            return self._language.operation(node, operands, ALL)
+        operands = [self._text(branch.test, region)]
         sides = zip(node.args[1:], branch.sides, strict=True)
-        args += [self._text(each, side) for each, side in sides]
-        return self._language.operation(node, args, ONCE)
+        operands += [self._text(operand, side) for operand, side in sides]
+        return self._language.operation(node, operands, ONCE)
 
 
 def _is_trivial(node: Node) -> bool:
@@ -465,9 +489,9 @@ def _is_trivial(node: Node) -> bool:
 
 def bracketed(start: str, text: str, end: str, pad: str = "") -> list[str]:
     """Text within brackets, on one line or on as many as it takes."""
-    one, inner = f"{pad}{start}{text}{end}", f"{pad}    "
-    if len(one) <= WIDTH:
-        return [one]
+    line, inner = f"{pad}{start}{text}{end}", f"{pad}    "
+    if len(line) <= WIDTH:
+        return [line]
     wrapper = TextWrapper(
         WIDTH,
         initial_indent=inner,
@@ -480,9 +504,9 @@ def bracketed(start: str, text: str, end: str, pad: str = "") -> list[str]:
 
 def assigned(left: str, text: str, pad: str = "") -> list[str]:
     """Lines of an assignment."""
-    one = f"{pad}{left} = {text}"
-    if len(one) <= WIDTH:
-        return [one]
+    line = f"{pad}{left} = {text}"
+    if len(line) <= WIDTH:
+        return [line]
     if len(left) <= WIDTH // 2:
         return bracketed(f"{left} = (", text, ")", pad)
     *head, last = bracketed("(", left, ")", pad)
@@ -516,11 +540,14 @@ def function_text(
     """
     arguments = {formal.partition(".")[0] for formal in formals}
     block = CodeBlock(results, labels, {*FUNCTIONS, *arguments, *RESERVED, name})
-    back = ", ".join(block.texts) or "()"
+    returned = ", ".join(block.texts) or "()"
     if len(results) == 1 and flat:
-        back += ","
-    fits = len(back) < WIDTH - 10
-    lines = [*block.lines, *([f"return {back}"] if fits else bracketed("return (", back, ")"))]
+        returned += ","
+    fits = len(returned) < WIDTH - 10
+    lines = [
+        *block.lines,
+        *([f"return {returned}"] if fits else bracketed("return (", returned, ")")),
+    ]
     head = bracketed(f"def {name}(", ", ".join(formals), "):")
     if len(says) > WIDTH - 6:
         says = "\n    (".join(says.rsplit(" (", 1))

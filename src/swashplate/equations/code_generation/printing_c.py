@@ -25,6 +25,7 @@ WIDTH = 100
 """Longest line of C."""
 TYPES = {"float": "double", "int": "long long", "bool": "bool"}
 """Types of values by their kinds."""
+ZEROS = {"float": "0.0", "int": "0", "bool": "false"}
 WORDS = set(
     """
 auto break case char const continue default do double else enum extern float for goto if inline int
@@ -39,7 +40,7 @@ erfc gamma lgamma tgamma fmin fmax fdim fma j0 j1 jn y0 y1 yn index time signal 
 BREAKS = re.compile(r"[,;\"] | (?=[?:+/=*-] |&& |\|\| )|\{(?=\.)")
 """Where a long line of C may end."""
 _LEVELS = (("if",), ("or",), ("and",), ("==", "!="), ("<", "<=", ">", ">="), ("+", "-"), ("*", "/"))
-LEVELS = {op: level for level, each in enumerate((*_LEVELS, ("not", "neg")), 1) for op in each}
+LEVELS = {op: level for level, ops in enumerate((*_LEVELS, ("not", "neg")), 1) for op in ops}
 """How tightly operations bind; names and calls as `ATOM`."""
 UNARY = LEVELS["neg"]
 FEW = 3
@@ -65,7 +66,7 @@ ROOT = HELPERS.pop("root")
 
 def helpers_in(text: str) -> list[str]:
     """Functions that a text calls, of those that stand for what C has not."""
-    return [each for name, each in HELPERS.items() if f"{name}(" in text]
+    return [helper for name, helper in HELPERS.items() if f"{name}(" in text]
 
 
 def filled(text: str, words: Mapping[str, Any]) -> str:
@@ -77,7 +78,9 @@ def filled(text: str, words: Mapping[str, Any]) -> str:
 
 def c_name(name: str) -> str:
     """A name of Python's as one of C's."""
-    plain_name = "".join(c if c.isascii() else f"u{ord(c):04x}" for c in name)
+    plain_name = "".join(
+        character if character.isascii() else f"u{ord(character):04x}" for character in name
+    )
     return f"{plain_name}_" if plain_name in WORDS else plain_name
 
 
@@ -97,7 +100,7 @@ def wrapped(line: str) -> list[str]:
     indent = " " * (len(line) - len(line.lstrip()))
     lines, rest = list[str](), line
     while len(rest) > WIDTH:
-        ends = [m.end() for m in BREAKS.finditer(rest, len(indent) + 8, WIDTH + 1)]
+        ends = [match.end() for match in BREAKS.finditer(rest, len(indent) + 8, WIDTH + 1)]
         if not ends:
             break
         late = [at for at in ends if at > WIDTH // 2] or ends[-1:]
@@ -110,7 +113,7 @@ def wrapped(line: str) -> list[str]:
 def _rank(line: str, at: int) -> int:
     """How well a line ends at a place: before a choice best, before a factor or a value worst."""
     marks = (("?", ":"), ("&&", "||"), ("+", "-"), ("*", "/", "="))
-    ranks = [rank for rank, each in enumerate(marks) if line[at:].startswith(each)]
+    ranks = [rank for rank, mark in enumerate(marks) if line[at:].startswith(mark)]
     return ranks[0] if ranks else 1
 
 
@@ -147,13 +150,16 @@ def comment(text: str, pad: str = "", width: int = WIDTH) -> list[str]:
 
 def indented(lines: Iterable[str]) -> list[str]:
     """Lines of C moved in, long ones on several."""
-    return [each for line in lines for each in (wrapped(f"    {line}") if line else [""])]
+    parts: list[str] = []
+    for line in lines:
+        parts += wrapped(f"    {line}") if line else [""]
+    return parts
 
 
 def function(says: str, head: str, body: Iterable[str]) -> str:
     """Text of a function of C."""
-    said = comment(says) if says else []
-    return "\n".join([*said, *wrapped(head), "{", *indented(body), "}"])
+    heading = comment(says) if says else []
+    return "\n".join([*heading, *wrapped(head), "{", *indented(body), "}"])
 
 
 def first_line(source: Parsed) -> str:
@@ -190,46 +196,51 @@ class C(Language):
         text = literal(value)
         return text, UNARY if text[0] == "-" else ATOM
 
-    def operation(self, node: Node, args: Sequence[Text], computed: int) -> Text:
+    def operation(self, node: Node, operands: Sequence[Text], computed: int) -> Text:
         """An operator with its operands, or a call; whole numbers among doubles are cast."""
         op, level = node.op, LEVELS.get(node.op, ATOM)
         if op == "if":
-            return self._choice(node, args)
+            return self._choice(node, operands)
         if op == "not":
-            return f"!{grouped(args[0], level)}", level
+            return f"!{grouped(operands[0], level)}", level
         if op == "neg":
-            text = grouped(args[0], level)
+            text = grouped(operands[0], level)
             return f"-({text})" if text.startswith("-") else f"-{text}", level
-        doubles = [as_double(*each) for each in zip(node.args, args, strict=True)]
+        doubles = [as_double(*pair) for pair in zip(node.args, operands, strict=True)]
         if op == "**":
             (base,) = doubles
             if node.value == 2 and base[1] == ATOM and node.kind == "float":
                 return f"{base[0]} * {base[0]}", LEVELS["*"]
-            return _whole(node, f"whole_power({base[0]}, {node.value})")
+            return _as_whole_number(node, f"whole_power({base[0]}, {node.value})")
         if level == ATOM:
             name = {"min": "lesser_of", "max": "greater_of", "abs": "fabs"}.get(op, op)
-            return _whole(node, f"{name}({', '.join(text for text, _ in doubles)})")
+            return _as_whole_number(node, f"{name}({', '.join(text for text, _ in doubles)})")
         compared = op in COMPARISONS
-        whole = all(each.kind == "int" for each in node.args) and op != "/"
-        left, right = args if whole else doubles
+        all_whole = all(operand.kind == "int" for operand in node.args) and op != "/"
+        left, right = operands if all_whole else doubles
         least = LEVELS["+"] if compared else level
         return f"{grouped(left, least)} {op} {grouped(right, max(least, level + 1))}", level
 
-    def _choice(self, node: Node, args: Sequence[Text]) -> Text:
-        (test, one, two), (_, then, other) = args, node.args
+    def _choice(self, node: Node, texts: Sequence[Text]) -> Text:
+        _, if_true, if_false = node.args
+        test, text_if_true, text_if_false = texts
         opposite = f"!{grouped(test, UNARY)}", UNARY
-        if other is FALSE:
-            return _joined(test, "&&", one)
-        if then is TRUE:
-            return _joined(test, "||", two)
-        if then is FALSE:
-            return _joined(opposite, "&&", two)
-        if other is TRUE:
-            return _joined(opposite, "||", one)
+        if if_false is FALSE:
+            return _joined(test, "&&", text_if_true)
+        if if_true is TRUE:
+            return _joined(test, "||", text_if_false)
+        if if_true is FALSE:
+            return _joined(opposite, "&&", text_if_false)
+        if if_false is TRUE:
+            return _joined(opposite, "||", text_if_true)
         if node.kind == "float":
-            one, two = as_double(then, one), as_double(other, two)
-        texts = grouped(test, LEVELS["=="]), grouped(one, LEVELS["or"]), two[0]
-        return f"{texts[0]} ? {texts[1]} : {texts[2]}", LEVELS["if"]
+            text_if_true, text_if_false = (
+                as_double(if_true, text_if_true),
+                as_double(if_false, text_if_false),
+            )
+        condition = grouped(test, LEVELS["=="])
+        first = grouped(text_if_true, LEVELS["or"])
+        return f"{condition} ? {first} : {text_if_false[0]}", LEVELS["if"]
 
     # -- statements --------------------------------------------------------------------------------
 
@@ -241,31 +252,39 @@ class C(Language):
         return [f"{pad}{start} = {text};"]
 
     def called(
-        self, call: Node, targets: Sequence[str], given: Sequence[str], declared: set[str], pad: str
+        self,
+        call: Node,
+        targets: Sequence[str],
+        arguments: Sequence[str],
+        declared: set[str],
+        pad: str,
     ) -> list[str]:
         """A call of what does the loop: it returns a root, and moves a state where it stands."""
         name = self._functions.name_of(call.value.loop, self._taken)
         kind = call.value.loop.kind
-        own = {"root": 2, "once": 0}.get(kind, 1 + len(targets))
+        # ahead of the equation's other arguments: a bracket, nothing, or a count and a state
+        leading = {"root": 2, "once": 0}.get(kind, 1 + len(targets))
         texts = [
-            as_double(node, (text, 0))[0] if k < own else text
-            for k, (node, text) in enumerate(zip(call.args, given, strict=True))
+            as_double(node, (text, 0))[0] if index < leading else text
+            for index, (node, text) in enumerate(zip(call.args, arguments, strict=True))
         ]
         if len(targets) == 1 and kind != "repeated":
             (target,) = targets
             start = target if target in declared else f"const double {target}"
             return [f"{pad}{start} = {name}({', '.join(texts)});"]
-        lines, places = list[str](), list[str]()
-        for k, target in enumerate(targets):
-            place = target or fresh_name("unused", self._taken)
-            places.append(f"&{place}")
-            start = place if target in declared else f"double {place}"
+        lines: list[str] = []
+        addresses: list[str] = []
+        for index, target in enumerate(targets):
+            variable = target or fresh_name("unused", self._taken)
+            addresses.append(f"&{variable}")
+            start = variable if target in declared else f"double {variable}"
             if kind == "repeated":
-                lines.append(f"{pad}{start} = {texts[1 + k]};")
+                lines.append(f"{pad}{start} = {texts[1 + index]};")
             elif target not in declared:
                 lines.append(f"{pad}{start};")
-        arguments = [*texts[: min(own, 1)], *texts[own:], *places]
-        return [*lines, f"{pad}{name}({', '.join(arguments)});"]
+        count = texts[:1] if leading else []
+        call_arguments = [*count, *texts[leading:], *addresses]
+        return [*lines, f"{pad}{name}({', '.join(call_arguments)});"]
 
     def branch(self, test: str, then: list[str], other: list[str], pad: str) -> list[str]:
         """`if` and `else`, or `else if` if there is nothing but that."""
@@ -275,10 +294,10 @@ class C(Language):
         if not other:
             return [*lines, f"{pad}}}"]
         inner = f"{pad}    "
-        alone = other[1:] if _HEADING.match(other[0]) else other
-        own = [line for line in alone if line[len(inner)] not in " }"]
-        if own == alone[:1] and own[0].startswith(f"{inner}if ("):
-            first, *rest = [line[4:] for line in alone]
+        nested = other[1:] if _HEADING.match(other[0]) else other
+        at_level = [line for line in nested if line[len(inner)] not in " }"]
+        if at_level == nested[:1] and at_level[0].startswith(f"{inner}if ("):
+            first, *rest = [line[4:] for line in nested]
             return [*lines, f"{pad}}} else {first.lstrip()}", *rest]
         return [*lines, f"{pad}}} else {{", *other, f"{pad}}}"]
 
@@ -286,10 +305,10 @@ class C(Language):
         """Declarations by type; zero if only one side gives a value."""
         lines = []
         for kind, word in TYPES.items():
-            own = [name for name, node in names.items() if node.kind == kind]
-            zero = "" if always else {"bool": " = false", "int": " = 0"}.get(kind, " = 0.0")
-            if own:
-                listed = ", ".join(f"{name}{zero}" for name in own)
+            names_of_kind = [name for name, node in names.items() if node.kind == kind]
+            zero = "" if always else f" = {ZEROS[kind]}"
+            if names_of_kind:
+                listed = ", ".join(f"{name}{zero}" for name in names_of_kind)
                 lines.append(f"{pad}{word} {listed};")
         return lines
 
@@ -306,26 +325,26 @@ class C(Language):
         The first one of each equation has the first line of its docstring. None is needed for the
         equation `around` until another has begun.
         """
-        said = set[Parsed]() if around is None else {around}
-        kept = list[str]()
-        for source, own in self._runs(lines, around):
-            pad = own[0][: len(own[0]) - len(own[0].lstrip())] if own else ""
-            says = "" if source is None else first_line(source)
-            if source is None or not own:
-                kept += own
+        introduced = set[Parsed]() if around is None else {around}
+        headed = list[str]()
+        for source, run in self._runs(lines, around):
+            if source is None or not run:
+                headed += run
                 continue
-            new = source not in said
-            said.add(source)
-            alone = len(own) < FEW and own[0].endswith(";") and not new
-            remark = f"{own[0]} /* {comment_line(source.name)} */"
-            if alone and len(remark) <= WIDTH - 4:
-                kept += [remark, *own[1:]]
+            pad = run[0][: len(run[0]) - len(run[0].lstrip())]
+            says = first_line(source)
+            new = source not in introduced
+            introduced.add(source)
+            short_run = len(run) < FEW and run[0].endswith(";") and not new
+            remark = f"{run[0]} /* {comment_line(source.name)} */"
+            if short_run and len(remark) <= WIDTH - 4:
+                headed += [remark, *run[1:]]
                 continue
-            if kept and not kept[-1].endswith("{") and kept[-1]:
-                kept.append("")
+            if headed and not headed[-1].endswith("{") and headed[-1]:
+                headed.append("")
             text = f"{source.name}: {says}" if new and says else source.name
-            kept += [*comment(text, pad, WIDTH - 4), *own]
-        return kept
+            headed += [*comment(text, pad, WIDTH - 4), *run]
+        return headed
 
     def _runs(
         self, lines: Iterable[str], around: Parsed | None
@@ -353,15 +372,17 @@ def as_double(node: Node, text: Text) -> Text:
     return f"(double){grouped(text, UNARY)}", UNARY
 
 
-def _whole(node: Node, text: str) -> Text:
+def _as_whole_number(node: Node, text: str) -> Text:
     """What a function of doubles returns, as a whole number if it is one."""
     return (f"whole_number({text})" if node.kind == "int" else text), ATOM
 
 
-def _joined(one: Text, op: str, two: Text) -> Text:
+def _joined(first: Text, op: str, second: Text) -> Text:
     """Two tests; others among them stand in brackets, as compilers and readers like it."""
     level = LEVELS["and" if op == "&&" else "or"]
-    texts = [each[0] if each[1] == level else grouped(each, LEVELS["=="]) for each in (one, two)]
+    texts = [
+        test[0] if test[1] == level else grouped(test, LEVELS["=="]) for test in (first, second)
+    ]
     return f" {op} ".join(texts), level
 
 
@@ -428,35 +449,39 @@ class Loops:
         )
 
     def _root(self, name: str, residual: str, inner: Inner) -> str:
-        own = {"low", "high", "x_1", "x_2", "x_3", "f_1", "f_2", "f_3", "t", "x", "f", "best"}
-        taken = {*WORDS, *own, "smallest", "reach", "xi", "phi", "steps", residual}
-        rest = [(kind, fresh_name(c_name(each), taken)) for each, kind in inner.formals.items()]
+        reserved = {"low", "high", "x_1", "x_2", "x_3", "f_1", "f_2", "f_3", "t", "x", "f", "best"}
+        taken = {*WORDS, *reserved, "smallest", "reach", "xi", "phi", "steps", residual}
+        others = [
+            (kind, fresh_name(c_name(formal), taken)) for formal, kind in inner.formals.items()
+        ]
         words = {
             "name": name,
             "residual": residual,
-            "formals": "".join(f", {TYPES[kind]} {each}" for kind, each in rest),
-            "given": "".join(f", {each}" for _, each in rest),
+            "formals": "".join(f", {TYPES[kind]} {formal}" for kind, formal in others),
+            "given": "".join(f", {formal}" for _, formal in others),
             "steps": STEPS,
             "precision": literal(PRECISION),
             "tiny": literal(TINY),
         }
         lines = filled(ROOT, words).rstrip("\n").split("\n")
-        return "\n".join(each for line in lines for each in wrapped(line))
+        return "\n".join(part for line in lines for part in wrapped(line))
 
     def _repeated(self, name: str, step: str, inner: Inner) -> str:
         *state, number = inner.leading
         taken = {*WORDS, "count", step}
-        rest = [(kind, fresh_name(c_name(each), taken)) for each, kind in inner.formals.items()]
-        places = [fresh_name(c_name(each), taken) for each in state]
+        others = [
+            (kind, fresh_name(c_name(formal), taken)) for formal, kind in inner.formals.items()
+        ]
+        state_names = [fresh_name(c_name(formal), taken) for formal in state]
         number = fresh_name(c_name(number), taken)
-        formals = ["double count", *(f"{TYPES[kind]} {each}" for kind, each in rest)]
-        formals += [f"double *{each}" for each in places]
-        given = [*(f"*{each}" for each in places), f"(double){number}"]
-        given += [each for _, each in rest]
-        if len(places) == 1:
-            line = f"    *{places[0]} = {step}({', '.join(given)});"
+        formals = ["double count", *(f"{TYPES[kind]} {formal}" for kind, formal in others)]
+        formals += [f"double *{formal}" for formal in state_names]
+        arguments = [*(f"*{formal}" for formal in state_names), f"(double){number}"]
+        arguments += [formal for _, formal in others]
+        if len(state_names) == 1:
+            line = f"    *{state_names[0]} = {step}({', '.join(arguments)});"
         else:
-            line = f"    {step}({', '.join([*given, *places])});"
+            line = f"    {step}({', '.join([*arguments, *state_names])});"
         head = f"static void {name}({', '.join(formals)})"
         loop = f"for (long long {number} = 0; {number} < whole_number(count); {number}++) {{"
         return function(f"{inner.source.name}, repeated.", head, [loop, line, "}"])
@@ -476,27 +501,27 @@ def scalar_function(
     `formals` are its arguments with their kinds. A single result is returned; several go to where
     the last arguments point, named as in `results`.
     """
-    back, places = returned(results)
+    result_type, pointers = returned(results)
     taken = {*functions.taken, name, *(path for path, _ in results)}
-    words = {each: re.sub(r"[.\[\]]+", "_", each).strip("_") for each in formals}
-    names = {each: fresh_name(c_name(word), taken) for each, word in words.items()}
-    known = {graph.name(each, kind): names[each] for each, kind in formals.items()}
+    words = {formal: re.sub(r"[.\[\]]+", "_", formal).strip("_") for formal in formals}
+    names = {formal: fresh_name(c_name(word), taken) for formal, word in words.items()}
+    available = {graph.name(formal, kind): names[formal] for formal, kind in formals.items()}
     language = C(functions, origins, taken)
-    named = {node: c_name(label) for node, label in labels.items()}
+    c_labels = {node: c_name(label) for node, label in labels.items()}
     nodes = [node for _, node in results]
-    block = CodeBlock(nodes, named, taken, known=known, language=language)
+    block = CodeBlock(nodes, c_labels, taken, available=available, language=language)
     lines = language.headed(block.lines, source)
     used = without_comments("\n".join([*block.lines, *block.texts]))
-    idle = [f"(void){each};" for each in names.values() if not mentions(used, each)]
-    idle += [""] if idle and lines else []
-    ends = [as_double(node, (text, 0))[0] for node, text in zip(nodes, block.texts, strict=True)]
+    unused = [f"(void){formal};" for formal in names.values() if not mentions(used, formal)]
+    unused += [""] if unused and lines else []
+    values = [as_double(node, (text, 0))[0] for node, text in zip(nodes, block.texts, strict=True)]
     if len(results) == 1:
-        lines.append(f"return {ends[0]};")
+        lines.append(f"return {values[0]};")
     else:
-        lines += [f"*{path} = {text};" for (path, _), text in zip(results, ends, strict=True)]
-    declared = [f"{TYPES[kind]} {names[each]}" for each, kind in formals.items()]
-    head = f"static {back} {name}({', '.join([*declared, *places]) or 'void'})"
-    return function(first_line(source), head, [*idle, *lines])
+        lines += [f"*{path} = {text};" for (path, _), text in zip(results, values, strict=True)]
+    declared = [f"{TYPES[kind]} {names[formal]}" for formal, kind in formals.items()]
+    head = f"static {result_type} {name}({', '.join([*declared, *pointers]) or 'void'})"
+    return function(first_line(source), head, [*unused, *lines])
 
 
 def mentions(text: str, name: str) -> bool:

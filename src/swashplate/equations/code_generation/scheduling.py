@@ -75,7 +75,7 @@ class Conditional:
 class Schedule:
     """Regions of all nodes that some results need.
 
-    `known` nodes are there already. `flat` says which branches are not worth one.
+    `available` nodes are there already. `flat` says which branches are not worth one.
 
     Attributes
     ----------
@@ -86,11 +86,11 @@ class Schedule:
     """
 
     def __init__(
-        self, results: Sequence[Node], known: Mapping[Node, object], flat: Flat | None = None
+        self, results: Sequence[Node], available: Mapping[Node, object], flat: Flat | None = None
     ) -> None:
         self._results = [*results]
-        self._order = [n for n in ordered(results, known) if n.op not in LEAVES]
-        self._index = {node: k for k, node in enumerate(self._order)}
+        self._order = [node for node in ordered(results, available) if node.op not in LEAVES]
+        self._index = {node: index for index, node in enumerate(self._order)}
         self._results_of: dict[Node, list[Node]] = {}
         for node in self._order:
             if node.op == "result":
@@ -138,7 +138,7 @@ class Schedule:
                     for operand in node.args:
                         needed.setdefault(operand, {})[region] = None
                     continue
-                test, one, two = node.args
+                test, if_true, if_false = node.args
                 key = depth[node], test, region
                 branch = branches.get(key)
                 if branch is None:
@@ -148,8 +148,8 @@ class Schedule:
                     needed.setdefault(test, {})[region] = None
                 branch.members.append(node)
                 self._branch_of[node, region] = branch
-                needed.setdefault(one, {})[branch.sides[0]] = None
-                needed.setdefault(two, {})[branch.sides[1]] = None
+                needed.setdefault(if_true, {})[branch.sides[0]] = None
+                needed.setdefault(if_false, {})[branch.sides[1]] = None
 
     def _is_branch(self, node: Node) -> bool:
         return node.op == "if" and node not in self.selects
@@ -181,33 +181,33 @@ class Schedule:
 
     def steps(self, region: Region) -> Iterator[Node | Conditional]:
         """Nodes and branches of a region, each after those that it needs."""
-        items: list[Node | Conditional] = [*region.nodes, *region.branches]
+        steps: list[Node | Conditional] = [*region.nodes, *region.branches]
         at: dict[Node | Conditional, int] = {}
         waits: dict[Node | Conditional, set[Node | Conditional]] = {}
-        for item in items:
-            waits[item] = {*self._needs(item, region)} - {item}
-            nodes = [item] if isinstance(item, Node) else item.members
-            at[item] = min(self._index[node] for node in nodes)
-        behind: dict[Node | Conditional, list[Node | Conditional]] = {}
-        for item, others in waits.items():
+        for step in steps:
+            waits[step] = {*self._needs(step, region)} - {step}
+            nodes = [step] if isinstance(step, Node) else step.members
+            at[step] = min(self._index[node] for node in nodes)
+        waiting: dict[Node | Conditional, list[Node | Conditional]] = {}
+        for step, others in waits.items():
             for other in others:
-                behind.setdefault(other, []).append(item)
+                waiting.setdefault(other, []).append(step)
         ready: list[tuple[int, int, Node | Conditional]] = []
-        for k, item in enumerate(items):
-            if not waits[item]:
-                heappush(ready, (at[item], k, item))
-        number = {item: k for k, item in enumerate(items)}
+        for index, step in enumerate(steps):
+            if not waits[step]:
+                heappush(ready, (at[step], index, step))
+        index_of = {step: index for index, step in enumerate(steps)}
         while ready:
-            _, _, item = heappop(ready)
-            yield item
-            for later in behind.get(item, ()):
-                waits[later].remove(item)
+            _, _, step = heappop(ready)
+            yield step
+            for later in waiting.get(step, ()):
+                waits[later].remove(step)
                 if not waits[later]:
-                    heappush(ready, (at[later], number[later], later))
+                    heappush(ready, (at[later], index_of[later], later))
 
-    def _needs(self, item: Node | Conditional, region: Region) -> Iterator[Node | Conditional]:
+    def _needs(self, step: Node | Conditional, region: Region) -> Iterator[Node | Conditional]:
         """Items of a region that one of its items needs."""
-        for node, where in self.uses(item, region):
+        for node, where in self.uses(step, region):
             computed_in = self.region_of(node, where)
             if computed_in is None or region not in computed_in.enclosing:
                 continue
@@ -220,15 +220,15 @@ class Schedule:
             else:
                 yield node
 
-    def uses(self, item: Node | Conditional, region: Region) -> Iterator[tuple[Node, Region]]:
+    def uses(self, step: Node | Conditional, region: Region) -> Iterator[tuple[Node, Region]]:
         """What an item of a region reads, all that lies within it included, and from where."""
-        if isinstance(item, Node):
-            yield from ((operand, region) for operand in item.args)
+        if isinstance(step, Node):
+            yield from ((operand, region) for operand in step.args)
             return
-        yield item.test, region
-        for k, side in enumerate(item.sides):
-            for member in item.members:
-                yield member.args[1 + k], side
+        yield step.test, region
+        for index, side in enumerate(step.sides):
+            for member in step.members:
+                yield member.args[1 + index], side
             for node in side.nodes:
                 yield from self.uses(node, side)
             for branch in side.branches:
@@ -244,36 +244,36 @@ def outermost_regions(regions: Iterable[Region]) -> list[Region]:
         while changed:
             changed = False
             last = outermost[-1]
-            for k, other in enumerate(outermost[:-1]):
+            for index, other in enumerate(outermost[:-1]):
                 both = common_region(other, last)
                 if both is not None:
-                    del outermost[k]
+                    del outermost[index]
                     outermost[-1] = both
                     changed = True
                     break
     return outermost
 
 
-def common_region(a: Region, b: Region) -> Region | None:
+def common_region(first: Region, second: Region) -> Region | None:
     """The region in which to compute a node that two regions need; None if there is none.
 
     Both see the node's name there, and no run computes the node without need.
     """
-    if a in b.enclosing:
-        return a
-    if b in a.enclosing:
-        return b
-    common = next(region for region in a.enclosing if region in b.enclosing)
-    side_a = a.enclosing[a.enclosing.index(common) - 1]
-    side_b = b.enclosing[b.enclosing.index(common) - 1]
+    if first in second.enclosing:
+        return first
+    if second in first.enclosing:
+        return second
+    common = next(region for region in first.enclosing if region in second.enclosing)
+    side_a = first.enclosing[first.enclosing.index(common) - 1]
+    side_b = second.enclosing[second.enclosing.index(common) - 1]
     assert side_a.branch is not None
     assert side_b.branch is not None
     if side_a.branch is side_b.branch:
-        return common if side_a is a and side_b is b else None
+        return common if side_a is first and side_b is second else None
     if side_a.branch.test is side_b.branch.test and side_a.side == side_b.side:
         if side_a.branch.depth < side_b.branch.depth:
-            return side_a if side_a is a else None
-        return side_b if side_b is b else None
+            return side_a if side_a is first else None
+        return side_b if side_b is second else None
     return None
 
 

@@ -129,8 +129,8 @@ class Trace:
         with self.running(callee):
             result = _Tracer(source, self).result(values)
             scalars = tuple(node for value in values.values() for _, node in leaves(value))
-            back = tuple(node for _, node in leaves(result))
-            self.calls.setdefault(source, set()).add((scalars, back))
+            returned = tuple(node for _, node in leaves(result))
+            self.calls.setdefault(source, set()).add((scalars, returned))
             rule = RULES.get(source.function)
             if rule is None or _is_changed(callee):
                 return result
@@ -160,9 +160,9 @@ class Trace:
         finally:
             self.under_way = outer
 
-    def make(self, op: str, *args: Node, value: Any = None) -> Node:
+    def make(self, op: str, *operands: Node, value: Any = None) -> Node:
         """A node that comes from the equation that is being run."""
-        return self.noted(make(op, *args, value=value))
+        return self.noted(make(op, *operands, value=value))
 
     def noted(self, node: Node) -> Node:
         """A node, with the equation that it comes from."""
@@ -182,7 +182,7 @@ class Trace:
         self, source: Parsed, rule: Parsed, arguments: Mapping[str, Value], result: Value
     ) -> Value:
         """The result of an equation with declared derivatives."""
-        by = {
+        floats = {
             ".".join(filter(None, (name, path))): node
             for name, value in arguments.items()
             for path, node in leaves(value)
@@ -195,22 +195,22 @@ class Trace:
             # a rule is that of the equation as it is written
             with self.within(chain), self.running(Callee(rule, NO_REPLACEMENTS)):
                 partials = [node for _, node in leaves(_Tracer(rule, self).result(arguments))]
-            if len(partials) != len(by) * len(results):
+            if len(partials) != len(floats) * len(results):
                 rule.refuse(
                     None,
-                    f"a number of derivatives that is not {len(by) * len(results)}",
-                    f"return those by {', '.join(by)}, in order",
+                    f"a number of derivatives that is not {len(floats) * len(results)}",
+                    f"return those by {', '.join(floats)}, in order",
                 )
             return tuple(partials)
 
         decided = tuple((name, _options_in(value)) for name, value in arguments.items())
-        key = (source.function, decided, *by.values(), *(node for _, node in results))
-        whole = self._rules.setdefault(key, Rule(tuple(by.values()), slopes))
+        key = (source.function, decided, *floats.values(), *(node for _, node in results))
+        rule_of_all = self._rules.setdefault(key, Rule(tuple(floats.values()), slopes))
         nodes = []
-        for k, (path, node) in enumerate(results):
-            part = self._rules.setdefault((*key, k), _part_of(whole, k))
+        for index, (path, node) in enumerate(results):
+            rule_of_one = self._rules.setdefault((*key, index), _part_of(rule_of_all, index))
             self.label(node, f"{source.name}_{path}" if path else source.name)
-            nodes.append(self.make("ruled", node, value=part))
+            nodes.append(self.make("ruled", node, value=rule_of_one))
         return rebuilt(result, iter(nodes))
 
 
@@ -219,7 +219,7 @@ def _is_changed(callee: Callee) -> bool:
     replaced = {old for old, chain in callee.replacements.items() if chain}
     if not replaced:
         return False
-    return any(plain(each) in replaced for each in closure(callee.source.function).values())
+    return any(plain(reached) in replaced for reached in closure(callee.source.function).values())
 
 
 def _options_in(value: Value) -> tuple[Any, ...]:
@@ -264,24 +264,24 @@ class _Tracer:
         """Do statements; what they return, if they do."""
         pending = [*statements]
         while pending:
-            match each := pending.pop(0):
+            match statement := pending.pop(0):
                 case ast.Return(value=ast.expr() as value):
                     return self.value(value)
                 case ast.If():
-                    test = self.test(each.test)
+                    test = self.test(statement.test)
                     if test.op == "number":
-                        pending[:0] = each.body if test.value else each.orelse
-                    elif has_return([each]):
-                        if_true, _ = self.in_branch(self.returned, [*each.body, *pending])
-                        if_false, _ = self.in_branch(self.returned, [*each.orelse, *pending])
-                        return self.select(each, test, if_true, if_false)
+                        pending[:0] = statement.body if test.value else statement.orelse
+                    elif has_return([statement]):
+                        if_true, _ = self.in_branch(self.returned, [*statement.body, *pending])
+                        if_false, _ = self.in_branch(self.returned, [*statement.orelse, *pending])
+                        return self.select(statement, test, if_true, if_false)
                     else:
-                        self.merge(test, each)
-                case ast.For(target=target, iter=ast.Call(args=args)):
-                    for i in reversed(range(*map(ast.literal_eval, args))):
-                        number = ast.copy_location(ast.Constant(i), each)
-                        set_counter = ast.copy_location(ast.Assign([target], number), each)
-                        pending[:0] = [set_counter, *each.body]
+                        self.merge(test, statement)
+                case ast.For(target=target, iter=ast.Call(args=bounds)):
+                    for count in reversed(range(*map(ast.literal_eval, bounds))):
+                        number = ast.copy_location(ast.Constant(count), statement)
+                        set_counter = ast.copy_location(ast.Assign([target], number), statement)
+                        pending[:0] = [set_counter, *statement.body]
                 case ast.Assign(targets=targets, value=value):
                     assigned = self.value(value)
                     for target in targets:
@@ -289,8 +289,10 @@ class _Tracer:
                 case ast.AnnAssign(target=target, value=ast.expr() as value):
                     self.bind(target, self.value(value))
                 case ast.AugAssign(target=ast.Name(id=name) as target):
-                    left = ast.copy_location(ast.Name(name), each)
-                    term = ast.copy_location(ast.BinOp(left, each.op, each.value), each)
+                    left = ast.copy_location(ast.Name(name), statement)
+                    term = ast.copy_location(
+                        ast.BinOp(left, statement.op, statement.value), statement
+                    )
                     self.bind(target, self.value(term))
         return None
 
@@ -310,15 +312,15 @@ class _Tracer:
             if name not in if_true or name not in if_false:
                 self.names.pop(name, None)  # without a value on one way: refused if it is read
                 continue
-            a, b = if_true[name], if_false[name]
-            if a is b:
-                self.names[name] = a
+            value_if_true, value_if_false = if_true[name], if_false[name]
+            if value_if_true is value_if_false:
+                self.names[name] = value_if_true
                 continue
-            if not alike(a, b):
+            if not alike(value_if_true, value_if_false):
                 self.refuse(
                     statement, f"{name} of two structures", "give it the same kind of value"
                 )
-            self.names[name] = self.select(statement, test, a, b)
+            self.names[name] = self.select(statement, test, value_if_true, value_if_false)
             self.trace.label(self.names[name], name)
 
     def select(self, at: ast.AST, test: Node, if_true: Value, if_false: Value) -> Value:
@@ -326,7 +328,9 @@ class _Tracer:
         if not alike(if_true, if_false):
             self.refuse(at, "results of different structure", "give the same tuple on every path")
         pairs = zip(leaves(if_true), leaves(if_false), strict=True)
-        choices = (self.trace.noted(choose(test, a, b)) for (_, a), (_, b) in pairs)
+        choices = (
+            self.trace.noted(choose(test, first, second)) for (_, first), (_, second) in pairs
+        )
         return rebuilt(if_true, choices)
 
     def bind(self, target: ast.expr, value: Value) -> None:
@@ -336,8 +340,8 @@ class _Tracer:
                 self.refuse(
                     target, "an unpacking of something else", "unpack a tuple of as many values"
                 )
-            for each, item in zip(target.elts, value.items, strict=True):
-                self.bind(each, item)
+            for element, element_value in zip(target.elts, value.items, strict=True):
+                self.bind(element, element_value)
             return
         assert isinstance(target, ast.Name)
         self.names[target.id] = value
@@ -349,13 +353,13 @@ class _Tracer:
         """A decision; an option that is on counts as true."""
         value = self.value(node)
         if isinstance(value, Flag):
-            known = self.known(node, value)
-            return known if isinstance(known, Node) else graph.number(known is not None)
+            setting = self.setting_of(node, value)
+            return setting if isinstance(setting, Node) else graph.number(setting is not None)
         if isinstance(value, Node):
             return graph.number(bool(value.value)) if value.op == "number" else value
         self.refuse(node, "a test of a tuple", "compare its elements")
 
-    def known(self, node: ast.AST, option: Flag) -> Any:
+    def setting_of(self, node: ast.AST, option: Flag) -> Any:
         """Value of an option, refused if it was not given."""
         if option.value == "unknown":
             what = f"a test of the option {option.text}, whose value is not known"
@@ -378,8 +382,8 @@ class _Tracer:
                 return Flag(None)
             case ast.Constant(value=int(number) | float(number)):
                 return graph.number(number)
-            case ast.Tuple(elts=items):
-                return Tuple(None, tuple(map(self.value, items)))
+            case ast.Tuple(elts=elements):
+                return Tuple(None, tuple(map(self.value, elements)))
             case ast.Name(id=name) if name in self.names:
                 return self.names[name]
             case ast.Name(id=name):
@@ -395,12 +399,12 @@ class _Tracer:
                 test = self.test(node.operand)
                 return self.negated(test)
             case ast.UnaryOp():
-                inner = self.scalar(node.operand)
+                operand = self.scalar(node.operand)
                 if isinstance(node.op, ast.UAdd):
-                    return inner
-                if inner.op == "number":
-                    return graph.number(-inner.value)
-                return self.trace.make("neg", inner)
+                    return operand
+                if operand.op == "number":
+                    return graph.number(-operand.value)
+                return self.trace.make("neg", operand)
             case ast.BinOp():
                 return self.arithmetic(node)
             case ast.Compare():
@@ -469,8 +473,8 @@ class _Tracer:
             counted = {"+": int.__add__, "-": int.__sub__, "*": int.__mul__}[op]
             return graph.number(counted(left.value, right.value))
         if op == "*" and left.kind == right.kind == "float":  # a factor that is known to be one
-            for one, other in ((left, right), (right, left)):
-                if graph.is_number(one, 1.0):
+            for factor, other in ((left, right), (right, left)):
+                if graph.is_number(factor, 1.0):
                     return other
         return self.trace.make(op, left, right)
 
@@ -491,10 +495,10 @@ class _Tracer:
 
     def missing(self, node: ast.AST, value: Value, off: bool) -> Node:
         """Whether a value `is None` (`off`), or is not."""
-        known = self.known(node, value) if isinstance(value, Flag) else True
-        if isinstance(known, Node):
-            return self.negated(known) if off else known
-        return graph.number((known is None) == off)
+        setting = self.setting_of(node, value) if isinstance(value, Flag) else True
+        if isinstance(setting, Node):
+            return self.negated(setting) if off else setting
+        return graph.number((setting is None) == off)
 
     def joined(self, node: ast.BoolOp) -> Node:
         """`and` and `or`, which are choices: the second test only counts after the first."""
@@ -525,31 +529,31 @@ class _Tracer:
             text = ast.unparse(node.func)
             self.refuse(node, f"a call of {text}", f"make {text} an @equation")
         callee = self.trace.callee(called)
-        names = [each.arg for each in callee.source.arguments]
+        names = [argument.arg for argument in callee.source.arguments]
         return self.trace.run(callee, self.arguments(node, names, callee.source.defaults))
 
     def function(self, node: ast.Call, op: str) -> Node:
         """Value of a function of numbers."""
-        args = [self.scalar(each) for each in node.args]
+        operands = [self.scalar(argument) for argument in node.args]
         least = 2 if op in ("atan2", "hypot", "min", "max") else 1
-        exactly = len(args) == least or (len(args) > least and op in ("min", "max"))
+        exactly = len(operands) == least or (len(operands) > least and op in ("min", "max"))
         if not exactly or node.keywords:
-            self.refuse(node, f"{op} of {len(args)} arguments", f"give it {least}")
-        if len(args) == 1:
-            return self.trace.make(op, args[0])
-        return reduce(lambda one, two: self.trace.make(op, one, two), args)
+            self.refuse(node, f"{op} of {len(operands)} arguments", f"give it {least}")
+        if len(operands) == 1:
+            return self.trace.make(op, operands[0])
+        return reduce(lambda first, second: self.trace.make(op, first, second), operands)
 
     def arguments(self, node: ast.Call, names: Sequence[str], optional: Any) -> Names:
         """Values for arguments of these names, in their order as far as they are given."""
         positional = [self.value(each) for each in node.args]
         by_name = {str(each.arg): self.value(each.value) for each in node.keywords}
         defaults = {name: None if name in optional else Parameter.empty for name in names}
-        taken = [
+        parameters = [
             Parameter(name, Parameter.POSITIONAL_OR_KEYWORD, default=defaults[name])
             for name in names
         ]
         try:
-            return Signature(taken).bind(*positional, **by_name).arguments
+            return Signature(parameters).bind(*positional, **by_name).arguments
         except TypeError as error:
             what = f"a call of {ast.unparse(node.func)} with {error}"
             self.refuse(node, what, f"it takes {', '.join(names)}")
@@ -586,17 +590,19 @@ class _Tracer:
                 "type them tuple[float, float, ...] with every element, or give derive their "
                 "lengths",
             )
-        numbers = [[node for _, node in leaves(each)] for each in (knots, values)]
+        numbers = [[node for _, node in leaves(table)] for table in (knots, values)]
         return self.interpolated(x, *numbers)
 
     def interpolated(self, x: Node, knots: Sequence[Node], values: Sequence[Node]) -> Node:
         """`interpolate`, written out."""
         make, label = self.trace.make, self.trace.label
         ends = [knots[0], knots[1], values[0], values[1]]
-        for i in range(1, len(knots) - 1):
-            beyond = make(">=", x, knots[i])
-            now = knots[i], knots[i + 1], values[i], values[i + 1]
-            ends = [choose(beyond, b, a) for a, b in zip(ends, now, strict=True)]
+        for segment in range(1, len(knots) - 1):
+            beyond = make(">=", x, knots[segment])
+            next_ends = knots[segment], knots[segment + 1], values[segment], values[segment + 1]
+            ends = [
+                choose(beyond, after, before) for before, after in zip(ends, next_ends, strict=True)
+            ]
             for node, name in zip(ends, ("left", "right", "low", "high"), strict=True):
                 label(self.trace.noted(node), name)
         left, right, low, high = ends

@@ -43,25 +43,25 @@ def leaves(value: Value, path: str = "") -> Iterator[tuple[str, Node]]:
     if isinstance(value, Node):
         yield path, value
     elif isinstance(value, Tuple):
-        for each, item in zip(value.fields, value.items, strict=True):
-            yield from leaves(item, f"{path}.{each}" if path else each)
+        for field, element in zip(value.fields, value.items, strict=True):
+            yield from leaves(element, f"{path}.{field}" if path else field)
 
 
 def rebuilt(value: Value, nodes: Iterator[Node]) -> Value:
     """The same structure with other scalars in it."""
     if isinstance(value, Tuple):
-        return Tuple(value.cls, tuple(rebuilt(each, nodes) for each in value.items))
+        return Tuple(value.cls, tuple(rebuilt(item, nodes) for item in value.items))
     return next(nodes) if isinstance(value, Node) else value
 
 
-def alike(a: Value, b: Value) -> bool:
+def alike(first: Value, second: Value) -> bool:
     """Whether two values can be one: whole numbers are numbers."""
-    if isinstance(a, Node) and isinstance(b, Node):
-        return a.kind == b.kind or {a.kind, b.kind} == {"int", "float"}
-    if isinstance(a, Tuple) and isinstance(b, Tuple):
-        same = a.cls is b.cls and len(a.items) == len(b.items)
-        return same and all(map(alike, a.items, b.items))
-    return isinstance(a, Flag) and isinstance(b, Flag) and a.value == b.value
+    if isinstance(first, Node) and isinstance(second, Node):
+        return first.kind == second.kind or {first.kind, second.kind} == {"int", "float"}
+    if isinstance(first, Tuple) and isinstance(second, Tuple):
+        same = first.cls is second.cls and len(first.items) == len(second.items)
+        return same and all(map(alike, first.items, second.items))
+    return isinstance(first, Flag) and isinstance(second, Flag) and first.value == second.value
 
 
 def fixed(value: Any) -> Value | None:
@@ -73,9 +73,9 @@ def fixed(value: Any) -> Value | None:
     if isinstance(value, int | float):
         return graph.number(value)
     if isinstance(value, tuple):
-        items = [each for each in map(fixed, value) if each is not None]
-        cls = type(value) if is_named_tuple(type(value)) else None
-        return Tuple(cls, tuple(items)) if len(items) == len(value) else None
+        elements = [element for element in map(fixed, value) if element is not None]
+        kind = type(value) if is_named_tuple(type(value)) else None
+        return Tuple(kind, tuple(elements)) if len(elements) == len(value) else None
     return None
 
 
@@ -137,7 +137,7 @@ def _argument(
             raise EquationError(
                 f"The option {path} is {value!r}: options are None (off) or True (on)."
             )
-        (inner,) = (each for each in args if each is not type(None))
+        (inner,) = (member for member in args if member is not type(None))
         if value is None or value == "unknown" or inner is bool:
             return Flag(value, path)
         return _argument(inner, path, text, options, lengths)
@@ -146,8 +146,11 @@ def _argument(
         return _argument(args[0], path, text, options, lengths)
     if is_named_tuple(hint):
         hints = typing.get_type_hints(hint, include_extras=True)
-        below = [(hints.get(f, float), f"{path}.{f}", f"{text}.{f}") for f in hint._fields]
-        return Tuple(hint, tuple(_argument(*each, options, lengths) for each in below))
+        below = [
+            (hints.get(field, float), f"{path}.{field}", f"{text}.{field}")
+            for field in hint._fields
+        ]
+        return Tuple(hint, tuple(_argument(*member, options, lengths) for member in below))
     if origin is tuple:
         if len(args) == 2 and args[1] is Ellipsis:
             if path not in lengths:
@@ -156,8 +159,10 @@ def _argument(
                     "many elements it has."
                 )
             args = (args[0],) * lengths[path]
-        below = [(each, f"{path}.{i}", f"{text}[{i}]") for i, each in enumerate(args)]
-        return Tuple(None, tuple(_argument(*each, options, lengths) for each in below))
+        below = [
+            (member, f"{path}.{index}", f"{text}[{index}]") for index, member in enumerate(args)
+        ]
+        return Tuple(None, tuple(_argument(*member, options, lengths) for member in below))
     raise EquationError(
         f"{path} of type {hint} cannot be an argument of an equation: it takes float, int, bool, "
         "bool | None for an option, tuples and named tuples of them."

@@ -60,12 +60,12 @@ def _initialised(
     first: Mapping[str, float],
     h: float,
     start: Start,
-    own: Collection[str],
+    started: Collection[str],
 ) -> tuple[Struct[Program], Array]:
     """The layout's program with its numbers, and derivatives of the states at the first sample.
 
-    `own` are paths of states that the run starts from as its own unknowns: nothing else moves them.
-    The code that computes the derivatives is generated when it is first needed.
+    `started` are paths of states that the run starts from as its own unknowns: nothing else moves
+    them. The code that computes the derivatives is generated when it is first needed.
     """
     structure = layout.structure
     slopes = dict[Moved, float]()
@@ -73,7 +73,7 @@ def _initialised(
         slopes = _slopes(structure, instance, first, h, start)
     tangent = np.zeros(layout.tangents)
     for (state, column), index in layout.tangent_of.items():
-        if f"{structure.model.prefix(state.part)}{state.path}" in own:
+        if f"{structure.model.prefix(state.part)}{state.path}" in started:
             tangent[index] = state.path in started_by(structure.model, state.part, column)
         else:
             tangent[index] = slopes.get((state, column), 0.0)
@@ -90,10 +90,10 @@ def _initialised(
 
 @generating
 def _at_rest(
-    layout: JacobianLayout, instance: Instance, h: float, own: tuple[str, ...]
+    layout: JacobianLayout, instance: Instance, h: float, started: tuple[str, ...]
 ) -> tuple[Struct[Program], Array]:
     """Those of a start at rest, which depends on no record."""
-    return _initialised(layout, instance, {}, h, "rest", own)
+    return _initialised(layout, instance, {}, h, "rest", started)
 
 
 # --- what a fit asks for --------------------------------------------------------------------------
@@ -132,15 +132,15 @@ NO_RUN_VALUES = RunValues()
 
 
 def residuals(
-    instance: Instance, observed: ObservedRecord, own: RunValues = NO_RUN_VALUES
+    instance: Instance, observed: ObservedRecord, run_values: RunValues = NO_RUN_VALUES
 ) -> Array:
     """(m,) weighted residuals of all observations, one after the other; 0 if the weight is 0.
 
-    Each is weight · (simulated + offset - measured) in its signal's SI unit; `own` are values of
-    the run's own unknowns.
+    Each is weight · (simulated + offset - measured) in its signal's SI unit; `run_values` are
+    values of the run's own unknowns.
     """
     rows = np.empty((1, observed.rows))
-    _march(instance, observed, own, columns=(), to=(), rows=rows, before=0)
+    _march(instance, observed, run_values, columns=(), to=(), rows=rows, before=0)
     return np.asarray(rows[0])
 
 
@@ -148,7 +148,7 @@ def jacobian(
     instance: Instance,
     observed: ObservedRecord,
     columns: Sequence[str],
-    own: RunValues = NO_RUN_VALUES,
+    run_values: RunValues = NO_RUN_VALUES,
     *,
     moved: Sequence[bool] | None = None,
     out: Array | None = None,
@@ -171,7 +171,7 @@ def jacobian(
     _march(
         instance,
         observed,
-        own,
+        run_values,
         columns=[columns[c] for c in to.tolist()],
         to=to,
         rows=out,
@@ -184,7 +184,7 @@ def triangle(
     instance: Instance,
     observed: ObservedRecord,
     columns: Sequence[str],
-    own: RunValues = NO_RUN_VALUES,
+    run_values: RunValues = NO_RUN_VALUES,
     *,
     moved: Sequence[bool] | None = None,
 ) -> Triangle:
@@ -199,7 +199,7 @@ def triangle(
     _march(
         instance,
         observed,
-        own,
+        run_values,
         columns=[columns[c] for c in to.tolist()],
         to=range(to.size),
         rows=aligned(used.size, ROWS),
@@ -224,7 +224,7 @@ NO_FACTOR = np.zeros((0, 0))
 def _march(
     instance: Instance,
     observed: ObservedRecord,
-    own: RunValues,
+    run_values: RunValues,
     *,
     columns: Sequence[str],
     to: ArrayLike,
@@ -240,31 +240,35 @@ def _march(
     h = observed.record.step
     start = observed.start
     signals = tuple(records)
-    outputs = tuple(dict.fromkeys(o.signal for o in observed.observations))
-    missing = [c for c in columns if c.startswith("start.") and c[6:] not in own.start]
+    outputs = tuple(dict.fromkeys(observation.signal for observation in observed.observations))
+    missing = [
+        column
+        for column in columns
+        if column.startswith("start.") and column[6:] not in run_values.start
+    ]
     if missing:
         raise InputError(f"{missing[0]} is a column, so RunValues needs a value of it.")
     structure = structure_of(instance.model, signals, instance.options, outputs)
     plan = observed.plan
-    numbers = tuple(outputs.index(each.signal) for each in observed.observations)
+    numbers = tuple(outputs.index(observation.signal) for observation in observed.observations)
     layout = layout_of(structure, tuple(columns), numbers, start)
     first = {name: float(values[0]) for name, values in records.items()}
     initial = instance.start(first, h, start)
-    states = initial_states(instance, initial, own.start)
+    states = initial_states(instance, initial, run_values.start)
     if start == "rest":
-        program, tangent = _at_rest(layout, instance, h, tuple(own.start))
+        program, tangent = _at_rest(layout, instance, h, tuple(run_values.start))
     else:
-        program, tangent = _initialised(layout, instance, first, h, start, own.start)
+        program, tangent = _initialised(layout, instance, first, h, start, run_values.start)
     fields = Sink(
         columns=len(rows),
         length=rows.shape[1],
         rows=rows,
         derived=len(columns),
-        to=np.array(to, dtype=np.int64),
-        own=before,
+        target=np.array(to, dtype=np.int64),
+        first_offset_row=before,
         folded=int(factor.size > 0),
         factor=factor,
-        offset=observed.offsets(own.offsets),
+        offset=observed.offsets(run_values.offsets),
         offset_row=observed.offset_rows(before),
     )
     sink = Struct(fields)
@@ -298,7 +302,7 @@ class BoundModel(NamedTuple):
     """A model with numbers, and what it is differentiated by."""
 
     instance: Instance
-    own: RunValues = NO_RUN_VALUES
+    run_values: RunValues = NO_RUN_VALUES
     """Values of the run's own unknowns."""
     paths: Sequence[str] = ()
     """Columns of derivatives."""
@@ -307,12 +311,14 @@ class BoundModel(NamedTuple):
 
     def residuals(self, observed: ObservedRecord) -> Array:
         """(m,) weighted residuals of all observations; see `residuals`."""
-        return residuals(self.instance, observed, self.own)
+        return residuals(self.instance, observed, self.run_values)
 
     def jacobian(self, observed: ObservedRecord, out: Array | None = None) -> Jacobian:
         """The same residuals with their exact derivatives; see `jacobian`."""
-        return jacobian(self.instance, observed, self.paths, self.own, moved=self.moved, out=out)
+        return jacobian(
+            self.instance, observed, self.paths, self.run_values, moved=self.moved, out=out
+        )
 
     def triangle(self, observed: ObservedRecord) -> Triangle:
         """Triangular factor of [J r]; see `triangle`."""
-        return triangle(self.instance, observed, self.paths, self.own, moved=self.moved)
+        return triangle(self.instance, observed, self.paths, self.run_values, moved=self.moved)

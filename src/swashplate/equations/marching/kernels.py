@@ -59,8 +59,8 @@ def routine(function: Callable[..., None]) -> Kernel:
     """
     if JIT_OFF:
         return function
-    hints = {k: v for k, v in function.__annotations__.items() if k != "return"}
-    kinds = tuple(_kind_of(hint) for hint in hints.values())
+    annotations = function.__annotations__
+    kinds = tuple(_kind_of(annotations[name]) for name in annotations if name != "return")
     name = function.__name__
     return code_of_function(name, name, kinds, lambda: function_definition_of(function))
 
@@ -76,7 +76,7 @@ def _kind_of(hint: Any) -> str:
 
 def addresses(kernels: Sequence[PlannedCode], needed: Container[int]) -> Any:
     """What `call_kernel` is given of each kernel; the kernels themselves must be kept as well."""
-    compiled = [kernel() if k in needed else None for k, kernel in enumerate(kernels)]
+    compiled = [kernel() if index in needed else None for index, kernel in enumerate(kernels)]
     if JIT_OFF:
         return compiled
     words = [0 if kernel is None else kernel.address for kernel in compiled]
@@ -134,13 +134,13 @@ def _word(field: Any, kind: str) -> int:
 # --- what routines call ---------------------------------------------------------------------------
 
 
-def behind(array: Any, start: int) -> Any:
+def row_from(array: Any, start: int) -> Any:
     """Numbers of an array from an index on, as one row."""
     return array.reshape(-1)[start:]
 
 
-@lowers(behind)
-def _behind(code: Lowering, array: Operand, start: Operand) -> Operand:
+@lowers(row_from)
+def _row_from(code: Lowering, array: Operand, start: Operand) -> Operand:
     return code.offset(array, start)
 
 
@@ -196,7 +196,7 @@ def _call(code: Lowering, address: Operand, *arguments: Operand) -> None:
 
 def _array_pointers(code: Lowering, arrays: Operand) -> list[Operand]:
     """Pointers to the arrays that a kernel takes."""
-    words = [code.load(arrays, number(k)) for k in range(len(KERNEL_KINDS) - 3)]
+    words = [code.load(arrays, number(index)) for index in range(len(KERNEL_KINDS) - 3)]
     return [_pointer(code, INTS, word) for word in words]
 
 

@@ -33,7 +33,7 @@ from swashplate.equations.code_generation.scheduling import VECTOR, all_vector
 from swashplate.equations.code_generation.values import leaves
 from swashplate.equations.declaration import JIT_OFF
 from swashplate.equations.graph import Node
-from swashplate.equations.keeping import kept, key_of
+from swashplate.equations.keeping import cached_on_disk, key_of
 from swashplate.equations.marching.kernels import FLOATS, INTS, pointers
 from swashplate.equations.marching.march import SampleCode, lower, output_of
 from swashplate.equations.marching.part_code import PartCode, SignalId, taps_of
@@ -119,12 +119,12 @@ class Straight:
     def lines(self, shared: set[str]) -> list[str]:
         """Text of the loops over lanes; the names in `shared` are the same for all lanes."""
         lines: list[str] = []
-        for k, loop in enumerate(self.loops):
+        for index, loop in enumerate(self.loops):
             computed = {name for statement in loop for name in statement.names}
             read = {name for statement in loop for name in statement.reads}
             read_later = {
                 name
-                for later_loop in self.loops[k + 1 :]
+                for later_loop in self.loops[index + 1 :]
                 for statement in later_loop
                 for name in statement.reads
             }
@@ -162,8 +162,8 @@ def vectorisation_report(model: Model, output: str | None = None, *, options: An
     signals = list[str]()
     options_of_parts = list[Any]()
     calls = dict[str, None]()
-    for i, part in enumerate(model.parts):
-        outside = [name for name in part.input_types if model.link_of(i, name) is None]
+    for index, part in enumerate(model.parts):
+        outside = [name for name in part.input_types if model.link_of(index, name) is None]
         signals += [part.tap(name).signal for name in outside if name not in part.defaults]
         own_options = options if len(model.parts) == 1 else getattr(options, part.name, None)
         if own_options is None and part.options is not None:
@@ -174,15 +174,15 @@ def vectorisation_report(model: Model, output: str | None = None, *, options: An
     sample_code = SampleCode(model, signals, options_of_parts, [signal])
     for used in sample_code.used:
         ends = sample_code.ends[used.part]
-        _, known = sample_code.ahead(used, ends, still=fractions_of(used))
-        block = sample_code.printed(used, ends, known=known, flat=all_vector)
+        _, available = sample_code.ahead(used, ends, still=fractions_of(used))
+        block = sample_code.printed(used, ends, available=available, flat=all_vector)
         for statement in block.statements:
             if is_vector(statement):
                 continue
             for node in statement.nodes:
                 if node.op not in VECTOR:
                     source = used.trace.origins.get(node)
-                    where = used.own.name if source is None else source.name
+                    where = used.part_model.name if source is None else source.name
                     calls[f"{where} calls {_called(node)}"] = None
     if not calls:
         return f"Nothing keeps {model.name} from vector instructions."
@@ -291,23 +291,25 @@ class _Writer:
             for tap in part.taps:
                 record = f"records[{sample_code.signals.index(tap.tap.signal)}]"
                 queue = [f"{part.delay_fraction(tap)}_coming", *part.tap_samples(tap)]
-                for lines, name, n in ((first, queue[1], "0"), (fetched, queue[0], "coming")):
-                    index = f"{n} - delay_samples[{tap.number} * LANES + lane]"
+                for lines, name, sample in ((first, queue[1], "0"), (fetched, queue[0], "coming")):
+                    index = f"{sample} - delay_samples[{tap.number} * LANES + lane]"
                     lines.append(f"at = {index}")
                     lines.append(f"{straight.row(name)} = {record}[at] if at >= 0 else 0.0")
                 following += [(old, new, frozenset((new,))) for new, old in pairwise(queue)]
         for name, text, reads in following:
             straight.become(name, text, reads)
-        read = {name for loop in straight.loops for each in loop for name in each.reads}
+        read = {name for loop in straight.loops for statement in loop for name in statement.reads}
         shared = {"target": "measured[n]", "counts": "weight[n]"}
         shared["half"] = "0.5 * h if n > 0 else 0.0"
-        shared |= {f"x_{name}": f"records[{k}][n]" for k, name in enumerate(sample_code.signals)}
-        inner = [f"{name} = {value}" for name, value in shared.items() if name in read]
+        shared |= {
+            f"x_{name}": f"records[{row}][n]" for row, name in enumerate(sample_code.signals)
+        }
+        inner = [f"{name} = {text}" for name, text in shared.items() if name in read]
         if fetched:
             inner += ["coming = min(n + 1, last)", *over_lanes(fetched)]
         inner += straight.lines({"h", *shared})
-        kept = over_lanes([f"outputs[lane * length + n] = {straight.row('shown')}"])
-        inner += ["if length > 0:", *indented(kept)]
+        shown_lines = over_lanes([f"outputs[lane * length + n] = {straight.row('shown')}"])
+        inner += ["if length > 0:", *indented(shown_lines)]
         lines = ["last = count - 1", *over_lanes(first)]
         lines += ["for n in range(count):", *indented(inner)]
         return [
@@ -335,19 +337,23 @@ class _Writer:
             part, part.ahead(sample_code.ends[part.part], fractions_of(part)), named=True
         )
         self._ahead.append((part, head))
-        own = [(source, n) for source, n in sample_code.sources.items() if source.part == part.part]
+        own_sources = [
+            (source, node)
+            for source, node in sample_code.sources.items()
+            if source.part == part.part
+        ]
         steps = dict(leaves(part.following))
-        results = {part.source(source): node for source, node in own}
+        results = {part.source(source): node for source, node in own_sources}
         if part.margin is not None:
-            before = graph.name(worst or "worst")
+            worst_so_far = graph.name(worst or "worst")
             worst = part.fresh("lowest")
-            results[worst] = lower(before, part.margin)
+            results[worst] = lower(worst_so_far, part.margin)
         if signal.part == part.part and signal.kind != "link":
             results["value"] = part.node(signal)
         states = dict(leaves(part.state))
         carried = {states[path].value: steps[path] for path in sample_code.carried[part.part]}
         block = sample_code.printed(
-            part, [*results.values(), *carried.values()], known=head.names, flat=all_vector
+            part, [*results.values(), *carried.values()], available=head.names, flat=all_vector
         )
         for statement in block.statements:
             straight.add(statement)
@@ -356,7 +362,7 @@ class _Writer:
             straight.let(name, *next(texts))
         if signal.part == part.part and signal.kind == "link":
             observed = sample_code.printed(
-                part, [sample_code.observed(part, signal)], known=block.names
+                part, [sample_code.observed(part, signal)], available=block.names
             )
             for statement in observed.statements:
                 straight.add(statement)
@@ -378,7 +384,7 @@ class _Writer:
             initial = dict(leaves(part.initial_state()))
             carried = sample_code.carried[part.part]
             at_rest = sample_code.printed(
-                part, [initial[path] for path in carried], known=head.names
+                part, [initial[path] for path in carried], available=head.names
             )
             lines += at_rest.lines
             for path, (text, reads) in zip(carried, at_rest.results, strict=True):
@@ -428,15 +434,17 @@ class Lanes:
         delay_samples = np.zeros((max(len(self._taps), 1), LANES), dtype=np.int64)
         starts: dict[str, int] = {}
         for part in self._facts.parts:
-            prefix, own = model.prefix(part.part), model.parts[part.part]
-            known = {name: f"{prefix}{path}" for name, path in part.parameters.items()}
-            known |= {name: f"given {prefix}{path}" for name, path in part.given.items()}
-            for name, path in known.items():
+            prefix = model.prefix(part.part)
+            part_model = model.parts[part.part]
+            paths = {name: f"{prefix}{path}" for name, path in part.parameters.items()}
+            paths |= {name: f"given {prefix}{path}" for name, path in part.given.items()}
+            for name, path in paths.items():
                 if name in rows and path in numbers:
                     block[rows[name]] = numbers[path]
                 elif name in rows:
-                    block[rows[name]] = own.parameters._field_defaults[part.parameters[name]]
-            for tap in (each for each in self._taps if each.part == part.part):
+                    block[rows[name]] = part_model.parameters._field_defaults[part.parameters[name]]
+            taps_of_part = [tap for tap in self._taps if tap.part == part.part]
+            for tap in taps_of_part:
                 late = numbers[f"{prefix}{tap.tap.delay}"] / h if tap.tap.delay else np.zeros(LANES)
                 end = np.maximum(late, tap.tap.ahead) - tap.tap.ahead
                 delay_samples[tap.number] = np.floor(end)
@@ -476,7 +484,7 @@ def lanes_of(
     model: Model, signals: tuple[str, ...], options: tuple[Any, ...], output: str
 ) -> Lanes:
     """The compiled lanes of a model for one output."""
-    facts = kept(
+    facts = cached_on_disk(
         f"{model.name}_lanes",
         (key_of(model), signals, options, output),
         lambda: _Writer(model, signals, options, output).facts,

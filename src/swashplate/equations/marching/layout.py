@@ -98,8 +98,8 @@ class JacobianLayout:
             todo=np.array(todo, dtype=np.int64),
             target=np.array([row for row, _ in self._sums], dtype=np.int64),
             first=np.cumsum([0, *(len(summands) for _, summands in self._sums)]).astype(np.int64),
-            a=np.array([pair[0] for pair in pairs], dtype=np.int64),
-            b=np.array([pair[1] for pair in pairs], dtype=np.int64),
+            first_factor=np.array([pair[0] for pair in pairs], dtype=np.int64),
+            second_factor=np.array([pair[1] for pair in pairs], dtype=np.int64),
             scale=np.array([term.scale for term in terms], dtype=np.float64),
             lanes=np.array(self._lanes, dtype=np.int64),
             first_observed=first_observed,
@@ -107,7 +107,9 @@ class JacobianLayout:
             integral_count=sum(what == INTEGRATE for what, *_ in todo),
         )
         self.kernels = {kernel for what, kernel, *_ in todo if what in (CALL, RECUR)}
-        self.factors = [(k, term.factor) for k, term in enumerate(terms) if term.factor is not None]
+        self.factors = [
+            (index, term.factor) for index, term in enumerate(terms) if term.factor is not None
+        ]
 
     def take_room(self) -> Struct[Room]:
         """Memory for a march, of an earlier one if it can be: new memory takes longer to get."""
@@ -144,28 +146,30 @@ class JacobianLayout:
     def _seed(self, start: str) -> None:
         """Note what the columns move directly: parameters, constants, delays, starts."""
         model = self.structure.model
-        number = {column: c for c, column in enumerate(self.columns)}
+        column_index = {column: index for index, column in enumerate(self.columns)}
         moves = self.structure.start_code(start).moves if self.columns else ()
         for moved, column in moves:
             if moved.kind == "state":
                 self._start_moves.add((moved, column))
-            elif column in number:
-                by = self._by.setdefault(moved, {})
-                by[number[column]] = Term(factor=(moved, column))
+            elif column in column_index:
+                terms = self._by.setdefault(moved, {})
+                terms[column_index[column]] = Term(factor=(moved, column))
         taps = taps_of(model, self.structure.signals)
         for part in self.structure.facts.parts:
-            i, prefix = part.part, model.prefix(part.part)
-            for path in floats_of(model.parts[i].parameters):
-                if f"{prefix}{path}" in number:
-                    self._by[SignalId(i, "p", path)] = {number[f"{prefix}{path}"]: Term()}
+            part_index, prefix = part.part, model.prefix(part.part)
+            for path in floats_of(model.parts[part_index].parameters):
+                if f"{prefix}{path}" in column_index:
+                    self._by[SignalId(part_index, "p", path)] = {
+                        column_index[f"{prefix}{path}"]: Term()
+                    }
             for tap in taps:
                 column = f"{prefix}{tap.tap.delay}"
-                if tap.part == i and tap.tap.delay and column in number:
-                    fraction = SignalId(i, "fraction", str(tap.number))
-                    self._by[fraction] = {number[column]: Term(factor=(fraction, column))}
+                if tap.part == part_index and tap.tap.delay and column in column_index:
+                    fraction = SignalId(part_index, "fraction", str(tap.number))
+                    self._by[fraction] = {column_index[column]: Term(factor=(fraction, column))}
             for column in self.columns:
-                for path in started_by(model, i, column):
-                    self._start_moves.add((SignalId(i, "state", path), column))
+                for path in started_by(model, part_index, column):
+                    self._start_moves.add((SignalId(part_index, "state", path), column))
 
     def _terms(self, result: SignalId, c: int) -> list[Term]:
         """What a derivative by a column is the sum of."""
@@ -257,7 +261,9 @@ class JacobianLayout:
         earlier = sum(what == INTEGRATE for what, *_ in integrals)
         rows = [self._make(terms) if terms else 0 for terms in ([Term((value,))], *derivatives)]
         integrals += self._combined(since)
-        integrals += [(INTEGRATE, row, earlier + k, 0) for k, row in enumerate(filter(None, rows))]
+        integrals += [
+            (INTEGRATE, row, earlier + index, 0) for index, row in enumerate(filter(None, rows))
+        ]
         return rows[0], [[Term((row,))] if row else [] for row in rows[1:]]
 
 

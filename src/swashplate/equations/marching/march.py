@@ -91,8 +91,8 @@ class SampleCode:
         self.signals = tuple(signals)
         taken = {*RESERVED, *self.signals, *(f"{signal}_before" for signal in self.signals)}
         self.parts = [
-            PartCode(model, i, signals, options_of_part, taken)
-            for i, options_of_part in enumerate(options)
+            PartCode(model, index, signals, options_of_part, taken)
+            for index, options_of_part in enumerate(options)
         ]
         self.ends: list[list[Node]] = [[] for _ in self.parts]
         self.carried: list[list[str]] = [[] for _ in self.parts]
@@ -124,7 +124,7 @@ class SampleCode:
             carried |= new
             ends += [following[path] for path in state if path in new]
         self.carried[part.part] = [path for path in state if path in carried]
-        for name in part.own.input_types:
+        for name in part.part_model.input_types:
             link = self.model.link_of(part.part, name)
             if link is not None and any(part.source(source) in read for source in link.sources):
                 self._need(link.sources)
@@ -140,12 +140,14 @@ class SampleCode:
         """What is known ahead of a sample, by name: numbers, the state, delays and records."""
         ids = {"h": SignalId(0, "h")}
         for part in self.used:
-            i = part.part
-            for kind, value in (("p", part.p), ("given", part.given), ("state", part.state)):
-                ids |= {node.value: SignalId(i, kind, path) for path, node in leaves(value)}
+            part_index = part.part
+            for kind, numbers in (("p", part.p), ("given", part.given), ("state", part.state)):
+                ids |= {
+                    node.value: SignalId(part_index, kind, path) for path, node in leaves(numbers)
+                }
             ids |= part.outside
             for tap in part.taps:
-                ids[part.delay_fraction(tap)] = SignalId(i, "fraction", str(tap.number))
+                ids[part.delay_fraction(tap)] = SignalId(part_index, "fraction", str(tap.number))
         return ids
 
     def module(self, *texts: str) -> str:
@@ -166,7 +168,7 @@ class SampleCode:
         part: PartCode,
         results: Sequence[Node],
         *,
-        known: Mapping[Node, str] | None = None,
+        available: Mapping[Node, str] | None = None,
         hints: Mapping[Node, str] | None = None,
         named: bool = False,
         flat: Flat | None = None,
@@ -180,7 +182,13 @@ class SampleCode:
         labels = {**part.trace.labels, **(hints or {})}
         language = BRANCHING if branches and flat is None else PYTHON
         block = CodeBlock(
-            results, labels, part.taken, known=known, named=named, flat=flat, language=language
+            results,
+            labels,
+            part.taken,
+            available=available,
+            named=named,
+            flat=flat,
+            language=language,
         )
         self.functions |= block.functions
         return block
@@ -200,8 +208,8 @@ class SampleCode:
     def given(self, part: PartCode, read: set[str]) -> list[str]:
         """Lines that take a part's parameters and givens, as far as they are read, from arrays."""
         return [
-            f"{node.value} = {array}[{places.index((part.part, path))}]"
-            for names, array, places in (
+            f"{node.value} = {array}[{paths.index((part.part, path))}]"
+            for names, array, paths in (
                 (part.p, "params", self.model.places("parameters")),
                 (part.given, "given", self.model.places("given")),
             )
@@ -227,11 +235,11 @@ class SampleCode:
         lines = []
         read = self.read(part)
         for tap in part.taps:
-            for j, name in enumerate(part.tap_samples(tap)):
+            for age, name in enumerate(part.tap_samples(tap)):
                 if name in read:
-                    back = f"{part.delay_samples(tap)} + {j}" if j else part.delay_samples(tap)
+                    back = f"{part.delay_samples(tap)} + {age}" if age else part.delay_samples(tap)
                     lines.append(f"{name} = {past(tap.tap.signal, back)}")
-        inputs = [part.own.tap(name).signal for name in part.own.input_types]
+        inputs = [part.part_model.tap(name).signal for name in part.part_model.input_types]
         lines += [
             f"x_{signal} = {now(signal)}"
             for signal in dict.fromkeys(inputs)
@@ -243,13 +251,14 @@ class SampleCode:
         self,
         part: PartCode,
         targets: Mapping[SignalId, str],
-        known: Mapping[Node, str],
+        available: Mapping[Node, str],
         further: Mapping[SignalId, str] = MappingProxyType({}),
     ) -> Sampled:
         """A part's sample, with signals that other parts need and what is kept.
 
         `targets` are the texts of where numbers are kept, and `further` of those that are kept if
-        ``everything`` is; limits are one number, a bit for each. `known` nodes have names already.
+        ``everything`` is; limits are one number, a bit for each. `available` nodes have names
+        already.
         """
         sources = {
             source: node for source, node in self.sources.items() if source.part == part.part
@@ -262,7 +271,7 @@ class SampleCode:
         results = [*sources.values(), *margin]
         results += [node for output in outputs for node in self.kept_nodes(part, output)]
         results += [steps[path] for path in self.carried[part.part]]
-        block = self.printed(part, results, known=known)
+        block = self.printed(part, results, available=available)
         texts = iter(block.texts)
         lines = block.lines
         lines += [f"{part.source(source)} = {next(texts)}" for source in sources]
@@ -272,12 +281,12 @@ class SampleCode:
         for output in outputs:
             lines += self.stored(part, output, targets[output], texts)
         following = [*texts]
-        known = {**known, **block.names}
+        available = {**available, **block.names}
         links = [output for output in targets if output.part == part.part and output.kind == "link"]
-        lines += self.kept_lines(part, links, targets, known)
+        lines += self.kept_lines(part, links, targets, available)
         later = [output for output in further if output.part == part.part]
         if later:
-            lines += ["if everything:", *indented(self.kept_lines(part, later, further, known))]
+            lines += ["if everything:", *indented(self.kept_lines(part, later, further, available))]
         return Sampled(lines, margin_name, following)
 
     def kept_lines(
@@ -285,12 +294,12 @@ class SampleCode:
         part: PartCode,
         outputs: Sequence[SignalId],
         targets: Mapping[SignalId, str],
-        known: Mapping[Node, str],
+        available: Mapping[Node, str],
     ) -> list[str]:
         """Lines that keep some numbers of a part, after its sample."""
         nodes = [node for output in outputs for node in self.kept_nodes(part, output)]
         # nothing waits for these, and branches take long to compile
-        block = self.printed(part, nodes, known=known, branches=False)
+        block = self.printed(part, nodes, available=available, branches=False)
         lines = block.lines
         texts = iter(block.texts)
         for output in outputs:
@@ -307,7 +316,7 @@ class SampleCode:
         """Lines that keep a number, from the texts of what it is made of."""
         if stored.kind != "limits":
             return assigned(target, next(texts))
-        bits = [f"choose({next(texts)}, {1 << k}, 0)" for k in range(len(part.limits))]
+        bits = [f"choose({next(texts)}, {1 << bit}, 0)" for bit in range(len(part.limits))]
         return assigned(target, " | ".join(bits))
 
     def observed(self, part: PartCode, stored: SignalId) -> Node:
@@ -324,10 +333,10 @@ class SampleCode:
     def states(self, part: PartCode, steps: Sequence[str]) -> States:
         """How a part's state is taken out of a flat array, to the next sample, and back."""
         carried = self.carried[part.part]
-        places = self.model.places("state")
+        paths = self.model.places("state")
         nodes = dict(leaves(part.state))
         names = [nodes[path].value for path in carried]
-        flat = [f"states[{places.index((part.part, path))}]" for path in carried]
+        flat = [f"states[{paths.index((part.part, path))}]" for path in carried]
         pairs = [*zip(names, flat, strict=True)]
         return States(
             load=[f"{name} = {element}" for name, element in pairs],
@@ -354,10 +363,10 @@ class States(NamedTuple):
     save: list[str]
 
 
-def lower(a: Node, b: Node) -> Node:
+def lower(first: Node, second: Node) -> Node:
     """The lower of two margins; not a number if one of them is not."""
-    test = graph.either(graph.make("<=", a, b), graph.make("!=", a, a))
-    return graph.choose(test, a, b)
+    test = graph.either(graph.make("<=", first, second), graph.make("!=", first, first))
+    return graph.choose(test, first, second)
 
 
 def march_source(
@@ -375,12 +384,12 @@ def march_source(
     sample_code = SampleCode(model, signals, options, [*targets, *further])
     parts = sample_code.used
     lines, saved, samples = ["last = first + count"], list[str](), list[list[str]]()
-    for k, signal in enumerate(sample_code.signals):
-        lines += [f"{signal} = records[{k}]", f"{signal}_before = before[{k}]"]
+    for index, signal in enumerate(sample_code.signals):
+        lines += [f"{signal} = records[{index}]", f"{signal}_before = before[{index}]"]
     lines += ["everything = worst_margin[1] != 0.0"] if further else []
     for part in parts:
-        ahead, known = sample_code.ahead(part, sample_code.ends[part.part])
-        sample = sample_code.body(part, targets, known, further)
+        ahead, available = sample_code.ahead(part, sample_code.ends[part.part])
+        sample = sample_code.body(part, targets, available, further)
         states = sample_code.states(part, sample.following)
         lines += [*sample_code.delays(part), *ahead, *states.load]
         saved += states.save
@@ -437,18 +446,18 @@ def step_source(
     prepare, ends, count = list[str](), ["worst = inf"], 0
     if tapped:
         lines += ["for j in range(lines.shape[1] - 1, 0, -1):"]
-        lines += [f"    lines[{k}, j] = lines[{k}, j - 1]" for k in tapped]
-        lines += [f"lines[{k}, 0] = inputs[{k}]" for k in tapped]
-    targets = {signal: f"outputs[{k}]" for k, signal in enumerate(stored)}
+        lines += [f"    lines[{index}, j] = lines[{index}, j - 1]" for index in tapped]
+        lines += [f"lines[{index}, 0] = inputs[{index}]" for index in tapped]
+    targets = {signal: f"outputs[{index}]" for index, signal in enumerate(stored)}
     for part in sample_code.used:
         ends_of_part = sample_code.ends[part.part]
-        ahead, known = sample_code.ahead(part, ends_of_part)
+        ahead, available = sample_code.ahead(part, ends_of_part)
         prepare += ahead
         for node in part.ahead(ends_of_part):
-            prepare.append(f"constants[{count}] = {known[node]}")
-            lines.append(f"{known[node]} = constants[{count}]")
+            prepare.append(f"constants[{count}] = {available[node]}")
+            lines.append(f"{available[node]} = constants[{count}]")
             count += 1
-        sample = sample_code.body(part, targets, known)
+        sample = sample_code.body(part, targets, available)
         states = sample_code.states(part, sample.following)
         lines += [
             *sample_code.delays(part),
@@ -479,14 +488,14 @@ def output_of(model: Model, output: str) -> tuple[SignalId, bool]:
     name = model.integrals[output] if integral else output
     if name in model.links:
         return SignalId(model.links[name].after, "link", name), integral
-    for i in range(len(model.parts) - 1, -1, -1):
-        part = model.parts[i]
+    for index in range(len(model.parts) - 1, -1, -1):
+        part = model.parts[index]
         if part.signals is not None and name in floats_of(part.signals):
-            return SignalId(i, "signals", name), integral
+            return SignalId(index, "signals", name), integral
         if name in floats_of(part.state):
-            return SignalId(i, "state", name), integral
-    known = [name for part in model.parts for name in part.signal_names]
+            return SignalId(index, "state", name), integral
+    signals = [name for part in model.parts for name in part.signal_names]
     raise InputError(
         f"{model.name} has no signal '{output}'; it has "
-        f"{', '.join([*known, *model.links, *model.integrals])}."
+        f"{', '.join([*signals, *model.links, *model.integrals])}."
     )

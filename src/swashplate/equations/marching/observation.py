@@ -116,7 +116,9 @@ class ObservedRecord:
         """All signals from outside, on the grid, by name."""
         signals = {self.driven_by: self.record.values, **self.others}
         # the kernels are compiled for arrays that can be written to
-        return {name: np.require(v, np.float64, ["C", "W"]) for name, v in signals.items()}
+        return {
+            name: np.require(values, np.float64, ["C", "W"]) for name, values in signals.items()
+        }
 
     @property
     def own_columns(self) -> tuple[str, ...]:
@@ -167,9 +169,11 @@ class ObservedRecord:
     @cached_property
     def plan(self) -> Struct[Plan]:
         """What the march needs to know of the observations."""
-        positions = [_cells(self.record, np.asarray(o.time)) for o in self.observations]
-        weights = [np.asarray(o.weight) for o in self.observations]
-        measured = _joined([np.asarray(o.values) for o in self.observations])
+        positions = [
+            _cells(self.record, np.asarray(observation.time)) for observation in self.observations
+        ]
+        weights = [np.asarray(observation.weight) for observation in self.observations]
+        measured = _joined([np.asarray(observation.values) for observation in self.observations])
         weight = _joined(weights)
         if not weight.all():
             measured = np.where(weight > 0.0, measured, 0.0)

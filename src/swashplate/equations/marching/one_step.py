@@ -9,7 +9,7 @@ from swashplate.equations.code_generation.functions import generating
 from swashplate.equations.code_generation.gradients import Derived, derived_function
 from swashplate.equations.code_generation.values import leaves
 from swashplate.equations.graph import Node, names_in, rewritten
-from swashplate.equations.keeping import kept, key_of
+from swashplate.equations.keeping import cached_on_disk, key_of
 from swashplate.equations.marching.march import SampleCode
 from swashplate.equations.marching.part_code import SignalId
 from swashplate.equations.model import Model
@@ -29,7 +29,7 @@ def step_derivatives(
     model: Model, signals: tuple[str, ...], options: tuple[Any, ...], outputs: tuple[SignalId, ...]
 ) -> StepDerivatives:
     """A model's next states, then its `outputs`, with their derivatives."""
-    return kept(
+    return cached_on_disk(
         f"{model.name}_linear",
         (key_of(model), signals, options, outputs),
         lambda: _derived(model, signals, options, outputs),
@@ -40,7 +40,7 @@ def _derived(
     model: Model, signals: tuple[str, ...], options: tuple[Any, ...], outputs: tuple[SignalId, ...]
 ) -> StepDerivatives:
     """The same, made of the equations."""
-    states = [SignalId(i, "state", path) for i, path in model.places("state")]
+    states = [SignalId(part_index, "state", path) for part_index, path in model.places("state")]
     sample_code = SampleCode(model, signals, options, [*states, *outputs])
     results = list[Node]()
     labels = dict[Node, str]()
@@ -57,13 +57,15 @@ def _derived(
         results += rewritten([sample_code.observed(part, signal)], passed)
     outside = sample_code.outside()
     arguments = {name: outside[name] for name in sorted(names_in(results) & outside.keys())}
-    by = [name for name, signal in arguments.items() if signal.kind in ("state", "tap", "input")]
+    moving = [
+        name for name, signal in arguments.items() if signal.kind in ("state", "tap", "input")
+    ]
     derived = derived_function(
         f"{model.name}_linear",
         f"Next states and outputs of {model.name}.",
         [*arguments],
-        [(str(k), node) for k, node in enumerate(results)],
-        [(name, name) for name in by],
+        [(str(index), node) for index, node in enumerate(results)],
+        [(name, name) for name in moving],
         labels,
         chained=True,
     )

@@ -60,12 +60,12 @@ class TapOf(NamedTuple):
 def taps_of(model: Model, signals: tuple[str, ...]) -> tuple[TapOf, ...]:
     """All taps on signals that are given as records, numbered."""
     taps: list[TapOf] = []
-    for i, part in enumerate(model.parts):
+    for index, part in enumerate(model.parts):
         for name in part.input_types:
             tap = part.tap(name)
-            outside = model.link_of(i, name) is None and tap.signal in signals
+            outside = model.link_of(index, name) is None and tap.signal in signals
             if outside and name in part.taps:
-                taps.append(TapOf(i, name, len(taps), tap))
+                taps.append(TapOf(index, name, len(taps), tap))
     return tuple(taps)
 
 
@@ -85,11 +85,11 @@ class PartCode:
         taken: set[str] | None = None,
         trace: Trace | None = None,
     ) -> None:
-        self.model, self.part, self.own = model, part, model.parts[part]
+        self.model, self.part, self.part_model = model, part, model.parts[part]
         self.records, self.options = tuple(signals), options
-        self.trace = Trace(replacements=self.own.replacements) if trace is None else trace
+        self.trace = Trace(replacements=self.part_model.replacements) if trace is None else trace
         self.taken: set[str] = set() if taken is None else taken
-        self.prefix = f"{self.own.name}_" if len(model.parts) > 1 else ""
+        self.prefix = f"{self.part_model.name}_" if len(model.parts) > 1 else ""
         self.taken.add("h")
         self.taps = [tap for tap in taps_of(model, self.records) if tap.part == part]
         for tap in self.taps:
@@ -98,7 +98,7 @@ class PartCode:
                 self.delay_fraction(tap),
                 self.delay_samples(tap),
             }
-        own = self.own
+        own = self.part_model
         self.p = _named(own.parameters, self._fresh("p"))
         self.given = _named(own.given, self._fresh("given")) if own.given else Tuple(None, ())
         self.state = _named(own.state, self._fresh("s"))
@@ -114,7 +114,9 @@ class PartCode:
             self.arguments["signals"] = self._call(own.sample)
         self.following = self._call(own.step)
         cls = self.following.cls if isinstance(self.following, Tuple) else None
-        numbers = tuple(path for path, n in leaves(self.following) if n.kind in ("float", "int"))
+        numbers = tuple(
+            path for path, node in leaves(self.following) if node.kind in ("float", "int")
+        )
         if cls is not own.state or numbers != floats_of(own.state):
             raise InputError(
                 f"Model {own.name}: {plain(own.step).__name__} must return a {own.state.__name__} "
@@ -135,24 +137,25 @@ class PartCode:
         arguments = {name: values[name] for name in arguments_of(equation) if name in values}
         if "options" in arguments_of(equation):
             arguments["options"] = fixed(self.options) or Flag("unknown", "options")
-        result = self.trace.call(equation, arguments)
-        self.trace.label(result, plain(equation).__name__ if isinstance(result, Node) else "")
-        return result
+        returned = self.trace.call(equation, arguments)
+        self.trace.label(returned, plain(equation).__name__ if isinstance(returned, Node) else "")
+        return returned
 
     def _input(self, name: str) -> Value:
         """An input as a name, a window of names, or what a hold makes of one."""
         link = self.model.link_of(self.part, name)
         if link is not None:
             return self._linked(link)
-        tap = self.own.tap(name)
-        record_tap = next((each for each in self.taps if each.input == name), None)
+        tap = self.part_model.tap(name)
+        record_taps = {tap.input: tap for tap in self.taps}
+        record_tap = record_taps.get(name)
         if record_tap is None:
             if tap.signal in self.records:
                 return graph.name(f"x_{tap.signal}")
-            if name not in self.own.defaults:
+            if name not in self.part_model.defaults:
                 # refused when the model gets its numbers; until then a constant stands for it
                 return graph.ZERO
-            return dict(leaves(self.p))[self.own.defaults[name]]
+            return dict(leaves(self.p))[self.part_model.defaults[name]]
         samples = tuple(map(graph.name, self.tap_samples(record_tap)))
         fraction = graph.name(self.delay_fraction(record_tap))
         window = Tuple(Window, (Tuple(None, samples), fraction))
@@ -178,7 +181,7 @@ class PartCode:
 
     def tap_samples(self, tap: TapOf) -> list[str]:
         """Names of a tap's samples, newest first."""
-        return [f"{self.prefix}{tap.input}_{j}" for j in range(tap.tap.samples)]
+        return [f"{self.prefix}{tap.input}_{age}" for age in range(tap.tap.samples)]
 
     def delay_fraction(self, tap: TapOf) -> str:
         """Name of the fraction of a sample in a tap's delay."""
@@ -191,22 +194,22 @@ class PartCode:
     @cached_property
     def margin(self) -> Node | None:
         """Margin of the domain."""
-        if self.own.domain is None:
+        if self.part_model.domain is None:
             return None
-        margin = self._call(self.own.domain)
+        margin = self._call(self.part_model.domain)
         if not isinstance(margin, Node):
+            domain = plain(self.part_model.domain).__name__
             raise InputError(
-                f"Model {self.own.name}: {plain(self.own.domain).__name__} must return one number, "
-                "the margin."
+                f"Model {self.part_model.name}: {domain} must return one number, the margin."
             )
         return margin
 
     @cached_property
     def limits(self) -> list[Node]:
         """The limits, in their order."""
-        if self.own.limits is None:
+        if self.part_model.limits is None:
             return []
-        return [node for _, node in leaves(self._call(self.own.limits))]
+        return [node for _, node in leaves(self._call(self.part_model.limits))]
 
     def ahead(self, ends: Iterable[Node], still: Collection[str] = ()) -> list[Node]:
         """What some ends need that follows from parameters, givens and the step alone.
@@ -234,10 +237,10 @@ class PartCode:
         """Names of what is read of records: samples of taps, and inputs as they come."""
         signals = {}
         for tap in self.taps:
-            for j, name in enumerate(self.tap_samples(tap)):
-                signals[name] = SignalId(self.part, "tap", f"{tap.input}.{j}")
+            for age, name in enumerate(self.tap_samples(tap)):
+                signals[name] = SignalId(self.part, "tap", f"{tap.input}.{age}")
         for name, node in self.inputs.items():
-            if node == graph.name(f"x_{self.own.tap(name).signal}"):
+            if node == graph.name(f"x_{self.part_model.tap(name).signal}"):
                 signals[node.value] = SignalId(self.part, "input", name)
         return signals
 
@@ -249,7 +252,9 @@ class PartCode:
     def node(self, stored: SignalId) -> Node:
         """A number that is kept."""
         if stored.kind in ("tap", "input"):
-            return next(graph.name(n) for n, signal in self.outside.items() if signal == stored)
+            return next(
+                graph.name(name) for name, signal in self.outside.items() if signal == stored
+            )
         if stored.kind == "state":
             return dict(leaves(self.state))[stored.path]
         return self.signal(stored.path)
@@ -260,13 +265,13 @@ class PartCode:
         At rest every signal is zero, or what its default parameter is; ``steady`` is the steady
         state under the inputs as they come. A part without an equation for that has no state.
         """
-        own = self.own
+        own = self.part_model
         if start == "steady" and own.settled is not None:
             return self._call(own.settled)
         if own.rest is None:
             defaults = own.state._field_defaults
             first = [defaults.get(path.split(".")[0], 0.0) for path, _ in leaves(self.state)]
-            return rebuilt(self.state, (graph.number(float(each)) for each in first))
+            return rebuilt(self.state, (graph.number(float(number)) for number in first))
         inputs: dict[str, Value] = {}
         for name in own.input_types:
             if name in own.defaults:
@@ -284,10 +289,10 @@ class PartCode:
 def _named(kind: Any, name_of: Callable[[str], str], path: str = "") -> Value:
     """A named tuple of names; `name_of` gives one for the words of a path."""
     hints = get_type_hints(kind)
-    items: list[Value] = []
+    elements: list[Value] = []
     for name in kind._fields:
         if is_named_tuple(hints[name]):
-            items.append(_named(hints[name], name_of, f"{path}{name}_"))
+            elements.append(_named(hints[name], name_of, f"{path}{name}_"))
         else:
-            items.append(graph.name(name_of(f"{path}{name}")))
-    return Tuple(kind, tuple(items))
+            elements.append(graph.name(name_of(f"{path}{name}")))
+    return Tuple(kind, tuple(elements))

@@ -73,8 +73,12 @@ def on_grid(
 ) -> dict[str, Record]:
     """Inputs by name as records on one grid; arguments as of `swashplate.equations.simulate`."""
     between, substeps = checked_sampling(inputs, rate, interpolation, substeps)
-    data = {name: column(v, f"The {name}") for name, v in inputs.items() if not is_real(v)}
-    sizes = {name: samples.size for name, samples in data.items()}
+    samples_of = {
+        name: column(values, f"The {name}")
+        for name, values in inputs.items()
+        if not is_real(values)
+    }
+    sizes = {name: samples.size for name, samples in samples_of.items()}
     if len(set(sizes.values())) != 1:
         if not sizes:
             first = next(iter(inputs), "input")
@@ -85,7 +89,9 @@ def on_grid(
         raise InputError(f"All inputs need the same number of samples: {listed}.")
     what, size = next(iter(sizes.items()))
     columns = {
-        name: data[name] if name in data else column(np.full(size, value), f"The {name}")
+        name: samples_of[name]
+        if name in samples_of
+        else column(np.full(size, value), f"The {name}")
         for name, value in inputs.items()
     }
     if time is None:

@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 from swashplate.equations.code_generation.functions import generating
 from swashplate.equations.marching.kernels import (
     Struct,
-    behind,
     call_kernel,
     call_recurrence,
     fields_of,
     routine,
+    row_from,
     run_routine,
 )
 
@@ -56,9 +56,9 @@ class Program(NamedTuple):
     """(t,) rows that are sums; those that are observed last, which have no place."""
     first: Indices
     """(t + 1,) first term of each, and how many there are."""
-    a: Indices
+    first_factor: Indices
     """(s,) row of a term's first factor."""
-    b: Indices
+    second_factor: Indices
     """(s,) row of its second factor, -1 for none."""
     scale: Array
     """(s,) number that multiplies a term."""
@@ -108,9 +108,9 @@ class Sink(NamedTuple):
     """(k + 1, length) all rows, or as many as are rotated at once."""
     derived: int
     """Derivatives that the march gives: d."""
-    to: Indices
+    target: Indices
     """(d,) rows where they go."""
-    own: int
+    first_offset_row: int
     """First row of those by the observations' own offsets; residuals come behind them."""
     folded: int
     """Whether a triangle is wanted."""
@@ -200,7 +200,7 @@ def absorb(sink: int, room: int) -> None:
     factor = fields_of(sink, Sink).factor
     products = fields_of(room, Room).products
     for j in range(columns):
-        pivot, line = behind(rows, j * ROWS), behind(factor, j * columns)
+        pivot, line = row_from(rows, j * ROWS), row_from(factor, j * columns)
         square = dot(pivot, pivot, products)
         if square < NOTHING:
             continue  # nothing to rotate, as with a parameter that the block does not depend on
@@ -212,7 +212,7 @@ def absorb(sink: int, room: int) -> None:
         scale = 1.0 / (norm * (norm + abs(corner)))
         line[j] = diagonal
         for k in range(j + 1, columns):
-            column = behind(rows, k * ROWS)
+            column = row_from(rows, k * ROWS)
             along = scale * (lead * line[k] + dot(pivot, column, products))
             line[k] -= along * lead
             for i in range(ROWS):
@@ -231,26 +231,28 @@ def upright(factor: Array) -> Array:
 def combine(struct: int, flat: Array, t: int, shift: int, count: int, row: Array) -> None:
     """Sum the products of the terms of a program's sum t, from `shift` behind their rows' first."""
     program = fields_of(struct, Program)
-    first, end = program.first[t], program.first[t + 1]
+    first = program.first[t]
+    end = program.first[t + 1]
     if first == end:
         for m in range(count):
             row[m] = 0.0
     for s in range(first, end):
-        a, scale = behind(flat, program.a[s] + shift), program.scale[s]
-        if program.b[s] >= 0:
-            b = behind(flat, program.b[s] + shift)
+        scale = program.scale[s]
+        factor = row_from(flat, program.first_factor[s] + shift)
+        if program.second_factor[s] >= 0:
+            other = row_from(flat, program.second_factor[s] + shift)
             if s == first:
                 for m in range(count):
-                    row[m] = scale * (a[m] * b[m])
+                    row[m] = scale * (factor[m] * other[m])
             else:
                 for m in range(count):
-                    row[m] += scale * (a[m] * b[m])
+                    row[m] += scale * (factor[m] * other[m])
         elif s == first:
             for m in range(count):
-                row[m] = scale * a[m]
+                row[m] = scale * factor[m]
         else:
             for m in range(count):
-                row[m] += scale * a[m]
+                row[m] += scale * factor[m]
 
 
 def integrate(row: Array, count: int, step: float, state: Array) -> None:
@@ -258,7 +260,8 @@ def integrate(row: Array, count: int, step: float, state: Array) -> None:
 
     `state` holds integral and rate at the sample before, and 1.0 once there is one.
     """
-    total, last = state[0], state[1]
+    total = state[0]
+    last = state[1]
     for n in range(count):
         rate = row[n]
         if state[2] != 0.0:
@@ -266,10 +269,11 @@ def integrate(row: Array, count: int, step: float, state: Array) -> None:
         state[2] = 1.0
         last = rate
         row[n] = total
-    state[0], state[1] = total, last
+    state[0] = total
+    state[1] = last
 
 
-def place(structs: int, r: int, first: int, size: int, at: int, count: int, to: int) -> None:
+def write_rows(structs: int, r: int, first: int, size: int, at: int, count: int, to: int) -> None:
     """Weighted rows of the problem at some stamps of an observation.
 
     `first` and `size` are the block's first sample and how many it has, `at` and `count` the first
@@ -280,16 +284,16 @@ def place(structs: int, r: int, first: int, size: int, at: int, count: int, to: 
     plan = fields_of(march.plan, Plan)
     sink = fields_of(march.sink, Sink)
     room = fields_of(march.room, Room)
-    flat, aside = room.block, room.aside
-    cell = behind(plan.cell, at)
-    fraction = behind(plan.fraction, at)
-    weight = behind(plan.weight, at)
-    measured = behind(plan.measured, at)
+    flat = room.block
+    aside = room.aside
+    cell = row_from(plan.cell, at)
+    fraction = row_from(plan.fraction, at)
+    weight = row_from(plan.weight, at)
+    measured = row_from(plan.measured, at)
     begin = cell[0]
-    end, behind_last = first + size, cell[count - 1] + 2
-    width = min(behind_last, end) - begin
+    width = min(first + size, cell[count - 1] + 2) - begin
     for c in range(sink.derived):
-        column = behind(sink.rows, sink.to[c] * sink.length + to)
+        column = row_from(sink.rows, sink.target[c] * sink.length + to)
         t = program.first_observed + r * sink.derived + c
         if plan.regular[r]:
             run_routine(march.combine, (march.program, flat, t, begin - first, count, column))
@@ -301,12 +305,13 @@ def place(structs: int, r: int, first: int, size: int, at: int, count: int, to: 
             for i in range(count):
                 n, f = cell[i] - begin, fraction[i]
                 column[i] = weight[i] * ((1.0 - f) * aside[n] + f * aside[n + 1])
-    for c in range(sink.own, sink.columns - 1):
-        column = behind(sink.rows, c * sink.length + to)
+    for c in range(sink.first_offset_row, sink.columns - 1):
+        column = row_from(sink.rows, c * sink.length + to)
         for i in range(count):
             column[i] = weight[i] if c == sink.offset_row[r] else 0.0
-    signal, offset = behind(flat, program.value[r] + begin - first), sink.offset[r]
-    column = behind(sink.rows, (sink.columns - 1) * sink.length + to)
+    signal = row_from(flat, program.value[r] + begin - first)
+    offset = sink.offset[r]
+    column = row_from(sink.rows, (sink.columns - 1) * sink.length + to)
     for i in range(count):
         n, f = cell[i] - begin, fraction[i]
         simulated = (1.0 - f) * signal[n] + f * signal[n + 1]
@@ -321,14 +326,14 @@ class March(NamedTuple):
     sink: int
     room: int
     combine: int
-    place: int
+    write_rows: int
     absorb: int
 
 
 @generating
 def routines() -> tuple[Any, ...]:
     """The last fields of a `March`."""
-    return routine(combine), routine(place), routine(absorb)
+    return routine(combine), routine(write_rows), routine(absorb)
 
 
 def march_struct(
@@ -339,6 +344,72 @@ def march_struct(
     return Struct(March(*structs, *routines()))
 
 
+def run_program(
+    march: Any, kernels: Indices, arrays: Indices, first: int, count: int, h: float
+) -> None:
+    """Do in a block what the program says; arguments as in `march_observed`."""
+    program = fields_of(march.program, Program)
+    room = fields_of(march.room, Room)
+    flat = room.block
+    for step in range(program.steps):
+        todo = row_from(program.todo, 4 * step)
+        what = todo[0]
+        if what == CALL:
+            call_kernel(kernels[todo[1]], count, first, h, arrays)
+        elif what == COMBINE:
+            for t in range(todo[1], todo[2]):
+                row = row_from(flat, program.target[t])
+                run_routine(march.combine, (march.program, flat, t, 0, count, row))
+        elif what == INTEGRATE:
+            rate = row_from(flat, todo[1])
+            integrate(rate, count, h, row_from(room.integral_states, 3 * todo[2]))
+        else:
+            begin = todo[2]
+            lanes = row_from(program.lanes, begin)
+            call_recurrence(kernels[todo[1]], count, lanes, todo[3] - begin, room.tangent, arrays)
+
+
+def write_observation(
+    structs: int, march: Any, r: int, first: int, count: int, size: int, waiting: int
+) -> int:
+    """Write the rows of an observation whose stamps lie in a block, and rotate full sinks.
+
+    `waiting` rows wait in the sink to be rotated; returns how many do so then.
+    """
+    program = fields_of(march.program, Program)
+    plan = fields_of(march.plan, Plan)
+    sink = fields_of(march.sink, Sink)
+    room = fields_of(march.room, Room)
+    # off the grid the point behind the stamp must be known as well
+    points = first + count
+    if points < size and plan.regular[r] == 0:
+        points -= 1
+    signal = row_from(room.block, program.value[r])
+    signal[count] = signal[count - 1]
+    stamp = room.next_sample[r]
+    end = stamp
+    while end < plan.first[r + 1] and plan.cell[end] < points:
+        end += 1
+    room.next_sample[r] = end
+    while stamp < end:
+        if sink.folded and plan.weight[stamp] == 0.0:
+            stamp += 1
+            continue
+        many = min(end - stamp, sink.length - waiting)
+        for i in range(1, many if sink.folded else 0):
+            if plan.weight[stamp + i] == 0.0:
+                many = i
+                break
+        to = waiting if sink.folded else stamp
+        run_routine(march.write_rows, (structs, r, first, count, stamp, many, to))
+        stamp += many
+        waiting += many if sink.folded else 0
+        if sink.folded and waiting == sink.length:
+            run_routine(march.absorb, (march.sink, march.room))
+            waiting = 0
+    return waiting
+
+
 def march_observed(kernels: Indices, arrays: Indices, size: int, h: float, structs: int) -> None:
     """March block by block, and compare what comes with what was observed.
 
@@ -347,66 +418,27 @@ def march_observed(kernels: Indices, arrays: Indices, size: int, h: float, struc
     address of a `March`.
     """
     march = fields_of(structs, March)
-    program = fields_of(march.program, Program)
     plan = fields_of(march.plan, Plan)
     sink = fields_of(march.sink, Sink)
     room = fields_of(march.room, Room)
     flat = room.block
-    used = 0  # Rows that wait in the sink to be rotated.
-    look_back = False
+    waiting = 0  # Rows in the sink that are to be rotated.
+    looks_back = False
     for r in range(plan.observations):
-        look_back = look_back or plan.regular[r] == 0
+        looks_back = looks_back or plan.regular[r] == 0
     for first in range(0, size, BLOCK):
-        if first > 0 and look_back:
+        if first > 0 and looks_back:
             # what interpolation looks back at, from the end of the block before
-            for k in range(STRIDE, room.size, STRIDE):
-                flat[k - 1] = flat[k + BLOCK - 1]
+            for row in range(STRIDE, room.size, STRIDE):
+                flat[row - 1] = flat[row + BLOCK - 1]
         count = min(size - first, BLOCK)
-        for step in range(program.steps):
-            todo = behind(program.todo, 4 * step)
-            what, a, b = todo[0], todo[1], todo[2]
-            if what == CALL:
-                call_kernel(kernels[a], count, first, h, arrays)
-            elif what == COMBINE:
-                for t in range(a, b):
-                    row = behind(flat, program.target[t])
-                    run_routine(march.combine, (march.program, flat, t, 0, count, row))
-            elif what == INTEGRATE:
-                integrate(behind(flat, a), count, h, behind(room.integral_states, 3 * b))
-            else:
-                lanes = behind(program.lanes, b)
-                call_recurrence(kernels[a], count, lanes, todo[3] - b, room.tangent, arrays)
+        run_program(march, kernels, arrays, first, count, h)
         for r in range(plan.observations):
-            # off the grid the point behind the stamp must be known as well
-            known = first + count - (first + count < size and plan.regular[r] == 0)
-            row = behind(flat, program.value[r])
-            row[count] = row[count - 1]
-            at = room.next_sample[r]
-            end = at
-            while end < plan.first[r + 1] and plan.cell[end] < known:
-                end += 1
-            room.next_sample[r] = end
-            while at < end:
-                if sink.folded and plan.weight[at] == 0.0:
-                    at += 1
-                    continue
-                many, left = end - at, sink.length - used
-                many = min(many, left)
-                for i in range(1, many if sink.folded else 0):
-                    if plan.weight[at + i] == 0.0:
-                        many = i
-                        break
-                to = used if sink.folded else at
-                run_routine(march.place, (structs, r, first, count, at, many, to))
-                at += many
-                used += many if sink.folded else 0
-                if sink.folded and used == sink.length:
-                    run_routine(march.absorb, (march.sink, march.room))
-                    used = 0
-    if used > 0:
+            waiting = write_observation(structs, march, r, first, count, size, waiting)
+    if waiting > 0:
         for c in range(sink.columns):
-            column = behind(sink.rows, c * sink.length)
-            for i in range(used, sink.length):
+            column = row_from(sink.rows, c * sink.length)
+            for i in range(waiting, sink.length):
                 column[i] = 0.0
         run_routine(march.absorb, (march.sink, march.room))
 

@@ -25,7 +25,7 @@ from swashplate.equations.fields import (
     numbers_of,
     value_at,
 )
-from swashplate.equations.keeping import kept, key_of
+from swashplate.equations.keeping import cached_on_disk, key_of
 from swashplate.equations.language import plain
 from swashplate.equations.marching.kernels import (
     KERNEL_KINDS,
@@ -128,8 +128,8 @@ class Instance:
             if len(self._cache) > MOST_CACHED:
                 self._cache.clear()
             self._cache[key] = compute()
-        result: T = self._cache[key]
-        return result
+        cached: T = self._cache[key]
+        return cached
 
     def tap_delays(self, signals: Sequence[str], h: float) -> TapDelays:
         """Where every tap reads at a step of `h`."""
@@ -170,10 +170,10 @@ class Instance:
             if signal not in inputs:
                 has = ", ".join(inputs) or "none"
                 raise InputError(f"{self.name} has no input '{signal}'; it has {has}.")
-        for i, part in enumerate(self.model.parts):
+        for index, part in enumerate(self.model.parts):
             for name in part.input_types:
                 signal = part.tap(name).signal
-                outside = self.model.link_of(i, name) is None and name not in part.defaults
+                outside = self.model.link_of(index, name) is None and name not in part.defaults
                 if outside and signal not in signals:
                     raise InputError(f"{self.name}: {part.name} needs the signal '{signal}'.")
 
@@ -195,14 +195,14 @@ class Instance:
         return self._cached((*first.items(), h, start), lambda: self._start(first, h, start, None))
 
     def _start(
-        self, first: Mapping[str, float], h: float, start: Start, given: Sequence[Any] | None
+        self, first: Mapping[str, float], h: float, start: Start, states_given: Sequence[Any] | None
     ) -> InitialStates:
         check_start(start)
         self.check_inputs(first)
         before = {name: value if start == "steady" else 0.0 for name, value in first.items()}
         states: list[Any] = []
         arguments_of_parts: list[Mapping[str, Any]] = []
-        for i, (part, numbers) in enumerate(zip(self.model.parts, self.parts, strict=True)):
+        for index, (part, numbers) in enumerate(zip(self.model.parts, self.parts, strict=True)):
             arguments: dict[str, Any] = {
                 "p": numbers.p,
                 "options": numbers.options,
@@ -211,7 +211,7 @@ class Instance:
             }
             for name in part.input_types:
                 tap = part.tap(name)
-                link = self.model.link_of(i, name)
+                link = self.model.link_of(index, name)
                 if link is not None:
                     arguments[name] = linked(
                         link, states, arguments_of_parts, self.model.replacements
@@ -224,10 +224,10 @@ class Instance:
                 arguments[name] = Window((value,) * tap.width, 0.0) if tap.width else value
             if part.inputs is not None:
                 arguments["inputs"] = part.inputs(*(arguments[name] for name in part.input_types))
-            if given is None:
+            if states_given is None:
                 arguments["state"] = self._state(part, arguments, start)
             else:
-                arguments["state"] = given[i]
+                arguments["state"] = states_given[index]
             states.append(arguments["state"])
             if part.sample is not None:
                 try:
@@ -330,12 +330,12 @@ def instance_of(model: Model, p: Any, *, options: Any = None, given: Any = None)
             if not isinstance(value, kind):
                 hint = ""
                 if len(model.parts) > 1:
-                    fields = ", ".join(f"{each}=..." for each in getattr(model, what)._fields)
+                    fields = ", ".join(f"{field}=..." for field in getattr(model, what)._fields)
                     hint = f": those of {model.name} are its {what}({fields})"
                 raise InputError(
                     f"Model {part.name}: its {what} must be a {kind.__name__}, not {value!r}{hint}."
                 )
-            if what == "options" and any(each not in (None, True, False) for each in value):
+            if what == "options" and any(option not in (None, True, False) for option in value):
                 raise InputError(
                     f"Model {part.name}: its options are None or False (off) or True (on), not "
                     f"{value!r}."
@@ -362,7 +362,7 @@ def instance_of(model: Model, p: Any, *, options: Any = None, given: Any = None)
 
 
 LIBRARY: dict[str, Any] = {
-    **{name: each for name, each in vars(math).items() if not name.startswith("_")},
+    **{name: member for name, member in vars(math).items() if not name.startswith("_")},
     "kernel": kernel,
     "inlined": inlined,
     **FUNCTIONS,
@@ -421,7 +421,7 @@ def planned_march(
     rows = {signal: f"flat[{row} * count + n]" for row, signal in enumerate((*stored, *further))}
     always = {signal: rows[signal] for signal in stored}
     if_everything = {signal: rows[signal] for signal in further}
-    text = kept(
+    text = cached_on_disk(
         f"{model.name}_march",
         (key_of(model), signals, options, stored, further),
         lambda: march_source(model, signals, options, always, if_everything),

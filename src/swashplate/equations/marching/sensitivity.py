@@ -62,7 +62,7 @@ class Sensitivities(Generic[R]):
         """(n, k) derivatives of a signal behind the input, by its name."""
         if signal not in self.computed:
             (driver, record), *others = self.run.records.items()
-            beside = {name: each.values for name, each in others}
+            beside = {name: other.values for name, other in others}
             observed = every_sample(record, signal, driver, self.run.start, beside)
             columns = self.bound.jacobian(observed).columns
             self._check(signal, columns)
@@ -122,11 +122,11 @@ def sensitivities(
     records = inputs_of(instance, inputs, rate, **sampling)
     run = Run(instance, records, start, begin or {})
     initial_states(instance, run.initial, run.begin)  # refuses what does not fit
-    known = (*parameter_paths(model), *(f"start.{path}" for path in run.begin))
+    selectable = (*parameter_paths(model), *(f"start.{path}" for path in run.begin))
     columns = tuple(parameters) if parameters is not None else parameter_paths(model)
     for path in columns:
-        if path not in known:
+        if path not in selectable:
             raise InputError(
-                f"{model.name} has no parameter '{path}'; it has {', '.join(known) or 'none'}."
+                f"{model.name} has no parameter '{path}'; it has {', '.join(selectable) or 'none'}."
             )
     return Sensitivities(run, columns, BoundModel(instance, RunValues(run.begin), columns))

@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.equations.code_generation.functions import generating
-from swashplate.equations.keeping import kept, key_of
+from swashplate.equations.keeping import cached_on_disk, key_of
 from swashplate.equations.marching.march import output_of, step_source
 from swashplate.equations.marching.part_code import SignalId
 from swashplate.equations.marching.record import check_rate
@@ -78,7 +78,7 @@ def _kernels(
     model: Model, inputs: tuple[str, ...], options: tuple[Any, ...], stored: tuple[SignalId, ...]
 ) -> tuple[Callable[..., None], Callable[[StepContext], float], int]:
     """Compiled constants of a model, its step, and how many constants there are."""
-    text, count = kept(
+    text, count = cached_on_disk(
         f"{model.name}_step",
         (key_of(model), inputs, options, stored),
         lambda: step_source(model, inputs, options, stored),
@@ -200,7 +200,7 @@ def compiled_step(
 def stored_of(model: Model, outputs: Sequence[str]) -> tuple[SignalId, ...]:
     """Where the outputs of a step come from; ``"limits"`` of the last part that has any."""
     ids = []
-    limited = [i for i, part in enumerate(model.parts) if part.limits is not None]
+    limited = [index for index, part in enumerate(model.parts) if part.limits is not None]
     for output in outputs:
         if output == "limits" and limited:
             ids.append(SignalId(limited[-1], "limits"))

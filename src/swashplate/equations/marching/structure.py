@@ -24,7 +24,7 @@ from swashplate.equations.code_generation.scheduling import all_vector
 from swashplate.equations.code_generation.values import leaves
 from swashplate.equations.declaration import JIT_OFF
 from swashplate.equations.graph import Node, names_in, rewritten
-from swashplate.equations.keeping import kept, key_of
+from swashplate.equations.keeping import cached_on_disk, key_of
 from swashplate.equations.marching.kernels import KERNEL_ARGUMENTS
 from swashplate.equations.marching.march import SampleCode, march_source, output_of
 from swashplate.equations.marching.part_code import PartCode, SignalId
@@ -117,7 +117,7 @@ class Structure:
     @cached_property
     def observed(self) -> list[tuple[SignalId, bool]]:
         """What is observed, and whether as an integral."""
-        return [output_of(self.model, each) for each in self.outputs]
+        return [output_of(self.model, output) for output in self.outputs]
 
     def start_code(self, start: str) -> StartCode:
         """Constants and states where a record begins, ``"rest"`` or ``"steady"``.
@@ -126,7 +126,7 @@ class Structure:
         to be called within `generating`.
         """
         if start not in self._start_codes:
-            self._start_codes[start] = kept(
+            self._start_codes[start] = cached_on_disk(
                 f"{self.model.name}_start",
                 (key_of(self.model), self.signals, self.options, self.outputs, start),
                 lambda: self._generated_start(start),
@@ -147,7 +147,7 @@ def structure_of(
     model: Model, signals: tuple[str, ...], options: tuple[Any, ...], observed: tuple[str, ...]
 ) -> Structure:
     """A model's structure for some observed signals, made once."""
-    facts = kept(
+    facts = cached_on_disk(
         f"{model.name}_jacobian",
         (key_of(model), signals, options, observed),
         lambda: _structured(model, signals, options, observed).facts,
@@ -174,7 +174,7 @@ class _Structuring:
         observed: tuple[str, ...],
     ) -> None:
         self.model = model
-        self.observed = [output_of(model, each)[0] for each in observed]
+        self.observed = [output_of(model, output)[0] for output in observed]
         self.sample_code = SampleCode(model, signals, options, self.observed)
         self.size = STRIDE
         self.row_of: dict[SignalId, int] = {}
@@ -218,11 +218,14 @@ class _Structuring:
 
     def _part(self, part: PartCode) -> PartStructure:
         """Differentiate what is needed of a part, and plan its kernels."""
-        i, sample_code = part.part, self.sample_code
-        observed = [signal for signal in self.observed if signal.part == i]
-        sources = [source for source in sample_code.sources if source.part == i]
+        part_index = part.part
+        sample_code = self.sample_code
+        observed = [signal for signal in self.observed if signal.part == part_index]
+        sources = [source for source in sample_code.sources if source.part == part_index]
         needed = [self.signal_id_of(source) for source in sources]
-        states = {path: SignalId(i, "state", path) for path in sample_code.carried[i]}
+        states = {
+            path: SignalId(part_index, "state", path) for path in sample_code.carried[part_index]
+        }
         following = dict(leaves(part.following))
         names = dict(leaves(part.state))
         results = {state: following[path] for path, state in states.items()}
@@ -251,14 +254,16 @@ class _Structuring:
         }
         groups = []
         for group in _strongly_connected(flows):
-            none = Term((), 0.0)
-            terms = [[self.partials[into].get(by, none) for by in group] for into in group]
-            pattern = tuple(tuple(None if t.rows else t.scale for t in row) for row in terms)
+            zero = Term((), 0.0)
+            terms = [[self.partials[into].get(by, zero) for by in group] for into in group]
+            pattern = tuple(
+                tuple(None if term.rows else term.scale for term in row) for row in terms
+            )
             factors = [first for row in terms for term in row for first in term.rows]
             number = self._plan(recurrence(pattern))
             groups.append(Group(group, factors, number))
         return PartStructure(
-            part=i,
+            part=part_index,
             fill_kernel=fill_kernel,
             factor_rows=factor_rows,
             groups=groups,
@@ -278,38 +283,47 @@ class _Structuring:
 
         Returns its number, None if nothing is to be written, and the first places of these rows.
         """
-        i, ends = part.part, [*results.values()]
-        by: dict[Node, SignalId] = {
-            graph.name(name): SignalId(i, "p", path) for name, path in part.parameters.items()
+        part_index = part.part
+        ends = [*results.values()]
+        ids: dict[Node, SignalId] = {
+            graph.name(name): SignalId(part_index, "p", path)
+            for name, path in part.parameters.items()
         }
-        _, known = self.sample_code.ahead(part, ends)
-        self._constants[i] = {node: known[node] for node in part.ahead(ends)}
-        by |= {node: SignalId(i, "k", name) for node, name in self._constants[i].items()}
-        by |= {node: SignalId(i, "state", path) for path, node in leaves(part.state)}
+        _, names_ahead = self.sample_code.ahead(part, ends)
+        self._constants[part_index] = {node: names_ahead[node] for node in part.ahead(ends)}
+        ids |= {
+            node: SignalId(part_index, "k", name)
+            for node, name in self._constants[part_index].items()
+        }
+        ids |= {node: SignalId(part_index, "state", path) for path, node in leaves(part.state)}
         for tap in part.taps:
             if tap.tap.delay:
-                by[graph.name(part.delay_fraction(tap))] = SignalId(i, "fraction", str(tap.number))
+                ids[graph.name(part.delay_fraction(tap))] = SignalId(
+                    part_index, "fraction", str(tap.number)
+                )
         for source in self.sample_code.sources:
-            by[graph.name(part.source(source))] = self.signal_id_of(source)
-        gradients = Gradients(ends, [*by])
+            ids[graph.name(part.source(source))] = self.signal_id_of(source)
+        gradients = Gradients(ends, [*ids])
         order = [*results]
-        moving = [*by.values()]
+        moving = [*ids.values()]
         self.partials |= {result: {} for result in order}
         first = self.size
         node_of_row = dict[int, Node]()
-        for (out, inp), node in gradients.partials.items():
+        for (result, argument), node in gradients.partials.items():
             term = Term((), float(node.value)) if node.op == "number" else Term((self._row(),))
-            self.partials[order[out]][moving[inp]] = term
+            self.partials[order[result]][moving[argument]] = term
             node_of_row |= dict.fromkeys(term.rows, node)
         if not node_of_row:
             return None, range(0)
         nodes = [*node_of_row.values()]
-        ahead, known = self.sample_code.ahead(part, nodes)
-        hints = gradients.hints([into.path for into in order], [by.path for by in moving], {})
+        ahead, names_ahead = self.sample_code.ahead(part, nodes)
+        hints = gradients.hints(
+            [into.path for into in order], [source.path for source in moving], {}
+        )
         # a loop without branches becomes vector instructions; plain Python refuses roots and
         # quotients that nobody asks for
         flat = None if JIT_OFF else all_vector
-        block = self.sample_code.printed(part, nodes, known=known, hints=hints, flat=flat)
+        block = self.sample_code.printed(part, nodes, available=names_ahead, hints=hints, flat=flat)
         read = names_in(nodes)
         lines = ahead
         lines += [
@@ -317,11 +331,15 @@ class _Structuring:
             for tap in part.taps
             if part.delay_fraction(tap) in read
         ]
-        inner = [f"{n} = flat[{self._named[n]} + m]" for n in sorted(read & self._named.keys())]
+        inner = [
+            f"{name} = flat[{self._named[name]} + m]" for name in sorted(read & self._named.keys())
+        ]
         inner += block.lines
-        inner += [f"flat[{k} + m] = {t}" for k, t in zip(node_of_row, block.texts, strict=True)]
+        inner += [
+            f"flat[{row} + m] = {text}" for row, text in zip(node_of_row, block.texts, strict=True)
+        ]
         lines += ["for m in range(count):", *indented(inner)]
-        name = f"fill_{part.own.name}"
+        name = f"fill_{part.part_model.name}"
         text = function_source(
             f"{name}({KERNEL_ARGUMENTS})", "Partial derivatives at known states.", lines, ""
         )
@@ -334,7 +352,7 @@ class _Structuring:
         part = self.sample_code.parts[signal.part]
         link = self.model.links[signal.path]
         node = self.sample_code.observed(part, signal)
-        by = {graph.name(part.source(each)): self.signal_id_of(each) for each in link.sources}
+        by = {graph.name(part.source(source)): self.signal_id_of(source) for source in link.sources}
         partials = Gradients([node], [*by]).partials
         if any(node.op != "number" for node in partials.values()):
             raise InputError(
@@ -342,51 +360,64 @@ class _Structuring:
                 "constant factors; put anything else into a part's sample."
             )
         sources = [*by.values()]
-        return {sources[inp]: Term((), float(node.value)) for (_, inp), node in partials.items()}
+        return {
+            sources[argument]: Term((), float(node.value))
+            for (_, argument), node in partials.items()
+        }
 
     # -- where it starts -----------------------------------------------------------------------
 
     def start_code(self, start: str) -> StartCode:
         """Constants and states where a record begins, with their derivatives."""
         sample_code = self.sample_code
-        outside = {n: each for n, each in sample_code.outside().items() if each.kind != "state"}
+        outside = {
+            name: stored for name, stored in sample_code.outside().items() if stored.kind != "state"
+        }
         results: dict[SignalId, Node] = {}
-        by: dict[str, str] = {}
+        column_of: dict[str, str] = {}
         begins: dict[Node, Node] = {}
         """What names stand for where the record begins."""
         labels: dict[Node, str] = {}
         for part in sample_code.used:
-            i, prefix = part.part, self.model.prefix(part.part)
+            part_index = part.part
+            prefix = self.model.prefix(part_index)
             initial = dict(leaves(part.initial_state(start)))
             states = dict(leaves(part.state))
             starts = dict(zip(initial, rewritten(initial.values(), begins), strict=True))
             begins |= {states[path]: node for path, node in starts.items()}
             own_sources = [
-                (source, node) for source, node in sample_code.sources.items() if source.part == i
+                (source, node)
+                for source, node in sample_code.sources.items()
+                if source.part == part_index
             ]
             signals = rewritten([node for _, node in own_sources], begins)
             begins |= {
                 graph.name(part.source(source)): node
                 for (source, _), node in zip(own_sources, signals, strict=True)
             }
-            results |= {SignalId(i, "k", name): node for node, name in self._constants[i].items()}
-            carried = [each for each in self.partials if each[:2] == (i, "state")]
+            results |= {
+                SignalId(part_index, "k", name): node
+                for node, name in self._constants[part_index].items()
+            }
+            carried = [stored for stored in self.partials if stored[:2] == (part_index, "state")]
             results |= {state: starts[state.path] for state in carried}
-            by |= {name: f"{prefix}{path}" for name, path in part.parameters.items()}
+            column_of |= {name: f"{prefix}{path}" for name, path in part.parameters.items()}
             labels |= part.trace.labels
         arguments = sorted(names_in(results.values()) & outside.keys())
-        active = [each for each in arguments if each in by]
+        moving = [name for name in arguments if name in column_of]
         derived = derived_function(
             f"{self.model.name}_start",
             f"Constants and states of {self.model.name} at the start.",
             arguments,
             [("_".join(map(str, key)), node) for key, node in results.items()],
-            [(each, each) for each in active],
+            [(name, name) for name in moving],
             labels,
             chained=True,
         )
         keys = [*results]
-        moves = tuple((keys[out], by[active[inp]]) for out, inp in derived.entries)
+        moves = tuple(
+            (keys[result], column_of[moving[argument]]) for result, argument in derived.entries
+        )
         return StartCode(tuple(outside[name] for name in arguments), moves, derived)
 
 
@@ -442,16 +473,16 @@ def _sum(terms: Sequence[str]) -> str:
 
 def _strongly_connected(flows: Mapping[SignalId, list[SignalId]]) -> Iterable[tuple[SignalId, ...]]:
     """States in groups that wait for each other, each group behind those that it needs."""
-    reach = {each: {each} for each in flows}
+    reach = {state: {state} for state in flows}
     for _ in flows:  # no way is longer
-        for out in flows:
-            reach[out].update(*(reach[inp] for inp in flows[out]))
+        for state, sources in flows.items():
+            reach[state].update(*(reach[source] for source in sources))
     group = {
-        each: tuple(other for other in flows if other in reach[each] and each in reach[other])
-        for each in flows
+        state: tuple(other for other in flows if other in reach[state] and state in reach[other])
+        for state in flows
     }
     order: TopologicalSorter[tuple[SignalId, ...]] = TopologicalSorter()
-    for each in flows:
-        others = dict.fromkeys(group[i] for i in flows[each])
-        order.add(group[each], *(other for other in others if other != group[each]))
+    for state in flows:
+        others = dict.fromkeys(group[source] for source in flows[state])
+        order.add(group[state], *(other for other in others if other != group[state]))
     return order.static_order()

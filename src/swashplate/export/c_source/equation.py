@@ -57,25 +57,27 @@ def equation_in_c(
     """
     source, trace = parsed(equation), Trace()
     try:
-        given = arguments(source, None, lengths)
+        values = arguments(source, None, lengths)
     except EquationError as error:
         where = f"{source.file}, line {source.node.lineno}: {source.name}"
         raise EquationError(f"{where} cannot be written in C: {error}") from None
-    result = trace.call(equation, given)
-    read = names_in(node for _, node in leaves(result))
-    names = [each for value in given.values() for each in _names(value)]
+    returned = trace.call(equation, values)
+    read = names_in(node for _, node in leaves(returned))
+    names = [node_name for argument in values.values() for node_name in _names(argument)]
     formals = {node.value: node.kind for node in names if node.value in read}
-    nodes = [(path, node) for path, node in leaves(result)]
+    nodes = [(path, node) for path, node in leaves(returned)]
     name = functions.fresh(source.name)
-    targets = [(f"result_{path.replace('.', '_')}" if path else "result", n) for path, n in nodes]
+    targets = [
+        (f"result_{path.replace('.', '_')}" if path else "result", node) for path, node in nodes
+    ]
     text = scalar_function(functions, name, source, trace.origins, trace.labels, formals, targets)
-    paths = {re.sub(r"\[(\d+)\]", r".\1", each): kind for each, kind in formals.items()}
+    paths = {re.sub(r"\[(\d+)\]", r".\1", node_name): kind for node_name, kind in formals.items()}
     return EquationInC(name, text, paths, {path: node.kind for path, node in nodes})
 
 
 def _names(value: Value) -> list[Node]:
     """All names of an argument, options among them."""
     if isinstance(value, Tuple):
-        return [each for item in value.items for each in _names(item)]
+        return [node for element in value.items for node in _names(element)]
     node: Node = value.value if isinstance(value, Flag) else value
     return [node]

@@ -43,14 +43,14 @@ class Exported:
     @property
     def file(self) -> str:
         """Name of header and source."""
-        own = self.prefix == c_name(self.model.name)
-        return self.prefix if own else f"swashplate_{self.model.name}"
+        is_named_after_model = self.prefix == c_name(self.model.name)
+        return self.prefix if is_named_after_model else f"swashplate_{self.model.name}"
 
     @property
     def type(self) -> str:
         """Name of the struct."""
-        own = self.prefix == c_name(self.model.name)
-        return f"{self.prefix}_{'model' if own else self.model.name}"
+        is_named_after_model = self.prefix == c_name(self.model.name)
+        return f"{self.prefix}_{'model' if is_named_after_model else self.model.name}"
 
     # -- names -------------------------------------------------------------------------------------
 
@@ -61,19 +61,19 @@ class Exported:
 
     def named(self, kind: str) -> list[tuple[int, str, str]]:
         """Part, path and name of every number of its parameters or givens."""
-        found = []
+        numbers_named = []
         for part, path in self.model.places(kind):
             full = f"{self.model.prefix(part)}{path}"
             name = self.parameters.get(full) or full.replace(".", "_")
-            found.append((part, path, c_name(name)))
-        return found
+            numbers_named.append((part, path, c_name(name)))
+        return numbers_named
 
     @cached_property
     def options(self) -> list[tuple[int, str]]:
         """Part and name of every option."""
         return [
-            (i, name)
-            for i, part in enumerate(self.model.parts)
+            (part_index, name)
+            for part_index, part in enumerate(self.model.parts)
             if part.options is not None
             for name in part.options._fields
         ]
@@ -81,18 +81,24 @@ class Exported:
     @cached_property
     def switches(self) -> dict[tuple[int, str], list[str]]:
         """By part and option: paths of the parameters that switch it on."""
-        found: dict[tuple[int, str], list[str]] = {}
-        for i, part in enumerate(self.model.parts):
-            for each in declared_by(part.parameters):
-                if each.switch:
-                    found.setdefault((i, each.switch), []).extend(each.fields)
-        return {key: paths for key, paths in found.items() if key in self.options}
+        paths_of: dict[tuple[int, str], list[str]] = {}
+        for part_index, part in enumerate(self.model.parts):
+            for definition in declared_by(part.parameters):
+                if definition.switch:
+                    paths_of.setdefault((part_index, definition.switch), []).extend(
+                        definition.fields
+                    )
+        return {key: paths for key, paths in paths_of.items() if key in self.options}
 
     @cached_property
     def settable(self) -> list[tuple[int, str]]:
         """Options that do not follow from parameters."""
         follows = {*self.switches, *self.follows}
-        return [o for o in self.options if o not in follows and o[1] not in self.internal]
+        return [
+            option
+            for option in self.options
+            if option not in follows and option[1] not in self.internal
+        ]
 
     @cached_property
     def signals(self) -> tuple[str, ...]:
@@ -102,18 +108,18 @@ class Exported:
     @cached_property
     def measured(self) -> tuple[str, ...]:
         """External signals for which a parameter stands where they are not given."""
-        found: dict[str, None] = {}
-        for i, part in enumerate(self.model.parts):
+        replaceable: dict[str, None] = {}
+        for part_index, part in enumerate(self.model.parts):
             for name in part.input_types:
-                if self.model.link_of(i, name) is None and name in part.defaults:
-                    found[part.tap(name).signal] = None
-        return tuple(found)
+                if self.model.link_of(part_index, name) is None and name in part.defaults:
+                    replaceable[part.tap(name).signal] = None
+        return tuple(replaceable)
 
     @cached_property
     def names(self) -> tuple[str, ...]:
         """All outputs."""
-        every = self.outputs or (*self.model.every_signal, *self.model.integrals)
-        return tuple(dict.fromkeys(every))
+        all_outputs = self.outputs or (*self.model.every_signal, *self.model.integrals)
+        return tuple(dict.fromkeys(all_outputs))
 
     @cached_property
     def limits(self) -> list[tuple[int, str]]:
@@ -123,10 +129,17 @@ class Exported:
     @cached_property
     def flags(self) -> list[str]:
         """Places in the struct of all that is true or false."""
-        options = [f"{self.members[i]}_options.{c_name(name)}" for i, name in self.options]
-        limits = [f"{self.members[i]}_limits.{c_name(name)}" for i, name in self.limits]
-        given = [f"inputs.measured[{k}].given" for k in range(max(len(self.measured), 1))]
-        return [*options, *limits, *given, "now.begun", "before.begun", "stale", "settled"]
+        options = [
+            f"{self.members[part_index]}_options.{c_name(name)}"
+            for part_index, name in self.options
+        ]
+        limits = [
+            f"{self.members[part_index]}_limits.{c_name(name)}" for part_index, name in self.limits
+        ]
+        set_inputs = [
+            f"inputs.measured[{index}].given" for index in range(max(len(self.measured), 1))
+        ]
+        return [*options, *limits, *set_inputs, "now.begun", "before.begun", "stale", "settled"]
 
     @property
     def taps(self) -> tuple[TapOf, ...]:
@@ -136,14 +149,16 @@ class Exported:
     @cached_property
     def lines(self) -> tuple[str, ...]:
         """External signals that are kept in delay lines."""
-        return tuple(dict.fromkeys(each.tap.signal for each in self.taps))
+        return tuple(dict.fromkeys(tap.tap.signal for tap in self.taps))
 
     @property
     def settles(self) -> bool:
         """Whether every part that remembers something has an equation for its steady state."""
-        return all(p.settled is not None or not floats_of(p.state) for p in self.model.parts)
+        return all(
+            part.settled is not None or not floats_of(part.state) for part in self.model.parts
+        )
 
     @cached_property
     def widest(self) -> int:
         """Samples of the widest window."""
-        return max([each.tap.samples for each in self.taps], default=3)
+        return max([tap.tap.samples for tap in self.taps], default=3)

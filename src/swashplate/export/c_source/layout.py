@@ -20,7 +20,7 @@ size value_count init reset settle step correct output limits set_input clear_in
 set_option get_option set_step get_step update find find_output find_input find_option
 parameter_name output_name sentence valid memory inputs measured value range
 """
-"""Names that the interface takes, of its own and behind the prefix."""
+"""Names that the interface takes: as they are, and after the prefix."""
 
 
 class Layout:
@@ -37,11 +37,12 @@ class Layout:
     """
 
     def __init__(self, exported: Exported) -> None:
-        self.e, self.model = exported, exported.model
+        self.exported, self.model = exported, exported.model
         self.P = exported.prefix.upper()
-        own = {*OWN.split(), *(f"{exported.prefix}_{each}" for each in PUBLIC.split())}
-        own |= {exported.type, f"{exported.prefix}_window", f"{exported.prefix}_memory"}
-        self.structs, self.loops = Structs(exported.prefix, own), Loops(own)
+        public = [f"{exported.prefix}_{word}" for word in PUBLIC.split()]
+        taken = {*OWN.split(), *public}
+        taken |= {exported.type, f"{exported.prefix}_window", f"{exported.prefix}_memory"}
+        self.structs, self.loops = Structs(exported.prefix, taken), Loops(taken)
         self.tags: list[dict[str, str]] = []
         for part in self.model.parts:
             kinds = {"": part.parameters, "options": part.options, "given": part.given}
@@ -53,19 +54,19 @@ class Layout:
 
     def place(self, source: SignalSource, state: str) -> str:
         """Where a signal of a part stands, or a number of its state."""
-        part, member = self.model.parts[source.part], self.e.members[source.part]
+        part, member = self.model.parts[source.part], self.exported.members[source.part]
         inside = part.signals is not None and source.signal in floats_of(part.signals)
         where = f"m->{member}_signals" if inside else f"m->{state}.{member}"
         return f"{where}.{path_of(source.signal)}"
 
     def value_of(self, signal: str) -> str:
         """Where the newest value of an external signal stands."""
-        own = c_name(signal)
-        if signal in self.e.measured:
-            return f"m->inputs.measured[{self.P}_INPUT_{own}].value"
-        return f"m->inputs.{own}"
+        member = c_name(signal)
+        if signal in self.exported.measured:
+            return f"m->inputs.measured[{self.P}_INPUT_{member}].value"
+        return f"m->inputs.{member}"
 
 
 def path_of(path: str) -> str:
     """A path of Python's as one of C's."""
-    return ".".join(c_name(each) for each in path.split("."))
+    return ".".join(c_name(word) for word in path.split("."))

@@ -60,23 +60,20 @@ class Writer:
     """
 
     def __init__(self, exported: Exported) -> None:
-        self.e, self.model = exported, exported.model
+        self.exported, self.model = exported, exported.model
         self.layout = layout = Layout(exported)
-        self.P, self.structs, self.loops, self.tags = (
-            layout.P,
-            layout.structs,
-            layout.loops,
-            layout.tags,
-        )
+        self.P = layout.P
+        self.structs, self.loops = layout.structs, layout.loops
+        self.tags = layout.tags
         self.links: dict[str, str] = {}
         self._link_names: dict[str, str] = {}
-        self.parts = [PartInC(layout, i) for i in range(len(self.model.parts))]
+        self.parts = [PartInC(layout, index) for index in range(len(self.model.parts))]
         self.constants: list[str] = []
         """Structs of constants."""
-        for each, tags in zip(self.parts, self.tags, strict=True):
-            if each.constants:
-                tags["constants"] = self.structs.fresh(f"{each.member}_constants")
-                self.constants.append(self._constants(each, tags["constants"]))
+        for part_in_c, tags in zip(self.parts, self.tags, strict=True):
+            if part_in_c.constants:
+                tags["constants"] = self.structs.fresh(f"{part_in_c.member}_constants")
+                self.constants.append(self._constants(part_in_c, tags["constants"]))
         self.core = self._functions()
 
     def _constants(self, part: PartInC, tag: str) -> str:
@@ -86,17 +83,18 @@ class Writer:
             origin = part.part.trace.origins.get(node)
             note = f" /* of {origin.name} */" if origin is not None else ""
             fields.append(f"double {name};{note}")
-        says = f"What follows from the parameters of the {part.own.name}, its options and the step."
+        part_name = part.part_model.name
+        says = f"What follows from the parameters of the {part_name}, its options and the step."
         return struct(says, tag, fields)
 
     # -- the sample --------------------------------------------------------------------------------
 
     def _functions(self) -> list[str]:
         """The functions around one sample."""
-        made = [self._updates(), self._sampled(), *self._starts(False)]
-        made += self._starts(True) if self.e.settles else []
+        functions = [self._updates(), self._sampled(), *self._starts(False)]
+        functions += self._starts(True) if self.exported.settles else []
         ends = [self._finite_states(), self._finite_outputs(), self._sample()]
-        return [*self.loops.texts, *self.links.values(), *made, *ends]
+        return [*self.loops.texts, *self.links.values(), *functions, *ends]
 
     def _link(self, link: Link) -> str:
         """A signal that is made of those of several parts, at the last sample."""
@@ -106,18 +104,19 @@ class Writer:
         if name not in self.links:
             trace = Trace(replacements=self.model.replacements)
             sources = {
-                each.signal: graph.name(self.layout.place(each, "before")) for each in link.sources
+                source.signal: graph.name(self.layout.place(source, "before"))
+                for source in link.sources
             }
-            value = trace.call(link.equation, sources)
-            assert isinstance(value, Node)
+            signal = trace.call(link.equation, sources)
+            assert isinstance(signal, Node)
             taken = {*self.loops.taken, "m"}
             labels = {node: c_name(label) for node, label in trace.labels.items()}
             language = C(self.loops, trace.origins, taken)
-            block = CodeBlock([value], labels, taken, language=language)
+            block = CodeBlock([signal], labels, taken, language=language)
             function_name = self.loops.fresh(name)
             lines = [*language.headed(block.lines), f"return {block.texts[0]};"]
             says = first_line(trace.callee(link.equation).source)
-            head = f"static double {function_name}(const {self.e.type} *m)"
+            head = f"static double {function_name}(const {self.exported.type} *m)"
             self.links[name] = function(says, head, lines)
             self._link_names[name] = function_name
         return f"{self._link_names[name]}(m)"
@@ -130,11 +129,11 @@ class Writer:
         """Declarations of what a part sees through its taps, and their names."""
         lines, names = [], []
         for tap in part.part.taps:
-            line = self.e.lines.index(tap.tap.signal)
+            line = self.exported.lines.index(tap.tap.signal)
             seen = f"seen(m, {tap.number}, {line}, {tap.tap.samples})"
             text = f"constant_window(m->before_record[{line}])" if constant else seen
             name = f"{part.member}_{c_name(tap.input)}"
-            lines.append(f"const struct {self.e.prefix}_window {name} = {text};")
+            lines.append(f"const struct {self.exported.prefix}_window {name} = {text};")
             names.append(f"&{name}")
         return lines, names
 
@@ -149,25 +148,30 @@ class Writer:
             holds = part.part.margin is not None
             body += [*lines, f"good = {call} && good;" if holds else f"{call};"]
         for name, signal in self.model.integrals.items():
-            value, own = self.output(signal), c_name(name)
-            body.append(f"m->now.{own}_rate = {value};")
-            grown = f"m->before.{own} + 0.5 * m->step * (m->before.{own}_rate + m->now.{own}_rate)"
-            body.append(f"m->now.{own} = m->before.begun ? {grown} : 0.0;")
+            rate = self.output(signal)
+            integral = c_name(name)
+            body.append(f"m->now.{integral}_rate = {rate};")
+            rates = f"(m->before.{integral}_rate + m->now.{integral}_rate)"
+            grown = f"m->before.{integral} + 0.5 * m->step * {rates}"
+            body.append(f"m->now.{integral} = m->before.begun ? {grown} : 0.0;")
         body.append("m->now.begun = true;")
-        tests = [*(["good"] if margins else []), "all_finite(&m->now)", "finite_outputs(m)"]
+        tests = ["all_finite(&m->now)", "finite_outputs(m)"]
+        if margins:
+            tests.insert(0, "good")
+            body.insert(0, "bool good = true;")
         body.append(f"return {' && '.join(tests)} ? {self.P}_OK : {self.P}_DOMAIN;")
         says = "One sample: everything at this instant, then all states to the next."
-        head = f"static int one_sample({self.e.type} *m)"
-        return function(says, head, [*(["bool good = true;"] if margins else []), *body])
+        head = f"static int one_sample({self.exported.type} *m)"
+        return function(says, head, body)
 
     def _starts(self, settled: bool) -> list[str]:
         """States at the first sample, at rest or settled: of each part, and of all."""
         word = "settled" if settled else "rest"
         texts = [part.start(settled) for part in self.parts]
         body: list[str] = []
-        for i, part in enumerate(self.parts):
+        for index, part in enumerate(self.parts):
             body.append(f"{part.names[word]}(m);")
-            later = "\n".join(texts[i + 1 :])
+            later = "\n".join(texts[index + 1 :])
             if f"m->{part.member}_signals" in later or f"m->before.{part.member}." in later:
                 lines, windows = self._windows(part, constant=True)
                 following = f"{part.member}_next"
@@ -175,56 +179,70 @@ class Writer:
                 body += [
                     f"m->before.{part.member} = m->now.{part.member};",
                     *lines,
-                    f"struct {self.tags[i]['state']} {following}; /* not needed */",
+                    f"struct {self.tags[index]['state']} {following}; /* not needed */",
                     f"{part.names['sample']}({arguments});",
                 ]
         what = "settled under what it was given" if settled else "at rest"
-        head = f"static void {'settled' if settled else 'rested'}_start({self.e.type} *m)"
+        head = f"static void {'settled' if settled else 'rested'}_start({self.exported.type} *m)"
         return [*texts, function(f"States before the first sample, {what}.", head, body)]
 
     def _updates(self) -> str:
         """What follows from parameters and step: options, constants, places of the taps."""
-        texts, options, checks, places = [], [], [], []
-        for (i, name), equation in self.e.follows.items():
-            member = self.e.members[i]
-            made = self.loops.fresh(f"{member}_{name}")
-            texts.append(self.parts[i].decided(made, equation))
-            options.append(f"m->{member}_options.{c_name(name)} = {made}(m);")
-        for i, equation in self.e.stable.items():
-            made = self.loops.fresh(f"{self.e.members[i]}_stable")
-            texts.append(self.parts[i].decided(made, equation))
-            checks += [f"if (!({made}(m) > 0.0)) {{", f"    return {self.P}_UNSTABLE;", "}"]
-        for i, _, number, tap in self.e.taps:
-            delay = f"m->{self.e.members[i]}.{path_of(tap.delay)}" if tap.delay else "0.0"
-            places.append(
+        texts: list[str] = []
+        options: list[str] = []
+        checks: list[str] = []
+        misplaced: list[str] = []
+        for (part_index, name), equation in self.exported.follows.items():
+            member = self.exported.members[part_index]
+            function_name = self.loops.fresh(f"{member}_{name}")
+            texts.append(self.parts[part_index].decided(function_name, equation))
+            options.append(f"m->{member}_options.{c_name(name)} = {function_name}(m);")
+        for part_index, equation in self.exported.stable.items():
+            function_name = self.loops.fresh(f"{self.exported.members[part_index]}_stable")
+            texts.append(self.parts[part_index].decided(function_name, equation))
+            checks += [
+                f"if (!({function_name}(m) > 0.0)) {{",
+                f"    return {self.P}_UNSTABLE;",
+                "}",
+            ]
+        for part_index, _, number, tap in self.exported.taps:
+            delay = (
+                f"m->{self.exported.members[part_index]}.{path_of(tap.delay)}"
+                if tap.delay
+                else "0.0"
+            )
+            misplaced.append(
                 f"!placed(m, {number}, {delay}, {literal(float(tap.ahead))}, {tap.samples})"
             )
-        if places:
-            test = f"if ({' || '.join(places)}) {{"
+        if misplaced:
+            test = f"if ({' || '.join(misplaced)}) {{"
             checks += [test, f"    return {self.P}_BAD_DELAY;", "}"]
         says = "Options, stability and delays of these parameters and this step."
         body = [*options, *checks]
         body = [*(body or ["(void)m;"]), f"return {self.P}_OK;"]
-        texts.append(function(says, f"static int checked({self.e.type} *m)", body))
-        own = [part for part in self.parts if part.constants]
-        texts += [part.computed() for part in own]
+        texts.append(function(says, f"static int checked({self.exported.type} *m)", body))
+        parts_with_constants = [part for part in self.parts if part.constants]
+        texts += [part.computed() for part in parts_with_constants]
         says, head = "Constants of these parameters and this step.", "static void computed"
-        calls = [f"{part.names['constants']}(m);" for part in own] or ["(void)m;"]
-        texts.append(function(says, f"{head}({self.e.type} *m)", calls))
+        calls = [f"{part.names['constants']}(m);" for part in parts_with_constants] or ["(void)m;"]
+        texts.append(function(says, f"{head}({self.exported.type} *m)", calls))
         return "\n\n".join(texts)
 
     def _finite_states(self) -> str:
         """Whether all states are finite: without a branch for each."""
-        members = self.e.members
-        states = [f"s->{members[i]}.{path_of(path)}" for i, path in self.model.places("state")]
+        members = self.exported.members
+        states = [
+            f"s->{members[part_index]}.{path_of(path)}"
+            for part_index, path in self.model.places("state")
+        ]
         says = "Whether all states are finite: what is not leaves no zero behind."
-        head = f"static bool all_finite(const struct {self.e.prefix}_memory *s)"
+        head = f"static bool all_finite(const struct {self.exported.prefix}_memory *s)"
         return function(says, head, _finite(states, "s"))
 
     def _finite_outputs(self) -> str:
         says = "Whether all outputs of the sample are finite."
-        head = f"static bool finite_outputs(const {self.e.type} *m)"
-        return function(says, head, _finite([*map(self.output, self.e.names)], "m"))
+        head = f"static bool finite_outputs(const {self.exported.type} *m)"
+        return function(says, head, _finite([*map(self.output, self.exported.names)], "m"))
 
     # -- numbers -----------------------------------------------------------------------------------
 
@@ -240,21 +258,25 @@ class Writer:
     def ranges(self) -> Iterator[tuple[str, str, Definition]]:
         """Name, place and definition of each parameter."""
         definitions: dict[tuple[int, str], Definition] = {}
-        for i, part in enumerate(self.model.parts):
-            for each in declared_by(part.parameters):
-                definitions |= {(i, path): each for path in each.fields}
-        for i, path, name in self.e.named("parameters"):
-            place = f"{self.e.members[i]}.{path_of(path)}"
-            yield name, place, definitions.get((i, path), Definition(name, ""))
+        for part_index, part in enumerate(self.model.parts):
+            for definition in declared_by(part.parameters):
+                definitions |= {(part_index, path): definition for path in definition.fields}
+        for part_index, path, name in self.exported.named("parameters"):
+            member_path = f"{self.exported.members[part_index]}.{path_of(path)}"
+            yield name, member_path, definitions.get((part_index, path), Definition(name, ""))
 
     def values(self) -> list[tuple[str, str]]:
         """Name and place of every parameter, given and option, as an initialisation takes them."""
-        found = [(name, place) for name, place, _ in self.ranges()]
-        for i, path, name in self.e.named("given"):
-            found.append((name, f"{self.e.members[i]}_given.{path_of(path)}"))
-        for i, name in self.e.options:
-            found.append((name, f"{self.e.members[i]}_options.{c_name(name)}"))
-        return found
+        named_members = [(name, member_path) for name, member_path, _ in self.ranges()]
+        for part_index, path, name in self.exported.named("given"):
+            named_members.append(
+                (name, f"{self.exported.members[part_index]}_given.{path_of(path)}")
+            )
+        for part_index, name in self.exported.options:
+            named_members.append(
+                (name, f"{self.exported.members[part_index]}_options.{c_name(name)}")
+            )
+        return named_members
 
     def constant_names(self) -> list[str]:
         """Names of the constants, which an initialisation takes after the values."""
@@ -270,13 +292,15 @@ class Writer:
         lines: list[str] = []
         functions: dict[str, Function] = {}
         for part in self.parts:
-            own, called = part.prepared(self.first_constant(part.number))
-            lines += own
+            part_lines, called = part.prepared(self.first_constant(part.number))
+            lines += part_lines
             functions |= called
         head = "prepare(params, given, options, h, constants)"
         text = function_source(head, "What follows from numbers, options and the step.", lines)
-        inner = {name: text for each in functions.values() for name, text in each.texts.items()}
-        texts = [*(f"@inlined\n{each}" for each in inner.values()), text]
+        inner: dict[str, str] = {}
+        for called_function in functions.values():
+            inner |= called_function.texts
+        texts = [*(f"@inlined\n{inner_text}" for inner_text in inner.values()), text]
         return module(f"{self.model.name}_constants", "\n\n".join(texts))["prepare"]
 
 
@@ -290,10 +314,10 @@ def writer_of(exported: Exported) -> Writer:
 def numbers(exported: Exported, instance: Instance, step: float) -> Array:
     """All numbers that the C ``init`` takes, as Python computes them."""
     options = [
-        each is not None
+        option is not None
         for model, part in zip(instance.model.parts, instance.parts, strict=True)
         if model.options is not None
-        for each in part.options
+        for option in part.options
     ]
     writer = writer_of(exported)
     constants = np.zeros(len(writer.constant_names()))
@@ -305,9 +329,9 @@ def numbers(exported: Exported, instance: Instance, step: float) -> Array:
     return np.array([step, *instance.params, *instance.given, *options, *constants])
 
 
-def _finite(places: Sequence[str], owner: str) -> list[str]:
+def _finite(members: Sequence[str], owner: str) -> list[str]:
     """Statements that return whether all numbers are finite, without a branch for each."""
-    lines = [f"none += {place} - {place};" for place in places] or [f"(void){owner};"]
+    lines = [f"none += {member} - {member};" for member in members] or [f"(void){owner};"]
     return ["double none = 0.0;", *lines, "return none == 0.0;"]
 
 
@@ -320,27 +344,31 @@ def feedthrough(exported: Exported, instance: Instance, step: float) -> dict[str
     One that is read through a tap counts if the window reaches its newest sample.
     """
     model, at_once = exported.model, newest(exported, instance, step)
-    places = [output_of(model, name)[0] for name in exported.names]
-    sample_code = SampleCode(model, model.external, instance.options, places)
+    observed = [output_of(model, name)[0] for name in exported.names]
+    sample_code = SampleCode(model, model.external, instance.options, observed)
     signals = {f"x_{name}": name for name in model.external}
     for part in sample_code.used:
         signals |= {
-            part.tap_samples(each)[0]: each.tap.signal
-            for each in part.taps
-            if each.tap.signal in at_once
+            part.tap_samples(tap)[0]: tap.tap.signal
+            for tap in part.taps
+            if tap.tap.signal in at_once
         }
     sources = {
-        sample_code.parts[each.part].source(each): n for each, n in sample_code.sources.items()
+        sample_code.parts[source.part].source(source): node
+        for source, node in sample_code.sources.items()
     }
-    found = {}
-    for name, place in zip(exported.names, places, strict=True):
-        read, pending = set[str](), [sample_code.observed(sample_code.parts[place.part], place)]
+    inputs_of = {}
+    for name, stored in zip(exported.names, observed, strict=True):
+        read = set[str]()
+        pending = [sample_code.observed(sample_code.parts[stored.part], stored)]
         while pending:
             names = names_in([pending.pop()])
-            pending += [sources[each] for each in (names & sources.keys()) - read]
+            pending += [sources[source] for source in (names & sources.keys()) - read]
             read |= names
-        found[name] = frozenset(signals[each] for each in read & signals.keys())
-    return found
+        inputs_of[name] = frozenset(
+            signals[newest_sample] for newest_sample in read & signals.keys()
+        )
+    return inputs_of
 
 
 def newest(exported: Exported, instance: Instance, step: float) -> dict[str, tuple[float, float]]:
@@ -348,9 +376,9 @@ def newest(exported: Exported, instance: Instance, step: float) -> dict[str, tup
     steps = dict[str, float]()
     for _, _, _, tap in exported.taps:
         steps[tap.signal] = max(1.0 + tap.ahead, steps.get(tap.signal, 0.0))
-    found = {}
-    for i, _, _, tap in exported.taps:
-        delay = float(value_at(instance.parts[i].p, tap.delay)) if tap.delay else 0.0
+    delay_and_steps = {}
+    for part_index, _, _, tap in exported.taps:
+        delay = float(value_at(instance.parts[part_index].p, tap.delay)) if tap.delay else 0.0
         if delay < (1.0 + tap.ahead) * step * (1.0 - 1e-12):
-            found[tap.signal] = delay, steps[tap.signal]
-    return found
+            delay_and_steps[tap.signal] = delay, steps[tap.signal]
+    return delay_and_steps

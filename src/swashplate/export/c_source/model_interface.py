@@ -28,29 +28,34 @@ TEXTS = sections(__package__, "interface.c.in")
 
 def interface(exported: Exported) -> dict[str, str]:
     """Header and source of a model, by file name."""
-    made = _Interface(exported)
-    return {f"{exported.file}.h": made.header(), f"{exported.file}.c": made.source()}
+    filled_interface = _Interface(exported)
+    return {
+        f"{exported.file}.h": filled_interface.header(),
+        f"{exported.file}.c": filled_interface.source(),
+    }
 
 
 class _Interface:
     """Fills the texts above."""
 
     def __init__(self, exported: Exported) -> None:
-        self.e, self.model, self.writer = exported, exported.model, writer_of(exported)
+        self.exported, self.model, self.writer = exported, exported.model, writer_of(exported)
         self.P = self.writer.P
         self.arguments = [c_name(name) for name in exported.signals]
         self.rows, self.numbers = list(self.writer.ranges()), self.writer.values()
 
-    def filled(self, text: str, **more: str) -> str:
-        e, signals = self.e, "".join(f", double {name}" for name in self.arguments)
+    def filled(self, text: str, **further: str) -> str:
+        exported, signals = self.exported, "".join(f", double {name}" for name in self.arguments)
         words = {
-            "type": e.type,
-            "p": e.prefix,
+            "type": exported.type,
+            "p": exported.prefix,
             "P": self.P,
-            "samples": e.widest,
-            "title": comment_line(e.title or f"The model {self.model.name}, one sample at a time."),
-            "file": e.file,
-            "GUARD": f"{e.file.upper()}_H",
+            "samples": exported.widest,
+            "title": comment_line(
+                exported.title or f"The model {self.model.name}, one sample at a time."
+            ),
+            "file": exported.file,
+            "GUARD": f"{exported.file.upper()}_H",
             "signals": signals,
             "formals": signals[2:] or "void",
             "passed": "".join(f", {name}" for name in self.arguments),
@@ -58,65 +63,72 @@ class _Interface:
             "zeros": ", 0.0" * len(self.arguments),
             "checked": len(self.numbers) + 1,
             "count": len(self.numbers) + len(self.writer.constant_names()) + 1,
-            "longest": literal(e.longest),
+            "longest": literal(exported.longest),
         }
-        return filled(text, {**words, **more})
+        return filled(text, {**words, **further})
 
     # -- header ------------------------------------------------------------------------------------
 
     def header(self) -> str:
-        e, P = self.e, self.P
+        exported, P = self.exported, self.P
+        parameters = [name for name, _, _ in self.rows]
+        options = [name for _, name in exported.settable]
+        limits = [name for _, name in exported.limits]
         enums = [
-            _enum("Outputs", f"{P}_", e.names, f"{P}_OUTPUTS"),
-            _enum("Parameters", f"{P}_PARAMETER_", [n for n, _, _ in self.rows], f"{P}_PARAMETERS"),
+            _enum("Outputs", f"{P}_", exported.names, f"{P}_OUTPUTS"),
+            _enum("Parameters", f"{P}_PARAMETER_", parameters, f"{P}_PARAMETERS"),
             _enum(
                 "Inputs beside those of a step, for which parameters stand",
-                f"{P}_INPUT_", e.measured, f"{P}_INPUTS",
+                f"{P}_INPUT_", exported.measured, f"{P}_INPUTS",
             ),
             _enum(
                 "Options; terms that belong to a parameter come on with it",
-                f"{P}_OPTION_", [n for _, n in e.settable], f"{P}_OPTIONS",
+                f"{P}_OPTION_", options, f"{P}_OPTIONS",
             ),
-            _enum("Limits, as bits", f"{P}_LIMIT_", [n for _, n in e.limits], "", bits=True),
+            _enum("Limits, as bits", f"{P}_LIMIT_", limits, "", bits=True),
         ]  # fmt: skip
         structs = [text for _, text in self.writer.structs.texts.values()]
         structs += [*self.writer.constants, self.struct()]
-        settle = self.filled(TEXTS["settle"]) if e.settles else ""
+        settle = self.filled(TEXTS["settle"]) if exported.settles else ""
         return self.filled(
             TEXTS["header"],
-            enums="\n\n".join(each for each in enums if each),
+            enums="\n\n".join(enum for enum in enums if enum),
             structs="\n\n".join(structs),
             settle=settle,
         )
 
     def struct(self) -> str:
         """The struct that holds all of a model."""
-        e, tags = self.e, self.writer.tags
-        lines = [f"struct {e.prefix}_memory {{ /* what changes from sample to sample */"]
-        for member, own in zip(e.members, tags, strict=True):
-            lines.append(f"    struct {own['state']} {member};")
+        exported, tags = self.exported, self.writer.tags
+        lines = [f"struct {exported.prefix}_memory {{ /* what changes from sample to sample */"]
+        for member, part_tags in zip(exported.members, tags, strict=True):
+            lines.append(f"    struct {part_tags['state']} {member};")
         for name in self.model.integrals:
             lines += [f"    double {c_name(name)};", f"    double {c_name(name)}_rate;"]
         lines += ["    bool begun; /* a sample was taken */", "};", ""]
         lines += [
-            f"struct {e.prefix}_measured {{",
+            f"struct {exported.prefix}_measured {{",
             "    double value;",
             "    bool given;",
             "};",
             "",
         ]
-        lines.append(f"struct {e.prefix}_inputs {{")
+        lines.append(f"struct {exported.prefix}_inputs {{")
         lines += [f"    double {name};" for name in self.arguments]
-        lines.append(f"    struct {e.prefix}_measured measured[{max(len(e.measured), 1)}];")
-        lines += ["};", "", f"struct {e.type} {{", "    double step; /* [s] */"]
-        for member, own in zip(e.members, tags, strict=True):
-            for word, tag in own.items():
+        lines.append(
+            f"    struct {exported.prefix}_measured measured[{max(len(exported.measured), 1)}];"
+        )
+        lines += ["};", "", f"struct {exported.type} {{", "    double step; /* [s] */"]
+        for member, part_tags in zip(exported.members, tags, strict=True):
+            for word, tag in part_tags.items():
                 if word != "state":
                     lines.append(f"    struct {tag} {member}{'_' if word else ''}{word};")
-        lines.append(f"    struct {e.prefix}_inputs inputs;")
-        lines.append(f"    struct {e.prefix}_memory now, before; /* before the last sample */")
-        if e.taps:
-            count, rows = len(e.taps), len(e.lines)
+        lines.append(f"    struct {exported.prefix}_inputs inputs;")
+        lines.append(
+            f"    struct {exported.prefix}_memory now, before; /* before the last sample */"
+        )
+        if exported.taps:
+            count, rows = len(exported.taps), len(exported.lines)
             lines += [
                 f"    int whole[{count}];       /* samples by which taps look back */",
                 f"    double fraction[{count}]; /* and the rest of one */",
@@ -131,13 +143,13 @@ class _Interface:
     # -- source ------------------------------------------------------------------------------------
 
     def source(self) -> str:
-        e = self.e
+        exported = self.exported
         core = "\n\n".join(self.writer.core)
         sections = [
             self.filled(TEXTS["top"]),
             "\n".join(self.helpers(core)),
             self.filled(TEXTS["numbers"]),
-            *([self.filled(TEXTS["lines"])] if e.taps else []),
+            *([self.filled(TEXTS["lines"])] if exported.taps else []),
             *([self.filled(TEXTS["constant"])] if "constant_window(" in core else []),
             "/* --- the model " + "-" * 80 + " */\n",
             core + "\n",
@@ -147,7 +159,7 @@ class _Interface:
             self.switched(),
             self.filled(
                 TEXTS["interface"],
-                settle=self.filled(TEXTS["settled"]) if e.settles else "",
+                settle=self.filled(TEXTS["settled"]) if exported.settles else "",
                 constants=self.constants(),
                 move=self.moved(),
                 outputs=self.outputs(),
@@ -159,83 +171,104 @@ class _Interface:
 
     def helpers(self, core: str) -> list[str]:
         """What the equations call, and the lines."""
-        found = helpers_in(core)
-        own = HELPERS["greater_of"]
-        return [*found, own] if self.e.taps and own not in found else found
+        called = helpers_in(core)
+        greater_of = HELPERS["greater_of"]
+        if self.exported.taps and greater_of not in called:
+            called.append(greater_of)
+        return called
 
     def constants(self) -> str:
         """Statements that take the constants of each part."""
         lines, first = list[str](), len(self.numbers) + 1
         for part in self.writer.parts:
             if part.constants:
-                place = f"m->{part.member}_constants"
-                lines.append(f"memcpy(&{place}, values + {first}, sizeof {place});")
+                member = f"m->{part.member}_constants"
+                lines.append(f"memcpy(&{member}, values + {first}, sizeof {member});")
                 first += len(part.constants)
         return _body(lines)
 
     def before_all(self) -> str:
         lines = [f"m->inputs.{name} = {name};" for name in self.arguments]
-        for k, signal in enumerate(self.e.lines):
-            value = c_name(signal) if signal in self.e.signals else "0.0"
+        for row, signal in enumerate(self.exported.lines):
+            initial = c_name(signal) if signal in self.exported.signals else "0.0"
             lines += [
-                f"m->before_record[{k}] = {value};",
+                f"m->before_record[{row}] = {initial};",
                 f"for (int i = 0; i < {self.P}_LINE; i++) {{",
-                f"    m->line[{k}][i] = {value};",
+                f"    m->line[{row}][i] = {initial};",
                 "}",
             ]
-        return _body([*lines, *(["m->newest = 0;"] if self.e.lines else [])] or ["(void)m;"])
+        return _body([*lines, *(["m->newest = 0;"] if self.exported.lines else [])] or ["(void)m;"])
 
     def bounds(self) -> str:
-        found = []
-        for name, own in zip(self.e.signals, self.arguments, strict=True):
-            bound = self.e.bounds.get(name)
-            found.append(
-                f"is_finite({own})" if bound is None
-                else f"{own} >= -{literal(bound)} && {own} <= {literal(bound)}"
+        tests = []
+        for name, argument in zip(self.exported.signals, self.arguments, strict=True):
+            bound = self.exported.bounds.get(name)
+            tests.append(
+                f"is_finite({argument})" if bound is None
+                else f"{argument} >= -{literal(bound)} && {argument} <= {literal(bound)}"
             )  # fmt: skip
-        return " && ".join(found) or "true"
+        return " && ".join(tests) or "true"
 
     def pushed(self) -> str:
         lines = [f"m->inputs.{name} = {name};" for name in self.arguments]
-        for k, signal in enumerate(self.e.lines):
-            lines.append(f"m->line[{k}][m->newest] = {self.writer.layout.value_of(signal)};")
+        for row, signal in enumerate(self.exported.lines):
+            lines.append(f"m->line[{row}][m->newest] = {self.writer.layout.value_of(signal)};")
         return _body(lines or ["(void)m;"])
 
     def moved(self) -> str:
-        if not self.e.lines:
+        if not self.exported.lines:
             return ""
         return f"    m->newest = m->newest > 0 ? m->newest - 1 : {self.P}_LINE - 1;\n"
 
     def tables(self) -> str:
         """Values with their places and ranges, places of options, names."""
-        e, ranges = self.e, dict[str, int]()
-        declared = {place: definition for _, place, definition in self.rows}
-        flags = {f"{e.members[i]}_options.{c_name(name)}" for i, name in e.options}
+        exported, ranges = self.exported, dict[str, int]()
+        declared = {member: definition for _, member, definition in self.rows}
+        flags = {
+            f"{exported.members[part_index]}_options.{c_name(name)}"
+            for part_index, name in exported.options
+        }
         rows = []
-        for _, place in self.numbers:
-            d = declared.get(place, Definition("", "", can_be_off=True))
-            above = d.above is not None or (place in declared and d.lower == -inf)
-            closed = d.can_be_off and d.upper == inf
-            limits = (d.lower, d.upper, above, closed, place in flags)
+        for _, member in self.numbers:
+            definition = declared.get(member, Definition("", "", can_be_off=True))
+            above = definition.above is not None or (
+                member in declared and definition.lower == -inf
+            )
+            closed = definition.can_be_off and definition.upper == inf
+            limits = (definition.lower, definition.upper, above, closed, member in flags)
             number = ranges.setdefault(", ".join(map(literal, limits)), len(ranges))
-            rows.append(f"    {{offsetof({e.type}, {place}), {number}}},")
-        lines = [f"static const struct {e.prefix}_range ranges[] = {{"]
-        lines += [*(f"    {{{each}}}," for each in ranges), "};", ""]
-        lines += [f"static const struct {e.prefix}_value value_table[] = {{", *rows, "};", ""]
-        options = [f"{e.members[i]}_options.{c_name(name)}" for i, name in e.settable]
+            rows.append(f"    {{offsetof({exported.type}, {member}), {number}}},")
+        lines = [f"static const struct {exported.prefix}_range ranges[] = {{"]
+        lines += [*(f"    {{{limits_of_range}}}," for limits_of_range in ranges), "};", ""]
+        lines += [
+            f"static const struct {exported.prefix}_value value_table[] = {{",
+            *rows,
+            "};",
+            "",
+        ]
+        options = [
+            f"{exported.members[part_index]}_options.{c_name(name)}"
+            for part_index, name in exported.settable
+        ]
         lines.append("static const unsigned option_places[] = {")
-        lines += [f"    offsetof({e.type}, {place})," for place in options] or ["    0,"]
+        lines += [f"    offsetof({exported.type}, {member})," for member in options] or ["    0,"]
         lines += ["};", ""]
-        pairs = [e.ranges.get(name, (-inf, inf)) for name in e.measured] or [(0.0, 0.0)]
+        pairs = [exported.ranges.get(name, (-inf, inf)) for name in exported.measured] or [
+            (0.0, 0.0)
+        ]
         listed = ", ".join(f"{{{literal(low)}, {literal(high)}}}" for low, high in pairs)
         lines += [*wrapped(f"static const double input_ranges[][2] = {{{listed}}};"), ""]
         lines.append("static const unsigned flag_places[] = {")
-        lines += [*(f"    offsetof({e.type}, {place})," for place in e.flags), "};", ""]
+        lines += [
+            *(f"    offsetof({exported.type}, {member})," for member in exported.flags),
+            "};",
+            "",
+        ]
         for word, names in (
             ("parameter", [name for name, _, _ in self.rows]),
-            ("output", e.names),
-            ("input", e.measured),
-            ("option", [name for _, name in e.settable]),
+            ("output", exported.names),
+            ("input", exported.measured),
+            ("option", [name for _, name in exported.settable]),
         ):
             listed = " ".join(f'"{name}\\0"' for name in names) or '""'
             lines += [*wrapped(f"static const char {word}_names[] = {listed};"), ""]
@@ -244,15 +277,15 @@ class _Interface:
     def switched(self) -> str:
         """Terms that come on and go off with their parameters."""
         cases: dict[str, list[str]] = {}
-        places = {place: i for i, (_, place, _) in enumerate(self.rows)}
-        for (part, option), paths in self.e.switches.items():
-            member = self.e.members[part]
-            own = [f"{member}.{path_of(path)}" for path in paths]
-            test = " || ".join(f"m->{place} != 0.0" for place in own)
+        index_of = {member: index for index, (_, member, _) in enumerate(self.rows)}
+        for (part, option), paths in self.exported.switches.items():
+            member = self.exported.members[part]
+            members = [f"{member}.{path_of(path)}" for path in paths]
+            test = " || ".join(f"m->{member} != 0.0" for member in members)
             line = f"m->{member}_options.{c_name(option)} = {test};"
-            cases.setdefault(line, []).extend(str(places[place]) for place in own)
+            cases.setdefault(line, []).extend(str(index_of[member]) for member in members)
         says = "Terms of the equations that are on where their parameters are not 0."
-        head = f"static void switched({self.e.type} *m, int parameter)"
+        head = f"static void switched({self.exported.type} *m, int parameter)"
         if not cases:
             return function(says, head, ["(void)m;", "(void)parameter;"]) + "\n"
         lines = ["switch (parameter) {"]
@@ -263,25 +296,27 @@ class _Interface:
     def places(self) -> str:
         """Whether taps and the newest sample lie within their lines."""
         most = f"{self.P}_LINE - {{}}"
-        ends = [(f"m->whole[{tap.number}]", most.format(tap.tap.samples)) for tap in self.e.taps]
-        ends += [("m->newest", most.format(1))] if self.e.lines else []
-        tests = [f"{place} >= 0 && {place} <= {end}" for place, end in ends]
+        ends = [
+            (f"m->whole[{tap.number}]", most.format(tap.tap.samples)) for tap in self.exported.taps
+        ]
+        ends += [("m->newest", most.format(1))] if self.exported.lines else []
+        tests = [f"{member} >= 0 && {member} <= {end}" for member, end in ends]
         return _body([f"return {' && '.join(tests) or 'true'};"])
 
     def outputs(self) -> str:
         lines = []
-        for name in self.e.names:
+        for name in self.exported.names:
             read = self.writer.output(name)
             lines += [f"    case {self.P}_{path_name(name)}:", f"        return {read};"]
         return "".join(f"{line}\n" for line in lines)
 
     def limits(self) -> str:
-        if not self.e.limits:
+        if not self.exported.limits:
             return _body(["(void)m;", "return 0u;"])
         lines = ["unsigned bits = 0u;"]
-        for i, name in self.e.limits:
-            place = f"m->{self.e.members[i]}_limits.{c_name(name)}"
-            lines.append(f"bits |= {place} ? (unsigned){self.P}_LIMIT_{c_name(name)} : 0u;")
+        for part_index, name in self.exported.limits:
+            member = f"m->{self.exported.members[part_index]}_limits.{c_name(name)}"
+            lines.append(f"bits |= {member} ? (unsigned){self.P}_LIMIT_{c_name(name)} : 0u;")
         return _body([*lines, "return bits;"])
 
 
@@ -298,9 +333,9 @@ def _enum(says: str, prefix: str, names: Sequence[str], count: str, *, bits: boo
     if not names and not count:
         return ""
     lines = [f"/* {says}. */", "enum {"]
-    for i, name in enumerate(names):
-        value = 1 << i if bits else i
-        comma = "," if count or i + 1 < len(names) else ""
-        lines.append(f"    {prefix}{path_name(name)} = {value}{comma}")
+    for index, name in enumerate(names):
+        constant = 1 << index if bits else index
+        comma = "," if count or index + 1 < len(names) else ""
+        lines.append(f"    {prefix}{path_name(name)} = {constant}{comma}")
     lines += [f"    {count} = {len(names)}"] if count else []
     return "\n".join([*lines, "};"])

@@ -59,9 +59,9 @@ class PartInC:
 
     def __init__(self, layout: Layout, number: int) -> None:
         self.layout, self.number = layout, number
-        model = layout.e.model
-        self.own, self.member = model.parts[number], layout.e.members[number]
-        kind = self.own.options
+        model = layout.exported.model
+        self.part_model, self.member = model.parts[number], layout.exported.members[number]
+        kind = self.part_model.options
         self.options: dict[str, Node] = {}
         self._symbols: Any = None
         if kind is not None:
@@ -71,14 +71,14 @@ class PartInC:
                 for name in kind._fields
             ]
             self.options = {
-                each: flag.value for each, flag in zip(kind._fields, flags, strict=True)
+                name: flag.value for name, flag in zip(kind._fields, flags, strict=True)
             }
             self._symbols = kind(*flags)
         self._trace(self.trace())
         self._trace(self.trace(outlined=formulas(self.part.trace)))
-        own = {*OWN}
+        taken = {*OWN}
         self.windows = [
-            fresh_name(c_name(tap.input if tap.tap.width else f"{tap.input}_window"), own)
+            fresh_name(c_name(tap.input if tap.tap.width else f"{tap.input}_window"), taken)
             for tap in self.part.taps
         ]
         self.names = {
@@ -97,26 +97,26 @@ class PartInC:
 
     def trace(self, outlined: Collection[Parsed] = ()) -> Trace:
         """What runs the part's equations on symbols."""
-        return Trace(outlined, self.own.replacements)
+        return Trace(outlined, self.part_model.replacements)
 
     def _trace(self, trace: Trace) -> None:
         """Run the equations of a sample on symbols."""
-        model = self.layout.e.model
+        model = self.layout.exported.model
         self.part = PartCode(model, self.number, model.external, self._symbols, trace=trace)
         self.results = self._results()
 
     def traced(self, equation: Equation, trace: Trace) -> Value:
         """What an equation of the part returns."""
-        known = dict(self.part.arguments)
+        values = dict(self.part.arguments)
         if (options := fixed(self._symbols)) is not None:
-            known["options"] = options
-        given = {name: known[name] for name in arguments_of(equation) if name in known}
-        return trace.call(equation, given)
+            values["options"] = options
+        arguments = {name: values[name] for name in arguments_of(equation) if name in values}
+        return trace.call(equation, arguments)
 
     def _results(self) -> dict[str, list[tuple[str, Node]]]:
         """Paths and nodes of what a sample computes: signals, limits, the next state."""
-        part, own = self.part, self.own
-        limits = Tuple(None, ()) if own.limits is None else self.traced(own.limits, part.trace)
+        part, model = self.part, self.part_model
+        limits = Tuple(None, ()) if model.limits is None else self.traced(model.limits, part.trace)
         return {
             "signals": [*leaves(part.arguments.get("signals", Tuple(None, ())))],
             "limits": [*leaves(limits)],
@@ -126,8 +126,8 @@ class PartInC:
     def labels(self, trace: Trace, ends: Iterable[Node]) -> dict[Node, str]:
         """What values are called, after the group of parameters and states that they follow."""
         groups = {}
-        for value in (self.part.p, self.part.state):
-            for path, node in leaves(value):
+        for numbers in (self.part.p, self.part.state):
+            for path, node in leaves(numbers):
                 group, dot, _ = path.rpartition(".")
                 groups[node] = f"{group.replace('.', '_')}_" if dot else ""
         several = len({*groups.values()} - {""}) > 1
@@ -146,59 +146,61 @@ class PartInC:
         """What follows from parameters and step, if it has a name or takes a library's function."""
         still = {node.value for node in self.options.values()}
         taken = set[str]()
-        found = dict[Node, str]()
+        constants = dict[Node, str]()
         pending = self.part.ahead(ends, still)[::-1]
         while pending:
             node = graph.plain_value(pending.pop())
-            if node in found or node.op in (*LEAVES, "call"):
+            if node in constants or node.op in (*LEAVES, "call"):
                 continue
             if not names_in([node]) - still:
                 continue
             named = node in self._labels and node.kind == "float"
-            if not named and not any(each.op in (*LIBRARY, "call") for each in ordered([node])):
+            if not named and not any(
+                operand.op in (*LIBRARY, "call") for operand in ordered([node])
+            ):
                 continue
             if named or node.op in LIBRARY or node.op == "result":
                 stem = self._labels.get(node) or STEMS.get(node.op, node.op)
-                found[node] = fresh_name(c_name(stem), taken)
+                constants[node] = fresh_name(c_name(stem), taken)
             else:
                 pending += node.args[::-1]
-        return found
+        return constants
 
     # -- places ------------------------------------------------------------------------------------
 
     def places(self) -> dict[Node, str]:
         """What numbers of the part are called in C."""
-        known = dict[Node, str]()
-        for word, value in (("p", self.part.p), ("given", self.part.given)):
-            known |= {node: f"{word}->{path_of(path)}" for path, node in leaves(value)}
-        known |= {node: f"state->{path_of(path)}" for path, node in leaves(self.part.state)}
-        known |= {node: f"options->{c_name(name)}" for name, node in self.options.items()}
-        known |= {node: f"k->{name}" for node, name in self.constants.items()}
-        for i, part in enumerate(self.layout.e.model.parts[: self.number]):
+        names = dict[Node, str]()
+        for word, numbers in (("p", self.part.p), ("given", self.part.given)):
+            names |= {node: f"{word}->{path_of(path)}" for path, node in leaves(numbers)}
+        names |= {node: f"state->{path_of(path)}" for path, node in leaves(self.part.state)}
+        names |= {node: f"options->{c_name(name)}" for name, node in self.options.items()}
+        names |= {node: f"k->{name}" for node, name in self.constants.items()}
+        for part_index, part in enumerate(self.layout.exported.model.parts[: self.number]):
             for path in part.signal_names:
-                source = SignalSource(i, path)
-                known[graph.name(self.part.source(source))] = self.layout.place(source, "before")
-        return known
+                source = SignalSource(part_index, path)
+                names[graph.name(self.part.source(source))] = self.layout.place(source, "before")
+        return names
 
     def pointers(self) -> dict[str, str]:
         """Declarations of what a function reads and writes, by the names that they make."""
         member, tags = self.member, self.layout.tags[self.number]
-        found = {"p": f"const struct {tags['']} *p = &m->{member};"}
+        declarations = {"p": f"const struct {tags['']} *p = &m->{member};"}
         for word, name in (("constants", "k"), ("options", "options"), ("given", "given")):
             if word in tags:
-                found[name] = f"const struct {tags[word]} *{name} = &m->{member}_{word};"
-        found["state"] = f"const struct {tags['state']} *state = &m->before.{member};"
+                declarations[name] = f"const struct {tags[word]} *{name} = &m->{member}_{word};"
+        declarations["state"] = f"const struct {tags['state']} *state = &m->before.{member};"
         for word in ("signals", "limits"):
             if word in tags:
-                found[word] = f"struct {tags[word]} *{word} = &m->{member}_{word};"
-        found["h"] = "const double h = m->step; /* [s] */"
-        return found
+                declarations[word] = f"struct {tags[word]} *{word} = &m->{member}_{word};"
+        declarations["h"] = "const double h = m->step; /* [s] */"
+        return declarations
 
     def body(
         self,
         trace: Trace,
         results: Mapping[str, Sequence[tuple[str, Node]]],
-        known: Mapping[Node, str],
+        available: Mapping[Node, str],
         inputs: Mapping[Node, tuple[str, str]],
         last: Node | None = None,
         pointers: Mapping[str, str] = MappingProxyType({}),
@@ -210,46 +212,54 @@ class PartInC:
         """
         taken = {*self.layout.loops.taken, *OWN, *self.windows}
         names = {node: fresh_name(name, taken) for node, (name, _) in inputs.items()}
-        nodes = [node for each in results.values() for _, node in each]
+        nodes = [node for results_of_word in results.values() for _, node in results_of_word]
         nodes += [last] if last is not None else []
         language = C(self.layout.loops, trace.origins, taken)
         labels = self.labels(trace, nodes)
-        block = CodeBlock(nodes, labels, taken, known={**known, **names}, language=language)
+        block = CodeBlock(nodes, labels, taken, available={**available, **names}, language=language)
         lines, texts = language.headed(block.lines), iter(block.texts)
-        for word, each in results.items():
-            lines += [""] if each and lines else []
-            for path, node in each:
-                value = as_double(node, (next(texts), 0))[0]
-                lines.append(f"{word}->{path_of(path)} = {value};")
+        for word, results_of_word in results.items():
+            lines += [""] if results_of_word and lines else []
+            for path, node in results_of_word:
+                double = as_double(node, (next(texts), 0))[0]
+                lines.append(f"{word}->{path_of(path)} = {double};")
         if last is not None:
             lines.append(f"return {next(texts)};")
         text = without_comments("\n".join(lines))
         ahead = [
-            f"const double {names[node]} = {said};"
-            for node, (_, said) in inputs.items()
+            f"const double {names[node]} = {text_of_input};"
+            for node, (_, text_of_input) in inputs.items()
             if mentions(text, names[node])
         ]
         text = "\n".join([*ahead, text])
         declared = {**self.pointers(), **pointers}
         head = [line for name, line in declared.items() if mentions(text, name)] + ahead
-        return [*head, *([""] if head and lines else []), *lines]
+        if head and lines:
+            head.append("")
+        return [*head, *lines]
 
     def inputs(self, start: bool = False) -> tuple[dict[Node, str], dict[Node, tuple[str, str]]]:
         """What an input is called: places of windows, and texts of values that get a name.
 
         At a `start` what is read through a line has its value before the record.
         """
-        layout, model = self.layout, self.layout.e.model
-        places, named = dict[Node, str](), dict[Node, tuple[str, str]]()
-        before = {each: f"m->before_record[{k}]" for k, each in enumerate(layout.e.lines)}
+        layout = self.layout
+        model = layout.exported.model
+        c_texts: dict[Node, str] = {}
+        named: dict[Node, tuple[str, str]] = {}
+        before = {
+            signal: f"m->before_record[{row}]" for row, signal in enumerate(layout.exported.lines)
+        }
         for tap, window in zip(self.part.taps, self.windows, strict=True):
-            for j, name in enumerate(self.part.tap_samples(tap)):
+            for age, name in enumerate(self.part.tap_samples(tap)):
                 signal = tap.tap.signal
-                places[graph.name(name)] = before[signal] if start else f"{window}->s[{j}]"
-            places[graph.name(self.part.delay_fraction(tap))] = "0.0" if start else f"{window}->f"
-        for name in self.own.input_types:
-            node, signal = self.part.inputs[name], self.own.tap(name).signal
-            link, default = model.link_of(self.number, name), self.own.defaults.get(name)
+                c_texts[graph.name(name)] = before[signal] if start else f"{window}->s[{age}]"
+            c_texts[graph.name(self.part.delay_fraction(tap))] = "0.0" if start else f"{window}->f"
+        for name in self.part_model.input_types:
+            node = self.part.inputs[name]
+            signal = self.part_model.tap(name).signal
+            link = model.link_of(self.number, name)
+            default = self.part_model.defaults.get(name)
             if not isinstance(node, Node) or node.op == "number":
                 continue
             if link is not None:
@@ -257,18 +267,18 @@ class PartInC:
                     named[node] = c_name(name), layout.place(link.sources[0], "before")
                 continue
             text = layout.value_of(signal)
-            if name in self.own.taps:
-                text = before[signal] if start else self._looked(node, places)
+            if name in self.part_model.taps:
+                text = before[signal] if start else self._looked(node, c_texts)
             if default is not None:
-                given = f"m->inputs.measured[{layout.P}_INPUT_{c_name(signal)}].given"
-                text = f"{given} ? {text} : p->{path_of(default)}"
+                is_set = f"m->inputs.measured[{layout.P}_INPUT_{c_name(signal)}].given"
+                text = f"{is_set} ? {text} : p->{path_of(default)}"
             named[node] = c_name(name), text
-        return places, named
+        return c_texts, named
 
-    def _looked(self, value: Node, places: Mapping[Node, str]) -> str:
+    def _looked(self, value: Node, c_texts: Mapping[Node, str]) -> str:
         """What a tap makes of its window, as one expression."""
         block = CodeBlock(
-            [value], {}, set(), known=places, language=C(self.layout.loops, {}, set())
+            [value], {}, set(), available=c_texts, language=C(self.layout.loops, {}, set())
         )
         assert not block.lines
         return block.texts[0]
@@ -277,71 +287,81 @@ class PartInC:
 
     def sample(self) -> str:
         """One sample: signals, limits, the next state, and whether the equations hold."""
-        places, named = self.inputs()
+        c_texts, named = self.inputs()
         margin, windows = self.part.margin, self.windows
         holds = None if margin is None else graph.make(">", margin, graph.ZERO)
-        known = {**self.places(), **places}
-        lines = self.body(self.part.trace, self.results, known, named, holds)
+        available = {**self.places(), **c_texts}
+        lines = self.body(self.part.trace, self.results, available, named, holds)
         text = without_comments("\n".join(lines))
-        idle = [name for name in ("next", *windows) if not mentions(text, name)]
+        unused = [name for name in ("next", *windows) if not mentions(text, name)]
         tag = self.layout.tags[self.number]["state"]
-        formals = [f"{self.layout.e.type} *m", f"struct {tag} *next"]
-        formals += [f"const struct {self.layout.e.prefix}_window *{each}" for each in windows]
-        back = "void" if margin is None else "bool"
-        head = f"static {back} {self.names['sample']}({', '.join(formals)})"
-        says = f"A sample of the {self.own.name}: what is known at it, and the state at the next."
-        lines = [*(f"(void){name};" for name in idle), *lines]
+        formals = [f"{self.layout.exported.type} *m", f"struct {tag} *next"]
+        formals += [
+            f"const struct {self.layout.exported.prefix}_window *{window}" for window in windows
+        ]
+        result_type = "void" if margin is None else "bool"
+        head = f"static {result_type} {self.names['sample']}({', '.join(formals)})"
+        part = self.part_model.name
+        says = f"A sample of the {part}: what is known at it, and the state at the next."
+        lines = [*(f"(void){name};" for name in unused), *lines]
         return function(says, head, lines if "m->" in text else ["(void)m;", *lines])
 
     def start(self, settled: bool) -> str:
         """The state at the first sample."""
-        equation = self.own.settled if settled else self.own.rest
+        equation = self.part_model.settled if settled else self.part_model.rest
         word = "settled" if settled else "rest"
-        head = f"static void {self.names[word]}({self.layout.e.type} *m)"
+        head = f"static void {self.names[word]}({self.layout.exported.type} *m)"
         tag = self.layout.tags[self.number]["state"]
         pointer = f"struct {tag} *next = &m->now.{self.member};"
         if equation is not None:
-            places, named = self.inputs(start=True)
+            c_texts, named = self.inputs(start=True)
             trace = self.trace()
-            value = self.traced(equation, trace)
-            results = {"next": [*leaves(value)]}
-            known = {**self.places(), **places}
-            lines = self.body(trace, results, known, named, pointers={"next": pointer})
+            state = self.traced(equation, trace)
+            results = {"next": [*leaves(state)]}
+            available = {**self.places(), **c_texts}
+            lines = self.body(trace, results, available, named, pointers={"next": pointer})
         else:
-            defaults = self.own.state._field_defaults
-            lines = [pointer] if self.own.state._fields else []
+            defaults = self.part_model.state._field_defaults
+            lines = [pointer] if self.part_model.state._fields else []
             for path, _ in leaves(self.part.state):
                 first = defaults.get(path.split(".")[0], 0.0)
-                for each in path.split(".")[1:]:
-                    first = getattr(first, each, 0.0)
+                for field in path.split(".")[1:]:
+                    first = getattr(first, field, 0.0)
                 lines.append(f"next->{path_of(path)} = {literal(float(first))};")
         how = "settled under its inputs" if settled else "at rest"
-        return function(f"The state of the {self.own.name} {how}.", head, lines or ["(void)m;"])
+        return function(
+            f"The state of the {self.part_model.name} {how}.", head, lines or ["(void)m;"]
+        )
 
     def computed(self) -> str:
         """Constants of these parameters, options and this step."""
-        head = f"static void {self.names['constants']}({self.layout.e.type} *m)"
-        known = self.places()
+        head = f"static void {self.names['constants']}({self.layout.exported.type} *m)"
+        available = self.places()
         results = []
         for node, name in self.constants.items():
-            del known[node]
+            del available[node]
             results.append((name, node))
         tag = self.layout.tags[self.number]["constants"]
         pointer = f"struct {tag} *k = &m->{self.member}_constants;"
-        lines = self.body(self.part.trace, {"k": results}, known, {}, pointers={"k": pointer})
-        says = f"What follows from the parameters of the {self.own.name}, its options and the step."
+        lines = self.body(self.part.trace, {"k": results}, available, {}, pointers={"k": pointer})
+        part = self.part_model.name
+        says = f"What follows from the parameters of the {part}, its options and the step."
         return function(says, head, lines)
 
     def decided(self, name: str, equation: Equation) -> str:
         """A function that returns what an equation of parameters, options and step says."""
         trace = self.trace()
-        value = self.traced(equation, trace)
-        assert isinstance(value, Node)
-        known = {k: v for k, v in self.places().items() if k not in self.constants}
-        lines = self.body(trace, {}, known, {}, value)
-        back = "bool" if value.kind == "bool" else "double"
+        decision = self.traced(equation, trace)
+        assert isinstance(decision, Node)
+        available = {
+            node: text for node, text in self.places().items() if node not in self.constants
+        }
+        lines = self.body(trace, {}, available, {}, decision)
+        result_type = "bool" if decision.kind == "bool" else "double"
         says = (equation.__doc__ or "").strip().partition("\n")[0]
-        return function(says, f"static {back} {name}(const {self.layout.e.type} *m)", lines)
+        return function(
+            says, f"static {result_type} {name}(const {self.layout.exported.type} *m)", lines
+        )
 
     # -- numbers -----------------------------------------------------------------------------------
 
@@ -351,27 +371,34 @@ class PartInC:
         They read ``params``, ``given``, ``options`` and ``h``, and fill ``constants``.
         """
         taken = {*FUNCTIONS, *RESERVED, "params", "given", "options", "h", "constants", "prepare"}
-        known = {}
-        for array, value in (("params", self.part.p), ("given", self.part.given)):
-            places = self.layout.e.model.places("parameters" if array == "params" else "given")
-            for path, node in leaves(value):
-                known[node] = f"{array}[{places.index((self.number, path))}]"
+        available = {}
+        for array, numbers in (("params", self.part.p), ("given", self.part.given)):
+            paths = self.layout.exported.model.places(
+                "parameters" if array == "params" else "given"
+            )
+            for path, node in leaves(numbers):
+                available[node] = f"{array}[{paths.index((self.number, path))}]"
         for name, node in self.options.items():
-            known[node] = f"options[{self.layout.e.options.index((self.number, name))}]"
-        block = CodeBlock([*self.constants], self._labels, taken, known=known)
+            available[node] = f"options[{self.layout.exported.options.index((self.number, name))}]"
+        block = CodeBlock([*self.constants], self._labels, taken, available=available)
         lines = [*block.lines]
-        for k, text in enumerate(block.texts):
-            lines += assigned(f"constants[{first + k}]", text)
+        for index, text in enumerate(block.texts):
+            lines += assigned(f"constants[{first + index}]", text)
         return lines, block.functions
 
 
 def formulas(trace: Trace) -> set[Parsed]:
     """Equations of numbers alone that a part uses more than once: they become functions of C."""
-    found = set()
+    repeated = set()
     for source, calls in trace.calls.items():
-        given, back = max(calls, key=lambda each: len(ordered(each[1], each[0])))
-        numbers = all(each.kind == "float" for each in (*given, *back))
-        plain_arguments = len(given) == len(source.arguments)
-        if len(calls) > 1 and numbers and plain_arguments and len(ordered(back, given)) > FEW:
-            found.add(source)
-    return found
+        arguments, results = max(calls, key=lambda call: len(ordered(call[1], call[0])))
+        numbers = all(node.kind == "float" for node in (*arguments, *results))
+        plain_arguments = len(arguments) == len(source.arguments)
+        if (
+            len(calls) > 1
+            and numbers
+            and plain_arguments
+            and len(ordered(results, arguments)) > FEW
+        ):
+            repeated.add(source)
+    return repeated

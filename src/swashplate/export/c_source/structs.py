@@ -53,7 +53,7 @@ class Structs:
 def struct(says: str, tag: str, fields: Iterable[str]) -> str:
     """Text of a struct; one without fields has a byte, as C99 wants it."""
     head = comment(says) if says else []
-    lines = [f"    {each}" for each in fields] or ["    char nothing;"]
+    lines = [f"    {declaration}" for declaration in fields] or ["    char nothing;"]
     return "\n".join([*head, f"struct {tag} {{", *lines, "};"])
 
 
