@@ -1,4 +1,4 @@
-"""First drafts of a campaign file: a guess of what each column of some logs is, and the file's text.
+"""First drafts of a campaign file: a guess of what each column of a log is, and the text.
 
 The kind of a column follows from its name and unit by the table of kinds,
 `swashplate.campaign.schema.KINDS`, and from its numbers. What is not known for sure is marked
@@ -63,7 +63,7 @@ PLC = re.compile(
 )
 """Names of a PLC's words, such as "PIW_STROKE" and "JOY_W"."""
 SMALLEST_WORD = 100
-"""Whole numbers that reach no further are no PLC's words: a per cent, or a unit of its own."""
+"""Whole numbers that reach no further are not a PLC's words, but percentages or volts."""
 MILLIVOLTS = 10_500
 """Whole numbers that reach further are not the millivolts of a card, which takes 10 V."""
 SIMATIC, SIMATIC_OVERRANGE = 27_648, 32_511
@@ -109,7 +109,7 @@ class _Guess(NamedTuple):
 
 
 class _Axis(NamedTuple):
-    """Columns of an axis: candidates for its input, the first of which is drafted; channels by name."""
+    """Columns of an axis: channels by name, and candidates for its input, best first."""
 
     inputs: list[_Guess]
     channels: dict[str, _Guess]
@@ -158,6 +158,8 @@ def draft_campaign(
         If there is no log, none has a column that is named, or a unit that is given measures
         something else than the column's kind.
     """
+    if not logs:
+        raise InputError("A draft needs at least one log.")
     kinds, units, folder = dict(columns or {}), dict(units or {}), Path(folder).resolve()
     opened = [open_log(path) for path in logs]
     headers = dict[str, LogColumn]()
@@ -188,8 +190,6 @@ def _check_stated(
     for name, kind in kinds.items():
         if kind not in ("time", *KINDS):
             raise InputError(f"'{name}' cannot be a '{kind}': it is time, {', '.join(KINDS)}.")
-    if not headers:
-        raise InputError("A draft needs at least one log.")
     for name in sorted({*kinds, *units}):
         if name not in headers:
             names = ", ".join(sorted(headers))
@@ -211,7 +211,7 @@ def _readable_columns(log: Log, names: list[str]) -> dict[str, Array]:
         return _readable_columns(log, names[:half]) | _readable_columns(log, names[half:])
 
 
-# --- guesses of the columns -------------------------------------------------------------------------
+# --- guesses of the columns -----------------------------------------------------------------------
 
 
 def _words(name: str) -> str:
@@ -224,16 +224,18 @@ def _by_words(column: LogColumn, name: str, unit: str | None) -> _Guess:
     words = _words(name)
     if re.fullmatch(TIME, _words(name.rpartition("/")[2])):
         return _Guess(column.name, "time", "", column.unit)
-    matches = {
-        kind: match
-        for kind, meant in KINDS.items()
-        if meant.words
-        and (match := re.fullmatch(rf"(?:(.*) )?(?:{meant.words}){COMPLEMENT}", words))
-    }
-    marked = speed_unit(unit or "")
-    kinds = (kind for kind, meant in KINDS.items() if kind in matches or marked in meant.marks)
-    axis = next((match[1] for match in matches.values()), "")
-    return _Guess(column.name, next(kinds, ""), axis or "", column.unit)
+    rotational_unit = speed_unit(unit or "")
+    first_kind = ""
+    axis: str | None = None
+    for kind, entry in KINDS.items():
+        match = None
+        if entry.words:
+            match = re.fullmatch(rf"(?:(.*) )?(?:{entry.words}){COMPLEMENT}", words)
+        if match is not None and axis is None:
+            axis = match[1] or ""
+        if not first_kind and (match is not None or rotational_unit in entry.marks):
+            first_kind = kind
+    return _Guess(column.name, first_kind, axis or "", column.unit)
 
 
 def _by_header(column: LogColumn, kind: str | None) -> _Guess:
@@ -423,7 +425,7 @@ def _axis_of(guesses: Sequence[_Guess]) -> _Axis:
     return axis
 
 
-# --- text of the file ------------------------------------------------------------------------------
+# --- text of the file -----------------------------------------------------------------------------
 
 
 def _axis_lines(
@@ -570,12 +572,15 @@ def _unit_lines(signal: _Guess) -> list[str]:
         return [f"unit = {toml_string(signal.unit)}    # {signal.unit_comment}"]
     if signal.rolls_over_at:
         usual = "deg"
-    elif signal.kind == "position" and re.fullmatch(
-        rf"(?:.* )?(?:{ROD}){COMPLEMENT}", _words(signal.name)
-    ):
+    elif signal.kind == "position" and _is_rod(signal.name):
         usual = "mm"
     mark = FIXME if signal.kind in OPEN_UNITS else "guessed"
     return [f"unit = {toml_string(usual)}    # {mark}: the header gives none"]
+
+
+def _is_rod(name: str) -> bool:
+    """Whether a column is called like the position of a rod."""
+    return bool(re.fullmatch(rf"(?:.* )?(?:{ROD}){COMPLEMENT}", _words(name)))
 
 
 def _unused_lines(
