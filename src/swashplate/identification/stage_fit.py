@@ -22,7 +22,7 @@ from swashplate.identification.estimation.stages import Parameters
 from swashplate.identification.validation import RunQuality, run_qualities
 from swashplate.results import Result
 
-Found = TypeVar("Found")
+Outcome = TypeVar("Outcome")
 Status = Literal[
     "estimated",
     "at its lower bound",
@@ -94,8 +94,8 @@ class StageFit(Result):
         return run_qualities(self.problem, self.solution.vector)
 
 
-def once_per_stage(analysis: Callable[[StageFit], Found]) -> Callable[[StageFit], Found]:
-    """A function of a stage that is computed when it is first asked for, and then kept.
+def once_per_stage(analysis: Callable[[StageFit], Outcome]) -> Callable[[StageFit], Outcome]:
+    """Cache an analysis of a stage with the stage: it is computed on its first call.
 
     Verdict, tables, report and files ask for the same analyses, which take seconds. They are kept
     with the stage, so that they go when it goes, and go with it to other processes: some refer to
@@ -104,9 +104,9 @@ def once_per_stage(analysis: Callable[[StageFit], Found]) -> Callable[[StageFit]
     key = f"{analysis.__module__}.{analysis.__qualname__}"
 
     @wraps(analysis)
-    def kept(stage: StageFit) -> Found:
+    def cached_analysis(stage: StageFit) -> Outcome:
         if key not in stage._analyses:
             stage._analyses[key] = analysis(stage)
-        return cast("Found", stage._analyses[key])
+        return cast("Outcome", stage._analyses[key])
 
-    return kept
+    return cached_analysis

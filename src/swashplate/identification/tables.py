@@ -62,9 +62,10 @@ def estimates_table(
     meant, instead of those of the machine.
     """
     unknowns = stage.problem.unknowns
-    known = "" if truth is None else "tpf"
+    # in terminal, page and file, or nowhere
+    truth_shown_in = "" if truth is None else "tpf"
     ends = f"{100.0 * LEVEL:g} %"
-    made = Table(
+    table = Table(
         f"Stage {stage.stage.name}",
         (
             Column("stage", of="f"),
@@ -74,8 +75,8 @@ def estimates_table(
             Column("nominal", ".5g"),
             Column("estimate", ".5g", key="value"),
             Column("change", "s", of="p"),
-            Column("truth", ".5g", of=known),
-            Column("holds", of=known),
+            Column("truth", ".5g", of=truth_shown_in),
+            Column("holds", of=truth_shown_in),
             Column(f"lower {ends}", ".5g", none=NONE, key="lower"),
             Column(f"upper {ends}", ".5g", none=NONE, key="upper"),
             Column("half width", "s", of="p"),
@@ -101,7 +102,7 @@ def estimates_table(
         if true is not None and (low, high) != (None, None):
             inside = (-inf if low is None else low) <= true <= (inf if high is None else high)
             holds = "yes" if inside else "no"
-        made.add(
+        table.add(
             stage.stage.name,
             estimate.name,
             meaning_of(unknown, stage),
@@ -119,7 +120,7 @@ def estimates_table(
             unit=unknown.unit,
             look=estimate.status != "estimated",
         )
-    return made
+    return table
 
 
 def _half_width(value: float, low: float | None, high: float | None) -> str:

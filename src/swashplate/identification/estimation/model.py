@@ -104,21 +104,23 @@ def linearised(
     model: MachineModel, values: Mapping[str, float], experiment: Experiment, names: Sequence[str]
 ) -> Mapping[str, Linearised]:
     """Simulation with derivatives by names, its own or differences; raises as `simulated`."""
-    if own := getattr(model, "linearise", None):
-        made: Mapping[str, Linearised] = own(values, experiment, names)
-        _check(made, experiment, len(names))
-        return made
-    middle = simulated(model, values, experiment)
-    found = {c: Linearised(y, np.empty((y.size, len(names)))) for c, y in middle.items()}
+    linearise = getattr(model, "linearise", None)
+    if linearise:
+        of_model: Mapping[str, Linearised] = linearise(values, experiment, names)
+        _check(of_model, experiment, len(names))
+        return of_model
+    outputs = simulated(model, values, experiment)
+    by_channel = {
+        channel: Linearised(output, np.empty((output.size, len(names))))
+        for channel, output in outputs.items()
+    }
     for k, name in enumerate(names):
         step = RELATIVE_STEP * max(abs(values[name]), 1e-3)
-        above, below = (
-            simulated(model, {**values, name: values[name] + way}, experiment)
-            for way in (step, -step)
-        )
-        for channel, part in found.items():
+        above = simulated(model, {**values, name: values[name] + step}, experiment)
+        below = simulated(model, {**values, name: values[name] - step}, experiment)
+        for channel, part in by_channel.items():
             part.by[:, k] = (above[channel] - below[channel]) / (2.0 * step)
-    return found
+    return by_channel
 
 
 def _check(outputs: object, experiment: Experiment, names: int | None = None) -> None:
@@ -160,7 +162,7 @@ Output = TypeVar("Output")
 
 
 def part_of(outputs: Mapping[str, Output], experiment: Experiment, channel: str) -> Output:
-    """What a model gives for a channel; an `InputError` if it gives nothing."""
+    """Output of a model for a channel; an `InputError` if it gives none."""
     if channel not in outputs:
         names = ", ".join(outputs)
         raise InputError(f"{experiment.name}: the model gives no '{channel}'; it gives {names}.")
@@ -168,7 +170,7 @@ def part_of(outputs: Mapping[str, Output], experiment: Experiment, channel: str)
 
 
 class SimulationRequest(NamedTuple):
-    """What is asked of a model: an experiment as the march sees it, and derivatives by columns."""
+    """Request to a model: an experiment as the march sees it, and derivatives by columns."""
 
     observed: ObservedRecord
     columns: Sequence[str] = ()
@@ -316,13 +318,13 @@ class UserModel(Result, EquationModel):
     def signals_of(self, experiment: Experiment) -> Mapping[str, str]:
         """Signal of the model for each channel that it gives; one of none is refused."""
         signals = self.signals
-        given = {name: name for name in experiment.channels if name in signals}
-        if not given:
+        signal_of = {name: name for name in experiment.channels if name in signals}
+        if not signal_of:
             raise InputError(
                 f"{experiment.name} has the channels {', '.join(experiment.channels)}, of which "
                 f"{self.model.name} gives none; it gives {', '.join(signals)}."
             )
-        return given
+        return signal_of
 
     def driven(
         self, experiment: Experiment, values: Mapping[str, float] = MappingProxyType({})
