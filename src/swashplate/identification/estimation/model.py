@@ -89,7 +89,7 @@ def simulated(
     Anything but one real number a sample for each channel is refused in an `InputError`.
     """
     outputs = model.simulate(values, experiment)
-    _check(outputs, experiment)
+    _check_outputs(outputs, experiment)
     for name, output in outputs.items():
         if not np.isfinite(output).all():
             row = int(np.argmax(~np.isfinite(output)))
@@ -107,7 +107,7 @@ def linearised(
     linearise = getattr(model, "linearise", None)
     if linearise:
         of_model: Mapping[str, Linearised] = linearise(values, experiment, names)
-        _check(of_model, experiment, len(names))
+        _check_outputs(of_model, experiment, len(names))
         return of_model
     outputs = simulated(model, values, experiment)
     by_channel = {
@@ -123,18 +123,23 @@ def linearised(
     return by_channel
 
 
-def _check(outputs: object, experiment: Experiment, names: int | None = None) -> None:
-    """Refuse what a model must not return: arrays, or with `names` Linearised by so many."""
+def _type_words(returned: object) -> str:
+    """Type of what a model returned, for a sentence."""
+    if returned is None:
+        return "None (is a return missing?)"
+    if isinstance(returned, np.ndarray):
+        return f"an array of {returned.dtype.name}"
+    return f"a {type(returned).__name__}"
+
+
+def _check_outputs(outputs: object, experiment: Experiment, names: int | None = None) -> None:
+    """Refuse outputs that are not arrays by channel, or with `names` Linearised by so many."""
     method, of_channel = "linearise", "a Linearised"
     if names is None:
         method, of_channel = "simulate", "an array of floats"
 
     def refused(must: str, returned: object) -> InputError:
-        words = f"a {type(returned).__name__}"
-        if returned is None:
-            words = "None (is a return missing?)"
-        elif isinstance(returned, np.ndarray):
-            words = f"an array of {returned.dtype.name}"
+        words = _type_words(returned)
         return InputError(f"{experiment.name}: {method} must return {must}, not {words}.")
 
     if not isinstance(outputs, Mapping):
