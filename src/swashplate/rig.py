@@ -65,7 +65,7 @@ the one that a fit starts from."""
 
 @dataclass(frozen=True)
 class Instruments:
-    """What lies between the signals and the log, every error one number; 0 is none.
+    """Errors of the instruments between the signals and the log, each one number; 0 is none.
 
     `dataclasses.replace` switches one error on or off.
 
@@ -165,9 +165,9 @@ class VirtualRun(Result):
     """One simulated test."""
 
     name: str
-    """Of the maneuver."""
+    """Name of the maneuver."""
     stem: str
-    """Of its file: axis and maneuver."""
+    """Name of its file without the ending: axis and maneuver."""
     role: Literal["fit", "validate"]
     columns: Mapping[str, Array]
     """Logged samples (n,), SI: ``"time"`` [s], ``"voltage"`` [V] and the channels; NaN is an empty
@@ -659,7 +659,7 @@ def _contents(tests: VirtualTests) -> tuple[str, str]:
 
 
 def _accuracy(kind: ChannelKind | Literal["voltage"], tools: Instruments) -> InlineTable:
-    """What a campaign file states of an instrument's error, for the rig knows it."""
+    """Accuracy of an instrument for the campaign file, which the rig knows."""
     from tomlkit import inline_table
 
     limits = {"gain": 0.0, "zero": 0.0, "time": 0.0}

@@ -1,4 +1,4 @@
-"""What measured signals are like, and what someone should look into before a fit.
+"""Properties of measured signals, and findings to look into before a fit.
 
 Rate, jitter, gaps, range, clipping, spikes and lost samples of each run; of a campaign, windows
 that no run takes and currents that have no sign. What is ignored counts for nothing.
@@ -60,7 +60,7 @@ NAMED = 6
 
 @dataclass(frozen=True)
 class Quality(Result):
-    """What one signal of one experiment is like; of a channel what is not ignored."""
+    """Properties of one signal of one experiment; of a channel without what is ignored."""
 
     signal: str
     """``"input"`` or the channel's name."""
@@ -77,7 +77,7 @@ class Quality(Result):
     ignored: float
     """Share of the samples whose weight is 0."""
     findings: tuple[str, ...]
-    """What someone should look into, one sentence each."""
+    """Findings to look into, one sentence each."""
 
 
 def examine(experiment: Experiment, unsigned: Collection[str] = ()) -> tuple[Quality, ...]:
@@ -216,7 +216,7 @@ def turned(driven: Array, motion: Array) -> bool:
 
 
 ESTIMATED = 'start = "estimated"'
-"""What the entry of a run says that begins in motion."""
+"""Entry of a run that begins in motion."""
 
 
 def moves_at_first(experiment: Experiment) -> tuple[str, ...]:

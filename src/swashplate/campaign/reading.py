@@ -530,7 +530,7 @@ GRAIN = 256
 MOVES = 0.02
 """Share of its largest excursion from rest beyond which an input moves."""
 BEFORE, AFTER = 2.0, 5.0
-"""What belongs to a window with motion before the input moves and after it has stopped. [s]"""
+"""Rest that a window has before the input moves and after it has stopped. [s]"""
 HELD = 120_000
 """Rows of one log that a campaign takes at most, more than the 110,605 of Kruse's thirteen tests of
 the hoist. A fit of two channels takes about 0.2 kB of memory for each, and 2 kB for each row of the

@@ -248,7 +248,7 @@ class _Dynamics(NamedTuple):
 
 
 class _Trial(NamedTuple):
-    """How well dynamics follow the measured currents, at the delay of the least error."""
+    """Error of dynamics beside the measured currents, at the delay of the least error."""
 
     dynamics: _Dynamics
     delay: float

@@ -54,7 +54,7 @@ TIME = (
 )
 """Names of columns of time stamps; those of signals are in `KINDS`."""
 COMPLEMENT = "(?: (?:of|der|des|du|de|del|della|do|da|van|av) .*)?"
-"""What may follow in such a name: "Drehzahl der Trommel"."""
+"""Complement that may follow in such a name: "Drehzahl der Trommel"."""
 INPUTS = get_args(InputKind)
 HALVES = {"current_plus", "current_minus"}
 PLC = re.compile(

@@ -75,7 +75,7 @@ class Guess(NamedTuple):
 
     axis: str
     unit: str
-    """Of a speed, ``"rad/s"`` or ``"m/s"``."""
+    """Unit of a speed, ``"rad/s"`` or ``"m/s"``."""
     dead_zone: tuple[float, float]
     """[V]"""
     gain: tuple[float, float]

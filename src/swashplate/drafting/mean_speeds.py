@@ -157,7 +157,7 @@ class MovingRun(NamedTuple):
     travelled: Array
     """Measured way (j,) since the first of them, of a speed its integral."""
     resolution: float
-    """Of the way, 0 if it is fine."""
+    """Resolution of the way, 0 if it is fine."""
 
 
 def _model(run: MovingRun, numbers: Array) -> tuple[Instance, RunValues]:

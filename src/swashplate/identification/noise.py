@@ -167,7 +167,7 @@ def correlation_length(autocovariance: Array, counts: Array) -> int:
 
 @dataclass(frozen=True, eq=False)
 class NoiseColour(Result):
-    """How the residuals of one channel are correlated, from all its runs of one sampling step."""
+    """Correlation of the residuals of one channel, from all its runs of one sampling step."""
 
     channel: str
     members: tuple[int, ...]

@@ -56,7 +56,7 @@ class CrossValidation(Result):
 
     seed: int
     planned: int
-    """How many folds there were to be."""
+    """Number of folds that were to be fitted."""
     folds: tuple[Fold, ...]
     measures: Mapping[str, Measures]
     """Measures of each channel over all runs, each predicted by a fit that did not see it."""

@@ -1,4 +1,4 @@
-"""What a stage of a fit found: plain data, below all that judges it.
+"""Result of a stage of a fit: plain data, below all that judges it.
 
 What follows from it alone is there as an attribute. What it is worth are functions of a stage, each
 in the file of its subject: `intervals.uncertainty_of`, `determination.identifiability_of`,
@@ -38,7 +38,7 @@ estimated forces, ``"fixed"`` is what no stage moved."""
 
 
 class Interval(NamedTuple):
-    """What is known of the error of an estimate."""
+    """Status, standard error and interval of an estimate."""
 
     status: Status
     standard_error: float | None = None
@@ -50,7 +50,7 @@ class Interval(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class StageFit(Result):
-    """What one stage found: its problem, the optimum, and the parameters with it.
+    """Result of one stage: its problem, the optimum, and the parameters with it.
 
     Its estimates with their intervals are those of `estimates_of`; `uncertainty_of` and
     `identifiability_of` say what they rest on.
@@ -62,7 +62,7 @@ class StageFit(Result):
     parameters: Parameters
     """The drive, or the user-defined model, with what was found."""
     starts: tuple[Solution, ...] = ()
-    """How each start ended, if there was more than one."""
+    """End of each start, if there was more than one."""
     earlier: tuple[StageFit, ...] = field(default=(), repr=False)
     """The stages before, whose results this one takes for granted."""
     stored: tuple[Interval, ...] | None = field(default=None, repr=False)

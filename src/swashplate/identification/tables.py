@@ -164,7 +164,7 @@ def profiles_table(profiles: Sequence[Profile], stages: Sequence[StageFit]) -> T
 
 
 def estimates_by_name(stages: Sequence[StageFit]) -> dict[str, Estimate]:
-    """What a fit says of every number: what each stage estimated, then what stayed fixed.
+    """Every number of a fit by its name: the estimates of each stage, then what stayed fixed.
 
     A parameter that is tied in both directions is there by its symbol and by both columns.
     """
@@ -201,11 +201,11 @@ MEANINGS: Mapping[Kind, str] = {
     "start current": "current of the card at the first sample",
     "instant": "instant of the command's jump, after the middle of both samples",
 }
-"""What unknowns of single runs are, in words."""
+"""Meanings of unknowns of single runs."""
 
 
 def meaning_of(unknown: Unknown, stage: StageFit) -> str:
-    """What an unknown is, in words; empty if nothing is known of it."""
+    """Meaning of an unknown, in words; empty if it has none."""
     if unknown.kind == "parameter":
         # names of a user-defined model are its own
         return "" if stage.stage.part == "model" else meaning_of_parameter(unknown.name)
@@ -220,7 +220,7 @@ def meaning_of(unknown: Unknown, stage: StageFit) -> str:
 
 
 def meaning_of_parameter(name: str) -> str:
-    """What a parameter is, by its symbol or column; empty if there is none such."""
+    """Meaning of a parameter, by its symbol or column; empty if there is no such parameter."""
     definition = CATALOGUE.get(COLUMNS.get(name, name))
     if definition is None:
         return ""
@@ -312,7 +312,7 @@ def unvalued_lines(stages: Sequence[StageFit]) -> list[str]:
 
 
 def scales_words(fit: StageFit) -> str:
-    """What one unit of residual is, channel by channel."""
+    """Sentence on the unit of the residuals of each channel."""
     parts = []
     for name, size in fit.problem.scales.items():
         having = next(run for run in fit.problem.experiments if name in run.channels)
@@ -382,7 +382,7 @@ def _measures(measures: Measures) -> tuple[float | None, ...]:
 
 
 def start_words(experiment: Experiment) -> str:
-    """How a run's initial state comes about."""
+    """Source of a run's initial state, in words."""
     if experiment.start == "given" and experiment.start_pressure is not None:
         return f"given, {1e-5 * experiment.start_pressure:.4g} bar"
     return "pressure estimated" if experiment.start == "estimated" else experiment.start

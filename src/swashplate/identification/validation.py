@@ -193,7 +193,7 @@ def measures(*runs: tuple[Array, Array, Array | None]) -> Measures:
 
 @dataclass(frozen=True, eq=False)
 class RunQuality(Result):
-    """How well one channel of one run is simulated."""
+    """Errors of the simulation of one channel of one run."""
 
     experiment: Experiment
     channel: str
@@ -203,7 +203,7 @@ class RunQuality(Result):
     test: ResidualTest | None
     """None where there are too few samples."""
     noise: float = 0.0
-    """Of a speed made from a position: standard deviation that the position's noise has in it.
+    """Standard deviation of a position's noise in a speed made from it.
     [unit of the channel]"""
 
     @property

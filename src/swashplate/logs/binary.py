@@ -37,7 +37,9 @@ class _Item(NamedTuple):
 def look(
     reader: str, path: Path, requested: Sequence[int] = (), first: int = 0, last: int | None = None
 ) -> tuple[dict[str, Any], list[Array]]:
-    """What a file holds, as `Log` has it, and the columns at some places, from a row to a last one.
+    """Contents of a file, as `Log` has them, and columns at some positions.
+
+    The columns begin at the row `first` and end before the row `last`; None is the end.
 
     The reader is one of `FORMATS`, or MATLAB of any version. Of a damaged file it raises
     whatever its library does.
@@ -261,7 +263,7 @@ def _hdf5_items(dataset: Any, name: str | None = None, form: str = "[{}]") -> It
 
 
 def _matlab73_items(dataset: Any) -> Iterator[_Item]:
-    """Of MATLAB 7.3, whose dimensions are stored the other way round."""
+    """Items of a dataset of MATLAB 7.3, whose dimensions are stored the other way round."""
     name = dataset.name.strip("/").replace("/", ".")
     kind = _decoded(dataset.attrs.get("MATLAB_class", "double"))
     numbers = kind in ("single", "logical", "double") or kind.lstrip("u").startswith("int")
@@ -475,4 +477,4 @@ FORMATS: dict[str, tuple[Callable[[Path], AbstractContextManager[Iterable[_Item]
     "TDMS": (_tdms, "channels"),
     "MDF 4": (_mdf, "channels"),
 }
-"""What opens a file of each format and says what it holds, and a word for that."""
+"""For each format the function that opens a file and lists its items, and a word for these."""

@@ -187,7 +187,7 @@ _THREE = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")
 
 
 class TextLayout(NamedTuple):
-    """How the rows of a text file are to be taken apart."""
+    """Layout of the rows of a text file."""
 
     delimiter: str
     """One character; a space stands for any number of spaces and tabs."""
@@ -289,7 +289,7 @@ def _refuse_thousands(lines: Sequence[str], layout: TextLayout, path: Path) -> N
 
 
 class _Trial(NamedTuple):
-    """How well a sample of lines reads under a layout."""
+    """Score of a layout for a sample of lines."""
 
     score: float
     """Share of the rows that fit times the share of their characters in numbers, and for a header

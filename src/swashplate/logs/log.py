@@ -21,7 +21,7 @@ class LogColumn(NamedTuple):
     """A column of a log."""
 
     name: str
-    """As the file has it, a unit in brackets included."""
+    """Name in the file, a unit in brackets included."""
     unit: str | None = None
     """As written in the header, in a row of units or in an attribute; None if there is none."""
 
@@ -46,7 +46,7 @@ class Log:
     )
     """Of text: columns at some positions, piece after piece."""
     table: Path | None = None
-    """Where its rows are read from in place of the file."""
+    """File that its rows are read from instead."""
     first: int = 0
     last: int | None = None
     """Rows that `read` gives, from the first to before the last one; None is the end."""
