@@ -65,7 +65,7 @@ the one that a fit starts from."""
 
 @dataclass(frozen=True)
 class Instruments:
-    """What lies between the signals and the log, every error one number; 0 is none.
+    """Errors of the instruments between the signals and the log, each one number; 0 is none.
 
     `dataclasses.replace` switches one error on or off.
 
@@ -165,15 +165,15 @@ class VirtualRun(Result):
     """One simulated test."""
 
     name: str
-    """Of the maneuver."""
+    """Name of the maneuver."""
     stem: str
-    """Of its file: axis and maneuver."""
+    """Name of its file without the ending: axis and maneuver."""
     role: Literal["fit", "validate"]
     columns: Mapping[str, Array]
-    """What was logged (n,), SI: ``"time"`` [s], ``"voltage"`` [V] and the channels; NaN is an empty
+    """Logged samples (n,), SI: ``"time"`` [s], ``"voltage"`` [V] and the channels; NaN is an empty
     cell, rows that were lost are missing in all."""
     truth: Simulation
-    """What really happened."""
+    """The simulation, without the instruments' errors."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,11 +182,11 @@ class VirtualTests:
 
     axis: str
     nominal: Drive
-    """What a fit starts from."""
+    """The drive that a fit starts from."""
     preset: str | None
     """Name of the packaged drive that `nominal` is, if it is one."""
     drive: Drive
-    """What was simulated."""
+    """The drive that was simulated."""
     instruments: Instruments
     severity: str
     """``"clean"``, ``"realistic"``, ``"harsh"`` or ``"custom"``."""
@@ -267,52 +267,88 @@ def run(
     """
     preset = drive if isinstance(drive, str) else None
     nominal = Drive.preset(drive) if isinstance(drive, str) else drive
-    seed, axis, kinds = whole("seed", seed), axis or nominal.name, tuple(channels)
+    seed = whole("seed", seed)
+    axis = axis or nominal.name
+    kinds = tuple(channels)
     # a real card's filter and decay know nothing of a log's samples (docs/decisions/0008)
     simulated = (truth or nominal).at_every_rate()
     if perturb:
         simulated = _perturbed(simulated, perturb, seed)
     simulated = Drive(replace(simulated.parameters, card_switch="split"))
-    listed = source_tests(axis) if maneuvers is None else maneuvers
-    tests = dict(listed if isinstance(listed, Mapping) else ((m.name, m) for m in listed))
-    held_back = HELD_BACK[axis] if validate is None and maneuvers is None else validate or ()
+    stated = source_tests(axis) if maneuvers is None else maneuvers
+    if isinstance(stated, Mapping):
+        tests = dict(stated)
+    else:
+        tests = {maneuver.name: maneuver for maneuver in stated}
+    held_back: Collection[str] = validate or ()
+    if validate is None and maneuvers is None:
+        held_back = HELD_BACK[axis]
     # as files' names: hoist_step_+4_V, hoist_ramp_+1_V-s
     stems = [re.sub(r"[^\w.+-]+", "_", f"{axis} {name}".replace("/", "-")) for name in tests]
-    files = {stem.lower() for stem in stems}
-    possible = [kind for kind in CHANNEL_KINDS if kind != "other"]
-    unknown = next((kind for kind in kinds if kind not in possible), None)
-    missing = next((name for name in held_back if name not in tests), None)
     turn = COUNTS_PER_TURN.get(axis, 1.0)
     if counts_per_turn is not None:
         turn = positive("counts_per_turn", counts_per_turn)
-    unknown_encoder = counts_per_turn is None and axis not in COUNTS_PER_TURN
-    why = {
-        f"severity is {severity!r}; it is one of {', '.join(SEVERITIES)}": severity
-        not in SEVERITIES,
-        "Two maneuvers have the same name; give them in a mapping by name": len(tests)
-        < len(listed),
-        "A campaign needs at least one maneuver": not tests,
-        f"There is no channel {unknown!r}; there are {', '.join(possible)}": unknown is not None,
-        "channels must be one or more kinds, each once": not 0 < len(kinds) == len(set(kinds)),
-        f"The encoder of '{axis}' is not known: give counts_per_turn, or as axis one of "
-        + ", ".join(COUNTS_PER_TURN): unknown_encoder and "encoder_counts" in kinds,
-        f"There is no run {missing!r} to validate; there are {', '.join(tests)}": missing
-        is not None,
-        "Two maneuvers would have the same file; give them other names": len(files) < len(tests),
-    }
-    for sentence in (sentence for sentence, wrong in why.items() if wrong):
-        raise InputError(f"{sentence}.")
-    tools, runs = instruments or SEVERITIES[severity], {}
+    if severity not in SEVERITIES:
+        raise InputError(f"severity is {severity!r}; it is one of {', '.join(SEVERITIES)}.")
+    if len(tests) < len(stated):
+        raise InputError("Two maneuvers have the same name; give them in a mapping by name.")
+    if not tests:
+        raise InputError("A campaign needs at least one maneuver.")
+    _check_kinds(kinds)
+    if "encoder_counts" in kinds and counts_per_turn is None and axis not in COUNTS_PER_TURN:
+        raise InputError(
+            f"The encoder of '{axis}' is not known: give counts_per_turn, or as axis one of "
+            f"{', '.join(COUNTS_PER_TURN)}."
+        )
+    _check_tests(tests, stems, held_back)
+    instruments_used = instruments or SEVERITIES[severity]
+    runs = dict[str, VirtualRun]()
     for stem, (name, maneuver) in zip(stems, tests.items(), strict=True):
         command = maneuver.sample(SOURCE_RATE)
-        if (largest := float(np.abs(command).max())) > FULL_SCALE:
+        largest = float(np.abs(command).max())
+        if largest > FULL_SCALE:
             raise InputError(f"The command reaches {largest:g} V, but the card takes ±10 V.")
-        happened = simulated.simulate(_converted(command, tools.command_bits))
-        columns = _logged(happened, kinds, tools, turn, seed, name)
-        role: Literal["fit", "validate"] = "validate" if name in held_back else "fit"
-        runs[name] = VirtualRun(name, stem, role, columns, happened)
-    called = severity if tools == SEVERITIES[severity] else "custom"
-    return VirtualTests(axis, nominal, preset, simulated, tools, called, seed, kinds, turn, runs)
+        simulation = simulated.simulate(_converted(command, instruments_used.command_bits))
+        runs[name] = VirtualRun(
+            name=name,
+            stem=stem,
+            role="validate" if name in held_back else "fit",
+            columns=_logged(simulation, kinds, instruments_used, turn, seed, name),
+            truth=simulation,
+        )
+    return VirtualTests(
+        axis=axis,
+        nominal=nominal,
+        preset=preset,
+        drive=simulated,
+        instruments=instruments_used,
+        severity=severity if instruments_used == SEVERITIES[severity] else "custom",
+        seed=seed,
+        channels=kinds,
+        counts_per_turn=turn,
+        runs=runs,
+    )
+
+
+def _check_kinds(kinds: Sequence[ChannelKind]) -> None:
+    """Refuse kinds of channel that the rig does not have, none at all, and a repeated one."""
+    possible = [kind for kind in CHANNEL_KINDS if kind != "other"]
+    for kind in kinds:
+        if kind not in possible:
+            raise InputError(f"There is no channel {kind!r}; there are {', '.join(possible)}.")
+    if not kinds or len(set(kinds)) < len(kinds):
+        raise InputError("channels must be one or more kinds, each once.")
+
+
+def _check_tests(
+    tests: Mapping[str, Maneuver], stems: Sequence[str], held_back: Collection[str]
+) -> None:
+    """Refuse a run to validate that is not among the tests, and files of the same name."""
+    for name in held_back:
+        if name not in tests:
+            raise InputError(f"There is no run {name!r} to validate; there are {', '.join(tests)}.")
+    if len({stem.lower() for stem in stems}) < len(tests):
+        raise InputError("Two maneuvers would have the same file; give them other names.")
 
 
 def _perturbed(drive: Drive, spread: float, seed: int) -> Drive:
@@ -366,57 +402,84 @@ def _logged(
     seed: int,
     name: str,
 ) -> dict[str, Array]:
-    """What the instruments make of a run; each has its own stream of chance."""
-    simulated_at = truth.time
-    # a log has the stamps of its jittered instants, which stay in order whatever the jitter
-    strayed = tools.jitter * _stream(seed, name, "time").standard_normal(simulated_at.size)
-    step = simulated_at[1] - simulated_at[0] if simulated_at.size > 1 else 0.0
-    bound = 0.4 * step
-    jittered = simulated_at + np.clip(strayed, -bound, bound)
-    sampled_at = np.clip(jittered, simulated_at[0], simulated_at[-1])
-
-    def sampled(signal: str) -> Array:
-        # the simulation has values at its own instants alone: between them lines are taken
-        values: Array = getattr(truth, signal)
-        if signal == "shaft_position" and tools.backlash:
-            values = _play(values, tools.backlash)
-        return values if not tools.jitter else np.interp(sampled_at, simulated_at, values)
-
-    def read(kind: ChannelKind | Literal["voltage"]) -> Array:
-        chance = _stream(seed, name, kind)
-        if kind == "rectified_current":
-            currents = sampled("current_positive"), sampled("current_negative")
-            return _ammeter(sampled_at, currents, tools, chance)
-        values = sampled("voltage" if kind == "voltage" else SIGNALS[kind])
-        if kind == "encoder_counts":
-            return _counter(values * (counts_per_turn / (2.0 * pi)), tools, chance)
-        noise = chance.standard_normal(simulated_at.size)
-        if kind == "voltage":
-            values = values + tools.voltage_offset + tools.voltage_noise * noise
-            return _converted(values, tools.voltage_bits)
-        return np.asarray(values + tools.transducer_noise * np.abs(values).max() * noise)
-
-    def lost(share: float, longest: int, *names: str) -> NDArray[np.bool_]:
-        """In runs of 1 to `longest`, together about a share of all."""
-        mask, chance = np.zeros(simulated_at.size, dtype=np.bool_), _stream(seed, name, *names)
-        begins = np.flatnonzero(chance.random(simulated_at.size) < share / (0.5 * (1 + longest)))
-        lengths = chance.integers(1, longest, size=begins.size, endpoint=True)
-        for begin, length in zip(begins.tolist(), lengths.tolist(), strict=True):
-            mask[begin : begin + length] = True
-        return mask
-
-    columns = {"voltage": read("voltage"), **{COLUMNS.get(k, k): read(k) for k in kinds}}
-    for column, values in columns.items() if tools.empty_cells else ():
-        gaps = lost(tools.empty_cells, tools.longest_gap, "empty", column)
-        columns[column] = np.where(gaps, np.nan, values)
-    is_logged = ~lost(tools.lost_rows, tools.longest_loss, "rows")
+    """Columns of a run's log; each instrument has its own stream of chance."""
+    size = truth.time.size
+    sampled_at = _sampling_instants(truth.time, tools, _stream(seed, name, "time"))
+    readings = _Readings(truth, sampled_at, tools, counts_per_turn)
+    columns = {"voltage": readings.voltage(_stream(seed, name, "voltage"))}
+    for kind in kinds:
+        columns[COLUMNS.get(kind, kind)] = readings.channel(kind, _stream(seed, name, kind))
+    if tools.empty_cells:
+        for column, values in columns.items():
+            chance = _stream(seed, name, "empty", column)
+            gaps = _lost_samples(size, tools.empty_cells, tools.longest_gap, chance)
+            columns[column] = np.where(gaps, np.nan, values)
+    chance = _stream(seed, name, "rows")
+    is_logged = ~_lost_samples(size, tools.lost_rows, tools.longest_loss, chance)
     if not is_logged.any():
         raise InputError(f"{name}: lost_rows leaves no row; use a smaller share.")
-    columns = {"time": _rounded(sampled_at, tools.stamp_resolution), **columns}
+    columns = {"time": _rounded_to_steps(sampled_at, tools.stamp_resolution), **columns}
     return {column: values[is_logged] for column, values in columns.items()}
 
 
-def _rounded(values: Array, step: float) -> Array:
+def _sampling_instants(time: Array, tools: Instruments, chance: Generator) -> Array:
+    """Jittered instants (n,) of the samples, in order whatever the jitter. [s]"""
+    jitter = tools.jitter * chance.standard_normal(time.size)
+    step = time[1] - time[0] if time.size > 1 else 0.0
+    bound = 0.4 * step
+    jittered = time + np.clip(jitter, -bound, bound)
+    return np.asarray(np.clip(jittered, time[0], time[-1]))
+
+
+@dataclass(frozen=True, eq=False)
+class _Readings:
+    """Readings of the instruments at the instants at which they are sampled."""
+
+    truth: Simulation
+    sampled_at: Array
+    """[s]"""
+    tools: Instruments
+    counts_per_turn: float
+
+    def voltage(self, chance: Generator) -> Array:
+        """The command, with zero error, noise and the steps of its converter. [V]"""
+        noise = chance.standard_normal(self.sampled_at.size)
+        values = self._sampled("voltage")
+        values = values + self.tools.voltage_offset + self.tools.voltage_noise * noise
+        return _converted(values, self.tools.voltage_bits)
+
+    def channel(self, kind: ChannelKind, chance: Generator) -> Array:
+        """Reading of the instrument of a kind of channel, in the unit of its log."""
+        if kind == "rectified_current":
+            currents = self._sampled("current_positive"), self._sampled("current_negative")
+            return _ammeter(self.sampled_at, currents, self.tools, chance)
+        values = self._sampled(SIGNALS[kind])
+        if kind == "encoder_counts":
+            return _counter(values * (self.counts_per_turn / (2.0 * pi)), self.tools, chance)
+        noise = chance.standard_normal(self.sampled_at.size)
+        return np.asarray(values + self.tools.transducer_noise * np.abs(values).max() * noise)
+
+    def _sampled(self, signal: str) -> Array:
+        """A signal at the sampling instants, on straight lines between the simulation's own."""
+        values: Array = getattr(self.truth, signal)
+        if signal == "shaft_position" and self.tools.backlash:
+            values = _play(values, self.tools.backlash)
+        if not self.tools.jitter:
+            return values
+        return np.interp(self.sampled_at, self.truth.time, values)
+
+
+def _lost_samples(size: int, share: float, longest: int, chance: Generator) -> NDArray[np.bool_]:
+    """Which samples are lost: runs of 1 to `longest`, together about a share of all."""
+    mask = np.zeros(size, dtype=np.bool_)
+    begins = np.flatnonzero(chance.random(size) < share / (0.5 * (1 + longest)))
+    lengths = chance.integers(1, longest, size=begins.size, endpoint=True)
+    for begin, length in zip(begins.tolist(), lengths.tolist(), strict=True):
+        mask[begin : begin + length] = True
+    return mask
+
+
+def _rounded_to_steps(values: Array, step: float) -> Array:
     """Values rounded to whole steps, as the nearest decimals if the step is one; 0 is none."""
     if not step:
         return values
@@ -457,7 +520,7 @@ def _ammeter(
         reading += np.abs(mean + height * np.where(passed < duty, rising, falling))
     noise = tools.current_noise * chance.standard_normal(instants.size)
     reading = (1.0 + tools.current_gain_error) * reading + tools.current_zero + noise
-    return _rounded(reading, tools.current_resolution)
+    return _rounded_to_steps(reading, tools.current_resolution)
 
 
 def _counter(counts: Array, tools: Instruments, chance: Generator) -> Array:
@@ -596,7 +659,7 @@ def _contents(tests: VirtualTests) -> tuple[str, str]:
 
 
 def _accuracy(kind: ChannelKind | Literal["voltage"], tools: Instruments) -> InlineTable:
-    """What a campaign file states of an instrument's error, for the rig knows it."""
+    """Accuracy of an instrument for the campaign file, which the rig knows."""
     from tomlkit import inline_table
 
     limits = {"gain": 0.0, "zero": 0.0, "time": 0.0}

@@ -44,7 +44,7 @@ VARIED = 8
 
 
 class SignalOrigin(NamedTuple):
-    """Where a signal comes from."""
+    """Origin of a signal: a log and its column."""
 
     file: Path
     column: str
@@ -119,7 +119,7 @@ class Encoder(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class InputSignal(Result):
-    """What drove the axis."""
+    """The input that drove the axis."""
 
     kind: InputKind
     unit: str
@@ -225,7 +225,7 @@ def _instrument(signal: InputSignal | Channel) -> Accuracy:
 
 
 def assumed_accuracy(kind: str, *, is_input: bool) -> Accuracy:
-    """What is assumed of an instrument of a kind that nothing is stated of."""
+    """Assumed accuracy of an instrument whose accuracy is not stated."""
     assumed = ASSUMED.get(kind, Accuracy())
     return assumed if is_input else assumed._replace(time=0.0)
 

@@ -1,4 +1,4 @@
-"""What measured signals are like, and what someone should look into before a fit.
+"""Properties of measured signals, and findings to look into before a fit.
 
 Rate, jitter, gaps, range, clipping, spikes and lost samples of each run; of a campaign, windows
 that no run takes and currents that have no sign. What is ignored counts for nothing.
@@ -60,7 +60,7 @@ NAMED = 6
 
 @dataclass(frozen=True)
 class Quality(Result):
-    """What one signal of one experiment is like; of a channel what is not ignored."""
+    """Properties of one signal of one experiment; of a channel without what is ignored."""
 
     signal: str
     """``"input"`` or the channel's name."""
@@ -77,7 +77,7 @@ class Quality(Result):
     ignored: float
     """Share of the samples whose weight is 0."""
     findings: tuple[str, ...]
-    """What someone should look into, one sentence each."""
+    """Findings to look into, one sentence each."""
 
 
 def examine(experiment: Experiment, unsigned: Collection[str] = ()) -> tuple[Quality, ...]:
@@ -223,7 +223,7 @@ def turned(driven: Array, motion: Array) -> bool:
 
 
 ESTIMATED = 'start = "estimated"'
-"""What the entry of a run says that begins in motion."""
+"""Entry of a run that begins in motion."""
 
 
 def moves_at_first(experiment: Experiment) -> tuple[str, ...]:
@@ -557,36 +557,36 @@ def _mean_speeds(experiment: Experiment) -> Iterator[tuple[Channel, Array, Array
             width = max(round(AVERAGED / float(np.median(np.diff(time)))), 1)
         if not channel.is_position:
             values = np.concatenate([[0.0], np.cumsum(values[:-1] * np.diff(time))])
-        some = np.arange(width, time.size, max(width // 4, 1))
-        yield (
-            channel,
-            time[some],
-            (values[some] - values[some - width]) / (time[some] - time[some - width]),
-        )
+        last = np.arange(width, time.size, max(width // 4, 1))
+        first = last - width
+        speeds = (values[last] - values[first]) / (time[last] - time[first])
+        yield channel, time[last], speeds
 
 
 def _of_other_scale(runs: Sequence[Experiment]) -> Iterator[str]:
     """A sentence on a run that moves far more or less than others do at such commands."""
     largest = max((float(np.abs(run.input.values).max()) for run in runs), default=0.0)
     gains = dict[str, dict[str, tuple[float, str]]]()
-    for each in runs if largest > 0.0 else ():
-        for channel, time, speed in _mean_speeds(each):
+    if largest == 0.0:
+        return
+    for run in runs:
+        for channel, time, speed in _mean_speeds(run):
             before = np.linspace(-HELD, 0.0, 9)[:, None] + time
-            command = each.input.at(before.ravel()).reshape(before.shape)
+            command = run.input.at(before.ravel()).reshape(before.shape)
             size = np.abs(command).min(axis=0)
             one_way = np.abs(np.sign(command).sum(axis=0)) == before.shape[0]
-            steady = one_way & (size > LARGE * largest) & (time > each.input.time[0] + HELD)
+            steady = one_way & (size > LARGE * largest) & (time > run.input.time[0] + HELD)
             if steady.sum() > 1:
                 gain = float(np.median(np.abs(speed[steady] / command[-1, steady])))
-                gains.setdefault(channel.name, {})[each.name] = gain, channel.source.column
+                gains.setdefault(channel.name, {})[run.name] = gain, channel.source.column
     for name, of_runs in gains.items():
-        for run, (gain, column) in of_runs.items():
-            others = [other for key, (other, _) in of_runs.items() if key != run]
+        for run_name, (gain, column) in of_runs.items():
+            others = [other for key, (other, _) in of_runs.items() if key != run_name]
             usual = float(np.median(others)) if len(others) > 2 else gain
             if min(gain, usual) > 0.0 and not 1.0 / OFF_SCALE < gain / usual < OFF_SCALE:
                 yield (
-                    f"{run}: '{name}' moves {gain / usual:.3g} times as fast as in the other runs "
-                    f"at similar commands; check the unit of '{column}' in this log (1 rad/s is "
+                    f"{run_name}: '{name}' moves {gain / usual:.3g} times as fast as in the other "
+                    f"runs at similar commands; check the unit of '{column}' in this log (1 rad/s is "
                     "9.55 1/min), its scale and the machine's gear"
                 )
 
@@ -619,11 +619,14 @@ def _unused(
     """
     for window in windows:
         matching = [run for run in runs if applying((window,), run.maneuver)]
-        times = [
-            c.time for each in matching for n, c in each.channels.items() if channel in (None, n)
-        ]
+        times = list[Array]()
+        for run in matching:
+            if channel is None:
+                times += [measured.time for measured in run.channels.values()]
+            elif channel in run.channels:
+                times.append(run.channels[channel].time)
         start, stop = ends(window)
-        logs = [long[run] for run in {each.run for each in matching} & long.keys()]
+        logs = [long[name] for name in {run.run for run in matching} & long.keys()]
         within_log = any(start <= last and stop >= first for first, last in logs)
         if not matching:
             names = list(dict.fromkeys(f"'{run.maneuver}'" for run in runs))
@@ -633,14 +636,13 @@ def _unused(
                 f"effect; the maneuvers are {', '.join([*names[:NAMED], *rest])}"
             )
         elif not within_log and not any(inside(window, time).any() for time in times):
-            first, last = (
-                "its end" if end is None else f"{end:g} s" for end in (window.start, window.stop)
-            )
-            of = f"any of {len(matching)} runs"
+            begin = "its end" if window.start is None else f"{window.start:g} s"
+            end = "its end" if window.stop is None else f"{window.stop:g} s"
+            searched = f"any of {len(matching)} runs"
             if len(matching) == 1:
-                time = matching[0].input.time
-                of = f"{matching[0].name}, which goes from {time[0]:.4g} to {time[-1]:.4g} s"
-            yield f"{where}: the window from {first} to {last} contains no sample of {of}"
+                run, time = matching[0], matching[0].input.time
+                searched = f"{run.name}, which goes from {time[0]:.4g} to {time[-1]:.4g} s"
+            yield f"{where}: the window from {begin} to {end} contains no sample of {searched}"
 
 
 def quality_table(experiment: Experiment, qualities: Sequence[Quality]) -> Table:
@@ -649,9 +651,16 @@ def quality_table(experiment: Experiment, qualities: Sequence[Quality]) -> Table
         f"{experiment.name}: {experiment.maneuver}, to {experiment.role}, "
         f"{experiment.duration:.4g} s, {qualities[0].stamps.rows} samples",
         (
-            *(Column("run", of="p"), Column("signal", wrap=True), Column("kind", of="p")),
-            *(Column("samples", ",d", of="p"), Column("Hz", ".4g"), Column("jitter", "s", of="t")),
-            *(Column("gap", "s"), Column("range"), Column("clip", "s"), Column("lost", "d")),
+            Column("run", of="p"),
+            Column("signal", wrap=True),
+            Column("kind", of="p"),
+            Column("samples", ",d", of="p"),
+            Column("Hz", ".4g"),
+            Column("jitter", "s", of="t"),
+            Column("gap", "s"),
+            Column("range"),
+            Column("clip", "s"),
+            Column("lost", "d"),
             Column("ignored", "s", of="p"),
         ),
     )

@@ -40,7 +40,7 @@ AnySignal = TypeVar("AnySignal", InputSignal, Channel)
 SINCE_1970 = 1e8
 """Stamps that begin beyond this are seconds of a calendar and are counted from the first. [s]"""
 LARGEST = 1e30
-"""No signal of a machine has so much of any SI unit."""
+"""Magnitude in any SI unit that no signal of a machine has: then unit or scale is wrong."""
 
 
 def read_run(
@@ -53,7 +53,7 @@ def read_run(
     origin : str
         The run, for sentences about the campaign file.
     name : str
-        Its own.
+        Name of the run.
 
     Returns
     -------
@@ -106,19 +106,30 @@ def _axes_of(run_origin: str, run: schema.RunEntry, axes: Axes) -> dict[str, sch
                 f"{run_origin} names the axis '{name}', but the axes are {', '.join(axes)}."
             )
     tested = {name: axes[name] for name in run.only or axes}
-    for name, changes in ((name, run.axes[name]) for name in tested if run.axes.get(name)):
-        axis, origin, given = axes[name], f"{run_origin}: axes.{name}", changes.get("channels")
-        for key, change in given.items() if isinstance(given, Mapping) else ():
-            if key not in axis.channels and not (isinstance(change, Mapping) and "kind" in change):
-                raise InputError(
-                    f"{origin} changes the channel '{key}', but the axis has "
-                    f"{', '.join(axis.channels)}; a new channel needs its kind and column."
-                )
+    for name in tested:
+        changes = run.axes.get(name)
+        if not changes:
+            continue
+        axis, origin = axes[name], f"{run_origin}: axes.{name}"
+        _check_changed_channels(origin, axis, changes.get("channels"))
         content = _merged(axis.model_dump(by_alias=True, exclude_unset=True), changes)
         if not content["channels"]:
             raise InputError(f'{origin} has no channel left; write role = "ignore" instead.')
         tested[name] = validated(content, schema.AxisEntry, origin)
     return tested
+
+
+def _check_changed_channels(origin: str, axis: schema.AxisEntry, changes: object) -> None:
+    """Refuse changes of a channel that an axis does not have, unless they define a new one."""
+    if not isinstance(changes, Mapping):
+        return
+    for key, change in changes.items():
+        is_new = isinstance(change, Mapping) and "kind" in change
+        if key not in axis.channels and not is_new:
+            raise InputError(
+                f"{origin} changes the channel '{key}', but the axis has "
+                f"{', '.join(axis.channels)}; a new channel needs its kind and column."
+            )
 
 
 def _merged(content: dict[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
@@ -143,23 +154,30 @@ def _merged(content: dict[str, Any], changes: Mapping[str, Any]) -> dict[str, An
 # --- signals in SI --------------------------------------------------------------------------------
 
 
-def _signals(axis: schema.AxisEntry) -> dict[str, schema.InputEntry | schema.ChannelEntry]:
-    """An axis's signals, by how sentences call them."""
-    return {"the input": axis.input} | {f"channel '{n}'": c for n, c in axis.channels.items()}
+def _described_signals(
+    axis: schema.AxisEntry,
+) -> dict[str, schema.InputEntry | schema.ChannelEntry]:
+    """An axis's signals, by their descriptions in sentences."""
+    signals: dict[str, schema.InputEntry | schema.ChannelEntry] = {"the input": axis.input}
+    for name, channel in axis.channels.items():
+        signals[f"channel '{name}'"] = channel
+    return signals
 
 
 def _columns_of(log: Log, axes: Axes) -> dict[str, LogColumn]:
-    """Columns that some axes need, by the names that they are wanted by."""
+    """Columns that some axes need, by the names in the campaign file."""
     column_of = dict[str, LogColumn]()
     for axis in axes.values():
-        for what, signal in _signals(axis).items():
+        for what, signal in _described_signals(axis).items():
             clocks = [clock.column for clock in (signal.time, axis.time) if clock is not None]
             requested = [(signal.column, what), *((name, f"the time of {what}") for name in clocks)]
-            for name, why in requested:
+            for name, purpose in requested:
+                if name is None:
+                    continue
                 try:
-                    column_of |= {name: log.find(name)} if name is not None else {}
+                    column_of[name] = log.find(name)
                 except InputError as error:
-                    raise InputError(f"For {why}: {error}") from None
+                    raise InputError(f"For {purpose}: {error}") from None
     return column_of
 
 
@@ -175,7 +193,9 @@ class _Columns:
 
     def stamps(self, signal: schema.SignalEntry, axis: schema.AxisEntry) -> Array:
         """Increasing stamps of a signal; those of a calendar from the axis's first one on. [s]"""
-        clock, main, size = signal.time or axis.time, axis.time, self.values[signal.column].size
+        main = axis.time
+        clock = signal.time or main
+        size = self.values[signal.column].size
         # signals share an array: whoever compares stamps sees at once that they are the same
         if (clock, size) in self._stamps:
             return self._stamps[clock, size]
@@ -192,8 +212,9 @@ class _Columns:
                 # the difference first: a float64 keeps a microsecond of a calendar's stamp
                 since = numbers if begin < SINCE_1970 else numbers - begin / factor
                 time = factor * since + clock.offset
-            time = self._stamps[clock, size] = check_duration(self.log, source, time)
-        return time
+            checked = check_duration(self.log, source, time)
+        self._stamps[clock, size] = checked
+        return checked
 
     def zero(self, axis: schema.AxisEntry, recorded: datetime | None) -> float | None:
         """Calendar time at which an axis's stamps are 0, in seconds since 1970; None if unknown.
@@ -215,17 +236,18 @@ class _Columns:
         unit = clock.unit or unit_of(column, clock.column or "", "s")
         return to_si(1.0, unit, "s", f"{self.log.path}: column '{column.name}' (the time)")
 
-    def _called(self, what: str, signal: schema.SignalEntry) -> str:
-        """A signal, for the sentence of an error."""
+    def _described(self, what: str, signal: schema.SignalEntry) -> str:
+        """Description of a signal in the sentence of an error."""
         return f"{self.log.path}: column '{self.columns[signal.column].name}' ({what})"
 
     def _conversion(
         self, what: str, signal: schema.InputEntry | schema.ChannelEntry
     ) -> tuple[str, float, float]:
         """The SI unit of a signal, with factor and zero, as of `schema.conversion`."""
-        usual = (*schema.KINDS[signal.kind].units, "1")[0]
+        units = schema.KINDS[signal.kind].units
+        usual = units[0] if units else "1"
         unit = signal.unit or unit_of(self.columns[signal.column], signal.column, usual)
-        return conversion(signal.kind, unit, self._called(what, signal))
+        return conversion(signal.kind, unit, self._described(what, signal))
 
     def as_recorded(
         self, what: str, signal: schema.InputEntry | schema.ChannelEntry
@@ -252,10 +274,10 @@ class _Columns:
         axis: schema.AxisEntry,
         run: schema.RunEntry,
     ) -> tuple[dict[str, Any], float]:
-        """What a signal is made of, in SI, and the size of its unit; empty if all is missing."""
+        """Fields of a signal, in SI, and the size of its unit; no fields if all is missing."""
         column = self.columns[signal.column]
         numbers = self.values[signal.column]
-        described = self._called(what, signal)
+        described = self._described(what, signal)
         time = self.stamps(signal, axis)
         is_input = isinstance(signal, schema.InputEntry)
         if time.size != numbers.size:
@@ -302,9 +324,9 @@ class _Columns:
 
 
 def _accuracy(signal: schema.InputEntry | schema.ChannelEntry, factor: float) -> Accuracy | None:
-    """What a campaign file states of an instrument, SI; the rest as assumed of its kind.
+    """Accuracy that a campaign file states of an instrument, SI; the rest as assumed of its kind.
 
-    A command that is said to be held is logged by what gives it: it changes at its samples.
+    A command that is stated to be held is logged by its source: it changes at its samples.
     """
     is_held = isinstance(signal, schema.InputEntry) and signal.interpolation == "previous"
     if signal.accuracy is None and not is_held:
@@ -343,7 +365,9 @@ def _experiments(
     parts, _ = columns.samples("the input", axis.input, axis, run)
     between = axis.input.interpolation
     drive = InputSignal(**parts, interpolation=between or "linear", settled=between is not None)
-    notes, signals, cuts = list[str](), dict[str, Channel](), dict[float, str]()
+    notes = list[str]()
+    signals = dict[str, Channel]()
+    cuts = dict[float, str]()
     zero = columns.zero(axis, run.recorded)
     for channel, entry in axis.channels.items():
         parts, factor = columns.samples(f"channel '{channel}'", entry, axis, run)
@@ -356,26 +380,9 @@ def _experiments(
         if not parts:
             notes.append(f"'{channel}' has no sample here and is left out of this run")
             continue
-        time, values, size = parts["time"], parts["values"], entry.rolls_over_at
-        what = "counter" if entry.kind == "encoder_counts" else "position"
-        noise = None if entry.noise is None else factor * entry.noise
-        counts = encoder = None
-        if entry.counts_per_turn is not None:
-            modulus = None if size is None else int(size)
-            encoder = Encoder(entry.counts_per_turn, entry.gear_ratio, entry.sign, modulus)
-            counts = values
-        signals[channel] = Channel(
-            channel,
-            **{**parts, "weight": values, "noise": noise, "encoder": encoder, "counts": counts},
-            stated=factor,
-            rolls_over_at=None if size is None or encoder is not None else factor * size,
-            interpolation=entry.interpolation,
-        )
-        for row in ambiguous_gaps(time, values, factor * size) if size is not None else ():
-            cuts[float(time[row])] = (
-                f"during the gap of {time[row] - time[row - 1]:.3g} s the {what} '{channel}', "
-                f"which wraps at {size:.12g}, may have wrapped once more or less"
-            )
+        signals[channel] = _channel_of(channel, entry, parts, factor)
+        if entry.rolls_over_at is not None:
+            cuts |= _gaps_with_wraps(signals[channel], entry, factor)
     if not signals:
         raise InputError(
             f"{columns.log.path}: the channels of the axis '{key}' have 0 samples that can be "
@@ -388,6 +395,7 @@ def _experiments(
         measured = {channel: read for channel, read in within.items() if read.time.size > 1}
         if command.time.size < 2 or not measured:
             continue
+        in_motion = part > 0 or resumes
         part_notes = list(notes) if part == 0 else []
         if np.isfinite(end):
             part_notes.append(f"split at {end:.4g} s; the rest is a separate run: {cuts[end]}")
@@ -395,12 +403,12 @@ def _experiments(
         maneuver = run.maneuver or recognised.name
         ignored = applying((*axis.ignore, *run.ignore), maneuver)
         yield Experiment(
-            name=f"{name} from {command.time[0]:.6g} s" if part or windowed else name,
+            name=f"{name} from {command.time[0]:.6g} s" if part > 0 or windowed else name,
             axis=key,
             run=run_name,
             role=run.role,
-            start="estimated" if part or resumes else run.start or axis.start,
-            start_pressure=None if part or resumes else run.start_pressure,
+            start="estimated" if in_motion else run.start or axis.start,
+            start_pressure=None if in_motion else run.start_pressure,
             input=command,
             channels={
                 channel: _finished(axis.channels[channel], read, command, maneuver, ignored, run)
@@ -412,6 +420,48 @@ def _experiments(
             recorded=None if zero is None else zero + float(command.time[0]),
             notes=tuple(part_notes),
         )
+
+
+def _channel_of(
+    name: str, entry: schema.ChannelEntry, parts: Mapping[str, Any], factor: float
+) -> Channel:
+    """Channel of a signal's fields and the size of its unit, its counts not yet unwrapped."""
+    values, size = parts["values"], entry.rolls_over_at
+    encoder = counts = wrap = None
+    if entry.counts_per_turn is not None:
+        modulus = None if size is None else int(size)
+        encoder = Encoder(entry.counts_per_turn, entry.gear_ratio, entry.sign, modulus)
+        counts = values
+    elif size is not None:
+        wrap = factor * size
+    return Channel(
+        name,
+        **parts,
+        weight=values,
+        noise=None if entry.noise is None else factor * entry.noise,
+        encoder=encoder,
+        counts=counts,
+        stated=factor,
+        rolls_over_at=wrap,
+        interpolation=entry.interpolation,
+    )
+
+
+def _gaps_with_wraps(
+    channel: Channel, entry: schema.ChannelEntry, factor: float
+) -> dict[float, str]:
+    """Instants [s] after gaps in which a channel may have wrapped unseen, and sentences on them."""
+    size = entry.rolls_over_at
+    assert size is not None
+    time = channel.time
+    signal = "counter" if entry.kind == "encoder_counts" else "position"
+    cuts = dict[float, str]()
+    for row in ambiguous_gaps(time, channel.values, factor * size):
+        cuts[float(time[row])] = (
+            f"within the gap of {time[row] - time[row - 1]:.3g} s the {signal} '{channel.name}', "
+            f"which wraps at {size:.12g}, may have wrapped once more or less"
+        )
+    return cuts
 
 
 def _seconds(moment: datetime) -> float:
@@ -478,7 +528,7 @@ GRAIN = 256
 MOVES = 0.02
 """Share of its largest excursion from rest beyond which an input moves."""
 BEFORE, AFTER = 2.0, 5.0
-"""What belongs to a window with motion before the input moves and after it has stopped. [s]"""
+"""Rest that a window has before the input moves and after it has stopped. [s]"""
 HELD = 120_000
 """Rows of one log that a campaign takes at most, more than the 110,605 of Kruse's thirteen tests of
 the hoist. A fit of two channels takes about 0.2 kB of memory for each, and 2 kB for each row of the
@@ -520,8 +570,9 @@ class _Trace:
         if intervals.size:
             self.period = min(self.period, float(np.median(intervals)))
             self.longest = max(self.longest, float(intervals.max()))
-        known_before = int(first > 0)
-        time, values = time[known_before:], values[known_before:]
+        if first > 0:
+            # the row before was taken in with its own block
+            time, values = time[1:], values[1:]
         self.end = float(time[-1])
         self.missing += int(np.count_nonzero(np.isnan(values)))
         edges = np.arange(0, values.size, GRAIN)
@@ -531,7 +582,7 @@ class _Trace:
         self.high[here] = np.fmax.reduceat(values, edges)
 
     def ranges(self) -> BlockRanges:
-        """What was kept of it."""
+        """Lowest and highest values of each grain of rows, with the trace's stamps."""
         return BlockRanges(
             name=self.name,
             axis=self.key,
@@ -558,13 +609,13 @@ def _overview(
     used, evenly over the log.
     """
     grains = -(-rows // GRAIN)
-    traces = [
-        _Trace(key, axis, what, channel, signal, grains)
-        for key, axis in axes.items()
-        for (what, signal), channel in zip(
-            _signals(axis).items(), ["input", *axis.channels], strict=True
-        )
-    ]
+    traces = list[_Trace]()
+    for key, axis in axes.items():
+        signal_names = ["input", *axis.channels]
+        for signal_name, (what, signal) in zip(
+            signal_names, _described_signals(axis).items(), strict=True
+        ):
+            traces.append(_Trace(key, axis, what, signal_name, signal, grains))
     step = BLOCK // GRAIN * GRAIN
     for first in range(0, rows, step):
         # with the row before, so that stamps are compared across blocks
@@ -604,28 +655,33 @@ def _windows(
     first = np.maximum(changes[::2] * GRAIN - round(BEFORE / period), 0)
     last = np.minimum(changes[1::2] * GRAIN + round(AFTER / period), rows)
     apart = np.flatnonzero(first[1:] > last[:-1])
-    pieces = [
-        (row, min(row + PIECE, end), row > begin)
-        for begin, end in zip(
-            first[[0, *(apart + 1)]].tolist(), last[[*apart, last.size - 1]].tolist(), strict=True
-        )
-        for row in range(begin, end, PIECE)
-    ]
-    every = -(-len(pieces) // MOST_WINDOWS)
-    while sum(end - begin for begin, end, _ in pieces[::every]) > HELD and every < len(pieces):
-        every += 1
-    stamps = np.arange(time.size) * GRAIN
+    begins = first[[0, *(apart + 1)]].tolist()
+    ends_of_motion = last[[*apart, last.size - 1]].tolist()
+    grain_rows = np.arange(time.size) * GRAIN
+    windows = list[LogWindow]()
+    for begin, end in zip(begins, ends_of_motion, strict=True):
+        for row in range(begin, end, PIECE):
+            row_end = min(row + PIECE, end)
+            window = LogWindow(
+                first=row,
+                last=row_end,
+                begin=float(np.interp(row, grain_rows, time)),
+                end=float(np.interp(row_end, grain_rows, time)),
+                resumes=row > begin,
+                used=True,
+            )
+            windows.append(window)
+    stride = -(-len(windows) // MOST_WINDOWS)
+    while stride < len(windows) and _rows_of(windows[::stride]) > HELD:
+        stride += 1
     return tuple(
-        LogWindow(
-            first=begin,
-            last=end,
-            begin=float(np.interp(begin, stamps, time)),
-            end=float(np.interp(end, stamps, time)),
-            resumes=resumes,
-            used=number % every == 0,
-        )
-        for number, (begin, end, resumes) in enumerate(pieces)
+        window._replace(used=number % stride == 0) for number, window in enumerate(windows)
     )
+
+
+def _rows_of(windows: Sequence[LogWindow]) -> int:
+    """Rows of some windows together."""
+    return sum(window.last - window.first for window in windows)
 
 
 def _moves(extremes: Array) -> NDArray[np.bool_]:

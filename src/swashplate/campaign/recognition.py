@@ -22,7 +22,7 @@ Mask = NDArray[np.bool_]
 Kind = Literal["rest", "step", "stairs", "ramp", "sine", "unnamed"]
 
 UNNAMED = "unnamed motion"
-"""What a record is called that is none of the maneuvers: a joystick, a chirp, several in a row."""
+"""Name of a record that is none of the maneuvers: a joystick, a chirp, several in a row."""
 SURE = 6.0
 """Standard deviations that noise exceeds by chance less than once in a hundred million samples."""
 SMALLEST_VOLTS = 0.1
@@ -31,7 +31,7 @@ LARGEST_ZERO = 0.5
 """Reading at rest beyond which it is no zero error of an instrument. [V]"""
 SHORTEST = 16
 """Samples below which nothing can be distinguished."""
-HELD = 5
+FEWEST_HELD = 5
 """Samples for which a level is held at least, or that a rise has between 10 % and 80 % of it."""
 
 
@@ -54,7 +54,7 @@ class Recognised(NamedTuple):
 
 
 class _Record(NamedTuple):
-    """A record about its rest."""
+    """A record relative to its value at rest."""
 
     time: Array
     values: Array
@@ -73,16 +73,16 @@ class _Record(NamedTuple):
         return first + (int(off.argmax()) if off.any() else off.size)
 
 
-class _Found(NamedTuple):
+class _Candidate(NamedTuple):
     """A maneuver that a record may be."""
 
     name: str
     model: Array
     """Its curve, up to the sample at which the return to rest begins. [unit]"""
     leaves: int
-    """That sample."""
+    """Index of that sample."""
     began: float
-    """[s]"""
+    """When the command leaves rest. [s]"""
     jumps: Mask | None = None
     """Samples within jumps, where nothing is known."""
     frequency: float | None = None
@@ -120,16 +120,11 @@ def recognise(time: ArrayLike, voltage: ArrayLike, *, unit: str = "V") -> Recogn
     """
     stamps = increasing(time) if np.size(time) > 1 else row("time", time)
     values = signal("input", voltage, stamps.size)
-    noise, volts = _noise(stamps, values), unit == "V"
-    # at rest: the mean of what the record begins with, as long as it stays there
-    zero, count = float(np.median(values[:3])), 3
-    for _ in range(2):
-        away = np.abs(values - zero) > SURE * noise + 1e-12 * abs(zero)
-        # the second half may hold the beginning of a slow ramp
-        count = max((int(away.argmax()) if away.any() else away.size) // 2, 3)
-        zero = float(values[:count].mean())
-    peak, smallest = float(np.abs(values - zero).max()), SMALLEST_VOLTS if volts else 0.0
-    if volts and abs(zero) > LARGEST_ZERO:
+    noise = _noise(stamps, values)
+    zero = _value_at_rest(values, noise)
+    peak = float(np.abs(values - zero).max())
+    smallest = SMALLEST_VOLTS if unit == "V" else 0.0
+    if unit == "V" and abs(zero) > LARGEST_ZERO:
         return Recognised(UNNAMED)
     # more noise than that may well be what is commanded
     if peak <= max(smallest, min(SURE * noise, SURE * smallest), 1e-12 * abs(zero)):
@@ -138,15 +133,34 @@ def recognise(time: ArrayLike, voltage: ArrayLike, *, unit: str = "V") -> Recogn
         noise = min(noise, 0.05 * peak)
         jump = max(3, round(0.03 / float(np.median(np.diff(stamps)))))
         tolerance = max(SURE * noise, 0.01 * peak)
-        record = _Record(stamps, values - zero, unit, noise, tolerance, peak, jump)
-        for find in (_stairs, _ramp, _sine):
-            shape = find(record)
+        record = _Record(
+            time=stamps,
+            values=values - zero,
+            unit=unit,
+            noise=noise,
+            tolerance=tolerance,
+            peak=peak,
+            jump=jump,
+        )
+        for recognise_shape in (_stairs, _ramp, _sine):
+            shape = recognise_shape(record)
             if shape is not None and _fits(record, shape):
                 return Recognised(shape.name, shape.frequency)
     return Recognised(UNNAMED)
 
 
-def _rounded(value: float, uncertainty: float) -> float:
+def _value_at_rest(values: Array, noise: float) -> float:
+    """Mean of the beginning of a record, as long as it stays there."""
+    zero = float(np.median(values[:3]))
+    for _ in range(2):
+        away = np.abs(values - zero) > SURE * noise + 1e-12 * abs(zero)
+        resting = int(away.argmax()) if away.any() else away.size
+        # the second half may hold the beginning of a slow ramp
+        zero = float(values[: max(resting // 2, 3)].mean())
+    return zero
+
+
+def _fewest_digits(value: float, uncertainty: float) -> float:
     """The number of fewest significant digits within `uncertainty` of `value`, the nearest of such.
 
     0.09997 within 0.0001 is 0.1, 6.4935 within 0.013 is 6.5.
@@ -159,7 +173,7 @@ def _rounded(value: float, uncertainty: float) -> float:
 
 
 def _noise(time: Array, values: Array) -> float:
-    """Standard deviation of what a straight line between both neighbours does not explain.
+    """Standard deviation of samples from the straight line between both neighbours.
 
     The median leaves jumps out; the curvature of a coarsely sampled sine counts as noise. The steps
     of a converter count as well: where they hide the noise, the median is zero.
@@ -177,26 +191,19 @@ def _noise(time: Array, values: Array) -> float:
     return max(float(np.median(np.abs(deviation))) / 0.6745, quantum)
 
 
-def _fits(record: _Record, shape: _Found) -> bool:
+def _fits(record: _Record, shape: _Candidate) -> bool:
     """Whether a record goes back to rest, and the RMS of its rest less the model is small.
 
     The command either falls to rest from one sample to the next or returns to it on a curve.
     """
-    time, values, first = record.time, record.values, shape.leaves
+    values, first = record.values, shape.leaves
     moving = np.flatnonzero(np.abs(values[first:]) > record.tolerance)
     last = first + (int(moving[-1]) + 1 if moving.size else 0)
     away_from_jumps = np.ones(values.size, np.bool_) if shape.jumps is None else ~shape.jumps
     if first < values.size:
-        if last - first >= record.jump or last == values.size:
-            start, stop = float(time[first]), float(time[min(last, values.size - 1)])
-            tail = values[first:last]
-            signs = np.sign(tail[np.abs(tail) > record.tolerance])
-            if (
-                abs(values[-1]) > max(record.tolerance, 0.05 * record.peak)
-                or stop - start > 0.75 * (start - shape.began)
-                or np.count_nonzero(np.abs(np.diff(signs)) > 1) > 1
-            ):
-                return False
+        is_curve = last - first >= record.jump or last == values.size
+        if is_curve and not _returns(record, shape.began, first, last):
+            return False
         shape.model[last:] = 0.0
         away_from_jumps[max(first - 1, 0) : last] = False
     squares = (values - shape.model)[away_from_jumps] ** 2
@@ -207,55 +214,79 @@ def _fits(record: _Record, shape: _Found) -> bool:
     return bool(squares.mean() <= quality**2 and worst <= (3.0 * quality) ** 2)
 
 
-def _stairs(record: _Record) -> _Found | None:
+def _returns(record: _Record, began: float, first: int, last: int) -> bool:
+    """Whether a curve from one sample to before another ends at rest, soon and with one overshoot.
+
+    Soon is within three quarters of the time since the command began [s].
+    """
+    time, values = record.time, record.values
+    start, stop = float(time[first]), float(time[min(last, values.size - 1)])
+    curve = values[first:last]
+    signs = np.sign(curve[np.abs(curve) > record.tolerance])
+    reversals = np.count_nonzero(np.abs(np.diff(signs)) > 1)
+    ends_at_rest = abs(values[-1]) <= max(record.tolerance, 0.05 * record.peak)
+    return bool(ends_at_rest and stop - start <= 0.75 * (start - began) and reversals <= 1)
+
+
+def _stairs(record: _Record) -> _Candidate | None:
     """Levels that are held, with jumps of 5 % of the largest or more between them."""
-    values, size, shown = record.values, record.values.size, list[float]()
+    values, size = record.values, record.values.size
+    heights = list[float]()
     least = max(2.0 * record.tolerance, 0.05 * record.peak)
     jumps = np.flatnonzero(np.abs(np.diff(values)) > least)
-    groups = np.split(jumps, np.flatnonzero(np.diff(jumps) > HELD) + 1)
+    groups = np.split(jumps, np.flatnonzero(np.diff(jumps) > FEWEST_HELD) + 1)
     # with so many jumps it is no stairs
-    if not jumps.size or len(groups) > 200 or any(np.ptp(g) >= record.jump for g in groups):
+    if not jumps.size or len(groups) > 200 or any(np.ptp(group) >= record.jump for group in groups):
         return None
-    model, within, began = np.zeros(size), np.ones(size, np.bool_), 0.0
+    model = np.zeros(size)
+    within_jumps = np.ones(size, np.bool_)
+    began = 0.0
     firsts = [0, *(int(group[-1]) + 1 for group in groups)]
     lasts = [*(int(group[0]) + 1 for group in groups), size]
     for first, last in zip(firsts, lasts, strict=True):
         # without the samples beside its jumps, which may be taken while they last
         beside = min(2, (last - first) // 4)
-        first, last = first + beside * (first > 0), last - beside * (last < size)
+        if first > 0:
+            first += beside
+        if last < size:
+            last -= beside
         level_samples = values[first:last]
-        usual = np.median(level_samples[: max(HELD, level_samples.size // 10)])
+        usual = np.median(level_samples[: max(FEWEST_HELD, level_samples.size // 10)])
         level_samples = level_samples[np.abs(level_samples - usual) <= record.tolerance]
-        if level_samples.size < (HELD if last < size else 1):
+        if level_samples.size < (FEWEST_HELD if last < size else 1):
             return None
-        level, within[first:last] = float(level_samples.mean()), False
+        level = float(level_samples.mean())
+        within_jumps[first:last] = False
         resting = abs(level) <= record.tolerance
-        if resting and not shown:
+        if resting and not heights:
             # of the jump to the first level it is known when it is complete
-            within[max(last - record.jump, 0) : last] = True
+            within_jumps[max(last - record.jump, 0) : last] = True
             continue
-        began = began if shown else float(record.time[first])
+        if not heights:
+            began = float(record.time[first])
         model[first:last] = 0.0 if resting else level
         error = record.noise * (1.0 / level_samples.size + 2.0 / firsts[1]) ** 0.5
-        shown.append(_rounded(level, max(3.0 * error, 0.002 * record.peak)))
-    if not shown:
+        heights.append(_fewest_digits(level, max(3.0 * error, 0.002 * record.peak)))
+    if not heights:
         return None
-    leaves = record.leaves(np.where(within, values, model), 0)
+    leaves = record.leaves(np.where(within_jumps, values, model), 0)
     # a level that is left is the last one, which is no rest
-    if leaves < size and (leaves < firsts[-1] + HELD or resting):
+    if leaves < size and (leaves < firsts[-1] + FEWEST_HELD or resting):
         return None
-    name = f"stairs {'/'.join(f'{height:g}' for height in shown)} {record.unit}"
-    if len(shown) == 1 or (len(shown) == 2 and resting and not shown[1]):
-        name = f"step {shown[0]:+g} {record.unit}"
-    return _Found(name, model, min(leaves, firsts[-1] + beside if resting else size), began, within)
+    name = f"stairs {'/'.join(f'{height:g}' for height in heights)} {record.unit}"
+    if len(heights) == 1 or (len(heights) == 2 and resting and not heights[1]):
+        name = f"step {heights[0]:+g} {record.unit}"
+    end = firsts[-1] + beside if resting else size
+    return _Candidate(name, model, min(leaves, end), began, within_jumps)
 
 
-def _ramp(record: _Record) -> _Found | None:
+def _ramp(record: _Record) -> _Candidate | None:
     """A straight rise from rest, perhaps to a level that is held."""
     time, values = record.time, record.values
     rising = values * np.sign(values[np.abs(values).argmax()])
-    low, high = (int((rising >= share * record.peak).argmax()) for share in (0.1, 0.8))
-    if high - low < HELD or time[high] - time[low] < 0.1:
+    low = int((rising >= 0.1 * record.peak).argmax())
+    high = int((rising >= 0.8 * record.peak).argmax())
+    if high - low < FEWEST_HELD or time[high] - time[low] < 0.1:
         return None
     leaves = high
     for _ in range(2):  # once more with all that lies on the first line
@@ -269,20 +300,21 @@ def _ramp(record: _Record) -> _Found | None:
         leaves = record.leaves(line, low)
         if leaves < high:
             return None
-    near = values[leaves + 2 : leaves + 2 + HELD]
-    level = float(np.median(near)) if near.size == HELD else 0.0
+    near = values[leaves + 2 : leaves + 2 + FEWEST_HELD]
+    level = float(np.median(near)) if near.size == FEWEST_HELD else 0.0
     if abs(level) > 0.5 * record.peak:
         stops = record.leaves(np.full(values.size, level), leaves + 2)
         # a shorter stay at the limit is the crest of its return
         if time[stops - 1] - time[leaves] >= 0.25:
             limit = abs(float(values[leaves + 2 : stops].mean()))
-            line, leaves = np.clip(line, -limit, limit), stops
+            line = np.clip(line, -limit, limit)
+            leaves = stops
     error = record.noise / float(np.linalg.norm(since))
-    shown = _rounded(slope, max(3.0 * error, 0.002 * abs(slope)))
-    return _Found(f"ramp {shown:+g} {record.unit}/s", line, leaves, start)
+    rate = _fewest_digits(slope, max(3.0 * error, 0.002 * abs(slope)))
+    return _Candidate(f"ramp {rate:+g} {record.unit}/s", line, leaves, start)
 
 
-def _sine(record: _Record) -> _Found | None:
+def _sine(record: _Record) -> _Candidate | None:
     """One frequency, at least a whole period of it in six samples or more."""
     from scipy.optimize import curve_fit
 
@@ -298,15 +330,15 @@ def _sine(record: _Record) -> _Found | None:
     regular = int(uneven.argmax()) if uneven.any() else uneven.size
     # the last may be a part of the return
     even = crossings[: min(regular + 1, max(crossings.size - 1, 2))]
-    first, certain = record.leaves(np.zeros(time.size), 0), int(np.searchsorted(time, even[-1]))
+    first = record.leaves(np.zeros(time.size), 0)
+    certain = int(np.searchsorted(time, even[-1]))
     fewest = 6.0 * float(np.median(np.diff(time)))
     if regular < max(uneven.size - 1, 1) or 2.0 * half < fewest or certain - first < 6:
         return None
     half, crossing = np.polyfit(np.arange(even.size), even, 1)
     # a crossing in the middle hardly correlates with the frequency
-    crossing += (
-        2.0 * half * round((0.5 * (time[first] + time[certain - 1]) - crossing) / half / 2.0)
-    )
+    middle = 0.5 * (time[first] + time[certain - 1])
+    crossing += 2.0 * half * round((middle - crossing) / half / 2.0)
     leaves = certain
 
     def tone(t: Array, a: float, crossing: float, mean: float, omega: float) -> Array:
@@ -326,16 +358,17 @@ def _sine(record: _Record) -> _Found | None:
                 return None
     amplitude, crossing, mean, omega = map(float, numbers)
     size = abs(amplitude)
-    # so long it takes from the crossing at which it begins to the tolerance
+    # time that it takes from the crossing at which it begins to the tolerance
     hidden = np.arcsin(min(record.tolerance / size, 1.0)) / omega if first else 0.0
     start = float(time[first]) - hidden
     model[:first] = 0.0
     goes_on = float(time[min(leaves, time.size - 1)]) - start > 0.99 * 2.0 * np.pi / omega
     if not goes_on or (first and abs(mean) > max(0.02 * size, record.noise)):
         return None
-    hertz, error = omega / (2.0 * np.pi), float(np.sqrt(covariance[3, 3])) / (2.0 * np.pi)
-    frequency = _rounded(hertz, max(3.0 * error, 0.001 * hertz))
+    hertz = omega / (2.0 * np.pi)
+    error = float(np.sqrt(covariance[3, 3])) / (2.0 * np.pi)
+    frequency = _fewest_digits(hertz, max(3.0 * error, 0.001 * hertz))
     rises = amplitude * float(np.cos(omega * (start - crossing)))
-    shown = _rounded(size if rises > -1e-9 * size else -size, 0.002 * size)
-    name = f"sine {shown:g} {record.unit} {frequency:g} Hz"
-    return _Found(name, model, leaves, start, frequency=frequency)
+    signed_size = _fewest_digits(size if rises > -1e-9 * size else -size, 0.002 * size)
+    name = f"sine {signed_size:g} {record.unit} {frequency:g} Hz"
+    return _Candidate(name, model, leaves, start, frequency=frequency)

@@ -25,7 +25,7 @@ Stamps of an even logger are off by what their printing rounds away: 1/512 s in 
 
 
 class StampStatistics(NamedTuple):
-    """What the stamps of a record are like."""
+    """Rate, jitter and gaps of the stamps of a record."""
 
     rows: int
     rate: float

@@ -34,7 +34,7 @@ CHANNEL_KINDS: tuple[ChannelKind, ...] = get_args(ChannelKind)
 
 
 class Kind(NamedTuple):
-    """What a kind of signal is, and what shows that a column of a log is of it."""
+    """Meaning of a kind of signal, and marks of a log's column that is of this kind."""
 
     units: tuple[str, ...]
     """SI units that it may have; the first is meant if none is given. None: as written."""

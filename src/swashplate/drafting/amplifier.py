@@ -4,6 +4,9 @@ What a control card does between command and current is, each way, a dead zone, 
 and a gain; and a filter, which on some cards has a limited rate. `guess_amplifier` reads the former
 off settled currents and takes the latter from whichever packaged card, or plain filter, follows the
 logs best.
+
+The constants are judgement: they are the grids of a coarse search, from whose best point a fit
+begins. Only a guess depends on them.
 """
 
 from __future__ import annotations
@@ -25,31 +28,36 @@ from swashplate.tables import UNIT, Cell, Column, Table
 Array = NDArray[np.float64]
 Pair = tuple[float, float]
 
-SETTLED, SLOW = 0.3, 0.15
-"""Time in which a command has changed by less than this share of the largest one, so that the
-current follows it settled, but for a delay. [s], [1]"""
-LATE = (0.0, 0.01, 0.02, 0.03, 0.04, 0.05, 0.06, 0.08, 0.1)
+SETTLED = 0.3
+"""Time over which a command must have been slow, so that the current has settled. [s]"""
+SLOW = 0.15
+"""Change of a slow command in that time, over the largest one, at most. [1]"""
+SETTLED_DELAYS = (0.0, 0.01, 0.02, 0.03, 0.04, 0.05, 0.06, 0.08, 0.1)
 """Delays with which settled currents follow, the filter's lag included. [s]"""
 FEWEST = 40
-"""Settled samples of a direction that tell anything."""
-ROWS, MOST = 4000, 2000
-"""Samples of a run, and settled samples of a direction, that are enough."""
+"""Fewest settled samples of a direction that a line is drawn through."""
+ENOUGH_OF_RUN = 4000
+"""Samples of a run that are enough: of more, some are left out."""
+ENOUGH_SETTLED = 2000
+"""Settled samples of a direction that are enough."""
 DEAD_ZONES = np.linspace(0.0, 0.6, 121)
 """Dead zones that are tried, over the largest command. [1]"""
 NATURAL_FREQUENCIES = (10.0, 20.0, 40.0, 80.0, 160.0, 320.0)
-"""Of plain filters that are tried. [rad/s]"""
+"""Natural frequencies of the plain filters that are tried. [rad/s]"""
 DELAYS = np.arange(0.0, 0.1005, 0.001)
 """Delays that are tried. [s]"""
 RATE = 512.0
 """Samples a second of the simulated currents. [Hz]"""
 DYNAMIC = ("zeta", "omega", "C", "lim1", "lim2", "I_t1", "I_t2", "a")
 """Parameters of the current's dynamics."""
-OF_SIZE = ("C", "lim1", "lim2", "I_t1", "I_t2")
-"""Those of them that go with the size of the current."""
+SCALED = ("C", "lim1", "lim2", "I_t1", "I_t2")
+"""Those of them that are proportional to the size of the current."""
+SCALED_AT = 10.0
+"""Command beyond the dead zone at which sizes of currents are compared: a card's full range. [V]"""
 
 
 class AmplifierGuess(NamedTuple):
-    """What currents show at first sight; both ways of a pair as magnitudes, plus first."""
+    """Numbers of an amplifier, read off currents; both ways of a pair as magnitudes, plus first."""
 
     def __repr__(self) -> str:
         return short(self)
@@ -91,22 +99,27 @@ class _Currents(NamedTuple):
     """Ways that it shows, 0 plus and 1 minus."""
 
 
+SIDES_OF: Mapping[str, tuple[int, ...]] = {"current_plus": (0,), "current_minus": (1,)}
+"""Ways that the current of one solenoid shows; other kinds show both."""
+
+
 def _currents(experiments: Sequence[Experiment]) -> Iterator[_Currents]:
     """Currents of runs that are driven by a voltage, as magnitudes."""
-    sides = {"current_plus": (0,), "current_minus": (1,)}
     for run in experiments:
         if run.input.kind != "voltage":
             continue
         for channel in run.of_kind(*CURRENTS):
-            every = slice(None, None, max(np.count_nonzero(channel.used) // ROWS, 1))
-            time, current = channel.time[channel.used][every], channel.values[channel.used][every]
+            stride = max(np.count_nonzero(channel.used) // ENOUGH_OF_RUN, 1)
+            time = channel.time[channel.used][::stride]
+            current = channel.values[channel.used][::stride]
             if time.size < FEWEST:
                 continue
             command = run.input.at(time)
             if channel.kind == "signed_current":
                 # not by the command's sign: the current turns later
                 current = np.abs(current)
-            yield _Currents(run, channel, time, command, current, sides.get(channel.kind, (0, 1)))
+            sides = SIDES_OF.get(channel.kind, (0, 1))
+            yield _Currents(run, channel, time, command, current, sides)
 
 
 def guess_amplifier(experiments: Sequence[Experiment]) -> AmplifierGuess | None:
@@ -115,66 +128,74 @@ def guess_amplifier(experiments: Sequence[Experiment]) -> AmplifierGuess | None:
     Runs need a voltage as input and a channel of a current; what is ignored does not count.
     """
     measured = list(_currents(experiments))
-    lines = [_static(measured, side) for side in range(2)]
-    if lines[0] is None and lines[1] is None:
+    seen_plus, seen_minus = _static_line(measured, 0), _static_line(measured, 1)
+    # numbers of a way that tells none are the other's
+    plus, minus = seen_plus or seen_minus, seen_minus or seen_plus
+    if plus is None or minus is None:
         return None
-    plus, minus = (line or opposite for line, opposite in (lines, lines[::-1]))
-    assert plus is not None
-    assert minus is not None
     static: dict[str, Pair] = {
         "V_dz": (plus.dead_zone, minus.dead_zone),
         "J": (plus.jump, minus.jump),
         "G1": (plus.gain, minus.gain),
     }
-    card, dynamics, delay, error = min(
-        (_followed(measured, static, *dynamic) for dynamic in _dynamics(static)),
-        key=lambda trial: trial[3],
-    )
-    spread = np.concatenate([currents.current for currents in measured])
+    trials = (_try_dynamics(measured, static, dynamics) for dynamics in _dynamics(static))
+    best = min(trials, key=lambda trial: trial.error)
+    currents = np.concatenate([reading.current for reading in measured])
     return AmplifierGuess(
         dead_zone=static["V_dz"],
         jump=static["J"],
         gain=static["G1"],
-        dynamics=dynamics,
-        card=card,
-        delay=delay,
-        command=(lines[0].command if lines[0] else 0.0, lines[1].command if lines[1] else 0.0),
-        fit_percent=100.0 * (1.0 - error / float(np.std(spread))),
+        dynamics=best.dynamics.numbers,
+        card=best.dynamics.card,
+        delay=best.delay,
+        command=(
+            seen_plus.command if seen_plus else 0.0,
+            seen_minus.command if seen_minus else 0.0,
+        ),
+        fit_percent=100.0 * (1.0 - best.error / float(np.std(currents))),
     )
 
 
 class _Line(NamedTuple):
-    """Settled current of one way over the command, and what it leaves."""
+    """Settled current of one way over the command, a dead zone and a straight line beyond it."""
 
     dead_zone: float
+    """[V]"""
     jump: float
+    """[A]"""
     gain: float
+    """[A/V]"""
     command: float
     """Largest one. [V]"""
-    left: float
-    """Mean square. [A²]"""
+    squared_error: float
+    """Mean over the samples. [A²]"""
 
 
-def _static(measured: Sequence[_Currents], side: int) -> _Line | None:
-    """Dead zone, jump and gain of a way at the delay of the least error; None if it tells none."""
-    lines = (_line(*_settled(measured, side, late)) for late in LATE)
-    return min(filter(None, lines), key=lambda line: line.left, default=None)
+def _static_line(measured: Sequence[_Currents], side: int) -> _Line | None:
+    """Line of a way at the delay of the least error; None if its currents tell none."""
+    best: _Line | None = None
+    for delay in SETTLED_DELAYS:
+        line = _line(*_settled(measured, side, delay))
+        if line is not None and (best is None or line.squared_error < best.squared_error):
+            best = line
+    return best
 
 
-def _settled(measured: Sequence[_Currents], side: int, late: float) -> tuple[Array, Array]:
-    """Commands of a sign, so much earlier [V], and currents that have settled [A].
+def _settled(measured: Sequence[_Currents], side: int, delay: float) -> tuple[Array, Array]:
+    """Commands of a way, earlier by a delay [s], as magnitudes [V], and settled currents [A].
 
-    All of them if the command is nowhere slow, as under a joystick.
+    All currents if the command is nowhere slow, as under a joystick.
     """
-    sign, slow, every = 1.0 - 2.0 * side, list[Array](), list[Array]()
+    sign = 1.0 - 2.0 * side
+    slow, every = list[Array](), list[Array]()
     largest = max((float(np.abs(currents.command).max()) for currents in measured), default=0.0)
     for currents in measured:
         if side not in currents.sides:
             continue
         drive = currents.experiment.input
-        grid = np.linspace(-SETTLED - late, 0.0, 9)[:, None] + currents.time
+        grid = np.linspace(-SETTLED - delay, 0.0, 9)[:, None] + currents.time
         before = drive.at(grid.ravel()).reshape(grid.shape)
-        command = sign * drive.at(currents.time - late)
+        command = sign * drive.at(currents.time - delay)
         one_way = command > 0.0
         readings = np.stack([command, currents.current])
         slow.append(readings[:, one_way & (np.ptp(before, axis=0) <= SLOW * largest)])
@@ -182,106 +203,137 @@ def _settled(measured: Sequence[_Currents], side: int, late: float) -> tuple[Arr
     volts, amperes = np.concatenate([np.zeros((2, 0)), *slow], axis=1)
     if volts.size < FEWEST or np.ptp(volts) < 0.1 * largest:
         volts, amperes = np.concatenate([np.zeros((2, 0)), *every], axis=1)
-    step = max(volts.size // MOST, 1)
-    return volts[::step], amperes[::step]
+    stride = max(volts.size // ENOUGH_SETTLED, 1)
+    return volts[::stride], amperes[::stride]
 
 
 def _line(volts: Array, amperes: Array) -> _Line | None:
     """Dead zone, jump and gain of least squares; None if no current rises with the command."""
-    best: _Line | None = None
     if volts.size < FEWEST:
         return None
-    most = float(volts.max())
-    for zone in (DEAD_ZONES * most).tolist():
-        beyond = volts > zone
+    best: _Line | None = None
+    largest = float(volts.max())
+    for dead_zone in (DEAD_ZONES * largest).tolist():
+        beyond = volts > dead_zone
         if np.count_nonzero(beyond) < FEWEST // 2:
             break
-        over = volts[beyond] - zone
+        over = volts[beyond] - dead_zone
         terms = np.stack([np.ones(over.size), over], axis=1)
         jump, gain = np.linalg.lstsq(terms, amperes[beyond], rcond=None)[0].tolist()
         if jump < 0.0:
-            jump, gain = 0.0, float(over @ amperes[beyond] / (over @ over))
-        residual = amperes - np.where(beyond, jump + gain * (volts - zone), 0.0)
-        line = _Line(zone, jump, gain, most, float(np.mean(residual**2)))
-        if gain > 0.0 and (best is None or line.left < best.left):
+            jump = 0.0
+            gain = float(over @ amperes[beyond] / (over @ over))
+        residual = amperes - np.where(beyond, jump + gain * (volts - dead_zone), 0.0)
+        line = _Line(
+            dead_zone=dead_zone,
+            jump=jump,
+            gain=gain,
+            command=largest,
+            squared_error=float(np.mean(residual**2)),
+        )
+        if gain > 0.0 and (best is None or line.squared_error < best.squared_error):
             best = line
     return best
 
 
-def _dynamics(static: Mapping[str, Pair]) -> Iterator[tuple[str, dict[str, Pair]]]:
-    """Dynamics to try: of each packaged card, for currents of this size, and of plain filters."""
+class _Dynamics(NamedTuple):
+    """Dynamics of a current that are tried."""
+
+    card: str
+    """The packaged card that they are of, empty for a plain filter."""
+    numbers: dict[str, Pair]
+    """Parameters by symbol. [SI]"""
+
+
+class _Trial(NamedTuple):
+    """Error of dynamics beside the measured currents, at the delay of the least error."""
+
+    dynamics: _Dynamics
+    delay: float
+    """[s]"""
+    error: float
+    """RMS. [A]"""
+
+
+def _dynamics(static: Mapping[str, Pair]) -> Iterator[_Dynamics]:
+    """Dynamics to try: of plain filters, and of each packaged card, for currents of this size."""
     plain = Drive.preset("neutral").at_every_rate().parameters
-    off = {symbol: _pair(plain, symbol) for symbol in DYNAMIC}
+    unlimited = {symbol: _pair(plain, symbol) for symbol in DYNAMIC}
     for omega in NATURAL_FREQUENCIES:
-        yield "", {**off, "zeta": (1.0, 1.0), "omega": (omega, omega)}
-    seen = {plain.card}
+        yield _Dynamics("", {**unlimited, "zeta": (1.0, 1.0), "omega": (omega, omega)})
+    cards = {plain.card}
     for name in preset_names():
         packaged = Drive.preset(name).at_every_rate().parameters
-        if packaged.card in seen:
-            continue
-        seen.add(packaged.card)
-        sizes = [
-            (jump + 10.0 * gain) / (j + 10.0 * g)
-            for jump, gain, j, g in zip(
-                *(static["J"], static["G1"], _pair(packaged, "J"), _pair(packaged, "G1")),
-                strict=True,
-            )
-        ]
-        factors = {symbol: sizes if symbol in OF_SIZE else [1.0, 1.0] for symbol in DYNAMIC}
-        numbers = {
-            symbol: (_pair(packaged, symbol)[0] * plus, _pair(packaged, symbol)[1] * minus)
-            for symbol, (plus, minus) in factors.items()
-        }
-        yield packaged.card, numbers
+        if packaged.card not in cards:
+            cards.add(packaged.card)
+            yield _Dynamics(packaged.card, _scaled_dynamics(packaged, static))
+
+
+def _scaled_dynamics(packaged: ParameterSet, static: Mapping[str, Pair]) -> dict[str, Pair]:
+    """Dynamics of a packaged card for currents of the size that settled ones have."""
+    factors = list[float]()
+    for side in range(2):
+        measured = static["J"][side] + SCALED_AT * static["G1"][side]
+        of_card = _pair(packaged, "J")[side] + SCALED_AT * _pair(packaged, "G1")[side]
+        factors.append(measured / of_card)
+    numbers = dict[str, Pair]()
+    for symbol in DYNAMIC:
+        plus, minus = _pair(packaged, symbol)
+        if symbol in SCALED:
+            plus *= factors[0]
+            minus *= factors[1]
+        numbers[symbol] = plus, minus
+    return numbers
 
 
 def _pair(parameters: ParameterSet, symbol: str) -> Pair:
+    """Numbers of plus and minus."""
     plus, minus = parameters[symbol].values
     return plus, minus
 
 
-def _followed(
-    measured: Sequence[_Currents],
-    static: Mapping[str, Pair],
-    card: str,
-    dynamics: dict[str, Pair],
-) -> tuple[str, dict[str, Pair], float, float]:
-    """Card and dynamics, with the delay [s] of the least error and that error's RMS [A]."""
+def _try_dynamics(
+    measured: Sequence[_Currents], static: Mapping[str, Pair], dynamics: _Dynamics
+) -> _Trial:
+    """Delay and error of the least squares; an infinite error if the card refuses a command."""
     # whatever the current, the solenoids do not overpower the feedback spring
     neutral = Drive.preset("neutral").at_every_rate().parameters
-    drive = Drive(neutral.with_numbers({"Z19": 1e-3, **static, **dynamics}))
-    squares, size = np.zeros(DELAYS.size), 0
+    drive = Drive(neutral.with_numbers({"Z19": 1e-3, **static, **dynamics.numbers}))
+    squares = np.zeros(DELAYS.size)
+    size = 0
     try:
-        for measured_current in measured:
-            command = measured_current.experiment.input
-            run = drive.simulate(
-                command.values,
-                RATE,
-                time=command.time,
-                interpolation="previous" if command.is_held else "linear",
-                start=measured_current.experiment.begins,
-            )
-            solenoids = (run.current_positive, run.current_negative)
-            simulated = np.sum([solenoids[side] for side in measured_current.sides], axis=0)
-            if measured_current.channel.kind == "signed_current":
-                simulated = np.abs(run.current)
+        for reading in measured:
+            time, simulated = _simulated_current(drive, reading)
             for k, delay in enumerate(DELAYS):
-                residual = (
-                    np.interp(measured_current.time - delay, run.time, simulated)
-                    - measured_current.current
-                )
+                residual = np.interp(reading.time - delay, time, simulated) - reading.current
                 squares[k] += float(residual @ residual)
-            size += measured_current.time.size
+            size += reading.time.size
     except InputError:  # a command beyond what a card takes, or a filter too fast for the step
-        return card, dynamics, 0.0, inf
+        return _Trial(dynamics, 0.0, inf)
     best = int(np.argmin(squares))
-    return card, dynamics, float(DELAYS[best]), float(np.sqrt(squares[best] / size))
+    return _Trial(dynamics, float(DELAYS[best]), float(np.sqrt(squares[best] / size)))
+
+
+def _simulated_current(drive: Drive, reading: _Currents) -> tuple[Array, Array]:
+    """Instants [s], and the simulated magnitude of the current that was measured [A]."""
+    command = reading.experiment.input
+    run = drive.simulate(
+        command.values,
+        RATE,
+        time=command.time,
+        interpolation="previous" if command.is_held else "linear",
+        start=reading.experiment.begins,
+    )
+    if reading.channel.kind == "signed_current":
+        return run.time, np.abs(run.current)
+    solenoids = (run.current_positive, run.current_negative)
+    return run.time, np.sum([solenoids[side] for side in reading.sides], axis=0)
 
 
 def amplifier_table(guess: AmplifierGuess) -> Table:
-    """What was guessed of the amplifier, each way."""
-    columns = (Column(side, ".4g") for side in ("plus", "minus"))
-    table = Table("Its amplifier, from the current", (Column(""), *columns, UNIT))
+    """Table of an amplifier's guess, a column for each way."""
+    columns = (Column(""), Column("plus", ".4g"), Column("minus", ".4g"), UNIT)
+    table = Table("Its amplifier, from the current", columns)
     omega = guess.dynamics["omega"]
     rows = (
         ("dead zone", guess.dead_zone, "V", ".3g"),

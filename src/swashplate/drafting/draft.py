@@ -1,8 +1,8 @@
-"""First drafts of a campaign file: what each column of some logs may be, and a file that says so.
+"""First drafts of a campaign file: a guess of what each column of a log is, and the text.
 
-A column is what the table of kinds, `swashplate.campaign.schema.KINDS`, says of its name and unit,
-and what its numbers show. What is not known for sure is marked "guessed"; what cannot be known
-stays open in a line "FIXME".
+The kind of a column follows from its name and unit by the table of kinds,
+`swashplate.campaign.schema.KINDS`, and from its numbers. What is not known for sure is marked
+"guessed"; what cannot be known stays open in a line "FIXME".
 """
 
 from __future__ import annotations
@@ -26,7 +26,9 @@ from swashplate.campaign import (
     TURNS,
     Accuracy,
     CampaignFile,
+    Experiment,
     InputKind,
+    Overview,
     conversion,
     has_sign,
     moves_at_first,
@@ -57,14 +59,14 @@ UNORDERED = (
     "only in the\n# order of time: sort the runs, or state recorded = 2026-05-04T13:20:00 in each."
 )
 FIXME = "FIXME"
-"""What the lines hold that say what the draft leaves out or open."""
+"""Mark of a line that a person must fill in."""
 TIME = (
     r"time|zeit|uhrzeit|zeitstempel|temps|heure|tijd|tid|tiempo|tempo|stamp|timestamp|time stamp|"
     r"datetime|date time|clock|t|seconds?|exp time"
 )
 """Names of columns of time stamps; those of signals are in `KINDS`."""
-OF = "(?: (?:of|der|des|du|de|del|della|do|da|van|av) .*)?"
-"""What may follow in such a name: "Drehzahl der Trommel"."""
+COMPLEMENT = "(?: (?:of|der|des|du|de|del|della|do|da|van|av) .*)?"
+"""Complement that may follow in such a name: "Drehzahl der Trommel"."""
 INPUTS = get_args(InputKind)
 HALVES = {"current_plus", "current_minus"}
 PLC = re.compile(
@@ -72,12 +74,14 @@ PLC = re.compile(
     re.IGNORECASE,
 )
 """Names of a PLC's words, such as "PIW_STROKE" and "JOY_W"."""
-SMALLEST_WORD, MILLIVOLTS, OVERRANGE = 100, 10_500, 32_511
-"""Whole numbers that reach no further than the first are no PLC's words; those that reach further
-than the second are no millivolts of a card; a SIMATIC's word, whose full scale is 27648, reaches to
-the third at most."""
+SMALLEST_WORD = 100
+"""Whole numbers that reach no further are not a PLC's words, but percentages or volts."""
+MILLIVOLTS = 10_500
+"""Whole numbers that reach further are not the millivolts of a card, which takes 10 V."""
+SIMATIC, SIMATIC_OVERRANGE = 27_648, 32_511
+"""Full scale of a SIMATIC's word, and the largest one that it gives (Siemens, analog values)."""
 OPEN_UNITS = ("stroker_pressure", "swash_angle", "spool_position")
-"""Kinds that hardly a logger writes in SI."""
+"""Kinds whose unit stays open, as hardly a logger writes them in SI."""
 TICKS = {"ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 """Units of whole numbers that count the time, and their size. [s]"""
 SLOWEST_LOG = 1.0
@@ -85,35 +89,39 @@ SLOWEST_LOG = 1.0
 OVERLAP = 0.1
 """Share of a log's length by which it may seem to begin before the one before it ended: file
 systems round the time of writing to as much as 2 s. [1]"""
-MANY = 4
+HELD_BACK_FROM = 4
 """Runs from which on one is held back for validation."""
 
 
+TWO_SIDED = 0.25
+"""Deflection to the smaller side, over the larger one, from which a maneuver has two sides. [1]"""
+
+
 class _Guess(NamedTuple):
-    """What a column may be."""
+    """Guess of what a column is."""
 
     name: str
     kind: str = ""
     """``"time"``, a kind of input or of channel, or empty."""
     axis: str = ""
-    """What stands before the word in its name, such as the "boom" of "Boom Cmd", or empty."""
+    """Beginning of its name, such as the "boom" of "Boom Cmd", or empty."""
     unit: str | None = None
-    given: bool = False
-    """Whether somebody said so."""
+    is_stated: bool = False
+    """Whether the caller stated the kind."""
     in_header: bool = True
     """Whether its unit stands in brackets, or in a row of its own, where it is read from again."""
     rolls_over_at: float = 0.0
     """Reading after which an encoder's counter or an angle wraps; 0 if it does not."""
-    why: str = "from its name"
-    """What its unit rests on, for the comment beside it, if it does not stand in the header."""
-    of_plc: bool = False
+    unit_comment: str = "from its name"
+    """Reason for its unit, beside the entry, if it does not stand in the header."""
+    has_plc_name: bool = False
     """Whether its name is that of a PLC's word."""
     full_scale: int = 0
     """Reading of a PLC's word at full scale; 0 if the numbers are no such words."""
 
 
 class _Axis(NamedTuple):
-    """Columns of an axis: what may be its input, the first of which is; channels by their names."""
+    """Columns of an axis: channels by name, and candidates for its input, best first."""
 
     inputs: list[_Guess]
     channels: dict[str, _Guess]
@@ -143,7 +151,7 @@ def draft_campaign(
     counts_per_turn : float, optional
         Of all encoders. Without it the entry stays open, and the file is refused until it is given.
     columns, units : mapping of str to str, optional
-        What some columns are, ``"time"`` or a kind such as ``"voltage"``, and their units.
+        Kinds of some columns, ``"time"`` or one such as ``"voltage"``, and their units.
     title : str, optional
         Heading of the report; by default the folder's name, marked as guessed.
 
@@ -171,23 +179,17 @@ def draft_campaign(
     >>> "[axes.hoist." in text
     True
     """
+    if not logs:
+        raise InputError("A draft needs at least one log.")
     kinds, units, folder = dict(columns or {}), dict(units or {}), Path(folder).resolve()
     opened = [open_log(path) for path in logs]
     headers = dict[str, LogColumn]()
-    for column in (column for log in opened for column in log.columns):
-        headers.setdefault(column.name, column)
-    why = "" if logs else "A draft needs at least one log"
-    for name in sorted({*kinds, *units} - {*headers}):
-        why = why or f"No log has a column '{name}'; there are {', '.join(sorted(headers))}"
-    for name, what in kinds.items():
-        if what not in ("time", *KINDS):
-            why = f"'{name}' cannot be a '{what}': it is time, {', '.join(KINDS)}"
-    if why:
-        raise InputError(f"{why}.")
-    for name in sorted(kinds.keys() & units.keys()):
-        _check_unit(kinds[name], units[name], f"Column '{name}' ({kinds[name]})")
-    numbers = [_numbers(log, [column.name for column in log.columns]) for log in opened]
-    blocks = {name: [number[name] for number in numbers if name in number] for name in headers}
+    for log in opened:
+        for column in log.columns:
+            headers.setdefault(column.name, column)
+    _check_stated(headers, kinds, units)
+    numbers = [_readable_columns(log, [column.name for column in log.columns]) for log in opened]
+    blocks = {name: [log[name] for log in numbers if name in log] for name in headers}
     guesses = _guesses(headers, blocks, counts_per_turn, kinds, units)
     # an axis is called like its drive, but no machine like the start for any of them
     axes = _axes(guesses, "drive" if drive in (None, NEUTRAL) else Path(drive or "").stem)
@@ -197,42 +199,40 @@ def draft_campaign(
     lines = [HEADER, heading, ""]
     for name, axis in axes.items():
         lines += _axis_lines(name, axis, guesses, blocks, opened[0], drive, counts_per_turn)
-    used = [guess for axis in axes.values() for guess in (*axis.inputs, *axis.channels.values())]
-    first = {column.name for column in opened[0].columns} - {guess.name for guess in used}
-    unused = ", ".join(e.name for e in guesses if e.name in first and e.kind != "time")
-    if unused:
-        lines += [f"{UNUSED}: {unused}", ""]
-    if counts_per_turn is not None and all(guess.kind != "encoder_counts" for guess in used):
-        among = f" among {unused}" if unused else ""
-        lines += [f"{NO_ENCODER}{among}; counts_per_turn = {counts_per_turn:.12g} is left out", ""]
-    text, runs = "\n".join(lines), list[_Run]()
-    stems = [log.path.stem for log in opened]
-    for log, read in zip(opened, numbers, strict=True):
-        drafted = _run(log, read, axes, folder, text)
-        if stems.count(log.path.stem) > 1:
-            # logs of one name in several folders, or formats
-            near = log.path.resolve().parent.name, log.path.name
-            drafted.more.insert(0, f"name = {toml_string('/'.join(near))}")
-        runs.append(drafted)
-    held_back = _held_back([run for run in runs if run.role == '"fit"'])
-    runs, order = _in_time(runs)
-    lines += order
-    for run in runs:
-        role = '"validate"' if run is held_back else run.role
-        lines += ["[[runs]]", f"file = {run.file}", f"role = {role}", *run.more, ""]
+    lines += _unused_lines(guesses, axes, opened[0], counts_per_turn)
+    lines += _run_lines(opened, numbers, axes, folder, text="\n".join(lines))
     return "\n".join(lines).rstrip() + "\n"
 
 
-def _numbers(log: Log, names: list[str]) -> dict[str, Array]:
-    """Those columns that hold numbers; of the others nothing is wanted."""
+def _check_stated(
+    headers: Mapping[str, LogColumn], kinds: Mapping[str, str], units: Mapping[str, str]
+) -> None:
+    """Refuse stated kinds and units that no column of the logs can have."""
+    for name, kind in kinds.items():
+        if kind not in ("time", *KINDS):
+            raise InputError(f"'{name}' cannot be a '{kind}': it is time, {', '.join(KINDS)}.")
+    for name in sorted({*kinds, *units}):
+        if name not in headers:
+            names = ", ".join(sorted(headers))
+            raise InputError(f"No log has a column '{name}'; there are {names}.")
+    for name in sorted(kinds.keys() & units.keys()):
+        _check_unit(kinds[name], units[name], f"Column '{name}' ({kinds[name]})")
+
+
+def _readable_columns(log: Log, names: list[str]) -> dict[str, Array]:
+    """Those columns that hold numbers; the others are left out."""
+    if not names:
+        return {}
     try:
-        return log.read(names) if names else {}
+        return log.read(names)
     except FileError:
         half = len(names) // 2
-        return {**_numbers(log, names[:half]), **_numbers(log, names[half:])} if half else {}
+        if half == 0:
+            return {}
+        return _readable_columns(log, names[:half]) | _readable_columns(log, names[half:])
 
 
-# --- what the columns are -------------------------------------------------------------------------
+# --- guesses of the columns -----------------------------------------------------------------------
 
 
 def _words(name: str) -> str:
@@ -241,27 +241,30 @@ def _words(name: str) -> str:
 
 
 def _by_words(column: LogColumn, name: str, unit: str | None) -> _Guess:
-    """What a name and a unit say: the first kind in the table that has either."""
+    """Guess from a name and a unit: the first kind in the table that has either."""
     words = _words(name)
     if re.fullmatch(TIME, _words(name.rpartition("/")[2])):
         return _Guess(column.name, "time", "", column.unit)
-    matches = {
-        kind: match
-        for kind, meant in KINDS.items()
-        if meant.words and (match := re.fullmatch(rf"(?:(.*) )?(?:{meant.words}){OF}", words))
-    }
-    marked = speed_unit(unit or "")
-    kinds = (kind for kind, meant in KINDS.items() if kind in matches or marked in meant.marks)
-    axis = next((match[1] for match in matches.values()), "")
-    return _Guess(column.name, next(kinds, ""), axis or "", column.unit)
+    rotational_unit = speed_unit(unit or "")
+    first_kind = ""
+    axis: str | None = None
+    for kind, entry in KINDS.items():
+        match = None
+        if entry.words:
+            match = re.fullmatch(rf"(?:(.*) )?(?:{entry.words}){COMPLEMENT}", words)
+        if match is not None and axis is None:
+            axis = match[1] or ""
+        if not first_kind and (match is not None or rotational_unit in entry.marks):
+            first_kind = kind
+    return _Guess(column.name, first_kind, axis or "", column.unit)
 
 
 def _by_header(column: LogColumn, kind: str | None) -> _Guess:
-    """What a header says, of a kind if one is given; the unit may be the end of its name."""
+    """Guess from a header, of a kind if it is stated; the unit may be the end of its name."""
     name = re.sub(r"[\[(].*[\])]", "", column.name).strip()
-    word = PLC.fullmatch(name) if column.unit is None else None
-    if word is not None:
-        name = word["after"] or word["before"]
+    plc_name = PLC.fullmatch(name) if column.unit is None else None
+    if plc_name is not None:
+        name = plc_name["after"] or plc_name["before"]
     unit = column.unit or ("rpm" if re.search(TURNS, name.lower()) else None)
     by_name = _by_words(column, name, unit)
     split = re.fullmatch(r"(.*)[_\s]+([^_\s]+)", name)
@@ -270,12 +273,15 @@ def _by_header(column: LogColumn, kind: str | None) -> _Guess:
     if by_last_word.kind == "other" and ending in ("V", "mV"):
         by_last_word = by_last_word._replace(kind="voltage")
     if kind is not None:
-        by_name, by_last_word = (guess._replace(kind=kind) for guess in (by_name, by_last_word))
+        by_name = by_name._replace(kind=kind)
+        by_last_word = by_last_word._replace(kind=kind)
     if column.unit is None and by_name.kind not in HALVES and _measures(by_last_word.kind, ending):
         return by_last_word._replace(unit=ending, in_header=False)
-    unit = unit if by_name.kind == "shaft_speed" else column.unit
-    in_header = column.unit is not None
-    return by_name._replace(unit=unit, in_header=in_header, of_plc=word is not None)
+    return by_name._replace(
+        unit=unit if by_name.kind == "shaft_speed" else column.unit,
+        in_header=column.unit is not None,
+        has_plc_name=plc_name is not None,
+    )
 
 
 def _check_unit(kind: str, unit: str, what: str) -> None:
@@ -302,74 +308,89 @@ def _guesses(
     headers: Mapping[str, LogColumn],
     blocks: Mapping[str, list[Array]],
     counts_per_turn: float | None,
-    kind_of: Mapping[str, str],
+    kinds: Mapping[str, str],
     units: Mapping[str, str],
 ) -> list[_Guess]:
     """Guesses by headers, and by the numbers of all logs.
 
-    A column that is said to be time or input takes the place of those that were guessed. A current
-    has a sign if it goes to minus its peak in any log; half a current without the other half is a
-    whole one; whole numbers that begin anew at their end are an encoder's, whatever their name.
+    A column that is stated to be time or input takes the place of those that were guessed. Half a
+    current without the other half is a whole one.
     """
-    taken = {"time"} & {*kind_of.values()}
-    taken |= {*INPUTS} if {"voltage", "current"} & {*kind_of.values()} else set()
+    taken = set[str]()
+    if "time" in kinds.values():
+        taken.add("time")
+    if "voltage" in kinds.values() or "current" in kinds.values():
+        taken.update(INPUTS)
     guesses = list[_Guess]()
     for name, column in headers.items():
+        guess = _by_header(column, kinds.get(name))
+        if name in kinds:
+            guess = guess._replace(kind=kinds[name], is_stated=True)
+        elif guess.kind in taken:
+            guess = guess._replace(kind="")
         values = [part for part in blocks[name] if part.size]
-        guess = _by_header(column, kind_of.get(name))
-        kind = kind_of.get(name, "" if guess.kind in taken else guess.kind)
-        guess = guess._replace(kind=kind, given=name in kind_of)
         if name in units:
-            guess = guess._replace(unit=units[name], in_header=False, why="given")
+            guess = guess._replace(unit=units[name], in_header=False, unit_comment="given")
         elif guess.unit is None:
             guess = _with_unit_of_numbers(guess, values)
-        if kind == "encoder_counts" or not (kind or guess.unit):
-            size = max((rolls_over_at(part, counts_per_turn) for part in values), default=0)
-            guess = guess._replace(kind="encoder_counts" if size else kind, rolls_over_at=size)
-        if kind == "position":
-            guess = guess._replace(rolls_over_at=_turn(values, guess.unit or "deg"))
-        if kind == "rectified_current" and name not in kind_of and has_sign(values):
-            guess = guess._replace(kind="signed_current")
-        guesses.append(guess)
-    kinds = {(guess.axis, guess.kind) for guess in guesses}
-    for n, guess in enumerate(guesses):
-        alone = guess.kind in HALVES and any((guess.axis, half) not in kinds for half in HALVES)
-        if alone and guess.name not in kind_of:
-            guesses[n] = guess._replace(kind="rectified_current")
+        guesses.append(_by_numbers(guess, values, counts_per_turn))
+    present = {(guess.axis, guess.kind) for guess in guesses}
+    for index, guess in enumerate(guesses):
+        is_half = guess.kind in HALVES and not guess.is_stated
+        if is_half and any((guess.axis, half) not in present for half in HALVES):
+            guesses[index] = guess._replace(kind="rectified_current")
     return guesses
 
 
+def _by_numbers(guess: _Guess, blocks: Sequence[Array], counts_per_turn: float | None) -> _Guess:
+    """Guess of a column with what its numbers tell of its kind and its range.
+
+    A current has a sign if it goes to minus its peak in any log; whole numbers that begin again at
+    their end are an encoder's, whatever their name.
+    """
+    if guess.kind == "encoder_counts" or not (guess.kind or guess.unit):
+        size = max((rolls_over_at(part, counts_per_turn) for part in blocks), default=0)
+        kind = "encoder_counts" if size else guess.kind
+        return guess._replace(kind=kind, rolls_over_at=size)
+    if guess.kind == "position":
+        return guess._replace(rolls_over_at=_turn(blocks, guess.unit or "deg"))
+    if guess.kind == "rectified_current" and not guess.is_stated and has_sign(blocks):
+        return guess._replace(kind="signed_current")
+    return guess
+
+
 def _with_unit_of_numbers(signal: _Guess, blocks: Sequence[Array]) -> _Guess:
-    """A column whose header gives no unit, with what its numbers say of one."""
+    """Guess of a column whose header gives no unit, with one that its numbers suggest."""
     finite = [part[np.isfinite(part)] for part in blocks]
     if signal.kind == "time":
-        unit, why = _time_unit(finite)
-        return signal._replace(unit=unit, why=why)
+        unit, comment = _time_unit(finite)
+        return signal._replace(unit=unit, unit_comment=comment)
     if signal.kind in ("", "encoder_counts", "position") or not finite:
         return signal
-    full = _full_scale(finite, named=signal.of_plc)
+    full = _full_scale(finite, has_plc_name=signal.has_plc_name)
     if full:
         return signal._replace(full_scale=full)
     largest = max(float(np.abs(part).max(initial=0.0)) for part in finite)
-    if signal.kind == "voltage" and largest > SMALLEST_WORD and _whole(finite):
-        return signal._replace(unit="mV", why=f"guessed: whole numbers up to {largest:.9g}")
+    if signal.kind == "voltage" and largest > SMALLEST_WORD and _are_whole_numbers(finite):
+        comment = f"guessed: whole numbers up to {largest:.9g}"
+        return signal._replace(unit="mV", unit_comment=comment)
     return signal
 
 
-def _whole(blocks: Sequence[Array]) -> bool:
+def _are_whole_numbers(blocks: Sequence[Array]) -> bool:
     """Whether all numbers are whole."""
     return all(bool(np.all(part == np.floor(part))) for part in blocks)
 
 
 def _time_unit(blocks: Sequence[Array]) -> tuple[str, str]:
-    """Unit of stamps without one, and why.
+    """Unit of stamps without one, and the comment that gives the reason.
 
     Seconds, unless they are whole numbers of which a step of one second or more would make a log
     too slow for any motion: then the largest unit in which it is fast enough.
     """
     steps = [float(np.median(np.diff(part))) for part in blocks if part.size > 1]
     step = float(np.median(steps)) if steps else 0.0
-    if step < 1.0 / SLOWEST_LOG or not _whole(blocks):
+    if step < 1.0 / SLOWEST_LOG or not _are_whole_numbers(blocks):
         return "s", "guessed: the header gives none"
     fast = (unit for unit, size in TICKS.items() if step * size <= 1.0 / SLOWEST_LOG)
     unit = next(fast, "ns")
@@ -377,19 +398,19 @@ def _time_unit(blocks: Sequence[Array]) -> tuple[str, str]:
     return unit, f"guessed: whole numbers that step by {step:.9g}, {rate:.4g} Hz in {unit}"
 
 
-def _full_scale(blocks: Sequence[Array], *, named: bool) -> int:
-    """Reading at full scale of what may be a PLC's word of 16 bits, or 0.
+def _full_scale(blocks: Sequence[Array], *, has_plc_name: bool) -> int:
+    """Reading at full scale of numbers that may be a PLC's words of 16 bits, or 0.
 
     A word is a whole number too large to be of a physical unit, or called so by its column. 27648
-    is that of SIMATIC, 16384 and 32767 of others, whose words end there.
+    is the full scale of SIMATIC, 16384 and 32767 that of others, whose words end there.
     """
     largest = max(float(np.abs(part).max(initial=0.0)) for part in blocks)
-    least = SMALLEST_WORD if named else MILLIVOLTS
-    if not _whole(blocks) or not least < largest <= 1 << 15:
+    least = SMALLEST_WORD if has_plc_name else MILLIVOLTS
+    if not _are_whole_numbers(blocks) or not least < largest <= 1 << 15:
         return 0
     if largest in (16383.0, 16384.0):
         return 16384
-    return 27648 if largest <= OVERRANGE else max(int(largest), 32767)
+    return SIMATIC if largest <= SIMATIC_OVERRANGE else max(int(largest), 32767)
 
 
 def _turn(values: Sequence[Array], unit: str) -> float:
@@ -407,12 +428,16 @@ def _axes(guesses: Sequence[_Guess], plain: str) -> dict[str, _Axis]:
     An axis needs an input and a channel; columns without a prefix belong to the only axis.
     """
     prefixes = dict.fromkeys(guess.axis for guess in guesses if guess.kind in INPUTS and guess.axis)
-    axes = {prefix: _axis([e for e in guesses if e.axis == prefix]) for prefix in prefixes}
-    axes = {prefix: axis for prefix, axis in axes.items() if axis.channels}
-    return axes if len(axes) > 1 else {plain: _axis(guesses)}
+    axes = dict[str, _Axis]()
+    for prefix in prefixes:
+        axis = _axis_of([guess for guess in guesses if guess.axis == prefix])
+        if axis.channels:
+            axes[prefix] = axis
+    return axes if len(axes) > 1 else {plain: _axis_of(guesses)}
 
 
-def _axis(guesses: Sequence[_Guess]) -> _Axis:
+def _axis_of(guesses: Sequence[_Guess]) -> _Axis:
+    """Inputs and channels among the columns of an axis."""
     axis = _Axis([guess for guess in guesses if guess.kind in INPUTS], {})
     for guess in guesses:
         if guess.kind not in ("", "time", *INPUTS):
@@ -421,7 +446,7 @@ def _axis(guesses: Sequence[_Guess]) -> _Axis:
     return axis
 
 
-# --- what the file says ---------------------------------------------------------------------------
+# --- text of the file -----------------------------------------------------------------------------
 
 
 def _axis_lines(
@@ -433,28 +458,31 @@ def _axis_lines(
     drive: str | None,
     counts_per_turn: float | None,
 ) -> list[str]:
-    """Tables of an axis; what the first log does not show stays open."""
+    """Lines of an axis' tables; entries that the first log does not show stay open."""
     drive_line = '# drive = "hoist"    # a packaged drive or a parameter file, to be fitted'
     if drive is not None:
         drive_line = f"drive = {toml_string(name if name in preset_names() else drive)}"
-    clock = f"{NO_TIME}    # {FIXME}: no column of time found; samples a second"
     clocks = {guess.name: _clock(guess, guesses) for guess in guesses}
-    main = next((clocks[guess.name] for guess in (*axis.inputs, *guesses)), "") or clock
+    main = next((clocks[guess.name] for guess in (*axis.inputs, *guesses)), "")
+    if not main:
+        main = f"{NO_TIME}    # {FIXME}: no column of time found; samples a second"
     start = 'start = "rest"    # at the first sample: rest, steady or estimated'
-    which = (
-        f'column = "{FIXME}"    # which of {", ".join(repr(column.name) for column in log.columns)}'
-    )
-    kind = f'kind = "voltage"    # {FIXME}: or current, or other'
-    tables = {"input": [kind, f"{which} commands?"]}
+    names = ", ".join(repr(column.name) for column in log.columns)
+    open_column = f'column = "{FIXME}"    # which of {names}'
+    input_kind = f'kind = "voltage"    # {FIXME}: or current, or other'
+    tables = {"input": [input_kind, f"{open_column} commands?"]}
     if not axis.channels:
-        kind = f'kind = "shaft_speed"    # {FIXME}: or position, encoder_counts ...'
-        tables["channels.measured"] = [kind, f"{which} was measured?"]
+        channel_kind = f'kind = "shaft_speed"    # {FIXME}: or position, encoder_counts ...'
+        tables["channels.measured"] = [channel_kind, f"{open_column} was measured?"]
     signals = [("input", guess) for guess in axis.inputs[:1]]
     signals += [(f"channels.{toml_key(key)}", channel) for key, channel in axis.channels.items()]
     for table, signal in signals:
         tables[table] = _signal_lines(signal, blocks[signal.name], counts_per_turn)
-        tables[table] += [clocks[signal.name]] * (clocks[signal.name] not in ("", main))
-    tables["input"] += [BETWEEN, *(f"# another input? '{guess.name}'" for guess in axis.inputs[1:])]
+        if clocks[signal.name] not in ("", main):
+            tables[table].append(clocks[signal.name])
+    tables["input"].append(BETWEEN)
+    for guess in axis.inputs[1:]:
+        tables["input"].append(f"# another input? '{guess.name}'")
     lines = [f"[axes.{toml_key(name)}]", drive_line, main, start, ""]
     for table, entries in tables.items():
         lines += [f"[axes.{toml_key(name)}.{table}]", *entries, ""]
@@ -463,64 +491,79 @@ def _axis_lines(
 
 def _clock(signal: _Guess, guesses: Sequence[_Guess]) -> str:
     """A signal's line of time: the first column of time in its group of the file, or of all."""
-
-    def beside(guess: _Guess) -> bool:
-        return guess.name.rpartition("/")[0] == signal.name.rpartition("/")[0]
-
-    times = sorted((guess for guess in guesses if guess.kind == "time"), key=beside, reverse=True)
+    times = [guess for guess in guesses if guess.kind == "time"]
     if not times:
         return ""
-    time = times[0]
+    group = signal.name.rpartition("/")[0]
+    time = next((guess for guess in times if guess.name.rpartition("/")[0] == group), times[0])
     column = f"column = {toml_string(time.name)}"
     if time.in_header:
         return f"time = {{ {column} }}"
-    return f"time = {{ {column}, unit = {toml_string(time.unit or 's')} }}    # {time.why}"
+    return f"time = {{ {column}, unit = {toml_string(time.unit or 's')} }}    # {time.unit_comment}"
 
 
 def _signal_lines(
     guess: _Guess, blocks: Sequence[Array], counts_per_turn: float | None
 ) -> list[str]:
     """Entries of an input or a channel."""
-    percent = guess.kind in ("other", "voltage") and guess.unit == "%"
-    command = percent or (guess.kind in ("other", "voltage") and guess.full_scale > 0)
-    kind, scale = ("voltage" if command else guess.kind), 1.0
-    kind_meant = KINDS[kind]
-    guessed = "" if guess.given and kind == guess.kind else "guessed: "
+    may_be_command = guess.kind in ("other", "voltage")
+    is_percent = may_be_command and guess.unit == "%"
+    is_scaled_command = is_percent or (may_be_command and guess.full_scale > 0)
+    kind = "voltage" if is_scaled_command else guess.kind
+    scale = 1.0
+    mark = "" if guess.is_stated and kind == guess.kind else "guessed: "
     lines = [
-        f'kind = "{kind}"    # {guessed}{kind_meant.meaning}',
+        f'kind = "{kind}"    # {mark}{KINDS[kind].meaning}',
         f"column = {toml_string(guess.name)}",
     ]
-    if percent:
+    if is_percent:
         scale = 0.1
         lines += ['unit = "V"', "scale = 0.1    # guessed: 100 % is taken as the 10 V of a card"]
-    elif command:
+    elif is_scaled_command:
         # rounded down, or the largest word would be beyond the 10 V that a card takes
         scale = floor(1e12 * 10.0 / guess.full_scale) / 1e12
-        why = f"guessed: 10 V over {guess.full_scale}, a PLC's word at full scale"
-        lines += ['unit = "V"', f"scale = {scale:.9g}    # {why}"]
+        reason = f"guessed: 10 V over {guess.full_scale}, a PLC's word at full scale"
+        lines += ['unit = "V"', f"scale = {scale:.9g}    # {reason}"]
     elif kind == "encoder_counts":
-        unknown = f"# counts_per_turn = 1000    # {FIXME}: per turn, quadrature included"
-        stated = f"counts_per_turn = {counts_per_turn or 0:.12g}"
-        lines.append(unknown if counts_per_turn is None else stated)
-        lines.append("gear_ratio = 1.0    # turns of the encoder per turn of the shaft")
+        lines += _encoder_lines(counts_per_turn)
     else:
         lines += _unit_lines(guess)
-    if guess.full_scale and not command:
-        why = f"range of the instrument over {guess.full_scale}, as of a PLC's word at full scale"
-        lines.append(f"scale = 1.0    # {FIXME}: {why}")
-    if size := guess.rolls_over_at:
-        lines.append(f"rolls_over_at = {size:.9g}    # guessed: wraps there")
-    if empty := sum(int(np.count_nonzero(~np.isfinite(part))) for part in blocks):
+    if guess.full_scale and not is_scaled_command:
+        reason = (
+            f"range of the instrument over {guess.full_scale}, as of a PLC's word at full scale"
+        )
+        lines.append(f"scale = 1.0    # {FIXME}: {reason}")
+    if guess.rolls_over_at:
+        lines.append(f"rolls_over_at = {guess.rolls_over_at:.9g}    # guessed: wraps there")
+    empty = sum(int(np.count_nonzero(~np.isfinite(part))) for part in blocks)
+    if empty:
         lines.append(f'missing = "drop"    # guessed: {empty} cells are empty')
-    neutral = next((x for part in blocks for x in part[np.isfinite(part)][:1].tolist()), 0.0)
+    neutral = _first_number(blocks)
     if neutral and guess.kind == "other":
-        why = "guessed: the first sample is neutral"
-        lines.append(f"offset = {-scale * neutral:.9g}    # {why}")
-    return lines + _accuracy_lines(kind, "V" if command else guess.unit)
+        reason = "guessed: the first sample is neutral"
+        lines.append(f"offset = {-scale * neutral:.9g}    # {reason}")
+    return lines + _accuracy_lines(kind, "V" if is_scaled_command else guess.unit)
+
+
+def _first_number(blocks: Sequence[Array]) -> float:
+    """The first finite number of the logs, 0 without one."""
+    for part in blocks:
+        finite = part[np.isfinite(part)]
+        if finite.size:
+            return float(finite[0])
+    return 0.0
+
+
+def _encoder_lines(counts_per_turn: float | None) -> list[str]:
+    """Entries of an encoder, whose counts for a turn stay open if they are not stated."""
+    counts = f"# counts_per_turn = 1000    # {FIXME}: per turn, quadrature included"
+    if counts_per_turn is not None:
+        counts = f"counts_per_turn = {counts_per_turn:.12g}"
+    return [counts, "gear_ratio = 1.0    # turns of the encoder per turn of the shaft"]
 
 
 def _accuracy_lines(kind: str, unit: str | None) -> list[str]:
-    """What is assumed of an instrument, as a comment that is easily made an entry."""
+    """Assumed accuracy of an instrument, as a comment that is easily made an entry."""
     assumed = ASSUMED.get(kind, Accuracy())
     limits = {"gain": assumed.gain, "zero": assumed.zero}
     if not any(limits.values()):
@@ -532,37 +575,72 @@ def _accuracy_lines(kind: str, unit: str | None) -> list[str]:
         return []
     limits["zero"] /= factor
     stated = ", ".join(f"{name} = {limit:.3g}" for name, limit in limits.items())
-    why = f"share of the reading, and {unit or KINDS[kind].units[0]}; assumed, see its data sheet"
-    return [f"# accuracy = {{ {stated} }}    # {why}"]
+    unit = unit or KINDS[kind].units[0]
+    meaning = f"share of the reading, and {unit}; assumed, see its data sheet"
+    return [f"# accuracy = {{ {stated} }}    # {meaning}"]
 
 
 def _unit_lines(signal: _Guess) -> list[str]:
     """The entry of a signal's unit, none if the header has it."""
     units = KINDS[signal.kind].units
-    usual = (*units, "1")[0]
+    usual = units[0] if units else "1"
     if signal.unit is not None and units and not _measures(signal.kind, signal.unit):
-        why = f"'{signal.unit}', as the header has it, is not a unit of a {signal.kind}"
-        return [f"unit = {toml_string(usual)}    # {FIXME}: {why}"]
+        reason = f"'{signal.unit}', as the header has it, is not a unit of a {signal.kind}"
+        return [f"unit = {toml_string(usual)}    # {FIXME}: {reason}"]
     if signal.in_header:
         return []
     if signal.unit is not None:
-        return [f"unit = {toml_string(signal.unit)}    # {signal.why}"]
+        return [f"unit = {toml_string(signal.unit)}    # {signal.unit_comment}"]
     if signal.rolls_over_at:
         usual = "deg"
-    elif signal.kind == "position" and re.fullmatch(rf"(?:.* )?(?:{ROD}){OF}", _words(signal.name)):
+    elif signal.kind == "position" and _is_rod(signal.name):
         usual = "mm"
     mark = FIXME if signal.kind in OPEN_UNITS else "guessed"
     return [f"unit = {toml_string(usual)}    # {mark}: the header gives none"]
 
 
-class _Run(NamedTuple):
-    """Entries of a run, and for each of its axes kind and direction, and size, of its maneuver."""
+def _is_rod(name: str) -> bool:
+    """Whether a column is called like the position of a rod."""
+    return bool(re.fullmatch(rf"(?:.* )?(?:{ROD}){COMPLEMENT}", _words(name)))
+
+
+def _unused_lines(
+    guesses: Sequence[_Guess],
+    axes: Mapping[str, _Axis],
+    log: Log,
+    counts_per_turn: float | None,
+) -> list[str]:
+    """Comments on columns of the first log, and on counts of a turn, that no entry uses."""
+    used = [guess for axis in axes.values() for guess in (*axis.inputs, *axis.channels.values())]
+    names = {column.name for column in log.columns} - {guess.name for guess in used}
+    unused = ", ".join(
+        guess.name for guess in guesses if guess.name in names and guess.kind != "time"
+    )
+    lines = list[str]()
+    if unused:
+        lines += [f"{UNUSED}: {unused}", ""]
+    if counts_per_turn is not None and all(guess.kind != "encoder_counts" for guess in used):
+        among = f" among {unused}" if unused else ""
+        lines += [f"{NO_ENCODER}{among}; counts_per_turn = {counts_per_turn:.12g} is left out", ""]
+    return lines
+
+
+# --- runs -----------------------------------------------------------------------------------------
+
+
+class _DraftedRun(NamedTuple):
+    """Entries of a run, and what its place among the others depends on."""
 
     file: str
+    """Value of the entry, and its comment."""
     role: str
-    more: list[str]
+    """Value of the entry, and its comment."""
+    entries: list[str]
+    """The lines after these two."""
     stratum: str = ""
+    """Kinds and directions of its maneuvers, axis by axis."""
     peak: float = 0.0
+    """Largest change of an input from its first sample. [unit of the input]"""
     written: float = 0.0
     """When its file was last written, in seconds since 1970. [s]"""
     duration: float | None = None
@@ -571,72 +649,78 @@ class _Run(NamedTuple):
     """When it begins, if its stamps are of a calendar. [s]"""
 
 
-def _run(
-    log: Log, read: Mapping[str, Array], axes: Mapping[str, _Axis], folder: Path, text: str
-) -> _Run:
-    """A run of a log that was read; ignored if the file could not be read with it.
+def _run_lines(
+    logs: Sequence[Log],
+    numbers: Sequence[Mapping[str, Array]],
+    axes: Mapping[str, _Axis],
+    folder: Path,
+    text: str,
+) -> list[str]:
+    """Lines of all runs, in the order of time; the lines of the file above them are the text."""
+    runs = list[_DraftedRun]()
+    stems = [log.path.stem for log in logs]
+    for log, columns in zip(logs, numbers, strict=True):
+        run = _drafted_run(log, columns, axes, folder, text)
+        if stems.count(log.path.stem) > 1:
+            # logs of one name in several folders, or formats
+            path = log.path.resolve()
+            run.entries.insert(0, f"name = {toml_string(f'{path.parent.name}/{path.name}')}")
+        runs.append(run)
+    held_back = _held_back([run for run in runs if run.role == '"fit"'])
+    runs, lines = _in_time(runs)
+    for run in runs:
+        role = '"validate"' if run is held_back else run.role
+        lines += ["[[runs]]", f"file = {run.file}", f"role = {role}", *run.entries, ""]
+    return lines
+
+
+def _drafted_run(
+    log: Log, columns: Mapping[str, Array], axes: Mapping[str, _Axis], folder: Path, text: str
+) -> _DraftedRun:
+    """Run of a log, with its columns of numbers; ignored if the file could not be read with it.
 
     The other lines of the file are the text.
     """
-    path, names = log.path.resolve(), {column.name for column in log.columns}
-    rows = max((column.size for column in read.values()), default=0)
-    empty = {name for name, values in read.items() if not np.isfinite(values).any()}
+    path = log.path.resolve()
     file = (path.relative_to(folder) if path.is_relative_to(folder) else path).as_posix()
-    tested, entries = dict[str, _Axis](), list[str]()
-    for name, axis in axes.items():
-        lacking = {key: e.name for key, e in axis.channels.items() if e.name not in names}
-        if all(e.name in names for e in axis.inputs[:1]) and (
-            not axis.channels or any(e.name in names - empty for e in axis.channels.values())
-        ):
-            tested[name] = axis
-            false = f"axes.{toml_key(name)}.channels.{{}} = false    # no column {{}}"
-            entries += [false.format(toml_key(k), toml_string(n)) for k, n in lacking.items()]
-    if tested and len(tested) < len(axes):
-        entries.insert(0, f"only = [{', '.join(map(toml_string, tested))}]")
-    written = path.stat().st_mtime
-    run = _Run(f"{toml_string(file)}    # {rows} samples", '"fit"', entries, written=written)
+    rows = max((column.size for column in columns.values()), default=0)
+    tested, entries = _tested_axes(log, columns, axes)
+    run = _DraftedRun(
+        file=f"{toml_string(file)}    # {rows} samples",
+        role='"fit"',
+        entries=entries,
+        written=path.stat().st_mtime,
+    )
     if not tested:
         return run._replace(role='"ignore"    # it has no input')
     if f'column = "{FIXME}"' in text:
         return run
-    with_counts = text.replace("# counts_per_turn = 1000", "counts_per_turn = 1000")
-    with_counts = with_counts.replace(NO_TIME, NO_TIME.lstrip("# "))
-    with_counts = "\n".join([with_counts, "[[runs]]", f"file = {run.file}", *entries])
     try:
-        content = validated(parse_toml(with_counts, "the draft"), CampaignFile, "the draft")
-        experiments, overview = read_run("the draft", "run", content.runs[0], content.axes, log)
+        experiments, overview = _trial_reading(log, run, text)
     except (FileError, InputError) as error:
         return run._replace(role=f'"ignore"    # {FIXME}: {error}')
-    said, stratum, peak, seen = run.file, "", 0.0, set[str]()
-    of_axis = [experiment for experiment in experiments if experiment.axis == experiments[0].axis]
     duration = float(experiments[-1].input.time[-1] - experiments[0].input.time[0])
     if overview is not None:
         duration = overview.end - overview.begin
+    comment = ""
     if NO_TIME not in text:
-        rate = 1.0 / float(np.median(np.diff(of_axis[0].input.time)))
-        said += f", {duration:.4g} s at {rate:.4g} Hz"
-        if overview is not None:
-            said += f", {len(of_axis)} of {len(overview.windows)} windows with motion used"
-        elif len(of_axis) > 1:
-            said += f" in {len(of_axis)} parts"
-    for unseen in (experiment for experiment in experiments if experiment.axis not in seen):
-        seen.add(unseen.axis)
-        said += f", {unseen.maneuver}" if unseen.input.kind == "voltage" else ""
-        if moves_at_first(unseen):
-            entries.append(
-                f"axes.{toml_key(unseen.axis)}.{ESTIMATED}    # guessed: it begins in motion"
-            )
-        away = unseen.input.values - unseen.input.values[0]
-        low, high = -float(away.min()), float(away.max())
-        two_sided = min(low, high) > 0.25 * max(low, high)
-        kind = unseen.recognised.kind if unseen.recognised else ""
-        direction = "up" if high > low else "down"
-        if two_sided:
-            direction = "two_sided"
-        stratum += f"{kind} {direction}, "
-        peak = max(peak, low, high)
+        comment = _sampling_words(experiments, overview, duration)
+    first_of_axis = dict[str, Experiment]()
+    for experiment in experiments:
+        first_of_axis.setdefault(experiment.axis, experiment)
+    stratum, peak = "", 0.0
+    for experiment in first_of_axis.values():
+        if experiment.input.kind == "voltage":
+            comment += f", {experiment.maneuver}"
+        if moves_at_first(experiment):
+            entry = f"axes.{toml_key(experiment.axis)}.{ESTIMATED}"
+            entries.append(f"{entry}    # guessed: it begins in motion")
+        deflection = _deflection(experiment)
+        kind = experiment.recognised.kind if experiment.recognised else ""
+        stratum += f"{kind} {deflection.direction}, "
+        peak = max(peak, deflection.peak)
     return run._replace(
-        file=said,
+        file=run.file + comment,
         stratum=stratum,
         peak=peak,
         duration=duration,
@@ -644,8 +728,82 @@ def _run(
     )
 
 
-def _in_time(runs: Sequence[_Run]) -> tuple[list[_Run], list[str]]:
-    """Runs in the order in which they were recorded, if clocks tell it, and lines on that.
+def _tested_axes(
+    log: Log, columns: Mapping[str, Array], axes: Mapping[str, _Axis]
+) -> tuple[list[str], list[str]]:
+    """Axes that a log tests, and entries that say which of them, and which channels it lacks.
+
+    It tests an axis if it has its input and any of its channels with a number in it.
+    """
+    names = {column.name for column in log.columns}
+    empty = {name for name, values in columns.items() if not np.isfinite(values).any()}
+    tested, entries = list[str](), list[str]()
+    for name, axis in axes.items():
+        channels = axis.channels.values()
+        has_input = not axis.inputs or axis.inputs[0].name in names
+        has_channel = not channels or any(guess.name in names - empty for guess in channels)
+        if not (has_input and has_channel):
+            continue
+        tested.append(name)
+        for key, guess in axis.channels.items():
+            if guess.name not in names:
+                entry = f"axes.{toml_key(name)}.channels.{toml_key(key)} = false"
+                entries.append(f"{entry}    # no column {toml_string(guess.name)}")
+    if tested and len(tested) < len(axes):
+        entries.insert(0, f"only = [{', '.join(map(toml_string, tested))}]")
+    return tested, entries
+
+
+def _trial_reading(
+    log: Log, run: _DraftedRun, text: str
+) -> tuple[Sequence[Experiment], Overview | None]:
+    """Experiments of a run as the drafted file has it, with entries in place of open ones."""
+    text = text.replace("# counts_per_turn = 1000", "counts_per_turn = 1000")
+    text = text.replace(NO_TIME, NO_TIME.lstrip("# "))
+    text = "\n".join([text, "[[runs]]", f"file = {run.file}", *run.entries])
+    content = validated(parse_toml(text, "the draft"), CampaignFile, "the draft")
+    return read_run("the draft", "run", content.runs[0], content.axes, log)
+
+
+def _sampling_words(
+    experiments: Sequence[Experiment], overview: Overview | None, duration: float
+) -> str:
+    """Duration [s] and rate of a run, and its parts, for the comment beside its file."""
+    of_axis = [experiment for experiment in experiments if experiment.axis == experiments[0].axis]
+    rate = 1.0 / float(np.median(np.diff(of_axis[0].input.time)))
+    words = f", {duration:.4g} s at {rate:.4g} Hz"
+    if overview is not None:
+        words += f", {len(of_axis)} of {len(overview.windows)} windows with motion used"
+    elif len(of_axis) > 1:
+        words += f" in {len(of_axis)} parts"
+    return words
+
+
+class _Deflection(NamedTuple):
+    """Change of an input from its first sample."""
+
+    direction: str
+    """``"up"``, ``"down"`` or ``"two_sided"``."""
+    peak: float
+    """[unit of the input]"""
+
+
+def _deflection(experiment: Experiment) -> _Deflection:
+    """Direction and peak of an experiment's input."""
+    change = experiment.input.values - experiment.input.values[0]
+    low, high = -float(change.min()), float(change.max())
+    larger = max(low, high)
+    if min(low, high) > TWO_SIDED * larger:
+        direction = "two_sided"
+    elif high > low:
+        direction = "up"
+    else:
+        direction = "down"
+    return _Deflection(direction, larger)
+
+
+def _in_time(runs: Sequence[_DraftedRun]) -> tuple[list[_DraftedRun], list[str]]:
+    """Runs in the order in which they were recorded, and a comment if no clock tells it.
 
     A log is written to its end. If files were written so far apart that none of their runs overlap,
     these are the times of a logger; those of copies lie closer together.
@@ -653,10 +811,10 @@ def _in_time(runs: Sequence[_Run]) -> tuple[list[_Run], list[str]]:
     read = [run for run in runs if run.duration is not None]
     if len(read) < 2 or all(run.recorded is not None for run in read):
         return sorted(runs, key=lambda run: run.recorded or inf), []
-    last_first = sorted(read, key=lambda run: run.written)
+    by_writing = sorted(read, key=lambda run: run.written)
     apart = all(
         later.written - (1.0 - OVERLAP) * (later.duration or 0.0) >= earlier.written
-        for earlier, later in pairwise(last_first)
+        for earlier, later in pairwise(by_writing)
     )
     if not apart:
         return [*runs], [UNORDERED, ""]
@@ -664,19 +822,19 @@ def _in_time(runs: Sequence[_Run]) -> tuple[list[_Run], list[str]]:
     return sorted(dated, key=lambda run: run.written), []
 
 
-def _dated(run: _Run) -> _Run:
-    """A run with the entry of when it was recorded, by its file."""
+def _dated(run: _DraftedRun) -> _DraftedRun:
+    """A run with the entry of when it was recorded, from the time of its file."""
     began = datetime.fromtimestamp(run.written - (run.duration or 0.0), UTC)
     words = began.isoformat(timespec="seconds").replace("+00:00", "Z")
     line = f"recorded = {words}    # guessed: time of writing of its file, minus its duration"
-    return run._replace(more=[line, *run.more])
+    return run._replace(entries=[line, *run.entries])
 
 
-def _held_back(fitted: Sequence[_Run]) -> _Run | None:
+def _held_back(fitted: Sequence[_DraftedRun]) -> _DraftedRun | None:
     """The run to validate with: the others have its kind, its direction and more than its size."""
-    largest = dict[str, _Run]()
+    largest = dict[str, _DraftedRun]()
     for run in fitted:
         if run.peak > largest.setdefault(run.stratum, run).peak:
             largest[run.stratum] = run
     others = [run for run in fitted if run is not largest[run.stratum]]
-    return others[-1] if others and len(fitted) >= MANY else None
+    return others[-1] if others and len(fitted) >= HELD_BACK_FROM else None

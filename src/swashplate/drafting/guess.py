@@ -3,7 +3,8 @@
 What a drive does between command and speed is, at first sight, a dead zone, a jump at its edge, a
 gain, a top speed and a greatest acceleration each way, one delay and one lag, and the creep at
 rest. `guess_drive` finds these by least squares on mean speeds, the creep from what moves while the
-command rests. All of it is where a fit begins (`starting_point`), not its result.
+command rests. All of it is where a fit begins (`starting_point`), not its result: the constants
+here are judgement, and a fit depends on them only by where its search begins.
 """
 
 from __future__ import annotations
@@ -15,9 +16,17 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.campaign import CURRENTS, Campaign, ChannelKind, Experiment, spiked
+from swashplate.campaign import CURRENTS, Campaign, Channel, ChannelKind, Experiment, spiked
 from swashplate.drafting.amplifier import AmplifierGuess, guess_amplifier
 from swashplate.drafting.mean_speeds import (
+    ACCELERATION,
+    DEAD_ZONE,
+    DELAY,
+    GAIN,
+    GAP,
+    JUMP,
+    LAG,
+    TOP_SPEED,
     WINDOW,
     MovingRun,
     moving_run,
@@ -34,9 +43,15 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 FEWEST = 40
-"""Mean speeds that tell anything."""
-REST, RESTS = 0.5, 4
-"""Length of the intervals in which a creep is looked for [s], and the fewest of them that tell."""
+"""Fewest mean speeds that a guess is made from, of the shortest windows."""
+FEWEST_SAMPLES = 8
+"""Up to so many used samples a channel does not count as one that measures a motion."""
+GREATEST = 0.99
+"""Quantile of the mean speeds' magnitudes that is taken for the greatest speed. [1]"""
+REST = 0.5
+"""Length of the intervals in which a creep is looked for. [s]"""
+RESTS = 4
+"""Fewest of these intervals that a creep is read from."""
 STILL = 0.01
 """Command that counts as none, over the largest one, whatever the dead zone. [1]"""
 LAGS_TO_REST = 5.0
@@ -45,17 +60,19 @@ FALSE_ALARM = 1e-3
 """Probability at which noise that is normal passes for a creep. [1]"""
 CREEPS = 0.002
 """Creep over the greatest speed that is none: zero errors of tachometers are as large. [1]"""
+MOTIONS: tuple[ChannelKind, ...] = ("shaft_speed", "encoder_counts", "position")
+"""Kinds of channel that measure a motion, the one to be preferred first."""
 
 
 class Guess(NamedTuple):
-    """What logs show at first sight; both ways of a pair as magnitudes, plus first."""
+    """Numbers of a drive, read off its logs; both ways of a pair as magnitudes, plus first."""
 
     def __repr__(self) -> str:
         return short(self)
 
     axis: str
     unit: str
-    """Of a speed, ``"rad/s"`` or ``"m/s"``."""
+    """Unit of a speed, ``"rad/s"`` or ``"m/s"``."""
     dead_zone: tuple[float, float]
     """[V]"""
     gain: tuple[float, float]
@@ -71,34 +88,35 @@ class Guess(NamedTuple):
     delay: float
     """[s]"""
     creep: float | None
-    """Speed at rest, with its sign; 0 if the logs show none, None where their rests are too
-    short or too few to show one. [unit]"""
+    """Speed at rest, with its sign; 0 if the logs show none, None if their rests are too short or
+    too few to show one. [unit]"""
     command: tuple[float, float]
     """Largest command; 0 for a way that was not tried, whose numbers are the other's. [V]"""
     speed: float
-    """Greatest mean speed. [unit]"""
+    """Greatest mean speed: the 0.99 quantile of their magnitudes. [unit]"""
     fit_percent: float
     """100 (1 - error's RMS over the mean speeds' standard deviation). [%]"""
     amplifier: AmplifierGuess | None = None
-    """What the current of the amplifier shows, None if no run measures one."""
+    """The amplifier's numbers, None if no run measures its current."""
 
 
-def _creep(runs: Sequence[MovingRun], numbers: Array, scale: float) -> float | None:
+def _creep(runs: Sequence[MovingRun], numbers: Array, speed: float) -> float | None:
     """Mean speed at rest beyond that of `numbers` (13,); 0 if it may be none, None without rests.
 
-    From intervals in which the command has lain in the dead zone for so long that a motion has come
-    to rest. Each is taken as one observation: the scatter of them has the noise, and what is left
-    of motions that end more slowly than the numbers say. The counts of an encoder may hide one at
-    both ends of a rest, or show one too many.
+    From intervals in which the command has lain in the dead zone for so long that a motion at the
+    greatest speed has come to rest. Each is taken as one observation: their scatter holds the
+    noise, and the rest of motions that end more slowly than the numbers say. The counts of an
+    encoder may hide one at both ends of a rest, or show one too many.
     """
     from scipy.special import stdtrit
 
-    dead_zones, accelerations, lag, delay = numbers[:2], numbers[6:8], numbers[10], numbers[12]
     largest = max(float(np.abs(run.command).max()) for run in runs)
     # a creep takes from the dead zone of one way what it gives to the other
-    still = max(0.5 * float(dead_zones.min()), STILL * largest)
-    settling = delay + LAGS_TO_REST * lag + scale / accelerations.min()
-    speeds, rounding = list[Array](), 0.0
+    still = max(0.5 * float(numbers[DEAD_ZONE].min()), STILL * largest)
+    stopping = speed / numbers[ACCELERATION].min()
+    settling = numbers[DELAY] + LAGS_TO_REST * numbers[LAG] + stopping
+    speeds = list[Array]()
+    rounding = 0.0
     for run in runs:
         simulated = simulated_course(run, numbers)
         for begin, end in _rests(run, still, settling):
@@ -112,17 +130,18 @@ def _creep(runs: Sequence[MovingRun], numbers: Array, scale: float) -> float | N
     mean = float(observed.mean())
     error = float(observed.std(ddof=1)) / sqrt(observed.size)
     quantile = float(stdtrit(observed.size - 1, 1.0 - 0.5 * FALSE_ALARM))
-    doubt = max(quantile * error + rounding / (REST * observed.size), CREEPS * scale)
+    doubt = max(quantile * error + rounding / (REST * observed.size), CREEPS * speed)
     return mean if abs(mean) > doubt else 0.0
 
 
 def _rests(run: MovingRun, still: float, settling: float) -> Iterable[tuple[float, float]]:
-    """Begin and end [s] of stretches at rest that were measured without a gap, settled ones."""
+    """Begin and end of each stretch that has settled to rest, measured without a gap. [s]"""
     resting = np.abs(run.command) <= still
     # a command that is held stays up to the next stamp
     until = np.append(run.stamps[1:], run.stamps[-1]) if run.is_held else run.stamps
     changes = np.flatnonzero(np.diff(np.concatenate([[0], resting.astype(np.int8), [0]])))
-    gaps = np.flatnonzero(np.diff(run.sampled) > 3.0 * float(np.median(np.diff(run.sampled))))
+    intervals = np.diff(run.sampled)
+    gaps = np.flatnonzero(intervals > GAP * float(np.median(intervals)))
     pieces = np.split(run.sampled, gaps + 1)
     for first, last in changes.reshape(-1, 2):
         for piece in pieces:
@@ -147,18 +166,48 @@ def guess_drive(tests: Campaign | Sequence[Experiment]) -> Guess:
         opposite to the command, a channel has gross spikes, or too little moves.
     """
     experiments = tests.select(role="fit") if isinstance(tests, Campaign) else tuple(tests)
-    runs, unit, spoilt = list[MovingRun](), "", spiked(experiments)
+    runs, unit = _moving_runs(experiments)
+    _check_length(runs, experiments)
+    speeds = np.concatenate([run.speeds for run in runs])
+    weights = np.concatenate([run.windows.weights for run in runs])
+    command = _largest_commands(runs)
+    speed = float(np.quantile(np.abs(speeds), GREATEST))
+    if not command.max() > 0.0 or speed == 0.0:
+        raise InputError("The command or the speed never leaves rest: there is nothing to guess.")
+    numbers = searched_numbers(runs, weights * speeds, command, speed, creep=0.0)
+    creep = _creep(runs, numbers, speed)
+    if creep:
+        # without it one dead zone was too wide, the other too narrow, and the gains made up for it
+        numbers = searched_numbers(runs, weights * speeds, command, speed, creep)
+    mean = np.average(speeds, weights=weights**2)
+    spread = np.sum(weights**2 * (speeds - mean) ** 2)
+    unexplained = np.sum(speed_errors(runs, numbers) ** 2) / spread
+    tried = command > 0.0
+    return Guess(
+        axis=experiments[0].axis,
+        unit=unit,
+        dead_zone=_both_ways(numbers[DEAD_ZONE], tried),
+        gain=_both_ways(numbers[GAIN], tried),
+        jump=_both_ways(numbers[JUMP], tried),
+        top_speed=_both_ways(numbers[TOP_SPEED], tried),
+        acceleration=_both_ways(numbers[ACCELERATION], tried),
+        lag=float(numbers[LAG]),
+        delay=round(float(numbers[DELAY]), 6),
+        creep=creep,
+        command=(float(command[0]), float(command[1])),
+        speed=speed,
+        fit_percent=100.0 * (1.0 - sqrt(unexplained)),
+        amplifier=guess_amplifier(experiments),
+    )
+
+
+def _moving_runs(experiments: Sequence[Experiment]) -> tuple[list[MovingRun], str]:
+    """Runs that measure a motion, and the unit of their speeds."""
+    spikes = spiked(experiments)
+    runs, unit = list[MovingRun](), ""
     reversed_runs = list[tuple[str, str]]()
-    kinds: tuple[ChannelKind, ...] = ("shaft_speed", "encoder_counts", "position")
     for experiment in experiments:
-        # the channel that tells how it moves: a speed before a position
-        moving = (
-            candidate
-            for kind in kinds
-            for candidate in experiment.of_kind(kind)
-            if candidate.used.sum() > 8
-        )
-        channel = next(moving, None)
+        channel = _motion_channel(experiment)
         if channel is None:
             continue
         if experiment.input.kind != "voltage":
@@ -168,68 +217,69 @@ def guess_drive(tests: Campaign | Sequence[Experiment]) -> Guess:
                 "that makes its full range ±10 V; an offset is added after scaling, in V."
             )
         for used in (channel, *experiment.of_kind(*CURRENTS)):
-            sentence, gross = spoilt.get((experiment.name, used.name), ("", False))
-            if gross:
+            sentence, is_gross = spikes.get((experiment.name, used.name), ("", False))
+            if is_gross:
                 raise InputError(f"{sentence}.")
         unit = f"{channel.unit}/s" if channel.is_position else channel.unit
-        runs.append(moving_run(experiment, channel))
-        if not goes_with_command(runs[-1]):
+        run = moving_run(experiment, channel)
+        runs.append(run)
+        if not goes_with_command(run):
             reversed_runs.append((experiment.name, channel.name))
     if 0 < len(reversed_runs) < len(runs):
-        run, name = reversed_runs[0]
+        run_name, channel_name = reversed_runs[0]
         raise InputError(
-            f"In {run} '{name}' moves opposite to the command, in other runs with it: reverse it "
-            "with "
-            'sign = -1 for this run, or leave the run out with role = "ignore".'
+            f"In {run_name} '{channel_name}' moves opposite to the command, in other runs with it: "
+            'reverse it with sign = -1 for this run, or leave the run out with role = "ignore".'
         )
-    speeds = np.concatenate([np.zeros(0), *(run.speeds for run in runs)])
+    return runs, unit
+
+
+def _motion_channel(experiment: Experiment) -> Channel | None:
+    """The channel that tells how a run moves, a speed before a position; None without one."""
+    for kind in MOTIONS:
+        for channel in experiment.of_kind(kind):
+            if channel.used.sum() > FEWEST_SAMPLES:
+                return channel
+    return None
+
+
+def _check_length(runs: Sequence[MovingRun], experiments: Sequence[Experiment]) -> None:
+    """Refuse runs that give no mean speeds, or too few."""
     weights = np.concatenate([np.zeros(0), *(run.windows.weights for run in runs)])
-    worth = float(np.sum(weights**2))
-    moving = (channel for run in experiments for channel in run.of_kind(*kinds))
-    if worth < FEWEST and any(channel.used.any() for channel in moving):
+    count = float(np.sum(weights**2))
+    motions = (channel for run in experiments for channel in run.of_kind(*MOTIONS))
+    if count < FEWEST and any(channel.used.any() for channel in motions):
         raise InputError(
-            f"The runs are too short to guess from: they give {worth:.0f} mean speeds of "
+            f"The runs are too short to guess from: they give {count:.0f} mean speeds of "
             f"{WINDOW:g} s, and at least {FEWEST} are needed."
         )
-    if not speeds.size:
+    if not weights.size:
         raise InputError(
             "No run measures a motion to guess from: it needs a channel of the kind shaft_speed, "
             "position or encoder_counts that is not ignored."
         )
+
+
+def _largest_commands(runs: Sequence[MovingRun]) -> Array:
+    """Largest command each way (2,), 0 for a way that is hardly exercised. [V]"""
     commands = np.concatenate([run.command for run in runs])
-    size = np.maximum([commands.max(), -commands.min()], 0.0)
-    size[size < ONE_WAY * size.max()] = 0.0
-    scale = float(np.quantile(np.abs(speeds), 0.99))
-    if not size.max() > 0.0 or scale == 0.0:
-        raise InputError("The command or the speed never leaves rest: there is nothing to guess.")
-    searched = searched_numbers(runs, weights * speeds, size, scale, 0.0)
-    creep = _creep(runs, searched, scale)
-    if creep:
-        # without it one dead zone was too wide, the other too narrow, and the gains made up for it
-        searched = searched_numbers(runs, weights * speeds, size, scale, creep)
-    mean = np.average(speeds, weights=weights**2)
-    unexplained = np.sum(speed_errors(runs, searched) ** 2) / np.sum(
-        weights**2 * (speeds - mean) ** 2
-    )
-    # numbers of a way that was not tried are the other's
-    pairs = searched[:10].reshape(5, 2)
-    pairs[:, size == 0.0] = pairs[:, size > 0.0][:, :1]
-    numbers = [(plus, minus) for plus, minus in [*pairs.tolist(), size.tolist()]]
-    dead_zone, gain, top_speed, acceleration, jump, command = numbers
-    return Guess(
-        *(experiments[0].axis, unit, dead_zone, gain, jump, top_speed, acceleration),
-        lag=float(searched[10]),
-        delay=round(float(searched[12]), 6),
-        creep=creep,
-        command=command,
-        speed=scale,
-        fit_percent=100.0 * (1.0 - sqrt(unexplained)),
-        amplifier=guess_amplifier(experiments),
-    )
+    largest = np.maximum([commands.max(), -commands.min()], 0.0)
+    largest[largest < ONE_WAY * largest.max()] = 0.0
+    return largest
+
+
+def _both_ways(pair: Array, tried: Mask) -> tuple[float, float]:
+    """Numbers of plus and minus; those of a way that was not tried are the other's."""
+    plus, minus = pair.tolist()
+    if not tried[0]:
+        plus = minus
+    elif not tried[1]:
+        minus = plus
+    return plus, minus
 
 
 def steady_speed(guess: Guess, side: int) -> float:
-    """Speed that settles under the largest command one way.
+    """Settled speed under the largest command one way.
 
     Parameters
     ----------
@@ -251,30 +301,29 @@ def steady_speed(guess: Guess, side: int) -> float:
 
 
 def guess_table(guess: Guess) -> Table:
-    """What was guessed, each way."""
-    columns = (Column(side, ".4g", none="not seen") for side in ("plus", "minus"))
-    table = Table(f"Axis {guess.axis}, first guess", (Column(""), *columns, UNIT))
+    """Table of a guess, a column for each way."""
+    columns = (
+        Column(""),
+        Column("plus", ".4g", none="not seen"),
+        Column("minus", ".4g", none="not seen"),
+        UNIT,
+    )
+    table = Table(f"Axis {guess.axis}, at first sight", columns)
     rows = (
         ("dead zone", guess.dead_zone, "V", ".3g"),
         ("gain beyond it", guess.gain, f"{guess.unit}/V", ""),
-        ("jump at its edge", tuple(jump or inf for jump in guess.jump), guess.unit, ""),
+        ("jump at its edge", (guess.jump[0] or inf, guess.jump[1] or inf), guess.unit, ""),
         ("top speed", guess.top_speed, guess.unit, ""),
         ("acceleration", guess.acceleration, f"{guess.unit}^2", ""),
     )
-    for name, values, unit, spec in rows:
-        cells = list[Cell | float | None]()
-        for column, (value, tried) in enumerate(zip(values, guess.command, strict=True)):
-            if not tried:
-                cells.append(Cell(None, "not tried"))
-            elif isfinite(value):
-                cells.append(value)
-            elif name == "top speed":
-                factor = display_unit(unit, steady_speed(guess, column)).factor
-                speed = f"{factor * steady_speed(guess, column):.3g}"
-                cells.append(Cell(None, f"at least {speed}, not seen"))
-            else:
-                cells.append(None)
-        table.add(name, *cells, unit=unit, spec=spec)
+    for name, (plus, minus), unit, spec in rows:
+        table.add(
+            name,
+            _guessed_cell(guess, 0, name, plus),
+            _guessed_cell(guess, 1, name, minus),
+            unit=unit,
+            spec=spec,
+        )
     table.add("delay", 1e3 * guess.delay, "", unit="ms", spec=".3g")
     table.add("lag", 1e3 * guess.lag, "", unit="ms", spec=".3g")
     creep: Cell | float = guess.creep or Cell(None, "not seen")
@@ -282,3 +331,16 @@ def guess_table(guess: Guess) -> Table:
         creep = Cell(None, "no long rest")
     table.add("creep at rest", creep, "", unit=guess.unit, spec=".3g")
     return table
+
+
+def _guessed_cell(guess: Guess, side: int, name: str, value: float) -> Cell | float | None:
+    """Cell of a way, 0 plus and 1 minus; an infinite value was not seen."""
+    if not guess.command[side]:
+        return Cell(None, "not tried")
+    if isfinite(value):
+        return value
+    if name == "top speed":
+        fastest = steady_speed(guess, side)
+        shown = display_unit(guess.unit, fastest).factor * fastest
+        return Cell(None, f"at least {shown:.3g}, not seen")
+    return None

@@ -1,4 +1,8 @@
-"""Mean speeds of a run, as they were measured and as a plain drive with a delay has them."""
+"""Mean speeds of a run, as they were measured and as a plain drive with a delay has them.
+
+The constants are judgement. A guess depends on them, and through it the start and the bounds of a
+first fit; a fit itself compares samples and uses none of them.
+"""
 
 from __future__ import annotations
 
@@ -29,18 +33,33 @@ STEP = 0.005
 BEFORE = 10.0
 """Time before a run for which its motion at first has lasted, longer than any delay. [s]"""
 WINDOW = 0.05
-"""Time over which mean speeds are compared, or two samples where these are farther apart. [s]"""
-FEW = 10.0
+"""Time over which mean speeds are compared, or two samples if these are farther apart. [s]"""
+FEW_COUNTS = 10.0
 """Counts in a window at the greatest speed below which an encoder's edges are joined by lines."""
 QUIET = 0.05
 """Noise of mean speeds over the greatest one, to which windows of a noisy position are widened."""
+SPEED_OVER = 0.5
+"""Time over which the greatest speed of a noisy position is taken. [s]"""
 EDGE = 0.01
 """Command over which a jump is complete, over the largest one: a sudden one would be felt by no
 small change of a dead zone, as marches go in steps. [1]"""
 FROM_START = np.append(np.zeros(12), 1.0)
-"""Of a position's derivatives by the numbers, and the position: what the first speed moves."""
+"""Of a position's derivatives by the first 12 numbers and of the position, which stands last, the
+one that the first speed moves: what was before the run goes into that one only."""
+GAP = 3.0
+"""Median intervals between two samples from which on they are a gap. [1]"""
 UNLIMITED = 1e30
 """Limit that is none, in the march."""
+
+# Positions of a drive's numbers (13,): the fields of `PlainDrive`, pairs plus first, and the delay.
+DEAD_ZONE = slice(0, 2)
+GAIN = slice(2, 4)
+TOP_SPEED = slice(4, 6)
+ACCELERATION = slice(6, 8)
+JUMP = slice(8, 10)
+LAG = 10
+CREEP = 11
+DELAY = 12
 
 
 class Course(NamedTuple):
@@ -51,23 +70,23 @@ class Course(NamedTuple):
     values: Array
     """(..., n)"""
 
-    def _cells(self, instants: Array) -> tuple[Any, Array]:
-        """In which of the n - 1 pieces instants (m,) lie, and the rates of change there."""
-        cells = np.searchsorted(self.time, instants, "right") - 1
-        cells = np.clip(cells, 0, self.time.size - 2)
-        rises = self.values[..., cells + 1] - self.values[..., cells]
-        return cells, rises / (self.time[cells + 1] - self.time[cells])
+    def _pieces(self, instants: Array) -> tuple[Any, Array]:
+        """Index of the piece, of n - 1, that each instant (m,) lies in, and its rate of change."""
+        pieces = np.searchsorted(self.time, instants, "right") - 1
+        pieces = np.clip(pieces, 0, self.time.size - 2)
+        rises = self.values[..., pieces + 1] - self.values[..., pieces]
+        return pieces, rises / (self.time[pieces + 1] - self.time[pieces])
 
     def at(self, instants: Array) -> Array:
-        """Positions (..., m) at instants (m,); before the first and after the last it stays."""
-        cells, rates = self._cells(instants)
-        since = np.clip(instants, self.time[0], self.time[-1]) - self.time[cells]
-        return np.asarray(self.values[..., cells] + since * rates)
+        """Positions (..., m) at instants (m,); constant before the first and after the last."""
+        pieces, rates = self._pieces(instants)
+        since = np.clip(instants, self.time[0], self.time[-1]) - self.time[pieces]
+        return np.asarray(self.values[..., pieces] + since * rates)
 
     def rate_at(self, instants: Array) -> Array:
         """Rates of change (..., m) at instants (m,)."""
         moving = (instants > self.time[0]) & (instants < self.time[-1])
-        return np.asarray(np.where(moving, self._cells(instants)[1], 0.0))
+        return np.asarray(np.where(moving, self._pieces(instants)[1], 0.0))
 
     def integral(self) -> Course:
         """Its integral from the first instant on."""
@@ -96,27 +115,27 @@ class Windows(NamedTuple):
 
     def mean_speeds(self, course: Course) -> Array:
         """Mean speeds (..., m) of a course."""
-        if not self.averaged:
-            return self._differences(course.at)
-        return self._differences(course.integral().at)
+        averaged = course.integral() if self.averaged else course
+        return self._differences(averaged.at)
 
     def mean_accelerations(self, course: Course) -> Array:
         """Rates of change (..., m) of mean speeds if a course is moved forward in time."""
         return self._differences(course.at if self.averaged else course.rate_at)
 
     def _differences(self, at: Callable[[Array], Array]) -> Array:
-        if not self.averaged:
-            first, last = at(self.begins), at(self.ends)
-        else:
-            first, last = (
-                (at(instants + self.averaged) - at(instants)) / self.averaged
-                for instants in (self.begins, self.ends)
-            )
+        """Differences over each window (..., m), of means over `averaged` if at is an integral."""
+
+        def mean_from(instants: Array) -> Array:
+            if not self.averaged:
+                return at(instants)
+            return (at(instants + self.averaged) - at(instants)) / self.averaged
+
+        first, last = mean_from(self.begins), mean_from(self.ends)
         return np.asarray((last - first) / (self.ends - self.begins))
 
-    def of(self, chosen: Mask) -> Windows:
-        """Some of them."""
-        return self._replace(begins=self.begins[chosen], ends=self.ends[chosen])
+    def at(self, mask: Mask) -> Windows:
+        """Those windows that a mask (m,) keeps."""
+        return self._replace(begins=self.begins[mask], ends=self.ends[mask])
 
 
 class MovingRun(NamedTuple):
@@ -134,28 +153,30 @@ class MovingRun(NamedTuple):
     is_held: bool
     """Whether the command is held between stamps, or a straight line."""
     start: float
+    """Speed that it begins with."""
     windows: Windows
     speeds: Array
+    """Measured mean speeds (m,) of the windows."""
     sampled: Array
     """Instants (j,) of the measured samples. [s]"""
     travelled: Array
     """Measured way (j,) since the first of them, of a speed its integral."""
     resolution: float
-    """Of the way, 0 if it is fine."""
+    """Resolution of the way, 0 if it is fine."""
 
 
 def _model(run: MovingRun, numbers: Array) -> tuple[Instance, RunValues]:
     """The plain drive with numbers, and the speed that it begins with."""
-    finite = PlainDrive(*np.minimum(numbers[:12], UNLIMITED).tolist())
+    finite = PlainDrive(*np.minimum(numbers[:DELAY], UNLIMITED).tolist())
     instance = instance_of(MODEL, finite, given=JumpWidth(run.edge))
     return instance, RunValues({"speed": run.start})
 
 
 def _delayed(run: MovingRun, positions: Array, start: Array | float, delay: float) -> Course:
-    """Positions (..., n) on the march's grid, as late as the delay [s], with what was before.
+    """Positions (..., n) on the march's grid, later by the delay [s], with the motion before it.
 
-    What comes out is delayed, so that the march meets its steps alike whatever the delay: else
-    errors had a minimum at every whole step.
+    The output is delayed and not the command, so that the march meets its steps alike whatever the
+    delay: else errors had a minimum at every whole step.
     """
     values = np.empty((*positions.shape[:-1], positions.shape[-1] + 1))
     values[..., 0] = -BEFORE * start
@@ -167,7 +188,7 @@ def simulated_course(run: MovingRun, numbers: Array) -> Course:
     """Position of a run; numbers (13,) are those of `PlainDrive`, and the delay."""
     instance, run_values = _model(run, numbers)
     positions = residuals(instance, run.observed, run_values)
-    return _delayed(run, positions, run.start, numbers[12])
+    return _delayed(run, positions, run.start, numbers[DELAY])
 
 
 def speed_errors(runs: Sequence[MovingRun], numbers: Array) -> Array:
@@ -185,7 +206,7 @@ def linearised_errors(runs: Sequence[MovingRun], numbers: Array) -> tuple[Array,
     for run in runs:
         instance, run_values = _model(run, numbers)
         derivatives = jacobian(instance, run.observed, PlainDrive._fields, run_values)
-        course = _delayed(run, derivatives.rows, run.start * FROM_START, numbers[12])
+        course = _delayed(run, derivatives.rows, run.start * FROM_START, numbers[DELAY])
         speeds = run.windows.mean_speeds(course)
         speeds[-1] -= run.speeds
         by_delay = -run.windows.mean_accelerations(course._replace(values=course.values[-1]))
@@ -195,43 +216,19 @@ def linearised_errors(runs: Sequence[MovingRun], numbers: Array) -> tuple[Array,
 
 
 def moving_run(experiment: Experiment, channel: Channel) -> MovingRun:
-    """What a guess needs of a run: its command, and the mean speeds that a channel measures."""
+    """Command of a run, and the mean speeds that a channel measures."""
     drive, used = experiment.input, channel.used
     time, values = channel.time[used], channel.values[used]
-    interval = float(np.median(np.diff(time)))
-    width = max(WINDOW, 2.0 * interval)
-    count = channel.resolution or 0.0
-    rows = round(width / interval)
-    fastest = np.abs(values[rows:] - values[:-rows]).max(initial=0.0)
-    travelled = values - values[0]
-    if not channel.is_position:
-        steps = 0.5 * (values[1:] + values[:-1]) * np.diff(time)
-        travelled = np.concatenate([[0.0], np.cumsum(steps)])
-    course = Course(time, travelled)
-    if count and fastest < FEW * count:
-        # a slow staircase shows a count in a window or none, whatever the speed between
-        course = _edges(time, values, count)
-        windows = _windows_between(course.time, width)
-    else:
-        if channel.kind == "position":
-            width = max(width, _quiet_width(time, values, interval))
-        begins = np.arange(time[0], time[-1] - 2.0 * width, width)
-        # all samples of a noisy position count, which a difference of two of them would lose
-        windows = Windows(begins, begins + width, averaged=width)
-    span = windows.begins, windows.ends + windows.averaged
-    inside = (span[0] >= drive.time[0]) & (span[1] <= drive.time[-1])
-    # windows across ignored samples or a gap tell of no speed
-    stamps = channel.time[used]
-    for gap in np.flatnonzero(np.diff(stamps) > 3.0 * interval):
-        inside &= (span[0] >= stamps[gap + 1]) | (span[1] <= stamps[gap])
-    windows = windows.of(inside)
+    travelled = _travelled(channel, time, values)
+    course, windows = _course_and_windows(channel, time, values, travelled)
+    windows = windows.at(_inside(windows, drive, time))
     speeds = windows.mean_speeds(course)
     grid = drive.time[0] + STEP * np.arange(np.ceil((drive.time[-1] - drive.time[0]) / STEP) + 1.0)
     is_held = drive.interpolation == "previous"
     # a straight line may cross a dead zone between two stamps
     stamps = np.append(drive.time, grid[-1]) if is_held else np.union1d(drive.time, grid)
-    start = 0.0 if experiment.start == "rest" or not speeds.size else float(speeds[0])
     command = drive.at(stamps)
+    begins_at_rest = experiment.start == "rest" or not speeds.size
     return MovingRun(
         observed=_observed(drive, grid, is_held),
         time=np.append(grid[0] - BEFORE, grid),
@@ -239,21 +236,61 @@ def moving_run(experiment: Experiment, channel: Channel) -> MovingRun:
         stamps=stamps,
         command=command,
         is_held=is_held,
-        start=start,
+        start=0.0 if begins_at_rest else float(speeds[0]),
         windows=windows,
         speeds=speeds,
         sampled=time,
         travelled=travelled,
-        resolution=count,
+        resolution=channel.resolution or 0.0,
     )
 
 
+def _travelled(channel: Channel, time: Array, values: Array) -> Array:
+    """Way (j,) since the first sample, of a speed its integral."""
+    if channel.is_position:
+        return np.asarray(values - values[0])
+    steps = 0.5 * (values[1:] + values[:-1]) * np.diff(time)
+    return np.concatenate([[0.0], np.cumsum(steps)])
+
+
+def _course_and_windows(
+    channel: Channel, time: Array, values: Array, travelled: Array
+) -> tuple[Course, Windows]:
+    """Measured way over time, and all windows in which its mean speeds are compared."""
+    interval = float(np.median(np.diff(time)))
+    width = max(WINDOW, 2.0 * interval)
+    count = channel.resolution or 0.0
+    rows = round(width / interval)
+    farthest = np.abs(values[rows:] - values[:-rows]).max(initial=0.0)
+    if count and farthest < FEW_COUNTS * count:
+        # a slow staircase shows a count in a window or none, whatever the speed between
+        edges = _edges(time, values, count)
+        return edges, _windows_between(edges.time, width)
+    if channel.kind == "position":
+        width = max(width, _quiet_width(time, values, interval))
+    begins = np.arange(time[0], time[-1] - 2.0 * width, width)
+    # all samples of a noisy position count, which a difference of two of them would lose
+    return Course(time, travelled), Windows(begins, begins + width, averaged=width)
+
+
+def _inside(windows: Windows, drive: InputSignal, time: Array) -> Mask:
+    """Which windows (m,) lie within the command and are not across a gap of the samples.
+
+    Windows across ignored samples or a gap tell of no speed.
+    """
+    begins, ends = windows.begins, windows.ends + windows.averaged
+    inside = (begins >= drive.time[0]) & (ends <= drive.time[-1])
+    intervals = np.diff(time)
+    for gap in np.flatnonzero(intervals > GAP * float(np.median(intervals))):
+        inside &= (begins >= time[gap + 1]) | (ends <= time[gap])
+    return np.asarray(inside)
+
+
 def _observed(drive: InputSignal, grid: Array, is_held: bool) -> ObservedRecord:
-    """The command on the march's grid, of each step its mean."""
+    """Mean command over each step of the march's grid."""
     stamps, values = drive.time, drive.values
-    middles = 0.5 * (values[1:] + values[:-1])
-    pieces = (values[:-1] if is_held else middles) * np.diff(stamps)
-    area = np.concatenate([[0.0], np.cumsum(pieces)])
+    means_between = values[:-1] if is_held else 0.5 * (values[1:] + values[:-1])
+    area = np.concatenate([[0.0], np.cumsum(means_between * np.diff(stamps))])
 
     def area_at(instants: Array) -> Array:
         before = np.clip(np.searchsorted(stamps, instants, "right") - 1, 0, stamps.size - 1)
@@ -267,7 +304,7 @@ def _observed(drive: InputSignal, grid: Array, is_held: bool) -> ObservedRecord:
 
 
 def _edges(time: Array, angle: Array, count: float) -> Course:
-    """Instants at which an encoder's reading changed [s], and the angles that it then had.
+    """Instants at which an encoder's reading changed [s], and the angle at each of them.
 
     A reading of k counts tells that the angle lies between k and k + 1, so that it is known when
     the reading changes, in both directions alike. A run without two changes stood still.
@@ -281,19 +318,21 @@ def _edges(time: Array, angle: Array, count: float) -> Course:
 
 def _windows_between(instants: Array, width: float) -> Windows:
     """Windows from one of the instants to the next that is at least a width later [s]."""
-    chosen = [0]
+    edges = [0]
     for index in range(1, instants.size):
-        if instants[index] - instants[chosen[-1]] >= width:
-            chosen.append(index)
-    return Windows(instants[chosen[:-1]], instants[chosen[1:]])
+        if instants[index] - instants[edges[-1]] >= width:
+            edges.append(index)
+    return Windows(instants[edges[:-1]], instants[edges[1:]])
 
 
 def _quiet_width(time: Array, position: Array, interval: float) -> float:
-    """Windows in which white noise of a position leaves 5 % of its greatest speed. [s]"""
+    """Width of windows in which white noise of a position is 5 % of its greatest speed. [s]"""
     # 20 = 1 + 9 + 9 + 1, of the squares of a third difference
     noise = float(np.median(np.abs(np.diff(position, 3)))) / (0.6745 * sqrt(20.0))
-    rough = max(round(0.5 / interval), 1)
-    moved = np.abs(position[rough:] - position[:-rough]) / (time[rough:] - time[:-rough])
-    fastest = float(moved.max(initial=0.0))
+    rows = max(round(SPEED_OVER / interval), 1)
+    speeds = np.abs(position[rows:] - position[:-rows]) / (time[rows:] - time[:-rows])
+    fastest = float(speeds.max(initial=0.0))
+    if not fastest:
+        return 0.0
     # of means over w/h samples the difference over w has the deviation noise √(2 h)/w^1.5
-    return (noise * sqrt(2.0 * interval) / (QUIET * fastest)) ** (2.0 / 3.0) if fastest else 0.0
+    return float((noise * sqrt(2.0 * interval) / (QUIET * fastest)) ** (2.0 / 3.0))

@@ -34,13 +34,14 @@ class PlainDrive(NamedTuple):
 
 
 class SpeedState(NamedTuple):
-    """State."""
+    """State of a plain drive."""
 
     speed: float
+    """[rad/s] or [m/s]"""
 
 
 class JumpWidth(NamedTuple):
-    """What a run gives."""
+    """Width of the jumps of a run: no parameter of the drive."""
 
     edge: float
     """Command over which a jump is complete. [V]"""
@@ -48,7 +49,7 @@ class JumpWidth(NamedTuple):
 
 @equation
 def speed_at(command: float, p: PlainDrive, given: JumpWidth) -> float:
-    """Speed that settles at a command."""
+    """Settled speed at a command in V."""
     plus = max(command - p.dead_zone_plus, 0.0)
     minus = max(-command - p.dead_zone_minus, 0.0)
     forward = p.gain_plus * plus + p.jump_plus * min(plus / given.edge, 1.0)
@@ -60,7 +61,7 @@ def speed_at(command: float, p: PlainDrive, given: JumpWidth) -> float:
 def step(
     state: SpeedState, command: float, p: PlainDrive, given: JumpWidth, h: float
 ) -> SpeedState:
-    """Speed after a step with a command."""
+    """Speed after a step of h seconds with a command in V."""
     share = 1.0 - exp(-h / max(p.lag, SHORTEST_LAG))
     change = share * (speed_at(command, p, given) - state.speed)
     return SpeedState(

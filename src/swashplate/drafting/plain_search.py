@@ -1,16 +1,30 @@
-"""The numbers of a plain drive with a delay that follow mean speeds best."""
+"""The numbers of a plain drive with a delay that follow mean speeds best.
+
+The search goes from a coarse grid to the optimum. Its constants are judgement: they decide from
+where it starts and which limits pass as seen. A fit that starts from the result depends on them
+only if the search ends in another minimum.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from itertools import product
 from math import inf, log
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.drafting.mean_speeds import (
+    ACCELERATION,
+    CREEP,
+    DEAD_ZONE,
+    DELAY,
+    GAIN,
+    JUMP,
+    LAG,
+    TOP_SPEED,
     MovingRun,
     linearised_errors,
     speed_errors,
@@ -21,81 +35,161 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 SEEN, NEXT_TO_NOTHING = 1.02, 1e-4
-"""A limit is not seen in the logs where the squared error without it is less than this much larger,
-nor by less than this share of all that moves. [1]"""
+"""A limit is not seen in the logs if the squared error without it is less than this many times as
+large, or larger by less than this share of the squares of all speeds. [1]"""
 ONE_WAY = 0.05
 """A way that gets less than this share of the command of the other is not exercised. [1]"""
 ROUGH = 0.05
 """Error over the greatest speed from which the squares of errors grow as their sizes. [1]"""
 JUMPS = (0.03, 0.12)
 """Jumps from which the search for one begins, over the greatest speed. [1]"""
-SEARCHED = [0, 1, 2, 3, 10, 12, 4, 5, 6, 7, 8, 9]
-"""Which of the 13 numbers each of what is searched for is of."""
-NONE = 30.0
-"""Logarithm of a limit, over the greatest speed, that is none. [1]"""
-LAGS, DELAYS, DEAD_ZONES = (0.02, 0.06, 0.2, 0.6), (0.0, 0.04, 0.12, 0.3), (0.02, 0.1, 0.25)
-"""Where the search begins; dead zones as shares of the largest command each way. [s], [s], [1]"""
+UNLIMITED_LOG = 30.0
+"""Logarithm, over the greatest speed, that stands for no limit. [1]"""
+LAGS = (0.02, 0.06, 0.2, 0.6)
+"""Lags from which the search begins: those of hydrostatic drives, within a factor of 2. [s]"""
+DELAYS = (0.0, 0.04, 0.12, 0.3)
+"""Delays from which the search begins. [s]"""
+DEAD_ZONES = (0.02, 0.1, 0.25)
+"""Dead zones from which the search begins, over the largest command each way. [1]"""
+
+# Positions in the vector of unknowns (12,); each pair plus first.
+X_DEAD_ZONE = slice(0, 2)
+"""Over the largest command each way. [1]"""
+X_GAIN = slice(2, 4)
+"""Logarithms, over the greatest speed for the largest command. [1]"""
+X_LAG = 4
+"""Logarithm of seconds."""
+X_DELAY = 5
+"""[s]"""
+X_LIMITS = slice(6, 10)
+"""Logarithms of top speeds, then of accelerations, over the greatest speed."""
+X_JUMP = slice(10, 12)
+"""Over the greatest speed. [1]"""
+UNKNOWNS = 12
+LIMITS = slice(TOP_SPEED.start, ACCELERATION.stop)
+"""Where the numbers (13,) of a drive have what `X_LIMITS` are logarithms of."""
+NUMBER_OF_UNKNOWN = [0, 1, 2, 3, LAG, DELAY, 4, 5, 6, 7, 8, 9]
+"""Index in the numbers (13,) of a drive that each unknown is of."""
 LOWEST = np.array([0.0, 0.0, -5.0, -5.0, log(0.002), 0.0, -1.5, -1.5, -2.0, -2.0, 0.0, 0.0])
+"""Lower bounds of the unknowns."""
 HIGHEST = np.array([0.95, 0.95, 7.0, 7.0, log(5.0), 1.0, 1.5, 1.5, 6.0, 6.0, 0.5, 0.5])
+"""Upper bounds of the unknowns."""
 TYPICAL = np.array([0.05, 0.05, 0.2, 0.2, 0.3, 0.02, 0.1, 0.1, 0.5, 0.5, 0.02, 0.02])
-"""Of what is searched for: dead zones over the largest command, logarithms of gains and of the lag,
-the delay [s], logarithms of top speeds and accelerations over the greatest speed, and jumps over
-it."""
+"""Sizes of the unknowns' steps, by which the search scales them."""
 
 
-def goes_with_command(run: MovingRun) -> bool:
-    """Whether a motion goes with its command at any of the delays from which the search begins."""
-    middle = 0.5 * (run.windows.begins + run.windows.ends + run.windows.averaged)
-    commands = (np.interp(middle - late, run.stamps, run.command) for late in DELAYS)
-    weighted = run.windows.weights**2 * run.speeds
-    return any(float(command @ weighted) >= 0.0 for command in commands)
+class _Detour(NamedTuple):
+    """Change of the unlimited drive from which the search for limits begins."""
+
+    dead_zone: float
+    """Over the largest command. [1]"""
+    gain: float
+    """Logarithm of a factor. [1]"""
+    lag: float
+    """Logarithm of a factor. [1]"""
 
 
-def searched_numbers(
-    runs: Sequence[MovingRun], weighted: Array, size: Array, scale: float, creep: float
-) -> Array:
-    """Numbers (13,) of least squares: a grid first, on which gains are linear, then all at once.
+DETOURS = (
+    _Detour(dead_zone=0.0, gain=0.0, lag=0.0),
+    _Detour(dead_zone=0.0, gain=0.0, lag=-1.5),
+    _Detour(dead_zone=0.0, gain=0.0, lag=-3.0),
+    _Detour(dead_zone=0.0, gain=0.7, lag=0.0),
+    _Detour(dead_zone=0.0, gain=0.7, lag=-1.5),
+    _Detour(dead_zone=0.0, gain=0.7, lag=-3.0),
+    _Detour(dead_zone=0.2, gain=0.0, lag=-1.5),
+    _Detour(dead_zone=0.2, gain=0.7, lag=-1.5),
+)
+"""A slow rise may be a lag or a limited acceleration, and less speed than a straight line has a
+larger dead zone or a top speed: from each of them the search ends at another minimum."""
 
-    From the weighted mean speeds (m,), the largest command each way (2,), the greatest speed and
-    the creep, which stays.
-    What the logs do not show is taken out in the end, and the rest goes to its optimum: with the
-    former in, the squares are so flat that a search ends anywhere along a valley.
-    """
-    from scipy.optimize import least_squares
 
-    tried, steepness = size > 0.0, scale / size.max()
+class _Descent(NamedTuple):
+    """End of a descent."""
 
-    def numbers_of(vector: Array) -> Array:
-        """From what is searched for (12,)."""
-        limits = np.exp(vector[6:10]) * scale
-        limits[vector[6:10] >= NONE] = inf
-        gain, last = np.exp(vector[2:4]) * steepness, [np.exp(vector[4]), creep, vector[5]]
-        return np.concatenate([vector[:2] * size, gain, limits, vector[10:12] * scale, last])
+    loss: float
+    unknowns: Array
+    """(12,)"""
 
-    def errors_of(vector: Array) -> Array:
-        return speed_errors(runs, numbers_of(vector)) / scale
 
-    def linearised(vector: Array) -> tuple[Array, Array]:
+class _GridPoint(NamedTuple):
+    """Gains of least squares at a lag, a delay and a dead zone."""
+
+    squared_error: float
+    unknowns: Array
+    """(12,)"""
+    gain: Array
+    """(2,) [speed/V]"""
+
+
+@dataclass(frozen=True)
+class _Search:
+    """Errors over the greatest speed, as functions of the vector of unknowns."""
+
+    runs: Sequence[MovingRun]
+    weighted: Array
+    """Weighted mean speeds (m,)."""
+    command: Array
+    """Largest command each way (2,), 0 for a way that is not exercised. [V]"""
+    speed: float
+    """The greatest one."""
+    creep: float
+    """Speed at rest, which stays."""
+
+    @property
+    def tried(self) -> Mask:
+        """Which ways (2,) are exercised."""
+        return np.asarray(self.command > 0.0)
+
+    @property
+    def steepness(self) -> float:
+        """The greatest speed for the largest command. [speed/V]"""
+        return float(self.speed / self.command.max())
+
+    def numbers(self, unknowns: Array) -> Array:
+        """Numbers (13,) of the drive."""
+        limits = np.exp(unknowns[X_LIMITS]) * self.speed
+        limits[unknowns[X_LIMITS] >= UNLIMITED_LOG] = inf
+        numbers = np.empty(13)
+        numbers[DEAD_ZONE] = unknowns[X_DEAD_ZONE] * self.command
+        numbers[GAIN] = np.exp(unknowns[X_GAIN]) * self.steepness
+        numbers[LIMITS] = limits
+        numbers[JUMP] = unknowns[X_JUMP] * self.speed
+        numbers[LAG] = np.exp(unknowns[X_LAG])
+        numbers[CREEP] = self.creep
+        numbers[DELAY] = unknowns[X_DELAY]
+        return numbers
+
+    def linearised(self, unknowns: Array) -> tuple[Array, Array]:
         """The errors (m,), and their derivatives (m, 12)."""
-        numbers = numbers_of(vector)
-        errors, by_number = linearised_errors(runs, numbers)
-        limits = np.where(vector[6:10] < NONE, numbers[4:8], 0.0)
-        factors = [size, numbers[2:4], numbers[10:11], np.ones(1), limits, np.full(2, scale)]
-        return errors / scale, by_number[:, SEARCHED] * (np.concatenate(factors) / scale)
+        numbers = self.numbers(unknowns)
+        errors, by_number = linearised_errors(self.runs, numbers)
+        number_by_unknown = np.empty(UNKNOWNS)
+        number_by_unknown[X_DEAD_ZONE] = self.command
+        number_by_unknown[X_GAIN] = numbers[GAIN]
+        number_by_unknown[X_LAG] = numbers[LAG]
+        number_by_unknown[X_DELAY] = 1.0
+        is_limited = unknowns[X_LIMITS] < UNLIMITED_LOG
+        number_by_unknown[X_LIMITS] = np.where(is_limited, numbers[LIMITS], 0.0)
+        number_by_unknown[X_JUMP] = self.speed
+        slopes = by_number[:, NUMBER_OF_UNKNOWN] * (number_by_unknown / self.speed)
+        return errors / self.speed, slopes
 
-    def loss_of(vector: Array) -> float:
-        """As `least_squares` has it with the loss "soft_l1"."""
-        rough = errors_of(vector) / ROUGH
+    def loss(self, unknowns: Array) -> float:
+        """The loss "soft_l1" of `least_squares`."""
+        errors = speed_errors(self.runs, self.numbers(unknowns)) / self.speed
+        rough = errors / ROUGH
         return ROUGH**2 * float(np.sum(np.sqrt(1.0 + rough**2) - 1.0))
 
-    def descended(start: Array, free: Mask, **options: Any) -> tuple[float, Array]:
-        """Loss and numbers after a descent in those that are free (12,)."""
+    def descend(self, start: Array, free: Mask, **options: Any) -> _Descent:
+        """Descend from a start (12,) in the unknowns that are free (12,)."""
+        from scipy.optimize import least_squares
+
         latest: dict[bytes, Array] = {}
 
         def errors_at(part: Array) -> Array:
-            searched = start.copy()
-            searched[free] = part
-            errors, slopes = linearised(searched)
+            unknowns = start.copy()
+            unknowns[free] = part
+            errors, slopes = self.linearised(unknowns)
             # nearly every step is taken: what is asked for next are the slopes there
             latest.clear()
             latest[part.tobytes()] = slopes[:, free]
@@ -118,66 +212,125 @@ def searched_numbers(
         )
         end = start.copy()
         end[free] = solution.x
-        return float(solution.cost), end
+        return _Descent(float(solution.cost), end)
 
-    def best(starts: Iterable[Array], free: Mask) -> tuple[float, Array]:
-        """Of many starts a few steps each, and only the best of them farther."""
-        first_legs = [descended(start, free, max_nfev=12) for start in starts]
-        first_legs.sort(key=lambda pair: pair[0])
-        return min(
-            (descended(vector, free, max_nfev=30) for _, vector in first_legs[:3]),
-            key=lambda pair: pair[0],
-        )
+    def best_from(self, starts: Iterable[Array], free: Mask) -> _Descent:
+        """Descend from many starts a few steps each, and farther from the best three only."""
+        first_legs = [self.descend(start, free, max_nfev=12) for start in starts]
+        first_legs.sort(key=lambda descent: descent.loss)
+        second_legs = [self.descend(leg.unknowns, free, max_nfev=30) for leg in first_legs[:3]]
+        return min(second_legs, key=lambda descent: descent.loss)
 
-    candidates: list[tuple[float, Array, Array]] = []
-    for lag, delay, share in product(LAGS, DELAYS, DEAD_ZONES):
-        numbers = np.array([*(share * size), 0.0, 0.0, *[inf] * 4, 0.0, 0.0, lag, creep, delay])
-        at_rest, slopes = linearised_errors(runs, numbers)
-        gain, left = np.zeros(2), slopes[:, 2:4][:, tried]
-        beyond_creep = weighted if creep == 0.0 else -at_rest
-        gain[tried] = np.linalg.lstsq(left, beyond_creep, rcond=None)[0]
-        cost = float(np.sum((left @ gain[tried] - beyond_creep) ** 2))
-        steep = np.log(np.maximum(gain, 1e-3 * steepness) / steepness)
-        dead = np.where(tried, share, 0.1)
-        vector = np.array([*dead, *steep, log(lag), delay, *[NONE] * 4, 0.0, 0.0])
-        candidates.append((cost, vector, gain))
-    candidates.sort(key=lambda candidate: candidate[0])
-    if (candidates[0][2][tried] <= 0.0).any():
+
+def goes_with_command(run: MovingRun) -> bool:
+    """Whether a motion goes with its command at any of the delays from which the search begins."""
+    middle = 0.5 * (run.windows.begins + run.windows.ends + run.windows.averaged)
+    commands = (np.interp(middle - delay, run.stamps, run.command) for delay in DELAYS)
+    weighted = run.windows.weights**2 * run.speeds
+    return any(float(command @ weighted) >= 0.0 for command in commands)
+
+
+def searched_numbers(
+    runs: Sequence[MovingRun], weighted: Array, command: Array, speed: float, creep: float
+) -> Array:
+    """Numbers (13,) of least squares: a grid first, on which gains are linear, then all at once.
+
+    From the weighted mean speeds (m,), the largest command each way (2,), the greatest speed and
+    the creep, which stays.
+    What the logs do not show is taken out in the end, and the rest goes to its optimum: with the
+    former in, the squares are so flat that a search ends anywhere along a valley.
+    """
+    search = _Search(runs, weighted, command, speed, creep)
+    free = np.ones(UNKNOWNS, dtype=bool)
+    for pair in (X_DEAD_ZONE, X_GAIN, slice(6, 8), slice(8, 10), X_JUMP):
+        free[pair] = search.tried
+    free_without_jump = free.copy()
+    free_without_jump[X_JUMP] = False
+    free_without_limits = free_without_jump.copy()
+    free_without_limits[X_LIMITS] = False
+
+    grid = _grid_points(search)
+    if (grid[0].gain[search.tried] <= 0.0).any():
         raise InputError(
             "The speed is opposite to the command: reverse it with sign = -1 in its channel."
         )
-    free = np.concatenate([tried, tried, [True, True], tried, tried, tried])
-    _, plain = best((vector for _, vector, _ in candidates[:3]), free & (np.arange(12) < 6))
-    # a slow rise may be a lag or a limited acceleration, and less speed than a straight line has a
-    # larger dead zone or a top speed: from each of them the search ends at another minimum
-    limited = plain.copy()
-    limited[6:10] = [0.0, 0.0, *[log(0.7) - plain[4]] * 2]
-    moves = [
-        *product((0.0,), (0.0, 0.7), (0.0, -1.5, -3.0)),
-        *product((0.2,), (0.0, 0.7), (-1.5,)),
-    ]
-    cost, searched = best(
-        (
-            limited + np.repeat([wider, steeper, quicker, 0.0], [2, 2, 1, 7])
-            for wider, steeper, quicker in moves
-        ),
-        free & (np.arange(12) < 10),
-    )
-    # the same line behind a larger dead zone
-    back = tried * size.max() / np.maximum(size, size.max() * ONE_WAY) / np.exp(searched[2:4])
-    smaller, jumping = best(
-        (searched + np.concatenate([jump * back, np.zeros(8), jump * tried]) for jump in JUMPS),
-        free,
-    )
-    if SEEN * smaller < cost:
-        cost, searched = smaller, jumping
-    # a limit or a jump that makes no difference was not met
-    seen = free.copy()
-    for index in range(6, 12):
-        without = searched.copy()
-        without[index] = NONE if index < 10 else 0.0
-        nothing = NEXT_TO_NOTHING * float(np.sum((weighted / scale) ** 2))
-        if loss_of(without) < SEEN * cost + nothing:
-            searched, seen[index] = without, False
-    _, searched = descended(searched, seen, xtol=1e-10, ftol=1e-12, gtol=1e-12)
-    return numbers_of(searched)
+    unlimited = search.best_from((point.unknowns for point in grid[:3]), free_without_limits)
+    best = search.best_from(_limited_starts(unlimited.unknowns), free_without_jump)
+    jumping = search.best_from(_jumping_starts(search, best.unknowns), free)
+    if SEEN * jumping.loss < best.loss:
+        best = jumping
+    seen, unknowns = _without_unseen(search, best, free)
+    optimum = search.descend(unknowns, seen, xtol=1e-10, ftol=1e-12, gtol=1e-12)
+    return search.numbers(optimum.unknowns)
+
+
+def _grid_points(search: _Search) -> list[_GridPoint]:
+    """Points of the grid, that of the least squared error first."""
+    points = list[_GridPoint]()
+    tried, steepness = search.tried, search.steepness
+    for lag, delay, share in product(LAGS, DELAYS, DEAD_ZONES):
+        numbers = np.zeros(13)
+        numbers[DEAD_ZONE] = share * search.command
+        numbers[LIMITS] = inf
+        numbers[LAG] = lag
+        numbers[CREEP] = search.creep
+        numbers[DELAY] = delay
+        at_rest, slopes = linearised_errors(search.runs, numbers)
+        by_gain = slopes[:, GAIN][:, tried]
+        beyond_creep = search.weighted if search.creep == 0.0 else -at_rest
+        gain = np.zeros(2)
+        gain[tried] = np.linalg.lstsq(by_gain, beyond_creep, rcond=None)[0]
+        squared_error = float(np.sum((by_gain @ gain[tried] - beyond_creep) ** 2))
+        unknowns = np.zeros(UNKNOWNS)
+        unknowns[X_DEAD_ZONE] = np.where(tried, share, 0.1)
+        unknowns[X_GAIN] = np.log(np.maximum(gain, 1e-3 * steepness) / steepness)
+        unknowns[X_LAG] = log(lag)
+        unknowns[X_DELAY] = delay
+        unknowns[X_LIMITS] = UNLIMITED_LOG
+        points.append(_GridPoint(squared_error, unknowns, gain))
+    points.sort(key=lambda point: point.squared_error)
+    return points
+
+
+def _limited_starts(unlimited: Array) -> list[Array]:
+    """Starts (12,) of the search for top speeds and accelerations, from the best without them."""
+    starts = list[Array]()
+    for detour in DETOURS:
+        start = unlimited.copy()
+        # the greatest speed was just reached, and 0.7 of the acceleration that the lag had
+        start[X_LIMITS] = [0.0, 0.0, log(0.7) - unlimited[X_LAG], log(0.7) - unlimited[X_LAG]]
+        start[X_DEAD_ZONE] += detour.dead_zone
+        start[X_GAIN] += detour.gain
+        start[X_LAG] += detour.lag
+        starts.append(start)
+    return starts
+
+
+def _jumping_starts(search: _Search, smooth: Array) -> list[Array]:
+    """Starts (12,) of the search for jumps: the same line beyond a larger dead zone."""
+    largest = search.command.max()
+    command = np.maximum(search.command, largest * ONE_WAY)
+    dead_zone_by_jump = search.tried * largest / command / np.exp(smooth[X_GAIN])
+    starts = list[Array]()
+    for jump in JUMPS:
+        start = smooth.copy()
+        start[X_DEAD_ZONE] += jump * dead_zone_by_jump
+        start[X_JUMP] += jump * search.tried
+        starts.append(start)
+    return starts
+
+
+def _without_unseen(search: _Search, best: _Descent, free: Mask) -> tuple[Mask, Array]:
+    """Which unknowns (12,) stay free, and their values (12,) with limits and jumps only if seen.
+
+    A limit or a jump that makes no difference was not met.
+    """
+    seen, unknowns = free.copy(), best.unknowns
+    next_to_nothing = NEXT_TO_NOTHING * float(np.sum((search.weighted / search.speed) ** 2))
+    for index in range(X_LIMITS.start, X_JUMP.stop):
+        without = unknowns.copy()
+        without[index] = UNLIMITED_LOG if index < X_LIMITS.stop else 0.0
+        if search.loss(without) < SEEN * best.loss + next_to_nothing:
+            unknowns = without
+            seen[index] = False
+    return seen, unknowns

@@ -1,4 +1,4 @@
-"""What a fit starts from: a guess as a parameter set, and a fit setup that frees it."""
+"""Start of a fit: a guess as a parameter set, and a fit setup that frees it."""
 
 from __future__ import annotations
 
@@ -19,9 +19,10 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 SHORTEST = 0.005
-"""Lag that a drive has at least. [s]"""
-TOLD = 0.01
-"""Lag that mean speeds tell from a delay: a fifth of their window, two steps of the march. [s]"""
+"""Shortest lag of a guessed drive: a step of the march of a guess, within which none shows. [s]"""
+DISTINGUISHED = 0.01
+"""Shortest lag that mean speeds distinguish from a delay: a fifth of their window, two steps of the
+march. [s]"""
 OFFSET = 0.1
 """Largest neutral offset of the spool, over its travel at the greatest speed that was seen. [1]"""
 ANGLE = 0.2
@@ -273,7 +274,7 @@ def _offset_line(guess: Guess, numbers: Mapping[str, float]) -> str:
 
 
 def _without_creep(guess: Guess) -> str:
-    """Why no creep is taken in."""
+    """Reason why no creep is taken in."""
     if guess.creep is None:
         return "the logs rest too seldom to show a creep"
     return "the logs show no creep at rest"
@@ -293,13 +294,14 @@ def _limit_lines(guess: Guess) -> list[str]:
 
 
 def _lag_line(guess: Guess, widest: float) -> str:
-    """The lag, up to so many times faster."""
-    if guess.lag > TOLD:
+    """Line that frees the lag, up to so many times faster than the guess."""
+    if guess.lag > DISTINGUISHED:
         return f"Z8 = {{ relative = [0.2, {widest}], log = true }}    # lag"
     # the acceleration is that of Z8 times Z16: without a lag nothing tells them apart
     return "# the lag is too short to be seen: Z8 stays fixed"
 
 
 def _limit_line(column: str, reach: tuple[float, float], words: str) -> str:
+    """Line that frees a limit, between two multiples of its guess."""
     low, high = reach
     return f"{column} = {{ relative = [{low}, {high}], log = true }}    # {words}"

@@ -71,7 +71,7 @@ estimates, and what the fit keeps of itself."""
 
 @dataclass(frozen=True, eq=False)
 class Identification(Estimated):
-    """What `identify` returns: a fitted drive or user-defined model, and what it is worth.
+    """Result of `identify`: a fitted drive or user-defined model, and what it is worth.
 
     Estimates are there by name. Intervals and verdict are computed when they are first asked for,
     or read from the folder that a result was loaded from.
@@ -367,7 +367,7 @@ class Identification(Estimated):
 
 
 def parts_of(result: Identification) -> list[tables.FitPart]:
-    """What a fit says besides its verdict, in the order in which the command prints it."""
+    """Sentences of a fit besides its verdict, in the order in which the command prints it."""
     fit = result.fit
     notes = [overview.sentence for overview in result.campaign.overviews]
     notes += [f"{run.name}: {sentence}." for run in fit.runs for sentence in run.notes]
@@ -431,7 +431,7 @@ def _seen_from(folder: Path, path: Path) -> str:
 
 
 def versions() -> dict[str, str]:
-    """Of this package and of Python."""
+    """Versions of this package and of Python."""
     return {"swashplate": __version__, "Python": platform.python_version()}
 
 
@@ -439,7 +439,7 @@ def versions() -> dict[str, str]:
 
 
 class StoredStage(FileTable):
-    """How a stage ended, and its starts."""
+    """End of a stage, and its starts."""
 
     name: str
     unknowns: tuple[Unknown, ...]
@@ -570,7 +570,7 @@ def _runs_of(path: Path, file: FitFile, campaign: Campaign) -> tuple[Experiment,
 def _nominal_of(
     path: Path, file: FitFile, model: ModelSetup | None, runs: Sequence[Experiment]
 ) -> Parameters:
-    """What a stored fit began from."""
+    """Start of a stored fit."""
     if isinstance(file.nominal, str):
         return read_set(file.nominal, str(path))
     if model is None:

@@ -90,13 +90,13 @@ OF_FORCES = ("Z19", "Z21")
 
 
 class Solved(NamedTuple):
-    """How a stage was solved."""
+    """Solution of a stage, and its starts."""
 
     problem: Problem
     """With its priors weighed."""
     solution: Solution
     starts: tuple[Solution, ...] = ()
-    """How each start ended, if there was more than one."""
+    """End of each start, if there was more than one."""
     intervals: tuple[Interval, ...] | None = None
     """What is known of each unknown's error, if it was computed before."""
 
@@ -345,7 +345,7 @@ def fit(
 
 
 class _Stated(NamedTuple):
-    """What is to be fitted, and what is doubtful about it."""
+    """Stages to be fitted, and doubts about them."""
 
     nominal: Parameters
     setup: FitSetup
@@ -422,7 +422,7 @@ def staged(
 
 
 def _instants_found(stage: StageFit) -> dict[tuple[str, str], Prior]:
-    """What a stage found of the instants of edges, by run and name."""
+    """Estimated instants of edges of a stage, by run and name."""
     unknowns = stage.problem.unknowns
     numbers = [k for k, unknown in enumerate(unknowns) if unknown.kind == "instant"]
     if not numbers:
@@ -576,7 +576,7 @@ def _is_hopeless(problem: Problem, vector: Array) -> bool:
 def _no_fit(
     stage: Stage, problem: Problem, starts: int, share: float, doubts: Sequence[str]
 ) -> str:
-    """That no search comes near what was measured, and what to look at."""
+    """Sentence that no search comes near the measurements, and on what to look at."""
     channels, percentage = listed(problem.channels), 100.0 * max(share, 0.0)
     best = f"the best of {starts} starts" if starts > 1 else "the search"
     sentence = (

@@ -130,7 +130,7 @@ def identify(
     >>> result.verdict.usable
     True
     """
-    _check_numbers(
+    _check_counts(
         starts=0 if starts is None else starts,
         folds=folds,
         seed=seed,
@@ -202,9 +202,9 @@ def identify(
     return identification
 
 
-def _check_numbers(**numbers: object) -> None:
-    """Refuse what is not a whole number of 0 or more, of evaluations of 1 or more."""
-    for name, number in numbers.items():
+def _check_counts(**counts: object) -> None:
+    """Refuse counts that are not whole numbers of 0 or more, of evaluations of 1 or more."""
+    for name, number in counts.items():
         least = 1 if name == "max_evaluations" else 0
         if not isinstance(number, int | np.integer) or isinstance(number, bool) or number < least:
             raise InputError(
@@ -218,8 +218,8 @@ def only_axis(campaign: Campaign, axis: str | None) -> str:
         campaign.select(axis=axis)
         return axis
     if len(campaign.axes) > 1:
-        known = ", ".join(campaign.axes)
-        raise InputError(f"{campaign.path} has the axes {known}; name one of them as the axis.")
+        axes = ", ".join(campaign.axes)
+        raise InputError(f"{campaign.path} has the axes {axes}; name one of them as the axis.")
     return next(iter(campaign.axes))
 
 
@@ -273,9 +273,9 @@ def _stated(
 def _check_profiles(result: Fit, profiles: Sequence[str]) -> None:
     """Refuse names of profiles that the fit does not estimate."""
     unknowns = [unknown for stage in result.stages for unknown in stage.problem.unknowns]
-    known = [unknown.label for unknown in unknowns]
+    labels = [unknown.label for unknown in unknowns]
     for name in profiles:
-        if name != "all" and name not in known:
+        if name != "all" and name not in labels:
             machine = ", ".join(unknown.label for unknown in unknowns if unknown.run is None)
             raise InputError(f"There is no parameter '{name}'; there are {machine}.")
 

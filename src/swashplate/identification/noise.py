@@ -40,8 +40,8 @@ class Covariance(Result):
     @property
     def standard_errors(self) -> Array:
         """(K,) of the solver's numbers; inf where undetermined, 0 for one at its bound."""
-        known = self.determined | ~self.variables.free
-        return np.where(known, np.sqrt(np.maximum(np.diag(self.matrix), 0.0)), np.inf)
+        has_error = self.determined | ~self.variables.free
+        return np.where(has_error, np.sqrt(np.maximum(np.diag(self.matrix), 0.0)), np.inf)
 
     @property
     def quantiles(self) -> Array:
@@ -61,20 +61,27 @@ class Covariance(Result):
 
 
 def covariance_of(fit: LinearisedFit, matrix: Array, freedom: Array) -> Covariance:
-    """A covariance from a matrix, cleared of what the fit does not determine."""
-    known = np.outer(fit.determined, fit.determined)
+    """A covariance from a matrix (K, K); entries of undetermined unknowns are 0."""
+    determined = np.outer(fit.determined, fit.determined)
     symmetric = 0.5 * (matrix + matrix.T)
-    return Covariance(fit.variables, np.where(known, symmetric, 0.0), fit.determined, freedom)
+    return Covariance(
+        variables=fit.variables,
+        matrix=np.where(determined, symmetric, 0.0),
+        determined=fit.determined,
+        degrees_of_freedom=freedom,
+    )
 
 
 # --- correlation over time ------------------------------------------------------------------------
 
-LONGEST, DRIFTING = 0.25, 0.3
-"""Longest lag looked at, as a part of the longest run: beyond it too few pairs are left; and the
-correlation length, as a part of that lag, from which it is a model error."""
-IN_A_ROW, STRAY = 5, 0.2
-"""Lags in a row that must lie inside their band where a correlation is said to end, and the share
-of those that follow that may lie outside."""
+LONGEST = 0.25
+"""Longest lag looked at, over the longest run: beyond it too few pairs remain. [1]"""
+DRIFTING = 0.3
+"""Correlation length, over that lag, from which it is a model error. [1]"""
+IN_A_ROW = 5
+"""Lags in a row that must lie inside their band for a correlation to end."""
+STRAY = 0.2
+"""Share of the lags after them that may lie outside. [1]"""
 SAME_STEP = 0.01
 """Relative difference of two runs' sampling steps below which they are treated as one."""
 
@@ -160,7 +167,7 @@ def correlation_length(autocovariance: Array, counts: Array) -> int:
 
 @dataclass(frozen=True, eq=False)
 class NoiseColour(Result):
-    """How the residuals of one channel are correlated, from all its runs of one sampling step."""
+    """Correlation of the residuals of one channel, from all its runs of one sampling step."""
 
     channel: str
     members: tuple[int, ...]
@@ -303,9 +310,11 @@ class _Pooled:
     def __init__(self, frequencies: list[Array], powers: list[Array], left: list[Array]) -> None:
         ends = np.cumsum([frequency.size for frequency in frequencies])[:-1]
         order = np.argsort(np.concatenate(frequencies), kind="stable")
-        seen, rest = np.concatenate(powers)[order], np.concatenate(left)[order]
+        power = np.concatenate(powers)[order]
+        remaining = np.concatenate(left)[order]
+        smoothed_remaining = np.maximum(_smoothed(remaining), LEAST_LEFT * NEIGHBOURS)
         shape = np.empty(order.size)
-        shape[order] = _smoothed(seen) / np.maximum(_smoothed(rest), LEAST_LEFT * NEIGHBOURS)
+        shape[order] = _smoothed(power) / smoothed_remaining
         self.shapes = np.split(shape, ends)
         """(F,) of each run, in units of its level."""
         count = max(order.size // NEIGHBOURS, 1)
@@ -315,11 +324,11 @@ class _Pooled:
         self.bins = np.split(number, ends)
         """(F,) of each run, the number of the bin of neighbours that each frequency lies in."""
         sizes = np.diff(np.append(first, order.size))
-        rest = np.maximum(np.add.reduceat(rest, first), LEAST_LEFT * sizes)
-        self.means = np.add.reduceat(seen, first) / rest
+        in_bins = np.maximum(np.add.reduceat(remaining, first), LEAST_LEFT * sizes)
+        self.means = np.add.reduceat(power, first) / in_bins
         """(B,) of each bin."""
-        self.squares = np.add.reduceat(seen**2, first) / rest**2
-        """(B,) of each bin, sums of the squares of what its mean is the sum of."""
+        self.squares = np.add.reduceat(power**2, first) / in_bins**2
+        """(B,) of each bin, sums of the squares of the terms whose sum its mean is."""
 
 
 class _Sandwich:
@@ -349,19 +358,20 @@ class _Sandwich:
         matrix = whitening @ self.middle @ whitening.T
         freedom = np.full_like(self.total, without)
         shared = self.fit.variables.shared
-        some = self.squares > 0.0
-        np.divide(each * self.total**2, self.squares, out=freedom, where=some)
+        np.divide(each * self.total**2, self.squares, out=freedom, where=self.squares > 0.0)
         by_direction = np.linalg.pinv(inverse.machine)
-        variances, unsure = np.diag(matrix), 1.0 / np.maximum(freedom[shared], 1.0)
+        variances = np.diag(matrix)
+        by_freedom = 1.0 / np.maximum(freedom[shared], 1.0)
         for run, (_, _, follow) in inverse.runs.items():
             own = inverse.factor.runs[run].own
             others = np.maximum(variances[own] - self.total[own], 0.0)
             # by each of the machine's unknowns, as if they were independent of each other
             shares = (follow @ by_direction) ** 2 * variances[shared]
             shares /= np.maximum(shares.sum(axis=1, keepdims=True), 1e-300)
-            squares = self.squares[own] + each * others**2 * (shares**2 @ unsure)
-            total, known = self.total[own] + others, squares > 0.0
-            freedom[own[known]] = each * total[known] ** 2 / squares[known]
+            squares = self.squares[own] + each * others**2 * (shares**2 @ by_freedom)
+            total = self.total[own] + others
+            positive = squares > 0.0
+            freedom[own[positive]] = each * total[positive] ** 2 / squares[positive]
         return covariance_of(self.fit, matrix, np.maximum(freedom, 1.0))
 
 
@@ -400,17 +410,21 @@ def band_score_covariance(fit: LinearisedFit) -> Covariance:
 
 
 def _covariances(fit: LinearisedFit) -> tuple[Covariance, Covariance]:
-    """By the smoothed spectrum and by scores of bands: in two passes over the runs."""
+    """Covariances by the smoothed spectrum and by scores of bands, in two passes over the runs."""
     smoothed, banded = _Sandwich(fit), _Sandwich(fit)
-    pooled = _pooled(fit)
-    runs = {channel: iter(zip(p.shapes, p.bins, strict=True)) for channel, p in pooled.items()}
-    shared = {c: np.zeros((fit.variables.shared.size, p.means.size)) for c, p in pooled.items()}
+    pooled = _pooled_spectra(fit)
+    shapes_and_bins = {}
+    shared = {}
+    for channel, noise in pooled.items():
+        shapes_and_bins[channel] = iter(zip(noise.shapes, noise.bins, strict=True))
+        shared[channel] = np.zeros((fit.variables.shared.size, noise.means.size))
     for run, spectrum in zip(fit.runs, _spectra(fit), strict=True):
-        noise, (shape, bins) = pooled[run.channel], next(runs[run.channel])
+        noise = pooled[run.channel]
+        shape, bins = next(shapes_and_bins[run.channel])
         derivatives, directions = spectrum.derivatives, spectrum.directions
         density = spectrum.level * shape * spectrum.twice
         smoothed.add(directions, ((derivatives.conj() * density) @ derivatives.T).real)
-        # what a unit of the noise's shape in each bin adds to the variances
+        # contribution of a unit of the noise's shape in each bin to the variances
         weights = spectrum.variances(derivatives) * (spectrum.level * spectrum.twice)
         first = np.flatnonzero(np.diff(bins, prepend=-1))
         weights, bins = np.add.reduceat(weights, first, axis=1), bins[first]
@@ -424,7 +438,8 @@ def _covariances(fit: LinearisedFit) -> tuple[Covariance, Covariance]:
         band = (spectrum.frequencies / width).astype(np.intp)
         scores = np.add.reduceat(products, np.flatnonzero(np.diff(band, prepend=-1)), axis=1)
         banded.add(directions, 0.5 * (scores.conj() @ scores.T).real)
-        parts, columns = 0.5 * spectrum.variances(scores), fit.variables.columns(run.name)
+        parts = 0.5 * spectrum.variances(scores)
+        columns = fit.variables.columns(run.name)
         banded.total[columns] += parts.sum(axis=1)
         banded.squares[columns] += np.sum(parts**2, axis=1)
     for channel, noise in pooled.items():
@@ -433,8 +448,8 @@ def _covariances(fit: LinearisedFit) -> tuple[Covariance, Covariance]:
     return smoothed.covariance(4.0, np.inf), banded.covariance(2.0, 1.0)
 
 
-def _pooled(fit: LinearisedFit) -> dict[str, _Pooled]:
-    """The noise of each channel."""
+def _pooled_spectra(fit: LinearisedFit) -> dict[str, _Pooled]:
+    """The noise spectrum of each channel."""
     parts: dict[str, tuple[list[Array], list[Array], list[Array]]] = {}
     for run, spectrum in zip(fit.runs, _spectra(fit), strict=True):
         frequencies, powers, left = parts.setdefault(run.channel, ([], [], []))
@@ -453,21 +468,23 @@ def _smoothed(values: Array) -> Array:
 
 
 def coloured_noise_covariance(fit: LinearisedFit) -> Covariance:
-    """Covariance to quote.
+    """Covariance that intervals are quoted from.
 
     The larger of two errors, unknown by unknown: a smoothed spectrum knows the noise well but takes
     it as alike all along a run; scores by bands take in noise that is not, but are few. Both take
     the machine for the same in all runs (see `effects.RunToRun`).
     """
     smoothed, banded = _covariances(fit)
-    return _widened(smoothed, _ratio(banded, smoothed), banded.degrees_of_freedom)
+    return _widened(smoothed, _variance_ratio(banded, smoothed), banded.degrees_of_freedom)
 
 
-def _ratio(one: Covariance, other: Covariance) -> Array:
-    """(K,) variances over those of another covariance; 0 if either is not known."""
-    ratio = np.zeros(one.determined.size)
-    known = one.determined & (one.standard_errors > 0.0) & (other.standard_errors > 0.0)
-    np.divide(np.diag(one.matrix), np.diag(other.matrix), out=ratio, where=known)
+def _variance_ratio(covariance: Covariance, reference: Covariance) -> Array:
+    """(K,) variances over those of a reference; 0 if either is not known."""
+    ratio = np.zeros(covariance.determined.size)
+    has_both = covariance.standard_errors > 0.0
+    has_both &= reference.standard_errors > 0.0
+    has_both &= covariance.determined
+    np.divide(np.diag(covariance.matrix), np.diag(reference.matrix), out=ratio, where=has_both)
     return ratio
 
 

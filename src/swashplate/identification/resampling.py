@@ -56,7 +56,7 @@ class CrossValidation(Result):
 
     seed: int
     planned: int
-    """How many folds there were to be."""
+    """Number of folds that were to be fitted."""
     folds: tuple[Fold, ...]
     measures: Mapping[str, Measures]
     """Measures of each channel over all runs, each predicted by a fit that did not see it."""
@@ -68,28 +68,28 @@ class CrossValidation(Result):
         return folds_tables(self)
 
     def sentences(self) -> tuple[str, ...]:
-        """What must be known besides the numbers."""
-        said = []
+        """Sentences on folds that are missing, did not converge or depend on the runs held out."""
+        sentences = list[str]()
         if len(self.folds) < self.planned:
-            said.append(f"Interrupted: {len(self.folds)} of {self.planned} folds were fitted.")
+            sentences.append(f"Interrupted: {len(self.folds)} of {self.planned} folds were fitted.")
         for fold in self.folds:
             name = f"Fold {fold.number + 1} (without {', '.join(fold.held)})"
             if fold.failure:
-                said.append(f"{name} could not be fitted: {fold.failure}")
+                sentences.append(f"{name} could not be fitted: {fold.failure}")
             elif not fold.converged:
-                said.append(f"{name} did not converge.")
+                sentences.append(f"{name} did not converge.")
             if fold.lost:
-                said.append(
+                sentences.append(
                     f"{name} loses {', '.join(fold.lost)}, on which no other run depends: its "
                     "prediction is not reliable."
                 )
-        return tuple(said)
+        return tuple(sentences)
 
 
-def folds_tables(found: CrossValidation, stages: Sequence[StageFit] = ()) -> list[Table]:
+def folds_tables(result: CrossValidation, stages: Sequence[StageFit] = ()) -> list[Table]:
     """Errors held out, beside those of the fit to all runs if its stages are given; the folds."""
     fitted_columns = "tpf" if stages else ""
-    whole = pooled(with_speeds(quality for stage in stages for quality in stage.runs))
+    of_all_runs = pooled(with_speeds(quality for stage in stages for quality in stage.runs))
     held_out = Table(
         "Cross-validation: each part predicted by a fit to the others",
         (
@@ -102,8 +102,8 @@ def folds_tables(found: CrossValidation, stages: Sequence[StageFit] = ()) -> lis
             Column("samples", ",d", "1", of="pf"),
         ),
     )
-    for name, predicted in found.measures.items():
-        fitted = whole[name].rmse if name in whole else None
+    for name, predicted in result.measures.items():
+        fitted = of_all_runs[name].rmse if name in of_all_runs else None
         held_out.add(
             name,
             predicted.fit_percent,
@@ -111,11 +111,11 @@ def folds_tables(found: CrossValidation, stages: Sequence[StageFit] = ()) -> lis
             fitted,
             predicted.rmse / fitted if fitted else None,
             predicted.samples,
-            unit=found.units[name],
+            unit=result.units[name],
         )
     columns = (Column("fold", "d"), Column("held out", wrap=True), Column("fit to the others"))
     folds = Table("Folds", (*columns, Column("fit % of those held out")))
-    for fold in found.folds:
+    for fold in result.folds:
         state = "converged" if fold.converged else "not converged"
         if fold.failure:
             state = "not fitted"

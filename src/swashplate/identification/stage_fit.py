@@ -1,4 +1,4 @@
-"""What a stage of a fit found: plain data, below all that judges it.
+"""Result of a stage of a fit: plain data, below all that judges it.
 
 What follows from it alone is there as an attribute. What it is worth are functions of a stage, each
 in the file of its subject: `intervals.uncertainty_of`, `determination.identifiability_of`,
@@ -22,7 +22,7 @@ from swashplate.identification.estimation.stages import Parameters
 from swashplate.identification.validation import RunQuality, run_qualities
 from swashplate.results import Result
 
-Found = TypeVar("Found")
+Outcome = TypeVar("Outcome")
 Status = Literal[
     "estimated",
     "at its lower bound",
@@ -38,7 +38,7 @@ estimated forces, ``"fixed"`` is what no stage moved."""
 
 
 class Interval(NamedTuple):
-    """What is known of the error of an estimate."""
+    """Status, standard error and interval of an estimate."""
 
     status: Status
     standard_error: float | None = None
@@ -50,7 +50,7 @@ class Interval(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class StageFit(Result):
-    """What one stage found: its problem, the optimum, and the parameters with it.
+    """Result of one stage: its problem, the optimum, and the parameters with it.
 
     Its estimates with their intervals are those of `estimates_of`; `uncertainty_of` and
     `identifiability_of` say what they rest on.
@@ -62,7 +62,7 @@ class StageFit(Result):
     parameters: Parameters
     """The drive, or the user-defined model, with what was found."""
     starts: tuple[Solution, ...] = ()
-    """How each start ended, if there was more than one."""
+    """End of each start, if there was more than one."""
     earlier: tuple[StageFit, ...] = field(default=(), repr=False)
     """The stages before, whose results this one takes for granted."""
     stored: tuple[Interval, ...] | None = field(default=None, repr=False)
@@ -94,8 +94,8 @@ class StageFit(Result):
         return run_qualities(self.problem, self.solution.vector)
 
 
-def once_per_stage(analysis: Callable[[StageFit], Found]) -> Callable[[StageFit], Found]:
-    """A function of a stage that is computed when it is first asked for, and then kept.
+def once_per_stage(analysis: Callable[[StageFit], Outcome]) -> Callable[[StageFit], Outcome]:
+    """Cache an analysis of a stage with the stage: it is computed on its first call.
 
     Verdict, tables, report and files ask for the same analyses, which take seconds. They are kept
     with the stage, so that they go when it goes, and go with it to other processes: some refer to
@@ -104,9 +104,9 @@ def once_per_stage(analysis: Callable[[StageFit], Found]) -> Callable[[StageFit]
     key = f"{analysis.__module__}.{analysis.__qualname__}"
 
     @wraps(analysis)
-    def kept(stage: StageFit) -> Found:
+    def cached_analysis(stage: StageFit) -> Outcome:
         if key not in stage._analyses:
             stage._analyses[key] = analysis(stage)
-        return cast("Found", stage._analyses[key])
+        return cast("Outcome", stage._analyses[key])
 
-    return kept
+    return cached_analysis

@@ -61,9 +61,10 @@ def estimates_table(
     meant, instead of those of the machine.
     """
     unknowns = stage.problem.unknowns
-    known = "" if truth is None else "tpf"
+    # in terminal, page and file, or nowhere
+    truth_shown_in = "" if truth is None else "tpf"
     ends = f"{100.0 * LEVEL:g} %"
-    made = Table(
+    table = Table(
         f"Stage {stage.stage.name}",
         (
             Column("stage", of="f"),
@@ -73,8 +74,8 @@ def estimates_table(
             Column("nominal", ".5g"),
             Column("estimate", ".5g", key="value"),
             Column("change", "s", of="p"),
-            Column("truth", ".5g", of=known),
-            Column("holds", of=known),
+            Column("truth", ".5g", of=truth_shown_in),
+            Column("holds", of=truth_shown_in),
             Column(f"lower {ends}", ".5g", none=NONE, key="lower"),
             Column(f"upper {ends}", ".5g", none=NONE, key="upper"),
             Column("half width", "s", of="p"),
@@ -100,7 +101,7 @@ def estimates_table(
         if true is not None and (low, high) != (None, None):
             inside = (-inf if low is None else low) <= true <= (inf if high is None else high)
             holds = "yes" if inside else "no"
-        made.add(
+        table.add(
             stage.stage.name,
             estimate.name,
             meaning_of(unknown, stage),
@@ -118,7 +119,7 @@ def estimates_table(
             unit=unknown.unit,
             look=estimate.status != "estimated",
         )
-    return made
+    return table
 
 
 def _half_width(value: float, low: float | None, high: float | None) -> str:
@@ -162,7 +163,7 @@ def profiles_table(profiles: Sequence[Profile], stages: Sequence[StageFit]) -> T
 
 
 def estimates_by_name(stages: Sequence[StageFit]) -> dict[str, Estimate]:
-    """What a fit says of every number: what each stage estimated, then what stayed fixed.
+    """Every number of a fit by its name: the estimates of each stage, then what stayed fixed.
 
     A parameter that is tied in both directions is there by its symbol and by both columns.
     """
@@ -199,11 +200,11 @@ MEANINGS: Mapping[Kind, str] = {
     "start current": "current of the card at the first sample",
     "instant": "instant of the command's jump, after the middle of both samples",
 }
-"""What unknowns of single runs are, in words."""
+"""Meanings of unknowns of single runs."""
 
 
 def meaning_of(unknown: Unknown, stage: StageFit) -> str:
-    """What an unknown is, in words; empty if nothing is known of it."""
+    """Meaning of an unknown, in words; empty if it has none."""
     if unknown.kind == "parameter":
         # names of a user-defined model are its own
         return "" if stage.stage.part == "model" else meaning_of_parameter(unknown.name)
@@ -218,7 +219,7 @@ def meaning_of(unknown: Unknown, stage: StageFit) -> str:
 
 
 def meaning_of_parameter(name: str) -> str:
-    """What a parameter is, by its symbol or column; empty if there is none such."""
+    """Meaning of a parameter, by its symbol or column; empty if there is no such parameter."""
     definition = CATALOGUE.get(COLUMNS.get(name, name))
     if definition is None:
         return ""
@@ -310,7 +311,7 @@ def unvalued_lines(stages: Sequence[StageFit]) -> list[str]:
 
 
 def scales_words(fit: StageFit) -> str:
-    """What one unit of residual is, channel by channel."""
+    """Sentence on the unit of the residuals of each channel."""
     parts = []
     for name, size in fit.problem.scales.items():
         having = next(run for run in fit.problem.experiments if name in run.channels)
@@ -380,7 +381,7 @@ def _measures(measures: Measures) -> tuple[float | None, ...]:
 
 
 def start_words(experiment: Experiment) -> str:
-    """How a run's initial state comes about."""
+    """Source of a run's initial state, in words."""
     if experiment.start == "given" and experiment.start_pressure is not None:
         return f"given, {1e-5 * experiment.start_pressure:.4g} bar"
     return "pressure estimated" if experiment.start == "estimated" else experiment.start

@@ -71,8 +71,8 @@ class ResidualTest(Result):
     @property
     def peak(self) -> tuple[float, float]:
         """Lag of the largest correlation [s], and its value."""
-        place = int(np.argmax(np.abs(self.correlation)))
-        return float(self.lags[place]), float(self.correlation[place])
+        index = int(np.argmax(np.abs(self.correlation)))
+        return float(self.lags[index]), float(self.correlation[index])
 
     @property
     def follows(self) -> bool:
@@ -81,14 +81,13 @@ class ResidualTest(Result):
 
     @property
     def verdict(self) -> str:
-        """Both in words."""
-        (lag, value), own = self.peak, "are white"
-        if self.duration:
-            own = f"stay correlated over {self.duration:.2g} s"
+        """Correlation of the residuals with themselves and with the input, in a sentence."""
+        lag, value = self.peak
+        colour = f"stay correlated over {self.duration:.2g} s" if self.duration else "are white"
         if not self.follows:
-            return f"The residuals {own} and do not follow the input."
+            return f"The residuals {colour} and do not follow the input."
         return (
-            f"The residuals {own} and follow the input (correlation {value:+.2f}, {lag:+.2g} s "
+            f"The residuals {colour} and follow the input (correlation {value:+.2f}, {lag:+.2g} s "
             "after it): the model leaves out something that the input causes."
         )
 
@@ -118,12 +117,13 @@ def residual_test(
     most = max(int(LONGEST * grid.size), 1)
     shown = min(most, max(int(longest / grid.step), 1))
     residual, command = residual - residual.mean(), command - command.mean()
-    own, counts = _autocorrelation(residual, grid, most)
-    length = correlation_length(own, counts)
+    of_residual, counts = _autocorrelation(residual, grid, most)
+    of_command, _ = _autocorrelation(command, grid, most)
+    length = correlation_length(of_residual, counts)
     # beyond the residuals' own length their estimated correlation is chance
-    kept = slice(1, max(length, 1) + 1)
-    theirs, _ = _autocorrelation(command, grid, most)
-    inflation = max(1.0, 1.0 + 2.0 * float(own[kept] @ theirs[kept]))
+    lags_within = slice(1, max(length, 1) + 1)
+    products_of_both = float(of_residual[lags_within] @ of_command[lags_within])
+    inflation = max(1.0, 1.0 + 2.0 * products_of_both)
     band = min(DEVIATIONS * float(np.sqrt(inflation / time.size)), 1.0)
     lags, correlation = np.arange(-shown, shown + 1.0) * grid.step, np.zeros(2 * shown + 1)
     scale = float(np.linalg.norm(residual) * np.linalg.norm(command))
@@ -198,7 +198,7 @@ def measures(*runs: tuple[Array, Array, Array | None]) -> Measures:
 
 @dataclass(frozen=True, eq=False)
 class RunQuality(Result):
-    """How well one channel of one run is simulated."""
+    """Errors of the simulation of one channel of one run."""
 
     experiment: Experiment
     channel: str
@@ -208,7 +208,7 @@ class RunQuality(Result):
     test: ResidualTest | None
     """None where there are too few samples."""
     noise: float = 0.0
-    """Of a speed made from a position: standard deviation that the position's noise has in it.
+    """Standard deviation of a position's noise in a speed made from it.
     [unit of the channel]"""
 
     @property

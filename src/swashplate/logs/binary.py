@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from swashplate.errors import FileError
-from swashplate.logs.log import Array, check_kind, printable, said, split_unit
+from swashplate.logs.log import Array, check_kind, first_sentence, printable, split_unit
 
 
 class _Item(NamedTuple):
@@ -37,7 +37,9 @@ class _Item(NamedTuple):
 def look(
     reader: str, path: Path, requested: Sequence[int] = (), first: int = 0, last: int | None = None
 ) -> tuple[dict[str, Any], list[Array]]:
-    """What a file holds, as `Log` has it, and the columns at some places, from a row to a last one.
+    """Contents of a file, as `Log` has them, and columns at some positions.
+
+    The columns begin at the row `first` and end before the row `last`; None is the end.
 
     The reader is one of `FORMATS`, or MATLAB of any version. Of a damaged file it raises
     whatever its library does.
@@ -118,21 +120,14 @@ def _parquet(path: Path) -> Iterator[Iterable[_Item]]:
     import polars as pl
 
     stored = pl.scan_parquet(path)
-    rows, kinds = int(stored.select(pl.len()).collect().item()), stored.collect_schema()
-    dated = {name for name, kind in kinds.items() if kind.is_temporal()}
-    numbers = dated | {
-        name for name, kind in kinds.items() if kind.is_numeric() or kind == pl.Boolean
-    }
-    yield (
-        _Item(
-            name,
-            "" if name in numbers else f"it is of the type {kind}",
-            "s" if name in dated else split_unit(name)[1],
-            rows,
-            partial(_parquet_rows, stored.select(name)),
-        )
-        for name, kind in kinds.items()
-    )
+    rows = int(stored.select(pl.len()).collect().item())
+    items = list[_Item]()
+    for name, kind in stored.collect_schema().items():
+        holds_numbers = kind.is_temporal() or kind.is_numeric() or kind == pl.Boolean
+        reason = "" if holds_numbers else f"it is of the type {kind}"
+        unit = "s" if kind.is_temporal() else split_unit(name)[1]
+        items.append(_Item(name, reason, unit, rows, partial(_parquet_rows, stored.select(name))))
+    yield items
 
 
 def _parquet_rows(column: Any, first: int, last: int | None) -> Any:
@@ -163,7 +158,7 @@ _UNITS = ("unit", "units", "Unit", "Units", "UNIT", "UNITS")
 _OBJECTS = 100_000  # in one file
 
 
-def _signals(
+def _vectors(
     name: str, array: Any, form: str, units: Sequence[str] = (), reverse: bool = False
 ) -> Iterator[_Item]:
     """Vectors of an array, the longer dimension being time.
@@ -171,40 +166,54 @@ def _signals(
     `form` is how its language writes an index: ``"({})"`` of MATLAB, which counts from 1,
     ``"[{}]"`` of HDF5. In `reverse` its dimensions are stored the other way round.
     """
-    shape, kind = array.shape[::-1] if reverse else array.shape, array.dtype.kind
-    reason = "" if kind in "iufb" else _KINDS.get(kind, "it is not an array of numbers")
-    reason = reason or ("it is empty" if 0 in shape else "")
-    if not reason and len(shape) > 2:
-        reason = f"it has {len(shape)} dimensions"
-    axis, count = None, 1
-    if len(shape) == 2 and 1 not in shape:
-        axis, count = (1, shape[1]) if shape[0] >= shape[1] else (0, shape[0])
-        if count > _MOST and not reason:
-            reason = f"it is a matrix of {shape[0]} by {shape[1]}"
+    shape = array.shape[::-1] if reverse else array.shape
+    reason = _why_no_vectors(shape, array.dtype.kind)
     if reason:
         yield _Item(name, reason)
         return
-    unit_texts = (
-        list(units) if len(units) == count else [*units[:1], split_unit(name)[1]][:1] * count
-    )
-    for i in range(count):
-        suffix, along = "", None
-        if axis is not None:
-            suffix = form.format(("{},:", ":,{}")[axis].format(i + (form[0] == "(")))
-            along = 1 - axis if reverse else axis
-        rows = max(shape, default=1)
-        yield _Item(name + suffix, "", unit_texts[i], rows, partial(_vector, array, along, i))
+    rows = max(shape, default=1)
+    if len(shape) < 2 or 1 in shape:
+        unit = units[0] if units else split_unit(name)[1]
+        yield _Item(name, "", unit, rows, partial(_vector, array, None, 0))
+        return
+    # the axis of the vectors' numbers, the shorter one
+    axis = 1 if shape[0] >= shape[1] else 0
+    stored_axis = 1 - axis if reverse else axis
+    first_index = 1 if form.startswith("(") else 0
+    for number in range(shape[axis]):
+        index = number + first_index
+        suffix = form.format(f":,{index}" if axis == 1 else f"{index},:")
+        if len(units) == shape[axis]:
+            unit = units[number]
+        else:
+            unit = units[0] if units else split_unit(name)[1]
+        yield _Item(name + suffix, "", unit, rows, partial(_vector, array, stored_axis, number))
+
+
+def _why_no_vectors(shape: Sequence[int], kind: str) -> str:
+    """Reason for which an array of a shape and a kind of NumPy's holds no vectors, or empty."""
+    if kind not in "iufb":
+        return _KINDS.get(kind, "it is not an array of numbers")
+    if 0 in shape:
+        return "it is empty"
+    if len(shape) > 2:
+        return f"it has {len(shape)} dimensions"
+    if len(shape) == 2 and min(shape) > _MOST:
+        return f"it is a matrix of {shape[0]} by {shape[1]}"
+    return ""
 
 
 def _vector(array: Any, axis: int | None, number: int, first: int, last: int | None) -> Any:
-    """A vector of an array of NumPy or HDF5, along an axis by its number; None: it is one."""
+    """Vector of an array of NumPy or HDF5, by its number along an axis; None: the array is one."""
     rows = slice(first, last)
     if not isinstance(array, np.ndarray):
         _check_stored(array)
     if axis is not None:
         return array[(rows, number) if axis else (number, rows)]
-    # a vector of n by 1 or 1 by n, or a single number
-    return array[tuple(rows if size > 1 else 0 for size in array.shape) if array.size > 1 else ...]
+    if array.size <= 1:
+        return array[...]
+    # a vector of n by 1 or 1 by n
+    return array[tuple(rows if size > 1 else 0 for size in array.shape)]
 
 
 @contextmanager
@@ -217,7 +226,7 @@ def _matlab(path: Path) -> Iterator[Iterable[_Item]]:
             for field, inner in value.items():
                 yield from items(f"{name}.{printable(field)}", inner)
         else:
-            yield from _signals(name, np.asarray(value), "({})")
+            yield from _vectors(name, np.asarray(value), "({})")
 
     variables = loadmat(path, appendmat=False, simplify_cells=True).items()
     named = (variable for variable in variables if not variable[0].startswith("__"))
@@ -246,17 +255,17 @@ def _hdf5_items(dataset: Any, name: str | None = None, form: str = "[{}]") -> It
         if dataset.is_virtual or dataset.external:
             reason = reason or "its numbers are in other files"
         stated: Any = next((dataset.attrs[key] for key in _UNITS if key in dataset.attrs), [])
-        units = [_text(number) for number in np.ravel(stated).tolist()]
-        signals = list(_signals(name, dataset, form, units, reverse=form == "({})"))
+        units = [_decoded(number) for number in np.ravel(stated).tolist()]
+        signals = list(_vectors(name, dataset, form, units, reverse=form == "({})"))
         yield from [_Item(name, reason)] if reason else signals
     except (TypeError, ValueError) as error:  # a type that NumPy does not have
-        yield _Item(name, said(error))
+        yield _Item(name, first_sentence(error))
 
 
 def _matlab73_items(dataset: Any) -> Iterator[_Item]:
-    """Of MATLAB 7.3, whose dimensions are stored the other way round."""
+    """Items of a dataset of MATLAB 7.3, whose dimensions are stored the other way round."""
     name = dataset.name.strip("/").replace("/", ".")
-    kind = _text(dataset.attrs.get("MATLAB_class", "double"))
+    kind = _decoded(dataset.attrs.get("MATLAB_class", "double"))
     numbers = kind in ("single", "logical", "double") or kind.lstrip("u").startswith("int")
     if name.startswith("#"):
         return  # what cells and objects refer to
@@ -268,7 +277,8 @@ def _matlab73_items(dataset: Any) -> Iterator[_Item]:
         yield from _hdf5_items(dataset, name, "({})")
 
 
-def _text(value: object) -> str:
+def _decoded(value: object) -> str:
+    """Text of an attribute, which may be stored as bytes."""
     return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
 
 
@@ -303,7 +313,7 @@ def _capytaine(path: Path) -> Iterator[Iterable[_Item]]:
     except Exception as error:  # at a broken byte the library and its objects raise all there is
         raise FileError(
             f"{path} is not a file of netCDF 4 with an array RAO over complex, {', '.join(_AXES)}, "
-            f"with their coordinates and the parts re and im: {said(error)}."
+            f"with their coordinates and the parts re and im: {first_sentence(error)}."
         ) from None
     yield (
         _Item(name, "", None, values.size, partial(_some, values))
@@ -467,4 +477,4 @@ FORMATS: dict[str, tuple[Callable[[Path], AbstractContextManager[Iterable[_Item]
     "TDMS": (_tdms, "channels"),
     "MDF 4": (_mdf, "channels"),
 }
-"""What opens a file of each format and says what it holds, and a word for that."""
+"""For each format the function that opens a file and lists its items, and a word for these."""

@@ -7,7 +7,6 @@ import csv
 import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Literal, NamedTuple
@@ -56,7 +55,7 @@ class TextOptions:
     __pydantic_config__: ClassVar[Any] = {"extra": "forbid"}
 
     def __post_init__(self) -> None:
-        """Check them."""
+        """Refuse options that make no sense."""
         mark = "," if self.delimiter is None else _NAMED.get(self.delimiter, self.delimiter)
         wrong = ""
         if len(mark) != 1 or not mark.isascii() or mark in '\r\n"\0':
@@ -76,8 +75,10 @@ class TextOptions:
 
     @property
     def marks(self) -> tuple[str, ...]:
-        """What comment lines begin with."""
-        return _COMMENTS if self.comment is None else tuple(filter(None, [self.comment]))
+        """Beginnings of comment lines."""
+        if self.comment is None:
+            return _COMMENTS
+        return (self.comment,) if self.comment else ()
 
 
 # --- encoding -------------------------------------------------------------------------------------
@@ -93,7 +94,7 @@ _CONTROL = re.compile(r"[\x00-\x08\x0e-\x19\x1b-\x1f\x7f]")
 def encoding_of(path: Path, stated: str | None) -> tuple[str, int]:
     """Name of a text file's encoding, and the bytes of its byte-order mark.
 
-    By default it is what a byte-order mark says, or UTF-8, or else Latin-1.
+    By default it is that of the byte-order mark, or UTF-8, or else Latin-1.
     """
     with path.open("rb") as file:
         head = file.read(1 << 16)
@@ -163,9 +164,13 @@ def date_form(cell: str) -> str | None:
         if clock is None or bool(clock["between"]) != bool(date):
             continue
         half, zone = clock["half"], clock["zone"]
-        form = f"{date}{clock['between']}{'%H' if half is None else '%I'}:%M:%S%.f"
-        form += "" if half is None else f"{half}%p"
-        return form + (f"{zone}%#z" if zone is not None and date else "")
+        if half is None:
+            form = f"{date}{clock['between']}%H:%M:%S%.f"
+        else:
+            form = f"{date}{clock['between']}%I:%M:%S%.f{half}%p"
+        if zone is not None and date:
+            form += f"{zone}%#z"
+        return form
     return None
 
 
@@ -182,7 +187,7 @@ _THREE = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")
 
 
 class TextLayout(NamedTuple):
-    """How the rows of a text file are to be taken apart."""
+    """Layout of the rows of a text file."""
 
     delimiter: str
     """One character; a space stands for any number of spaces and tabs."""
@@ -203,9 +208,15 @@ class TextLayout(NamedTuple):
             line = line.replace("\t", " ").strip()
         if '"' in line:
             quoted = csv.reader([line], delimiter=mark, skipinitialspace=True, strict=strict)
-            with suppress(StopIteration, *[] if strict else [csv.Error]):
+            try:
                 return [cell.strip() for cell in next(quoted)]
-        return [cell.strip() for cell in (line.split() if mark == " " else line.split(mark))]
+            except StopIteration:
+                pass
+            except csv.Error:
+                if strict:
+                    raise
+        cells = line.split() if mark == " " else line.split(mark)
+        return [cell.strip() for cell in cells]
 
     def names(self, line: str) -> list[str]:
         """Cells of a header; where spaces delimit, the one before a unit does not."""
@@ -238,53 +249,80 @@ def find_layout(lines: Sequence[str], options: TextOptions, path: Path) -> TextL
     Comments and blank lines must not be among the lines; header lines may. Two readings that are as
     good as each other are refused.
     """
-    quoted = any('"' in line for line in lines)
-    stated = {key: getattr(options, key) for key in ("delimiter", "decimal")}
-    mark = options.delimiter and _NAMED.get(options.delimiter, options.delimiter)
-    trials = [
-        trial
-        for delimiter in ([mark] if mark else [",", ";", "\t", " ", "|"])
-        for decimal in ([options.decimal] if options.decimal else [".", ","])
-        if delimiter != decimal or quoted or None not in stated.values()
-        for trial in _tried(lines, TextLayout(delimiter, decimal))
-    ]
+    trials = _trials(lines, options)
     if not trials:
+        stated = {"delimiter": options.delimiter, "decimal": options.decimal}
         settings = " and ".join(f"{key} {value!r}" for key, value in stated.items() if value)
-        count = f"{len(lines)} line" + "s" * (len(lines) > 1)
-        raise FileError(
-            f"{path} has no rows of two or more numbers{settings and f' with {settings}'}, only "
-            f"{count} of text."
-        )
+        under = f" with {settings}" if settings else ""
+        count = f"{len(lines)} line{'s' if len(lines) > 1 else ''}"
+        raise FileError(f"{path} has no rows of two or more numbers{under}, only {count} of text.")
     # a tab between numbers delimits them, whatever spaces there are in names
-    tabbed = max((rows for _, rows, trial in trials if trial.delimiter == "\t"), default=0)
-    trials = [trial for trial in trials if trial[2].delimiter != " " or trial[1] > tabbed]
-    best = max(score for score, _, _ in trials)
-    equal = [trial for score, _, trial in trials if score > best - 1e-9]
-    if len({trial.delimiter for trial in equal}) > 1:
+    tabbed = max((trial.rows for trial in trials if trial.layout.delimiter == "\t"), default=0)
+    trials = [trial for trial in trials if trial.layout.delimiter != " " or trial.rows > tabbed]
+    best = max(trial.score for trial in trials)
+    equal = [trial.layout for trial in trials if trial.score > best - 1e-9]
+    if len({layout.delimiter for layout in equal}) > 1:
         row = next((line for line in lines if "," in line), lines[0])
         readings = " or as ".join(map(str, equal))
         raise FileError(
             f"{path} can be read in more than one way, '{shown(row)}' as {readings}; "
             "give 'delimiter' or 'decimal' as an option."
         )
-    layout = equal[0]  # with a point: where both signs are alike, there are whole numbers alone
+    layout = equal[0]  # with a point: if both signs are alike, there are whole numbers only
     if options.decimal is None and layout.delimiter != "," and layout.decimal == ",":
-        rows = (zip(layout.cells(line), layout.numeric, strict=False) for line in lines)
-        cells = [cell for row in rows for cell, numeric in row if numeric and "," in cell]
-        cells = [cell for cell in cells if is_number_text(cell, ",")]
-        if cells and all(_THREE.fullmatch(cell) for cell in cells):
-            raise FileError(
-                f"{path} has numbers like '{cells[0]}', in which the comma may be a decimal sign "
-                "or a thousands separator; give 'decimal' as an option."
-            )
+        _refuse_thousands(lines, layout, path)
     return layout
 
 
-def _tried(lines: Sequence[str], layout: TextLayout) -> Iterator[tuple[float, int, TextLayout]]:
-    """A layout with its width and columns of numbers, behind its score and its number of rows.
+def _refuse_thousands(lines: Sequence[str], layout: TextLayout, path: Path) -> None:
+    """Refuse numbers whose decimal commas may all be separators of thousands."""
+    cells = list[str]()
+    for line in lines:
+        for cell, numeric in zip(layout.cells(line), layout.numeric, strict=False):
+            if numeric and "," in cell and is_number_text(cell, ","):
+                cells.append(cell)
+    if cells and all(_THREE.fullmatch(cell) for cell in cells):
+        raise FileError(
+            f"{path} has numbers like '{cells[0]}', in which the comma may be a decimal sign or a "
+            "thousands separator; give 'decimal' as an option."
+        )
 
-    The score is the share of rows that fit times the share of their characters in numbers; a header
-    of as many fields adds a half. A log of one column has no time and gives nothing.
+
+class _Trial(NamedTuple):
+    """Score of a layout for a sample of lines."""
+
+    score: float
+    """Share of the rows that fit times the share of their characters in numbers, and for a header
+    of as many fields a half."""
+    rows: int
+    """Rows that fit."""
+    layout: TextLayout
+
+
+def _trials(lines: Sequence[str], options: TextOptions) -> list[_Trial]:
+    """Layouts that are stated or possible, and under which there are rows of numbers."""
+    delimiters, decimals = [",", ";", "\t", " ", "|"], [".", ","]
+    if options.delimiter:
+        delimiters = [_NAMED.get(options.delimiter, options.delimiter)]
+    if options.decimal:
+        decimals = [options.decimal]
+    # a decimal comma between commas needs quotes, or somebody who states both
+    is_stated = options.delimiter is not None and options.decimal is not None
+    may_be_equal = is_stated or any('"' in line for line in lines)
+    trials = list[_Trial]()
+    for delimiter in delimiters:
+        for decimal in decimals:
+            if delimiter != decimal or may_be_equal:
+                trial = _try_layout(lines, TextLayout(delimiter, decimal))
+                if trial is not None:
+                    trials.append(trial)
+    return trials
+
+
+def _try_layout(lines: Sequence[str], layout: TextLayout) -> _Trial | None:
+    """Try a layout, and complete it by its width and its columns of numbers.
+
+    A log of one column has no time and gives nothing.
     """
     rows = [layout.cells(line) for line in lines]
     marks = [[is_number_text(cell, layout.decimal) for cell in row] for row in rows]
@@ -297,24 +335,30 @@ def _tried(lines: Sequence[str], layout: TextLayout) -> Iterator[tuple[float, in
         for row, mark in zip(rows, marks, strict=True)
         if len(row) == width > 1 and any(mark)
     ]
-    columns = zip(*full_rows, strict=True)
-    numeric = [
-        2 * sum(one for _, one in column) >= sum(cell != "" for cell, _ in column)
-        and any(one for _, one in column)
-        for column in columns
-    ]
+    numeric = list[bool]()
+    for column in zip(*full_rows, strict=True):
+        numbers = sum(is_number for _, is_number in column)
+        filled = sum(cell != "" for cell, _ in column)
+        numeric.append(numbers > 0 and 2 * numbers >= filled)
     layout = layout._replace(width=width, numeric=tuple(numeric))
-    begin = next((row_number for row_number, row in enumerate(rows) if layout.fits(row)), None)
+    begin = next((index for index, row in enumerate(rows) if layout.fits(row)), None)
     if begin is None:
-        return
-    letters = sum(len(cell) for row in full_rows for cell, _ in row)
-    share = sum(len(cell) for row in full_rows for cell, one in row if one) / letters
-    score = len(full_rows) / (len(rows) - begin) * share
+        return None
+    characters, in_numbers = 0, 0
+    for row in full_rows:
+        for cell, is_number in row:
+            characters += len(cell)
+            if is_number:
+                in_numbers += len(cell)
+    score = len(full_rows) / (len(rows) - begin) * (in_numbers / characters)
     # the line of text above the rows, the header, should have as many fields as they
-    header = next((len(rows[i]) for i in reversed(range(begin)) if not any(marks[i])), 0)
-    if header > 1:
-        score += 0.5 if header == width else 0.25
-    yield score, len(full_rows), layout
+    header_width = 0
+    for index in range(begin):
+        if not any(marks[index]):
+            header_width = len(rows[index])
+    if header_width > 1:
+        score += 0.5 if header_width == width else 0.25
+    return _Trial(score, len(full_rows), layout)
 
 
 # --- names and units, above the rows --------------------------------------------------------------
@@ -322,73 +366,118 @@ def _tried(lines: Sequence[str], layout: TextLayout) -> Iterator[tuple[float, in
 _Units = list[str | None]
 
 
+class _Line(NamedTuple):
+    """A line of the file."""
+
+    number: int
+    """The first is 1."""
+    text: str
+
+
+class _Heading(NamedTuple):
+    """Names and units above the rows, and the first row."""
+
+    names: list[str]
+    units: _Units | None
+    first_row: _Line
+
+
 def read_heading(
     head: Sequence[str], layout: TextLayout, options: TextOptions, path: Path
 ) -> tuple[tuple[LogColumn, ...], int]:
     """Columns by the first lines of a file, and the line of the first row; the first line is 1."""
-    numbered = [
-        numbered_line
-        for numbered_line in enumerate(head, 1)
-        if not layout.is_blank(numbered_line[1])
-    ]
+    comments, plain = list[_Line](), list[_Line]()
     marks = "|".join(map(re.escape, options.marks))
-    # comments without their marks, as NumPy writes names into one
-    comments = {
-        number: re.sub(rf"^\s*(?:{marks})", "", line)
-        for number, line in numbered
-        if line.lstrip().startswith(options.marks)
-    }
-    plain = [numbered_line for numbered_line in numbered if numbered_line[0] not in comments]
-    names: list[str] = []
-    units: _Units | None = None
-    if options.header_row:
-        number = options.header_row
-        plain = [numbered_line for numbered_line in plain if numbered_line[0] > number]
-        header = comments.get(number, head[number - 1] if number <= len(head) else "")
-        if layout.is_blank(header) or not plain:
-            raise FileError(f"{path} has no header in line {number}, or no rows below it.")
-        names, _ = _names_and_units([header], layout)
-        if not names:
-            raise _wrong_header(number, header, layout, path)
-        units = _units_of(layout.cells(plain[0][1]))
-        first = 0 if units is None else 1
-        if first == len(plain):
-            raise FileError(f"{path} has no rows below line {number}.")
-    else:
-        rows = list[list[str]]()
-        for _, line in plain:
-            rows.append(layout.cells(line))
-            if layout.fits(rows[-1]):
-                break
+    for number, text in enumerate(head, 1):
+        if layout.is_blank(text):
+            continue
+        if text.lstrip().startswith(options.marks):
+            # without its mark, as NumPy writes names into one
+            comments.append(_Line(number, re.sub(rf"^\s*(?:{marks})", "", text)))
         else:
-            raise FileError(f"{path} has no rows of numbers in its first {len(plain)} lines.")
-        first = len(rows) - 1
-        # a damaged row is a row all the same: it must be refused, not taken for the names
-        while first > 1 and any(layout.numbers_in(rows[first - 1])):
-            above = layout.names(plain[first - 2][1])
-            if _units_of(rows[first - 1]) or len(above) < len(rows[0]):
-                break
-            first -= 1
-    if options.header_row is None:
-        filled = [
-            numbered_line for numbered_line in plain[:first] if any(layout.cells(numbered_line[1]))
-        ]
-        names, units = _names_and_units([line for _, line in filled], layout)
-        if filled and not names:
-            title = filled[-1][1].rstrip()
-            if len(layout.names(title)) > 1 and not title.endswith((":", ".")):
-                raise _wrong_header(*filled[-1], layout, path)
-        if not names:
-            notes = [line for number, line in comments.items() if number < plain[first][0]]
-            names, units = _names_and_units(notes, layout)
-            if units is None and (not all(names) or any(layout.numbers_in(names))):
-                names = []
-    begin, row = plain[first]
-    return tuple(_columns(names, units, layout, layout.cells(row))), begin
+            plain.append(_Line(number, text))
+    if options.header_row:
+        heading = _stated_heading(head, options.header_row, comments, plain, layout, path)
+    else:
+        first = _first_row(plain, layout, path)
+        heading = _Heading([], None, plain[first])
+        if options.header_row is None:
+            heading = _recognised_heading(comments, plain[:first], plain[first], layout, path)
+    columns = _columns(heading.names, heading.units, layout, layout.cells(heading.first_row.text))
+    return tuple(columns), heading.first_row.number
+
+
+def _stated_heading(
+    head: Sequence[str],
+    number: int,
+    comments: Sequence[_Line],
+    plain: Sequence[_Line],
+    layout: TextLayout,
+    path: Path,
+) -> _Heading:
+    """Heading in a line whose number is stated; a row of units may follow it."""
+    below = [line for line in plain if line.number > number]
+    header = head[number - 1] if number <= len(head) else ""
+    for comment in comments:
+        if comment.number == number:
+            header = comment.text
+    if layout.is_blank(header) or not below:
+        raise FileError(f"{path} has no header in line {number}, or no rows below it.")
+    names, _ = _names_and_units([header], layout)
+    if not names:
+        raise _wrong_header(number, header, layout, path)
+    units = _units_of(layout.cells(below[0].text))
+    if units is None:
+        return _Heading(names, None, below[0])
+    if len(below) == 1:
+        raise FileError(f"{path} has no rows below line {number}.")
+    return _Heading(names, units, below[1])
+
+
+def _first_row(plain: Sequence[_Line], layout: TextLayout, path: Path) -> int:
+    """Index of the first row among the lines that are not comments."""
+    rows = list[list[str]]()
+    for line in plain:
+        rows.append(layout.cells(line.text))
+        if layout.fits(rows[-1]):
+            break
+    else:
+        raise FileError(f"{path} has no rows of numbers in its first {len(plain)} lines.")
+    first = len(rows) - 1
+    # a damaged row is a row all the same: it must be refused, not taken for the names
+    while first > 1 and any(layout.numbers_in(rows[first - 1])):
+        names_above = layout.names(plain[first - 2].text)
+        if _units_of(rows[first - 1]) or len(names_above) < len(rows[0]):
+            break
+        first -= 1
+    return first
+
+
+def _recognised_heading(
+    comments: Sequence[_Line],
+    above: Sequence[_Line],
+    first_row: _Line,
+    layout: TextLayout,
+    path: Path,
+) -> _Heading:
+    """Heading in the last lines above the first row, or in the last comments above it."""
+    filled = [line for line in above if any(layout.cells(line.text))]
+    names, units = _names_and_units([line.text for line in filled], layout)
+    if names:
+        return _Heading(names, units, first_row)
+    if filled:
+        title = filled[-1].text.rstrip()
+        if len(layout.names(title)) > 1 and not title.endswith((":", ".")):
+            raise _wrong_header(filled[-1].number, filled[-1].text, layout, path)
+    notes = [comment.text for comment in comments if comment.number < first_row.number]
+    names, units = _names_and_units(notes, layout)
+    if units is None and (not all(names) or any(layout.numbers_in(names))):
+        names = []
+    return _Heading(names, units, first_row)
 
 
 def _names_and_units(above: Sequence[str], layout: TextLayout) -> tuple[list[str], _Units | None]:
-    """Names and units in the last one or two of some lines; no names where these are none."""
+    """Names and units in the last one or two of some lines; no names if they hold none."""
     if not above:
         return [], None
     names = layout.names(above[-1])
@@ -399,12 +488,17 @@ def _names_and_units(above: Sequence[str], layout: TextLayout) -> tuple[list[str
     if len(names) != layout.width:
         return [], None
     units = _units_of(names)
-    before = layout.names(above[-2]) if units is not None and len(above) > 1 else []
-    return (before, units) if len(before) == layout.width else (names, None)
+    if units is not None and len(above) > 1:
+        names_before = layout.names(above[-2])
+        if len(names_before) == layout.width:
+            return names_before, units
+    return names, None
 
 
 def _wrong_header(number: int, line: str, layout: TextLayout, path: Path) -> FileError:
-    count, hint = len(layout.names(line)), ""
+    """Refusal of a header with another number of names than the rows have fields."""
+    count = len(layout.names(line))
+    hint = ""
     if layout.delimiter == "," and layout.width >= 2 * count - 1:
         hint = " Are decimal commas mixed with commas between columns? Export it with semicolons."
     return FileError(
@@ -416,21 +510,25 @@ def _wrong_header(number: int, line: str, layout: TextLayout, path: Path) -> Fil
 def _columns(
     names: Sequence[str], units: _Units | None, layout: TextLayout, cells: Sequence[str]
 ) -> Iterator[LogColumn]:
-    """Columns by names, each its own, and units; a first cell that is a date makes it seconds."""
-    named = [*names] or [""] * layout.width
+    """Columns by unique names and units; a column whose first cell is a date is in seconds."""
+    header = list(names) if names else [""] * layout.width
     if names and not names[-1] and not layout.numeric[-1] and not cells[-1]:
-        named.pop()  # a delimiter at the end of each line
-    called = [name or f"column {position}" for position, name in enumerate(named, 1)]
-    counts, seen = Counter(called), Counter[str]()
-    for position, name in enumerate(called):
-        seen[name] += 1
-        unit = split_unit(name)[1] or (units[position] if units else None)
+        header.pop()  # a delimiter at the end of each line
+    full_names = [name or f"column {position}" for position, name in enumerate(header, 1)]
+    counts = Counter(full_names)
+    so_far = Counter[str]()
+    for position, name in enumerate(full_names):
+        so_far[name] += 1
+        unit = split_unit(name)[1] or None
+        if not unit and units:
+            unit = units[position]
         if position < len(cells) and date_form(cells[position]):
             unit = "s"
-        yield LogColumn(printable(f"{name} #{seen[name]}" if counts[name] > 1 else name), unit)
+        unique = f"{name} #{so_far[name]}" if counts[name] > 1 else name
+        yield LogColumn(printable(unique), unit)
 
 
-_KNOWN = frozenset(
+_KNOWN_UNITS = frozenset(
     """
     s sec secs second seconds ms msec us µs μs min minute minutes h hr hour hours
     hz khz mhz 1/s v mv kv volt volts a ma amp amps ampere amperes ohm ω
@@ -449,17 +547,24 @@ _BRACKETS = re.compile(r"\[.*\]|\(.*\)")
 
 
 def _units_of(cells: Sequence[str]) -> _Units | None:
-    """Units of a row of them, None if a cell is empty; or None if it is no such row."""
+    """Units in a row of units, None for an empty cell; or None if the row is not one."""
     filled = [cell for cell in cells if cell]
     # a short word of another language may stand among units, such as Imp for pulses
     others = [cell for cell in filled if not _is_unit(cell)]
     if 2 * len(others) >= len(filled) or any(len(cell) > _SHORT for cell in others):
         return None
-    return [cell[1:-1].strip() if _BRACKETS.fullmatch(cell) else cell or None for cell in cells]
+    units: _Units = []
+    for cell in cells:
+        if _BRACKETS.fullmatch(cell):
+            units.append(cell[1:-1].strip())
+        else:
+            units.append(cell or None)
+    return units
 
 
 def _is_unit(cell: str) -> bool:
-    if _BRACKETS.fullmatch(cell) or cell.lower() in _KNOWN or speed_unit(cell) != cell:
+    """Whether a cell is a unit: in brackets, or made of known ones."""
+    if _BRACKETS.fullmatch(cell) or cell.lower() in _KNOWN_UNITS or speed_unit(cell) != cell:
         return True
     words = [part for part in _PARTS.split(cell.lower()) if part]
-    return bool(words) and all(part in _KNOWN for part in words)
+    return bool(words) and all(part in _KNOWN_UNITS for part in words)

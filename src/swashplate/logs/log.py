@@ -21,7 +21,7 @@ class LogColumn(NamedTuple):
     """A column of a log."""
 
     name: str
-    """As the file has it, a unit in brackets included."""
+    """Name in the file, a unit in brackets included."""
     unit: str | None = None
     """As written in the header, in a row of units or in an attribute; None if there is none."""
 
@@ -32,13 +32,13 @@ class Log:
 
     path: Path
     format: str
-    """What it was read as, for people: ``CSV, semicolons, decimal comma``."""
+    """Description of its format: ``CSV, semicolons, decimal comma``."""
     columns: tuple[LogColumn, ...]
     """The columns that hold numbers; in text, all columns."""
     load: Callable[[Sequence[int], int, int | None], Sequence[Array]] = field(repr=False)
     """Columns at some positions, each once, from a row to before a last one (None: to the end)."""
     left_out: Mapping[str, str] = field(default_factory=dict)
-    """What the file has besides and cannot be read as numbers: name and reason."""
+    """Other contents of the file, which are not numbers: name and reason."""
     lengths: tuple[int, ...] = field(default=(), repr=False)
     """Rows of each column; of text, about."""
     stream: Callable[[Sequence[int]], Iterator[list[Array]]] | None = field(
@@ -46,7 +46,7 @@ class Log:
     )
     """Of text: columns at some positions, piece after piece."""
     table: Path | None = None
-    """Where its rows are read from in place of the file."""
+    """File that its rows are read from instead."""
     first: int = 0
     last: int | None = None
     """Rows that `read` gives, from the first to before the last one; None is the end."""
@@ -84,11 +84,15 @@ class Log:
             [name for name in names if name.lstrip("/") == requested.lstrip("/")],
             [name for name, bare in names.items() if bare == requested],
             [name for name in names if suffixed.fullmatch(name)],
-            [name for name, bare in names.items() if requested in (_last(name), _last(bare))],
+            [
+                name
+                for name, bare in names.items()
+                if requested in (_last_part(name), _last_part(bare))
+            ],
         ):
             matches = matches or candidates
         for name, reason in self.left_out.items():
-            if not matches and requested in (name, _last(name)):
+            if not matches and requested in (name, _last_part(name)):
                 raise FileError(f"{self.path}: '{name}' cannot be read as numbers: {reason}.")
         listed = ", ".join(map(repr, (matches or list(names))[:_LISTED]))
         listed += f" and {len(names) - _LISTED} more" if len(matches or names) > _LISTED else ""
@@ -158,7 +162,7 @@ def printable(text: str) -> str:
     return "".join(character if character.isprintable() else "�" for character in text)
 
 
-def said(error: BaseException) -> str:
+def first_sentence(error: BaseException) -> str:
     """The first sentence of an error's message, or what it is."""
     if isinstance(error, MemoryError):
         return "it needs more memory than there is"
@@ -233,7 +237,8 @@ def _without_unit(column: LogColumn) -> str:
     return name if unit is not None and unit == column.unit else column.name
 
 
-def _last(name: str) -> str:
+def _last_part(name: str) -> str:
+    """The name without its groups."""
     return name.rpartition("/")[2]
 
 
@@ -258,8 +263,10 @@ def check_stamps(log: Log, column: str, stamps: Array) -> None:
     raise FileError(f"{log.path}: column '{column}' {what}{others}; time stamps must increase.")
 
 
-SHORTEST, LONGEST = 1e-6, 1e10
-"""A record lasts longer than the one and less than the other, three centuries. [s]"""
+SHORTEST = 1e-6
+"""A record lasts longer: below it the unit of its stamps is wrong. [s]"""
+LONGEST = 1e10
+"""A record lasts less: three centuries. [s]"""
 
 
 def check_duration(log: Log, source: str, time: Array) -> Array:

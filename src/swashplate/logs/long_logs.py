@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from swashplate.errors import FileError
-from swashplate.logs.log import Array, Log, said
+from swashplate.logs.log import Array, Log, first_sentence
 from swashplate.logs.subprocess_reader import open_in_subprocess
 
 if TYPE_CHECKING:
@@ -100,7 +100,7 @@ def _convert(log: Log, columns: Sequence[int], table: Path, stamp: str) -> None:
             raise failed[0] from None
         raise FileError(
             f"{log.path} has about {max(log.lengths)} rows, more than are kept in memory, and its "
-            f"table {table.name} cannot be written next to it: {said(error)}."
+            f"table {table.name} cannot be written next to it: {first_sentence(error)}."
         ) from None
     finally:
         partial.unlink(missing_ok=True)

@@ -13,7 +13,7 @@ from swashplate.logs.log import (
     check_duration,
     check_finite,
     check_stamps,
-    said,
+    first_sentence,
     unit_of,
 )
 from swashplate.logs.subprocess_reader import open_in_subprocess
@@ -104,7 +104,7 @@ def _check_readable(source: Path, why: str = "") -> None:
     except FileNotFoundError:
         raise MissingFileError(f"There is no file {source}.") from None
     except (OSError, ValueError) as error:
-        why = f"cannot be read: {getattr(error, 'strerror', None) or said(error)}"
+        why = f"cannot be read: {getattr(error, 'strerror', None) or first_sentence(error)}"
     if why:
         raise FileError(f"{source} {why}.")
 

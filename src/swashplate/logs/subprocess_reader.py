@@ -26,7 +26,7 @@ import numpy as np
 
 from swashplate.errors import FileError, InputError, SwashplateError
 from swashplate.logs.binary import look
-from swashplate.logs.log import Array, Log, LogColumn, printable, said
+from swashplate.logs.log import Array, Log, LogColumn, first_sentence, printable
 
 _PATIENCE = 30.0
 """How long a small file may take [s]."""
@@ -66,9 +66,9 @@ class _ReaderProcess:
     def __init__(self) -> None:
         # what it says of an error, and what libraries leave behind of a damaged file
         self._scratch = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
-        self._said = Path(self._scratch.name) / "errors"
+        self._error_file = Path(self._scratch.name) / "errors"
         threads = min(4, os.cpu_count() or 1)  # each takes a share of the memory that it may have
-        with self._said.open("wb") as errors:
+        with self._error_file.open("wb") as errors:
             self._process = subprocess.Popen(
                 [sys.executable, "-c", _START.format(path=sys.path)],
                 stdin=subprocess.PIPE,
@@ -137,7 +137,7 @@ class _ReaderProcess:
         read = [source.readinto(array.view(np.uint8).data) == array.nbytes for array in arrays]
         if not answer or not all(read):
             self._process.wait()
-            lines = self._said.read_bytes()[-2000:].decode("utf-8", "replace").split("\n")
+            lines = self._error_file.read_bytes()[-2000:].decode("utf-8", "replace").split("\n")
             last = next((line for line in reversed(lines) if line[:1].isalpha()), "")
             reason = printable(last).strip().rstrip(".")[:200]
             why = f": {reason}" if reason else ""
@@ -186,7 +186,7 @@ def serve() -> None:
             if not isinstance(error, SwashplateError):
                 what = (
                     f"{name} cannot be read as {reader}, it is damaged or of another kind: "
-                    f"{said(error)}."
+                    f"{first_sentence(error)}."
                 )
             answer = {"error": what.replace(name, shown), "kind": type(error).__name__}
         answer["sizes"] = [array.size for array in arrays]

@@ -53,8 +53,9 @@ def open_text(path: Path, options: TextOptions | None = None) -> Log:
     filled = [line for line in head if (text := line.lstrip()) and not text.startswith(marks)]
     if not filled:
         raise FileError(f"{path} has no rows of numbers, only comments and empty lines.")
-    some = max(4, min(_SAMPLE, _SAMPLED * len(head) // size))
-    layout = find_layout(filled[:some] + filled[some :: 1 + len(filled) // some], options, path)
+    count = max(4, min(_SAMPLE, _SAMPLED * len(head) // size))
+    sample = filled[:count] + filled[count :: 1 + len(filled) // count]
+    layout = find_layout(sample, options, path)
     columns, first = read_heading(head[:_HEAD], layout, options, path)
     table = _Table(path, encoding, skipped, layout, columns, first, marks)
 
@@ -116,7 +117,7 @@ class _Table:
             begin += piece.count("\n")
             if lines:
                 yield [
-                    self._numbers(cells[str(position)], lines, position, count, clocks)
+                    self._piece_of_column(cells[str(position)], lines, position, count, clocks)
                     for position in positions
                 ]
             count += len(lines)
@@ -174,7 +175,7 @@ class _Table:
         names = [str(where) for where in range(self.layout.width)]
         return lines, pl.DataFrame(rows, dict.fromkeys(names, pl.String), orient="row")
 
-    def _numbers(
+    def _piece_of_column(
         self,
         cells: polars.Series,
         lines: Sequence[int],
@@ -183,7 +184,8 @@ class _Table:
         clocks: dict[int, _Clock],
     ) -> Array:
         """A column of a piece, before which there are `count` rows."""
-        text, kind, decimal = cells.str.strip_chars().fill_null(""), "number", self.layout.decimal
+        text = cells.str.strip_chars().fill_null("")
+        decimal = self.layout.decimal
         is_clock = position in clocks
         read = clocks[position].seconds(text) if is_clock else _numbers_of(text, decimal)
         if count == 0 and isinstance(read, int) and (form := date_form(text[read])):
@@ -193,10 +195,11 @@ class _Table:
             return read
         row = read
         other_mark = "," if decimal == "." else "."
+        kind = "number"
         if position in clocks:
             kind = "date like the first one"
         elif is_number_text(text[row], other_mark):
-            kind += f" with a decimal {'comma' if other_mark == '.' else 'point'}"
+            kind = f"number with a decimal {'comma' if other_mark == '.' else 'point'}"
         raise FileError(
             f"{self.path}: column '{self.columns[position].name}' holds "
             f"'{shown(text[row])}', which is not a {kind}, in data row {count + row + 1} "

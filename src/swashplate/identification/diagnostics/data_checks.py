@@ -547,33 +547,41 @@ def _is_noisy(values: Array, step: float) -> bool:
 
 
 def check_rank(where: str, problem: Problem) -> list[Finding]:
-    """Fewer samples than unknowns, or unknowns on which nothing depends."""
+    """Refusals of fewer samples than unknowns, and of unknowns on which nothing depends."""
     unknowns = problem.unknowns
     if problem.samples < len(unknowns):
-        said = f"{count(problem.samples, 'sample')} cannot determine {len(unknowns)} parameters; "
-        return [refusal(None, None, f"{where}: {said}record longer runs, or free less.")]
+        sentence = (
+            f"{where}: {count(problem.samples, 'sample')} cannot determine {len(unknowns)} "
+            "parameters; record longer runs, or free less."
+        )
+        return [refusal(None, None, sentence)]
     exact = isinstance(problem.model, EquationModel)  # any other may take minutes
     if exact and not problem.evaluate(problem.start).jacobian.any():
-        said = f"no run depends on any of {', '.join(unknowns.names[:NAMED])}; free what the runs "
-        return [
-            refusal(None, None, f"{where}: {said}exercise, or add a test that exercises these.")
-        ]
+        names = ", ".join(unknowns.names[:NAMED])
+        sentence = (
+            f"{where}: no run depends on any of {names}; free what the runs exercise, or add a test "
+            "that exercises these."
+        )
+        return [refusal(None, None, sentence)]
     return []
 
 
 def beside_the_drives(campaign: Campaign) -> list[str]:
-    """What stands out when each axis's drive is simulated under the runs' commands."""
-    found = []
+    """Sentences on runs that stand out beside a simulation of their axis's drive."""
+    sentences = list[str]()
     for name, axis in campaign.axes.items():
         if axis.drive is None:
             continue
-        nominal, runs = smooth(campaign.drive(name).parameters), []
+        nominal = smooth(campaign.drive(name).parameters)
+        runs = list[Experiment]()
         for run in campaign.select(axis=name):
             beyond = beyond_the_card(run)
-            found += [f"{said}; this run is not compared with the drive" for said in beyond]
-            runs += [] if beyond else [run]
-        # a drive that is made up says nothing of what a machine does
-        made_up = all(parameter.status == "assumed" for parameter in nominal.values())
-        if runs and not made_up and all(experiment.input.kind != "other" for experiment in runs):
-            found += [finding.sentence.rstrip(".") for finding in check_runs(runs, nominal)]
-    return found
+            for sentence in beyond:
+                sentences.append(f"{sentence}; this run is not compared with the drive")
+            if not beyond:
+                runs.append(run)
+        # a drive of assumed numbers says nothing of what a machine does
+        assumed = all(parameter.status == "assumed" for parameter in nominal.values())
+        if runs and not assumed and all(run.input.kind != "other" for run in runs):
+            sentences += [finding.sentence.rstrip(".") for finding in check_runs(runs, nominal)]
+    return sentences

@@ -111,12 +111,12 @@ class Verdict(Result):
 
     @property
     def headline(self) -> str:
-        """One sentence."""
+        """Whether the fit is usable, and why, in one sentence."""
         if self.unfinished:
             return f"Not usable: {'; '.join(self.unfinished)}."
         if self.unsound:
-            more = f" ({len(self.unsound) - 1} more.)" if len(self.unsound) > 1 else ""
-            return f"Not usable, as the data are not sound: {self.unsound[0].sentence}{more}"
+            others = f" ({len(self.unsound) - 1} more.)" if len(self.unsound) > 1 else ""
+            return f"Not usable, as the data are not sound: {self.unsound[0].sentence}{others}"
         error = self.error
         if error is None:
             return "Not usable: no channel moves, so no prediction can be assessed."
@@ -149,16 +149,18 @@ class Verdict(Result):
             f"{prediction.signal} within {percent(prediction.worst.error)}"
             for prediction in decisive
         ]
-        said = (
+        sentences = (
             f"In nine of ten new maneuvers {listed(stated)} of range; {percent(self.required)} is "
             "required."
         )
         for prediction in decisive:
-            tested = {found.motion for found in prediction.classes}
+            tested = {stated.motion for stated in prediction.classes}
             unknown = [words for motion, words in MOTIONS.items() if motion not in tested]
             if unknown:
-                said += f" {prediction.signal}: unknown in {listed(unknown)}, as no run has it."
-        return said
+                sentences += (
+                    f" {prediction.signal}: unknown in {listed(unknown)}, as no run has it."
+                )
+        return sentences
 
     @property
     def values(self) -> str:
@@ -190,17 +192,17 @@ class Verdict(Result):
 
     def answers(self) -> dict[str, str]:
         """The three answers, and what would explain the error, by their names."""
-        said = {
+        answers = {
             "Data": self.data,
             "Prediction": self.prediction,
             "Values": self.values,
             "Error beyond noise": self.cause,
         }
-        return {name: text for name, text in said.items() if text}
+        return {name: text for name, text in answers.items() if text}
 
     def table(self) -> Table:
         """The stated error of each channel by class of motion."""
-        made = Table(
+        table = Table(
             "Stated error in a new maneuver",
             (
                 Column("signal"),
@@ -214,21 +216,22 @@ class Verdict(Result):
             ),
         )
         for prediction in self.predictions:
-            tested = {found.motion: found for found in prediction.classes}
+            tested = {stated.motion: stated for stated in prediction.classes}
+            is_decisive = prediction.channel in self.decisive
             for motion in get_args(MotionClass):
-                found = tested.get(motion, ClassError(motion, nan, 0, 0))
-                made.add(
+                stated = tested.get(motion, ClassError(motion, nan, 0, 0))
+                table.add(
                     prediction.signal,
                     motion,
-                    found.error * prediction.reach,
-                    found.error,
-                    float(found.fitted + found.held_out),
-                    float(found.held_out),
-                    _state(found, self.required) if prediction.channel in self.decisive else "-",
+                    stated.error * prediction.reach,
+                    stated.error,
+                    float(stated.fitted + stated.held_out),
+                    float(stated.held_out),
+                    _state(stated, self.required) if is_decisive else "-",
                     unit=prediction.unit,
-                    look=prediction.channel in self.decisive and found.error > self.required,
+                    look=is_decisive and stated.error > self.required,
                 )
-        return made
+        return table
 
     def html(self, between: str = "") -> str:
         """HTML: headline, answers and sentences, other HTML, the stated errors."""

@@ -103,8 +103,8 @@ LIMIT_COLUMNS = {
 # --- what drives an experiment --------------------------------------------------------------------
 
 
-def _record(signal: InputSignal) -> Record:
-    """A signal on the march's grid, its own where its stamps are even.
+def _gridded(signal: InputSignal) -> Record:
+    """A signal on the march's grid, which is its own grid if its stamps are even.
 
     The grid of one with sudden changes is finer, so that these come at once.
     """
@@ -124,19 +124,19 @@ def _record(signal: InputSignal) -> Record:
     record = record_of(signal.values, rate, what=what, interpolation=way)
     # the march joins the points of its grid by straight lines: of a command that is held, each
     # stands for the step after it
-    held = 0.5 * record.step if signal.is_held else 0.0
-    return replace(record, start=float(signal.time[0]) + held)
+    half_step = 0.5 * record.step if signal.is_held else 0.0
+    return replace(record, start=float(signal.time[0]) + half_step)
 
 
 def _jumps_at_once(signal: InputSignal, *, even: bool) -> bool:
-    """Whether sudden changes of a signal are none of the straight lines between its samples.
+    """Whether a signal changes suddenly, and not along straight lines between its samples.
 
     Not of a slow log, in which the instants of these are estimated.
     """
     if signal.interpolation == "linear" or (signal.is_held and not even):
         return False
-    places = signal.jumps
-    return bool(places.size) and float(np.diff(signal.time)[places].max()) <= APART
+    jumps = signal.jumps
+    return bool(jumps.size) and float(np.diff(signal.time)[jumps].max()) <= APART
 
 
 def voltage_record(experiment: Experiment) -> Record:
@@ -146,7 +146,7 @@ def voltage_record(experiment: Experiment) -> Record:
             f"{experiment.name} is driven by a {experiment.input.kind}, not by a voltage: fit the "
             "pump alone."
         )
-    return check_voltage(_record(experiment.input), clip=False)
+    return check_voltage(_gridded(experiment.input), clip=False)
 
 
 def measured_current(experiment: Experiment, scale: float = 1.0) -> Record:
@@ -158,7 +158,7 @@ def measured_current(experiment: Experiment, scale: float = 1.0) -> Record:
     """
     drive = experiment.input
     if drive.kind == "current":
-        return _record(replace(drive, values=scale * drive.values))
+        return _gridded(replace(drive, values=scale * drive.values))
     signed = [(channel, channel.values) for channel in experiment.of_kind("signed_current")]
     both = experiment.of_kind("current_plus"), experiment.of_kind("current_minus")
     for plus, minus in zip(*both, strict=False):
@@ -174,8 +174,8 @@ def measured_current(experiment: Experiment, scale: float = 1.0) -> Record:
             "the kind signed_current, current_plus and current_minus, or rectified_current."
         )
     channel, values = signed[0]
-    made = InputSignal("current", "A", channel.time, scale * values, "linear", channel.source)
-    return _record(made)
+    current = InputSignal("current", "A", channel.time, scale * values, "linear", channel.source)
+    return _gridded(current)
 
 
 def simulated_current(
@@ -189,8 +189,8 @@ def simulated_current(
     card begins at rest or settled, as the experiment does.
     """
     record = voltage_record(experiment)
-    seen = Observation("current", record.points, np.zeros(record.values.size))
-    observed = ObservedRecord(record, (seen,), "voltage", experiment.begins)
+    observation = Observation("current", record.points, np.zeros(record.values.size))
+    observed = ObservedRecord(record, (observation,), "voltage", experiment.begins)
     # refinements begin behind the card
     ready = DriveModel(parameters.plain, "card").ready(
         start, experiment, SimulationRequest(observed)
@@ -207,20 +207,26 @@ def simulated_run(experiment: Experiment, parameters: ParameterSet) -> Simulatio
     part: DrivePart = "pump" if experiment.input.kind == "current" else "chain"
     try:
         driver, record, _ = DriveModel(parameters, part).driven(experiment)
-        begin = experiment.begins, experiment.start_pressure
-        return simulate_drive(parameters, {driver: record}, *begin)
+        return simulate_drive(
+            parameters, {driver: record}, experiment.begins, experiment.start_pressure
+        )
     except InputError as error:
         raise InputError(f"{experiment.input.source}: {error}") from None
 
 
 def limits_reached(experiment: Experiment, parameters: ParameterSet) -> set[str]:
     """Columns of the limits that act in a run, such as ``"Z16_plus"``, of Z13 to Z16."""
-    run, found = simulated_run(experiment, parameters), set[str]()
+    run = simulated_run(experiment, parameters)
+    columns = set[str]()
     for limit, signal, symbol, _ in REACHED:
         acts = run.active(limit)
-        sides = {"_plus": run[signal] > 0.0, "_minus": run[signal] < 0.0} if signal else {"": acts}
-        found |= {symbol + side for side, there in sides.items() if (acts & there).any()}
-    return found
+        sides = {"": acts}
+        if signal:
+            sides = {"_plus": run[signal] > 0.0, "_minus": run[signal] < 0.0}
+        for side, is_on_side in sides.items():
+            if (acts & is_on_side).any():
+                columns.add(symbol + side)
+    return columns
 
 
 def limits_unreached(
@@ -279,19 +285,18 @@ def at_rate_of(
     It then has the filter's differential equation, if a run is marched at another rate than the one
     that its recursion belongs to.
     """
-    own, runs = (
-        parameters.rate,
-        [experiment for experiment in experiments if experiment.input.kind == "voltage"],
-    )
-    if own is None:
+    recursion_rate = parameters.rate
+    if recursion_rate is None:
         return parameters, ()
-    for run in runs:
+    for run in experiments:
+        if run.input.kind != "voltage":
+            continue
         rate = 1.0 / voltage_record(run).step
-        if abs(rate / own - 1.0) > OTHER_RATE:
+        if abs(rate / recursion_rate - 1.0) > OTHER_RATE:
             return at_every_rate(parameters), (
                 f"{run.name} is simulated at {rate:.4g} Hz, but the card's filter of "
-                f"{parameters.name} is a recursion for {own:g} Hz: the fit takes the differential "
-                "equation with the same poles, which is valid at every rate.",
+                f"{parameters.name} is a recursion for {recursion_rate:g} Hz: the fit takes the "
+                "differential equation with the same poles, which is valid at every rate.",
             )
     return parameters, ()
 

@@ -94,7 +94,7 @@ def simulated(
     Anything but one real number a sample for each channel is refused in an `InputError`.
     """
     outputs = model.simulate(values, experiment)
-    _check(outputs, experiment)
+    _check_outputs(outputs, experiment)
     for name, output in outputs.items():
         if not np.isfinite(output).all():
             row = int(np.argmax(~np.isfinite(output)))
@@ -109,35 +109,42 @@ def linearised(
     model: MachineModel, values: Mapping[str, float], experiment: Experiment, names: Sequence[str]
 ) -> Mapping[str, Linearised]:
     """Simulation with derivatives by names, its own or differences; raises as `simulated`."""
-    if own := getattr(model, "linearise", None):
-        made: Mapping[str, Linearised] = own(values, experiment, names)
-        _check(made, experiment, len(names))
-        return made
-    middle = simulated(model, values, experiment)
-    found = {c: Linearised(y, np.empty((y.size, len(names)))) for c, y in middle.items()}
+    linearise = getattr(model, "linearise", None)
+    if linearise:
+        of_model: Mapping[str, Linearised] = linearise(values, experiment, names)
+        _check_outputs(of_model, experiment, len(names))
+        return of_model
+    outputs = simulated(model, values, experiment)
+    by_channel = {
+        channel: Linearised(output, np.empty((output.size, len(names))))
+        for channel, output in outputs.items()
+    }
     for k, name in enumerate(names):
         step = RELATIVE_STEP * max(abs(values[name]), 1e-3)
-        above, below = (
-            simulated(model, {**values, name: values[name] + way}, experiment)
-            for way in (step, -step)
-        )
-        for channel, part in found.items():
+        above = simulated(model, {**values, name: values[name] + step}, experiment)
+        below = simulated(model, {**values, name: values[name] - step}, experiment)
+        for channel, part in by_channel.items():
             part.by[:, k] = (above[channel] - below[channel]) / (2.0 * step)
-    return found
+    return by_channel
 
 
-def _check(outputs: object, experiment: Experiment, names: int | None = None) -> None:
-    """Refuse what a model must not return: arrays, or with `names` Linearised by so many."""
+def _type_words(returned: object) -> str:
+    """Type of what a model returned, for a sentence."""
+    if returned is None:
+        return "None (is a return missing?)"
+    if isinstance(returned, np.ndarray):
+        return f"an array of {returned.dtype.name}"
+    return f"a {type(returned).__name__}"
+
+
+def _check_outputs(outputs: object, experiment: Experiment, names: int | None = None) -> None:
+    """Refuse outputs that are not arrays by channel, or with `names` Linearised by so many."""
     method, of_channel = "linearise", "a Linearised"
     if names is None:
         method, of_channel = "simulate", "an array of floats"
 
     def refused(must: str, returned: object) -> InputError:
-        words = f"a {type(returned).__name__}"
-        if returned is None:
-            words = "None (is a return missing?)"
-        elif isinstance(returned, np.ndarray):
-            words = f"an array of {returned.dtype.name}"
+        words = _type_words(returned)
         return InputError(f"{experiment.name}: {method} must return {must}, not {words}.")
 
     if not isinstance(outputs, Mapping):
@@ -165,7 +172,7 @@ Output = TypeVar("Output")
 
 
 def part_of(outputs: Mapping[str, Output], experiment: Experiment, channel: str) -> Output:
-    """What a model gives for a channel; an `InputError` if it gives nothing."""
+    """Output of a model for a channel; an `InputError` if it gives none."""
     if channel not in outputs:
         names = ", ".join(outputs)
         raise InputError(f"{experiment.name}: the model gives no '{channel}'; it gives {names}.")
@@ -173,7 +180,7 @@ def part_of(outputs: Mapping[str, Output], experiment: Experiment, channel: str)
 
 
 class SimulationRequest(NamedTuple):
-    """What is asked of a model: an experiment as the march sees it, and derivatives by columns."""
+    """Request to a model: an experiment as the march sees it, and derivatives by columns."""
 
     observed: ObservedRecord
     columns: Sequence[str] = ()
@@ -321,13 +328,13 @@ class UserModel(Result, EquationModel):
     def signals_of(self, experiment: Experiment) -> Mapping[str, str]:
         """Signal of the model for each channel that it gives; one of none is refused."""
         signals = self.signals
-        given = {name: name for name in experiment.channels if name in signals}
-        if not given:
+        signal_of = {name: name for name in experiment.channels if name in signals}
+        if not signal_of:
             raise InputError(
                 f"{experiment.name} has the channels {', '.join(experiment.channels)}, of which "
                 f"{self.model.name} gives none; it gives {', '.join(signals)}."
             )
-        return given
+        return signal_of
 
     def driven(
         self, experiment: Experiment, values: Mapping[str, float] = MappingProxyType({})

@@ -63,6 +63,20 @@ class Evaluation(NamedTuple):
     """(m, K)"""
 
 
+class _MarchedRun(NamedTuple):
+    """An experiment as the march of a model of equations sees it."""
+
+    observed: ObservedRecord
+    names: list[str]
+    """Names of the model that its unknowns are of."""
+    free_zeros: list[str]
+    """Channels whose zeros are free."""
+    columns: list[str]
+    """Columns of the model that the names depend on."""
+    by_names: Array
+    """(columns, names) derivatives of the columns by the names."""
+
+
 @dataclass(frozen=True, eq=False)
 class Problem(Result):
     """Half the weighted sum of squares of all experiments, as a function of the unknowns.
@@ -99,13 +113,13 @@ class Problem(Result):
     """
 
     model: MachineModel
-    """One of equations stands for itself, or as a `UserModel` with more said about it."""
+    """A model of equations, bare or in a `UserModel`, or an object with `simulate`."""
     experiments: tuple[Experiment, ...]
     unknowns: Unknowns
     channels: tuple[str, ...]
     """Names of the channels that are fitted."""
     scales: Mapping[str, float]
-    """What one unit of residual is, by channel: its noise, in its unit."""
+    """Unit of the residuals of each channel: the standard deviation of its noise, in its unit."""
     fixed: Mapping[str, float] = field(default_factory=dict)
     """Values of the model's names that are not unknown but differ from the model's own."""
     zeros: Mapping[str, float] = field(default_factory=dict)
@@ -123,9 +137,10 @@ class Problem(Result):
     def __post_init__(self) -> None:
         if isinstance(self.model, OfEquations):
             object.__setattr__(self, "model", UserModel(self.model))
-        for what, there in (("parameter", self.unknowns), ("experiment", self.experiments)):
-            if not there:
-                raise InputError(f"A fit needs at least one {what}.")
+        if not self.unknowns:
+            raise InputError("A fit needs at least one parameter.")
+        if not self.experiments:
+            raise InputError("A fit needs at least one experiment.")
         if not self.samples:
             raise InputError(
                 f"No sample of {', '.join(self.channels) or 'any channel'} is used: all are "
@@ -145,11 +160,11 @@ class Problem(Result):
     @cached_property
     def weights(self) -> tuple[Mapping[str, Array], ...]:
         """For each experiment and fitted channel the (m,) factors on the residuals."""
-        found = []
+        weights = []
         for run in self.experiments:
             names = [name for name in self.channels if name in run.channels]
-            found.append({n: _factors(run[n].weight, self.scales[n]) for n in names})
-        return tuple(found)
+            weights.append({name: _factors(run[name].weight, self.scales[name]) for name in names})
+        return tuple(weights)
 
     @property
     def samples(self) -> int:
@@ -164,7 +179,7 @@ class Problem(Result):
         """
         key = vector.tobytes(), compressed
         if key not in self._last:
-            evaluation = self._compressed(vector) if compressed else self._whole(vector)
+            evaluation = self._compressed(vector) if compressed else self._all_samples(vector)
             self._last.clear()
             self._last[key] = evaluation
         return self._last[key]
@@ -186,7 +201,7 @@ class Problem(Result):
         residuals, jacobian = factor[:, -1], factor[:, :-1]
         return Evaluation(np.ascontiguousarray(residuals), np.ascontiguousarray(jacobian))
 
-    def _whole(self, vector: Array) -> Evaluation:
+    def _all_samples(self, vector: Array) -> Evaluation:
         """Residuals and derivatives of all samples, as a robust loss needs them."""
         parts = self._each(lambda number: self._full(vector, number))
         residuals, rows = self.unknowns.prior_rows(vector)
@@ -237,15 +252,18 @@ class Problem(Result):
         values, zeros = self.model_values(vector, number), self._zeros(vector, number)
         names = list(self.unknowns.targets(vector, run))
         outputs = linearised(self.model, values, experiment, names)
-        chain, made = self.unknowns.chain(vector, names, run), {}
+        chain = self.unknowns.chain(vector, names, run)
+        by_channel = dict[str, Linearised]()
         for name, weight in self.weights[number].items():
             channel, output = experiment[name], part_of(outputs, experiment, name)
             residual = output.values + zeros[name] - channel.values
             by = output.by @ chain
             by += self.unknowns.zeros_chain(vector, [name], run)
-            parts = self._compared(channel, residual), self._compared(channel, by)
-            made[name] = Linearised(weight * parts[0], weight[:, None] * parts[1])
-        return made
+            by_channel[name] = Linearised(
+                weight * self._compared(channel, residual),
+                weight[:, None] * self._compared(channel, by),
+            )
+        return by_channel
 
     def model_values(self, vector: Array, number: int) -> dict[str, float]:
         """Values by the model's names for one experiment; a channel's zero is none of them."""
@@ -274,12 +292,13 @@ class Problem(Result):
     def _reduced(self, vector: Array, number: int) -> RunRows:
         """The triangular factor of [J r] of one experiment, without ever holding J."""
         ready, observed = self._ready(vector, number)
-        experiment, (_, names, zeros, asked, by) = self.experiments[number], self._own[number]
+        run_name, marched = self.experiments[number].name, self._marched_runs[number]
         factor = ready.triangle(observed).factor
-        chain = self.unknowns.chain(vector, names, experiment.name)
-        jacobian = factor[:, : len(asked)] @ by @ chain
-        zeros_chain = self.unknowns.zeros_chain(vector, zeros, experiment.name)
-        jacobian += factor[:, len(asked) : -1] @ zeros_chain
+        chain = self.unknowns.chain(vector, marched.names, run_name)
+        count = len(marched.columns)
+        jacobian = factor[:, :count] @ marched.by_names @ chain
+        zeros_chain = self.unknowns.zeros_chain(vector, marched.free_zeros, run_name)
+        jacobian += factor[:, count:-1] @ zeros_chain
         return self._block(number, np.column_stack([jacobian, factor[:, -1]]))
 
     def _block(self, number: int, rows: Array) -> RunRows:
@@ -289,38 +308,39 @@ class Problem(Result):
     @cached_property
     def _marched(self) -> tuple[bool, ...]:
         """Whether the march itself makes the residuals of each experiment."""
-        whole = self.compare is None and isinstance(self.model, EquationModel)
-        moved = {unknown.run for unknown in self.unknowns if unknown.kind == "instant"}
-        return tuple(whole and run.name not in moved for run in self.experiments)
+        can_march = self.compare is None and isinstance(self.model, EquationModel)
+        with_moved_edges = {unknown.run for unknown in self.unknowns if unknown.kind == "instant"}
+        return tuple(can_march and run.name not in with_moved_edges for run in self.experiments)
 
     def _ready(self, vector: Array, number: int) -> tuple[BoundModel, ObservedRecord]:
         """The model with the numbers of one experiment, and this as the march sees it."""
-        experiment, (observed, _, _, asked, _) = self.experiments[number], self._own[number]
-        model, zeros = cast("EquationModel", self.model), self._zeros(vector, number)
-        request = SimulationRequest(observed, asked, list(zeros.values()))
-        return model.ready(self.model_values(vector, number), experiment, request), observed
+        experiment, marched = self.experiments[number], self._marched_runs[number]
+        model = cast("EquationModel", self.model)
+        zeros = list(self._zeros(vector, number).values())
+        request = SimulationRequest(marched.observed, marched.columns, zeros)
+        ready = model.ready(self.model_values(vector, number), experiment, request)
+        return ready, marched.observed
 
     @cached_property
-    def _own(self) -> list[tuple[ObservedRecord, list[str], list[str], list[str], Array]]:
-        """Each experiment as the march of a model of equations sees it.
-
-        With the names of its unknowns and the channels whose zeros are free; the columns that the
-        former ask for, and the derivatives of these columns by them.
-        """
-        model, made = cast("EquationModel", self.model), []
+    def _marched_runs(self) -> list[_MarchedRun]:
+        """Each experiment as the march of a model of equations sees it."""
+        model = cast("EquationModel", self.model)
+        marched = list[_MarchedRun]()
         for experiment, weights in zip(self.experiments, self.weights, strict=True):
             names = list(self.unknowns.targets(self.start, experiment.name))
             free = self.unknowns.zeros(self.start, experiment.name)
             zeros = [name for name in weights if name in free]
             observed = model.observed(experiment, weights, zeros)
-            made.append((observed, names, zeros, *model.columns(names)))
-        return made
+            columns, by_names = model.columns(names)
+            marched.append(_MarchedRun(observed, names, zeros, columns, by_names))
+        return marched
 
     def _each(self, work: Callable[[int], Returned]) -> list[Returned]:
-        """What is found for each experiment, in their order."""
+        """Results of some work for each experiment, in their order."""
         numbers = range(len(self.experiments))
-        alone = min(self.threads, len(numbers)) == 1
-        return list(map(work, numbers) if alone else _pool(self.threads).map(work, numbers))
+        if min(self.threads, len(numbers)) == 1:
+            return [work(number) for number in numbers]
+        return list(_pool(self.threads).map(work, numbers))
 
 
 def _factors(weight: Array, scale: float) -> Array:

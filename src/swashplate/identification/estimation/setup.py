@@ -98,16 +98,18 @@ class Forces(FileTable):
 
     def values(self, parameters: ParameterSet) -> dict[str, float]:
         """The forces of a parameter set, by name. [N]"""
-        found = np.linalg.solve(self._inverse, [parameters.numbers[c] for c in self.columns])
-        return dict(zip(self.names, found.tolist(), strict=True))
+        coefficients = [parameters.numbers[column] for column in self.columns]
+        forces = np.linalg.solve(self._inverse, coefficients)
+        return dict(zip(self.names, forces.tolist(), strict=True))
 
     def coefficients(
         self, values: Mapping[str, float], parameters: ParameterSet
     ) -> dict[str, float]:
         """Coefficients for some forces; those not named are as in the parameter set. [N/Aᵏ]"""
         forces = self.values(parameters)
-        found = self._inverse @ np.array([values.get(name, forces[name]) for name in forces])
-        return dict(zip(self.columns, found.tolist(), strict=True))
+        changed = np.array([values.get(name, force) for name, force in forces.items()])
+        coefficients = self._inverse @ changed
+        return dict(zip(self.columns, coefficients.tolist(), strict=True))
 
     def slopes(self, name: str) -> dict[str, float]:
         """Derivatives by one force of the coefficients of its direction. [1/Aᵏ]"""

@@ -195,8 +195,8 @@ def solve(
     ...     channels=("shaft_speed",),
     ...     scales={"shaft_speed": 0.01},
     ... )
-    >>> found = solve(problem)
-    >>> round(problem.unknowns.values(found.vector)["gain"], 2)
+    >>> solution = solve(problem)
+    >>> round(problem.unknowns.values(solution.vector)["gain"], 2)
     0.4
     """
     from scipy.optimize import least_squares
@@ -217,15 +217,15 @@ def solve(
     spent = 0
     revivals = 0
     lowest_at_revival = np.inf
-    # After an unknown without effect was moved to where it has one, it is held for one leg, while
+    # After an unknown without effect was moved to where it has one, it is paused for one leg, while
     # the others adapt.
-    held = np.zeros(begin.size, dtype=bool)
+    paused = np.zeros(begin.size, dtype=bool)
     try:
         while True:
             leg = least_squares(
                 lambda vector: memory(vector).residuals.copy(),
                 begin,
-                jac=lambda vector, held=held: np.where(held, 0.0, memory(vector).jacobian),
+                jac=lambda vector, fixed=paused: np.where(fixed, 0.0, memory(vector).jacobian),
                 bounds=memory.bounds,
                 x_scale="jac",
                 loss=loss,
@@ -247,12 +247,12 @@ def solve(
                 break
             if spent >= max_evaluations:
                 break
-            released = held.any()
+            released = paused.any()
             point = None
-            held = np.zeros_like(held)
+            paused = np.zeros_like(paused)
             may_revive = not released and revivals < REVIVALS
             if may_revive and lowest < lowest_at_revival * (1.0 - GAINED):
-                point, held = _with_effect_again(memory, best)
+                point, paused = _with_effect_again(memory, best)
                 lowest_at_revival = lowest
                 if point is not None:
                     revivals += 1

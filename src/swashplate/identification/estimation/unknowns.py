@@ -20,14 +20,15 @@ from swashplate.results import Result
 Array = NDArray[np.float64]
 
 
-def _numbers(content: object) -> Array:
-    made = np.asarray(content)
-    if made.ndim != 1 or made.dtype.kind not in "fi" or not np.isfinite(made).all():
+def _finite_vector(content: object) -> Array:
+    """Vector (K,) of a file's list of finite numbers."""
+    vector = np.asarray(content)
+    if vector.ndim != 1 or vector.dtype.kind not in "fi" or not np.isfinite(vector).all():
         raise ValueError("it must be a list of finite numbers")
-    return made.astype(np.float64)
+    return vector.astype(np.float64)
 
 
-Vector = Annotated[Array, PlainValidator(_numbers), PlainSerializer(np.ndarray.tolist)]
+Vector = Annotated[Array, PlainValidator(_finite_vector), PlainSerializer(np.ndarray.tolist)]
 """The numbers that a solver moves, (K,); in a file a list."""
 AT_BOUND = 1e-4
 """Part of the reach between the bounds within which a number is at one of them: a search stays

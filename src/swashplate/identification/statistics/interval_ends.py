@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator
+from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -72,56 +73,72 @@ def side_of(
 
     `step` is that of about one standard error, negative downwards; `most` points are looked at.
     """
-    points, sign, step = list[Point](), float(np.sign(step)), abs(step)
+    walk = _Walk(minimise, optimum, index, rise, float(np.sign(step)))
+    try:
+        ending, distance = walk.outwards(abs(step), abs(bound - optimum.number), most)
+    except _BetterOptimumError as error:
+        return ProfileSide(walk.points, "better optimum", better=error.args[0])
+    end = None if distance is None else optimum.number + walk.sign * distance
+    return ProfileSide(walk.points, ending, end)
 
-    def height(distance: float) -> float | None:
+
+@dataclass(frozen=True, eq=False)
+class _Walk:
+    """Points of a profile on one side of an optimum."""
+
+    minimise: Minimise
+    optimum: Point
+    index: int
+    rise: float
+    """Rise of the cost at which the side ends."""
+    sign: float
+    """1 upwards, -1 downwards."""
+    points: list[Point] = field(default_factory=list)
+
+    def height(self, distance: float) -> float | None:
         """Root of the least cost's rise over the threshold's; None outside the model's domain.
 
         It is nearly a straight line.
         """
-        number = optimum.number + sign * distance
-        near = min((optimum, *points), key=lambda point: abs(point.number - number))
+        number = self.optimum.number + self.sign * distance
+        near = min((self.optimum, *self.points), key=lambda point: abs(point.number - number))
         start = near.vector.copy()
-        start[index] = number
+        start[self.index] = number
         try:
-            cost, vector = minimise(index, number, start)
+            cost, vector = self.minimise(self.index, number, start)
         except DomainError:
             return None
         if not np.isfinite(cost):
             return None
-        if cost < optimum.cost - BETTER * rise:
+        if cost < self.optimum.cost - BETTER * self.rise:
             raise _BetterOptimumError(Point(number, float(cost), vector))
-        points.append(Point(number, float(cost), vector))
-        return float(np.sqrt(max(cost - optimum.cost, 0.0) / rise))
+        self.points.append(Point(number, float(cost), vector))
+        return float(np.sqrt(max(cost - self.optimum.cost, 0.0) / self.rise))
 
-    def walked() -> tuple[Ending, float | None]:
-        """How the side ended, and how far from the optimum the cost has risen just enough."""
-        near, low, stride, halvings = 0.0, 0.0, STRIDE * step, 0
-        while len(points) < most:
-            distance = min(near + stride, abs(bound - optimum.number))
+    def outwards(self, step: float, reach: float, most: int) -> tuple[Ending, float | None]:
+        """Ending of the side, and how far from the optimum the cost has risen just enough."""
+        near = low = 0.0
+        stride = STRIDE * step
+        halvings = 0
+        while len(self.points) < most:
+            distance = min(near + stride, reach)
             if distance <= near:
                 return "bound", None
             if distance > FURTHEST * step:
                 break
-            now = height(distance)
-            if now is None:
+            height = self.height(distance)
+            if height is None:
                 if halvings == HALVINGS:
                     return "domain", None
-                halvings, stride = halvings + 1, 0.5 * stride
+                halvings += 1
+                stride *= 0.5
                 continue
-            if now >= 1.0:
-                return "crossed", _crossing(height, near, low, distance, now)
+            if height >= 1.0:
+                return "crossed", _crossing(self.height, near, low, distance, height)
             # slowly, so that the next start is good and a flat stretch is not leapt over
-            stride *= float(np.clip(STRIDE / max(now - low, 0.1 * STRIDE), 0.3, 2.5))
-            near, low = distance, now
+            stride *= float(np.clip(STRIDE / max(height - low, 0.1 * STRIDE), 0.3, 2.5))
+            near, low = distance, height
         return "open", None
-
-    try:
-        ending, distance = walked()
-    except _BetterOptimumError as found:
-        return ProfileSide(points, "better optimum", better=found.args[0])
-    end = None if distance is None else optimum.number + sign * distance
-    return ProfileSide(points, ending, end)
 
 
 def _crossing(
@@ -151,9 +168,14 @@ def minimiser(problem: Problem, *, tolerance: float = 1e-8, max_evaluations: int
     def minimise(index: int, number: float, start: Array) -> tuple[float, Array]:
         if start.size == 1:
             return problem.cost(start), start
-        fixed, most = {index: number}, max_evaluations
-        found = solve(problem, start, fixed=fixed, tolerance=tolerance, max_evaluations=most)
-        return found.cost, found.vector
+        solution = solve(
+            problem,
+            start,
+            fixed={index: number},
+            tolerance=tolerance,
+            max_evaluations=max_evaluations,
+        )
+        return solution.cost, solution.vector
 
     return minimise
 
