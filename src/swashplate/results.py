@@ -114,7 +114,8 @@ class Result:
         return list(sentences() if callable(sentences) else sentences)
 
     def _repr_html_(self) -> str | None:
-        headline, tables = self._headline(), self._tables()
+        headline = self._headline()
+        tables = self._tables()
         shown = "".join(table._repr_html_() for table in tables)
         sentences = listing(self._sentences())
         if headline:
@@ -123,7 +124,8 @@ class Result:
 
     def summary(self) -> str:
         """Text: its headline or its repr, its tables in the units that people read, sentences."""
-        headline, tables = self._headline(), [str(table) for table in self._tables()]
+        headline = self._headline()
+        tables = [str(table) for table in self._tables()]
         lines = "\n".join(f"- {sentence}" for sentence in self._sentences())
         paragraphs = [headline, lines, *tables] if headline else [repr(self), *tables, lines]
         return "\n\n".join(part for part in paragraphs if part)

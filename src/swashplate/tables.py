@@ -324,7 +324,8 @@ def ending(path: str | Path, form: Form) -> str:
 
 def check_place(path: str | Path) -> None:
     """See to it that a file can be where it shall be, as far as that shows beforehand."""
-    target, reason = Path(path), None
+    target = Path(path)
+    reason = None
     folder = target.parent
     try:
         if not folder.exists():

@@ -340,7 +340,8 @@ def inverse_map(drive: Drive, points: int = 101) -> InverseMap:
         )
     upwards, _ = starting_acceleration(drive, 1.0)
     downwards, _ = starting_acceleration(drive, -1.0)
-    errors, lags = list[float](), list[float]()
+    errors = list[float]()
+    lags = list[float]()
     for branch in (plus, minus):
         speed = 0.5 * (branch.speed[1:] + branch.speed[:-1])
         voltage = 0.5 * (branch.voltage[1:] + branch.voltage[:-1])

@@ -61,7 +61,8 @@ def removals(drive: Drive) -> list[Removal]:
     Only those whose removal changes a parameter. The spool offset is among them, although it limits
     nothing: the creep that it causes is an error, too.
     """
-    numbers, definitions = drive.parameters.numbers, drive.parameters.definitions
+    numbers = drive.parameters.numbers
+    definitions = drive.parameters.definitions
     # with the card's jump left as it is, a solenoid's dead zone beyond it would stay
     jump = min(numbers["Z17"], numbers["J_plus"], numbers["J_minus"])
     plate = farthest_stop(drive)

@@ -479,7 +479,8 @@ def bands(
     """
     if not 0.0 < level < 1.0:
         raise InputError(f"The level {level:g} of a band must lie between 0 and 1.")
-    count, size = len(drawn.drives), trial.voltage.size
+    count = len(drawn.drives)
+    size = trial.voltage.size
     if size * count > MOST_SAMPLES:
         raise InputError(
             f"{count} drives over {size} samples take too much memory: take "

@@ -60,7 +60,8 @@ def performance(
     DomainError
         If the drive leaves the model's domain.
     """
-    speeds, accelerations = [], []
+    speeds = []
+    accelerations = []
     for name, sign in (("positive", 1.0), ("negative", -1.0)):
         if direction in (name, "both"):
             voltage = np.full(int(STEP_LENGTH * STEP_RATE) + 1, sign * FULL_VOLTAGE)

@@ -110,7 +110,8 @@ class WhatIf(Result):
 
         With the `bands` of both, of the same outcomes, each number has half of its interval.
         """
-        columns, cells = list[Column](), list[Array]()
+        columns = list[Column]()
+        cells = list[Array]()
         for name, variant in ((AS_IS, self.before), (CHANGED, self.after)):
             columns.append(Column(name, "z.2f", none="none"))
             cells.append(np.array([*variant.speed_limits, *variant.values]))

@@ -189,7 +189,8 @@ def whatif(
     with spinner("Simulating"):
         name, trial = parsing.named_trial(choice.chosen, maneuver, sampling)
         result = what_if(choice.chosen, moved, trial, outcomes=(*OUTCOMES, "travel"))
-    bands, sentences = dict[str, monte_carlo.Bands](), list[str]()
+    bands = dict[str, monte_carlo.Bands]()
+    sentences = list[str]()
     if uncertainty is not None:
         with spinner("Drawing drives"):
             draws = monte_carlo.stored_draws(uncertainty, drive=choice.chosen, campaign=campaign)
@@ -199,7 +200,8 @@ def whatif(
             )
             for which, variant in drawn.items():
                 band = monte_carlo.bands(variant, trial, result.outcomes, level=LEVEL)
-                bands[which], (width, when) = band, band.widest
+                bands[which] = band
+                width, when = band.widest
                 sentences.append(
                     f"Band of {band.draws} drives, {which}: at most "
                     f"{quantity(width, 'rad/s', spec='.3g')} wide, at {when:.3g} s."
@@ -278,7 +280,8 @@ def size(
     )
     required = sizing.Requirements(speed, acceleration, error, direction)
     with spinner("Sizing"):
-        follow, ranges = None, parsing.factor_ranges_of(variables or SIZED, sizing.DEFAULT_RANGE)
+        follow = None
+        ranges = parsing.factor_ranges_of(variables or SIZED, sizing.DEFAULT_RANGE)
         if maneuver is not None:
             voltage = parsing.named_maneuver(maneuver, drive.chosen).sample()
             # a larger drive may well be what it takes to reach it
@@ -404,7 +407,8 @@ def compensate(
         )
     with spinner("Inverting"):
         marched = parsing.at_rate(drive.chosen, sampling.rate)
-        inverse, improvement = compensation.inverse_map(marched, points), None
+        inverse = compensation.inverse_map(marched, points)
+        improvement = None
         tables = inverse.tables([radians(speed) for speed in speeds_deg_s or ()])
         if stick is not None:
             name, run = parsing.simulated_run(marched, stick, sampling)
@@ -638,7 +642,8 @@ def full_order(
     with spinner("Simulating"):
         if maneuver is None:
             domain = full.validity(full_drive, sampling.rate)
-            title, heading = drive.title, f"{len(domain.rows)} maneuvers"
+            title = drive.title
+            heading = f"{len(domain.rows)} maneuvers"
         else:
             name, run = parsing.simulated_as(full_drive.drive, maneuver, sampling)
             comparison = full.compare(full_drive, run, start=sampling.start)

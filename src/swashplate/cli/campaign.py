@@ -139,7 +139,8 @@ def init(
     check_writable(target, CAMPAIGN_FILE, force=force)
     file = None if drive is None else parsing.drive_file(drive)
     if file is not None:  # a drive as a campaign file names it
-        resolved, root = file.resolve(), target.parent.resolve()
+        resolved = file.resolve()
+        root = target.parent.resolve()
         drive = (
             resolved.relative_to(root) if resolved.is_relative_to(root) else resolved
         ).as_posix()
@@ -289,7 +290,9 @@ def plot(
             f"{channels_listed}."
         )
     if run is not None and channel is not None:
-        experiment, shown, simulated = campaign[run], campaign[run][channel], None
+        experiment = campaign[run]
+        shown = experiment[channel]
+        simulated = None
         drive = campaign.axes[experiment.axis].drive
         if shown.kind in SIGNALS and drive is not None and not shown.is_position:
             predictions = predict(campaign.drive(experiment.axis), [experiment])
@@ -426,7 +429,8 @@ def guess(
     from swashplate.identification.identifying import runs_to_fit
 
     folder = path.parent if out is None else out
-    start, setup = folder / "start.toml", folder / "setup.toml"
+    start = folder / "start.toml"
+    setup = folder / "setup.toml"
     with spinner(f"Reading {path}"):
         check_free(start, setup, force=force)
         campaign, axis_name = parsing.campaign_of(path, axis)

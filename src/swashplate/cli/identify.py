@@ -361,7 +361,8 @@ def validate(
 
         with spinner("Writing the report"):
             joined(measures).write(made_folder(out) / "measures.csv")
-            page, notes = out / "report.html", {**versions(), "drive from": drive}
+            page = out / "report.html"
+            notes = {**versions(), "drive from": drive}
             write_validation_report(
                 parameters, campaign, page, predicted, judged=judged, notes=notes
             )
@@ -436,10 +437,8 @@ def report(
                 "leave out --truth."
             )
         if fitted.suffix.lower() == ".toml":
-            fitted_numbers, numbers = (
-                parsing.parameters_of(str(fitted)).numbers,
-                result.fit.parameters,
-            )
+            fitted_numbers = parsing.parameters_of(str(fitted)).numbers
+            numbers = result.fit.parameters
             differing = [
                 name for name, value in numbers.numbers.items() if fitted_numbers[name] != value
             ]

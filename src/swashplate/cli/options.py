@@ -195,7 +195,8 @@ class DriveChoice:
     @property
     def title(self) -> str:
         """Its name for a heading; one from a file of another name goes by that, too."""
-        path, name = Path(self.drive), self.chosen.name
+        path = Path(self.drive)
+        name = self.chosen.name
         return name if path.stem == name else f"{path.name or self.drive} ({name})"
 
     @property

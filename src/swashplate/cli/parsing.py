@@ -185,9 +185,12 @@ def assignments_of(
     for word in words:
         name, _, value = (part.strip() for part in word.partition("="))
         match = _VALUE.fullmatch(value)
-        definition, numbers, unit = None, list[float](), ""
+        definition = None
+        numbers = list[float]()
+        unit = ""
         if match is not None:
-            definition, unit = known(name), (match[3] or "").strip()
+            definition = known(name)
+            unit = (match[3] or "").strip()
             numbers = [float(number) for number in match.group(1, 2) if number]
         if len(numbers) not in counts or (unit and not units):
             raise InputError(f"{option} cannot read '{word}'; write it as {example}.")
@@ -346,7 +349,8 @@ def at_rate(drive: Drive, rate: float) -> Drive:
     from swashplate.cli.terminal import note
     from swashplate.equations.marching.record import least_substeps
 
-    filter_rate, marched = drive.parameters.rate, rate * least_substeps(rate)
+    filter_rate = drive.parameters.rate
+    marched = rate * least_substeps(rate)
     if filter_rate is None or abs(marched / filter_rate - 1.0) < 1e-9:
         return drive
     steps = "" if marched == rate else f", computed in steps of 1/{marched:g} s,"
@@ -384,7 +388,10 @@ def simulated_run(
     head = command.partition(":")[0]  # stairs:2/4/0 is not a path
     if not ("/" in head or _ENDING.search(head) or Path(command).is_file()):
         maneuver = named_maneuver(command, drive)
-        name, where, values, time = maneuver.name, "", maneuver.sample(options.rate), None
+        name = maneuver.name
+        where = ""
+        values = maneuver.sample(options.rate)
+        time = None
     else:
         kind = file_kind(Path(command))
         if kind not in ("log", ""):
@@ -403,7 +410,10 @@ def simulated_run(
                 f"{command} needs --interpolation linear (a straight line from row to row) or "
                 "--interpolation previous (each row held until the next)."
             )
-        name, where, values, time = Path(command).name, f"{command}: ", series.values, series.time
+        name = Path(command).name
+        where = f"{command}: "
+        values = series.values
+        time = series.time
     inputs = _measured(measured, command if where else "", options.time_column)
     try:
         return name, drive.simulate(

@@ -101,10 +101,12 @@ def _blocks(table: Table, line: int) -> Iterator[rich.table.Table]:
     Numbers are never cut. Heads are broken first; every block begins with the columns before the
     first number.
     """
-    columns, every = table.columns, range(len(table.columns))
+    columns = table.columns
+    every = range(len(table.columns))
     heads = ["" if columns[k] is UNIT else head for k, head in enumerate(table.heads())]
     rows = [table.texts(row) for row in table.rows]
-    whole, broken = _widths([heads, *rows]), list[int]()
+    whole = _widths([heads, *rows])
+    broken = list[int]()
 
     def length(columns: Sequence[int]) -> int:
         return sum((broken or whole)[k] for k in columns) + BETWEEN * (len(columns) - 1)
@@ -234,12 +236,14 @@ def long_work(text: str, steps: int = 0) -> Iterator[Callable[..., None]]:
     words = TextColumn("{task.description}", markup=False)
     columns = (SpinnerColumn(), BarColumn(bar_width=12), words, TimeRemainingColumn())
     with Progress(*columns, console=side, transient=True, disable=not side.is_terminal) as bar:
-        task, steps_begun = bar.add_task(text, total=None), 0
+        task = bar.add_task(text, total=None)
+        steps_begun = 0
 
         def show(what: str, share: float | None = None) -> None:
             nonlocal steps_begun
             if steps:
-                share, steps_begun = steps_begun / steps, steps_begun + 1
+                share = steps_begun / steps
+                steps_begun += 1
             total = None if share is None else 1.0
             bar.update(task, description=what, total=total, completed=share or 0.0)
 

@@ -162,7 +162,8 @@ def shafts_for(x: float, y: float, now: Shafts, g: Geometry, home: Home) -> Shaf
     The point is in the ship's frame [m]; beyond the boom's reach it is the nearest reach. The
     hoist's angle stays as it is.
     """
-    e_x, e_y = x - g.axis.x, y - g.axis.y
+    e_x = x - g.axis.x
+    e_y = y - g.axis.y
     c = min(max((sqrt(e_x * e_x + e_y * e_y) - g.foot) / g.boom, 0.0), 1.0)
     rope = luff_rope(Boom(c, sqrt(1.0 - c * c)), g)
     before = home.slew + now.slew

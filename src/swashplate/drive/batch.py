@@ -54,7 +54,8 @@ def simulate_drives(
             numbers[column] = values
     check_output(cost.output if cost else output)
     driver, record = next(iter(records.items()))
-    by_voltage, models = driver == "voltage", models_of(parameters.equations)
+    by_voltage = driver == "voltage"
+    models = models_of(parameters.equations)
     rules = [*broken_rules(numbers, definitions)]
     if by_voltage:
         rules += unstable_filters(numbers, record.step, parameters.rate is None)
@@ -85,7 +86,8 @@ def _groups(
         own = [numbers[each] for each in SWITCHES if SWITCHES[each] == option and each in numbers]
         masks[option] = np.any(own, axis=0)
     kinds = np.stack(list(masks.values()), axis=1)
-    base, card = pump_options(parameters), card_options(parameters) if by_voltage else None
+    base = pump_options(parameters)
+    card = card_options(parameters) if by_voltage else None
     groups = []
     for kind in np.unique(kinds, axis=0):
         on = {name: True if acts else None for name, acts in zip(masks, kind, strict=True)}

@@ -92,7 +92,8 @@ def operating_point(
         plate, at the relief pressure, after a saturated orifice, in the grip of a friction without
         presliding; or if the solenoid overpowers the feedback spring.
     """
-    name, given = parameters.name, current if voltage is None else voltage
+    name = parameters.name
+    given = current if voltage is None else voltage
     if given is None or (voltage is not None and current is not None):
         raise InputError("Linearise at a voltage or a current; give exactly one of them.")
     if not is_real(given) or not isfinite(given):

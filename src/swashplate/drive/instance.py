@@ -177,7 +177,8 @@ def unstable_filters(numbers: Mapping[str, Array], step: float, exact: bool) -> 
         ),
     )
     for side in SIDES:
-        zeta, omega = numbers[f"zeta_{side}"], numbers[f"omega_{side}"]
+        zeta = numbers[f"zeta_{side}"]
+        omega = numbers[f"omega_{side}"]
         steps = omega * step / filter_step_limit(zeta, exact)
         values = {
             "side": side,
@@ -218,7 +219,8 @@ def at_every_rate(parameters: ParameterSet) -> ParameterSet:
     for side in SIDES:
         zeta, omega, C = (parameters.numbers[f"{name}_{side}"] for name in ("zeta", "omega", "C"))
         w = omega / parameters.rate
-        middle, half = 1.0 - zeta * w, w * sqrt(complex(zeta * zeta - 1.0))
+        middle = 1.0 - zeta * w
+        half = w * sqrt(complex(zeta * zeta - 1.0))
         poles = middle + half, middle - half
         if any(each.imag == 0.0 and each.real <= 0.0 for each in poles):
             raise InputError(

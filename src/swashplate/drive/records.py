@@ -95,7 +95,8 @@ def drive_records(
 
 def _check_measured(name: str, values: Array) -> None:
     """Refuse a record with a sample that no machine has, or whose size can hardly be meant."""
-    definition, (least, most) = INPUTS[name], RANGES[name]
+    definition = INPUTS[name]
+    least, most = RANGES[name]
     low, high = float(values.min()), float(values.max())
     try:
         check_plausible(name, definition, max(low, high, key=abs))

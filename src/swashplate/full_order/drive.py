@@ -64,7 +64,8 @@ MOST_SUBSTEPS = 20_000  # Sub-steps a sample, beyond which the machine is too st
 
 def _definitions() -> Definitions:
     """Parameters of the drive with five states: the card's, the solenoids', the machine's."""
-    by_symbol, paths = dict[str, Definition](), dict[str, str]()
+    by_symbol = dict[str, Definition]()
+    paths = dict[str, str]()
     for symbol, definition in CATALOGUE.items():
         if definition.block == "control_card":
             by_symbol[symbol] = definition

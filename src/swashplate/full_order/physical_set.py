@@ -377,10 +377,13 @@ def _completed(
         )
     # of what is known; nothing else may be asked of it
     machine = Machine(*(n.get(name, 0.0) for name in Machine._fields))
-    arm, area, oil = n["swash_arm"], n["piston_area"], "oil_volume and bulk_modulus"
+    arm = n["swash_arm"]
+    area = n["piston_area"]
+    oil = "oil_volume and bulk_modulus"
     supply = Z["Z9"] + _rest(machine)[0]
     _, stiffness = _rest(machine._replace(supply_pressure=supply))
-    spring_rate, spring_moment = area / (Z["Z1"] * arm), Z["Z4"] ** 0.5
+    spring_rate = area / (Z["Z1"] * arm)
+    spring_moment = Z["Z4"] ** 0.5
     gauge = (1.0 + area**2 * stiffness / spring_rate) / (1.0 + Z["Z6"]) / stiffness
     completed: dict[str, tuple[Value, str]] = {
         "spool_arm": (Z["Z5"], "Z5"),

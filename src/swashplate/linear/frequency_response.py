@@ -133,7 +133,8 @@ class FrequencyResponse(Tabular):
 
     def table(self) -> Table:
         """Gain, phase and distortion by amplitude, at up to `SHOWN` of the frequencies."""
-        unit, answer_unit = self.units.get(self.input, ""), self.units.get(self.output, "")
+        unit = self.units.get(self.input, "")
+        answer_unit = self.units.get(self.output, "")
         gain_unit = f"{answer_unit or '1'}/{unit}" if unit else answer_unit
         columns = (
             Column("amplitude", "g", unit),
@@ -142,7 +143,8 @@ class FrequencyResponse(Tabular):
             Column("phase", "z.1f", "rad"),
             Column("distortion", ".1%"),
         )
-        made, size = Table("", columns), self.frequencies.size
+        made = Table("", columns)
+        size = self.frequencies.size
         rows = np.unique(np.linspace(0, size - 1, min(size, SHOWN)).round().astype(int))
         for k, amplitude in enumerate(self.amplitudes.tolist()):
             for at in rows.tolist():
@@ -150,7 +152,8 @@ class FrequencyResponse(Tabular):
                 if self.moves[k, at]:
                     numbers = (self.gain[k, at], self.phase[k, at], self.distortion[k, at])
                     answer = tuple(map(float, numbers))
-                frequency, first = float(self.frequencies[at]), at == rows[0]
+                frequency = float(self.frequencies[at])
+                first = at == rows[0]
                 made.add(amplitude, frequency, *answer, section=bool(first and k))
         if rows.size < size:
             made.caption = f"{rows.size} of {size} frequencies shown"
@@ -158,7 +161,8 @@ class FrequencyResponse(Tabular):
 
     def still(self) -> list[str]:
         """Where `moves` denies an answer, in words, for each amplitude that has such a place."""
-        unit, sentences = self.units.get(self.input, ""), list[str]()
+        unit = self.units.get(self.input, "")
+        sentences = list[str]()
         for amplitude, moves in zip(self.amplitudes, self.moves, strict=True):
             places = np.flatnonzero(~moves)
             if places.size == 0:

@@ -86,7 +86,8 @@ def linearize(
                 f"{instance.name}: '{name}' is not an input at the operating point; there are "
                 f"{', '.join(each for each in instance.model.external if each in at)}."
             )
-    model, h = instance.model, 0.0 if rate is None else 1.0 / rate
+    model = instance.model
+    h = 0.0 if rate is None else 1.0 / rate
     if rate is None and any(part.taps for part in model.parts):
         raise InputError(
             f"{instance.name}: {model.name} reads past samples of its inputs, so it is not a model "
@@ -149,7 +150,8 @@ def _linear_model(
     read, the memory. The delay is in whole samples: those by which all that is read of the first
     input is late.
     """
-    model, signals = instance.model, tuple(initial.before)
+    model = instance.model
+    signals = tuple(initial.before)
     h = 0.0 if rate is None else 1.0 / rate
     for part, known in zip(model.parts, initial.arguments, strict=True):
         if part.domain is None:
@@ -193,7 +195,8 @@ def _linear_model(
     for (row, k), slope in zip(derived.entries, results[len(slopes) :], strict=True):
         if moved[k] in column:
             slopes[row, column[moved[k]]] += slope
-    into, out = slopes[:n], slopes[n:]
+    into = slopes[:n]
+    out = slopes[n:]
     read = [(*each, k) for k, each in enumerate(columns, n) if slopes[:, k].any()]
     lags = {name: [lag for of, lag, _ in read if of == name] or [0] for name in inputs}
     first = {name: min(lags[name]) if name == inputs[0] else 0 for name in inputs}
@@ -202,9 +205,11 @@ def _linear_model(
     size = n + len(past)
     at = {each: k for k, each in enumerate((*past, *first.items()), n)}
     A, C = np.zeros((size, size + len(inputs))), np.zeros((len(out), size + len(inputs)))
-    A[:n, :n], C[:, :n] = into[:, :n], out[:, :n]
+    A[:n, :n] = into[:, :n]
+    C[:, :n] = out[:, :n]
     for name, lag, k in read:
-        A[:n, at[name, lag]], C[:, at[name, lag]] = into[:, k], out[:, k]
+        A[:n, at[name, lag]] = into[:, k]
+        C[:, at[name, lag]] = out[:, k]
     for name, lag in past:
         A[at[name, lag], at[name, lag - 1]] = 1.0
     memory = tuple(f"{name}_{lag}" for name, lag in past)

@@ -65,7 +65,8 @@ class LinearModel:
 
     def __repr__(self) -> str:
         time = "continuous" if self.rate is None else f"sampled at {self.rate:g} Hz"
-        kind, inputs = type(self).__name__, ", ".join(self.inputs)
+        kind = type(self).__name__
+        inputs = ", ".join(self.inputs)
         return f"{kind}({self.name!r}, {inputs} to {', '.join(self.outputs)}, {time})"
 
     @property

@@ -191,12 +191,16 @@ def named_set(name: str | Path) -> ParameterSet:
 def read_set(text: str, origin: str) -> ParameterSet:
     """A parameter set from TOML text; `origin` names it in errors."""
     contents = validated(parse_toml(text, origin), SetFile, origin)
-    model, rate = contents.model, contents.model.rate
+    model = contents.model
+    rate = model.rate
     if isinstance(contents.control_card, str):
         card = _packaged_card(contents.control_card, origin)
-        card_name, entries, rate = card.name, card.control_card, rate or card.rate
+        card_name = card.name
+        entries = card.control_card
+        rate = rate or card.rate
     else:
-        card_name, entries = contents.card or f"{contents.name} card", contents.control_card
+        card_name = contents.card or f"{contents.name} card"
+        entries = contents.control_card
     equations = _replacements(model.equations, origin)
     blocks: dict[Block, Mapping[str, ParameterEntry]] = {
         "control_card": entries,
@@ -241,7 +245,8 @@ def _replacements(entries: Sequence[EquationPlaces], origin: str) -> tuple[Repla
     from swashplate.models.drive import drive, pump_drive
 
     replacements = []
-    model, pump_model = drive, pump_drive
+    model = drive
+    pump_model = pump_drive
     for entry in entries:
         try:
             replacement = found_at(entry.model_dump(exclude_none=True))

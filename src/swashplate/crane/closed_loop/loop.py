@@ -578,9 +578,12 @@ def loop_of(
                     volts[i] = stick[m, i]
                     if actuation != DIRECT:
                         volts[i] = voltage_for(reference[i], inverses[i], actuation)
-                a.inputs[0], b.inputs[0], c.inputs[0] = volts[0], volts[1], volts[2]
+                a.inputs[0] = volts[0]
+                b.inputs[0] = volts[1]
+                c.inputs[0] = volts[2]
                 if loaded:
-                    a.inputs[1], b.inputs[1] = axes[TORQUE, 0], axes[TORQUE, 1]
+                    a.inputs[1] = axes[TORQUE, 0]
+                    b.inputs[1] = axes[TORQUE, 1]
                     c.inputs[1] = axes[TORQUE, 2]
                 margins[0] = min(margins[0], hoist(a))
                 margins[1] = min(margins[1], slew_drive(b))

@@ -131,8 +131,10 @@ def plot_envelope(
     drawn = {by for curve in curves for by in curve.by}
     dashes = [handle(WORDS[by], INK, d, LINE) for by, d in DASHES.items() if by in drawn]
     words = f"{envelope.name}: acceleration that each speed allows" if title is None else title
-    speed, acceleration = display_unit("rad/s"), display_unit("rad/s^2")
-    up, across = acceleration.label("acceleration"), speed.label("speed")
+    speed = display_unit("rad/s")
+    acceleration = display_unit("rad/s^2")
+    up = acceleration.label("acceleration")
+    across = speed.label("speed")
     if ax is None:
         figure, (panel,) = sheet([3.8], words, [up], across, legend=[*colors, *dashes])
         _draw_envelope(panel, envelope)
@@ -146,7 +148,8 @@ def plot_envelope(
 
 
 def _draw_envelope(ax: Axes, envelope: Envelope) -> None:
-    speed, acceleration = display_unit("rad/s"), display_unit("rad/s^2")
+    speed = display_unit("rad/s")
+    acceleration = display_unit("rad/s^2")
     zero_line(ax, upright=True)
     low, high = (speed.factor * limits.top_speed for limits in (envelope.minus, envelope.plus))
     span = (high - low) or 1.0
@@ -154,7 +157,8 @@ def _draw_envelope(ax: Axes, envelope: Envelope) -> None:
     most = []
     curves = zip((*envelope.accelerating, envelope.released), ENVELOPE_LOOKS, strict=True)
     for (curve, (color, _)), sign in zip(curves, (1.0, -1.0, 0.0), strict=True):
-        across, up = speed.factor * curve.speed, acceleration.factor * curve.acceleration
+        across = speed.factor * curve.speed
+        up = acceleration.factor * curve.acceleration
         if sign:  # of the full commands only what speeds up their own way counts
             up = sign * np.maximum(sign * up, 0.0)
             ax.fill_between(across, up, color=color, alpha=0.08, linewidth=0.0)
@@ -174,8 +178,10 @@ def _draw_envelope(ax: Axes, envelope: Envelope) -> None:
 def _mark_way(ax: Axes, limits: DirectionLimits, color: str, height: float) -> None:
     """The speed that a way ends at, and the acceleration that it begins with."""
     units = display_unit("rad/s"), display_unit("rad/s^2")
-    speed, acceleration = units[0].factor * limits.top_speed, units[1].factor * limits.acceleration
-    up, stopped = limits.acceleration > 0.0, limits.top_speed == limits.speed_limit
+    speed = units[0].factor * limits.top_speed
+    acceleration = units[1].factor * limits.acceleration
+    up = limits.acceleration > 0.0
+    stopped = limits.top_speed == limits.speed_limit
     ax.axvline(speed, color=color, linewidth=1.0, linestyle="solid" if stopped else "dotted")
     what = "swash stop" if stopped else f"at {'+' if up else '−'}{FULL_VOLTAGE:g} V"
     write_words(
@@ -225,7 +231,8 @@ def plot_limit_timeline(
     InputError
         If the reference speed has another length than the run.
     """
-    acting, unit = [limit for limit in Limit if run.held_back(limit).any()], display_unit("rad/s")
+    acting = [limit for limit in Limit if run.held_back(limit).any()]
+    unit = display_unit("rad/s")
     requested = None if reference is None else np.asarray(reference, dtype=np.float64)
     if requested is not None and requested.shape != run.time.shape:
         raise InputError(
@@ -309,7 +316,8 @@ def plot_whatif(
     moved = ", ".join(f"{name} x {factor:g}" for name, factor in result.factors.items())
     words = f"{result.before.drive.name}: {moved}" if title is None else title
     heights = [1.2, 2.8, 1.8, 1.3] if bands else [1.2, 2.8, 1.8]
-    speed, acceleration = display_unit("rad/s"), display_unit("rad/s^2")
+    speed = display_unit("rad/s")
+    acceleration = display_unit("rad/s^2")
     labels = ["voltage (V)", speed.label("shaft speed"), acceleration.label("acceleration")]
     labels.append(speed.label("about the median"))
     figure, axes = sheet(heights, words, labels, "time (s)", legend=legend)
@@ -337,7 +345,8 @@ def plot_whatif(
 
 def _speed_limits(ax: Axes, result: WhatIf, looks: Mapping[str, Stroke]) -> None:
     """Speed limits of the two drives, as far as the command's direction goes."""
-    voltage, factor = result.trial.voltage, display_unit("rad/s").factor
+    voltage = result.trial.voltage
+    factor = display_unit("rad/s").factor
     for name in (AS_IS, CHANGED):
         up, down = result.variants[name].speed_limits
         for limit, used in ((up, (voltage > 0.0).any()), (down, (voltage < 0.0).any())):
@@ -347,7 +356,8 @@ def _speed_limits(ax: Axes, result: WhatIf, looks: Mapping[str, Stroke]) -> None
 
 def shade_band(ax: Axes, band: Bands, color: ColorType, *, about: Array | float = 0.0) -> None:
     """Shade a band of speeds; a long one by every so many samples."""
-    step, factor = max(-(-band.time.size // (2 * COLUMNS)), 1), display_unit("rad/s").factor
+    step = max(-(-band.time.size // (2 * COLUMNS)), 1)
+    factor = display_unit("rad/s").factor
     lower, upper = (factor * (edge - about)[::step] for edge in (band.lower, band.upper))
     ax.fill_between(
         band.time[::step], lower, upper, color=color, alpha=0.25, linewidth=0.0, zorder=1.6
@@ -535,14 +545,16 @@ def plot_compensation(
 
 
 def _draw_map(inverse: InverseMap, full_range: Axes, close_up: Axes | None = None) -> None:
-    unit, (low, high) = display_unit("rad/s"), inverse.limits
+    unit = display_unit("rad/s")
+    low, high = inverse.limits
     narrow = max(CLOSE_UP * min(-low, high), 2.0 * max(map(abs, inverse.gap)))
     panels = [(full_range, (low, high))]
     if close_up is not None:
         panels.append((close_up, (max(low, -narrow), min(high, narrow))))
     for ax, ends in panels:
         speed = np.union1d(np.linspace(*ends, POINTS), np.clip(inverse.gap, *ends))
-        straight, across = proportional_command(inverse, speed), unit.factor * speed
+        straight = proportional_command(inverse, speed)
+        across = unit.factor * speed
         ax.plot(across, straight, color=GREY, linestyle="dashed", linewidth=1.0)
         ax.plot(across, inverse.voltage(speed), color=INK, linewidth=LINE)
         dress(ax, "", unit.label("reference speed"))
@@ -574,7 +586,8 @@ def _draw_map(inverse: InverseMap, full_range: Axes, close_up: Axes | None = Non
 
 
 def _draw_improvement(speed: Axes, error: Axes, improvement: Improvement) -> None:
-    unit, runs = display_unit("rad/s"), list(improvement.runs.values())
+    unit = display_unit("rad/s")
+    runs = list(improvement.runs.values())
     time = runs[0].time
     dress(speed, unit.label("speed"))
     dress(error, unit.label("error"), "time (s)")

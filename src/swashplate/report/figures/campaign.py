@@ -116,7 +116,8 @@ def _column(key: tuple[str, str], signals: Sequence[InputSignal | Channel]) -> P
         min(float(experiment.min()) for experiment in shown),
         max(float(experiment.max()) for experiment in shown),
     )
-    kind, unit = signals[0].kind, display_unit(key[1], max(abs(low), abs(high)))
+    kind = signals[0].kind
+    unit = display_unit(key[1], max(abs(low), abs(high)))
     free = kind in ("position", "encoder_counts")
     if free:
         high = 0.5 * max(float(np.ptp(experiment)) for experiment in shown)
@@ -182,7 +183,8 @@ def plot_campaign(experiments: Iterable[Experiment], *, title: str | None = None
 
 
 def _page(experiments: Sequence[Experiment], columns: Sequence[PanelColumn], title: str) -> Figure:
-    rows, across = len(experiments), len(columns)
+    rows = len(experiments)
+    across = len(columns)
     width = max(WIDTH, across * (NARROWEST + BETWEEN))
     room = width / across - 1.3 * BETWEEN
     figure = new_figure(width, HEAD + 2.0 * ROW + rows * (PANEL + ABOVE) + FOOT)
@@ -235,8 +237,10 @@ def _fill(
     ax: Axes, column: PanelColumn, signal: InputSignal | Channel, experiment: Experiment
 ) -> None:
     """A signal, with marks where it is ignored, weighted, clipped or missing."""
-    time, factor = signal.time, column.unit.factor
-    values, counted = factor * signal.values, factor * _counted(signal)
+    time = signal.time
+    factor = column.unit.factor
+    values = factor * signal.values
+    counted = factor * _counted(signal)
     zero_line(ax)
     middle = 0.5 * float(counted.min() + counted.max()) if column.free else 0.0
     margin = _ROOM * (column.high - column.low) or 1.0
@@ -415,7 +419,9 @@ def plot_channel(
         If the window holds fewer than two samples.
     """
     rows = rows_within(channel.time, window, str(channel.source))
-    time, values, used = channel.time[rows], channel.values[rows], channel.used[rows]
+    time = channel.time[rows]
+    values = channel.values[rows]
+    used = channel.used[rows]
     legend = [handle("measured", INK if channel.is_position else BLUE, width=THIN)]
     if simulated is not None:
         legend.append(handle("simulated", VERMILION))
@@ -430,17 +436,20 @@ def plot_channel(
         late = 1e3 * speeds[1][0].delay
         legend.append(handle("speed: difference of neighbours", ROUGH))
         legend.append(handle(f"speed: 10 and 30 Hz filters, {late:.1f} ms late", BLUE))
-        below, si = "speed", f"{channel.unit}/s"
+        below = "speed"
+        si = f"{channel.unit}/s"
     elif simulated is not None:
         lower.append((time, values - simulated[rows], INK, THIN))
-        below, si = "measured less simulated", channel.unit
+        below = "measured less simulated"
+        si = channel.unit
     unit = display_unit(channel.shown_unit, float(np.abs(values).max()))
     labels = [unit.label(channel.kind.replace("_", " ").replace("encoder counts", "angle"))]
     if lower:
         scale = lower[-1][1] if channel.is_position else lower[-1][1][_scale_rows(used)]
         small = display_unit(si, float(np.abs(scale).max()))
         labels.append(small.label(below))
-    heights, words = [2.4, 2.2] if lower else [3.2], channel.name if title is None else title
+    heights = [2.4, 2.2] if lower else [3.2]
+    words = channel.name if title is None else title
     figure, axes = sheet(heights, words, labels, "time (s)", legend=legend)
     style: dict[str, Any] = {"held": channel.is_position, "width": THIN, "zorder": 2.5}
     counted = values[_scale_rows(used)]
@@ -504,7 +513,8 @@ def plot_prediction(
     signals = with_speeds((quality,))
     channel = quality.experiment[quality.channel]
     rows = rows_within(channel.time, window, str(channel.source))
-    time, used = channel.time[rows], channel.used[rows]
+    time = channel.time[rows]
+    used = channel.used[rows]
     counted = _scale_rows(used)
     panels = [_overlay(signal, rows) for signal in signals]
     judged = signals[-1]

@@ -122,7 +122,8 @@ def plot_simulation(
     InputError
         If the window holds fewer than two samples.
     """
-    pump, run = simulation.pump, simulation
+    pump = simulation.pump
+    run = simulation
 
     def acting(*limits: Limit) -> tuple[tuple[Shade, Array], ...]:
         return tuple((SHADES[limit], stretches(run.time, run.active(limit))) for limit in limits)
@@ -286,9 +287,11 @@ def _draw_given(
     title: str | None,
 ) -> None:
     """Draw signals in axes of a caller, which may have curves already."""
-    curves, labels = [], []
+    curves = []
+    labels = []
     for name in signals:
-        values, definition = run[name][rows], _definition(run, name)
+        values = run[name][rows]
+        definition = _definition(run, name)
         unit = display_unit(definition.unit, float(np.abs(values).max()) or inf)
         curves.append(unit.factor * values)
         labels.append(unit.label(definition.name))
@@ -302,7 +305,8 @@ def _draw_given(
 
 def _panel(run: Run, signal: str, label: str, rows: slice) -> Panel:
     """Panel of one signal, with the ends of its range."""
-    values, definition = run[signal], _definition(run, signal)
+    values = run[signal]
+    definition = _definition(run, signal)
     unit = display_unit(definition.unit, float(np.abs(values[rows]).max()) or inf)
     marks = tuple(
         Mark(end, f"limit {unit.factor * end:.4g} {unit.name}".rstrip().replace("-", "−"))
@@ -516,7 +520,8 @@ def plot_comparison(simulations: Mapping[str, Simulation], *, title: str | None 
     """
     if not simulations:
         raise InputError("A comparison needs at least one simulation.")
-    looks, speed = strokes(simulations), display_unit("rad/s")
+    looks = strokes(simulations)
+    speed = display_unit("rad/s")
     words = "Shaft speed under the same command" if title is None else title
     legend = [handle(name, *look) for name, look in looks.items()]
     heights = [1.2, 2.6, 1.6] if len(simulations) > 1 else [1.2, 2.6]
@@ -532,7 +537,8 @@ def plot_comparison(simulations: Mapping[str, Simulation], *, title: str | None 
         for simulation in simulations.values()
     ]
     for (name, run), command in zip(simulations.items(), commands, strict=True):
-        (color, dashes), time = looks[name], run.time
+        color, dashes = looks[name]
+        time = run.time
         if run is first:
             draw(axes[0], time, command, INK, zorder=3.0)
         elif not np.array_equal(commands[0], command):

@@ -80,7 +80,8 @@ def write_fit_report(
     The page holds what the eye can tell of every run, a few bytes a sample (`runs.run_data`): it
     grows with the number of runs, not with their length.
     """
-    fit, stages = result.fit, result.fit.stages
+    fit = result.fit
+    stages = fit.stages
     runs = shown_runs(stages, result.predicted)
     held_out = sum(run.role == "validate" for run in runs)
     facts = (
@@ -275,10 +276,12 @@ def _curves_section(runs: Sequence[ShownRun], virtual: bool) -> Section:
 def _live_section(fit: Fit, campaign: Campaign, runs: Sequence[ShownRun]) -> Section:
     """The drive itself beside the run that it misses most, of those held out if there are any."""
     blocks: list[PageBlock] = []
-    drive, nominal = fit.parameters, fit.nominal
+    drive = fit.parameters
+    nominal = fit.nominal
     if isinstance(drive, ParameterSet) and isinstance(nominal, ParameterSet):
         # the statuses are those of the nominal set: what was fitted is what has moved
-        before, moved = nominal.parameters, {}
+        before = nominal.parameters
+        moved = {}
         for symbol, parameter in drive.parameters.items():
             same = symbol in before and before[symbol].values == parameter.values
             moved[symbol] = replace(parameter, status="fixed" if same else "fitted")
@@ -353,7 +356,8 @@ def _setup_section(
 
 def _stage_words(fit: StageFit) -> list[str]:
     """What a stage was asked to do."""
-    stage, problem = fit.stage, fit.problem
+    stage = fit.stage
+    problem = fit.problem
     words = [f"Simulates {_PARTS[stage.part]}."]
     if stage.part == "pump":
         words.append(f"The current is the {stage.current} one.")
@@ -481,7 +485,8 @@ def _correlations(stage: StageFit, general: Sequence[bool]) -> list[PageBlock]:
     except InputError:  # the sentences above say why there are none
         return []
     determined = [k for k, is_general in enumerate(general) if is_general and quoted.determined[k]]
-    names, values = quoted.variables.names, quoted.correlation
+    names = quoted.variables.names
+    values = quoted.correlation
     pairs = [
         (float(values[i, j]), names[i], names[j]) for i in determined for j in determined if i < j
     ]

@@ -253,7 +253,8 @@ def print_report(page: str | Path, path: str | Path) -> None:
         in ``.pdf``.
     """
     ending(path, PRINTED)
-    browser, address = find_browser(), Path(page).absolute().as_uri()
+    browser = find_browser()
+    address = Path(page).absolute().as_uri()
 
     def write(beside: Path) -> None:
         with TemporaryDirectory() as profile:

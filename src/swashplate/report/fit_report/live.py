@@ -105,7 +105,8 @@ def write_live_page(
         runs = [run_of(at_instants(parameters, experiment)) for experiment in driven]
         page = live_page(parameters, runs, campaign.title, campaign.virtual, name)
     elif command is not None:
-        record, sentences = record_of(command.sample(rate), rate, what="voltage"), ()
+        record = record_of(command.sample(rate), rate, what="voltage")
+        sentences = ()
         run = {**_record(record), "name": command.name, "role": "", "channels": []}
         page = live_page(parameters, [run], parameters.title or parameters.name, False, name)
     else:
@@ -273,14 +274,18 @@ def _comparable(channels: Iterable[Channel]) -> list[Channel]:
 
 def _channel(channel: Channel) -> dict[str, Any]:
     """A measured channel with what it is compared with."""
-    signal, values, unit = SIGNALS[channel.kind], channel.values, channel.unit
+    signal = SIGNALS[channel.kind]
+    values = channel.values
+    unit = channel.unit
     name = channel.name
     if channel.is_position:
-        values, unit = speed_of(channel, "exact").speed, f"{channel.unit}/s"
+        values = speed_of(channel, "exact").speed
+        unit = f"{channel.unit}/s"
         name = f"speed from {channel.name}"
     also = ""
     if signal == "current_sum":
-        signal, also = "current_positive", "current_negative"
+        signal = "current_positive"
+        also = "current_negative"
     shown = _shown(signal, name, unit, float(np.abs(values).max(initial=0.0)))
     interval = float(np.median(np.diff(channel.time)))
     return {

@@ -103,7 +103,8 @@ def shown_runs(stages: Sequence[StageFit], predicted: Sequence[RunQuality]) -> t
         for speed in with_speeds(stage.runs)
     ]
     qualities += [(speed, "") for speed in with_speeds(predicted)]
-    units, runs = {}, dict[tuple[str, str], list[ShownChannel]]()
+    units = {}
+    runs = dict[tuple[str, str], list[ShownChannel]]()
     for name in {quality.channel for quality, _ in qualities}:
         alike = [quality for quality, _ in qualities if quality.channel == name]
         channels = [run.experiment[name] for run in alike]
@@ -134,7 +135,8 @@ def off_scale(channel: Channel, values: Array) -> Mask:
 
 def run_words(quality: RunQuality) -> str:
     """What must stand beside every fit %: RMSE, initial state, what is ignored."""
-    measures, run = quality.measures, quality.experiment
+    measures = quality.measures
+    run = quality.experiment
     channel = run[quality.channel]
     words = [f"RMSE {quantity(measures.rmse, channel.shown_unit)}"]
     if measures.fit_percent is not None and measures.nrmse is not None:
@@ -160,7 +162,8 @@ def write_samples(runs: Sequence[ShownRun], path: str | Path) -> None:
     files = []
     for run in runs:
         for measured in run.channels:
-            channel, quality = measured.channel, measured.quality
+            channel = measured.channel
+            quality = measured.quality
             columns = {
                 "run": run.name,
                 "role": run.role,
@@ -196,7 +199,9 @@ def run_data(run: ShownRun) -> dict[str, Any]:
 
 
 def _channel(shown: ShownChannel) -> dict[str, Any]:
-    channel, factor, small = shown.channel, shown.unit.factor, shown.small.factor
+    channel = shown.channel
+    factor = shown.unit.factor
+    small = shown.small.factor
     residual = small * shown.quality.residual
     rms = float(np.sqrt(np.mean(np.square(residual[channel.used])))) if channel.used.any() else 0.0
     signals = [(factor * shown.quality.simulated, None), (residual, rms / FINE or None)]

@@ -146,7 +146,8 @@ def numbers_table(drive: Drive, stages: Sequence[StageFit]) -> tuple[Table, list
     Without stages of a fit there are no intervals.
     """
     largest = largest_commands(stages)
-    values, sentences = machine_numbers_of(drive, largest), list[str]()
+    values = machine_numbers_of(drive, largest)
+    sentences = list[str]()
     range_ = _Range(np.full((6, 2), np.nan), np.full((6, 2), "", dtype=object), values, values)
     if stages:
         try:
@@ -192,7 +193,8 @@ def _range_of(drive: Drive, stages: Sequence[StageFit], values: Array, largest: 
     def numbers(drive: Drive) -> Array:
         return machine_numbers_of(drive, largest)
 
-    unseen, assumed = unseen_limits(stages), assumed_parameters(stages)
+    unseen = unseen_limits(stages)
+    assumed = assumed_parameters(stages)
     errors = standard_errors(stages, numbers, assumed)
     half = QUANTILE * errors
     nearest, farthest = _at_limits(drive, unseen), without_limits(drive, unseen)
@@ -262,7 +264,8 @@ def mistaken_for_a_lag(
 
 def _cell(factor: float, values: Array, range_: _Range, index: tuple[int, int]) -> Cell:
     """A number as it is printed: with its interval, or as the end of what is possible."""
-    value, half = factor * values[index], factor * range_.half[index]
+    value = factor * values[index]
+    half = factor * range_.half[index]
     near, far = factor * range_.near[index], factor * range_.far[index]
     if not np.isfinite(value):
         return Cell(None, NONE)
@@ -377,7 +380,8 @@ def summary_section(
         )
     ]
     shown.append(PageBlock("pair", list(_curves(runs, campaign.virtual))))
-    numbers, limits = [], []
+    numbers = []
+    limits = []
     if drive is not None:
         numbers.append(PageBlock("heading", "Numbers that matter", "h3"))
         table = None
@@ -421,7 +425,8 @@ def _limits(drive: Drive, stages: Sequence[StageFit]) -> list[str]:
 
     The steps go to the largest commands that were tested; what no test reached is no limit here.
     """
-    length, (plus, minus) = int(2.0 * RATE), largest_commands(stages)
+    length = int(2.0 * RATE)
+    plus, minus = largest_commands(stages)
     command = np.repeat((0.0, plus, 0.0, -minus, 0.0), length)
     try:
         limited = without_limits(drive, unseen_limits(stages)) if stages else drive
