@@ -32,7 +32,7 @@ enabled = True
 
 
 class Display(Protocol):
-    """What shows a line of progress."""
+    """A display of lines of progress."""
 
     def show(self, line: str) -> None:
         """Show a line in the place of the one before."""

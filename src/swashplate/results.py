@@ -37,7 +37,7 @@ SPELT_OUT = 4
 
 
 def short(value: object) -> str:
-    """What `repr` says of a result: its fields, arrays by their shape, others by their names."""
+    """Short form of a result for `repr`: its fields, arrays by shape, others by name."""
     if is_dataclass(value):
         names = [field.name for field in fields(value) if field.repr]
     else:  # a model of pydantic's, or a named tuple
@@ -109,7 +109,7 @@ class Result:
         return str(getattr(self, "headline", ""))
 
     def _sentences(self) -> list[str]:
-        """What follows from the tables, sentence by sentence."""
+        """Conclusions from the tables, sentence by sentence."""
         sentences = getattr(self, "sentences", ())
         return list(sentences() if callable(sentences) else sentences)
 

@@ -401,7 +401,7 @@ def write_whole(path: str | Path, write: Callable[[Path], object]) -> None:
     except OSError as error:
         raise FileError(f"{target} cannot be written: {error.strerror or error}.") from None
     except Exception as error:  # libraries raise what they like; what is not the disk's goes on
-        reason = _of_the_disk(error)
+        reason = _disk_message(error)
         if reason is None:
             raise
         raise FileError(f"{target} cannot be written: {reason}.") from None
@@ -415,14 +415,14 @@ def _permissions(path: Path) -> int | None:
         return None
 
 
-def _of_the_disk(error: BaseException) -> str | None:
-    """What a disk said, where a library says it in an error of its own or stumbles over it."""
+def _disk_message(error: BaseException) -> str | None:
+    """Message of the operating system inside a library's error; None if it has none."""
     if "(os error " in str(error):
         return str(error).partition(" (os error ")[0].rpartition(": ")[2]
     before = error.__cause__ or error.__context__
     if isinstance(before, OSError):
         return before.strerror or str(before)
-    return None if before is None else _of_the_disk(before)
+    return None if before is None else _disk_message(before)
 
 
 def write_bytes(content: bytes, path: str | Path) -> None:

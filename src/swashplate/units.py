@@ -182,7 +182,7 @@ class DisplayUnit(NamedTuple):
     factor: float
 
     def label(self, words: str) -> str:
-        """What an axis shows, with the unit in parentheses if there is one."""
+        """Label of an axis, with the unit in parentheses if there is one."""
         return f"{words} ({self.name})" if self.name else words
 
 
@@ -258,7 +258,7 @@ def units_of_choice(words: Sequence[str], drum: float | None = None) -> dict[str
 def _chosen_by(
     word: str, drum: float | None
 ) -> tuple[dict[str, DisplayUnit], dict[str, DisplayUnit]]:
-    """What a unit is chosen for, and what of the shaft goes with it, by SI unit."""
+    """Units chosen by a word, and those of the shaft that go with it, both by SI unit."""
     turns = _TURNS.get(speed_unit(word))
     rope = {"m/min": 60.0, "m/s": 1.0}
     if word == "m/min" and drum is None:

@@ -439,7 +439,7 @@ def improvement(
     *,
     inverse: InverseMap | None = None,
 ) -> Improvement:
-    """What the inverse map buys: a reference speed simulated with and without it.
+    """Simulate a reference speed with and without the inverse map, to compare their errors.
 
     Parameters
     ----------

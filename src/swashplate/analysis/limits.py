@@ -102,7 +102,7 @@ def removals(drive: Drive) -> list[Removal]:
 
 @dataclass(frozen=True)
 class LimitShare(Removal):
-    """What one limit costs."""
+    """Cost of one limit: how much smaller the tracking error is without it."""
 
     time_share: float | None
     """Share of the record's samples at which it acts, of the dead zone only those with a command
@@ -119,7 +119,7 @@ class LimitShare(Removal):
 
 @dataclass(frozen=True, eq=False)
 class LimitShares(Tabular):
-    """What each limit of a drive costs under one command, the costliest first.
+    """Costs of the limits of a drive under one command, the costliest first.
 
     The shares need not add up to 1: where one limit hides another, taking either away alone helps
     little, and where they take turns each helps on its own.
@@ -148,7 +148,7 @@ class LimitShares(Tabular):
         return costliest
 
     def sentences(self) -> list[str]:
-        """What to change first, and what cannot be left out."""
+        """Name the limit to change first, and those that cannot be removed."""
         first = self.first
         sentences = ["No single change makes the error smaller."]
         if first is not None and first.error is not None:
@@ -169,7 +169,7 @@ class LimitShares(Tabular):
         return sentences
 
     def table(self, *, acting: bool = False) -> Table:
-        """What each limit costs, the costliest first; or only those that do something here."""
+        """Tabulate the costs of all limits, the costliest first; or only of those that act here."""
         columns = (
             Column("Limit", key="limit"),
             Column("component", of="f"),

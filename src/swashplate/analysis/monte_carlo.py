@@ -66,7 +66,7 @@ class Draws(Result):
         return {name: np.array([by_name[name] for by_name in numbers]) for name in numbers[0]}
 
     def sentences(self) -> tuple[str, ...]:
-        """What the draws rest on."""
+        """State the basis of the draws."""
         sentences = []
         if self.fixed:
             sentences.append(
@@ -432,7 +432,7 @@ MOST_SAMPLES = 150_000_000  # Samples of speed that are kept at once: 1.2 GB.
 
 @dataclass(frozen=True, eq=False)
 class Bands(Result):
-    """Where the speed lies at each instant, and each outcome."""
+    """Bands of the speed at each instant, and of each outcome."""
 
     time: Array  # (n,) [s]
     lower: Array  # (n,) [rad/s]

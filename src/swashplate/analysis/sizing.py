@@ -32,7 +32,7 @@ SMALLEST = 1e-300
 
 
 class Performance(NamedTuple):
-    """What a drive can do; of two directions the worse one."""
+    """Performance of a drive; of two directions the worse one."""
 
     speed: float  # That the largest command settles at. [rad/s]
     acceleration: float  # Largest one after a full step from rest. [rad/s²]
@@ -43,7 +43,7 @@ class Performance(NamedTuple):
 def performance(
     drive: Drive, follow: Trial | None = None, *, direction: Direction = "both"
 ) -> Performance:
-    """What a drive can do.
+    """Simulate what a drive can do.
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ REQUIRED = {
 
 @dataclass(frozen=True)
 class Requirements(Result):
-    """What is required; None is not.
+    """Required performance; None is not required.
 
     Parameters
     ----------
@@ -132,7 +132,7 @@ class Requirements(Result):
 
     @property
     def given(self) -> dict[str, float]:
-        """What is required by name, SI."""
+        """Requirements that are not None, by name, SI."""
         values = {name: getattr(self, name) for name in REQUIRED}
         return {name: value for name, value in values.items() if value is not None}
 
@@ -145,7 +145,7 @@ class Requirements(Result):
         return np.array(slacks)
 
     def reached(self, performances: Sequence[Performance]) -> str:
-        """What the best of some drives reach, as the rest of a sentence."""
+        """Say, as the rest of a sentence, how far the best of some drives come."""
         slacks = np.array([self.slacks(performance) for performance in performances])
         best = slacks.argmax(axis=0)
         missed = [

@@ -251,7 +251,7 @@ class Operated(AtSea):
 
     @property
     def run_options(self) -> dict[str, Any]:
-        """Where a run begins, and what hangs on the crane, as far as it is given."""
+        """Pose of the crane at the start and load on its rope, as far as they are given."""
         from swashplate.crane import Suspension
 
         options = self.pose | _given(
@@ -426,7 +426,7 @@ def _given(**options: Any) -> dict[str, Any]:
 
 
 def sea_sentences(seaway: Seaway | None) -> tuple[str, ...]:
-    """Where the simulated seaway differs from the requested one."""
+    """Say how the simulated seaway differs from the requested one."""
     return () if seaway is None else seaway.sentences()
 
 

@@ -249,7 +249,7 @@ def fit(
 
 
 def _say_fit(result: Identification) -> None:
-    """What was found, stage by stage, and how well each run is followed."""
+    """Print the estimates, stage by stage, and how well each run is followed."""
     from swashplate.identification.assessment import parts_of
 
     text_above = False

@@ -56,7 +56,7 @@ _INSTEAD = {
 
 
 def file_kind(path: Path) -> str:
-    """What a file is: ``"log"``, ``"campaign"``, ``"drive"``, ``"setup"``, or empty."""
+    """Kind of a file: ``"log"``, ``"campaign"``, ``"drive"``, ``"setup"``, or empty."""
     from swashplate.logs import SUFFIXES
 
     if path.name.lower().endswith((*SUFFIXES, ".xlsx", ".xls")):
@@ -104,7 +104,7 @@ def campaign_of(path: Path, axis: str | None = None) -> tuple[Campaign, str]:
 def fit_of(
     path: Path, axis: str | None, setup: str | None, begin: str | None
 ) -> tuple[Campaign, tuple[Experiment, ...], FitSetup, ParameterSet]:
-    """What a fit is about: campaign, runs to fit, what is free, and the drive it begins at."""
+    """Read the basis of a fit: campaign, runs to fit, setup, and the drive it begins at."""
     from swashplate.identification.estimation.stages import setup_of
     from swashplate.identification.identifying import runs_to_fit
 
@@ -174,7 +174,7 @@ def assignments_of(
     *,
     units: bool = False,
 ) -> dict[str, Any]:
-    """What words such as ``Z16=1.2e-4/1.5e-4`` or ``Z16=0.12mm`` say, by name, each given once.
+    """Parse words such as ``Z16=1.2e-4/1.5e-4`` or ``Z16=0.12mm`` by name, each given once.
 
     `known` gives a name's definition or raises, `counts` are how many numbers it may have; `units`
     may follow them, which are then turned into SI.

@@ -160,12 +160,12 @@ class Crane:
 
     @property
     def assumed(self) -> str:
-        """How much of the geometry is assumed: ``"12 of 13 quantities"``, empty if nothing is."""
+        """Assumed part of the geometry: ``"12 of 13 quantities"``, empty if nothing is assumed."""
         count = sum(quantity.status == "assumed" for quantity in self.quantities.values())
         return f"{count} of {len(self.quantities)} quantities" if count else ""
 
     def provenance(self) -> tuple[str, ...]:
-        """Where drives come from, and what their tests left open, in sentences.
+        """State the origin of the drives, and what their tests left open, in sentences.
 
         Of each drive in `sources` its file, the verdict on its fit and what that holds for; of any
         drive the limits that no test of it reached.
@@ -368,7 +368,7 @@ class Crane:
         return _inverse(self.controller_drive(axis))
 
     def home(self, slew_deg: float = 0.0, boom_deg: float = 45.0, rope_m: float = 20.0) -> Home:
-        """Where a run starts.
+        """Pose of the crane at the start of a run.
 
         Parameters
         ----------

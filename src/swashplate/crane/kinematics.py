@@ -42,7 +42,7 @@ class Geometry(NamedTuple):
 
 
 class Home(NamedTuple):
-    """Where the crane stands while all shafts are at zero."""
+    """Pose of the crane while all shafts are at zero."""
 
     slew: float
     """ψ₀, 0 forward, positive to starboard. [rad]"""

@@ -64,7 +64,7 @@ def multiplier_of(free: Vector, along: Vector, length: float) -> float:
 
 @dataclass(frozen=True)
 class Suspension(Result):
-    """How the load hangs: elastic rope, hook with slings; by default neither."""
+    """Suspension of the load: elastic rope, hook with slings; by default neither."""
 
     stiffness: float = inf
     """EA, force for a strain of one of the rope's parts together, 1 kN to 1 TN; infinite for a
@@ -176,7 +176,7 @@ class Hung(NamedTuple):
 
 @equation
 def coasting(now: Vector, before: Vector, square: float, a: Vector) -> Vector:
-    """Where a body is one step later under an acceleration, 2 x - x' + h² a. [m]"""
+    """Position of a body one step later under an acceleration, 2 x - x' + h² a. [m]"""
     return moved(moved(now, 1.0, moved(now, -1.0, before)), square, a)
 
 
@@ -296,7 +296,7 @@ def rope_step(
 
 
 class Start(NamedTuple):
-    """How the load begins, relative to the tip, both horizontal and inertial."""
+    """Initial offset and velocity of the load relative to the tip, horizontal and inertial."""
 
     offset: tuple[float, float] = (0.0, 0.0)
     """[m]"""

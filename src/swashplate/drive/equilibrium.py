@@ -174,7 +174,7 @@ def operating_point(
 
 
 def _beyond(parameters: ParameterSet, voltage: float) -> str:
-    """What to linearise instead of in a dead zone: at the first voltage of the side beyond it."""
+    """Advise to linearise beyond the dead zone: name the first voltage of the side beyond it."""
     way, sign, side = (1.0, "+", "plus") if voltage >= 0.0 else (-1.0, "-", "minus")
     # a zone's end is part of it, so that the first step beyond has a model
     steps = np.arange(1, ceil(FULL_VOLTAGE * 10**DECIMALS) + 1) / 10**DECIMALS

@@ -43,7 +43,7 @@ class LinearDrive(LinearModel, Result):
         return model_tables(self, SHOWN_AT)
 
     def content(self) -> dict[str, Any]:
-        """What is written of a model; see `LinearModel.content`."""
+        """Content of a model's file; see `LinearModel.content`."""
         point = {k: v for k, v in asdict(self.operating_point).items() if v is not None}
         sides = {"coulomb": self.coulomb, "one_sided": list(point.pop("one_sided"))}
         # tables last, as TOML has them

@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 
 
 class RunKeywords(TypedDict, total=False):
-    """How inputs are given, and what was measured beside the command; see `Drive.simulate`."""
+    """Inputs, and signals measured beside the command; see `Drive.simulate`."""
 
     clip: bool
     time: ArrayLike | None

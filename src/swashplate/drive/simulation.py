@@ -28,7 +28,7 @@ Flags = NDArray[np.uint8]
 
 
 class Limit(IntFlag):
-    """What holds the drive back; several can act at once."""
+    """Limits that hold the drive back; several can act at once."""
 
     DEAD_ZONE = 1
     """The current is within the solenoids' dead zone: no force."""
@@ -175,7 +175,7 @@ class Simulation(Run):
         return float(self.held_back(limit).mean())
 
     def tables(self) -> tuple[Table, Table]:
-        """What the drive did, and how long each of its limits held it back."""
+        """Tabulate the motion of the drive, and how long each of its limits held it back."""
         did = Table("", (Column("Shaft"), Column("", "z.2f"), UNIT))
         position = float(self.shaft_position[-1])
         did.add("peak speed, positive", max(float(self.shaft_speed.max()), 0.0), unit="rad/s")

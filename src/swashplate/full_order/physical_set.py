@@ -226,7 +226,7 @@ class PhysicalSet(Entries):
 
 
 def quantity_of(name: str) -> Definition:
-    """What a quantity is; a name that none has is refused."""
+    """Definition of a quantity; refuses an unknown name."""
     if name in QUANTITIES:
         return QUANTITIES[name]
     close = get_close_matches(name, QUANTITIES, n=1)
@@ -239,7 +239,7 @@ def quantity_of(name: str) -> Definition:
 
 
 def chosen_quantity(name: str) -> Definition:
-    """What may be chosen by a name: a quantity, or one of `CHOICES`."""
+    """Definition of a name that may be chosen: a quantity's, or one of `CHOICES`."""
     return CHOICES[name] if name in CHOICES else quantity_of(name)
 
 
@@ -277,7 +277,7 @@ def _broken_rules(parameters: Mapping[str, Parameter]) -> Iterator[Broken]:
 def chosen_over(
     assumed: Mapping[str, Parameter], chosen: Mapping[str, Change | Parameter]
 ) -> dict[str, Parameter]:
-    """What a set is completed from: assumed values, and the user's in SI in their place.
+    """Values that complete a set: assumed ones, replaced by the user's in SI.
 
     Names are those of quantities and of `CHOICES`. An inertia or damping also takes the place of
     the frequency or damping ratio that it would otherwise follow from.
@@ -474,7 +474,7 @@ def _motor_leakage(owner: str, Z: Mapping[str, float], n: Mapping[str, float]) -
 
 
 class PhysicalFile(FileTable):
-    """What a packaged set assumes; the rest follows from the parameter set of its name."""
+    """Assumptions of a packaged set; the rest follows from the parameter set of its name."""
 
     format: Literal[1]
     name: str
@@ -517,7 +517,7 @@ SHOWN = {
 
 
 def choices_table(axis: str, given: Mapping[str, Change]) -> Table:
-    """What a physical set is completed from: assumed values, and given ones, counted."""
+    """Tabulate the values that complete a physical set: assumed ones, and given ones."""
     columns = (Column("Physical value"), Column("", "s"), Column(""), Column(""))
     made = Table("What the drive's parameters do not say", columns)
     entries = chosen_over(_assumed(axis)[1], given)

@@ -116,7 +116,7 @@ class FrequencyResponse(Tabular):
 
     @property
     def moves(self) -> NDArray[np.bool_]:
-        """Where there is an answer at all, (a, f): a small sine may stay in a dead zone."""
+        """True if there is an answer at all, (a, f): a small sine may stay in a dead zone."""
         return np.asarray(self.ratio != 0.0)
 
     @property
@@ -160,7 +160,7 @@ class FrequencyResponse(Tabular):
         return made
 
     def still(self) -> list[str]:
-        """Where `moves` denies an answer, in words, for each amplitude that has such a place."""
+        """Name, for each amplitude, the frequencies at which there is no answer; see `moves`."""
         unit = self.units.get(self.input, "")
         sentences = list[str]()
         for amplitude, moves in zip(self.amplitudes, self.moves, strict=True):

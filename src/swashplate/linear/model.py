@@ -318,7 +318,7 @@ class LinearModel:
         return StateSpace(*matrices)
 
     def content(self) -> dict[str, Any]:
-        """What is written of a model, as plain numbers, strings and lists; SI."""
+        """Content of a model's file, as plain numbers, strings and lists; SI."""
         time = {} if self.rate is None else {"rate": self.rate}
         return {
             "format": 1,

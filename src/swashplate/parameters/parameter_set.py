@@ -66,7 +66,7 @@ class Parameter(Result):
 
     @property
     def name(self) -> str:
-        """What it is, in words."""
+        """Name in words."""
         return self.definition.name
 
     @property
@@ -212,7 +212,7 @@ class ParameterSet(Entries):
 
     @property
     def definitions(self) -> Definitions:
-        """What the set can have a value of, by symbol: the package's, then its own equations'."""
+        """Definitions of all parameters by symbol: the package's, then its user's equations'."""
         kinds = (equation.parameters for equation in self.equations)
         return definitions_of(tuple(kind for kind in kinds if kind is not None))
 
@@ -260,7 +260,7 @@ class ParameterSet(Entries):
         return replace(self, parameters=parameters, options=self.options & switches, equations=())
 
     def unreached_sentence(self, drive: str = "this drive") -> str:
-        """What the tests of a drive, as it is called, left open; empty if it is nothing."""
+        """Say what the tests of a drive left open; empty if nothing. `drive` is its name there."""
         if not self.unreached:
             return ""
         return (

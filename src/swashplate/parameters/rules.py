@@ -173,7 +173,7 @@ def applied(rule: Rule, n: Values) -> Broken:
 
 
 def range_rule(definition: Definition, column: str, values: Array) -> Broken:
-    """Which values lie outside a definition's range, and what is wrong with one of them."""
+    """Mark values outside a definition's range, and say what is wrong with one of them."""
 
     def sentence(i: int) -> str:
         value = float(values[i])

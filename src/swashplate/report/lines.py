@@ -151,7 +151,7 @@ MOST_SPANS = 1000
 
 
 class Shade(NamedTuple):
-    """How stretches of time of one meaning look, and what the legend calls them."""
+    """Look of stretches of time of one meaning, and their words in the legend."""
 
     color: str
     name: str

@@ -48,7 +48,7 @@ Dashes = Literal["solid", "dashed", "dotted"]
 
 
 class Stroke(NamedTuple):
-    """How the lines of one drive look."""
+    """Look of the lines of one drive."""
 
     color: str
     dashes: Dashes

@@ -54,7 +54,7 @@ would swing against each other from sample to sample."""
 
 
 class RunOptions(TypedDict, total=False):
-    """How a run is set up: keywords of `simulate` and `CraneStepper`, each optional.
+    """Options of a run: keywords of `simulate` and `CraneStepper`, each optional.
 
     Parameters
     ----------
@@ -250,7 +250,7 @@ class CraneStepper:
         return self.signals(self._advanced(self.fixed, commands, ship, out)).table()
 
     def run(self, commands: Array, ship: Array) -> Array:
-        """What the loop stores of a whole run, by `Fixed.columns`.
+        """March a complete run and return its stored signals, by `Fixed.columns`.
 
         As `take`; the stepper cannot be used after it.
         """
@@ -302,7 +302,7 @@ class CraneStepper:
         return self._noise.standard_normal((due - taken, loop.NOISY))
 
     def _stopped(self, ended: int) -> Exception:
-        """What has stopped the loop, as the error to raise."""
+        """The error to raise for the reason why the loop has stopped."""
         crane = self._crane
         time = self._state.sample / RATE
         shafts = Shafts(*self._state.axes[loop.ANGLE])
@@ -340,7 +340,7 @@ def _fixed(
     wind: tuple[float, float] = (0.0, 0.0),
     brake: bool = True,
 ) -> Fixed:
-    """What stays as it is during a run, of `RunOptions`; refuses one that cannot be."""
+    """Check the options of a run, `RunOptions`, and make its constants of them."""
     if actuation not in ACTUATIONS:
         raise InputError(f"actuation is '{actuation}'; it is {', '.join(ACTUATIONS[:-1])}.")
     load = crane.safe_load if load is None else load

@@ -259,7 +259,7 @@ class Seaway(Result):
         return 1.0 - self.spectrum.share(low, high) / self.spectrum.share(*BAND)
 
     def sentences(self) -> tuple[str, ...]:
-        """What of the sea is not simulated as it is given, if that is more than a little."""
+        """Say which parts of the sea are not simulated as given, if they are more than a little."""
         outside = 1.0 - self.spectrum.share(*BAND)
         lost = self._lost
         sentences = []

@@ -246,7 +246,7 @@ class Assessment(Tabular, Drawn):
         return " ".join(filter(None, [words, self.unusable_sentence()]))
 
     def unusable_sentence(self) -> str:
-        """Which fits are not usable that the assessed variant rests on; empty if there is none."""
+        """Name unusable fits behind the assessed variant; empty if there are none."""
         case = self.study.cases[self.assessed_variant]
         unusable = {
             axis
@@ -265,7 +265,7 @@ class Assessment(Tabular, Drawn):
         return " ".join(filter(None, sentences))
 
     def harm_sentence(self) -> str:
-        """Whether the assessed variant harms, and by how much it changes the swing."""
+        """Say whether the assessed variant harms, and by how much it changes the swing."""
         share = self.share_worse(self.assessed_variant)
         seaways = len(self.study.seeds)
         without = np.degrees(rms_of(self.swing(NONE)).value)
@@ -297,7 +297,7 @@ class Assessment(Tabular, Drawn):
         )
 
     def sufficiency_sentence(self) -> str:
-        """Whether the assessed variant stays within all limits; empty if the crane has none."""
+        """Say whether the assessed variant is within all limits; empty if the crane has none."""
         if self.sufficient is None:
             return ""
         limited = self.limited(self.assessed_variant)
@@ -314,7 +314,7 @@ class Assessment(Tabular, Drawn):
         )
 
     def remedy_sentences(self) -> list[str]:
-        """What would do, or that nothing that was tried would; none if nothing was."""
+        """Name sufficient remedies, or say that none of those tried is; empty if none was tried."""
         if self.tried and not self.remedies:
             return [f"None of these would do: {listed(self.tried)}."]
         sentences = [self._remedy_sentence(remedy) for remedy in self.remedies]
@@ -420,7 +420,7 @@ class Assessment(Tabular, Drawn):
         return table
 
     def _limit_table(self) -> Table:
-        """What has a limit, of the assessed variant."""
+        """Tabulate the limited quantities of the assessed variant."""
         heads = ("limit", "in 3 h", "from", "to")
         numbers = [Column(head, ".3g", none="–") for head in heads]
         last = (Column("within"), Column(NONE, ".3g", none="–"))
@@ -496,7 +496,7 @@ class Assessment(Tabular, Drawn):
         return (*sentences, *study.provenance())
 
     def _basis(self) -> list[str]:
-        """What the answers rest on, in sentences."""
+        """State the basis of the answers, in sentences."""
         study = self.study
         crane = study.crane
         none = study.cases[NONE]
@@ -561,7 +561,7 @@ def share_worse_of(
 
 
 def _is_worse(run: RunOutcome, uncontrolled: RunOutcome) -> bool:
-    """Whether a run with control is worse than that without, of which one at least was whole."""
+    """Whether a run with control is worse than one without; one of them at least was complete."""
     if run.departure_reason or uncontrolled.departure_reason:
         return bool(run.departure_reason)
     return run.rms_swing > uncontrolled.rms_swing

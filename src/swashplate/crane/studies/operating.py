@@ -129,7 +129,7 @@ class Operability(Tabular):
         return [table]
 
     def to_polars(self) -> polars.DataFrame:
-        """What limits each cell: a row for each variant, sea and heading, SI."""
+        """Limits of all cells: a row for each variant, sea and heading, SI."""
         import polars as pl
 
         rows = [
@@ -150,7 +150,7 @@ class Operability(Tabular):
         return pl.DataFrame(rows)
 
     def sentences(self) -> tuple[str, ...]:
-        """What the shares rest on."""
+        """State the basis of the shares."""
         simulated = sum(cell.simulated for cells in self.cells.values() for cell in cells.values())
         every = sum(map(len, self.cells.values()))
         headings = listed([f"{heading:g}" for heading in self.headings])
@@ -172,7 +172,7 @@ class Operability(Tabular):
 
 
 def label_of(limit: str) -> str:
-    """What limits a cell, as a table has it."""
+    """Label of the quantity that limits a cell, as a table shows it."""
     return LIMITED[limit].label if limit in LIMITED else limit
 
 

@@ -27,7 +27,7 @@ SATURATED = (1 << PUMPS.index(Limit.ORIFICE)) | (1 << PUMPS.index(Limit.SWASH_ST
 
 
 class RunOutcome(NamedTuple):
-    """What counts of one run, in SI."""
+    """Outcome of one run, in SI."""
 
     rms_swing: float
     """NaN if the run left the model or was stopped."""
@@ -59,7 +59,7 @@ STOPPED = RunOutcome(
 
 
 def outcome_of(run: CraneRun, start: float, target: tuple[float, float] | None) -> RunOutcome:
-    """What counts of a run from a time [s] on.
+    """Summarise a run from a time [s] on.
 
     Parameters
     ----------

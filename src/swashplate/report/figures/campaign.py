@@ -76,7 +76,7 @@ _ROLES = {"fit": "for the fit", "validate": "for validation"}
 
 
 class PanelColumn(NamedTuple):
-    """What a column of panels shows: a channel by name and unit; the input has no name."""
+    """Channel of a column of panels, by name and unit; the input has no name."""
 
     key: tuple[str, str]
     words: str
@@ -99,7 +99,7 @@ def _signals(experiment: Experiment) -> dict[tuple[str, str], InputSignal | Chan
 
 
 def _scale_rows(used: Mask) -> Mask:
-    """Which samples set the scale of a panel: those that are used, or all if none is."""
+    """Mark the samples that set the scale of a panel: those used, or all if none is."""
     return used if used.any() else np.ones_like(used)
 
 
@@ -551,7 +551,7 @@ class Overlay(NamedTuple):
 
 
 def _overlay(quality: RunQuality, rows: slice) -> Overlay:
-    """What was measured of a channel, and what is simulated on top of it."""
+    """Measured curve of a channel, and the simulated one on top of it."""
     channel = quality.experiment[quality.channel]
     words = channel.kind.replace("_", " ").replace("encoder counts", "angle")
     curves = [(channel.values[rows], BLUE), (quality.simulated[rows], VERMILION)]

@@ -36,7 +36,7 @@ LETTERS = 118
 
 
 def assumed(crane: Crane) -> str:
-    """How much of a crane's geometry is assumed, as a remark."""
+    """Remark on the assumed part of a crane's geometry."""
     return f"{crane.assumed} of the crane are assumed" if crane.assumed else ""
 
 

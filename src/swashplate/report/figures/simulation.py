@@ -87,7 +87,7 @@ class Mark(NamedTuple):
 
 
 class Panel(NamedTuple):
-    """What one panel shows: signals in SI, drawn in the units that people read."""
+    """Content of one panel: signals in SI, drawn in the units that people read."""
 
     words: str
     si: str
@@ -320,7 +320,7 @@ def _panel(run: Run, signal: str, label: str, rows: slice) -> Panel:
 
 
 def _definition(run: Run, signal: str) -> Definition:
-    """What a signal is: as a user-defined model declares it, of a drive as `SIGNAL_UNITS` say."""
+    """Definition of a signal: of a user-defined model its own, of a drive from `SIGNAL_UNITS`."""
     words = signal.replace("_", " ")
     if isinstance(run, Simulation | FullOrderSimulation):
         return Definition(words, SIGNAL_UNITS.get(signal, ""))

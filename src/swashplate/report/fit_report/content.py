@@ -316,7 +316,7 @@ def _residual_section(runs: Sequence[ShownRun]) -> Section:
 def _data_section(
     findings: Sequence[str], quality: Table, overviews: Sequence[Overview]
 ) -> Section:
-    """What is used of long logs, what the check of the logs finds, and the quality of signals."""
+    """Section on the used parts of long logs, the data checks, and the quality of signals."""
     heading = f"{count(len(findings), 'finding')}:" if findings else NO_FINDINGS
     numbered = [
         Markup('<span id="finding-{}">{}</span>').format(number, sentence)
@@ -355,7 +355,7 @@ def _setup_section(
 
 
 def _stage_words(fit: StageFit) -> list[str]:
-    """What a stage was asked to do."""
+    """Describe the task of a stage."""
     stage = fit.stage
     problem = fit.problem
     words = [f"Simulates {_PARTS[stage.part]}."]
@@ -468,7 +468,7 @@ def _identifiability_section(stages: Sequence[StageFit]) -> Section:
 
 
 def _effects(identifiability: Identifiability, shown: Sequence[bool]) -> list[PageBlock]:
-    """How much all weighted residuals change for 1 % of each parameter, the largest first."""
+    """Tabulate the change of all weighted residuals for 1 % of each parameter, the largest first."""
     table = Table("", (Column("parameter"), Column("change of the residuals for 1 %", ".3g")))
     pairs = zip(identifiability.sensitivity, identifiability.variables.names, shown, strict=True)
     for effect, name in sorted(

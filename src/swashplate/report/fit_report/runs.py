@@ -47,7 +47,7 @@ class ShownChannel:
 
     @property
     def channel(self) -> Channel:
-        """What was measured."""
+        """The measured channel."""
         return self.quality.experiment[self.quality.channel]
 
 
@@ -134,7 +134,7 @@ def off_scale(channel: Channel, values: Array) -> Mask:
 
 
 def run_words(quality: RunQuality) -> str:
-    """What must stand beside every fit %: RMSE, initial state, what is ignored."""
+    """Words that must stand beside every fit %: RMSE, initial state, ignored samples."""
     measures = quality.measures
     run = quality.experiment
     channel = run[quality.channel]

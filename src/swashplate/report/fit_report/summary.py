@@ -71,7 +71,7 @@ FULL: Commands = (FULL_VOLTAGE, FULL_VOLTAGE)
 
 
 def machine_numbers_of(drive: Drive, largest: Commands = FULL) -> Array:
-    """What matters about a drive, (6, 2): each way, positive and negative. SI
+    """Characteristic numbers of a drive, (6, 2): each way, positive and negative. SI
 
     Dead zone [V]; top speed [rad/s], steady under ±10 V; largest acceleration [rad/s²], delay and
     lag [s] of a step from rest to the largest command, the delay up to 2 % of the change to the
@@ -127,7 +127,7 @@ def tested_commands(stages: Sequence[StageFit]) -> Commands:
 
 
 class _Range(NamedTuple):
-    """How far numbers (6, 2) can be off."""
+    """Possible error of the machine's numbers (6, 2)."""
 
     half: Array
     """Half widths of 95 % intervals, NaN if there is none."""
@@ -249,7 +249,7 @@ def _meanings(table: Table) -> list[str]:
 def mistaken_for_a_lag(
     column: str, stages: Sequence[StageFit], unseen: Mapping[str, float]
 ) -> bool:
-    """Whether an orifice that no stage looks for may have been taken for a lag that one estimates.
+    """Whether an orifice that no stage estimates may have been mistaken for an estimated lag.
 
     Of a limited acceleration a fit without the limit makes a longer lag, and says nothing.
     """
@@ -421,7 +421,7 @@ def _curves(runs: Sequence[ShownRun], virtual: bool) -> Iterable[PageBlock]:
 
 
 def _limits(drive: Drive, stages: Sequence[StageFit]) -> list[str]:
-    """What acts during a step each way, and what to change first.
+    """Say which limits act during a step each way, and which to change first.
 
     The steps go to the largest commands that were tested; what no test reached is no limit here.
     """
