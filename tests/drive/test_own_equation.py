@@ -170,7 +170,10 @@ USED = "swashplate.models.pump:shaft_speed"
         ({"old": USED, "new": "json:dumps"}, "json:dumps is not an equation"),
         ({"old": USED, "new": "os:environ"}, "os:environ is not an equation"),
         ({"old": USED, "new": PLACE, "parameters": "os:environ"}, "os:environ is not a class of"),
-        ({"old": USED, "new": PLACE, "parameters": "builtins:dict"}, "builtins:dict is not a class"),
+        (
+            {"old": USED, "new": PLACE, "parameters": "builtins:dict"},
+            "builtins:dict is not a class",
+        ),
         ({"old": PLACE, "new": PLACE}, "does not use faster"),
         ({"old": USED, "new": f"{__name__}:sealed_balance"}, "arguments of shaft_speed"),
         ({"old": "swashplate.cli:x", "new": PLACE}, "x of the module swashplate.cli"),

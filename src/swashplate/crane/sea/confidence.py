@@ -83,7 +83,7 @@ def counted_words(share: ConfidenceInterval, seaways: int) -> str:
 
 
 def more_seaways(share: float, seaways: int, allowed: float) -> str:
-    """Say which larger number of seaways distinguishes a share from the allowed one, if it stays."""
+    """Larger number of seaways that distinguishes a share from the allowed one, if it stays."""
     for number in ENOUGH:
         interval = share_of(round(share * number), number)
         if number > seaways and not interval.low <= allowed <= interval.high:
