@@ -198,12 +198,12 @@ def whatif(
             sentences.append(
                 f"± is half of the interval that contains {100.0 * LEVEL:g} % of the drives."
             )
-            for which, variant in drawn.items():
+            for name_of_variant, variant in drawn.items():
                 band = monte_carlo.bands(variant, trial, result.outcomes, level=LEVEL)
-                bands[which] = band
+                bands[name_of_variant] = band
                 width, when = band.widest
                 sentences.append(
-                    f"Band of {band.draws} drives, {which}: at most "
+                    f"Band of {band.draws} drives, {name_of_variant}: at most "
                     f"{quantity(width, 'rad/s', spec='.3g')} wide, at {when:.3g} s."
                 )
             sentences += draws.sentences()
@@ -295,8 +295,10 @@ def size(
         say("The drive meets the requirements as it is.")
     elif not drive.changes:  # whatif begins at a drive as its file has it
         moved = [f"{name}={factor!r}" for name, factor in result.factors.items() if factor != 1.0]
-        scales = [word for factor in moved for word in ("--scale", factor)]
-        command_line = shlex.join(["swashplate", "whatif", drive.drive, *scales])
+        words = ["swashplate", "whatif", drive.drive]
+        for factor in moved:
+            words += ["--scale", factor]
+        command_line = shlex.join(words)
         note(f"To simulate the change: {command_line}")
 
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 from difflib import get_close_matches
 from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from swashplate.documents import parse_toml, read_text
 from swashplate.errors import FileError, InputError, MissingFileError, UnknownParameterError
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from swashplate.drive.simulation import Array
     from swashplate.identification.estimation.model_setup import ModelSetup
     from swashplate.identification.estimation.setup import FitSetup
+    from swashplate.logs import Series
     from swashplate.maneuvers import Maneuver
     from swashplate.parameters.parameter_set import Change, ParameterSet
 
@@ -101,20 +102,29 @@ def campaign_of(path: Path, axis: str | None = None) -> tuple[Campaign, str]:
     return campaign, axis or next(iter(campaign.axes))
 
 
-def fit_of(
-    path: Path, axis: str | None, setup: str | None, begin: str | None
-) -> tuple[Campaign, tuple[Experiment, ...], FitSetup, ParameterSet]:
-    """Read the basis of a fit: campaign, runs to fit, setup, and the drive it begins at."""
+class FitBasis(NamedTuple):
+    """Campaign, runs, setup and initial drive of a fit."""
+
+    campaign: Campaign
+    experiments: tuple[Experiment, ...]
+    """Runs to fit."""
+    setup: FitSetup
+    start: ParameterSet
+    """The drive that the fit begins at."""
+
+
+def fit_basis(path: Path, axis: str | None, setup: str | None, begin: str | None) -> FitBasis:
+    """Read campaign, runs, setup and initial drive of a fit."""
     from swashplate.identification.estimation.stages import setup_of
     from swashplate.identification.identifying import runs_to_fit
 
     campaign, axis_name = campaign_of(path, axis)
     start = campaign.drive(axis_name).parameters if begin is None else parameters_of(begin)
-    return (
-        campaign,
-        runs_to_fit(campaign, axis_name),
-        setup_of(campaign, axis_name, start, setup),
-        start,
+    return FitBasis(
+        campaign=campaign,
+        experiments=runs_to_fit(campaign, axis_name),
+        setup=setup_of(campaign, axis_name, start, setup),
+        start=start,
     )
 
 
@@ -169,15 +179,15 @@ def assignments_of(
     option: str,
     words: Iterable[str],
     example: str,
-    known: Callable[[str], Any],
+    definition_of: Callable[[str], Any],
     counts: Collection[int] = (1, 2),
     *,
     units: bool = False,
 ) -> dict[str, Any]:
     """Parse words such as ``Z16=1.2e-4/1.5e-4`` or ``Z16=0.12mm`` by name, each given once.
 
-    `known` gives a name's definition or raises, `counts` are how many numbers it may have; `units`
-    may follow them, which are then turned into SI.
+    `definition_of` gives a name's definition or raises, `counts` are how many numbers it may have;
+    `units` may follow them, which are then turned into SI.
     """
     from swashplate.units import to_si
 
@@ -189,7 +199,7 @@ def assignments_of(
         numbers = list[float]()
         unit = ""
         if match is not None:
-            definition = known(name)
+            definition = definition_of(name)
             unit = (match[3] or "").strip()
             numbers = [float(number) for number in match.group(1, 2) if number]
         if len(numbers) not in counts or (unit and not units):
@@ -210,7 +220,7 @@ def drive_of(word: str, values: Sequence[str] = (), factors: Sequence[str] = ())
     drive = Drive(parameters_of(word))
     definitions = drive.parameters.definitions
 
-    def valued(name: str) -> Any:
+    def settable(name: str) -> Any:
         if _is_design_variable(name):
             words = f"{name} is a design variable, which has no value: write --scale {name}=1.5."
             raise InputError(words)
@@ -231,14 +241,14 @@ def drive_of(word: str, values: Sequence[str] = (), factors: Sequence[str] = ())
 
             return powers_of(name)  # refuses it, and lists design variables as well
 
-    chosen = assignments_of("--set", values, set_as, valued, units=True)
-    changes = assignments_of("--scale", scaled_variables, scaled_as, str, (1,))
-    drive = drive.replace(**chosen)
+    changes = assignments_of("--set", values, set_as, settable, units=True)
+    variable_factors = assignments_of("--scale", scaled_variables, scaled_as, str, (1,))
+    drive = drive.replace(**changes)
     drive = drive.scale(**assignments_of("--scale", scaling, scaled_as, scalable))
-    if changes:
+    if variable_factors:
         from swashplate.analysis.design_variables import with_factors
 
-        drive = with_factors(drive, changes)
+        drive = with_factors(drive, variable_factors)
     return drive
 
 
@@ -299,9 +309,8 @@ def changes_between(before: ParameterSet, after: ParameterSet) -> list[str]:
         f"{unit_text(parameter.unit)}".rstrip()
         for parameter in added
     ]
-    if UNFELT in {parameter.symbol for parameter in added} and not set(FEELING) & set(
-        after.refinements
-    ):
+    is_load_added = any(parameter.symbol == UNFELT for parameter in added)
+    if is_load_added and not set(FEELING) & set(after.refinements):
         lines.append(f"! {UNFELT} changes nothing without {' or '.join(FEELING)}: set one as well.")
     for old in before.values():
         new = after[old.symbol]
@@ -329,7 +338,9 @@ def named_maneuver(word: str, *drives: Drive) -> Maneuver:
     from swashplate.parameters.files import AXES
 
     axes = [drive.name for drive in drives if drive.name in AXES]
-    tests = {name: test for axis in reversed(axes) for name, test in source_tests(axis).items()}
+    tests: dict[str, Maneuver] = {}
+    for axis in reversed(axes):
+        tests |= source_tests(axis)
     if word in tests:
         return tests[word]
     try:
@@ -383,38 +394,23 @@ def simulated_run(
     measured: Sequence[str] = (),
 ) -> tuple[str, Simulation]:
     """Name of a command, a maneuver or a file, and the drive's simulation over it."""
-    from swashplate.logs import open_log, read_series
-
-    head = command.partition(":")[0]  # stairs:2/4/0 is not a path
-    if not ("/" in head or _ENDING.search(head) or Path(command).is_file()):
+    name_or_file = command.partition(":")[0]  # stairs:2/4/0 is not a path
+    is_path = "/" in name_or_file or _ENDING.search(name_or_file) is not None
+    if is_path or Path(command).is_file():
+        name = Path(command).name
+        log = command
+        where = f"{command}: "
+        series = _command_series(command, options)
+        values = series.values
+        time = series.time
+    else:
         maneuver = named_maneuver(command, drive)
         name = maneuver.name
+        log = ""
         where = ""
         values = maneuver.sample(options.rate)
         time = None
-    else:
-        kind = file_kind(Path(command))
-        if kind not in ("log", ""):
-            words = "not a command: name a maneuver such as step:9, or a log."
-            raise InputError(f"{command} is {_NAMES[kind]}, {words}")
-        log = open_log(command)
-        columns = (("--time-column", options.time_column), ("--column", options.column))
-        for option, column in columns:
-            try:
-                log.find(column)
-            except InputError as error:
-                raise InputError(f"{str(error).rstrip('.')}, with {option}.") from None
-        series = read_series(command, options.column, "V", time_column=options.time_column)
-        if options.interpolation is None:
-            raise InputError(
-                f"{command} needs --interpolation linear (a straight line from row to row) or "
-                "--interpolation previous (each row held until the next)."
-            )
-        name = Path(command).name
-        where = f"{command}: "
-        values = series.values
-        time = series.time
-    inputs = _measured(measured, command if where else "", options.time_column)
+    inputs = _measured(measured, log, options.time_column)
     try:
         return name, drive.simulate(
             values,
@@ -429,33 +425,59 @@ def simulated_run(
         raise InputError(f"{where}{error}") from None
 
 
+def _command_series(command: str, options: CommandSampling) -> Series:
+    """Read the voltage of a command from a log; refuses another kind of file."""
+    from swashplate.logs import open_log, read_series
+
+    kind = file_kind(Path(command))
+    if kind not in ("log", ""):
+        words = "not a command: name a maneuver such as step:9, or a log."
+        raise InputError(f"{command} is {_NAMES[kind]}, {words}")
+    log = open_log(command)
+    columns = (("--time-column", options.time_column), ("--column", options.column))
+    for option, column in columns:
+        try:
+            log.find(column)
+        except InputError as error:
+            raise InputError(f"{str(error).rstrip('.')}, with {option}.") from None
+    series = read_series(command, options.column, "V", time_column=options.time_column)
+    if options.interpolation is None:
+        raise InputError(
+            f"{command} needs --interpolation linear (a straight line from row to row) or "
+            "--interpolation previous (each row held until the next)."
+        )
+    return series
+
+
 def _measured(measured: Sequence[str], log: str, time_column: str) -> dict[str, Any]:
     """Inputs other than the voltage by name: a column of a log, or a number."""
     from swashplate.drive import MEASURED
     from swashplate.logs import read_series
 
-    found = dict[str, Any]()
+    inputs = dict[str, Any]()
     for word in measured:
         name, _, text = (part.strip() for part in word.partition("="))
-        if name not in MEASURED or not text or name in found:
+        if name not in MEASURED or not text or name in inputs:
             names = ", ".join(MEASURED)
             raise InputError(f"--measured {word}: write NAME=COLUMN, once for each of {names}.")
         try:
-            found[name] = float(text)
+            inputs[name] = float(text)
         except ValueError:
             if not log:
                 must = "a maneuver has no columns, so give a number in SI"
                 raise InputError(f"--measured {word}: {must}.") from None
             unit = MEASURED[name][0]
-            found[name] = read_series(log, text, unit, time_column=time_column).values
-    return found
+            inputs[name] = read_series(log, text, unit, time_column=time_column).values
+    return inputs
 
 
 def window_of(time: Array, begin: float | None, end: float | None) -> tuple[float, float] | None:
     """The part of a record that --from and --to name; None for all of it. [s]"""
-    first, last = float(time[0]), float(time[-1])
-    whole = begin is None and end is None
-    return None if whole else (first if begin is None else begin, last if end is None else end)
+    if begin is None and end is None:
+        return None
+    first = float(time[0]) if begin is None else begin
+    last = float(time[-1]) if end is None else end
+    return first, last
 
 
 def named_trial(drive: Drive, command: str, options: CommandSampling) -> tuple[str, Trial]:

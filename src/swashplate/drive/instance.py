@@ -58,11 +58,14 @@ class Models(NamedTuple):
 def models_of(equations: tuple[Replacement, ...]) -> Models:
     """The drive's models with user-defined equations in them."""
     models = Models(drive, pump_drive, flowing_drive, flowing_pump_drive, settled_drive)
-    if any(uses(pump_drive, each.old) for each in equations):
+    if any(uses(pump_drive, replacement.old) for replacement in equations):
         # where the spool closes is known in closed form of the package's equations alone
         equations = (*equations, Replacement(settled_pressure, searched_pressure))
-    for each in equations:
-        models = Models(*(again(m, each) if uses(m, each.old) else m for m in models))
+    for replacement in equations:
+        changed = [
+            again(model, replacement) if uses(model, replacement.old) else model for model in models
+        ]
+        models = Models._make(changed)
     return models
 
 
@@ -95,7 +98,7 @@ def card_of(parameters: ParameterSet) -> Card:
     """The card's numbers."""
     numbers = parameters.numbers
     plus, minus = (
-        Channel(*(numbers[f"{name}_{side}"] for name in Channel._fields)) for side in SIDES
+        Channel(**{name: numbers[f"{name}_{side}"] for name in Channel._fields}) for side in SIDES
     )
     return Card(plus, minus, numbers["tau"])
 

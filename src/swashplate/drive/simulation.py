@@ -77,23 +77,27 @@ class Simulation(Run):
     @cached_property
     def names(self) -> tuple[str, ...]:
         """The signals that it has: `SIGNALS`, with refinements the motor's, after ``"time"``."""
-        there = SIGNALS if self.driven_by == "voltage" else SIGNALS[1:]
-        known = 2 if self.pump.motor_constant > 0.0 else 1 if self.refined else 0
-        return ("time", *there, *tuple(MOTOR)[:known])
+        signals = SIGNALS if self.driven_by == "voltage" else SIGNALS[1:]
+        motor_signals = tuple(MOTOR)
+        if not self.refined:
+            motor_signals = ()
+        elif not self.pump.motor_constant > 0.0:
+            motor_signals = motor_signals[:1]
+        return ("time", *signals, *motor_signals)
 
     @property
     def pump(self) -> Pump:
         """Numbers of pump and motor."""
-        made: Pump = self.instance.parts[1].p
-        return made
+        pump: Pump = self.instance.parts[1].p
+        return pump
 
     @property
     def refined(self) -> bool:
         """Whether an option beyond Kruse's equations is on, or the motor's constant known."""
         options = self.instance.parts[1].options
         names = ("friction", "hysteresis", "ripple", "damping", "leakage", "line")
-        known = self.pump.motor_constant > 0.0
-        return known or any(getattr(options, name) is not None for name in names)
+        has_motor_constant = self.pump.motor_constant > 0.0
+        return has_motor_constant or any(getattr(options, name) is not None for name in names)
 
     @property
     def voltage(self) -> Array | None:

@@ -411,7 +411,7 @@ def _chain(panels: Sequence[Panel], time: Array, title: str, rows: slice = slice
 
 def _legend(panels: Sequence[Panel], looks: Sequence[Shade]) -> list[Patch]:
     """Handles of the looks of limits that act in one of the panels, in the order given."""
-    acting = set()
+    acting = set[Shade]()
     for panel in panels:
         acting.update(look for look, spans in panel.limits if spans.size)
     return [shade_handle(look) for look in looks if look in acting]
