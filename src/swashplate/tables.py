@@ -113,9 +113,9 @@ class Table:
         every = tuple(si if column is UNIT else next(values) for column in self.columns)
         self.rows.append(Row(every, unit, spec, look, section or total, total))
 
-    def of(self, place: str) -> Table:
-        """The table with the columns of a place: ``"t"`` terminal, ``"p"`` page, ``"f"`` file."""
-        shown = [k for k, column in enumerate(self.columns) if place in column.of]
+    def of(self, medium: str) -> Table:
+        """The table with the columns of a medium: ``"t"`` terminal, ``"p"`` page, ``"f"`` file."""
+        shown = [k for k, column in enumerate(self.columns) if medium in column.of]
         rows = [row._replace(cells=tuple(row.cells[k] for k in shown)) for row in self.rows]
         return Table(self.title, [self.columns[k] for k in shown], self.caption, rows, self.si)
 
@@ -129,10 +129,14 @@ class Table:
     def texts(self, row: Row) -> list[str]:
         """A row's cells as words for people."""
         pairs = list(zip(self.columns, row.cells, strict=True))
-        own = [(column, value) for column, value in pairs if not (column is UNIT or column.pure)]
+        in_row_unit = [
+            (column, value) for column, value in pairs if not (column is UNIT or column.pure)
+        ]
         # numbers of fixed decimals keep the large unit: 0.0450 A, but 45 mA
-        fixed = any((row.spec or each.spec).endswith("f") for each, _ in own if each.spec)
-        size = float("inf") if fixed else largest([value for _, value in own])
+        fixed = any(
+            (row.spec or column.spec).endswith("f") for column, _ in in_row_unit if column.spec
+        )
+        size = float("inf") if fixed else largest([value for _, value in in_row_unit])
         shown = chosen_unit(row.unit) if self.si else display_unit(row.unit, size)
         texts = []
         for column, value in pairs:
@@ -165,7 +169,7 @@ class Table:
         heads = [[line.strip() for line in head.split("\n")] for head in shown.heads()]
         height = max(map(len, heads), default=1)
         # a head of fewer lines stands right above its column
-        stacked = [[*[""] * (height - len(head)), *head] for head in heads]
+        stacked = [[""] * (height - len(head)) + head for head in heads]
         lines = [*zip(*stacked, strict=True), *map(shown.texts, shown.rows)]
         sizes = [max(map(len, cells)) for cells in zip(*lines, strict=True)]
         right = [">" if column.spec else "<" for column in shown.columns]
@@ -272,13 +276,20 @@ def spread(value: float, lower: float, upper: float) -> tuple[str, str, str]:
     return middle, low, high
 
 
-def percent(part: float, whole: float, *, sign: bool = False) -> str:
-    """A part of a whole in per cent, two significant digits."""
-    if whole == 0.0 or not isfinite(part / whole):
+def percent(part: float, total: float, *, sign: bool = False) -> str:
+    """A part of a total in per cent, two significant digits."""
+    if total == 0.0 or not isfinite(part / total):
         return NONE
-    number = 100.0 * part / abs(whole)
+    number = 100.0 * part / abs(total)
     size = abs(number)
-    decimals = 0 if size >= 10.0 else 1 if size >= 1.0 else 2 if size >= 0.1 else 3
+    if size >= 10.0:
+        decimals = 0
+    elif size >= 1.0:
+        decimals = 1
+    elif size >= 0.1:
+        decimals = 2
+    else:
+        decimals = 3
     return f"{number:+.{decimals}f} %" if sign else f"{number:.{decimals}f} %"
 
 

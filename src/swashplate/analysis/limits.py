@@ -274,7 +274,7 @@ def shares_of(drive: Drive, run: Simulation, reference: ArrayLike | None = None)
         except SwashplateError as refusal:
             return str(refusal)
 
-    present = removals(drive) + [each for each in MEASURED if each.signal in run.records]
+    present = removals(drive) + [removal for removal in MEASURED if removal.signal in run.records]
     removable = _removable_together(drive, present)
     unlimited = speed_without(removable)
     if reference is not None:

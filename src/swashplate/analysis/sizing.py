@@ -338,7 +338,7 @@ def smallest_change(slack: Slack, low: Array, high: Array) -> Array | None:
     from scipy.stats.qmc import Sobol
 
     unchanged = np.ones(low.size)
-    if _met(slack, unchanged):
+    if _is_met(slack, unchanged):
         return unchanged
     # a quarter of the sequence's range lies beyond each side of the box: faces and corners
     inner = np.clip(2.0 * Sobol(low.size, scramble=False).random_base2(SCANNED) - 0.5, 0.0, 1.0)
@@ -354,7 +354,7 @@ def smallest_change(slack: Slack, low: Array, high: Array) -> Array | None:
             drawn = _edge(slack, _with(drawn, k, 1.0), drawn)
         return drawn
 
-    satisfying = sorted((point for point in points if _met(slack, point)), key=_change)
+    satisfying = sorted((point for point in points if _is_met(slack, point)), key=_change)
     starts = [drawn_in(point) for point in satisfying[:2]]
     solutions = list(starts)
     for start in starts:
@@ -380,7 +380,7 @@ def smallest_alone(slack: Slack, low: Array, high: Array, index: int) -> float |
         before = unchanged
         for factor in np.linspace(1.0, end, ALONG + 1):
             goal = _with(unchanged, index, float(factor))
-            if _met(slack, goal):
+            if _is_met(slack, goal):
                 reached.append(float(_edge(slack, before, goal)[index]))
                 break
             before = goal
@@ -389,12 +389,12 @@ def smallest_alone(slack: Slack, low: Array, high: Array, index: int) -> float |
 
 def _edge(slack: Slack, start: Array, goal: Array) -> Array:
     """First point that satisfies on the way from a start to a goal that does, by bisection."""
-    if _met(slack, start):
+    if _is_met(slack, start):
         return start
     low, high = 0.0, 1.0
     while high - low > FINEST:
         middle = 0.5 * (low + high)
-        if _met(slack, start + middle * (goal - start)):
+        if _is_met(slack, start + middle * (goal - start)):
             high = middle
         else:
             low = middle
@@ -407,7 +407,7 @@ def _with(point: Array, index: int, factor: float) -> Array:
     return other
 
 
-def _met(slack: Slack, point: Array) -> bool:
+def _is_met(slack: Slack, point: Array) -> bool:
     return bool(slack(point).min() >= 0.0)
 
 

@@ -15,7 +15,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from swashplate.analysis.compensation import InverseMap, inverse_map
 from swashplate.crane.axes import AXES, check_names
 from swashplate.crane.drives import DriveLike, DriveSource, drives_of
-from swashplate.crane.kinematics import Boom, Geometry, Home, Vector, luff_rope
+from swashplate.crane.kinematics import Boom, Geometry, Home, luff_rope, vector_of
 from swashplate.crane.limits import DEFINITIONS, LIMITED, limits_of
 from swashplate.crane.quantities import (
     DEFAULTS,
@@ -321,7 +321,7 @@ class Crane:
         return Geometry(
             boom=si["boom_length"],
             foot=si["foot_offset"],
-            axis=Vector(*self._si["slew_axis"]),
+            axis=vector_of(self._si["slew_axis"]),
             sheave=si["tower_sheave_distance"],
             sheave_cos=cos(si["tower_sheave_angle"]),
             sheave_sin=sin(si["tower_sheave_angle"]),

@@ -5,6 +5,7 @@ command hoists, slews to starboard (right), lifts the boom. All in closed form a
 the boom: its cosine and sine follow from the luff rope's length by the law of cosines.
 """
 
+from collections.abc import Iterable
 from math import atan2, cos, sin, sqrt
 from typing import NamedTuple
 
@@ -17,6 +18,12 @@ class Vector(NamedTuple):
     x: float
     y: float
     z: float
+
+
+def vector_of(numbers: Iterable[float]) -> Vector:
+    """Vector of three numbers."""
+    x, y, z = map(float, numbers)
+    return Vector(x, y, z)
 
 
 class Geometry(NamedTuple):

@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swashplate.crane.kinematics import Vector, dot, moved, norm, rotation, to_ship
+from swashplate.crane.kinematics import Vector, dot, moved, norm, rotation, to_ship, vector_of
 from swashplate.equations import equation, kernel
 from swashplate.errors import InputError
 from swashplate.results import Result
@@ -435,9 +435,9 @@ def load_motion(
         wind=wind,
         swing_damping=swing_damping,
     )
-    now = hanging_load(Vector(*path[0].tolist()), 0.0, 0.0, float(rope[0]), s)
+    now = hanging_load(vector_of(path[0]), 0.0, 0.0, float(rope[0]), s)
     before, hook_before = (np.array(body) - v * h for body in (now.load, now.hook))
-    now = now._replace(before=Vector(*before.tolist()), hook_before=Vector(*hook_before.tolist()))
+    now = now._replace(before=vector_of(before), hook_before=vector_of(hook_before))
     if start is not None:
         load = np.asarray(start, dtype=np.float64)
         line = load - path[0]
@@ -450,10 +450,10 @@ def load_motion(
         hook = load - s.sling / distance * line
         stretch = distance - s.sling - float(rope[0])
         now = Hung(
-            load=Vector(*load.tolist()),
-            before=Vector(*(load - v * h).tolist()),
-            hook=Vector(*hook.tolist()),
-            hook_before=Vector(*(hook - v * h).tolist()),
+            load=vector_of(load),
+            before=vector_of(load - v * h),
+            hook=vector_of(hook),
+            hook_before=vector_of(hook - v * h),
             pull=float(elastic_pull(stretch, stretch, float(rope[0]), s, h)),
             stretch=stretch,
         )

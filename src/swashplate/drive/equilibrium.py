@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from math import ceil, isfinite
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,8 +36,8 @@ DECIMALS = 4
 
 def steady_states(parameters: ParameterSet, voltage: Array) -> tuple[Array, Array]:
     """Signed current [A] and speed [rad/s] that each of many constant voltages settles at."""
-    whole = without_ripple(drive_instance(parameters, by_voltage=True))
-    settled = replace(whole, model=models_of(parameters.equations).settled_drive)
+    instance = without_ripple(drive_instance(parameters, by_voltage=True))
+    settled = replace(instance, model=models_of(parameters.equations).settled_drive)
     stored = (SignalId(0, "signals", "current"), SignalId(1, "signals", "shaft_speed"))
     initial = InitialStates((), {"voltage": 0.0}, ())
     current, speed = marched(settled, {"voltage": voltage}, 1.0, initial, stored)

@@ -225,13 +225,13 @@ def at_every_rate(parameters: ParameterSet) -> ParameterSet:
         middle = 1.0 - zeta * w
         half = w * sqrt(complex(zeta * zeta - 1.0))
         poles = middle + half, middle - half
-        if any(each.imag == 0.0 and each.real <= 0.0 for each in poles):
+        if any(pole.imag == 0.0 and pole.real <= 0.0 for pole in poles):
             raise InputError(
                 f"{parameters.name}: the recursion of the {side} channel's filter (zeta = "
                 f"{zeta:g}, omega = {omega:g} rad/s at {parameters.rate:g} Hz) swings from sample "
                 "to sample, as no filter of another rate does; lower omega."
             )
-        first, second = (parameters.rate * log(each) for each in poles)
+        first, second = (parameters.rate * log(pole) for pole in poles)
         replacement = float(sqrt(first * second).real)
         changes[f"omega_{side}"] = replacement
         changes[f"zeta_{side}"] = -float((first + second).real) / (2.0 * replacement)

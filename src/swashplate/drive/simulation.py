@@ -72,7 +72,7 @@ class Simulation(Run):
     first_signals = FIRST_SIGNALS
     plotted = ("shaft_speed",)
 
-    limit_names = tuple(str(each.name).lower() for each in Limit)
+    limit_names = tuple(str(limit.name).lower() for limit in Limit)
 
     @cached_property
     def names(self) -> tuple[str, ...]:

@@ -40,7 +40,9 @@ from swashplate.parameters.rules import Broken, Rule, applied, range_rule, refus
 from swashplate.tables import Column, Table
 from swashplate.units import chosen_unit, unit_text
 
-QUANTITIES: Mapping[str, Definition] = {each.symbol: each for each in declared_by(Machine)}
+QUANTITIES: Mapping[str, Definition] = {
+    definition.symbol: definition for definition in declared_by(Machine)
+}
 """Quantities by name, from the spool to the load."""
 IN_PLACE_OF: Mapping[str, str] = {
     "feedback_arm_inertia": "spool_frequency",
@@ -519,18 +521,18 @@ SHOWN = {
 def choices_table(axis: str, given: Mapping[str, Change]) -> Table:
     """Tabulate the values that complete a physical set: assumed ones, and given ones."""
     columns = (Column("Physical value"), Column("", "s"), Column(""), Column(""))
-    made = Table("What the drive's parameters do not say", columns)
+    table = Table("What the drive's parameters do not say", columns)
     entries = chosen_over(_assumed(axis)[1], given)
     for name, entry in entries.items():
         unit, factor = SHOWN.get(entry.unit, (unit_text(entry.unit), 1.0))
         if chosen_unit(entry.unit).factor != 1.0:
             unit, factor = chosen_unit(entry.unit)
         numbers = "/".join(f"{factor * value:.5g}" for value in entry.values)
-        made.add(name, numbers, unit, "given" if entry.status == "user" else "assumed")
+        table.add(name, numbers, unit, "given" if entry.status == "user" else "assumed")
     assumed = sum(entry.status != "user" for entry in entries.values())
     if assumed:
-        made.caption = (
+        table.caption = (
             f"{assumed} of {len(entries)} physical values are assumed, as of the packaged {axis}; "
             "--physical gives what you know"
         )
-    return made
+    return table
