@@ -252,8 +252,9 @@ class InverseMap(Result):
         limits = Table(
             "", (Column("Limit"), Column("negative", ".3f"), Column("positive", ".3f"), UNIT)
         )
-        limits.add("speed", *self.limits, unit="rad/s")
-        limits.add("slowest that can be held", *self.gap, unit="rad/s", spec="z.3f")
+        lowest, highest = self.limits
+        limits.add("speed", lowest, highest, unit="rad/s")
+        limits.add("slowest that can be held", below, above, unit="rad/s", spec="z.3f")
         limits.add("acceleration at rest", -down, up, unit="rad/s^2", spec=".2f")
         limits.add("lag", "", 1e3 * self.lag, unit="ms", spec=".1f")
         limits.add("error of the straight lines", "", self.error, unit="rad/s", spec=".2g")

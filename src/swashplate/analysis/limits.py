@@ -265,7 +265,9 @@ def shares_of(drive: Drive, run: Simulation, reference: ArrayLike | None = None)
 
     def speed_without(removed: Sequence[Removal]) -> Array | str:
         """Speed over the same command, or why there is none."""
-        changes = {name: value for removal in removed for name, value in removal.changes.items()}
+        changes: dict[str, Change] = {}
+        for removal in removed:
+            changes |= removal.changes
         signals = {removal.signal for removal in removed}
         records = {name: record for name, record in run.records.items() if name not in signals}
         try:
@@ -310,7 +312,10 @@ def shares_of(drive: Drive, run: Simulation, reference: ArrayLike | None = None)
             )
         )
     shares.sort(key=lambda share: inf if share.error is None else share.error)
-    acting = {column for share in shares if share.time_share for column in share.changes}
+    acting = set[str]()
+    for share in shares:
+        if share.time_share:
+            acting.update(share.changes)
     result = LimitShares(
         name=drive.name,
         run=run,

@@ -144,12 +144,10 @@ def assumed_parameters(stages: Sequence[StageFit]) -> list[dict[str, float]]:
     """
     model = stages[0].problem.model
     assert isinstance(model, DriveModel)
-    moved = {
-        target
-        for stage in stages
-        for unknown in stage.problem.unknowns
-        for target in unknown.targets
-    }
+    moved = set[str]()
+    for stage in stages:
+        for unknown in stage.problem.unknowns:
+            moved.update(unknown.targets)
     stated = {name for together in stages[0].problem.uncertain for name in together}
     if any(stage.stage.forces is not None for stage in stages):
         moved |= set(Forces.columns)

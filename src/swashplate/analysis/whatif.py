@@ -121,10 +121,10 @@ class WhatIf(Result):
         before, after = cells[0], cells[2 if bands else 1]
         change = after / np.where(before == 0.0, np.nan, before) - 1.0
         table = Table("", (Column(""), *columns, Column("change", "+z.1%"), UNIT))
-        rows = np.array([*cells, change]).T.tolist()
-        table.add("top speed, positive", *rows[0], unit="rad/s")
-        table.add("top speed, negative", *rows[1], unit="rad/s")
-        for outcome, row in zip(self.outcomes, rows[2:], strict=True):
+        plus, minus, *outcome_rows = np.array([*cells, change]).T.tolist()
+        table.add("top speed, positive", *plus, unit="rad/s")
+        table.add("top speed, negative", *minus, unit="rad/s")
+        for outcome, row in zip(self.outcomes, outcome_rows, strict=True):
             outcome.add_to(table, row)
         return table
 

@@ -598,20 +598,20 @@ def _setup_beside(drive: str | None) -> str | None:
 
 
 def _show_determined(
-    informations: Sequence[RunInformation], tables: Sequence[Table], run_names: Sequence[str]
+    stage_information: Sequence[RunInformation], tables: Sequence[Table], run_names: Sequence[str]
 ) -> None:
     """Print what the runs determine of the parameters, stage by stage."""
-    for information, table in zip(informations, tables, strict=True):
+    for information, table in zip(stage_information, tables, strict=True):
         show(table)
         # what no run exercises is said with its reason
         bullets(
             replace(information.identifiability, unexcited=()).sentences(), information.sentences()
         )
-    if not informations:
+    if not stage_information:
         return
     note("")
     for number, name in enumerate(run_names, start=1):
         note(f"run {number}: {name}")
     say(INFORMATION)
-    if all(information.identifiability.complete for information in informations):
+    if all(information.identifiability.complete for information in stage_information):
         note("The fit setup can stay as it is.")

@@ -431,8 +431,7 @@ def _table(title: str, quantities: Mapping[str, CraneQuantity], names: Mapping[s
     for name, quantity in quantities.items():
         value = ", ".join(f"{number:g}" for number in quantity.values)
         assumed = quantity.status == "assumed"
-        cells = (names[name], value, quantity.unit, quantity.status, quantity.source)
-        table.add(*cells, look=assumed)
+        table.add(names[name], value, quantity.unit, quantity.status, quantity.source, look=assumed)
     return table
 
 

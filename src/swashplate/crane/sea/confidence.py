@@ -53,7 +53,8 @@ def rms_of(values: Array) -> ConfidenceInterval:
     of Student's for the mean of the squares.
     """
     squares = mean_of(values**2, 0.0)
-    return ConfidenceInterval(*np.sqrt(np.array(squares)).tolist())
+    rms, low, high = np.sqrt(np.array(squares)).tolist()
+    return ConfidenceInterval(rms, low, high)
 
 
 def share_of(hits: int, of: int, unknown: int = 0) -> ConfidenceInterval:

@@ -248,12 +248,9 @@ class Assessment(Tabular, Drawn):
     def unusable_sentence(self) -> str:
         """Name unusable fits behind the assessed variant; empty if there are none."""
         case = self.study.cases[self.assessed_variant]
-        unusable = {
-            axis
-            for crane in case.cranes
-            for axis, source in crane.sources.items()
-            if not source.usable
-        }
+        unusable = set[str]()
+        for crane in case.cranes:
+            unusable.update(axis for axis, source in crane.sources.items() if not source.usable)
         if not unusable:
             return ""
         axes = listed([axis for axis in AXES if axis in unusable])
@@ -366,20 +363,19 @@ class Assessment(Tabular, Drawn):
 
     def tables(self) -> list[Table]:
         """Swing, how often it is worse, what has a limit, differences, drives' limits, remedies."""
+        driven = [name for name in self.names[1:] if self.study.cases[name].driven]
         acting = [
             (name, axis, [self.acting(name, axis, limit) for limit in PUMPS])
-            for name in self.names[1:]
-            if self.study.cases[name].driven
+            for name in driven
             for axis in AXES
         ]
-        tables = [
-            self._swing_table(),
-            self._worse_table(),
-            *([self._limit_table()] if self.study.crane.limits else []),
-            self._difference_table(),
-            limit_table(acting),
-        ]
-        return [*tables, self._remedy_table()] if self.remedies else tables
+        tables = [self._swing_table(), self._worse_table()]
+        if self.study.crane.limits:
+            tables.append(self._limit_table())
+        tables += [self._difference_table(), limit_table(acting)]
+        if self.remedies:
+            tables.append(self._remedy_table())
+        return tables
 
     def _swing_table(self) -> Table:
         seaways = len(self.study.seeds)
@@ -396,9 +392,12 @@ class Assessment(Tabular, Drawn):
             "in 3 h: most probable largest swing. Runs that left the model are not in the RMS",
         )
         for name in self.names:
+            rms = rms_of(self.swing(name))
             table.add(
                 name,
-                *rms_of(self.swing(name)),
+                rms.value,
+                rms.low,
+                rms.high,
                 largest_of(self.of(name), "swing").value,
                 sum(self.departures(name).values()),
                 look=name != NONE and self.share_worse(name).value > self.allowed_share_worse,
@@ -416,7 +415,14 @@ class Assessment(Tabular, Drawn):
         for name in self.names[1:]:
             share_worse = self.share_worse(name)
             look = share_worse.value > self.allowed_share_worse
-            table.add(name, round(share_worse.value * seaways), *share_worse, look=look)
+            table.add(
+                name,
+                round(share_worse.value * seaways),
+                share_worse.value,
+                share_worse.low,
+                share_worse.high,
+                look=look,
+            )
         return table
 
     def _limit_table(self) -> Table:

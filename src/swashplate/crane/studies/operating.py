@@ -116,9 +116,11 @@ class Operability(Tabular):
 
     def tables(self) -> list[Table]:
         """Share of the year that each variant can work, and what limits the rest."""
-        limits = dict.fromkeys(
-            limit for name in self.names for limit in self.shares(name) if limit != WORKABLE
-        )
+        limits = list[str]()
+        for name in self.names:
+            for limit in self.shares(name):
+                if limit != WORKABLE and limit not in limits:
+                    limits.append(limit)
         heads = [Column(label_of(limit), ".1%", wrap=True) for limit in limits]
         columns = (Column("variant", wrap=True), Column("workable", ".1%"), *heads)
         table = Table("Share of the year, and what limits the rest first", columns)

@@ -110,10 +110,12 @@ class Case(NamedTuple):
             self.cranes[0], seaway, damping=self.swing_damping, **self.pose
         )
         largest = LARGEST_START * self.options["rope_m"] * sin(radians(FARTHEST_SWING))
-        share = min(largest / max(float(np.hypot(*offset)), 1e-9), 1.0)
+        offset_x, offset_y = offset
+        velocity_x, velocity_y = velocity
+        share = min(largest / max(float(np.hypot(offset_x, offset_y)), 1e-9), 1.0)
         return {
-            "load_offset": (share * offset[0], share * offset[1]),
-            "load_velocity": (share * velocity[0], share * velocity[1]),
+            "load_offset": (share * offset_x, share * offset_y),
+            "load_velocity": (share * velocity_x, share * velocity_y),
         }
 
     def words(self) -> str:
