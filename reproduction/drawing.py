@@ -132,7 +132,7 @@ def draw_panel(ax: Axes, panel: Panel, tall: float) -> None:
     for curve, color in zip(panel.curves, colors, strict=True):
         width = _WIDTHS[curve.role]
         if curve.held:
-            draw(ax, curve.time, curve.values, color, held=True, width=width)
+            draw(ax, curve.time, curve.values, color, zero_order=True, width=width)
         else:
             draw(ax, curve.time, curve.values, color, width=width)
     for level in panel.levels:

@@ -215,8 +215,10 @@ def _sentence(errors: Sequence[ErrorDetails], model: type[BaseModel]) -> str:
     where = [part for part in location if _names_entry(part)]
     # of a list the entries count from 1, as in other sentences
     named = [f" {int(part) + 1}" if part.isdecimal() else f".{part}" for part in where]
-    path, kind = "".join(named).removeprefix("."), error["type"]
-    parent, key = "".join(named[:-1]).removeprefix("."), where[-1] if where else ""
+    path = "".join(named).removeprefix(".")
+    kind = error["type"]
+    parent = "".join(named[:-1]).removeprefix(".")
+    key = where[-1] if where else ""
     table = f"[{parent}]" if parent else "the file"
     if kind == "missing":
         return f"{table} needs an entry '{key}'"

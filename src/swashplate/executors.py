@@ -74,7 +74,7 @@ _shared: Any = None
 
 
 def _receive(shared: Any) -> None:
-    """What a worker does first: keep what all items share, and end when its parent does.
+    """Initialise a worker: keep what all items share, and end when its parent does.
 
     A parent that is killed cannot end its workers, and what they hold of its pipes would keep
     whoever reads them waiting.

@@ -117,7 +117,7 @@ def _lock(handle: int) -> None:
 
 
 def _description() -> str:
-    """What the sentence of another process calls the present one."""
+    """Description of this process in a sentence of another one."""
     now = datetime.now().astimezone().isoformat(" ", "seconds")
     return f"process {os.getpid()} on {platform.node() or 'this machine'}, since {now},"
 

@@ -218,7 +218,8 @@ class Maneuver(Drawn):
         if not isinstance(after, Maneuver):
             return NotImplemented
         moved = ((self.length + start, curve) for start, curve in after.pieces)
-        name, length = f"{self.name} + {after.name}", self.length + after.length
+        name = f"{self.name} + {after.name}"
+        length = self.length + after.length
         amplitude = max(self.amplitude, after.amplitude)
         highest = max(self.highest, after.highest)
         return Maneuver(name, length, (*self.pieces, *moved), amplitude, highest)
@@ -307,7 +308,8 @@ def _settled(
     command = Maneuver(name, end, ((0.0, _line), *pieces), amplitude)
     if not end < length:
         return command
-    level, duration = float(command(end)), length - end
+    level = float(command(end))
+    duration = length - end
     bound = max(amplitude, abs(level))
 
     def stays(part: float) -> bool:
@@ -329,7 +331,8 @@ def _settled(
 
 def _window(start: float, settle: float | None, length: float) -> tuple[float, float, float]:
     """Start and end of the command between rest and return, and the whole length. [s]"""
-    start, length = finite("start", start, 0.0), finite("length", length, 0.0)
+    start = finite("start", start, 0.0)
+    length = finite("length", length, 0.0)
     settle = finite("settle", settle or 0.0, 0.0)
     if start + settle >= length:
         raise InputError(
@@ -400,7 +403,8 @@ def step(
     >>> command.sample(512.0).shape
     (5121,)
     """
-    amplitude, length = finite("amplitude", amplitude), finite("length", length)
+    amplitude = finite("amplitude", amplitude)
+    length = finite("length", length)
     start, stop = finite("start", start), finite("stop", stop)
     if not 0.0 <= start < stop <= length:
         raise InputError(
@@ -450,9 +454,11 @@ def ramp(
     >>> maneuvers.ramp(2.0)([2.0, 6.0, 10.0]).tolist()
     [2.0, 10.0, 10.0]
     """
-    slope, limit = finite("slope", slope), positive("limit", limit)
+    slope = finite("slope", slope)
+    limit = positive("limit", limit)
     start, end, length = _window(start, settle, length)
-    pieces, last = [(start, partial(_line, rise=slope))], slope
+    pieces = [(start, partial(_line, rise=slope))]
+    last = slope
     if abs(slope) * (end - start) > limit:
         top = partial(_line, level=math.copysign(limit, slope))
         pieces.append((start + limit / abs(slope), top))
@@ -493,8 +499,10 @@ def stairs(
     >>> maneuvers.stairs([3.0, 6.0, -3.0])([1.5, 3.5, 5.5]).tolist()
     [3.0, 6.0, -3.0]
     """
-    volts, dwell = row("levels", levels).tolist(), positive("dwell", dwell)
-    start, settle = finite("start", start, 0.0), finite("settle", settle or 0.0, 0.0)
+    volts = row("levels", levels).tolist()
+    dwell = positive("dwell", dwell)
+    start = finite("start", start, 0.0)
+    settle = finite("settle", settle or 0.0, 0.0)
     pieces = [(start + dwell * k, partial(_line, level=level)) for k, level in enumerate(volts)]
     end = start + dwell * len(pieces)
     name = f"stairs {'/'.join(f'{level:g}' for level in volts)} V"
@@ -543,7 +551,8 @@ def sine(
     >>> command([1.0, 1.5, 2.0]).round(6).tolist()
     [0.0, 9.0, 0.0]
     """
-    amplitude, frequency = finite("amplitude", amplitude), positive("frequency", frequency)
+    amplitude = finite("amplitude", amplitude)
+    frequency = positive("frequency", frequency)
     name = f"sine {amplitude:g} V {frequency:g} Hz"
     return _oscillation(name, amplitude, _window(start, settle, length), [frequency])
 
@@ -645,7 +654,8 @@ def multisine(
     >>> bool(abs(command.sample(512.0)).max() <= 5.0)
     True
     """
-    amplitude, seed = finite("amplitude", amplitude), whole("seed", seed)
+    amplitude = finite("amplitude", amplitude)
+    seed = whole("seed", seed)
     start, end, length = window = _window(start, settle, length)
     band = isinstance(frequencies, tuple)
     lines = _band(frequencies, end - start) if band else row("frequencies", frequencies)

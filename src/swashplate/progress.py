@@ -32,7 +32,7 @@ enabled = True
 
 
 class Display(Protocol):
-    """What shows a line of progress."""
+    """A display of lines of progress."""
 
     def show(self, line: str) -> None:
         """Show a line in the place of the one before."""
@@ -205,7 +205,9 @@ class NotebookLine:
         """Show a line in the place of the one before, behind what the cell did so far."""
         cell = sys.modules["IPython"].get_ipython().execution_count
         if cell != self._cell:
-            self._cell, self._handle, self._seconds = cell, None, {}
+            self._cell = cell
+            self._handle = None
+            self._seconds = {}
         ended = [f"{words}: {seconds:.1f} s" for words, seconds in self._seconds.items()]
         text = "; ".join([*ended, line] if line else ended)
         words = {

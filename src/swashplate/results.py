@@ -37,7 +37,7 @@ SPELT_OUT = 4
 
 
 def short(value: object) -> str:
-    """What `repr` says of a result: its fields, arrays by their shape, others by their names."""
+    """Short form of a result for `repr`: its fields, arrays by shape, others by name."""
     if is_dataclass(value):
         names = [field.name for field in fields(value) if field.repr]
     else:  # a model of pydantic's, or a named tuple
@@ -109,12 +109,13 @@ class Result:
         return str(getattr(self, "headline", ""))
 
     def _sentences(self) -> list[str]:
-        """What follows from the tables, sentence by sentence."""
+        """Conclusions from the tables, sentence by sentence."""
         sentences = getattr(self, "sentences", ())
         return list(sentences() if callable(sentences) else sentences)
 
     def _repr_html_(self) -> str | None:
-        headline, tables = self._headline(), self._tables()
+        headline = self._headline()
+        tables = self._tables()
         shown = "".join(table._repr_html_() for table in tables)
         sentences = listing(self._sentences())
         if headline:
@@ -123,7 +124,8 @@ class Result:
 
     def summary(self) -> str:
         """Text: its headline or its repr, its tables in the units that people read, sentences."""
-        headline, tables = self._headline(), [str(table) for table in self._tables()]
+        headline = self._headline()
+        tables = [str(table) for table in self._tables()]
         lines = "\n".join(f"- {sentence}" for sentence in self._sentences())
         paragraphs = [headline, lines, *tables] if headline else [repr(self), *tables, lines]
         return "\n\n".join(part for part in paragraphs if part)

@@ -113,9 +113,9 @@ class Table:
         every = tuple(si if column is UNIT else next(values) for column in self.columns)
         self.rows.append(Row(every, unit, spec, look, section or total, total))
 
-    def of(self, place: str) -> Table:
-        """The table with the columns of a place: ``"t"`` terminal, ``"p"`` page, ``"f"`` file."""
-        shown = [k for k, column in enumerate(self.columns) if place in column.of]
+    def of(self, medium: str) -> Table:
+        """The table with the columns of a medium: ``"t"`` terminal, ``"p"`` page, ``"f"`` file."""
+        shown = [k for k, column in enumerate(self.columns) if medium in column.of]
         rows = [row._replace(cells=tuple(row.cells[k] for k in shown)) for row in self.rows]
         return Table(self.title, [self.columns[k] for k in shown], self.caption, rows, self.si)
 
@@ -129,10 +129,14 @@ class Table:
     def texts(self, row: Row) -> list[str]:
         """A row's cells as words for people."""
         pairs = list(zip(self.columns, row.cells, strict=True))
-        own = [(column, value) for column, value in pairs if not (column is UNIT or column.pure)]
+        in_row_unit = [
+            (column, value) for column, value in pairs if not (column is UNIT or column.pure)
+        ]
         # numbers of fixed decimals keep the large unit: 0.0450 A, but 45 mA
-        fixed = any((row.spec or each.spec).endswith("f") for each, _ in own if each.spec)
-        size = float("inf") if fixed else largest([value for _, value in own])
+        fixed = any(
+            (row.spec or column.spec).endswith("f") for column, _ in in_row_unit if column.spec
+        )
+        size = float("inf") if fixed else largest([value for _, value in in_row_unit])
         shown = chosen_unit(row.unit) if self.si else display_unit(row.unit, size)
         texts = []
         for column, value in pairs:
@@ -165,7 +169,7 @@ class Table:
         heads = [[line.strip() for line in head.split("\n")] for head in shown.heads()]
         height = max(map(len, heads), default=1)
         # a head of fewer lines stands right above its column
-        stacked = [[*[""] * (height - len(head)), *head] for head in heads]
+        stacked = [[""] * (height - len(head)) + head for head in heads]
         lines = [*zip(*stacked, strict=True), *map(shown.texts, shown.rows)]
         sizes = [max(map(len, cells)) for cells in zip(*lines, strict=True)]
         right = [">" if column.spec else "<" for column in shown.columns]
@@ -272,13 +276,20 @@ def spread(value: float, lower: float, upper: float) -> tuple[str, str, str]:
     return middle, low, high
 
 
-def percent(part: float, whole: float, *, sign: bool = False) -> str:
-    """A part of a whole in per cent, two significant digits."""
-    if whole == 0.0 or not isfinite(part / whole):
+def percent(part: float, total: float, *, sign: bool = False) -> str:
+    """A part of a total in per cent, two significant digits."""
+    if total == 0.0 or not isfinite(part / total):
         return NONE
-    number = 100.0 * part / abs(whole)
+    number = 100.0 * part / abs(total)
     size = abs(number)
-    decimals = 0 if size >= 10.0 else 1 if size >= 1.0 else 2 if size >= 0.1 else 3
+    if size >= 10.0:
+        decimals = 0
+    elif size >= 1.0:
+        decimals = 1
+    elif size >= 0.1:
+        decimals = 2
+    else:
+        decimals = 3
     return f"{number:+.{decimals}f} %" if sign else f"{number:.{decimals}f} %"
 
 
@@ -324,7 +335,8 @@ def ending(path: str | Path, form: Form) -> str:
 
 def check_place(path: str | Path) -> None:
     """See to it that a file can be where it shall be, as far as that shows beforehand."""
-    target, reason = Path(path), None
+    target = Path(path)
+    reason = None
     folder = target.parent
     try:
         if not folder.exists():
@@ -400,7 +412,7 @@ def write_whole(path: str | Path, write: Callable[[Path], object]) -> None:
     except OSError as error:
         raise FileError(f"{target} cannot be written: {error.strerror or error}.") from None
     except Exception as error:  # libraries raise what they like; what is not the disk's goes on
-        reason = _of_the_disk(error)
+        reason = _disk_message(error)
         if reason is None:
             raise
         raise FileError(f"{target} cannot be written: {reason}.") from None
@@ -414,14 +426,14 @@ def _permissions(path: Path) -> int | None:
         return None
 
 
-def _of_the_disk(error: BaseException) -> str | None:
-    """What a disk said, where a library says it in an error of its own or stumbles over it."""
+def _disk_message(error: BaseException) -> str | None:
+    """Message of the operating system inside a library's error; None if it has none."""
     if "(os error " in str(error):
         return str(error).partition(" (os error ")[0].rpartition(": ")[2]
     before = error.__cause__ or error.__context__
     if isinstance(before, OSError):
         return before.strerror or str(before)
-    return None if before is None else _of_the_disk(before)
+    return None if before is None else _disk_message(before)
 
 
 def write_bytes(content: bytes, path: str | Path) -> None:

@@ -80,7 +80,8 @@ def to_si(value: float, unit: str, si: str, what: str) -> float:
         return 2.0 * pi * to_si(value, unit, "Hz", what)
     from pint import DimensionalityError, UndefinedUnitError
 
-    registry, examples = _registry(), "rad/s or rpm" if si == "rad/s" else si
+    registry = _registry()
+    examples = "rad/s or rpm" if si == "rad/s" else si
     try:
         # offsets (degC) are handled by Quantity, not by a factor
         quantity = registry.Quantity(value, _written_out(unit) if unit != "1" else "")
@@ -181,7 +182,7 @@ class DisplayUnit(NamedTuple):
     factor: float
 
     def label(self, words: str) -> str:
-        """What an axis shows, with the unit in parentheses if there is one."""
+        """Label of an axis, with the unit in parentheses if there is one."""
         return f"{words} ({self.name})" if self.name else words
 
 
@@ -257,8 +258,9 @@ def units_of_choice(words: Sequence[str], drum: float | None = None) -> dict[str
 def _chosen_by(
     word: str, drum: float | None
 ) -> tuple[dict[str, DisplayUnit], dict[str, DisplayUnit]]:
-    """What a unit is chosen for, and what of the shaft goes with it, by SI unit."""
-    turns, rope = _TURNS.get(speed_unit(word)), {"m/min": 60.0, "m/s": 1.0}
+    """Units chosen by a word, and those of the shaft that go with it, both by SI unit."""
+    turns = _TURNS.get(speed_unit(word))
+    rope = {"m/min": 60.0, "m/s": 1.0}
     if word == "m/min" and drum is None:
         raise InputError("A speed in m/min of rope needs the drum's diameter: --drum 0.4.")
     if word in rope and drum is not None:

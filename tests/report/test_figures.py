@@ -68,7 +68,7 @@ def test_no_extreme_is_lost_on_either_side_of_a_gap(values, steps, columns) -> N
 def test_a_line_is_broken_where_samples_are_missing_and_a_lonely_one_is_a_dot() -> None:
     ax = Figure().subplots()
     time = np.array([0.0, 1.0, 2.0, 9.1, 15.0, 16.0])  # two steps of more than 5 s
-    draw(ax, time, time, "k", held=True)
+    draw(ax, time, time, "k", zero_order=True)
     line, dots = ax.lines
     stamps, heights = line.get_data()
     np.testing.assert_array_equal(stamps, [0.0, 1.0, 2.0, 2.0, 9.1, 9.1, 15.0, 16.0])

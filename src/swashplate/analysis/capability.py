@@ -218,7 +218,7 @@ def _row(words: str, unit: str, spec: str = "") -> Any:
 
 @dataclass(frozen=True)
 class DirectionLimits(Result):
-    """What a drive can do in one direction, SI, with its sign; gains are positive."""
+    """Capabilities of a drive in one direction, SI, with its sign; gains are positive."""
 
     accelerated_by: AcceleratedBy  # What sets the acceleration at rest.
     dead_zone: float = _row("dead zone up to", "V")  # Largest command that moves nothing.
@@ -249,7 +249,7 @@ PLUS, MINUS = 0, 1
 
 @dataclass(frozen=True, eq=False)
 class Envelope(Tabular, Drawn):
-    """What a drive can do."""
+    """Capabilities of a drive in both directions."""
 
     drawn_by: ClassVar[str] = "plot_envelope"
 
@@ -332,7 +332,7 @@ class Envelope(Tabular, Drawn):
 
 
 def envelope(drive: Drive) -> Envelope:
-    """What a drive can do in each direction.
+    """Compute the capabilities of a drive in each direction.
 
     Dead zone, creep and gains of the steady map, limits of speed and acceleration, and the times
     of a full step, which are those of a simulation. Of a drive that was fitted or guessed, a number

@@ -252,8 +252,9 @@ class InverseMap(Result):
         limits = Table(
             "", (Column("Limit"), Column("negative", ".3f"), Column("positive", ".3f"), UNIT)
         )
-        limits.add("speed", *self.limits, unit="rad/s")
-        limits.add("slowest that can be held", *self.gap, unit="rad/s", spec="z.3f")
+        lowest, highest = self.limits
+        limits.add("speed", lowest, highest, unit="rad/s")
+        limits.add("slowest that can be held", below, above, unit="rad/s", spec="z.3f")
         limits.add("acceleration at rest", -down, up, unit="rad/s^2", spec=".2f")
         limits.add("lag", "", 1e3 * self.lag, unit="ms", spec=".1f")
         limits.add("interpolation error", "", self.error, unit="rad/s", spec=".2g")
@@ -340,7 +341,8 @@ def inverse_map(drive: Drive, points: int = 101) -> InverseMap:
         )
     upwards, _ = starting_acceleration(drive, 1.0)
     downwards, _ = starting_acceleration(drive, -1.0)
-    errors, lags = list[float](), list[float]()
+    errors = list[float]()
+    lags = list[float]()
     for branch in (plus, minus):
         speed = 0.5 * (branch.speed[1:] + branch.speed[:-1])
         voltage = 0.5 * (branch.voltage[1:] + branch.voltage[:-1])
@@ -438,7 +440,7 @@ def improvement(
     *,
     inverse: InverseMap | None = None,
 ) -> Improvement:
-    """What the inverse map buys: a reference speed simulated with and without it.
+    """Simulate a reference speed with and without the inverse map, to compare their errors.
 
     Parameters
     ----------

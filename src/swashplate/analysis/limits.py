@@ -60,7 +60,8 @@ def removals(drive: Drive) -> list[Removal]:
     Only those whose removal changes a parameter. The spool offset is among them, although it limits
     nothing: the creep that it causes is an error, too.
     """
-    numbers, definitions = drive.parameters.numbers, drive.parameters.definitions
+    numbers = drive.parameters.numbers
+    definitions = drive.parameters.definitions
     # with the card's jump left as it is, a solenoid's dead zone beyond it would stay
     jump = min(numbers["Z17"], numbers["J_plus"], numbers["J_minus"])
     plate = farthest_stop(drive)
@@ -100,7 +101,7 @@ def removals(drive: Drive) -> list[Removal]:
 
 @dataclass(frozen=True)
 class LimitShare(Removal):
-    """What one limit costs."""
+    """Cost of one limit: how much smaller the tracking error is without it."""
 
     time_share: float | None
     """Share of the record's samples at which it acts, of the dead zone only those with a command
@@ -117,7 +118,7 @@ class LimitShare(Removal):
 
 @dataclass(frozen=True, eq=False)
 class LimitShares(Tabular):
-    """What each limit of a drive costs under one command, the costliest first.
+    """Costs of the limits of a drive under one command, the costliest first.
 
     The shares need not add up to 1: where one limit hides another, taking either away alone helps
     little, and where they take turns each helps on its own.
@@ -146,7 +147,7 @@ class LimitShares(Tabular):
         return costliest
 
     def sentences(self) -> list[str]:
-        """What to change first, and what cannot be left out."""
+        """Name the limit to change first, and those that cannot be removed."""
         first = self.first
         sentences = ["No single change makes the error smaller."]
         if first is not None and first.error is not None:
@@ -167,7 +168,7 @@ class LimitShares(Tabular):
         return sentences
 
     def table(self, *, acting: bool = False) -> Table:
-        """What each limit costs, the costliest first; or only those that do something here."""
+        """Tabulate the costs of all limits, the costliest first; or only of those that act here."""
         columns = (
             Column("Limit", key="limit"),
             Column("component", of="f"),
@@ -263,7 +264,9 @@ def shares_of(drive: Drive, run: Simulation, reference: ArrayLike | None = None)
 
     def speed_without(removed: Sequence[Removal]) -> Array | str:
         """Speed over the same command, or why there is none."""
-        changes = {name: value for removal in removed for name, value in removal.changes.items()}
+        changes: dict[str, Change] = {}
+        for removal in removed:
+            changes |= removal.changes
         signals = {removal.signal for removal in removed}
         records = {name: record for name, record in run.records.items() if name not in signals}
         try:
@@ -272,7 +275,7 @@ def shares_of(drive: Drive, run: Simulation, reference: ArrayLike | None = None)
         except SwashplateError as refusal:
             return str(refusal)
 
-    present = removals(drive) + [each for each in MEASURED if each.signal in run.records]
+    present = removals(drive) + [removal for removal in MEASURED if removal.signal in run.records]
     removable = _removable_together(drive, present)
     unlimited = speed_without(removable)
     if reference is not None:
@@ -308,7 +311,10 @@ def shares_of(drive: Drive, run: Simulation, reference: ArrayLike | None = None)
             )
         )
     shares.sort(key=lambda share: inf if share.error is None else share.error)
-    acting = {column for share in shares if share.time_share for column in share.changes}
+    acting = set[str]()
+    for share in shares:
+        if share.time_share:
+            acting.update(share.changes)
     result = LimitShares(
         name=drive.name,
         run=run,

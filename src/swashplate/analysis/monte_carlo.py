@@ -67,7 +67,7 @@ class Draws(Result):
         return {name: np.array([by_name[name] for by_name in numbers]) for name in numbers[0]}
 
     def sentences(self) -> tuple[str, ...]:
-        """What the draws rest on."""
+        """State the basis of the draws."""
         sentences = []
         if self.fixed:
             sentences.append(
@@ -145,12 +145,10 @@ def assumed_parameters(stages: Sequence[StageFit]) -> list[dict[str, float]]:
     """
     model = stages[0].problem.model
     assert isinstance(model, DriveModel)
-    moved = {
-        target
-        for stage in stages
-        for unknown in stage.problem.unknowns
-        for target in unknown.targets
-    }
+    moved = set[str]()
+    for stage in stages:
+        for unknown in stage.problem.unknowns:
+            moved.update(unknown.targets)
     stated = {name for together in stages[0].problem.uncertain for name in together}
     if any(stage.stage.forces is not None for stage in stages):
         moved |= set(Forces.columns)
@@ -433,7 +431,7 @@ MOST_SAMPLES = 150_000_000  # Samples of speed that are kept at once: 1.2 GB.
 
 @dataclass(frozen=True, eq=False)
 class Bands(Result):
-    """Where the speed lies at each instant, and each outcome."""
+    """Bands of the speed at each instant, and of each outcome."""
 
     time: Array  # (n,) [s]
     lower: Array  # (n,) [rad/s]
@@ -480,7 +478,8 @@ def bands(
     """
     if not 0.0 < level < 1.0:
         raise InputError(f"The level {level:g} of a band must lie between 0 and 1.")
-    count, size = len(drawn.drives), trial.voltage.size
+    count = len(drawn.drives)
+    size = trial.voltage.size
     if size * count > MOST_SAMPLES:
         raise InputError(
             f"{count} drives over {size} samples take too much memory: use {MOST_SAMPLES // size} "

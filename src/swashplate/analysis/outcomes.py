@@ -200,7 +200,8 @@ OUTCOMES: dict[str, Outcome] = {}
 
 def _outcome(unit: str, undefined: str = "") -> Callable[[Compute], Compute]:
     def keep(compute: Compute) -> Compute:
-        name, meaning = compute.__name__, str(compute.__doc__)
+        name = compute.__name__
+        meaning = str(compute.__doc__)
         OUTCOMES[name] = Outcome(name, unit, meaning, compute, undefined)
         return compute
 

@@ -32,7 +32,7 @@ SMALLEST = 1e-300
 
 
 class Performance(NamedTuple):
-    """What a drive can do; of two directions the worse one."""
+    """Performance of a drive; of two directions the worse one."""
 
     speed: float  # That the largest command settles at. [rad/s]
     acceleration: float  # Largest one after a full step from rest. [rad/s²]
@@ -43,7 +43,7 @@ class Performance(NamedTuple):
 def performance(
     drive: Drive, follow: Trial | None = None, *, direction: Direction = "both"
 ) -> Performance:
-    """What a drive can do.
+    """Simulate what a drive can do.
 
     Parameters
     ----------
@@ -60,7 +60,8 @@ def performance(
     DomainError
         If the drive leaves the model's domain.
     """
-    speeds, accelerations = [], []
+    speeds = []
+    accelerations = []
     for name, sign in (("positive", 1.0), ("negative", -1.0)):
         if direction in (name, "both"):
             voltage = np.full(int(STEP_LENGTH * STEP_RATE) + 1, sign * FULL_VOLTAGE)
@@ -89,7 +90,7 @@ REQUIRED = {
 
 @dataclass(frozen=True)
 class Requirements(Result):
-    """What is required; None is not.
+    """Required performance; None is not required.
 
     Parameters
     ----------
@@ -131,7 +132,7 @@ class Requirements(Result):
 
     @property
     def given(self) -> dict[str, float]:
-        """What is required by name, SI."""
+        """Requirements that are not None, by name, SI."""
         values = {name: getattr(self, name) for name in REQUIRED}
         return {name: value for name, value in values.items() if value is not None}
 
@@ -144,7 +145,7 @@ class Requirements(Result):
         return np.array(slacks)
 
     def reached(self, performances: Sequence[Performance]) -> str:
-        """What the best of some drives reach, as the rest of a sentence."""
+        """Say, as the rest of a sentence, how far the best of some drives come."""
         slacks = np.array([self.slacks(performance) for performance in performances])
         best = slacks.argmax(axis=0)
         missed = [
@@ -337,7 +338,7 @@ def smallest_change(slack: Slack, low: Array, high: Array) -> Array | None:
     from scipy.stats.qmc import Sobol
 
     unchanged = np.ones(low.size)
-    if _met(slack, unchanged):
+    if _is_met(slack, unchanged):
         return unchanged
     # a quarter of the sequence's range lies beyond each side of the box: faces and corners
     inner = np.clip(2.0 * Sobol(low.size, scramble=False).random_base2(SCANNED) - 0.5, 0.0, 1.0)
@@ -353,7 +354,7 @@ def smallest_change(slack: Slack, low: Array, high: Array) -> Array | None:
             drawn = _edge(slack, _with(drawn, k, 1.0), drawn)
         return drawn
 
-    satisfying = sorted((point for point in points if _met(slack, point)), key=_change)
+    satisfying = sorted((point for point in points if _is_met(slack, point)), key=_change)
     starts = [drawn_in(point) for point in satisfying[:2]]
     solutions = list(starts)
     for start in starts:
@@ -379,7 +380,7 @@ def smallest_alone(slack: Slack, low: Array, high: Array, index: int) -> float |
         before = unchanged
         for factor in np.linspace(1.0, end, ALONG + 1):
             goal = _with(unchanged, index, float(factor))
-            if _met(slack, goal):
+            if _is_met(slack, goal):
                 reached.append(float(_edge(slack, before, goal)[index]))
                 break
             before = goal
@@ -388,12 +389,12 @@ def smallest_alone(slack: Slack, low: Array, high: Array, index: int) -> float |
 
 def _edge(slack: Slack, start: Array, goal: Array) -> Array:
     """First point that satisfies on the way from a start to a goal that does, by bisection."""
-    if _met(slack, start):
+    if _is_met(slack, start):
         return start
     low, high = 0.0, 1.0
     while high - low > FINEST:
         middle = 0.5 * (low + high)
-        if _met(slack, start + middle * (goal - start)):
+        if _is_met(slack, start + middle * (goal - start)):
             high = middle
         else:
             low = middle
@@ -406,7 +407,7 @@ def _with(point: Array, index: int, factor: float) -> Array:
     return other
 
 
-def _met(slack: Slack, point: Array) -> bool:
+def _is_met(slack: Slack, point: Array) -> bool:
     return bool(slack(point).min() >= 0.0)
 
 

@@ -110,7 +110,8 @@ class WhatIf(Result):
 
         With the `bands` of both, of the same outcomes, each number has half of its interval.
         """
-        columns, cells = list[Column](), list[Array]()
+        columns = list[Column]()
+        cells = list[Array]()
         for name, variant in ((AS_IS, self.before), (CHANGED, self.after)):
             columns.append(Column(name, "z.2f", none="none"))
             cells.append(np.array([*variant.speed_limits, *variant.values]))
@@ -120,10 +121,10 @@ class WhatIf(Result):
         before, after = cells[0], cells[2 if bands else 1]
         change = after / np.where(before == 0.0, np.nan, before) - 1.0
         table = Table("", (Column(""), *columns, Column("change", "+z.1%"), UNIT))
-        rows = np.array([*cells, change]).T.tolist()
-        table.add("top speed, positive", *rows[0], unit="rad/s")
-        table.add("top speed, negative", *rows[1], unit="rad/s")
-        for outcome, row in zip(self.outcomes, rows[2:], strict=True):
+        plus, minus, *outcome_rows = np.array([*cells, change]).T.tolist()
+        table.add("top speed, positive", *plus, unit="rad/s")
+        table.add("top speed, negative", *minus, unit="rad/s")
+        for outcome, row in zip(self.outcomes, outcome_rows, strict=True):
             outcome.add_to(table, row)
         return table
 

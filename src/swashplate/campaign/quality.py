@@ -586,8 +586,8 @@ def _of_other_scale(runs: Sequence[Experiment]) -> Iterator[str]:
             if min(gain, usual) > 0.0 and not 1.0 / OFF_SCALE < gain / usual < OFF_SCALE:
                 yield (
                     f"{run_name}: '{name}' moves {gain / usual:.3g} times as fast as in the other "
-                    f"runs at similar commands; check the unit of '{column}' in this log (1 rad/s is "
-                    "9.55 1/min), its scale and the machine's gear"
+                    f"runs at similar commands; check the unit of '{column}' in this log (1 rad/s "
+                    "is 9.55 1/min), its scale and the machine's gear"
                 )
 
 

@@ -188,7 +188,8 @@ def whatif(
     with spinner("Simulating"):
         name, trial = trials.named_trial(choice.chosen, maneuver, sampling)
         result = what_if(choice.chosen, moved, trial, outcomes=(*OUTCOMES, "travel"))
-    bands, sentences = dict[str, analysis.Bands](), list[str]()
+    bands = dict[str, analysis.Bands]()
+    sentences = list[str]()
     if uncertainty is not None:
         with spinner("Drawing drives"):
             draws = analysis.stored_draws(uncertainty, drive=choice.chosen, campaign=campaign)
@@ -196,11 +197,12 @@ def whatif(
             sentences.append(
                 f"± is half of the interval that contains {100.0 * LEVEL:g} % of the drives."
             )
-            for which, variant in drawn.items():
+            for name_of_variant, variant in drawn.items():
                 band = analysis.bands(variant, trial, result.outcomes, level=LEVEL)
-                bands[which], (width, when) = band, band.widest
+                bands[name_of_variant] = band
+                width, when = band.widest
                 sentences.append(
-                    f"Band of {band.draws} drives, {which}: at most "
+                    f"Band of {band.draws} drives, {name_of_variant}: at most "
                     f"{quantity(width, 'rad/s', spec='.3g')} wide, at {when:.3g} s."
                 )
             sentences += draws.sentences()
@@ -277,7 +279,8 @@ def size(
     )
     required = analysis.Requirements(speed, acceleration, error, direction)
     with spinner("Sizing"):
-        follow, ranges = None, parsing.factor_ranges_of(variables or SIZED, analysis.DEFAULT_RANGE)
+        follow = None
+        ranges = parsing.factor_ranges_of(variables or SIZED, analysis.DEFAULT_RANGE)
         if maneuver is not None:
             voltage = trials.named_maneuver(maneuver, drive.chosen).sample()
             # a larger drive may well be what it takes to reach it
@@ -291,8 +294,10 @@ def size(
         say("The drive meets the requirements as it is.")
     elif not drive.changes:  # whatif begins at a drive as its file has it
         moved = [f"{name}={factor!r}" for name, factor in result.factors.items() if factor != 1.0]
-        scales = [word for factor in moved for word in ("--scale", factor)]
-        command_line = shlex.join(["swashplate", "whatif", drive.drive, *scales])
+        words = ["swashplate", "whatif", drive.drive]
+        for factor in moved:
+            words += ["--scale", factor]
+        command_line = shlex.join(words)
         note(f"To simulate the change: {command_line}")
 
 
@@ -403,7 +408,8 @@ def compensate(
         )
     with spinner("Inverting"):
         marched = trials.at_rate(drive.chosen, sampling.rate)
-        inverse, improvement = analysis.inverse_map(marched, points), None
+        inverse = analysis.inverse_map(marched, points)
+        improvement = None
         tables = inverse.tables([radians(speed) for speed in speeds_deg_s or ()])
         if stick is not None:
             name, run = trials.simulated_run(marched, stick, sampling)
@@ -634,7 +640,8 @@ def full_order(
     with spinner("Simulating"):
         if maneuver is None:
             domain = full.validity(full_drive, sampling.rate)
-            title, heading = drive.title, f"{len(domain.rows)} maneuvers"
+            title = drive.title
+            heading = f"{len(domain.rows)} maneuvers"
         else:
             name, run = trials.simulated_as(full_drive.drive, maneuver, sampling)
             comparison = full.compare(full_drive, run, start=sampling.start)

@@ -6,7 +6,7 @@ import shlex
 from dataclasses import replace
 from math import radians
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -49,6 +49,11 @@ from swashplate.tables import (
     made_folder,
     write_text,
 )
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from swashplate.identification import RunInformation
 
 LEGEND = (
     "jitter and longest gap in ms; clip: % of the samples at the ends of the instrument's range;\n"
@@ -139,7 +144,8 @@ def init(
     check_writable(target, CAMPAIGN_FILE, force=force)
     file = None if drive is None else parsing.drive_file(drive)
     if file is not None:  # a drive as a campaign file names it
-        resolved, root = file.resolve(), target.parent.resolve()
+        resolved = file.resolve()
+        root = target.parent.resolve()
         drive = (
             resolved.relative_to(root) if resolved.is_relative_to(root) else resolved
         ).as_posix()
@@ -161,7 +167,8 @@ def init(
     note(f"Draft: {target}")
     guessed = text.count("# guessed")
     note(f"{count(guessed, 'entry is', 'entries are')} guessed: look for '# guessed'.")
-    table, open_ends = "", (f"# {FIXME}", f'column = "{FIXME}"')
+    table = ""
+    open_ends = (f"# {FIXME}", f'column = "{FIXME}"')
     for line in text.splitlines():
         if line.startswith(("[", "file = ")):  # a run is known by its file
             table = line.partition("    #")[0]
@@ -222,12 +229,9 @@ def check(
     note(LEGEND)
     for text in of_file:
         say(ended(f"! {text}"))
-    findings = sum(
-        len(quality.findings)
-        for qualities_of_run in qualities.values()
-        for quality in qualities_of_run
-    )
-    findings += len(of_file)
+    findings = len(of_file)
+    for qualities_of_run in qualities.values():
+        findings += sum(len(quality.findings) for quality in qualities_of_run)
     if campaign.ignored:
         note(f"Ignored, and not opened: {', '.join(campaign.ignored)}.")
     if not campaign.select(role="fit"):
@@ -288,18 +292,14 @@ def plot(
             f"{channels_listed}."
         )
     if run is not None and channel is not None:
-        experiment, shown, simulated = campaign[run], campaign[run][channel], None
+        experiment = campaign[run]
+        shown = experiment[channel]
+        simulated = None
         drive = campaign.axes[experiment.axis].drive
         if shown.kind in SIGNALS and drive is not None and not shown.is_position:
-            predictions = predict(campaign.drive(experiment.axis), [experiment])
-            simulated = next(
-                (
-                    prediction.simulated
-                    for prediction in predictions
-                    if prediction.channel == channel
-                ),
-                None,
-            )
+            for prediction in predict(campaign.drive(experiment.axis), [experiment]):
+                if prediction.channel == channel:
+                    simulated = prediction.simulated
         window = trials.window_of(shown.time, begin, end)
         labels = {"window": window, "title": f"{run}, {channel}"}
         draw_figure(out, "plot_channel", shown, simulated, **labels)
@@ -425,7 +425,8 @@ def guess(
     from swashplate.identification import runs_to_fit
 
     folder = path.parent if out is None else out
-    start, setup = folder / "start.toml", folder / "setup.toml"
+    start = folder / "start.toml"
+    setup = folder / "setup.toml"
     with spinner(f"Reading {path}"):
         check_free(start, setup, force=force)
         campaign, axis_name = parsing.campaign_of(path, axis)
@@ -546,31 +547,29 @@ def advise(
         raise InputError(
             "--from is the initial drive before a fit, --drive the fitted one: give one of them."
         )
-    named = drive if tested else subject
-    source = None if named is None else parsing.drive_file(named)
-    if setup is None and source is not None:
-        # a fit writes what it estimated next to the drive that it found
-        estimated = source.parent / parsing.SETUP_FILE
-        setup = str(estimated) if estimated.is_file() else None
+    if setup is None:
+        setup = _setup_beside(drive if tested else subject)
     run_informations = list[RunInformation]()
     doubts = tuple[str, ...]()
     run_names = list[str]()
     with spinner("Evaluating the tests"):
         if tested:
-            _, experiments, plan, start = parsing.fit_of(Path(subject), axis, setup, drive or begin)
-            doubts = refuse_unsound(check_runs(experiments, smooth(start)))
+            basis = parsing.fit_basis(Path(subject), axis, setup, drive or begin)
+            experiments = basis.experiments
+            start = smooth(basis.start)
+            doubts = refuse_unsound(check_runs(experiments, start))
             run_informations = [
-                run_information(stage, smooth(start), experiments) for stage in plan.stages
+                run_information(stage, start, experiments) for stage in basis.setup.stages
             ]
             run_names = [experiment.name for experiment in experiments]
-            prior = prior_information(smooth(start), plan, experiments, fitted=drive is not None)
+            prior = prior_information(start, basis.setup, experiments, fitted=drive is not None)
         else:
-            start = parsing.parameters_of(subject)
-            prior = prior_information(smooth(start), load_setup(setup or start.name))
+            untested = parsing.parameters_of(subject)
+            prior = prior_information(smooth(untested), load_setup(setup or untested.name))
         machine = Drive(prior.parameters)
         requested = [trials.named_maneuver(word, machine) for word in maneuver or ()]
-        maneuvers = {each.name: each for each in requested or default_maneuvers()}
-        candidates = [prior.candidate(each) for each in maneuvers.values()]
+        maneuvers = {test.name: test for test in requested or default_maneuvers()}
+        candidates = [prior.candidate(test) for test in maneuvers.values()]
         ranked = advise(prior.present, candidates, prior.variables)
         plan_of_tests = sequential_plan(prior.present, candidates, prior.variables, tests)
     determined = [information.table(run_names) for information in run_informations]
@@ -579,19 +578,7 @@ def advise(
     save(out, "Tests", advice_table("", ranked).write)
     for sentence in doubts:
         say(f"! {sentence}")
-    for information, table in zip(run_informations, determined, strict=True):
-        show(table)
-        # what no run exercises is said with its reason
-        bullets(
-            replace(information.identifiability, unexcited=()).sentences(), information.sentences()
-        )
-    if run_informations:
-        note("")
-        for number, name in enumerate(run_names, start=1):
-            note(f"run {number}: {name}")
-        say(INFORMATION)
-        if all(information.identifiability.complete for information in run_informations):
-            note("The fit setup needs no change.")
+    _show_determined(run_informations, determined, run_names)
     show(advice_table("Tests", ranked[:top]))
     if plan_of_tests:
         show(advice_table("Plan, each test in addition to those before it", plan_of_tests))
@@ -608,3 +595,32 @@ def advise(
         "the drive; '-': not determined (100 % and more). 'better' is the mean factor by which the "
         "errors of the parameters that are determined already would shrink."
     )
+
+
+def _setup_beside(drive: str | None) -> str | None:
+    """The fit setup that a fit wrote next to the drive that it found; None if there is none."""
+    file = None if drive is None else parsing.drive_file(drive)
+    if file is None:
+        return None
+    estimated = file.parent / parsing.SETUP_FILE
+    return str(estimated) if estimated.is_file() else None
+
+
+def _show_determined(
+    stage_information: Sequence[RunInformation], tables: Sequence[Table], run_names: Sequence[str]
+) -> None:
+    """Print what the runs determine of the parameters, stage by stage."""
+    for information, table in zip(stage_information, tables, strict=True):
+        show(table)
+        # what no run exercises is said with its reason
+        bullets(
+            replace(information.identifiability, unexcited=()).sentences(), information.sentences()
+        )
+    if not stage_information:
+        return
+    note("")
+    for number, name in enumerate(run_names, start=1):
+        note(f"run {number}: {name}")
+    say(INFORMATION)
+    if all(information.identifiability.complete for information in stage_information):
+        note("The fit setup can stay as it is.")

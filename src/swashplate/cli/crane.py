@@ -183,11 +183,13 @@ def run(
         from swashplate.report.scene import write_scene
 
         save(scene, "Scene", lambda path: write_scene(runs, path))
-    sentences = [f"{name}: {words}" for name, run in runs.items() for words in run.sentences()]
+    sentences = list[str]()
+    for name, simulated in runs.items():
+        sentences += [f"{name}: {words}" for words in simulated.sentences()]
     damping = crane.swing_damping if operated.swing_damping is None else operated.swing_damping
     if seaway is not None and damping > 0.0:
         sentences.insert(0, _stationary_words(operated, seaway, damping))
-    _end(crane, tables, *sea_sentences(seaway), *sentences, *crane.provenance())
+    _print_result(crane, tables, [*sea_sentences(seaway), *sentences, *crane.provenance()])
 
 
 @command(
@@ -281,7 +283,7 @@ def assess(
         write = partial(write_assessment, assessment)
     save(out, what, write)
     draw_figure(plot, "plot_assessment", assessment)
-    _end(study.chosen, assessment.tables(), *assessment.sentences()[1:])
+    _print_result(study.chosen, assessment.tables(), assessment.sentences()[1:])
     say_saved()
     if not assessment.passed:
         side.print(assessment.headline)
@@ -358,7 +360,7 @@ def operability(
         write = partial(write_operability, year)
     save(out, what, write)
     draw_figure(plot, "plot_operability", year)
-    _end(study.chosen, year.tables(), *year.sentences(), *study.chosen.provenance())
+    _print_result(study.chosen, year.tables(), [*year.sentences(), *study.chosen.provenance()])
 
 
 @command(
@@ -387,7 +389,7 @@ def follow(at_sea: AtSea, *, out: TableFile = None, plot: FigureFile = None) -> 
     save(out, "Amplitudes, in SI", followable.tables()[0].write)
     draw_figure(plot, "plot_follow", followable)
     about_sea = sea_sentences(seaway) if at_sea.sea else ()
-    _end(at_sea.chosen, followable.tables(), *about_sea, *at_sea.chosen.provenance())
+    _print_result(at_sea.chosen, followable.tables(), [*about_sea, *at_sea.chosen.provenance()])
 
 
 @command(
@@ -426,7 +428,8 @@ def sweep(
     swept: Sweep = study.through(swing_over, study.chosen, over, **keywords)
     save(out, "Swing, in SI", swept.tables()[0].write)
     draw_figure(plot, "plot_sweep", swept)
-    _end(study.chosen, swept.tables(), *sea_sentences(study.waters), *study.chosen.provenance())
+    sentences = [*sea_sentences(study.waters), *study.chosen.provenance()]
+    _print_result(study.chosen, swept.tables(), sentences)
 
 
 @command(
@@ -486,11 +489,11 @@ def damping(
     ratio = Column("damping ratio", ".3%")
     interval = [Column(name, ".3%") for name in ("from", "to")]
     table = Table("Free swing, 95 % interval", (ratio, *interval, Column("period", ".2f", "s")))
-    table.add(*free_swing)
+    table.add(free_swing.value, free_swing.low, free_swing.high, free_swing.period)
     show(table)
 
 
-def _end(crane: Crane, tables: Iterable[Table], *sentences: str) -> None:
+def _print_result(crane: Crane, tables: Iterable[Table], sentences: Iterable[str]) -> None:
     """Print title, tables and sentences."""
     note(crane.title)
     show(*tables)

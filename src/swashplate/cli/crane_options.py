@@ -147,12 +147,12 @@ class AtSea(Placed):
     @property
     def _lean(self) -> dict[str, Any]:
         """List and trim, as far as they are given."""
-        return _given(list_deg=self.list_deg, trim_deg=self.trim_deg)
+        return _without_none(list_deg=self.list_deg, trim_deg=self.trim_deg)
 
     @property
     def _at_sea(self) -> dict[str, Any]:
         """The options of waves and ship that are given, except the sea and the lean, by name."""
-        return _given(
+        return _without_none(
             heading=self.heading,
             ship=self.ship,
             roll_period=self.roll_period,
@@ -173,15 +173,15 @@ class AtSea(Placed):
 
         words = self.sea or ([] if default is None else [default])
         if not words:
-            given = [*self._at_sea, *_given(seed=seed)]
-            if given:
-                option = given[0].replace("_", "-")
+            options_at_sea = [*self._at_sea, *_without_none(seed=seed)]
+            if options_at_sea:
+                option = options_at_sea[0].replace("_", "-")
                 raise InputError(f"--{option} needs a sea: give --sea, such as --sea ss3.")
             return None
         if len(words) > 1:
             raise InputError(f"--sea {' --sea '.join(words)}: give one sea.")
         sea, spread = _sea_of(words[0])
-        options = self._lean | _given(heading_deg=self.heading, speed=self.speed, seed=seed)
+        options = self._lean | _without_none(heading_deg=self.heading, speed=self.speed, seed=seed)
         if self.reference is not None:
             options["reference"] = _vector("--reference", self.reference, "-12,0,9")
         record = max(RECORDS[0], length)
@@ -202,7 +202,7 @@ class AtSea(Placed):
         from swashplate.crane import read_ship
         from swashplate.crane.sea import CRANE_SHIP
 
-        roll = _given(roll_period=self.roll_period, roll_damping=self.roll_damping)
+        roll = _without_none(roll_period=self.roll_period, roll_damping=self.roll_damping)
         if self.ship is None:
             return replace(CRANE_SHIP, **roll)
         if roll:
@@ -253,16 +253,16 @@ class Operated(AtSea):
 
     @property
     def run_options(self) -> dict[str, Any]:
-        """Where a run begins, and what hangs on the crane, as far as it is given."""
+        """Pose of the crane at the start and load on its rope, as far as they are given."""
         from swashplate.crane import Suspension
 
-        options = self.pose | _given(
+        options = self.pose | _without_none(
             drag_area=self.drag_area, load=self.load, swing_damping=self.swing_damping
         )
         names = [field.name for field in fields(Suspension)]
-        values = named_numbers("--suspension", self.suspension, "stiffness=6e7", names)
-        if values:
-            options["suspension"] = Suspension(**values)
+        properties = named_numbers("--suspension", self.suspension, "stiffness=6e7", names)
+        if properties:
+            options["suspension"] = Suspension(**properties)
         if self.wind is not None:
             if self.drag_area is None:
                 raise InputError(
@@ -332,7 +332,9 @@ class Studied(Operated):
         controller = control_of(self.control)
         if controller is None:
             raise InputError("--control is empty: there is nothing to assess.")
-        options = self.run_options | _given(length=self.length, run_in=self.run_in) | keywords
+        options = (
+            self.run_options | _without_none(length=self.length, run_in=self.run_in) | keywords
+        )
         if self.waters is not None:
             options["sea"] = self.waters
         if self.seeds is not None:
@@ -422,13 +424,13 @@ def _sensors(noise_deg: float = 0.1, delay: float = 0.05, rate: float = 50.0) ->
     return Sensors(rope_angle_noise_deg=noise_deg, delay=delay, rate=rate)
 
 
-def _given(**options: Any) -> dict[str, Any]:
-    """The options that are given."""
+def _without_none(**options: Any) -> dict[str, Any]:
+    """The options that are not None."""
     return {name: value for name, value in options.items() if value is not None}
 
 
 def sea_sentences(seaway: Seaway | None) -> tuple[str, ...]:
-    """Where the simulated seaway differs from the requested one."""
+    """Say how the simulated seaway differs from the requested one."""
     return () if seaway is None else seaway.sentences()
 
 
@@ -452,8 +454,12 @@ def _sea_of(text: str) -> tuple[str | Spectrum, bool]:
             f"--sea {text}: write a name, --sea ss3, or significant height in m and peak period in "
             "s, --sea 1.5,8, with the peak factor, --sea 1.5,8,3.3."
         )
-    height, *others = (number_of(f"--sea {text}", word) for word in (first, *numbers))
-    return Spectrum(height, *others), spread
+    height = number_of(f"--sea {text}", first)
+    period = number_of(f"--sea {text}", numbers[0])
+    if len(numbers) == 1:
+        return Spectrum(height, period), spread
+    peak_factor = number_of(f"--sea {text}", numbers[1])
+    return Spectrum(height, period, peak_factor), spread
 
 
 def _vector(option: str, text: str, example: str) -> tuple[float, ...]:

@@ -6,7 +6,7 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -23,6 +23,9 @@ from swashplate.cli.terminal import check_free, note, save, spinner
 from swashplate.cli.trials import named_maneuver
 from swashplate.errors import InputError
 from swashplate.tables import PAGE, Form, check_folder
+
+if TYPE_CHECKING:
+    from swashplate.drive import Drive
 
 FMU = Form("an FMU", (".fmu",))
 WASM = Form("WebAssembly", (".wasm",))
@@ -112,13 +115,7 @@ def export(
                 ),
             )
         if c is not None:
-            with spinner(f"Writing {c}"):
-                written = exporting.c(exported, c, longest_step)
-                if compile:
-                    (header,) = (each.name for each in written if each.name.endswith("drive.h"))
-                    written.append(exporting.compiled_c(c, header))
-            for written_file in written:
-                note(f"C: {written_file}")
+            _export_c(exported, c, longest_step, compile=compile)
         if wasm is not None:
             save(
                 wasm, "WebAssembly", lambda path: exporting.wasm(exported, path, step=longest_step)
@@ -126,6 +123,19 @@ def export(
     drive.warn()
     for line in drive.changes:
         note(line)
+
+
+def _export_c(drive: Drive, folder: Path, step: float, *, compile: bool) -> None:
+    """Write the C source of a drive, compile it if it is asked for, and name the files."""
+    from swashplate import export as exporting
+
+    with spinner(f"Writing {folder}"):
+        files = exporting.c(drive, folder, step)
+        if compile:
+            (header,) = (file.name for file in files if file.name.endswith("drive.h"))
+            files.append(exporting.compiled_c(folder, header))
+    for file in files:
+        note(f"C: {file}")
 
 
 @contextmanager

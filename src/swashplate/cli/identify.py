@@ -248,7 +248,7 @@ def fit(
 
 
 def _say_fit(result: Identification) -> None:
-    """What was found, stage by stage, and how well each run is followed."""
+    """Print the estimates, stage by stage, and how well each run is followed."""
     from swashplate.identification import parts_of
 
     text_above = False
@@ -357,7 +357,8 @@ def validate(
 
         with spinner("Writing the report"):
             joined(measures).write(made_folder(out) / "measures.csv")
-            page, notes = out / "report.html", {**versions(), "drive from": drive}
+            page = out / "report.html"
+            notes = {**versions(), "drive from": drive}
             write_validation_report(
                 parameters, campaign, page, predicted, judged=judged, notes=notes
             )
@@ -432,10 +433,8 @@ def report(
                 "out --truth."
             )
         if fitted.suffix.lower() == ".toml":
-            fitted_numbers, numbers = (
-                parsing.parameters_of(str(fitted)).numbers,
-                result.fit.parameters,
-            )
+            fitted_numbers = parsing.parameters_of(str(fitted)).numbers
+            numbers = result.fit.parameters
             differing = [
                 name for name, value in numbers.numbers.items() if fitted_numbers[name] != value
             ]

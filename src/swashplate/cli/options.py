@@ -195,7 +195,8 @@ class DriveChoice:
     @property
     def title(self) -> str:
         """Its name for a heading; one from a file of another name goes by that, too."""
-        path, name = Path(self.drive), self.chosen.name
+        path = Path(self.drive)
+        name = self.chosen.name
         return name if path.stem == name else f"{path.name or self.drive} ({name})"
 
     @property
@@ -227,7 +228,7 @@ class DriveChoice:
 
 @dataclass(frozen=True)
 class CommandSampling:
-    """How a command is sampled, and read if it is a file."""
+    """Options for sampling a command, and for reading it if it is a file."""
 
     rate: RateOption = 512.0
     interpolation: Annotated[
@@ -252,7 +253,7 @@ class CommandSampling:
 
 @dataclass(frozen=True)
 class Simulating(CommandSampling):
-    """How a command is sampled, and simulated."""
+    """Options for sampling a command and simulating it."""
 
     start: Annotated[
         Start, typer.Option(help="Start from rest at 0 V, or settled at the first voltage.")

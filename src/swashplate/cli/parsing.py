@@ -7,7 +7,7 @@ from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import replace
 from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from swashplate.documents import parse_toml, read_text
 from swashplate.errors import FileError, InputError, MissingFileError, UnknownParameterError
@@ -49,7 +49,7 @@ _INSTEAD = {
 
 
 def file_kind(path: Path) -> str:
-    """What a file is: ``"log"``, ``"campaign"``, ``"drive"``, ``"setup"``, or empty."""
+    """Kind of a file: ``"log"``, ``"campaign"``, ``"drive"``, ``"setup"``, or empty."""
     from swashplate.logs import SUFFIXES
 
     if path.name.lower().endswith((*SUFFIXES, ".xlsx", ".xls")):
@@ -94,20 +94,29 @@ def campaign_of(path: Path, axis: str | None = None) -> tuple[Campaign, str]:
     return campaign, axis or next(iter(campaign.axes))
 
 
-def fit_of(
-    path: Path, axis: str | None, setup: str | None, begin: str | None
-) -> tuple[Campaign, tuple[Experiment, ...], FitSetup, ParameterSet]:
-    """What a fit is about: campaign, runs to fit, what is free, and the drive it begins at."""
+class FitBasis(NamedTuple):
+    """Campaign, runs, setup and initial drive of a fit."""
+
+    campaign: Campaign
+    experiments: tuple[Experiment, ...]
+    """Runs to fit."""
+    setup: FitSetup
+    start: ParameterSet
+    """The drive that the fit begins at."""
+
+
+def fit_basis(path: Path, axis: str | None, setup: str | None, begin: str | None) -> FitBasis:
+    """Read campaign, runs, setup and initial drive of a fit."""
     from swashplate.identification import runs_to_fit
     from swashplate.identification.estimation import setup_of
 
     campaign, axis_name = campaign_of(path, axis)
     start = campaign.drive(axis_name).parameters if begin is None else parameters_of(begin)
-    return (
-        campaign,
-        runs_to_fit(campaign, axis_name),
-        setup_of(campaign, axis_name, start, setup),
-        start,
+    return FitBasis(
+        campaign=campaign,
+        experiments=runs_to_fit(campaign, axis_name),
+        setup=setup_of(campaign, axis_name, start, setup),
+        start=start,
     )
 
 
@@ -162,15 +171,15 @@ def assignments_of(
     option: str,
     words: Iterable[str],
     example: str,
-    known: Callable[[str], Any],
+    definition_of: Callable[[str], Any],
     counts: Collection[int] = (1, 2),
     *,
     units: bool = False,
 ) -> dict[str, Any]:
-    """What words such as ``Z16=1.2e-4/1.5e-4`` or ``Z16=0.12mm`` say, by name, each given once.
+    """Parse words such as ``Z16=1.2e-4/1.5e-4`` or ``Z16=0.12mm`` by name, each given once.
 
-    `known` gives a name's definition or raises, `counts` are how many numbers it may have; `units`
-    may follow them, which are then turned into SI.
+    `definition_of` gives a name's definition or raises, `counts` are how many numbers it may have;
+    `units` may follow them, which are then turned into SI.
     """
     from swashplate.units import to_si
 
@@ -178,9 +187,12 @@ def assignments_of(
     for word in words:
         name, _, value = (part.strip() for part in word.partition("="))
         match = _VALUE.fullmatch(value)
-        definition, numbers, unit = None, list[float](), ""
+        definition = None
+        numbers = list[float]()
+        unit = ""
         if match is not None:
-            definition, unit = known(name), (match[3] or "").strip()
+            definition = definition_of(name)
+            unit = (match[3] or "").strip()
             numbers = [float(number) for number in match.group(1, 2) if number]
         if len(numbers) not in counts or (unit and not units):
             raise InputError(f"{option} cannot read '{word}'; write it as {example}.")
@@ -200,7 +212,7 @@ def drive_of(word: str, values: Sequence[str] = (), factors: Sequence[str] = ())
     drive = Drive(parameters_of(word))
     definitions = drive.parameters.definitions
 
-    def valued(name: str) -> Any:
+    def settable(name: str) -> Any:
         if _is_design_variable(name):
             words = f"{name} is a design variable, which has no value: write --scale {name}=1.5."
             raise InputError(words)
@@ -221,14 +233,14 @@ def drive_of(word: str, values: Sequence[str] = (), factors: Sequence[str] = ())
 
             return powers_of(name)  # refuses it, and lists design variables as well
 
-    chosen = assignments_of("--set", values, set_as, valued, units=True)
-    changes = assignments_of("--scale", scaled_variables, scaled_as, str, (1,))
-    drive = drive.replace(**chosen)
+    changes = assignments_of("--set", values, set_as, settable, units=True)
+    variable_factors = assignments_of("--scale", scaled_variables, scaled_as, str, (1,))
+    drive = drive.replace(**changes)
     drive = drive.scale(**assignments_of("--scale", scaling, scaled_as, scalable))
-    if changes:
+    if variable_factors:
         from swashplate.analysis import with_factors
 
-        drive = with_factors(drive, changes)
+        drive = with_factors(drive, variable_factors)
     return drive
 
 
@@ -289,9 +301,8 @@ def changes_between(before: ParameterSet, after: ParameterSet) -> list[str]:
         f"{unit_text(parameter.unit)}".rstrip()
         for parameter in added
     ]
-    if UNFELT in {parameter.symbol for parameter in added} and not set(FEELING) & set(
-        after.refinements
-    ):
+    is_load_added = any(parameter.symbol == UNFELT for parameter in added)
+    if is_load_added and not set(FEELING) & set(after.refinements):
         lines.append(f"! {UNFELT} changes nothing without {' or '.join(FEELING)}: set one as well.")
     for old in before.values():
         new = after[old.symbol]

@@ -63,7 +63,8 @@ def simulate(
     with spinner("Simulating"):
         marched = trials.at_rate(drive.chosen, sampling.rate)
         name, run = trials.simulated_as(marched, maneuver, sampling)
-        tables, title = run.tables(), f"{drive.title}, {name}"
+        tables = run.tables()
+        title = f"{drive.title}, {name}"
     save(out, "All signals, in SI", run.write)
     window = trials.window_of(run.time, begin, end)
     draw_figure(plot, "plot_simulation", run, window=window, title=title)
@@ -117,7 +118,8 @@ def compare(
     def write(path: Path) -> None:
         import polars as pl
 
-        run, speeds = runs[labels[0]], {f"shaft_speed {k}": e.shaft_speed for k, e in runs.items()}
+        run = runs[labels[0]]
+        speeds = {f"shaft_speed {k}": e.shaft_speed for k, e in runs.items()}
         write_table(pl.DataFrame({"time": run.time, "voltage": run.voltage, **speeds}), path)
 
     save(out, "Voltage and both speeds, in SI", write)

@@ -90,9 +90,14 @@ side = Console(stderr=True, markup=False, highlight=False, emoji=False)
 """Standard error: what a pipe must not carry."""
 
 
-def _widths(texts: Sequence[Sequence[str]]) -> list[int]:
-    columns = zip(*texts, strict=True)
-    return [max(len(line) for cell in column for line in cell.split("\n")) for column in columns]
+def _widths(rows: Sequence[Sequence[str]]) -> list[int]:
+    """Letters of the longest line of each column."""
+    widths = [0] * len(rows[0])
+    for row in rows:
+        for index, cell in enumerate(row):
+            longest = max(len(line) for line in cell.split("\n"))
+            widths[index] = max(widths[index], longest)
+    return widths
 
 
 def _blocks(table: Table, line: int) -> Iterator[rich.table.Table]:
@@ -101,13 +106,15 @@ def _blocks(table: Table, line: int) -> Iterator[rich.table.Table]:
     Numbers are never cut. Heads are broken first; every block begins with the columns before the
     first number.
     """
-    columns, every = table.columns, range(len(table.columns))
+    columns = table.columns
+    every = range(len(table.columns))
     heads = ["" if columns[k] is UNIT else head for k, head in enumerate(table.heads())]
     rows = [table.texts(row) for row in table.rows]
-    whole, broken = _widths([heads, *rows]), list[int]()
+    unbroken = _widths([heads, *rows])
+    broken = list[int]()
 
     def length(columns: Sequence[int]) -> int:
-        return sum((broken or whole)[k] for k in columns) + BETWEEN * (len(columns) - 1)
+        return sum((broken or unbroken)[k] for k in columns) + BETWEEN * (len(columns) - 1)
 
     def block(columns_shown: Sequence[int]) -> rich.table.Table:
         shown = rich.table.Table(
@@ -147,15 +154,16 @@ def _blocks(table: Table, line: int) -> Iterator[rich.table.Table]:
         heads[k] = words.replace(NARROW, " %")
     wide = enumerate(_widths([heads, *rows]))
     broken = [column if k in numbers else min(column, LONGEST) for k, column in wide]
-    lead = places = list(every[: numbers[0]])
+    lead = list(every[: numbers[0]])
+    columns_of_block = lead
     for k in every[numbers[0] :]:
         unit = [k + 1] if k + 1 in every and columns[k + 1] is UNIT else []
-        full = columns[k] is not UNIT and length([*places, k, *unit]) > line
-        if full and len(places) > len(lead):
-            yield block(places)
-            places = lead
-        places = [*places, k]
-    yield block(places)
+        full = columns[k] is not UNIT and length([*columns_of_block, k, *unit]) > line
+        if full and len(columns_of_block) > len(lead):
+            yield block(columns_of_block)
+            columns_of_block = lead
+        columns_of_block = [*columns_of_block, k]
+    yield block(columns_of_block)
 
 
 def show(*tables: Table) -> None:
@@ -231,15 +239,23 @@ def long_work(text: str, steps: int = 0) -> Iterator[Callable[..., None]]:
     """
     from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeRemainingColumn
 
-    words = TextColumn("{task.description}", markup=False)
-    columns = (SpinnerColumn(), BarColumn(bar_width=12), words, TimeRemainingColumn())
-    with Progress(*columns, console=side, transient=True, disable=not side.is_terminal) as bar:
-        task, steps_begun = bar.add_task(text, total=None), 0
+    with Progress(
+        SpinnerColumn(),
+        BarColumn(bar_width=12),
+        TextColumn("{task.description}", markup=False),
+        TimeRemainingColumn(),
+        console=side,
+        transient=True,
+        disable=not side.is_terminal,
+    ) as bar:
+        task = bar.add_task(text, total=None)
+        steps_begun = 0
 
         def show(what: str, share: float | None = None) -> None:
             nonlocal steps_begun
             if steps:
-                share, steps_begun = steps_begun / steps, steps_begun + 1
+                share = steps_begun / steps
+                steps_begun += 1
             total = None if share is None else 1.0
             bar.update(task, description=what, total=total, completed=share or 0.0)
 

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from swashplate.analysis import Trial
     from swashplate.cli.options import CommandSampling, Simulating, Start
     from swashplate.drive import Drive, Simulation
+    from swashplate.logs import Series
     from swashplate.maneuvers import Maneuver
 
 _ENDING = re.compile(r"\.[A-Za-z]\w*$")
@@ -29,7 +30,9 @@ def named_maneuver(word: str, *drives: Drive) -> Maneuver:
     from swashplate.parameters import AXES
 
     axes = [drive.name for drive in drives if drive.name in AXES]
-    tests = {name: test for axis in reversed(axes) for name, test in source_tests(axis).items()}
+    tests: dict[str, Maneuver] = {}
+    for axis in reversed(axes):
+        tests |= source_tests(axis)
     if word in tests:
         return tests[word]
     try:
@@ -49,7 +52,8 @@ def at_rate(drive: Drive, rate: float) -> Drive:
     from swashplate.cli.terminal import note
     from swashplate.equations.marching import least_substeps
 
-    filter_rate, marched = drive.parameters.rate, rate * least_substeps(rate)
+    filter_rate = drive.parameters.rate
+    marched = rate * least_substeps(rate)
     if filter_rate is None or abs(marched / filter_rate - 1.0) < 1e-9:
         return drive
     steps = "" if marched == rate else f", computed in steps of 1/{marched:g} s,"
@@ -82,32 +86,23 @@ def simulated_run(
     measured: Sequence[str] = (),
 ) -> tuple[str, Simulation]:
     """Name of a command, a maneuver or a file, and the drive's simulation over it."""
-    from swashplate.logs import open_log, read_series
-
-    head = command.partition(":")[0]  # stairs:2/4/0 is not a path
-    if not ("/" in head or _ENDING.search(head) or Path(command).is_file()):
-        maneuver = named_maneuver(command, drive)
-        name, where, values, time = maneuver.name, "", maneuver.sample(options.rate), None
+    name_or_file = command.partition(":")[0]  # stairs:2/4/0 is not a path
+    is_path = "/" in name_or_file or _ENDING.search(name_or_file) is not None
+    if is_path or Path(command).is_file():
+        name = Path(command).name
+        log = command
+        where = f"{command}: "
+        series = _command_series(command, options)
+        values = series.values
+        time = series.time
     else:
-        kind = file_kind(Path(command))
-        if kind not in ("log", ""):
-            words = "not a command: name a maneuver such as step:9, or a log."
-            raise InputError(f"{command} is {KIND_NAMES[kind]}, {words}")
-        log = open_log(command)
-        columns = (("--time-column", options.time_column), ("--column", options.column))
-        for option, column in columns:
-            try:
-                log.find(column)
-            except InputError as error:
-                raise InputError(f"{str(error).rstrip('.')}, with {option}.") from None
-        series = read_series(command, options.column, "V", time_column=options.time_column)
-        if options.interpolation is None:
-            raise InputError(
-                f"{command} needs --interpolation linear (a straight line from row to row) or "
-                "--interpolation previous (each row held until the next)."
-            )
-        name, where, values, time = Path(command).name, f"{command}: ", series.values, series.time
-    inputs = _measured(measured, command if where else "", options.time_column)
+        maneuver = named_maneuver(command, drive)
+        name = maneuver.name
+        log = ""
+        where = ""
+        values = maneuver.sample(options.rate)
+        time = None
+    inputs = _measured(measured, log, options.time_column)
     try:
         return name, drive.simulate(
             values,
@@ -122,35 +117,61 @@ def simulated_run(
         raise InputError(f"{where}{error}") from None
 
 
+def _command_series(command: str, options: CommandSampling) -> Series:
+    """Read the voltage of a command from a log; refuses another kind of file."""
+    from swashplate.logs import open_log, read_series
+
+    kind = file_kind(Path(command))
+    if kind not in ("log", ""):
+        words = "not a command: name a maneuver such as step:9, or a log."
+        raise InputError(f"{command} is {KIND_NAMES[kind]}, {words}")
+    log = open_log(command)
+    columns = (("--time-column", options.time_column), ("--column", options.column))
+    for option, column in columns:
+        try:
+            log.find(column)
+        except InputError as error:
+            raise InputError(f"{str(error).rstrip('.')}, with {option}.") from None
+    series = read_series(command, options.column, "V", time_column=options.time_column)
+    if options.interpolation is None:
+        raise InputError(
+            f"{command} needs --interpolation linear (a straight line from row to row) or "
+            "--interpolation previous (each row held until the next)."
+        )
+    return series
+
+
 def _measured(measured: Sequence[str], log: str, time_column: str) -> dict[str, Any]:
     """Inputs other than the voltage by name: a column of a log, or a number."""
     from swashplate.drive import MEASURED
     from swashplate.logs import read_series
 
-    found = dict[str, Any]()
+    inputs = dict[str, Any]()
     for word in measured:
         name, _, text = (part.strip() for part in word.partition("="))
-        if name not in MEASURED or not text or name in found:
+        if name not in MEASURED or not text or name in inputs:
             names = ", ".join(MEASURED)
             raise InputError(f"--measured {word}: write NAME=COLUMN, once for each of {names}.")
         try:
-            found[name] = float(text)
+            inputs[name] = float(text)
         except ValueError:
             if not log:
                 must = "a maneuver has no columns, so give a number in SI"
                 raise InputError(f"--measured {word}: {must}.") from None
             unit = MEASURED[name][0]
-            found[name] = read_series(log, text, unit, time_column=time_column).values
-    return found
+            inputs[name] = read_series(log, text, unit, time_column=time_column).values
+    return inputs
 
 
 def window_of(
     time: NDArray[np.float64], begin: float | None, end: float | None
 ) -> tuple[float, float] | None:
     """The part of a record that --from and --to name; None for all of it. [s]"""
-    first, last = float(time[0]), float(time[-1])
-    whole = begin is None and end is None
-    return None if whole else (first if begin is None else begin, last if end is None else end)
+    if begin is None and end is None:
+        return None
+    first = float(time[0]) if begin is None else begin
+    last = float(time[-1]) if end is None else end
+    return first, last
 
 
 def named_trial(drive: Drive, command: str, options: CommandSampling) -> tuple[str, Trial]:

@@ -111,7 +111,7 @@ class Control:
         return (self,)
 
     def words(self) -> str:
-        """What it is, with its numbers: ``"delayed feedback of 0.2 at 0.25 periods"``."""
+        """Description with numbers: ``"delayed feedback of 0.2 at 0.25 periods"``."""
         return self.kind
 
 
@@ -360,7 +360,7 @@ class Controller(Control):
 
 
 class Stages(NamedTuple):
-    """What a controller is made of, as a run takes it."""
+    """Parts of a controller, as a run takes them."""
 
     settings: Settings
     controller: Controller | None

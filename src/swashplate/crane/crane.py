@@ -15,7 +15,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from swashplate.analysis import InverseMap, inverse_map
 from swashplate.crane.axes import AXES, check_names
 from swashplate.crane.drives import DriveLike, DriveSource, drives_of
-from swashplate.crane.kinematics import Boom, Geometry, Home, Vector, luff_rope
+from swashplate.crane.kinematics import Boom, Geometry, Home, luff_rope, vector_of
 from swashplate.crane.limits import DEFINITIONS, LIMITED, limits_of
 from swashplate.crane.quantities import (
     DEFAULTS,
@@ -160,12 +160,12 @@ class Crane:
 
     @property
     def assumed(self) -> str:
-        """How much of the geometry is assumed: ``"12 of 13 quantities"``, empty if nothing is."""
+        """Assumed part of the geometry: ``"12 of 13 quantities"``, empty if nothing is assumed."""
         count = sum(quantity.status == "assumed" for quantity in self.quantities.values())
         return f"{count} of {len(self.quantities)} quantities" if count else ""
 
     def provenance(self) -> tuple[str, ...]:
-        """Where drives come from, and what their tests left open, in sentences.
+        """State the origin of the drives, and what their tests left open, in sentences.
 
         Of each drive in `sources` its file, the verdict on its fit and what that holds for; of any
         drive the limits that no test of it reached.
@@ -321,7 +321,7 @@ class Crane:
         return Geometry(
             boom=si["boom_length"],
             foot=si["foot_offset"],
-            axis=Vector(*self._si["slew_axis"]),
+            axis=vector_of(self._si["slew_axis"]),
             sheave=si["tower_sheave_distance"],
             sheave_cos=cos(si["tower_sheave_angle"]),
             sheave_sin=sin(si["tower_sheave_angle"]),
@@ -368,7 +368,7 @@ class Crane:
         return _inverse(self.controller_drive(axis))
 
     def home(self, slew_deg: float = 0.0, boom_deg: float = 45.0, rope_m: float = 20.0) -> Home:
-        """Where a run starts.
+        """Pose of the crane at the start of a run.
 
         Parameters
         ----------
@@ -431,8 +431,7 @@ def _table(title: str, quantities: Mapping[str, CraneQuantity], names: Mapping[s
     for name, quantity in quantities.items():
         value = ", ".join(f"{number:g}" for number in quantity.values)
         assumed = quantity.status == "assumed"
-        cells = (names[name], value, quantity.unit, quantity.status, quantity.source)
-        table.add(*cells, look=assumed)
+        table.add(names[name], value, quantity.unit, quantity.status, quantity.source, look=assumed)
     return table
 
 

@@ -22,7 +22,7 @@ UNUSABLE: Final = "Not usable"
 
 
 class Fitted(Protocol):
-    """What a fit returns, as far as a crane takes it; of one with a `verdict`, that too."""
+    """Result of a fit, as far as a crane uses it; its `verdict`, too, if it has one."""
 
     @property
     def drive(self) -> Drive:
@@ -34,7 +34,7 @@ DriveLike = Drive | Fitted | str | Path
 
 
 class DriveSource(NamedTuple):
-    """Where the drive of an axis comes from, and the verdict on its fit."""
+    """Origin of the drive of an axis, and the verdict on its fit."""
 
     origin: str
     """Its file, or how it was given."""
@@ -51,11 +51,11 @@ class DriveSource(NamedTuple):
 
     @property
     def usable(self) -> bool:
-        """Whether no verdict says that it is not."""
+        """Whether the fit is usable; without a verdict it counts as usable."""
         return self.fit_usable is not False
 
     def words(self) -> str:
-        """Where the drive comes from, what the verdict was and what it holds for.
+        """Describe the drive's origin, the verdict on its fit and the range it holds for.
 
         It ends a sentence, and may go on with another one.
         """
@@ -128,7 +128,7 @@ def _drive(drive_like: DriveLike, folder: Path, axis: str) -> tuple[Drive, Path 
 
 
 def _source(drive_like: DriveLike, drive: Drive, path: Path | None) -> DriveSource | None:
-    """Where a drive comes from; None for a packaged one, and a `Drive` that says nothing of it."""
+    """Find the origin of a drive; None for a packaged one, and a `Drive` without an origin."""
     if path is not None:
         return _source_of_file(path, drive)
     if isinstance(drive_like, str | Path):

@@ -5,6 +5,7 @@ command hoists, slews to starboard (right), lifts the boom. All in closed form a
 the boom: its cosine and sine follow from the luff rope's length by the law of cosines.
 """
 
+from collections.abc import Iterable
 from math import atan2, cos, sin, sqrt
 from typing import NamedTuple
 
@@ -17,6 +18,12 @@ class Vector(NamedTuple):
     x: float
     y: float
     z: float
+
+
+def vector_of(numbers: Iterable[float]) -> Vector:
+    """Vector of three numbers."""
+    x, y, z = map(float, numbers)
+    return Vector(x, y, z)
 
 
 class Geometry(NamedTuple):
@@ -42,7 +49,7 @@ class Geometry(NamedTuple):
 
 
 class Home(NamedTuple):
-    """Where the crane stands while all shafts are at zero."""
+    """Pose of the crane while all shafts are at zero."""
 
     slew: float
     """ψ₀, 0 forward, positive to starboard. [rad]"""
@@ -162,7 +169,8 @@ def shafts_for(x: float, y: float, now: Shafts, g: Geometry, home: Home) -> Shaf
     The point is in the ship's frame [m]; beyond the boom's reach it is the nearest reach. The
     hoist's angle stays as it is.
     """
-    e_x, e_y = x - g.axis.x, y - g.axis.y
+    e_x = x - g.axis.x
+    e_y = y - g.axis.y
     c = min(max((sqrt(e_x * e_x + e_y * e_y) - g.foot) / g.boom, 0.0), 1.0)
     rope = luff_rope(Boom(c, sqrt(1.0 - c * c)), g)
     before = home.slew + now.slew

@@ -36,7 +36,7 @@ class CraneQuantity(BaseModel):
 
 
 class QuantityDefinition(NamedTuple):
-    """What a quantity may be: SI unit, how many numbers it has, and their plausible range."""
+    """Definition of a quantity: SI unit, count of numbers, and their plausible range."""
 
     unit: str
     size: int
@@ -119,7 +119,7 @@ def user_quantity(name: str, value: Any) -> CraneQuantity:
 
 
 def _shape(definition: QuantityDefinition) -> str:
-    """How many numbers a quantity has, in words."""
+    """Count of a quantity's numbers, in words."""
     return "one number" if definition.size == 1 else f"a list of {definition.size} numbers"
 
 

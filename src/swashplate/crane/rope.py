@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swashplate.crane.kinematics import Vector, dot, moved, norm, rotation, to_ship
+from swashplate.crane.kinematics import Vector, dot, moved, norm, rotation, to_ship, vector_of
 from swashplate.equations import equation, kernel
 from swashplate.errors import InputError
 from swashplate.results import Result
@@ -64,7 +64,7 @@ def multiplier_of(free: Vector, along: Vector, length: float) -> float:
 
 @dataclass(frozen=True)
 class Suspension(Result):
-    """How the load hangs: elastic rope, hook with slings; by default neither."""
+    """Suspension of the load: elastic rope, hook with slings; by default neither."""
 
     stiffness: float = inf
     """EA, force for a strain of one of the rope's parts together, 1 kN to 1 TN; infinite for a
@@ -176,7 +176,7 @@ class Hung(NamedTuple):
 
 @equation
 def coasting(now: Vector, before: Vector, square: float, a: Vector) -> Vector:
-    """Where a body is one step later under an acceleration, 2 x - x' + h² a. [m]"""
+    """Position of a body one step later under an acceleration, 2 x - x' + h² a. [m]"""
     return moved(moved(now, 1.0, moved(now, -1.0, before)), square, a)
 
 
@@ -296,7 +296,7 @@ def rope_step(
 
 
 class Start(NamedTuple):
-    """How the load begins, relative to the tip, both horizontal and inertial."""
+    """Initial offset and velocity of the load relative to the tip, horizontal and inertial."""
 
     offset: tuple[float, float] = (0.0, 0.0)
     """[m]"""
@@ -435,9 +435,9 @@ def load_motion(
         wind=wind,
         swing_damping=swing_damping,
     )
-    now = hanging_load(Vector(*path[0].tolist()), 0.0, 0.0, float(rope[0]), s)
+    now = hanging_load(vector_of(path[0]), 0.0, 0.0, float(rope[0]), s)
     before, hook_before = (np.array(body) - v * h for body in (now.load, now.hook))
-    now = now._replace(before=Vector(*before.tolist()), hook_before=Vector(*hook_before.tolist()))
+    now = now._replace(before=vector_of(before), hook_before=vector_of(hook_before))
     if start is not None:
         load = np.asarray(start, dtype=np.float64)
         line = load - path[0]
@@ -450,10 +450,10 @@ def load_motion(
         hook = load - s.sling / distance * line
         stretch = distance - s.sling - float(rope[0])
         now = Hung(
-            load=Vector(*load.tolist()),
-            before=Vector(*(load - v * h).tolist()),
-            hook=Vector(*hook.tolist()),
-            hook_before=Vector(*(hook - v * h).tolist()),
+            load=vector_of(load),
+            before=vector_of(load - v * h),
+            hook=vector_of(hook),
+            hook_before=vector_of(hook - v * h),
             pull=float(elastic_pull(stretch, stretch, float(rope[0]), s, h)),
             stretch=stretch,
         )

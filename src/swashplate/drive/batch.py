@@ -38,12 +38,12 @@ def simulate_drives(
     """March many sets over one record; see `Drive.simulate_many`."""
     check_mapping("changes", changes)
     definitions = parameters.definitions
-    given, count = set_columns(
+    changed_values, count = set_columns(
         {name: in_si(values, definitions.find(name).unit, name) for name, values in changes.items()}
     )
     numbers = {name: np.full(count, value) for name, value in parameters.numbers.items()}
     changed: set[str] = set()
-    for name, values in given.items():
+    for name, values in changed_values.items():
         for column in definitions.columns_of([name]):
             if column in changed:
                 raise InputError(f"{column} is given twice.")
@@ -51,7 +51,8 @@ def simulate_drives(
             numbers[column] = values
     check_output(cost.output if cost else output)
     driver, record = next(iter(records.items()))
-    by_voltage, models = driver == "voltage", models_of(parameters.equations)
+    by_voltage = driver == "voltage"
+    models = models_of(parameters.equations)
     rules = [*broken_rules(numbers, definitions)]
     if by_voltage:
         rules += unstable_filters(numbers, record.step, parameters.rate is None)
@@ -79,10 +80,11 @@ def _groups(
     stops = np.tan(np.maximum(numbers["Z13_plus"], numbers["Z13_minus"]))
     masks: dict[str, NDArray[np.bool_]] = {"steep": stops >= TAN_22_5}
     for option in sorted({SWITCHES[column] for column in changed if column in SWITCHES}):
-        own = [numbers[each] for each in SWITCHES if SWITCHES[each] == option and each in numbers]
-        masks[option] = np.any(own, axis=0)
+        switched_by = [name for name in SWITCHES if SWITCHES[name] == option and name in numbers]
+        masks[option] = np.any([numbers[name] for name in switched_by], axis=0)
     kinds = np.stack(list(masks.values()), axis=1)
-    base, card = pump_options(parameters), card_options(parameters) if by_voltage else None
+    base = pump_options(parameters)
+    card = card_options(parameters) if by_voltage else None
     groups = []
     for kind in np.unique(kinds, axis=0):
         on = {name: True if acts else None for name, acts in zip(masks, kind, strict=True)}

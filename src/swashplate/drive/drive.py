@@ -714,7 +714,8 @@ class Drive(Result, Mapping[str, Parameter]):
         """
         from swashplate.drive.linearisation import linearize_drive
 
-        at, current = in_si(at, "V", "The voltage"), in_si(current, "A", "The current")
+        at = in_si(at, "V", "The voltage")
+        current = in_si(current, "A", "The current")
         return linearize_drive(self.parameters, at, current, input, outputs, coulomb)
 
     def frequency_response(

@@ -32,8 +32,8 @@ DECIMALS = 4
 
 def steady_states(parameters: ParameterSet, voltage: Array) -> tuple[Array, Array]:
     """Signed current [A] and speed [rad/s] that each of many constant voltages settles at."""
-    whole = without_ripple(drive_instance(parameters, by_voltage=True))
-    settled = replace(whole, model=models_of(parameters.equations).settled_drive)
+    instance = without_ripple(drive_instance(parameters, by_voltage=True))
+    settled = replace(instance, model=models_of(parameters.equations).settled_drive)
     stored = (SignalId(0, "signals", "current"), SignalId(1, "signals", "shaft_speed"))
     initial = InitialStates((), {"voltage": 0.0}, ())
     current, speed = marched(settled, {"voltage": voltage}, 1.0, initial, stored)
@@ -96,18 +96,8 @@ def operating_point(
         plate, at the relief pressure, after a saturated orifice, in the grip of a friction without
         presliding; or if the solenoid overpowers the feedback spring.
     """
-    name, given = parameters.name, current if voltage is None else voltage
-    if given is None or (voltage is not None and current is not None):
-        raise InputError("Linearise at a voltage or a current; give exactly one of them.")
-    if not is_real(given) or not isfinite(given):
-        raise InputError(f"Linearise at a finite number of volts or amperes, not {given}.")
-    if input == "voltage" and voltage is None:
-        raise InputError("A model from the voltage needs a voltage to linearise at, not a current.")
-    if voltage is not None:
-        if abs(voltage) > FULL_VOLTAGE:
-            raise InputError(f"The voltage is {voltage:g} V, but the card takes ±10 V.")
-        current = float(steady_states(parameters, np.array([voltage]))[0][0])
-    assert current is not None
+    name = parameters.name
+    current = _current_at(parameters, input, voltage, current)
     instance = without_ripple(drive_instance(parameters, by_voltage=False))
     pump, options, _ = instance.parts[1]
     replacements = instance.model.parts[1].replacements
@@ -117,15 +107,8 @@ def operating_point(
         raise DomainError(f"{name}: {overpowered(margin, 'current')}")
 
     sides = []
-    if input == "voltage":
-        assert voltage is not None
-        card = card_of(parameters)
-        channel = card.plus if voltage >= 0.0 else card.minus
-        if channel.V_dz == channel.J == voltage == 0.0:
-            sides.append("card at 0 V: the side of positive voltage")
-        elif abs(voltage) <= channel.V_dz:
-            zone = f"{voltage:g} V is in the card's dead zone"
-            raise DomainError(f"{name}: {zone}, so the gain is 0; {_beyond(parameters, voltage)}.")
+    if input == "voltage" and voltage is not None:
+        sides += _card_sides(parameters, voltage)
     if input in ("voltage", "current"):
         if options.hysteresis is not None:
             raise DomainError(
@@ -135,32 +118,23 @@ def operating_point(
                 "alone with input solenoid_force, or sweep sines of a size with "
                 "frequency_response."
             )
-        if pump.Z17 == current == 0.0:
-            sides.append("solenoids at 0 A: the side of positive current")
-        elif abs(current) <= pump.Z17:
-            at = "" if voltage is None else f"{voltage:g} V gives "
-            instead = f"linearise beyond ±{pump.Z17:g} A"
-            raise DomainError(
-                f"{name}: {at}{current:.6g} A, which is in the solenoids' dead zone of Z17 = "
-                f"±{pump.Z17:g} A, so the gain is 0; "
-                f"{instead if voltage is None else _beyond(parameters, voltage)}."
-            )
+        sides += _solenoid_sides(parameters, pump.Z17, current, voltage)
     if options.friction is not None and pump.spool_presliding == 0.0:
         raise DomainError(
             f"{name}: without spool_presliding the spool_friction of {pump.spool_friction:g} N "
             "prevents small motions of the spool, so the gain is 0; give a presliding, or sweep "
             "sines of a size with frequency_response."
         )
-    known = instance.start({"current": current}, 1.0 / SOURCE_RATE, "steady").arguments[1]
+    _, arguments = instance.start({"current": current}, 1.0 / SOURCE_RATE, "steady").arguments
     equations: Any = instance.model.parts[1]
-    limits = called(equations, equations.limits, known)
+    limits = called(equations, equations.limits, arguments)
     for limit, what in NO_GAIN.items():
         if getattr(limits, limit):
             raise DomainError(
                 f"{name}: {what}, so the gain is 0; linearise at a smaller command, at which the "
                 "speed still changes."
             )
-    signals = known["signals"]
+    signals = arguments["signals"]
     # without leakage the spool is closed, but for rounding
     opening = 0.0 if options.leaky is None else signals.orifice_opening
     if options.symmetric is not None and opening == 0.0:
@@ -177,12 +151,65 @@ def operating_point(
     )
 
 
+def _current_at(
+    parameters: ParameterSet, input: str, voltage: float | None, current: float | None
+) -> float:
+    """Steady current at a voltage, or the given one [A]; refuses what is out of range."""
+    command = current if voltage is None else voltage
+    if command is None or (voltage is not None and current is not None):
+        raise InputError("Linearise at a voltage or a current; give exactly one of them.")
+    if not is_real(command) or not isfinite(command):
+        raise InputError(f"Linearise at a finite number of volts or amperes, not {command}.")
+    if input == "voltage" and voltage is None:
+        raise InputError("A model from the voltage needs a voltage to linearise at, not a current.")
+    if voltage is None:
+        return command
+    if abs(voltage) > FULL_VOLTAGE:
+        raise InputError(f"The voltage is {voltage:g} V, but the card takes ±10 V.")
+    currents, _ = steady_states(parameters, np.array([voltage]))
+    return float(currents[0])
+
+
+def _card_sides(parameters: ParameterSet, voltage: float) -> list[str]:
+    """Side of the card whose slope is taken at 0 V; refuses a voltage in its dead zone."""
+    card = card_of(parameters)
+    channel = card.plus if voltage >= 0.0 else card.minus
+    if channel.V_dz == channel.J == voltage == 0.0:
+        return ["card at 0 V: the side of positive voltage"]
+    if abs(voltage) <= channel.V_dz:
+        zone = f"{voltage:g} V lies in the card's dead zone"
+        raise DomainError(
+            f"{parameters.name}: {zone}, so the gain is 0; {_beyond(parameters, voltage)}."
+        )
+    return []
+
+
+def _solenoid_sides(
+    parameters: ParameterSet, dead_zone: float, current: float, voltage: float | None
+) -> list[str]:
+    """Side of the solenoids whose slope is taken at 0 A; refuses a current in their dead zone."""
+    if dead_zone == current == 0.0:
+        return ["solenoids at 0 A: the side of positive current"]
+    if abs(current) > dead_zone:
+        return []
+    cause = "" if voltage is None else f"{voltage:g} V gives "
+    instead = f"linearise beyond ±{dead_zone:g} A"
+    if voltage is not None:
+        instead = _beyond(parameters, voltage)
+    raise DomainError(
+        f"{parameters.name}: {cause}{current:.6g} A, which lies in the solenoids' dead zone of "
+        f"Z17 = ±{dead_zone:g} A, so the gain is 0; {instead}."
+    )
+
+
 def _beyond(parameters: ParameterSet, voltage: float) -> str:
-    """What to linearise instead of in a dead zone: at the first voltage of the side beyond it."""
-    way, sign, side = (1.0, "+", "plus") if voltage >= 0.0 else (-1.0, "-", "minus")
+    """Advise to linearise beyond the dead zone: name the first voltage of the side beyond it."""
+    direction = 1.0 if voltage >= 0.0 else -1.0
+    sign = "+" if voltage >= 0.0 else "-"
+    side = "plus" if voltage >= 0.0 else "minus"
     # a zone's end is part of it, so that the first step beyond has a model
     steps = np.arange(1, ceil(FULL_VOLTAGE * 10**DECIMALS) + 1) / 10**DECIMALS
-    current, _ = steady_states(parameters, way * steps)
+    current, _ = steady_states(parameters, direction * steps)
     numbers = parameters.numbers
     answers = (steps > numbers[f"V_dz_{side}"]) & (np.abs(current) > numbers["Z17"])
     instead = f"no voltage up to {sign}{FULL_VOLTAGE:g} V leaves it: linearise on the other side"

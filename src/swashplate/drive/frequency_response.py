@@ -43,7 +43,8 @@ def sweep_drive(
         raise InputError(
             f"The rate is {rate:g} Hz, but must be between {SOURCE_RATE:g} and {FASTEST:g} Hz."
         )
-    f, a = checked_frequencies(frequencies, rate), checked_amplitudes(amplitudes)
+    f = checked_frequencies(frequencies, rate)
+    a = checked_amplitudes(amplitudes)
     if input not in ("voltage", "current"):
         raise InputError(f"The input is '{input}'; it is 'voltage' or 'current'.")
     if output not in SWEPT_OUTPUTS or output == input:
@@ -94,30 +95,30 @@ def response_table(response: FrequencyResponse, frequency: float) -> Table:
     `response` is from voltage to the shaft's speed; at one of its frequencies [Hz]: another is
     refused in an `InputError`, nothing is interpolated.
     """
-    at = int(np.argmin(np.abs(response.frequencies - frequency)))
-    nearest = float(response.frequencies[at])
+    index = int(np.argmin(np.abs(response.frequencies - frequency)))
+    nearest = float(response.frequencies[index])
     if not abs(nearest - frequency) <= 1e-9 * nearest:
         raise InputError(
             f"The response was not computed at {frequency:g} Hz; the nearest frequency is "
             f"{nearest:.6g} Hz."
         )
-    heads = (
-        ("amplitude", "g", "V"),
-        ("gain", ".3f", "rad/s/V", "none"),
-        ("phase", "z.1f", "deg"),
-        ("lag", "z.1f", "ms"),
-        ("distortion %", ".1f"),
-        ("mean speed", "z.2f", "rad/s"),
+    columns = (
+        Column("amplitude", "g", "V"),
+        Column("gain", ".3f", "rad/s/V", "none"),
+        Column("phase", "z.1f", "deg"),
+        Column("lag", "z.1f", "ms"),
+        Column("distortion %", ".1f"),
+        Column("mean speed", "z.2f", "rad/s"),
     )
-    made = Table("", tuple(Column(*each) for each in heads))
+    table = Table("", columns)
     # the phase within a turn of itself, as of this frequency alone
-    phases = np.angle(response.ratio[:, at])
+    phases = np.angle(response.ratio[:, index])
     for k, amplitude in enumerate(map(float, response.amplitudes)):
-        answer: tuple[float | None, ...] = (None,) * 4
-        if response.moves[k, at]:
-            phase = float(phases[k])
-            lag = -1e3 * phase / (2.0 * np.pi * frequency)
-            distortion = 100.0 * float(response.distortion[k, at])
-            answer = (float(response.gain[k, at]), np.degrees(phase), lag, distortion)
-        made.add(amplitude, *answer, float(response.mean[k, at]))
-    return made
+        gain = phase = lag = distortion = None
+        if response.moves[k, index]:
+            gain = float(response.gain[k, index])
+            phase = float(np.degrees(phases[k]))
+            lag = -1e3 * float(phases[k]) / (2.0 * np.pi * frequency)
+            distortion = 100.0 * float(response.distortion[k, index])
+        table.add(amplitude, gain, phase, lag, distortion, float(response.mean[k, index]))
+    return table

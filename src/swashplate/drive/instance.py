@@ -63,11 +63,14 @@ class Models(NamedTuple):
 def models_of(equations: tuple[Replacement, ...]) -> Models:
     """The drive's models with user-defined equations in them."""
     models = Models(drive, pump_drive, flowing_drive, flowing_pump_drive, settled_drive)
-    if any(uses(pump_drive, each.old) for each in equations):
+    if any(uses(pump_drive, replacement.old) for replacement in equations):
         # where the spool closes is known in closed form of the package's equations alone
         equations = (*equations, Replacement(settled_pressure, searched_pressure))
-    for each in equations:
-        models = Models(*(again(m, each) if uses(m, each.old) else m for m in models))
+    for replacement in equations:
+        changed = [
+            again(model, replacement) if uses(model, replacement.old) else model for model in models
+        ]
+        models = Models._make(changed)
     return models
 
 
@@ -101,7 +104,7 @@ def card_of(parameters: ParameterSet) -> Card:
     """The card's numbers."""
     numbers = parameters.numbers
     plus, minus = (
-        Channel(*(numbers[f"{name}_{side}"] for name in Channel._fields)) for side in SIDES
+        Channel(**{name: numbers[f"{name}_{side}"] for name in Channel._fields}) for side in SIDES
     )
     return Card(plus, minus, numbers["tau"])
 
@@ -183,7 +186,8 @@ def unstable_filters(numbers: Mapping[str, Array], step: float, exact: bool) -> 
         ),
     )
     for side in SIDES:
-        zeta, omega = numbers[f"zeta_{side}"], numbers[f"omega_{side}"]
+        zeta = numbers[f"zeta_{side}"]
+        omega = numbers[f"omega_{side}"]
         steps = omega * step / filter_step_limit(zeta, exact)
         values = {
             "side": side,
@@ -224,15 +228,16 @@ def at_every_rate(parameters: ParameterSet) -> ParameterSet:
     for side in SIDES:
         zeta, omega, C = (parameters.numbers[f"{name}_{side}"] for name in ("zeta", "omega", "C"))
         w = omega / parameters.rate
-        middle, half = 1.0 - zeta * w, w * sqrt(complex(zeta * zeta - 1.0))
+        middle = 1.0 - zeta * w
+        half = w * sqrt(complex(zeta * zeta - 1.0))
         poles = middle + half, middle - half
-        if any(each.imag == 0.0 and each.real <= 0.0 for each in poles):
+        if any(pole.imag == 0.0 and pole.real <= 0.0 for pole in poles):
             raise InputError(
                 f"{parameters.name}: the recursion of the {side} channel's filter (zeta = "
                 f"{zeta:g}, omega = {omega:g} rad/s at {parameters.rate:g} Hz) swings from sample "
                 "to sample, as no filter of another rate does; lower omega."
             )
-        first, second = (parameters.rate * log(each) for each in poles)
+        first, second = (parameters.rate * log(pole) for pole in poles)
         replacement = float(sqrt(first * second).real)
         changes[f"omega_{side}"] = replacement
         changes[f"zeta_{side}"] = -float((first + second).real) / (2.0 * replacement)

@@ -51,7 +51,7 @@ class LinearDrive(LinearModel, Result):
         return model_tables(self, SHOWN_AT)
 
     def content(self) -> dict[str, Any]:
-        """What is written of a model; see `LinearModel.content`."""
+        """Content of a model's file; see `LinearModel.content`."""
         point = {k: v for k, v in asdict(self.operating_point).items() if v is not None}
         sides = {"coulomb": self.coulomb, "one_sided": list(point.pop("one_sided"))}
         # tables last, as TOML has them
@@ -132,8 +132,8 @@ class LinearDrive(LinearModel, Result):
         last = tuple(f"{name}_last" for name in self.inputs)
         # what is measured beside the command goes straight from sample to sample
         zero_order = [interpolation == "previous", *(False for _ in self.inputs[1:])]
-        delayed = with_delay_line((fine.A, fine.B, fine.C, fine.D), delay_samples)
-        A, B, C, D = lifted(*delayed, substeps, zero_order)
+        A, B, C, D = with_delay_line((fine.A, fine.B, fine.C, fine.D), delay_samples)
+        A, B, C, D = lifted(A, B, C, D, substeps, zero_order)
         return replace(
             sampled,
             A=A,
@@ -181,10 +181,10 @@ def model_tables(
     if model.input == "voltage":
         delay = 1e3 * model.parameters.numbers["tau"]
         moving.add("delay of the card", delay, unit="ms", spec="z.3f")
-    moving.add("bandwidth (-3 dB)", _finite(model.bandwidth), unit="Hz", spec=".4g")
+    moving.add("bandwidth (-3 dB)", _none_if_infinite(model.bandwidth), unit="Hz", spec=".4g")
     moving.add(f"gain {at}", abs(answer), unit=f"rad/s/{unit}", spec=".5g")
     moving.add(f"phase {at}", float(np.angle(answer, deg=True)), unit="deg", spec="z.2f")
-    largest = _finite(model.largest_gain)
+    largest = _none_if_infinite(model.largest_gain)
     moving.add("largest proportional gain", largest, unit=f"{unit}/(rad/s)", spec=".4g")
 
     poles = _poles_table(model)
@@ -194,23 +194,36 @@ def model_tables(
     shown = display_unit(f"{unit}/(rad/s)")
     loop = _key_values(f"Proportional loop, {shown.factor * loop_gain:g} {shown.name}")
     loop.add("crossover", margins.crossover or Cell(None, "none"), unit="Hz", spec=".4g")
-    loop.add("phase margin", _finite(np.degrees(margins.phase_margin)), unit="deg", spec=".1f")
-    loop.add("delay margin", _finite(1e3 * margins.delay_margin), unit="ms", spec=".2f")
-    loop.add("gain margin", _finite(margins.gain_margin), spec=".3g")
+    loop.add(
+        "phase margin", _none_if_infinite(np.degrees(margins.phase_margin)), unit="deg", spec=".1f"
+    )
+    loop.add("delay margin", _none_if_infinite(1e3 * margins.delay_margin), unit="ms", spec=".2f")
+    loop.add("gain margin", _none_if_infinite(margins.gain_margin), spec=".3g")
     return [operating, moving, poles, loop]
 
 
 def _poles_table(model: LinearDrive) -> Table:
     """Poles without those of delays, of two conjugate ones the upper."""
-    heads = (("real", "z.5g"), ("imaginary", "s"), ("Hz", ".4g"), ("damping", ".3f"))
-    poles = Table("", (Column("Poles"), *(Column(*each) for each in heads)))
+    columns = (
+        Column("Poles"),
+        Column("real", "z.5g"),
+        Column("imaginary", "s"),
+        Column("Hz", ".4g"),
+        Column("damping", ".3f"),
+    )
+    poles = Table("", columns)
     rate = model.rate
     for pole in model.poles[model.poles.imag >= 0.0]:
         s = pole if rate is None else np.log(pole) * rate
         size = float(abs(s))
         imaginary = f"±{pole.imag:.5g}" if pole.imag else ""
-        numbers = float(pole.real), imaginary, size / (2.0 * np.pi), float(-s.real) / size
-        poles.add("rad/s" if rate is None else "z", *numbers)
+        poles.add(
+            "rad/s" if rate is None else "z",
+            float(pole.real),
+            imaginary,
+            size / (2.0 * np.pi),
+            float(-s.real) / size,
+        )
     return poles
 
 
@@ -218,5 +231,5 @@ def _key_values(title: str) -> Table:
     return Table("", (Column(title), Column("", "z.4f", none="no limit"), UNIT))
 
 
-def _finite(value: float) -> float | None:
-    return None if np.isinf(value) else float(value)
+def _none_if_infinite(margin: float) -> float | None:
+    return None if np.isinf(margin) else float(margin)

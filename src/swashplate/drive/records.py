@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 
 class RunKeywords(TypedDict, total=False):
-    """How inputs are given, and what was measured beside the command; see `Drive.simulate`."""
+    """Inputs, and signals measured beside the command; see `Drive.simulate`."""
 
     clip: bool
     time: ArrayLike | None
@@ -94,7 +94,8 @@ def drive_records(
 
 def _check_measured(name: str, values: Array) -> None:
     """Refuse a record with a sample that no machine has, or whose size can hardly be meant."""
-    definition, (least, most) = INPUTS[name], RANGES[name]
+    definition = INPUTS[name]
+    least, most = RANGES[name]
     low, high = float(values.min()), float(values.max())
     try:
         check_plausible(name, definition, max(low, high, key=abs))

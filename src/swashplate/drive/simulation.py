@@ -29,7 +29,7 @@ Flags = NDArray[np.uint8]
 
 
 class Limit(IntFlag):
-    """What holds the drive back; several can act at once."""
+    """Limits that hold the drive back; several can act at once."""
 
     DEAD_ZONE = 1
     """The current is within the solenoids' dead zone: no force."""
@@ -83,28 +83,32 @@ class Simulation(Run):
     first_signals = FIRST_SIGNALS
     plotted = ("shaft_speed",)
 
-    limit_names = tuple(str(each.name).lower() for each in Limit)
+    limit_names = tuple(str(limit.name).lower() for limit in Limit)
 
     @cached_property
     def names(self) -> tuple[str, ...]:
         """The signals that it has: `SIGNALS`, with refinements the motor's, after ``"time"``."""
-        there = SIGNALS if self.driven_by == "voltage" else SIGNALS[1:]
-        known = 2 if self.pump.motor_constant > 0.0 else 1 if self.refined else 0
-        return ("time", *there, *tuple(MOTOR)[:known])
+        signals = SIGNALS if self.driven_by == "voltage" else SIGNALS[1:]
+        motor_signals = tuple(MOTOR)
+        if not self.refined:
+            motor_signals = ()
+        elif not self.pump.motor_constant > 0.0:
+            motor_signals = motor_signals[:1]
+        return ("time", *signals, *motor_signals)
 
     @property
     def pump(self) -> Pump:
         """Numbers of pump and motor."""
-        made: Pump = self.instance.parts[1].p
-        return made
+        pump: Pump = self.instance.parts[1].p
+        return pump
 
     @property
     def refined(self) -> bool:
         """Whether an option beyond Kruse's equations is on, or the motor's constant known."""
         options = self.instance.parts[1].options
         names = ("friction", "hysteresis", "ripple", "damping", "leakage", "line")
-        known = self.pump.motor_constant > 0.0
-        return known or any(getattr(options, name) is not None for name in names)
+        has_motor_constant = self.pump.motor_constant > 0.0
+        return has_motor_constant or any(getattr(options, name) is not None for name in names)
 
     @property
     def voltage(self) -> Array | None:
@@ -186,7 +190,7 @@ class Simulation(Run):
         return float(self.held_back(limit).mean())
 
     def tables(self) -> tuple[Table, Table]:
-        """What the drive did, and how long each of its limits held it back."""
+        """Tabulate the motion of the drive, and how long each of its limits held it back."""
         did = Table("", (Column("Shaft"), Column("", "z.2f"), UNIT))
         position = float(self.shaft_position[-1])
         did.add("peak speed, positive", max(float(self.shaft_speed.max()), 0.0), unit="rad/s")

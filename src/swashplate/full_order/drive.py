@@ -63,7 +63,8 @@ MOST_SUBSTEPS = 20_000  # Sub-steps a sample, beyond which the machine is too st
 
 def _definitions() -> Definitions:
     """Parameters of the drive with five states: the card's, the solenoids', the machine's."""
-    by_symbol, paths = dict[str, Definition](), dict[str, str]()
+    by_symbol = dict[str, Definition]()
+    paths = dict[str, str]()
     for symbol, definition in CATALOGUE.items():
         if definition.block == "control_card":
             by_symbol[symbol] = definition
@@ -102,8 +103,8 @@ class FullOrderSimulation(Run, Tabular):
     @property
     def plant(self) -> model.Plant:
         """The machine and its solenoids."""
-        found: model.Plant = self.instance.parts[1].p
-        return found
+        plant: model.Plant = self.instance.parts[1].p
+        return plant
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -140,12 +141,12 @@ class FullOrderSimulation(Run, Tabular):
     def table(self) -> Table:
         """Lowest, highest and last value of each signal."""
         numbers = (Column(words, "z.4g") for words in ("lowest", "highest", "at the end"))
-        made = Table("", (Column("Signal"), *numbers, UNIT))
+        table = Table("", (Column("Signal"), *numbers, UNIT))
         for name in SIGNALS:
             values = self[name]
             low, high, last = float(values.min()), float(values.max()), float(values[-1])
-            made.add(name.replace("_", " "), low, high, last, unit=SIGNAL_UNITS[name])
-        return made
+            table.add(name.replace("_", " "), low, high, last, unit=SIGNAL_UNITS[name])
+        return table
 
     @property
     def spool_hold(self) -> Flags:
@@ -311,8 +312,8 @@ class FullOrderDrive:
         parameters = self.drive.parameters
         symmetric = parameters.pressure_root == "symmetric"
         options = PlantOptions(symmetric or None, self.physical.air)
-        given = model.Substeps(float(self.substeps(step, substeps)))
-        plant = PartNumbers(self.plant, options, given)
+        substep_count = model.Substeps(float(self.substeps(step, substeps)))
+        plant = PartNumbers(self.plant, options, substep_count)
         if not card:
             source = PartNumbers(CurrentSource())
             return Instance(model.full_machine, (source, plant), self.physical.name)
@@ -558,7 +559,7 @@ class Modes(Result):
     def table(self) -> Table:
         """Frequency and damping ratio of each mode."""
         heads = (Column("Mode"), Column("Hz", ".4g"), Column("damping", ".3f"), Column(""))
-        made = Table("Modes at rest", heads)
+        table = Table("Modes at rest", heads)
         slow = f"τ = {-1.0 / self.slow.real:.4g} s, " if self.slow.real < 0.0 else ""
         for name, mode, words in (
             ("spool", self.spool, "on its feedback spring"),
@@ -566,8 +567,8 @@ class Modes(Result):
             ("swash plate, held pressure", self.swash_at_held_pressure, "on its spring alone"),
             ("slow pole", self.slow, f"{slow}which one state keeps"),
         ):
-            made.add(name, self.frequency_hz(mode), self.damping_ratio(mode), words)
-        return made
+            table.add(name, self.frequency_hz(mode), self.damping_ratio(mode), words)
+        return table
 
 
 def _upper(pair: NDArray[np.number]) -> complex:
@@ -696,7 +697,10 @@ def compare(full: FullOrderDrive, run: Simulation, *, start: Start = "rest") -> 
 
 def validity(full: FullOrderDrive, rate: float = SOURCE_RATE) -> Table:
     """For which of `TABLE_MANEUVERS` one state is enough, as `validity_table` has it."""
-    runs = ((name, full.drive.simulate(each.sample(rate), rate)) for name, each in TABLE_MANEUVERS)
+    runs = (
+        (name, full.drive.simulate(maneuver.sample(rate), rate))
+        for name, maneuver in TABLE_MANEUVERS
+    )
     return validity_table(full.physical.name, ((name, compare(full, run)) for name, run in runs))
 
 
@@ -730,8 +734,8 @@ def validity_table(axis: str, compared: Iterable[tuple[str, OrderComparison]]) -
 
 def validity_verdict(table: Table) -> str:
     """For which commands of a `validity_table` one state is enough, in a sentence."""
-    found = table.to_polars()
-    moving = found.filter(found["within_1_percent"].is_not_null())
+    comparisons = table.to_polars()
+    moving = comparisons.filter(comparisons["within_1_percent"].is_not_null())
     if not moving.height:
         return "The shaft does not move, so the one-state model cannot be assessed."
     beyond = moving.filter(~moving["within_1_percent"])["maneuver"].to_list()

@@ -45,7 +45,9 @@ from swashplate.parameters import load_preset as load_parameters
 from swashplate.tables import Column, Table
 from swashplate.units import chosen_unit, unit_text
 
-QUANTITIES: Mapping[str, Definition] = {each.symbol: each for each in declared_by(Machine)}
+QUANTITIES: Mapping[str, Definition] = {
+    definition.symbol: definition for definition in declared_by(Machine)
+}
 """Quantities by name, from the spool to the load."""
 IN_PLACE_OF: Mapping[str, str] = {
     "feedback_arm_inertia": "spool_frequency",
@@ -231,7 +233,7 @@ class PhysicalSet(Entries):
 
 
 def quantity_of(name: str) -> Definition:
-    """What a quantity is; a name that none has is refused."""
+    """Definition of a quantity; refuses an unknown name."""
     if name in QUANTITIES:
         return QUANTITIES[name]
     close = get_close_matches(name, QUANTITIES, n=1)
@@ -244,7 +246,7 @@ def quantity_of(name: str) -> Definition:
 
 
 def chosen_quantity(name: str) -> Definition:
-    """What may be chosen by a name: a quantity, or one of `CHOICES`."""
+    """Definition of a name that may be chosen: a quantity's, or one of `CHOICES`."""
     return CHOICES[name] if name in CHOICES else quantity_of(name)
 
 
@@ -282,7 +284,7 @@ def _broken_rules(parameters: Mapping[str, Parameter]) -> Iterator[Broken]:
 def chosen_over(
     assumed: Mapping[str, Parameter], chosen: Mapping[str, Change | Parameter]
 ) -> dict[str, Parameter]:
-    """What a set is completed from: assumed values, and the user's in SI in their place.
+    """Values that complete a set: assumed ones, replaced by the user's in SI.
 
     Names are those of quantities and of `CHOICES`. An inertia or damping also takes the place of
     the frequency or damping ratio that it would otherwise follow from.
@@ -382,10 +384,13 @@ def _completed(
         )
     # of what is known; nothing else may be asked of it
     machine = Machine(*(n.get(name, 0.0) for name in Machine._fields))
-    arm, area, oil = n["swash_arm"], n["piston_area"], "oil_volume and bulk_modulus"
+    arm = n["swash_arm"]
+    area = n["piston_area"]
+    oil = "oil_volume and bulk_modulus"
     supply = Z["Z9"] + _rest(machine)[0]
     _, stiffness = _rest(machine._replace(supply_pressure=supply))
-    spring_rate, spring_moment = area / (Z["Z1"] * arm), Z["Z4"] ** 0.5
+    spring_rate = area / (Z["Z1"] * arm)
+    spring_moment = Z["Z4"] ** 0.5
     gauge = (1.0 + area**2 * stiffness / spring_rate) / (1.0 + Z["Z6"]) / stiffness
     completed: dict[str, tuple[Value, str]] = {
         "spool_arm": (Z["Z5"], "Z5"),
@@ -476,7 +481,7 @@ def _motor_leakage(owner: str, Z: Mapping[str, float], n: Mapping[str, float]) -
 
 
 class PhysicalFile(FileTable):
-    """What a packaged set assumes; the rest follows from the parameter set of its name."""
+    """Assumptions of a packaged set; the rest follows from the parameter set of its name."""
 
     format: Literal[1]
     name: str
@@ -519,20 +524,20 @@ SHOWN = {
 
 
 def choices_table(axis: str, given: Mapping[str, Change]) -> Table:
-    """What a physical set is completed from: assumed values, and given ones, counted."""
+    """Tabulate the values that complete a physical set: assumed ones, and given ones."""
     columns = (Column("Physical value"), Column("", "s"), Column(""), Column(""))
-    made = Table("Physical values not given by the drive's parameters", columns)
+    table = Table("What the drive's parameters do not say", columns)
     entries = chosen_over(_assumed(axis)[1], given)
     for name, entry in entries.items():
         unit, factor = SHOWN.get(entry.unit, (unit_text(entry.unit), 1.0))
         if chosen_unit(entry.unit).factor != 1.0:
             unit, factor = chosen_unit(entry.unit)
         numbers = "/".join(f"{factor * value:.5g}" for value in entry.values)
-        made.add(name, numbers, unit, "given" if entry.status == "user" else "assumed")
+        table.add(name, numbers, unit, "given" if entry.status == "user" else "assumed")
     assumed = sum(entry.status != "user" for entry in entries.values())
     if assumed:
-        made.caption = (
+        table.caption = (
             f"{assumed} of {len(entries)} physical values are assumed, as of the packaged {axis}; "
             "set known ones with --physical"
         )
-    return made
+    return table

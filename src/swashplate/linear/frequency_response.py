@@ -121,7 +121,7 @@ class FrequencyResponse(Tabular):
 
     @property
     def moves(self) -> NDArray[np.bool_]:
-        """Where there is an answer at all, (a, f): a small sine may stay in a dead zone."""
+        """True if there is an answer at all, (a, f): a small sine may stay in a dead zone."""
         return np.asarray(self.ratio != 0.0)
 
     @property
@@ -138,7 +138,8 @@ class FrequencyResponse(Tabular):
 
     def table(self) -> Table:
         """Gain, phase and distortion by amplitude, at up to `SHOWN` of the frequencies."""
-        unit, answer_unit = self.units.get(self.input, ""), self.units.get(self.output, "")
+        unit = self.units.get(self.input, "")
+        answer_unit = self.units.get(self.output, "")
         gain_unit = f"{answer_unit or '1'}/{unit}" if unit else answer_unit
         columns = (
             Column("amplitude", "g", unit),
@@ -147,31 +148,40 @@ class FrequencyResponse(Tabular):
             Column("phase", "z.1f", "rad"),
             Column("distortion", ".1%"),
         )
-        made, size = Table("", columns), self.frequencies.size
+        table = Table("", columns)
+        size = self.frequencies.size
         rows = np.unique(np.linspace(0, size - 1, min(size, SHOWN)).round().astype(int))
         for k, amplitude in enumerate(self.amplitudes.tolist()):
-            for at in rows.tolist():
-                answer: tuple[float | None, ...] = (None, None, None)
-                if self.moves[k, at]:
-                    numbers = (self.gain[k, at], self.phase[k, at], self.distortion[k, at])
-                    answer = tuple(map(float, numbers))
-                frequency, first = float(self.frequencies[at]), at == rows[0]
-                made.add(amplitude, frequency, *answer, section=bool(first and k))
+            for index in rows.tolist():
+                gain = phase = distortion = None
+                if self.moves[k, index]:
+                    gain = float(self.gain[k, index])
+                    phase = float(self.phase[k, index])
+                    distortion = float(self.distortion[k, index])
+                table.add(
+                    amplitude,
+                    float(self.frequencies[index]),
+                    gain,
+                    phase,
+                    distortion,
+                    section=bool(k > 0 and index == rows[0]),
+                )
         if rows.size < size:
-            made.caption = f"{rows.size} of {size} frequencies shown"
-        return made
+            table.caption = f"{rows.size} of {size} frequencies shown"
+        return table
 
     def still(self) -> list[str]:
-        """Where `moves` denies an answer, in words, for each amplitude that has such a place."""
-        unit, sentences = self.units.get(self.input, ""), list[str]()
+        """Name, for each amplitude, the frequencies at which there is no answer; see `moves`."""
+        unit = self.units.get(self.input, "")
+        sentences = list[str]()
         for amplitude, moves in zip(self.amplitudes, self.moves, strict=True):
-            places = np.flatnonzero(~moves)
-            if places.size == 0:
+            still = np.flatnonzero(~moves)
+            if still.size == 0:
                 continue
-            low, high = self.frequencies[places[[0, -1]]]
+            low, high = self.frequencies[still[[0, -1]]]
             where = f"at {low:.3g} Hz" if low == high else f"from {low:.3g} to {high:.3g} Hz"
-            if high > low and places[-1] - places[0] >= places.size:
-                where = f"at {places.size} frequencies {where}"
+            if high > low and still[-1] - still[0] >= still.size:
+                where = f"at {still.size} frequencies {where}"
             size = f"{amplitude:g} {unit}".rstrip()
             sentences.append(f"No motion under {size} {where}")
         return sentences
@@ -269,14 +279,15 @@ def sweep(
         If nothing moves at all, the answer does not come to repeat itself, or the model leaves its
         domain.
     """
-    f, a = checked_frequencies(frequencies, rate), checked_amplitudes(amplitudes)
+    f = checked_frequencies(frequencies, rate)
+    a = checked_amplitudes(amplitudes)
     if not is_real(tolerance) or not 0.0 < tolerance < 1.0:
         raise InputError(f"The tolerance is {tolerance!r}, but must be between 0 and 1.")
     if not is_real(bias) or not np.isfinite(bias):
         raise InputError(f"The bias is {bias}, but must be a finite number.")
     if units is None:
-        known = instance.model.definitions
-        units = {name: known[name].unit for name in (input, output) if name in known}
+        definitions = instance.model.definitions
+        units = {name: definitions[name].unit for name in (input, output) if name in definitions}
 
     ratio = np.zeros((a.size, f.size), dtype=np.complex128)
     distortion, mean = np.zeros((2, a.size, f.size))
@@ -327,8 +338,8 @@ def _cycles(
 ) -> Array:
     """Answer from the steady state under the first sample, a row for each cycle."""
     initial = instance.start({input: float(record[0])}, step, "steady")
-    seen, _ = output_of(instance.model, output)
-    (signal,) = marched(instance, {input: record}, step, initial, (seen,), input)
+    stored, _ = output_of(instance.model, output)
+    (signal,) = marched(instance, {input: record}, step, initial, (stored,), input)
     return np.asarray(signal.reshape(-1, steps))
 
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from swashplate.equations import Instance, check_mapping, floats_of, is_real, state_paths, value_at
 from swashplate.equations.marching import (
@@ -19,6 +20,8 @@ from swashplate.equations.marching import (
 )
 from swashplate.errors import DomainError, InputError
 from swashplate.linear.model import LinearModel
+
+Array = NDArray[np.float64]
 
 
 def linearize(
@@ -74,12 +77,7 @@ def linearize(
             f"{instance!r} is not a model with numbers: give "
             "swashplate.equations.instance_of(model, p)."
         )
-    if rate is not None:
-        check_rate(rate)
-    check_mapping("at", at)
-    for name, value in at.items():
-        if not is_real(value) or not np.isfinite(value):
-            raise InputError(f"{instance.name}: {name} is {value!r}, but must be a finite number.")
+    _check_point(instance, at, rate)
     moving = tuple(at if inputs is None else inputs)
     if not moving:
         raise InputError(
@@ -89,9 +87,10 @@ def linearize(
         if name not in at or name not in instance.model.external:
             raise InputError(
                 f"{instance.name}: '{name}' is not an input at the operating point; there are "
-                f"{', '.join(each for each in instance.model.external if each in at)}."
+                f"{', '.join(signal for signal in instance.model.external if signal in at)}."
             )
-    model, h = instance.model, 0.0 if rate is None else 1.0 / rate
+    model = instance.model
+    h = 0.0 if rate is None else 1.0 / rate
     if rate is None and any(part.taps for part in model.parts):
         raise InputError(
             f"{instance.name}: {model.name} reads past samples of its inputs, so it is not a model "
@@ -109,26 +108,43 @@ def linearize(
             "states=[...], one of each part."
         )
     if states is None:
-        for part in model.parts:
-            if part.settled is None and floats_of(part.state):
-                each_state = ", ".join(f"{kind.__name__}(...)" for kind in kinds)
-                raise InputError(
-                    f"{instance.name}: {part.name} has no equation for its steady state "
-                    "('settled'); give the states of the operating point: "
-                    f"states=[{each_state}]."
-                )
-        # what belongs to the first sample alone has passed
-        known = instance.start(at, h, "steady").arguments
-        states = [
-            called(part, part.step, each) for part, each in zip(model.parts, known, strict=True)
-        ]
+        states = _settled_states(instance, at, h)
     initial = instance.start(at, h, "steady", states)
-    named = tuple(model.outputs) or tuple(model.parts[-1].outputs)
-    named = tuple(each for each in named if each not in model.integrals)
-    requested = tuple(outputs) if outputs is not None else named or model.parts[-1].signal_names
+    usual = tuple(model.outputs) or tuple(model.parts[-1].outputs)
+    usual = tuple(signal for signal in usual if signal not in model.integrals)
+    requested = tuple(outputs) if outputs is not None else usual or model.parts[-1].signal_names
     if not requested:
         raise InputError(f"{instance.name}: a linear model needs an output.")
     return _linear_model(instance, initial, rate, moving, requested)
+
+
+def _check_point(instance: Instance, at: Mapping[str, float], rate: float | None) -> None:
+    """Refuse a rate out of range, and constant signals that are not finite numbers."""
+    if rate is not None:
+        check_rate(rate)
+    check_mapping("at", at)
+    for name, value in at.items():
+        if not is_real(value) or not np.isfinite(value):
+            raise InputError(f"{instance.name}: {name} is {value!r}, but must be a finite number.")
+
+
+def _settled_states(instance: Instance, at: Mapping[str, float], h: float) -> list[Any]:
+    """State of each part that the model settles at, one sample after the start."""
+    model = instance.model
+    for part in model.parts:
+        if part.settled is None and floats_of(part.state):
+            states = ", ".join(f"{part.state.__name__}(...)" for part in model.parts)
+            raise InputError(
+                f"{instance.name}: {part.name} has no equation for its steady state "
+                "('settled'); give the states of the operating point: "
+                f"states=[{states}]."
+            )
+    # what belongs to the first sample alone has passed
+    arguments = instance.start(at, h, "steady").arguments
+    return [
+        called(part, part.step, arguments_of_part)
+        for part, arguments_of_part in zip(model.parts, arguments, strict=True)
+    ]
 
 
 def _are(states: Any, kinds: Sequence[Any]) -> bool:
@@ -137,7 +153,7 @@ def _are(states: Any, kinds: Sequence[Any]) -> bool:
         return False
     if not all(map(isinstance, states, kinds)):
         return False
-    values = [value_at(each, path) for each in states for path in floats_of(type(each))]
+    values = [value_at(state, path) for state in states for path in floats_of(type(state))]
     return all(is_real(value) and np.isfinite(value) for value in values)
 
 
@@ -154,66 +170,47 @@ def _linear_model(
     read, the memory. The delay is in whole samples: those by which all that is read of the first
     input is late.
     """
-    model, signals = instance.model, tuple(initial.before)
+    model = instance.model
     h = 0.0 if rate is None else 1.0 / rate
-    for part, known in zip(model.parts, initial.arguments, strict=True):
-        if part.domain is None:
-            continue
-        margin = called(part, part.domain, known)
-        if not margin > 0.0:
-            raise DomainError(f"{instance.name}: {outside(model, margin, 'operating point')}")
+    _check_domain(instance, initial)
     for name in outputs:
         if name in model.integrals:
             raise InputError(
                 f"{instance.name}: '{name}' is an integral of a signal, which a linear model does "
                 f"not have; use '{model.integrals[name]}'."
             )
-    seen = tuple(output_of(model, name)[0] for name in outputs)
-    arguments, derived = step_derivatives(model, signals, instance.options, seen)
-    delays = instance.tap_delays(signals, h)
     states = state_paths(model)
     n = len(states)
-    values = []
-    for stored in arguments.values():
-        if stored.kind == "fraction":
-            values.append(float(delays.fraction[int(stored.path)]))
-        elif stored.kind == "state":
-            values.append(float(value_at(initial.states[stored.part], stored.path)))
-        else:
-            values.append(instance.number_at(stored, initial.before, h))
-    delay_samples = {
-        (tap.part, tap.input): int(delays.samples[tap.number]) for tap in taps_of(model, signals)
+    samples, slopes = _step_slopes(instance, initial, h, inputs, outputs)
+    of_states = slopes[:n]
+    of_outputs = slopes[n:]
+    column_of = {
+        sample: column for column, sample in enumerate(samples, n) if slopes[:, column].any()
     }
-    moved: list[Any] = []  # of each derivative the state, or the input and its age in samples
-    for i, kind, path in map(arguments.__getitem__, derived.inputs):
-        name, _, sample = path.partition(".")
-        late = delay_samples[i, name] + int(sample) if kind == "tap" else 0
-        signal = model.parts[i].tap(name).signal
-        moved.append(f"{model.prefix(i)}{path}" if kind == "state" else (signal, late))
-    ages = {each for each in moved if isinstance(each, tuple) and each[0] in inputs}
-    columns = sorted(ages, key=lambda each: (inputs.index(each[0]), each[1]))
-    column = {each: k for k, each in enumerate([*states, *columns])}
-    slopes = np.zeros((n + len(outputs), n + len(columns)))
-    results = derived.python(*values)
-    for (row, k), slope in zip(derived.entries, results[len(slopes) :], strict=True):
-        if moved[k] in column:
-            slopes[row, column[moved[k]]] += slope
-    into, out = slopes[:n], slopes[n:]
-    read = [(*each, k) for k, each in enumerate(columns, n) if slopes[:, k].any()]
-    lags = {name: [lag for of, lag, _ in read if of == name] or [0] for name in inputs}
-    first = {name: min(lags[name]) if name == inputs[0] else 0 for name in inputs}
-    past = [(name, lag) for name in inputs for lag in range(first[name] + 1, max(lags[name]) + 1)]
+    ages = {
+        name: [sample.age for sample in column_of if sample.input == name] or [0] for name in inputs
+    }
+    first = {name: min(ages[name]) if name == inputs[0] else 0 for name in inputs}
+    past = [
+        InputSample(name, age)
+        for name in inputs
+        for age in range(first[name] + 1, max(ages[name]) + 1)
+    ]
+    present = [InputSample(name, age) for name, age in first.items()]
     # rows: the model's states, then the past samples; columns: these and the present inputs
     size = n + len(past)
-    at = {each: k for k, each in enumerate((*past, *first.items()), n)}
-    A, C = np.zeros((size, size + len(inputs))), np.zeros((len(out), size + len(inputs)))
-    A[:n, :n], C[:, :n] = into[:, :n], out[:, :n]
-    for name, lag, k in read:
-        A[:n, at[name, lag]], C[:, at[name, lag]] = into[:, k], out[:, k]
-    for name, lag in past:
-        A[at[name, lag], at[name, lag - 1]] = 1.0
-    memory = tuple(f"{name}_{lag}" for name, lag in past)
-    known = model.definitions
+    at = {sample: column for column, sample in enumerate((*past, *present), n)}
+    A = np.zeros((size, size + len(inputs)))
+    C = np.zeros((len(outputs), size + len(inputs)))
+    A[:n, :n] = of_states[:, :n]
+    C[:, :n] = of_outputs[:, :n]
+    for sample, column in column_of.items():
+        A[:n, at[sample]] = of_states[:, column]
+        C[:, at[sample]] = of_outputs[:, column]
+    for sample in past:
+        A[at[sample], at[InputSample(sample.input, sample.age - 1)]] = 1.0
+    memory = tuple(f"{sample.input}_{sample.age}" for sample in past)
+    definitions = model.definitions
     return LinearModel(
         name=instance.name,
         A=A[:, :size],
@@ -226,5 +223,75 @@ def _linear_model(
         delay=first[inputs[0]] * h,
         rate=rate,
         memory=memory,
-        units={name: known[name].unit for name in (*inputs, *outputs) if name in known},
+        units={name: definitions[name].unit for name in (*inputs, *outputs) if name in definitions},
     )
+
+
+def _check_domain(instance: Instance, initial: InitialStates) -> None:
+    """Refuse an operating point outside the domain of one of the model's parts."""
+    for part, arguments in zip(instance.model.parts, initial.arguments, strict=True):
+        if part.domain is None:
+            continue
+        margin = called(part, part.domain, arguments)
+        if not margin > 0.0:
+            sentence = outside(instance.model, margin, "operating point")
+            raise DomainError(f"{instance.name}: {sentence}")
+
+
+class InputSample(NamedTuple):
+    """A sample of an input that a step reads."""
+
+    input: str
+    age: int
+    """Samples by which it is older than the present one."""
+
+
+def _step_slopes(
+    instance: Instance,
+    initial: InitialStates,
+    h: float,
+    inputs: tuple[str, ...],
+    outputs: tuple[str, ...],
+) -> tuple[list[InputSample], Array]:
+    """Derivatives of a step of length h [s] at the states that a march would start with.
+
+    Rows are the model's states after the step, then the outputs; columns the states before it, then
+    the samples of the inputs, in the order that is returned beside them.
+    """
+    model = instance.model
+    signals = tuple(initial.before)
+    stored_outputs = tuple(output_of(model, name)[0] for name in outputs)
+    arguments, derived = step_derivatives(model, signals, instance.options, stored_outputs)
+    delays = instance.tap_delays(signals, h)
+    values = []
+    for stored in arguments.values():
+        if stored.kind == "fraction":
+            values.append(float(delays.fraction[int(stored.path)]))
+        elif stored.kind == "state":
+            values.append(float(value_at(initial.states[stored.part], stored.path)))
+        else:
+            values.append(instance.number_at(stored, initial.before, h))
+    delay_samples = {
+        (tap.part, tap.input): int(delays.samples[tap.number]) for tap in taps_of(model, signals)
+    }
+    varied: list[str | InputSample] = []  # of each derivative the state, or the sample of an input
+    for i, kind, path in map(arguments.__getitem__, derived.inputs):
+        if kind == "state":
+            varied.append(f"{model.prefix(i)}{path}")
+            continue
+        name, _, sample = path.partition(".")
+        age = delay_samples[i, name] + int(sample) if kind == "tap" else 0
+        varied.append(InputSample(model.parts[i].tap(name).signal, age))
+    states = state_paths(model)
+    samples = sorted(
+        {source for source in varied if isinstance(source, InputSample) and source.input in inputs},
+        key=lambda sample: (inputs.index(sample.input), sample.age),
+    )
+    column_of = {source: column for column, source in enumerate([*states, *samples])}
+    slopes = np.zeros((len(states) + len(outputs), len(column_of)))
+    derivatives = derived.python(*values)[len(slopes) :]
+    for (row, index), slope in zip(derived.entries, derivatives, strict=True):
+        column = column_of.get(varied[index])
+        if column is not None:
+            slopes[row, column] += slope
+    return samples, slopes

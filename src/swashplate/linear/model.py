@@ -65,7 +65,8 @@ class LinearModel:
 
     def __repr__(self) -> str:
         time = "continuous" if self.rate is None else f"sampled at {self.rate:g} Hz"
-        kind, inputs = type(self).__name__, ", ".join(self.inputs)
+        kind = type(self).__name__
+        inputs = ", ".join(self.inputs)
         return f"{kind}({self.name!r}, {inputs} to {', '.join(self.outputs)}, {time})"
 
     @property
@@ -75,8 +76,8 @@ class LinearModel:
 
     def poles_of(self, *states: str) -> ComplexArray:
         """Poles of some of the states by themselves, the slowest first."""
-        kept = [k for k, name in enumerate(self.states) if name in states]
-        poles = np.linalg.eigvals(self.A[np.ix_(kept, kept)])
+        rows = [k for k, name in enumerate(self.states) if name in states]
+        poles = np.linalg.eigvals(self.A[np.ix_(rows, rows)])
         slowness = poles.real if self.rate is None else np.abs(poles)
         return np.asarray(poles[np.lexsort((poles.imag, -slowness))], dtype=np.complex128)
 
@@ -86,7 +87,8 @@ class LinearModel:
 
         Of a continuous model in the s-plane [rad/s], of a sampled one in the z-plane [1].
         """
-        return self.poles_of(*(name for name in self.states if name not in self.memory))
+        machine_states = [name for name in self.states if name not in self.memory]
+        return self.poles_of(*machine_states)
 
     @property
     def is_stable(self) -> bool:
@@ -98,7 +100,8 @@ class LinearModel:
     @cached_property
     def _slowest(self) -> float:
         """Frequency far below every motion that dies out if some state integrates, else 0. [Hz]"""
-        rates = np.abs(self.poles - (self.rate is not None))
+        standstill = 0.0 if self.rate is None else 1.0  # the pole of a state that integrates
+        rates = np.abs(self.poles - standstill)
         dying = rates[rates > INTEGRATES * self._scale]
         if dying.size == rates.size:
             return 0.0
@@ -306,8 +309,9 @@ class LinearModel:
 
         matrices = self.A, self.B, self.C, self.D
         if self.rate is not None:
-            late = round(self.delay * self.rate)
-            return StateSpace(*with_delay_line(matrices, late), dt=1.0 / self.rate)
+            delay_samples = round(self.delay * self.rate)
+            A, B, C, D = with_delay_line(matrices, delay_samples)
+            return StateSpace(A, B, C, D, dt=1.0 / self.rate)
         if self.delay != 0.0 and not without_delay:
             raise InputError(
                 f"The model has a delay of {self.delay:g} s, which no state space represents "
@@ -315,10 +319,10 @@ class LinearModel:
                 "python-control's pade for example, or use a sampled model (discrete), which has "
                 "it as states."
             )
-        return StateSpace(*matrices)
+        return StateSpace(self.A, self.B, self.C, self.D)
 
     def content(self) -> dict[str, Any]:
-        """What is written of a model, as plain numbers, strings and lists; SI."""
+        """Content of a model's file, as plain numbers, strings and lists; SI."""
         time = {} if self.rate is None else {"rate": self.rate}
         return {
             "format": 1,

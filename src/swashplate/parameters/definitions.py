@@ -154,7 +154,7 @@ DEFINITIONS = Definitions(
 
 @lru_cache(maxsize=64)
 def definitions_of(kinds: tuple[type, ...]) -> Definitions:
-    """What a drive has whose user-defined equations have parameters of their own.
+    """Definitions of the parameters of a drive whose user-defined equations add some.
 
     Parameters
     ----------

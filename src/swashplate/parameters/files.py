@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from pydantic import Field
 
@@ -26,6 +26,9 @@ from swashplate.parameters.parameter_set import (
 )
 from swashplate.parameters.plausible import check_plausible
 from swashplate.units import to_si
+
+if TYPE_CHECKING:
+    from tomlkit.items import InlineTable
 
 # --- what stands in a file ------------------------------------------------------------------------
 
@@ -190,12 +193,16 @@ def named_set(name: str | Path) -> ParameterSet:
 def read_set(text: str, origin: str) -> ParameterSet:
     """A parameter set from TOML text; `origin` names it in errors."""
     contents = validated(parse_toml(text, origin), SetFile, origin)
-    model, rate = contents.model, contents.model.rate
+    model = contents.model
+    rate = model.rate
     if isinstance(contents.control_card, str):
         card = _packaged_card(contents.control_card, origin)
-        card_name, entries, rate = card.name, card.control_card, rate or card.rate
+        card_name = card.name
+        entries = card.control_card
+        rate = rate or card.rate
     else:
-        card_name, entries = contents.card or f"{contents.name} card", contents.control_card
+        card_name = contents.card or f"{contents.name} card"
+        entries = contents.control_card
     equations = _replacements(model.equations, origin)
     blocks: dict[Block, Mapping[str, ParameterEntry]] = {
         "control_card": entries,
@@ -240,7 +247,8 @@ def _replacements(entries: Sequence[EquationPlaces], origin: str) -> tuple[Repla
     from swashplate.models.drive import drive, pump_drive
 
     replacements = []
-    model, pump_model = drive, pump_drive
+    model = drive
+    pump_model = pump_drive
     for entry in entries:
         try:
             replacement = found_at(entry.model_dump(exclude_none=True))
@@ -291,7 +299,24 @@ def parameter_of(definition: Definition, entry: ParameterEntry) -> Parameter:
 
 def dump_set(parameters: ParameterSet) -> str:
     """A parameter set as TOML text that `read_set` turns back into an equal set."""
-    from tomlkit import comment, document, dumps, inline_table
+    from tomlkit import comment, document, dumps
+
+    blocks: dict[str, dict[str, object]] = {"model": _model_entries(parameters)}
+    for symbol, parameter in parameters.items():
+        blocks.setdefault(parameter.definition.block, {})[symbol] = _parameter_entry(parameter)
+    text = document()
+    text.add(comment("swashplate parameter set; SI units; [plus, minus] as magnitudes"))
+    text.add("format", 1)
+    for name in ("name", "title", "card"):
+        text.add(name, getattr(parameters, name))
+    for block, entries in blocks.items():
+        text.add(block, entries)
+    return dumps(text)
+
+
+def _model_entries(parameters: ParameterSet) -> dict[str, object]:
+    """Entries of a set's table [model]."""
+    from tomlkit import inline_table
 
     options: dict[str, object] = {
         name: getattr(parameters, name) for name in ("pressure_root", "coulomb_sign", "card_switch")
@@ -308,25 +333,22 @@ def dump_set(parameters: ParameterSet) -> str:
         unreached = inline_table()
         unreached.update(parameters.unreached)
         options["unreached"] = unreached
-    blocks: dict[str, dict[str, object]] = {"model": options}
-    for symbol, parameter in parameters.items():
-        entry = inline_table()
-        entry.append(
-            "value",
-            list(parameter.values) if isinstance(parameter.value, Pair) else parameter.value,
-        )
-        entry.append("unit", parameter.unit)
-        if parameter.source:
-            entry.append("source", parameter.source)
-        entry.append("status", parameter.status)
-        if parameter.own_bounds is not None:
-            entry.append("bounds", list(parameter.own_bounds))
-        blocks.setdefault(parameter.definition.block, {})[symbol] = entry
-    text = document()
-    text.add(comment("swashplate parameter set; SI units; [plus, minus] as magnitudes"))
-    text.add("format", 1)
-    for name in ("name", "title", "card"):
-        text.add(name, getattr(parameters, name))
-    for block, entries in blocks.items():
-        text.add(block, entries)
-    return dumps(text)
+    return options
+
+
+def _parameter_entry(parameter: Parameter) -> "InlineTable":
+    """A parameter as an inline table."""
+    from tomlkit import inline_table
+
+    entry = inline_table()
+    entry.append(
+        "value",
+        list(parameter.values) if isinstance(parameter.value, Pair) else parameter.value,
+    )
+    entry.append("unit", parameter.unit)
+    if parameter.source:
+        entry.append("source", parameter.source)
+    entry.append("status", parameter.status)
+    if parameter.own_bounds is not None:
+        entry.append("bounds", list(parameter.own_bounds))
+    return entry

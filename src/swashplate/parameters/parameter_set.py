@@ -73,7 +73,7 @@ class Parameter(Result):
 
     @property
     def name(self) -> str:
-        """What it is, in words."""
+        """Name in words."""
         return self.definition.name
 
     @property
@@ -128,7 +128,9 @@ class Entries(Mapping[str, Parameter]):
 
     def _keep(self, parameters: Mapping[str, Parameter]) -> None:
         """Keep parameters as they are from now on, and all their numbers by column."""
-        numbers = {k: v for parameter in parameters.values() for k, v in parameter.numbers.items()}
+        numbers: dict[str, float] = {}
+        for parameter in parameters.values():
+            numbers |= parameter.numbers
         object.__setattr__(self, "parameters", MappingProxyType(parameters))
         object.__setattr__(self, "numbers", MappingProxyType(numbers))
 
@@ -146,10 +148,10 @@ class Entries(Mapping[str, Parameter]):
 
     def __reduce__(self) -> tuple[object, ...]:
         # read-only views cannot be pickled, so a copy in another process is built anew
-        own: Any = self
-        given = (getattr(self, each.name) for each in fields(own) if each.init)
+        instance: Any = self
+        members = [getattr(self, field.name) for field in fields(instance) if field.init]
         return type(self), tuple(
-            dict(each) if isinstance(each, MappingProxyType) else each for each in given
+            dict(member) if isinstance(member, MappingProxyType) else member for member in members
         )
 
 
@@ -219,7 +221,7 @@ class ParameterSet(Entries):
 
     @property
     def definitions(self) -> Definitions:
-        """What the set can have a value of, by symbol: the package's, then its own equations'."""
+        """Definitions of all parameters by symbol: the package's, then its user's equations'."""
         kinds = (equation.parameters for equation in self.equations)
         return definitions_of(tuple(kind for kind in kinds if kind is not None))
 
@@ -267,7 +269,7 @@ class ParameterSet(Entries):
         return replace(self, parameters=parameters, options=self.options & switches, equations=())
 
     def unreached_sentence(self, drive: str = "this drive") -> str:
-        """What the tests of a drive, as it is called, left open; empty if it is nothing."""
+        """Say what the tests of a drive left open; empty if nothing. `drive` is its name there."""
         if not self.unreached:
             return ""
         return (
@@ -293,15 +295,22 @@ class ParameterSet(Entries):
             members = [
                 parameter for parameter in self.values() if parameter.definition.block == block
             ]
-            for source, group in groupby(members, key=lambda each: each.source):
+            for source, group in groupby(members, key=lambda parameter: parameter.source):
                 if source:
                     table.add("", f"{source}:", None, None, "", section=True)
-                for number, each in enumerate(group):
-                    values = (*each.values, None)[:2]
-                    start = not source and number == 0
-                    cells = (each.symbol, each.name, *values, each.status)
-                    table.add(*cells, unit=each.unit, section=start)
-            tables += [table] if members else []
+                for index, parameter in enumerate(group):
+                    values = parameter.values
+                    table.add(
+                        parameter.symbol,
+                        parameter.name,
+                        values[0],
+                        values[1] if len(values) > 1 else None,
+                        parameter.status,
+                        unit=parameter.unit,
+                        section=not source and index == 0,
+                    )
+            if members:
+                tables.append(table)
         return tables
 
     def replace(self, changes: Mapping[str, Change]) -> Self:
@@ -375,14 +384,16 @@ class ParameterSet(Entries):
         for name, factor in factors.items():
             numbers = self[self.definitions.find(name).symbol].numbers
             columns = self.definitions.columns_of([name])
-            each = factor if isinstance(factor, tuple) else (factor,) * len(columns)
-            if len(each) != len(columns):
+            column_factors = factor if isinstance(factor, tuple) else (factor,) * len(columns)
+            if len(column_factors) != len(columns):
                 takes = "one value, so it takes one factor" if len(columns) == 1 else "two values"
-                raise ParameterError(f"{name} has {takes}, not {len(each)}.")
-            for k, times in zip(columns, each, strict=True):
-                if not is_real(times):
-                    raise ParameterError(f"The factor of {name} must be a number, not {times!r}.")
-                changes[k] = numbers[k] * times
+                raise ParameterError(f"{name} has {takes}, not {len(column_factors)}.")
+            for column, column_factor in zip(columns, column_factors, strict=True):
+                if not is_real(column_factor):
+                    raise ParameterError(
+                        f"The factor of {name} must be a number, not {column_factor!r}."
+                    )
+                changes[column] = numbers[column] * column_factor
         return self.replace(changes)
 
 
@@ -409,7 +420,8 @@ def value_of(
     if name == definition.symbol:
         return Pair(numbers[0], numbers[-1])
     assert old is not None
-    return Pair(*(old.numbers | {name: numbers[0]}).values())
+    plus, minus = (old.numbers | {name: numbers[0]}).values()
+    return Pair(plus, minus)
 
 
 def meant_value(

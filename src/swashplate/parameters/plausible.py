@@ -62,7 +62,8 @@ def check_plausible(column: str, definition: Definition, *values: float) -> None
         return
     low, high = definition.plausible
     for value in values:
-        size, of_wrong_sign = abs(value), value < 0.0 <= definition.lower
+        size = abs(value)
+        of_wrong_sign = value < 0.0 <= definition.lower
         if of_wrong_sign or size in (0.0, inf) or not (size < low or size > high):
             continue
         unit = "" if definition.unit == "1" else f" {definition.unit}"

@@ -172,10 +172,11 @@ def applied(rule: Rule, n: Values) -> Broken:
 
 
 def range_rule(definition: Definition, column: str, values: Array) -> Broken:
-    """Which values lie outside a definition's range, and what is wrong with one of them."""
+    """Mark values outside a definition's range, and say what is wrong with one of them."""
 
     def sentence(i: int) -> str:
-        value, hint = float(values[i]), ""
+        value = float(values[i])
+        hint = ""
         if value < 0.0 and definition.directional and isfinite(value):
             hint = "; minus values are stored as magnitudes"
         return f"{definition.broken(column, value)}{hint}."
@@ -194,10 +195,12 @@ def _static(n: Values, size: int) -> tuple[Array, Array]:
     sides = [[n[f"{name}_{side}"] for name in Channel._fields] for side in SIDES]
     channels = np.moveaxis(np.array(sides), -1, 0)
     pumps = np.column_stack([n[name] for name in Pump._fields])
-    lowest, moment_sines = np.empty((size, 2)), np.empty((size, 2))
+    lowest = np.empty((size, 2))
+    moment_sines = np.empty((size, 2))
     if size == 1 and next(_alone) < FEW:
         # commands that read a few sets and simulate nothing need not wait for machine code
-        pump, volts = Pump(*pumps[0].tolist()), VOLTAGES.tolist()
+        pump = Pump(*pumps[0].tolist())
+        volts = VOLTAGES.tolist()
         for k in range(2):
             channel = Channel(*channels[0, k].tolist())
             lowest[0, k], moment_sines[0, k] = interpreted(_extremes)(channel, pump, k, volts)

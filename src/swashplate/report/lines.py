@@ -104,9 +104,9 @@ def broken(
         breaks = gap_rows(time)
     rows = thinned(time, values, breaks, columns)
     rows_after = np.searchsorted(rows, breaks, side="right")
-    return np.insert(time[rows], rows_after, time[breaks]), np.insert(
-        values[rows], rows_after, np.nan
-    )
+    broken_time = np.insert(time[rows], rows_after, time[breaks])
+    broken_values = np.insert(values[rows], rows_after, np.nan)
+    return broken_time, broken_values
 
 
 def draw(
@@ -115,7 +115,7 @@ def draw(
     values: Array,
     color: ColorType,
     *,
-    held: bool = False,
+    zero_order: bool = False,
     dashes: Dashes = "solid",
     width: float = LINE,
     zorder: float = 2.0,
@@ -124,17 +124,26 @@ def draw(
 ) -> None:
     """Draw a signal over stamps [s]: no line across a gap, a dot where a sample is alone.
 
-    A long signal is drawn by its extremes in so many columns (`thinned`). If it is held, each
-    sample stays up to the next.
+    A long signal is drawn by its extremes in so many columns (`thinned`). With
+    `zero_order` each sample stays up to the next.
     """
     breaks = gap_rows(time)
     if values.size > LONG:
         width *= 0.6
-    style: Literal["default", "steps-post"] = "steps-post" if held else "default"
+    style: Literal["default", "steps-post"] = "steps-post" if zero_order else "default"
     keywords: dict[str, Any] = {"color": color, "zorder": zorder}
     joints: dict[str, Any] = {"solid_capstyle": "butt", "solid_joinstyle": "round"}
-    points = broken(time, values, breaks, columns)
-    ax.plot(*points, ls=dashes, lw=width, drawstyle=style, label=label, **joints, **keywords)
+    drawn_time, drawn_values = broken(time, values, breaks, columns)
+    ax.plot(
+        drawn_time,
+        drawn_values,
+        ls=dashes,
+        lw=width,
+        drawstyle=style,
+        label=label,
+        **joints,
+        **keywords,
+    )
     # with a break, or nothing, on both sides no line would show it
     apart = np.ones(time.size + 1, dtype=np.bool_)
     apart[1:-1] = False
@@ -151,7 +160,7 @@ MOST_SPANS = 1000
 
 
 class Shade(NamedTuple):
-    """How stretches of time of one meaning look, and what the legend calls them."""
+    """Look of stretches of time of one meaning, and their words in the legend."""
 
     color: str
     name: str
@@ -201,7 +210,8 @@ def shade(ax: Axes, spans: Array, look: Shade) -> None:
     from matplotlib.collections import PolyCollection
 
     begin, end = merged_spans(spans).T
-    x, y = np.stack((begin, end, end, begin), axis=1), np.array([0.0, 0.0, 1.0, 1.0])
+    x = np.stack((begin, end, end, begin), axis=1)
+    y = np.array([0.0, 0.0, 1.0, 1.0])
     ax.add_collection(
         PolyCollection(
             list(np.stack(np.broadcast_arrays(x, y), axis=2)),

@@ -48,7 +48,7 @@ Dashes = Literal["solid", "dashed", "dotted"]
 
 
 class Stroke(NamedTuple):
-    """How the lines of one drive look."""
+    """Look of the lines of one drive."""
 
     color: str
     dashes: Dashes
@@ -94,11 +94,10 @@ def sheet(
     inside = sum(heights) + GAP * (len(heights) - 1)
     figure = new_figure(WIDTH, HEAD + ROW * rows + inside + FOOT)
     ratios = {"height_ratios": heights}
-    size = len(heights), columns
-    grid = figure.subplots(*size, sharex=True, squeeze=False, gridspec_kw=ratios)
+    grid = figure.subplots(len(heights), columns, sharex=True, squeeze=False, gridspec_kw=ratios)
     axes = list(grid.T.ravel())
-    for ax, label in zip(axes, [*labels, *[""] * len(axes)], strict=False):
-        dress(ax, label)
+    for index, ax in enumerate(axes):
+        dress(ax, labels[index] if index < len(labels) else "")
     if below:
         label_below(axes[-1], below)
     write_title(figure, title)
@@ -269,7 +268,7 @@ def zero_line(ax: Axes, *, upright: bool = False) -> None:
 def write_words(
     ax: Axes,
     words: str,
-    place: tuple[float, float],
+    position: tuple[float, float],
     shift: tuple[float, float] = (4.0, 3.0),
     *,
     coords: Any = "axes fraction",
@@ -278,10 +277,10 @@ def write_words(
     va: str = "baseline",
     **how: Any,
 ) -> None:
-    """Write small words at a place, shifted by some points."""
+    """Write small words at a position, shifted by some points."""
     ax.annotate(
         words,
-        place,
+        position,
         xycoords=coords,
         xytext=shift,
         textcoords="offset points",
@@ -293,9 +292,9 @@ def write_words(
     )
 
 
-def signed(value: float, decimals: int) -> str:
+def signed(number: float, decimals: int) -> str:
     """A number with its sign, a true minus, and no sign at zero."""
-    text = f"{value:+.{decimals}f}"
+    text = f"{number:+.{decimals}f}"
     return text[1:] if float(text) == 0.0 else text.replace("-", "−")
 
 

@@ -90,7 +90,7 @@ class Inverse(NamedTuple):
 
 
 class Fixed(NamedTuple):
-    """What stays as it is during a run."""
+    """Quantities that stay constant during a run."""
 
     geometry: Geometry
     home: Home
@@ -131,7 +131,7 @@ class LoopArrays(NamedTuple):
 
 
 class State(NamedTuple):
-    """What one sample passes to the next, delayed signals and the drives' states apart."""
+    """State from one sample to the next, without delayed signals and the drives' states."""
 
     sample: int
     axes: Array
@@ -145,7 +145,7 @@ class State(NamedTuple):
 
 
 class Seen(NamedTuple):
-    """What control sees of crane and ship."""
+    """Measurements of crane and ship that reach the control."""
 
     swing_x: float
     swing_y: float
@@ -179,7 +179,7 @@ def measurement_at(sample: float, rate: float) -> int:
 def measured(
     true: Seen, sample: int, first: int, sensing: Sensing, readings: Array, noise: Array
 ) -> Seen:
-    """What control gets from its sensors at a sample; `noise` begins at measurement `first`."""
+    """Pass true values through the sensors at a sample; `noise` begins at measurement `first`."""
     last = len(readings) - 1  # lengths are powers of two
     number = measurement_at(sample, sensing.rate)
     if sample == 0 or number > measurement_at(sample - 1, sensing.rate):
@@ -239,7 +239,7 @@ def shaped(
 def operator_path(
     reference: Array, axes: Array, memory: Array, sample: int, half: float, h: float, fixed: Fixed
 ) -> tuple[float, float]:
-    """Where the operator's speeds alone would have brought the tip in the ship's frame, shaped. [m]
+    """Position of the tip by the operator's speeds alone, shaped, in the ship's frame. [m]
 
     `half` is half a period of the load. [samples]
     """
@@ -265,7 +265,7 @@ def tip_offset(
     half: float,
     settings: Settings,
 ) -> tuple[float, float]:
-    """What delayed feedback and ship compensation add to the path, in the ship's frame. [m]"""
+    """Offset of the path by delayed feedback and ship compensation, in the ship's frame. [m]"""
     last = memory.shape[1] - 1
     memory[SWING, sample & last] = seen.swing_x
     memory[SWING + 1, sample & last] = seen.swing_y
@@ -578,9 +578,12 @@ def loop_of(
                     volts[i] = stick[m, i]
                     if actuation != DIRECT:
                         volts[i] = voltage_for(reference[i], inverses[i], actuation)
-                a.inputs[0], b.inputs[0], c.inputs[0] = volts[0], volts[1], volts[2]
+                a.inputs[0] = volts[0]
+                b.inputs[0] = volts[1]
+                c.inputs[0] = volts[2]
                 if loaded:
-                    a.inputs[1], b.inputs[1] = axes[TORQUE, 0], axes[TORQUE, 1]
+                    a.inputs[1] = axes[TORQUE, 0]
+                    b.inputs[1] = axes[TORQUE, 1]
                     c.inputs[1] = axes[TORQUE, 2]
                 margins[0] = min(margins[0], hoist(a))
                 margins[1] = min(margins[1], slew_drive(b))

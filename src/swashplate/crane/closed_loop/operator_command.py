@@ -284,7 +284,7 @@ class OperatorCommand(Result):
 
 
 def _angle_to(axis: str, target: float, crane: Crane, home: Home, luff_angle: float) -> float:
-    """What the shaft of an axis turns from home to a target of `TARGETS`. [rad]"""
+    """Angle of an axis's shaft from home to a target of `TARGETS`. [rad]"""
     g = crane.geometry
     if axis == "hoist":
         return (home.rope - target + g.coupling * g.luff * luff_angle) / g.hoist

@@ -139,7 +139,7 @@ class CraneRun(Tabular):
 
     @property
     def actuation(self) -> str:
-        """What turned reference speeds into speeds, as of `RunOptions`."""
+        """Actuation that turned reference speeds into speeds, as of `RunOptions`."""
         return ACTUATIONS[self.fixed.actuation]
 
     @cached_property
@@ -318,7 +318,7 @@ class CraneRun(Tabular):
         return simulation
 
     def tables(self) -> list[Table]:
-        """What the run amounts to, and what limits its drives."""
+        """Tabulate the summary of the run and the limits that acted on its drives."""
         return run_tables({self.actuation: self})
 
     def sentences(self) -> tuple[str, ...]:

@@ -53,7 +53,7 @@ would swing against each other from sample to sample."""
 
 
 class RunOptions(TypedDict, total=False):
-    """How a run is set up: keywords of `simulate` and `CraneStepper`, each optional.
+    """Options of a run: keywords of `simulate` and `CraneStepper`, each optional.
 
     Parameters
     ----------
@@ -168,7 +168,8 @@ class CraneStepper:
             weight = fixed.mass * GRAVITY
             axes[loop.TORQUE] = shaft_torques(Vector(0.0, 0.0, -weight), home.slew, boom, weight, g)
         rope = float(rope_length(Shafts(0.0, 0.0, 0.0), g, home))
-        hung = hanging_load(tip, *fixed.start.offset, rope, fixed.hanging)
+        offset_x, offset_y = fixed.start.offset
+        hung = hanging_load(tip, offset_x, offset_y, rope, fixed.hanging)
         self._state = State(0, axes, tip, hung, 0.0, 0.0)
         longest = 2.0 * pi * sqrt(fixed.ropes[1] / GRAVITY) * RATE + 4.0
         memory = np.zeros((4, 1 << int(longest).bit_length()))
@@ -249,7 +250,7 @@ class CraneStepper:
         return self.signals(self._advanced(self.fixed, commands, ship, out)).table()
 
     def run(self, commands: Array, ship: Array) -> Array:
-        """What the loop stores of a whole run, by `Fixed.columns`.
+        """March a complete run and return its stored signals, by `Fixed.columns`.
 
         As `take`; the stepper cannot be used after it.
         """
@@ -301,10 +302,11 @@ class CraneStepper:
         return self._noise.standard_normal((due - taken, loop.NOISY))
 
     def _stopped(self, ended: int) -> Exception:
-        """What has stopped the loop, as the error to raise."""
+        """The error to raise for the reason why the loop has stopped."""
         crane = self._crane
         time = self._state.sample / RATE
-        shafts = Shafts(*self._state.axes[loop.ANGLE])
+        hoist, slew, luff = self._state.axes[loop.ANGLE]
+        shafts = Shafts(hoist, slew, luff)
         rope = float(rope_length(shafts, self.fixed.geometry, self.fixed.home))
         if ended == loop.TOO_FAST:
             return InputError(too_fast_sentence(rope, time, RATE))
@@ -339,7 +341,7 @@ def _fixed(
     wind: tuple[float, float] = (0.0, 0.0),
     brake: bool = True,
 ) -> Fixed:
-    """What stays as it is during a run, of `RunOptions`; refuses one that cannot be."""
+    """Check the options of a run, `RunOptions`, and make its constants of them."""
     if actuation not in ACTUATIONS:
         raise InputError(f"actuation is '{actuation}'; it is {', '.join(ACTUATIONS[:-1])}.")
     load = crane.safe_load if load is None else load
@@ -365,9 +367,11 @@ def _fixed(
     if max(map(abs, wind)) > STRONGEST:
         raise InputError(f"wind is {wind!r}, but must be within {STRONGEST:g} m/s on each axis.")
     offset = _pair("load_offset", load_offset, "two lengths, forward and to port, in m")
-    if not hypot(*offset) < FARTHEST * rope_m:
+    offset_x, offset_y = offset
+    distance = hypot(offset_x, offset_y)
+    if not distance < FARTHEST * rope_m:
         raise InputError(
-            f"load_offset is {hypot(*offset):.4g} m long, but must be shorter than {FARTHEST:g} of "
+            f"load_offset is {distance:.4g} m long, but must be shorter than {FARTHEST:g} of "
             f"the rope of {rope_m:g} m."
         )
     velocity = _pair("load_velocity", load_velocity, "two speeds, forward and to port, in m/s")

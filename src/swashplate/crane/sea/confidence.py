@@ -53,7 +53,8 @@ def rms_of(values: Array) -> ConfidenceInterval:
     of Student's for the mean of the squares.
     """
     squares = mean_of(values**2, 0.0)
-    return ConfidenceInterval(*np.sqrt(np.array(squares)).tolist())
+    rms, low, high = np.sqrt(np.array(squares)).tolist()
+    return ConfidenceInterval(rms, low, high)
 
 
 def share_of(hits: int, of: int, unknown: int = 0) -> ConfidenceInterval:
@@ -83,7 +84,7 @@ def counted_words(share: ConfidenceInterval, seaways: int) -> str:
 
 
 def more_seaways(share: float, seaways: int, allowed: float) -> str:
-    """How many seaways, more than there were, tell a share from the one allowed, if it stays."""
+    """Larger number of seaways that distinguishes a share from the allowed one, if it stays."""
     for number in ENOUGH:
         interval = share_of(round(share * number), number)
         if number > seaways and not interval.low <= allowed <= interval.high:

@@ -90,8 +90,9 @@ class Spectrum:
                 raise InputError(
                     f"The {name} of a sea is {value:g}, but must be above 0 and at most {most:g}."
                 )
-        if self.share(*BAND) < LEAST_ENERGY:
-            low, high = (2.0 * np.pi / omega for omega in BAND[::-1])
+        lowest, highest = BAND
+        if self.share(lowest, highest) < LEAST_ENERGY:
+            low, high = 2.0 * np.pi / highest, 2.0 * np.pi / lowest
             raise InputError(
                 f"A sea with a peak at {self.period:g} s has little energy between waves of "
                 f"{low:.3g} and {high:.3g} s, which are simulated: use a period between."
@@ -267,12 +268,14 @@ class Seaway(Result):
         """Share of the simulated energy beyond the frequencies of the ship's file."""
         if not isinstance(self.ship, TransferFunctions):
             return 0.0
-        low, high = np.clip(self.ship.frequencies[[0, -1]], *BAND).tolist()
-        return 1.0 - self.spectrum.share(low, high) / self.spectrum.share(*BAND)
+        lowest, highest = BAND
+        low, high = np.clip(self.ship.frequencies[[0, -1]], lowest, highest).tolist()
+        return 1.0 - self.spectrum.share(low, high) / self.spectrum.share(lowest, highest)
 
     def sentences(self) -> tuple[str, ...]:
-        """What of the sea is not simulated as it is given, if that is more than a little."""
-        outside = 1.0 - self.spectrum.share(*BAND)
+        """Say which parts of the sea are not simulated as given, if they are more than a little."""
+        lowest, highest = BAND
+        outside = 1.0 - self.spectrum.share(lowest, highest)
         lost = self._lost
         sentences = []
         if outside > OUTSIDE:

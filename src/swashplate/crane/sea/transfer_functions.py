@@ -332,7 +332,7 @@ def _from_rows(rows: Iterable[Amplitude]) -> Amplitudes:
 
 
 def _expected(name: str) -> str:
-    """What a number of a file must be, in words."""
+    """Describe the numbers that a column of a file may have."""
     kind = KINDS.get(name, name)
     if kind not in RANGES:
         return "a number"
@@ -341,7 +341,7 @@ def _expected(name: str) -> str:
 
 
 def _is_plausible(name: str, value: float) -> bool:
-    """Whether a number of a file is what `_expected` says."""
+    """Whether a number of a file is in the range that `_expected` describes."""
     kind = KINDS.get(name, name)
     low, high = RANGES.get(kind, (-inf, inf))
     return isfinite(value) and low <= value <= high and (kind not in WHOLE or value.is_integer())

@@ -130,7 +130,7 @@ def _questions(crane: Crane, questions: Sequence[Question] | None) -> tuple[Ques
 
 
 def seaways_needed(seaways: int, allowed: float) -> str:
-    """What a number of seaways can decide, in a sentence to print before they are run."""
+    """Say what a number of seaways can decide: a sentence to print before they are run."""
     _check_allowed(allowed)
     needed = fewest_seaways(allowed)
     if seaways >= needed:

@@ -246,14 +246,11 @@ class Assessment(Tabular, Drawn):
         return " ".join(filter(None, [words, self.unusable_sentence()]))
 
     def unusable_sentence(self) -> str:
-        """Which fits are not usable that the assessed variant rests on; empty if there is none."""
+        """Name unusable fits behind the assessed variant; empty if there are none."""
         case = self.study.cases[self.assessed_variant]
-        unusable = {
-            axis
-            for crane in case.cranes
-            for axis, source in crane.sources.items()
-            if not source.usable
-        }
+        unusable = set[str]()
+        for crane in case.cranes:
+            unusable.update(axis for axis, source in crane.sources.items() if not source.usable)
         if not unusable:
             return ""
         axes = listed([axis for axis in AXES if axis in unusable])
@@ -265,7 +262,7 @@ class Assessment(Tabular, Drawn):
         return " ".join(filter(None, sentences))
 
     def harm_sentence(self) -> str:
-        """Whether the assessed variant harms, and by how much it changes the swing."""
+        """Say whether the assessed variant harms, and by how much it changes the swing."""
         share = self.share_worse(self.assessed_variant)
         seaways = len(self.study.seeds)
         without = np.degrees(rms_of(self.swing(NONE)).value)
@@ -297,7 +294,7 @@ class Assessment(Tabular, Drawn):
         )
 
     def sufficiency_sentence(self) -> str:
-        """Whether the assessed variant stays within all limits; empty if the crane has none."""
+        """Say whether the assessed variant is within all limits; empty if the crane has none."""
         if self.sufficient is None:
             return ""
         limited = self.limited(self.assessed_variant)
@@ -314,7 +311,7 @@ class Assessment(Tabular, Drawn):
         )
 
     def remedy_sentences(self) -> list[str]:
-        """What would do, or that nothing that was tried would; none if nothing was."""
+        """Name sufficient remedies, or say that none of those tried is; empty if none was tried."""
         if self.tried and not self.remedies:
             return [f"None of these is sufficient: {listed(self.tried)}."]
         sentences = [self._remedy_sentence(remedy) for remedy in self.remedies]
@@ -366,20 +363,19 @@ class Assessment(Tabular, Drawn):
 
     def tables(self) -> list[Table]:
         """Swing, how often it is worse, what has a limit, differences, drives' limits, remedies."""
+        driven = [name for name in self.names[1:] if self.study.cases[name].driven]
         acting = [
             (name, axis, [self.acting(name, axis, limit) for limit in PUMPS])
-            for name in self.names[1:]
-            if self.study.cases[name].driven
+            for name in driven
             for axis in AXES
         ]
-        tables = [
-            self._swing_table(),
-            self._worse_table(),
-            *([self._limit_table()] if self.study.crane.limits else []),
-            self._difference_table(),
-            limit_table(acting),
-        ]
-        return [*tables, self._remedy_table()] if self.remedies else tables
+        tables = [self._swing_table(), self._worse_table()]
+        if self.study.crane.limits:
+            tables.append(self._limit_table())
+        tables += [self._difference_table(), limit_table(acting)]
+        if self.remedies:
+            tables.append(self._remedy_table())
+        return tables
 
     def _swing_table(self) -> Table:
         seaways = len(self.study.seeds)
@@ -396,9 +392,12 @@ class Assessment(Tabular, Drawn):
             "in 3 h: most probable largest swing. Runs that left the model are not in the RMS",
         )
         for name in self.names:
+            rms = rms_of(self.swing(name))
             table.add(
                 name,
-                *rms_of(self.swing(name)),
+                rms.value,
+                rms.low,
+                rms.high,
                 largest_of(self.of(name), "swing").value,
                 sum(self.departures(name).values()),
                 look=name != NONE and self.share_worse(name).value > self.allowed_share_worse,
@@ -416,11 +415,18 @@ class Assessment(Tabular, Drawn):
         for name in self.names[1:]:
             share_worse = self.share_worse(name)
             look = share_worse.value > self.allowed_share_worse
-            table.add(name, round(share_worse.value * seaways), *share_worse, look=look)
+            table.add(
+                name,
+                round(share_worse.value * seaways),
+                share_worse.value,
+                share_worse.low,
+                share_worse.high,
+                look=look,
+            )
         return table
 
     def _limit_table(self) -> Table:
-        """What has a limit, of the assessed variant."""
+        """Tabulate the limited quantities of the assessed variant."""
         heads = ("limit", "in 3 h", "from", "to")
         numbers = [Column(head, ".3g", none="–") for head in heads]
         last = (Column("within"), Column(NONE, ".3g", none="–"))
@@ -498,7 +504,7 @@ class Assessment(Tabular, Drawn):
         return (*sentences, *study.provenance())
 
     def _basis(self) -> list[str]:
-        """What the answers rest on, in sentences."""
+        """State the basis of the answers, in sentences."""
         study = self.study
         crane = study.crane
         none = study.cases[NONE]
@@ -563,7 +569,7 @@ def share_worse_of(
 
 
 def _is_worse(run: RunOutcome, uncontrolled: RunOutcome) -> bool:
-    """Whether a run with control is worse than that without, of which one at least was whole."""
+    """Whether a run with control is worse than one without; one of them at least was complete."""
     if run.departure_reason or uncontrolled.departure_reason:
         return bool(run.departure_reason)
     return run.rms_swing > uncontrolled.rms_swing

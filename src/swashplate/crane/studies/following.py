@@ -27,7 +27,7 @@ SLOWEST = 3600.0
 
 
 class Demand(NamedTuple):
-    """What a sea asks of the tip of a boom that shall stand still over the sea."""
+    """Demand of a sea on the tip of a boom that shall stand still over the sea."""
 
     period: float
     """Mean time between crossings of zero of the motion along the boom. [s]"""

@@ -116,9 +116,11 @@ class Operability(Tabular):
 
     def tables(self) -> list[Table]:
         """Share of the year that each variant can work, and what limits the rest."""
-        limits = dict.fromkeys(
-            limit for name in self.names for limit in self.shares(name) if limit != WORKABLE
-        )
+        limits = list[str]()
+        for name in self.names:
+            for limit in self.shares(name):
+                if limit != WORKABLE and limit not in limits:
+                    limits.append(limit)
         heads = [Column(label_of(limit), ".1%", wrap=True) for limit in limits]
         columns = (Column("variant", wrap=True), Column("workable", ".1%"), *heads)
         table = Table("Share of the year, and what limits the rest first", columns)
@@ -129,7 +131,7 @@ class Operability(Tabular):
         return [table]
 
     def to_polars(self) -> polars.DataFrame:
-        """What limits each cell: a row for each variant, sea and heading, SI."""
+        """Limits of all cells: a row for each variant, sea and heading, SI."""
         import polars as pl
 
         rows = [
@@ -150,7 +152,7 @@ class Operability(Tabular):
         return pl.DataFrame(rows)
 
     def sentences(self) -> tuple[str, ...]:
-        """What the shares rest on."""
+        """State the basis of the shares."""
         simulated = sum(cell.simulated for cells in self.cells.values() for cell in cells.values())
         every = sum(map(len, self.cells.values()))
         headings = listed([f"{heading:g}" for heading in self.headings])
@@ -172,7 +174,7 @@ class Operability(Tabular):
 
 
 def label_of(limit: str) -> str:
-    """What limits a cell, as a table has it."""
+    """Label of the quantity that limits a cell, as a table shows it."""
     return LIMITED[limit].label if limit in LIMITED else limit
 
 

@@ -27,7 +27,7 @@ SATURATED = (1 << PUMPS.index(Limit.ORIFICE)) | (1 << PUMPS.index(Limit.SWASH_ST
 
 
 class RunOutcome(NamedTuple):
-    """What counts of one run, in SI."""
+    """Outcome of one run, in SI."""
 
     rms_swing: float
     """NaN if the run left the model or was stopped."""
@@ -59,7 +59,7 @@ STOPPED = RunOutcome(
 
 
 def outcome_of(run: CraneRun, start: float, target: tuple[float, float] | None) -> RunOutcome:
-    """What counts of a run from a time [s] on.
+    """Summarise a run from a time [s] on.
 
     Parameters
     ----------
@@ -100,10 +100,10 @@ def outcome_of(run: CraneRun, start: float, target: tuple[float, float] | None) 
     if target is not None:
         away = load[:, :2] - np.array(target)
         peaks["placement"] = peaks_of(np.hypot(away[:, 0], away[:, 1]))
-    whole = departure is None
+    completed = departure is None
     return RunOutcome(
-        rms_swing=float(np.sqrt(np.mean(swing**2))) if whole else np.nan,
-        largest_swing=float(swing.max()) if whole else np.nan,
+        rms_swing=float(np.sqrt(np.mean(swing**2))) if completed else np.nan,
+        largest_swing=float(swing.max()) if completed else np.nan,
         limits=_acting(run, slice(first, last)),
         saturation=_saturated(run, slice(first, last)),
         peaks=peaks,

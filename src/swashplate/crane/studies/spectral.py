@@ -59,7 +59,7 @@ class LinearValue(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class LinearResponse(Result):
-    """What a sea does to a crane whose drives follow instantaneously, and what it asks of them."""
+    """Response to a sea of a crane whose drives follow instantaneously, and the demand on them."""
 
     values: Mapping[str, LinearValue]
     """By names of `limits.LIMITED`, saturation apart, and of `DEMANDS`."""
@@ -114,7 +114,7 @@ def linear_response(
     suspension: Suspension | None = None,
     duration: float = THREE_HOURS,
 ) -> LinearResponse:
-    """What a sea does to a crane at rest, by transfer functions and spectrum.
+    """Compute the response of a crane at rest to a sea, by transfer functions and spectrum.
 
     Parameters
     ----------

@@ -71,12 +71,12 @@ class Case(NamedTuple):
 
     @property
     def pose(self) -> dict[str, Any]:
-        """Where it begins: keywords of `Crane.home`."""
+        """Pose at the start: keywords of `Crane.home`."""
         return {name: self._options[name] for name in ("slew_deg", "boom_deg", "rope_m")}
 
     @property
     def hangs(self) -> dict[str, Any]:
-        """What hangs on it, as far as it is given: keywords of `linear_response`."""
+        """Load and suspension, as far as they are given: keywords of `linear_response`."""
         names = ("swing_damping", "load", "suspension")
         return {name: self._options[name] for name in names if name in self._options}
 
@@ -110,14 +110,16 @@ class Case(NamedTuple):
             self.cranes[0], seaway, damping=self.swing_damping, **self.pose
         )
         largest = LARGEST_START * self.options["rope_m"] * sin(radians(FARTHEST_SWING))
-        share = min(largest / max(float(np.hypot(*offset)), 1e-9), 1.0)
+        offset_x, offset_y = offset
+        velocity_x, velocity_y = velocity
+        share = min(largest / max(float(np.hypot(offset_x, offset_y)), 1e-9), 1.0)
         return {
-            "load_offset": (share * offset[0], share * offset[1]),
-            "load_velocity": (share * velocity[0], share * velocity[1]),
+            "load_offset": (share * offset_x, share * offset_y),
+            "load_velocity": (share * velocity_x, share * velocity_y),
         }
 
     def words(self) -> str:
-        """Where the crane stands, what hangs on it and what controls it, in a sentence."""
+        """Describe pose, load and control of the crane in a sentence."""
         crane = self.cranes[0]
         pose = self.pose
         control = self.options["control"]
@@ -137,7 +139,7 @@ class Case(NamedTuple):
         return f"Control by {control.words()}: {stands}{clip}."
 
     def target(self, seaway: Seaway) -> tuple[float, float] | None:
-        """Where the load shall be, horizontal and inertial [m]; None if the operator moves it."""
+        """Target of the load, horizontal and inertial [m]; None if the operator moves it."""
         if self.stick.samples is not None or self.stick.parts:
             return None
         crane = self.cranes[0]
@@ -298,7 +300,7 @@ class Study(Result):
 
 
 def assumed_words(crane: Crane) -> list[str]:
-    """What is assumed of a crane and its limits, and whether its drives feel the load."""
+    """List assumptions about a crane and its limits, and whether its drives feel the load."""
     sentences = []
     if crane.assumed:
         sentences.append(f"{crane.assumed} of the crane are assumed.")
@@ -313,7 +315,7 @@ def assumed_words(crane: Crane) -> list[str]:
 
 
 def clip_size(clip: Clip, crane: Crane, pose: Mapping[str, Any]) -> float:
-    """What control may add to the tip along the boom, at most. [m]"""
+    """Largest offset of the tip along the boom that control may add. [m]"""
     if clip.size != "auto":
         return float(clip.size)
     period = 2.0 * pi * sqrt(pose["rope_m"] / GRAVITY)

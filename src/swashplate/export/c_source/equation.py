@@ -7,8 +7,9 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
-from swashplate.equations import Flag, parsed
+from swashplate.equations import parsed
 from swashplate.equations.code_generation import (
+    Flag,
     Loops,
     Trace,
     Tuple,

@@ -559,8 +559,8 @@ def check_rank(where: str, problem: Problem) -> list[Finding]:
     if exact and not problem.evaluate(problem.start).jacobian.any():
         names = ", ".join(unknowns.names[:NAMED])
         sentence = (
-            f"{where}: no run depends on any of {names}; free what the runs exercise, or add a test "
-            "that exercises these."
+            f"{where}: no run depends on any of {names}; free what the runs exercise, or add a "
+            "test that exercises these."
         )
         return [refusal(None, None, sentence)]
     return []

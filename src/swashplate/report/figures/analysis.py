@@ -134,11 +134,15 @@ def plot_envelope(
     """
     colors = [handle(name, color) for color, name in ENVELOPE_LOOKS]
     curves = (*envelope.accelerating, envelope.released)
-    drawn = {by for curve in curves for by in curve.by}
+    drawn = set[str]()
+    for curve in curves:
+        drawn.update(curve.by)
     dashes = [handle(WORDS[by], INK, d, LINE) for by, d in DASHES.items() if by in drawn]
     words = f"{envelope.name}: acceleration that each speed allows" if title is None else title
-    speed, acceleration = display_unit("rad/s"), display_unit("rad/s^2")
-    up, across = acceleration.label("acceleration"), speed.label("speed")
+    speed = display_unit("rad/s")
+    acceleration = display_unit("rad/s^2")
+    up = acceleration.label("acceleration")
+    across = speed.label("speed")
     if ax is None:
         figure, (panel,) = sheet([3.8], words, [up], across, legend=[*colors, *dashes])
         _draw_envelope(panel, envelope)
@@ -152,7 +156,8 @@ def plot_envelope(
 
 
 def _draw_envelope(ax: Axes, envelope: Envelope) -> None:
-    speed, acceleration = display_unit("rad/s"), display_unit("rad/s^2")
+    speed = display_unit("rad/s")
+    acceleration = display_unit("rad/s^2")
     zero_line(ax, upright=True)
     low, high = (speed.factor * limits.top_speed for limits in (envelope.minus, envelope.plus))
     span = (high - low) or 1.0
@@ -160,7 +165,8 @@ def _draw_envelope(ax: Axes, envelope: Envelope) -> None:
     most = []
     curves = zip((*envelope.accelerating, envelope.released), ENVELOPE_LOOKS, strict=True)
     for (curve, (color, _)), sign in zip(curves, (1.0, -1.0, 0.0), strict=True):
-        across, up = speed.factor * curve.speed, acceleration.factor * curve.acceleration
+        across = speed.factor * curve.speed
+        up = acceleration.factor * curve.acceleration
         if sign:  # of the full commands only what speeds up their own way counts
             up = sign * np.maximum(sign * up, 0.0)
             ax.fill_between(across, up, color=color, alpha=0.08, linewidth=0.0)
@@ -169,24 +175,30 @@ def _draw_envelope(ax: Axes, envelope: Envelope) -> None:
         width, above = (LINE, 2.0) if sign else (3.0, 1.7)
         turns = [0, *(n for n in range(1, len(curve.by)) if curve.by[n] != curve.by[n - 1])]
         for start, stop in zip(turns, [*turns[1:], len(curve.by)], strict=True):
-            part, by = slice(start, stop + 1), curve.by[start]  # up to the first of the next
+            part = slice(start, stop + 1)  # up to the first of the next
+            by = curve.by[start]
             ax.plot(across[part], up[part], color=color, ls=DASHES[by], lw=width, zorder=above)
     height = 1.3 * max(most[:2]) or 1.0
     ax.set_ylim(-height, height)
     for limits, color in ((envelope.plus, BLUE), (envelope.minus, VERMILION)):
-        _mark_way(ax, limits, color, height)
+        _mark_direction(ax, limits, color, height)
 
 
-def _mark_way(ax: Axes, limits: DirectionLimits, color: str, height: float) -> None:
-    """The speed that a way ends at, and the acceleration that it begins with."""
-    units = display_unit("rad/s"), display_unit("rad/s^2")
-    speed, acceleration = units[0].factor * limits.top_speed, units[1].factor * limits.acceleration
-    up, stopped = limits.acceleration > 0.0, limits.top_speed == limits.speed_limit
+def _mark_direction(ax: Axes, limits: DirectionLimits, color: str, height: float) -> None:
+    """Mark the top speed of a direction, and its acceleration at rest."""
+    speed_unit = display_unit("rad/s")
+    acceleration_unit = display_unit("rad/s^2")
+    speed = speed_unit.factor * limits.top_speed
+    acceleration = acceleration_unit.factor * limits.acceleration
+    up = limits.acceleration > 0.0
+    stopped = limits.top_speed == limits.speed_limit
     ax.axvline(speed, color=color, linewidth=1.0, linestyle="solid" if stopped else "dotted")
-    what = "swash stop" if stopped else f"at {'+' if up else '−'}{FULL_VOLTAGE:g} V"
+    cause = f"at {'+' if up else '−'}{FULL_VOLTAGE:g} V"
+    if stopped:
+        cause = "swash stop"
     write_words(
         ax,
-        f"{what}\n{signed(speed, 3 if abs(speed) < 10.0 else 1)} {units[0].name}",
+        f"{cause}\n{signed(speed, 3 if abs(speed) < 10.0 else 1)} {speed_unit.name}",
         (speed, -0.96 * height if up else 0.96 * height),
         (-4.0 if up else 4.0, 0.0),
         coords="data",
@@ -198,7 +210,7 @@ def _mark_way(ax: Axes, limits: DirectionLimits, color: str, height: float) -> N
     number = signed(acceleration, 2 if abs(acceleration) < 10.0 else 1)
     write_words(
         ax,
-        f"{limits.accelerated_by}, at rest\n{number} {units[1].name}",
+        f"{limits.accelerated_by}, at rest\n{number} {acceleration_unit.name}",
         (0.0, acceleration),
         (5.0, 6.0) if up else (-5.0, -6.0),  # away from where the line falls
         coords="data",
@@ -231,7 +243,8 @@ def plot_limit_timeline(
     InputError
         If the reference speed has another length than the run.
     """
-    acting, unit = [limit for limit in Limit if run.held_back(limit).any()], display_unit("rad/s")
+    acting = [limit for limit in Limit if run.held_back(limit).any()]
+    unit = display_unit("rad/s")
     requested = None if reference is None else np.asarray(reference, dtype=np.float64)
     if requested is not None and requested.shape != run.time.shape:
         raise InputError(
@@ -310,12 +323,13 @@ def plot_whatif(
     looks = {AS_IS: Stroke(BLUE, "solid")}
     looks |= {name: Stroke(color, "dashed") for name, color in zip(alone, colors, strict=False)}
     looks[CHANGED] = Stroke(VERMILION, "solid")
-    legend = [handle(name, *look) for name, look in looks.items()]
+    legend = [handle(name, look.color, look.dashes) for name, look in looks.items()]
     legend.append(handle("reference", GREY, "dotted"))
     moved = ", ".join(f"{name} x {factor:g}" for name, factor in result.factors.items())
     words = f"{result.before.drive.name}: {moved}" if title is None else title
     heights = [1.2, 2.8, 1.8, 1.3] if bands else [1.2, 2.8, 1.8]
-    speed, acceleration = display_unit("rad/s"), display_unit("rad/s^2")
+    speed = display_unit("rad/s")
+    acceleration = display_unit("rad/s^2")
     labels = ["voltage (V)", speed.label("shaft speed"), acceleration.label("acceleration")]
     labels.append(speed.label("about the median"))
     figure, axes = sheet(heights, words, labels, "time (s)", legend=legend)
@@ -343,7 +357,8 @@ def plot_whatif(
 
 def _speed_limits(ax: Axes, result: WhatIf, looks: Mapping[str, Stroke]) -> None:
     """Speed limits of the two drives, as far as the command's direction goes."""
-    voltage, factor = result.trial.voltage, display_unit("rad/s").factor
+    voltage = result.trial.voltage
+    factor = display_unit("rad/s").factor
     for name in (AS_IS, CHANGED):
         up, down = result.variants[name].speed_limits
         for limit, used in ((up, (voltage > 0.0).any()), (down, (voltage < 0.0).any())):
@@ -353,7 +368,8 @@ def _speed_limits(ax: Axes, result: WhatIf, looks: Mapping[str, Stroke]) -> None
 
 def shade_band(ax: Axes, band: Bands, color: ColorType, *, about: Array | float = 0.0) -> None:
     """Shade a band of speeds; a long one by every so many samples."""
-    step, factor = max(-(-band.time.size // (2 * COLUMNS)), 1), display_unit("rad/s").factor
+    step = max(-(-band.time.size // (2 * COLUMNS)), 1)
+    factor = display_unit("rad/s").factor
     lower, upper = (factor * (edge - about)[::step] for edge in (band.lower, band.upper))
     ax.fill_between(
         band.time[::step], lower, upper, color=color, alpha=0.25, linewidth=0.0, zorder=1.6
@@ -514,7 +530,7 @@ def plot_compensation(
         if improvement is not None:
             raise InputError("The runs of an improvement need a separate figure: leave out ax.")
         axes = given_axes(ax, min(max(np.size(np.asarray(ax, dtype=object)), 1), 2), "panels")
-        _draw_map(inverse, *axes)
+        _draw_map(inverse, axes[0], axes[1] if len(axes) > 1 else None)
         legend_within(axes[0], legend)
         if title:
             axes[0].set_title(title, loc="left", fontsize=NORMAL, color=INK)
@@ -541,14 +557,17 @@ def plot_compensation(
 
 
 def _draw_map(inverse: InverseMap, full_range: Axes, close_up: Axes | None = None) -> None:
-    unit, (low, high) = display_unit("rad/s"), inverse.limits
+    unit = display_unit("rad/s")
+    low, high = inverse.limits
     narrow = max(CLOSE_UP * min(-low, high), 2.0 * max(map(abs, inverse.gap)))
     panels = [(full_range, (low, high))]
     if close_up is not None:
         panels.append((close_up, (max(low, -narrow), min(high, narrow))))
-    for ax, ends in panels:
-        speed = np.union1d(np.linspace(*ends, POINTS), np.clip(inverse.gap, *ends))
-        straight, across = proportional_command(inverse, speed), unit.factor * speed
+    for ax, (first, last) in panels:
+        even = np.linspace(first, last, POINTS)
+        speed = np.union1d(even, np.clip(inverse.gap, first, last))
+        straight = proportional_command(inverse, speed)
+        across = unit.factor * speed
         ax.plot(across, straight, color=GREY, linestyle="dashed", linewidth=1.0)
         ax.plot(across, inverse.voltage(speed), color=INK, linewidth=LINE)
         dress(ax, "", unit.label("reference speed"))
@@ -560,7 +579,7 @@ def _draw_map(inverse: InverseMap, full_range: Axes, close_up: Axes | None = Non
         (low, high), volts, ("left", "right"), (-10.0, 10.0), strict=True
     ):
         point = (unit.factor * end, height)
-        full_range.plot(*([edge] for edge in point), "o", color=INK, markersize=4.5)
+        full_range.plot([point[0]], [point[1]], "o", color=INK, markersize=4.5)
         words = f"{point[0]:.4g} {unit.name}, {height:.3g} V".replace("-", "−")
         write_words(full_range, words, point, (0.0, shift), coords="data", ha=side, va="center")
     if close_up is None:
@@ -580,7 +599,8 @@ def _draw_map(inverse: InverseMap, full_range: Axes, close_up: Axes | None = Non
 
 
 def _draw_improvement(speed: Axes, error: Axes, improvement: Improvement) -> None:
-    unit, runs = display_unit("rad/s"), list(improvement.runs.values())
+    unit = display_unit("rad/s")
+    runs = list(improvement.runs.values())
     time = runs[0].time
     dress(speed, unit.label("speed"))
     dress(error, unit.label("error"), "time (s)")

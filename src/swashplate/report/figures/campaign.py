@@ -76,7 +76,7 @@ _ROLES = {"fit": "for the fit", "validate": "for validation"}
 
 
 class PanelColumn(NamedTuple):
-    """What a column of panels shows: a channel by name and unit; the input has no name."""
+    """Channel of a column of panels, by name and unit; the input has no name."""
 
     key: tuple[str, str]
     words: str
@@ -99,7 +99,7 @@ def _signals(experiment: Experiment) -> dict[tuple[str, str], InputSignal | Chan
 
 
 def _scale_rows(used: Mask) -> Mask:
-    """Which samples set the scale of a panel: those that are used, or all if none is."""
+    """Mark the samples that set the scale of a panel: those used, or all if none is."""
     return used if used.any() else np.ones_like(used)
 
 
@@ -110,16 +110,17 @@ def _counted(signal: InputSignal | Channel) -> Array:
 
 
 def _column(key: tuple[str, str], signals: Sequence[InputSignal | Channel]) -> PanelColumn:
+    """Column of the signals of one name and unit of all runs, with their common scale."""
     # what is ignored may leave the panel: one spike would flatten all runs
     shown = [_counted(signal) for signal in signals]
-    low, high = (
-        min(float(experiment.min()) for experiment in shown),
-        max(float(experiment.max()) for experiment in shown),
-    )
-    kind, unit = signals[0].kind, display_unit(key[1], max(abs(low), abs(high)))
+    low = min(float(samples.min()) for samples in shown)
+    high = max(float(samples.max()) for samples in shown)
+    kind = signals[0].kind
+    _, si = key
+    unit = display_unit(si, max(abs(low), abs(high)))
     free = kind in ("position", "encoder_counts")
     if free:
-        high = 0.5 * max(float(np.ptp(experiment)) for experiment in shown)
+        high = 0.5 * max(float(np.ptp(samples)) for samples in shown)
         low = -high
     words = {"encoder_counts": "encoder's angle", "other": signals[0].source.column}
     label = unit.label(words.get(kind, kind.replace("_", " ")))
@@ -177,12 +178,16 @@ def plot_campaign(experiments: Iterable[Experiment], *, title: str | None = None
             words = f"{title or 'Measured tests'}: {axis}"
             if len(pages) > 1:
                 words += f", page {number} of {len(pages)}"
-            figures.append(_page(page, columns, words))
+            figures.append(_page_figure(page, columns, words))
     return figures
 
 
-def _page(experiments: Sequence[Experiment], columns: Sequence[PanelColumn], title: str) -> Figure:
-    rows, across = len(experiments), len(columns)
+def _page_figure(
+    experiments: Sequence[Experiment], columns: Sequence[PanelColumn], title: str
+) -> Figure:
+    """Figure of a page: a row for each run, its signals side by side."""
+    rows = len(experiments)
+    across = len(columns)
     width = max(WIDTH, across * (NARROWEST + BETWEEN))
     room = width / across - 1.3 * BETWEEN
     figure = new_figure(width, HEAD + 2.0 * ROW + rows * (PANEL + ABOVE) + FOOT)
@@ -199,31 +204,47 @@ def _page(experiments: Sequence[Experiment], columns: Sequence[PanelColumn], tit
             ax.xaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
             ax.yaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))
             if column.key in signals:
-                _fill(ax, column, signals[column.key], experiment)
+                _draw_signal(ax, column, signals[column.key], experiment)
             else:
                 ax.set_yticks([])
                 write_words(ax, "not measured", (0.5, 0.5), (0.0, 0.0), ha="center", va="center")
             # room for the heading, and in the first row for the columns' names
-            heads = (column.key[0] or "input", 0.085), (column.words, 0.066)
-            cut = [shorten(head, room / letter) for head, letter in heads]
-            words, pad = ("\n".join(cut), 20.0) if number == 0 else (" ", 6.0)
+            words = " "
+            pad = 6.0
+            if number == 0:
+                name = shorten(column.key[0] or "input", room / 0.085)
+                words = f"{name}\n{shorten(column.words, room / 0.066)}"
+                pad = 20.0
             ax.set_title(words, loc="left", fontsize=SMALL, color=INK, pad=pad)
         _heading(row[0], experiment)
     for ax in grid[-1]:
         label_below(ax, "time (s)")
-    why = "; ".join(dict.fromkeys(why for e in experiments for _, _, why in e.ignored if why))
+    write_title(figure, title)
+    _put_page_legend(figure, grid, experiments)
+    return figure
+
+
+def _put_page_legend(figure: Figure, grid: Any, experiments: Sequence[Experiment]) -> None:
+    """Explain below a page the marks that are drawn in one of its panels."""
+    reasons = list[str]()
+    for experiment in experiments:
+        for _, _, reason in experiment.ignored:
+            if reason and reason not in reasons:
+                reasons.append(reason)
+    why = "; ".join(reasons)
     handles: dict[str, Patch | Line2D] = {
         "ignored": shade_handle(IGNORED, f"ignored: {why}" if 0 < len(why) <= 60 else ""),
         "weight": Patch(facecolor=WEIGHTED, label="weight, relative to the largest"),
         "clipped": Patch(facecolor=ORANGE, label="at the end of the instrument's range"),
         GAP_MARK["label"]: Line2D([], [], **GAP_MARK),
     }
-    labels = {a.get_label() for ax in grid.flat for a in (*ax.collections, *ax.lines, *ax.patches)}
-    write_title(figure, title)
+    labels = set()
+    for ax in grid.flat:
+        for artist in (*ax.collections, *ax.lines, *ax.patches):
+            labels.add(artist.get_label())
     if shown := [handle for key, handle in handles.items() if key in labels]:
         style = {"frameon": False, "fontsize": SMALL, "ncols": 2}
         figure.legend(handles=shown, loc="outside lower left", **style)
-    return figure
 
 
 def shorten(words: str, letters: float) -> str:
@@ -231,19 +252,21 @@ def shorten(words: str, letters: float) -> str:
     return words if len(words) <= letters else f"{words[: int(letters) - 1]}…"
 
 
-def _fill(
+def _draw_signal(
     ax: Axes, column: PanelColumn, signal: InputSignal | Channel, experiment: Experiment
 ) -> None:
-    """A signal, with marks where it is ignored, weighted, clipped or missing."""
-    time, factor = signal.time, column.unit.factor
-    values, counted = factor * signal.values, factor * _counted(signal)
+    """Draw a signal, with marks where it is ignored, weighted, clipped or missing."""
+    time = signal.time
+    factor = column.unit.factor
+    values = factor * signal.values
+    counted = factor * _counted(signal)
     zero_line(ax)
     middle = 0.5 * float(counted.min() + counted.max()) if column.free else 0.0
     margin = _ROOM * (column.high - column.low) or 1.0
     ax.set_ylim(middle + column.low - margin, middle + column.high + margin)
     # the input has no weights, and a channel nothing that is held between its samples
     weight = getattr(signal, "weight", None)
-    is_held = getattr(signal, "interpolation", "") == "previous"
+    is_zero_order = getattr(signal, "interpolation", "") == "previous"
     if weight is None:
         windows = np.array(sorted(window[:2] for window in experiment.ignored)).reshape(-1, 2)
         inside = np.clip(windows, time[0], time[-1])
@@ -270,7 +293,7 @@ def _fill(
                 ax.hlines(level, first, last, zorder=1.9, capstyle="projecting", **bar)
     mark_gaps(ax, time)
     color = INK if weight is None else BLUE
-    draw(ax, time, values, color, held=is_held, width=THIN, columns=COARSE)
+    draw(ax, time, values, color, zero_order=is_zero_order, width=THIN, columns=COARSE)
 
 
 def _heading(ax: Axes, experiment: Experiment) -> None:
@@ -415,7 +438,9 @@ def plot_channel(
         If the window holds fewer than two samples.
     """
     rows = rows_within(channel.time, window, str(channel.source))
-    time, values, used = channel.time[rows], channel.values[rows], channel.used[rows]
+    time = channel.time[rows]
+    values = channel.values[rows]
+    used = channel.used[rows]
     legend = [handle("measured", INK if channel.is_position else BLUE, width=THIN)]
     if simulated is not None:
         legend.append(handle("simulated", VERMILION))
@@ -430,19 +455,22 @@ def plot_channel(
         late = 1e3 * speeds[1][0].delay
         legend.append(handle("speed: difference of neighbours", ROUGH))
         legend.append(handle(f"speed: 10 and 30 Hz filters, {late:.1f} ms late", BLUE))
-        below, si = "speed", f"{channel.unit}/s"
+        below = "speed"
+        si = f"{channel.unit}/s"
     elif simulated is not None:
         lower.append((time, values - simulated[rows], INK, THIN))
-        below, si = "measured less simulated", channel.unit
+        below = "measured less simulated"
+        si = channel.unit
     unit = display_unit(channel.shown_unit, float(np.abs(values).max()))
     labels = [unit.label(channel.kind.replace("_", " ").replace("encoder counts", "angle"))]
     if lower:
         scale = lower[-1][1] if channel.is_position else lower[-1][1][_scale_rows(used)]
         small = display_unit(si, float(np.abs(scale).max()))
         labels.append(small.label(below))
-    heights, words = [2.4, 2.2] if lower else [3.2], channel.name if title is None else title
+    heights = [2.4, 2.2] if lower else [3.2]
+    words = channel.name if title is None else title
     figure, axes = sheet(heights, words, labels, "time (s)", legend=legend)
-    style: dict[str, Any] = {"held": channel.is_position, "width": THIN, "zorder": 2.5}
+    style: dict[str, Any] = {"zero_order": channel.is_position, "width": THIN, "zorder": 2.5}
     counted = values[_scale_rows(used)]
     room = 0.12 * float(np.ptp(counted)) or 1.0 / unit.factor
     axes[0].set_ylim(unit.factor * (counted.min() - room), unit.factor * (counted.max() + room))
@@ -504,7 +532,8 @@ def plot_prediction(
     signals = with_speeds((quality,))
     channel = quality.experiment[quality.channel]
     rows = rows_within(channel.time, window, str(channel.source))
-    time, used = channel.time[rows], channel.used[rows]
+    time = channel.time[rows]
+    used = channel.used[rows]
     counted = _scale_rows(used)
     panels = [_overlay(signal, rows) for signal in signals]
     judged = signals[-1]
@@ -520,8 +549,8 @@ def plot_prediction(
     figure, axes = sheet(heights, words, labels, "time (s)", legend=legend)
     for ax, panel, unit in zip(axes, panels, units, strict=True):
         shown = [unit.factor * values[counted] for values, _ in panel.curves]
-        low = min(float(experiment.min()) for experiment in shown)
-        high = max(float(experiment.max()) for experiment in shown)
+        low = min(float(curve.min()) for curve in shown)
+        high = max(float(curve.max()) for curve in shown)
         room = 0.1 * (high - low) or 1.0
         ax.set_ylim(low - room, high + room)
         zero_line(ax)
@@ -541,7 +570,7 @@ class Overlay(NamedTuple):
 
 
 def _overlay(quality: RunQuality, rows: slice) -> Overlay:
-    """What was measured of a channel, and what is simulated on top of it."""
+    """Measured curve of a channel, and the simulated one on top of it."""
     channel = quality.experiment[quality.channel]
     words = channel.kind.replace("_", " ").replace("encoder counts", "angle")
     curves = [(channel.values[rows], BLUE), (quality.simulated[rows], VERMILION)]

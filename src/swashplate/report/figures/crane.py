@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from textwrap import wrap
-from typing import Any, overload
+from typing import Any, NamedTuple, overload
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -35,7 +35,7 @@ LETTERS = 118
 
 
 def assumed(crane: Crane) -> str:
-    """How much of a crane's geometry is assumed, as a remark."""
+    """Remark on the assumed part of a crane's geometry."""
     return f"{crane.assumed} of the crane are assumed" if crane.assumed else ""
 
 
@@ -68,8 +68,8 @@ def seaway_words(sea: Seaway, height: bool = True) -> str:
     return ", ".join(words)
 
 
-def remarks(*texts: str) -> str:
-    """Remarks joined, in lines that fit above a panel."""
+def remarks(texts: Sequence[str]) -> str:
+    """Join remarks, of which some may be empty, in lines that fit above a panel."""
     return "\n".join(wrap("; ".join(filter(None, texts)), LETTERS))
 
 
@@ -86,13 +86,13 @@ def _panels(
     below: str,
     title: str,
     looks: Mapping[str, style.Stroke],
-    *texts: str,
+    texts: Sequence[str],
 ) -> tuple[Figure, list[Axes]]:
-    """Panels with a legend of lines, if there are several, and a remark."""
+    """Make panels with a legend of lines, if there are several, and remarks above them."""
     legend = []
     if len(looks) > 1:
-        legend = [style.handle(name, *look) for name, look in looks.items()]
-    words = remarks(*texts)
+        legend = [style.handle(name, look.color, look.dashes) for name, look in looks.items()]
+    words = remarks(texts)
     lines = 1 + words.count("\n")
     figure, axes = style.sheet(heights, title, labels, below, legend=legend, lines=lines)
     remark(axes[0], words, style.legend_rows(legend) if legend else 0)
@@ -130,43 +130,73 @@ def plot_crane(
     first = next(iter(named.values()))
     looks = style.strokes(named)
     driven = {name: run for name, run in named.items() if run.actuation != "ideal"}
-    shown = [("swing_deg", "swing (deg)", 2.1, named)]
-    for signal, label, height in (("slew_deg", "slew (deg)", 1.5), ("boom_deg", "boom (deg)", 1.2)):
-        if any(np.ptp(getattr(run, signal)) > MOVED for run in named.values()):
-            shown.append((signal, label, height, named))
-    if sea:
-        shown.append(("swing_deg", "in sea (deg)", 1.5, dict(sea)))
-    heights = [height for _, _, height, _ in shown]
-    labels = [label for _, label, _, _ in shown]
+    panels = _signal_panels(named, sea or {})
+    heights = [panel.height for panel in panels]
+    labels = [panel.label for panel in panels]
     if driven:
         heights.append(0.17 * 2 * len(driven) + 0.25)
         labels.append("limits")
-    back = "grey line: the stick is back at zero" if first.stick_end > 0.0 else ""
+    stick_moves = first.stick_end > 0.0
+    stick_remark = "grey line: the stick is back at zero" if stick_moves else ""
     figure, axes = _panels(
         heights,
         labels,
         "time (s)",
         title or first.crane.title,
         looks,
-        back,
-        assumed(first.crane),
+        texts=(stick_remark, assumed(first.crane)),
     )
-    for ax, (signal, _, _, lines) in zip(axes, shown, strict=False):
-        for name, run in lines.items():
-            draw(ax, run.time, getattr(run, signal), looks[name].color, dashes=looks[name].dashes)
-        if signal == "swing_deg":
-            ax.set_ylim(bottom=0.0)
+    for ax, panel in zip(axes, panels, strict=False):
+        _draw_signal(ax, panel, looks)
     if driven:
-        _acting(axes[-1], driven, looks)
+        _draw_limits(axes[-1], driven, looks)
     for ax in axes:
         fit_time(ax, first.time)
-        if first.stick_end > 0.0:
+        if stick_moves:
             ax.axvline(first.stick_end, color=style.FAINT, linewidth=0.8, zorder=1.0)
     return figure
 
 
-def _acting(ax: Axes, runs: Mapping[str, CraneRun], looks: Mapping[str, style.Stroke]) -> None:
-    """Bars while limits of slew and luff act, a row for each run and axis."""
+class SignalPanel(NamedTuple):
+    """A panel of one signal of several runs."""
+
+    signal: str
+    """Name of the signal of a `CraneRun`."""
+    label: str
+    height: float
+    """[inch]"""
+    runs: Mapping[str, CraneRun]
+
+
+def _signal_panels(
+    runs: Mapping[str, CraneRun], runs_at_sea: Mapping[str, CraneRun]
+) -> list[SignalPanel]:
+    """Panels of swing, slew and boom if one of them moves, and swing at sea if it was simulated."""
+    panels = [SignalPanel("swing_deg", "swing (deg)", 2.1, runs)]
+    slew = SignalPanel("slew_deg", "slew (deg)", 1.5, runs)
+    boom = SignalPanel("boom_deg", "boom (deg)", 1.2, runs)
+    panels += [panel for panel in (slew, boom) if _moves(panel)]
+    if runs_at_sea:
+        panels.append(SignalPanel("swing_deg", "in sea (deg)", 1.5, dict(runs_at_sea)))
+    return panels
+
+
+def _moves(panel: SignalPanel) -> bool:
+    """Whether the angle of a panel moves in any of its runs, so far that it is worth a panel."""
+    return any(np.ptp(getattr(run, panel.signal)) > MOVED for run in panel.runs.values())
+
+
+def _draw_signal(ax: Axes, panel: SignalPanel, looks: Mapping[str, style.Stroke]) -> None:
+    """Draw the signal of a panel, a line for each run."""
+    for name, run in panel.runs.items():
+        look = looks[name]
+        draw(ax, run.time, getattr(run, panel.signal), look.color, dashes=look.dashes)
+    if panel.signal == "swing_deg":
+        ax.set_ylim(bottom=0.0)
+
+
+def _draw_limits(ax: Axes, runs: Mapping[str, CraneRun], looks: Mapping[str, style.Stroke]) -> None:
+    """Draw bars while limits of slew and luff act, a row for each run and axis."""
     rows = [(name, axis) for name in runs for axis in ("slew", "luff")]
     ax.set_ylim(len(rows) - 0.4, -0.6)
     for row, (name, axis) in enumerate(rows):
@@ -223,31 +253,33 @@ def plot_sweep(result: Sweep, *, title: str | None = None) -> Figure:
         assumed(result.crane),
     )
     if result.over == "bearing":
-        return _polar(result, title or usual, looks, *texts)
+        return _polar(result, title or usual, looks, texts)
     labels = ("swing, RMS (deg)",)
-    figure, (ax,) = _panels([3.0], labels, below, title or usual, looks, *texts)
-    values = np.degrees(result.values)
+    figure, (ax,) = _panels([3.0], labels, below, title or usual, looks, texts)
+    swings = np.degrees(result.values)
     points = result.points
     highest = LEAST
     for variant, (color, dashes) in enumerate(looks.values()):
-        of_variant = values[:, :, variant].T
+        of_variant = swings[:, :, variant].T
         estimates = np.array([rms_of(seaways) for seaways in of_variant])
-        gone = np.isnan(of_variant).any(axis=1)
-        estimates[gone] = np.nan  # a mean of those that stayed would be too small
+        left_model = np.isnan(of_variant).any(axis=1)
+        estimates[left_model] = np.nan  # a mean of those that stayed would be too small
         middle, low, high = np.maximum(estimates, LEAST).T
         ax.fill_between(points, low, high, color=color, alpha=0.12, linewidth=0.0)
         ax.plot(points, middle, color=color, linestyle=dashes, linewidth=1.4, marker="o", ms=3.0)
         # crosses of several variants at a point stand below one another
-        height = np.full(int(gone.sum()), 0.97 - 0.05 * variant)
+        height = np.full(int(left_model.sum()), 0.97 - 0.05 * variant)
         across = ax.get_xaxis_transform()
-        ax.plot(points[gone], height, "x", color=color, ms=5.0, transform=across, clip_on=False)
+        ax.plot(
+            points[left_model], height, "x", color=color, ms=5.0, transform=across, clip_on=False
+        )
         highest = max(highest, float(np.nanmax(np.append(middle, LEAST))))
     ax.plot(points, np.degrees(result.spectrum), color=style.GREY, linewidth=0.8, zorder=1.5)
     if result.over == "height":
         ax.set_ylim(0.0, 1.25 * highest)
         ax.set_xlim(0.0, 1.02 * float(points.max()))
     else:
-        finite = values[np.isfinite(values)]
+        finite = swings[np.isfinite(swings)]
         low = max(LEAST, 0.5 * float(finite.min(initial=highest)))
         _logarithmic(ax, low, 2.0 * highest)
         ax.axvline(1.0, color=style.FAINT, linewidth=0.8, zorder=1.0)
@@ -264,11 +296,13 @@ def _side_of(bearings: Array) -> tuple[str, float]:
     return "", 0.0
 
 
-def _polar(result: Sweep, title: str, looks: dict[str, style.Stroke], *texts: str) -> Figure:
+def _polar(
+    result: Sweep, title: str, looks: dict[str, style.Stroke], texts: Sequence[str]
+) -> Figure:
     """Swing over the bearing around the ship, or over the half of it that the bearings are on."""
-    legend = [style.handle(name, *look) for name, look in looks.items()]
+    legend = [style.handle(name, look.color, look.dashes) for name, look in looks.items()]
     rows = style.legend_rows(legend)
-    words = remarks(*texts)
+    words = remarks(texts)
     above = style.HEAD + style.ROW * (rows + 1 + words.count("\n"))
     side, first = _side_of(result.points)
     tall = 0.5 * ACROSS if side else ACROSS
@@ -280,13 +314,56 @@ def _polar(result: Sweep, title: str, looks: dict[str, style.Stroke], *texts: st
     bottom = AROUND + 0.5 * (tall - ACROSS)
     square = left / style.WIDTH, bottom / height, ACROSS / style.WIDTH, ACROSS / height
     ax: Any = figure.add_axes(square, projection="polar")
-    ax.set_theta_offset(first + np.pi if side else 0.5 * np.pi)  # half a circle lies flat
-    ax.set_theta_direction(-1)
     if side:
-        ax.set_thetamin(np.degrees(first))
-        ax.set_thetamax(np.degrees(first) + 180.0)
-        ax.spines["start"].set_color(style.FAINT)
-        ax.spines["end"].set_color(style.FAINT)
+        _dress_half_circle(ax, first)
+    else:
+        _dress_circle(ax)
+    _draw_polar(ax, result, looks)
+    head = figure.add_axes((0.012, 1.0 - (above + 0.02) / height, 0.9, 0.001))
+    head.set_axis_off()
+    style.put_legend(head, legend)
+    remark(head, words, rows)
+    return figure
+
+
+BEARINGS = {0: "bow", 90: "starboard", 180: "stern", 270: "port"}
+"""Names of bearings, clockwise from the bow. [deg]"""
+
+
+def _dress_circle(ax: Any) -> None:
+    """Turn polar axes so that the bow is at the top, and name the bearings around them."""
+    angles = range(0, 360, 30)
+    ax.set_theta_offset(0.5 * np.pi)
+    _dress_bearings(ax, angles)
+    for angle, text in zip(angles, ax.get_xticklabels(), strict=True):
+        alignment = "left" if angle < 180 else "right"
+        text.set_horizontalalignment("center" if angle % 180 == 0 else alignment)
+
+
+def _dress_half_circle(ax: Any, first: float) -> None:
+    """Show half a circle from a bearing [rad] on, which lies flat, and name its bearings."""
+    first_deg = np.degrees(first)
+    ax.set_theta_offset(first + np.pi)
+    ax.set_thetamin(first_deg)
+    ax.set_thetamax(first_deg + 180.0)
+    ax.spines["start"].set_color(style.FAINT)
+    ax.spines["end"].set_color(style.FAINT)
+    _dress_bearings(ax, range(round(first_deg), round(first_deg) + 181, 30))
+
+
+def _dress_bearings(ax: Any, angles: range) -> None:
+    """Dress polar axes, with names of bearings [deg], clockwise."""
+    ax.set_theta_direction(-1)
+    labels = [BEARINGS.get(angle % 360, f"{angle}°") for angle in angles]
+    ax.set_xticks(np.radians(angles), labels)
+    ax.tick_params(labelsize=style.SMALL, labelcolor=style.INK)
+    ax.tick_params(axis="x", pad=8.0)
+    ax.grid(True, color=style.GRID, linewidth=0.6)
+    ax.spines["polar"].set_color(style.FAINT)
+
+
+def _draw_polar(ax: Any, result: Sweep, looks: Mapping[str, style.Stroke]) -> None:
+    """Draw the swing of each variant over the bearing, on a logarithmic radius."""
     mean = np.degrees(result.rms())
     largest = float(np.nanmax(np.append(mean, RADII[1])))
     # closed if the bearings go all the way around, not if they are part of a circle
@@ -295,35 +372,18 @@ def _polar(result: Sweep, title: str, looks: dict[str, style.Stroke], *texts: st
     again = again[gap <= 1.5 * np.diff(result.points).max(initial=0.0)]
     around = np.append(result.points, again)
     edge = float(np.log10(1.3 * largest / CENTRE))
-    for values, (color, dashes) in zip(mean.T, looks.values(), strict=True):
-        radius = np.log10(np.maximum(np.append(values, values[: again.size]), CENTRE) / CENTRE)
+    for swing, (color, dashes) in zip(mean.T, looks.values(), strict=True):
+        radius = np.log10(np.maximum(np.append(swing, swing[: again.size]), CENTRE) / CENTRE)
         ax.plot(around, radius, color=color, linestyle=dashes, linewidth=1.4, marker="o", ms=2.5)
-        gone = result.points[np.isnan(values)]
-        ax.plot(gone, np.full(gone.size, edge), "x", color=color, ms=6.0, clip_on=False)
-    shown = [radius for radius in RADII if radius <= 1.3 * largest]
+        left_model = result.points[np.isnan(swing)]
+        rim = np.full(left_model.size, edge)
+        ax.plot(left_model, rim, "x", color=color, ms=6.0, clip_on=False)
+    circles = [radius for radius in RADII if radius <= 1.3 * largest]
     ax.set_ylim(0.0, edge)
-    ax.set_yticks(np.log10(np.array(shown) / CENTRE), [f"{radius:g}°" for radius in shown])
+    ax.set_yticks(np.log10(np.array(circles) / CENTRE), [f"{radius:g}°" for radius in circles])
+    side, _ = _side_of(result.points)
     if not side:
         ax.set_rlabel_position(52.5)  # lines cross it straight on
-    names = {0: "bow", 90: "starboard", 180: "stern", 270: "port"}
-    angles = range(0, 360, 30)
-    if side:
-        angles = range(round(np.degrees(first)), round(np.degrees(first)) + 181, 30)
-    labels = [names.get(angle % 360, f"{angle}°") for angle in angles]
-    ax.set_xticks(np.radians(angles), labels)
-    ax.tick_params(labelsize=style.SMALL, labelcolor=style.INK)
-    ax.tick_params(axis="x", pad=8.0)
-    if not side:
-        for angle, text in zip(angles, ax.get_xticklabels(), strict=True):
-            alignment = "left" if angle < 180 else "right"
-            text.set_horizontalalignment("center" if angle % 180 == 0 else alignment)
-    ax.grid(True, color=style.GRID, linewidth=0.6)
-    ax.spines["polar"].set_color(style.FAINT)
-    head = figure.add_axes((0.012, 1.0 - (above + 0.02) / height, 0.9, 0.001))
-    head.set_axis_off()
-    style.put_legend(head, legend)
-    remark(head, words, rows)
-    return figure
 
 
 # --- what axes can follow -------------------------------------------------------------------------
@@ -358,20 +418,16 @@ def plot_follow(
     """
     looks = style.strokes(AXIS_LINES)
     words = title or "What the axes can follow"
-    labels = ("amplitude (m)",), "period (s)"
+    label = "amplitude (m)"
+    below = "period (s)"
     if ax is None:
+        boom = f"boom at {result.boom_deg:.0f}°"
         figure, (panel,) = _panels(
-            [3.6],
-            *labels,
-            words,
-            looks,
-            f"boom at {result.boom_deg:.0f}°",
-            DEMANDED,
-            assumed(result.crane),
+            [3.6], [label], below, words, looks, texts=(boom, DEMANDED, assumed(result.crane))
         )
     else:
-        legend = [style.handle(name, *look) for name, look in looks.items()]
-        (panel,) = style.dress_given(ax, title, *labels, what="panel", legend=legend)
+        legend = [style.handle(name, look.color, look.dashes) for name, look in looks.items()]
+        (panel,) = style.dress_given(ax, title, [label], below, what="panel", legend=legend)
     lines = list(zip(looks.values(), result.amplitude.T, strict=True))
     for (color, dashes), amplitudes in lines:
         panel.plot(result.periods, amplitudes, color=color, linestyle=dashes, linewidth=1.4)

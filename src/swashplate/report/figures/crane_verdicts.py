@@ -69,7 +69,7 @@ def plot_assessment(
     """
     if ax is not None:
         (panel,) = style.dress_given(ax, title, [""], SWING, what="panel")
-        _swings(panel, result)
+        _draw_swings(panel, result)
         return ax
     study = result.study
     limited = result.limited(result.assessed_variant)
@@ -94,9 +94,9 @@ def plot_assessment(
         style.put_legend(panel, legend, room=ROOM)
         remark(panel, words, style.legend_rows(legend, ROOM))
     style.label_below(panels[0], SWING)
-    _swings(panels[0], result)
+    _draw_swings(panels[0], result)
     if limited:
-        _limits(panels[1], result, limited)
+        _draw_limits(panels[1], result, limited)
     return figure
 
 
@@ -127,8 +127,8 @@ def _swing_legend(result: Assessment) -> list[Line2D]:
     return handles
 
 
-def _swings(ax: Axes, result: Assessment) -> None:
-    """A row for each variant: its seaways, their mean, how many left the model."""
+def _draw_swings(ax: Axes, result: Assessment) -> None:
+    """Draw a row for each variant: its seaways, their mean, how many left the model."""
     names = list(reversed(result.names))
     swings = {name: np.degrees(result.swing(name)) for name in names}
     edge = _largest_swing(result, list(swings.values()))
@@ -150,8 +150,8 @@ def _swings(ax: Axes, result: Assessment) -> None:
         labels.append(label)
     if result.linear is not None:
         by_spectrum = np.degrees(result.linear.values["swing"].rms)
-        ends = names.index(NONE) - 0.4, names.index(NONE) + 0.4
-        ax.vlines(by_spectrum, *ends, color=style.INK, linewidth=1.0, zorder=4.0)
+        row = names.index(NONE)
+        ax.vlines(by_spectrum, row - 0.4, row + 0.4, color=style.INK, linewidth=1.0, zorder=4.0)
     _swing_axis(ax, edge, broken=any(result.departures(name) for name in names))
     ax.grid(False, axis="y")
     ax.set_yticks(range(len(names)), labels, fontsize=style.SMALL)
@@ -195,9 +195,8 @@ def _diamond(ax: Axes, row: float, swing: Array) -> None:
 
 
 def _limit_legend(result: Assessment, limited: Sequence[AssessedQuantity]) -> list[Line2D]:
-    decisions = [
-        decision for decision in WITHIN if decision in {quantity.within for quantity in limited}
-    ]
+    occurring = {quantity.within for quantity in limited}
+    decisions = [decision for decision in WITHIN if decision in occurring]
     handles = []
     for decision in decisions:
         color = FACES[decision] if decision != "not decided" else style.INK
@@ -210,8 +209,8 @@ def _limit_legend(result: Assessment, limited: Sequence[AssessedQuantity]) -> li
     return handles
 
 
-def _limits(ax: Axes, result: Assessment, limited: Sequence[AssessedQuantity]) -> None:
-    """A row for each quantity that has a limit: its largest value as a share of that."""
+def _draw_limits(ax: Axes, result: Assessment, limited: Sequence[AssessedQuantity]) -> None:
+    """Draw a row for each quantity that has a limit: its largest value as a share of that."""
     others = {name: result.limited(name) for name in result.names[:-1]}
     shares = [_share(quantity.largest.high, quantity.limit) for quantity in limited]
     for quantities in others.values():
@@ -240,8 +239,8 @@ def _limits(ax: Axes, result: Assessment, limited: Sequence[AssessedQuantity]) -
         _point(ax, share, row, end, "o", color, face=FACES[quantity.within], ms=6.5)
         unit, factor = quantity.shown
         # what has no more than three decimals is 0: a side-lead without waves across the boom
-        value = f"{round(factor * quantity.largest.value, 3):.3g}" if isfinite(share) else "–"
-        shown = f"{value} of {factor * quantity.limit:.3g} {unit}".rstrip()
+        number = f"{round(factor * quantity.largest.value, 3):.3g}" if isfinite(share) else "–"
+        shown = f"{number} of {factor * quantity.limit:.3g} {unit}".rstrip()
         labels.append(f"{LIMITED[quantity.name].label}\n{shown}")
     ax.set_xscale("log")
     ax.set_xlim(LEAST_SHARE, end)
@@ -254,11 +253,11 @@ def _limits(ax: Axes, result: Assessment, limited: Sequence[AssessedQuantity]) -
     ax.set_ylim(-0.5, len(labels) - 0.5)
 
 
-def _share(value: float, limit: float) -> float:
-    """A value over its limit, which is 0 if no drive may be at a limit of its own."""
+def _share(largest: float, limit: float) -> float:
+    """A largest value over its limit, which is 0 if no drive may be at a limit of its own."""
     if limit > 0.0:
-        return value / limit
-    return MOST_SHARE if value > 0.0 else 0.0
+        return largest / limit
+    return MOST_SHARE if largest > 0.0 else 0.0
 
 
 def _point(
@@ -320,7 +319,7 @@ def plot_operability(result: Operability, *, title: str | None = None) -> Figure
     style.write_title(figure, title or "Share of the year that can be worked, and what limits it")
     for panel, name in zip(panels, names, strict=False):
         style.dress(panel)
-        _cells(panel, result, name, colors)
+        _draw_cells(panel, result, name, colors)
         worked = f"{100.0 * result.workable(name):.0f} % of the year"
         words = f"{style.in_lines(name, NAME)}: {worked}"
         panel.set_title(words, loc="left", fontsize=style.NORMAL, color=style.INK)
@@ -342,7 +341,7 @@ def plot_operability(result: Operability, *, title: str | None = None) -> Figure
         assumed(result.crane),
     ]
     drawn_legend = figure.legend(
-        title=remarks(*texts),
+        title=remarks(texts),
         title_fontproperties={"size": style.SMALL},
         alignment="left",
         handles=legend,
@@ -365,8 +364,8 @@ def _weights(result: Operability) -> dict[str, float]:
     return dict(sorted(weights.items(), key=lambda entry: -entry[1]))
 
 
-def _cells(ax: Axes, result: Operability, name: str, colors: Mapping[str, str]) -> None:
-    """The cells of the scatter diagram, each in its colour."""
+def _draw_cells(ax: Axes, result: Operability, name: str, colors: Mapping[str, str]) -> None:
+    """Draw the cells of the scatter diagram, each in its colour."""
     scatter = result.scatter
     cells = result.cells[name]
     periods = _edges(scatter.period)
@@ -398,9 +397,9 @@ def _cells(ax: Axes, result: Operability, name: str, colors: Mapping[str, str]) 
     ax.grid(False)
 
 
-def _edges(values: Array) -> dict[float, tuple[float, float]]:
+def _edges(coordinates: Array) -> dict[float, tuple[float, float]]:
     """Ends of the cells of a scatter diagram by their middles, half way to the neighbours."""
-    middles = np.unique(values)
+    middles = np.unique(coordinates)
     if middles.size == 1:
         half = 0.25 * middles
         return {float(middles[0]): (float(middles[0] - half[0]), float(middles[0] + half[0]))}

@@ -19,6 +19,7 @@ from swashplate.report.style import (
     FAINT,
     GREY,
     LINE,
+    Stroke,
     dress_given,
     handle,
     sheet,
@@ -26,7 +27,7 @@ from swashplate.report.style import (
     write_words,
 )
 from swashplate.results import GivenAxes
-from swashplate.units import display_unit
+from swashplate.units import DisplayUnit, display_unit
 
 Array = NDArray[np.float64]
 
@@ -103,27 +104,17 @@ def plot_bode(
     >>> response = Drive.preset("hoist").frequency_response([0.1, 0.5], [3.0], bias=6.0)
     >>> plot_bode(response).savefig("bode.png")
     """
-    ends = (response.input, response.output)
-    if linear is not None and (linear.input, linear.outputs[0]) != ends:
-        raise InputError(
-            f"The sweep is from {response.input} to {response.output}, but the linear model from "
-            f"{linear.input} to {linear.outputs[0]}."
-        )
+    if linear is not None:
+        _check_ends(linear, response)
     unit = response.units.get(response.input, "")
     looks = strokes(f"{amplitude:g} {unit}" for amplitude in response.amplitudes)
-    legend = [handle(name, *look) for name, look in looks.items()]
+    legend = [handle(name, look.color, look.dashes) for name, look in looks.items()]
     if linear is not None:
-        about = ""
-        if isinstance(linear, LinearDrive):
-            point = linear.operating_point
-            where = f"{point.current:.4g} A" if point.voltage is None else f"{point.voltage:.4g} V"
-            about = f" about {where}"
-        legend.append(handle(f"small motions{about}", GREY, "dashed"))
+        legend.append(handle(f"small motions{_operating_words(linear)}", GREY, "dashed"))
     output = WORDS.get(response.output, response.output.replace("_", " "))
     words = f"{response.name}: {response.input} to {output}, sines about {response.bias:g} {unit}"
-    si = SIGNAL_UNITS.get(response.output, response.units.get(response.output, ""))
-    shown = display_unit(si, float(response.gain.max()))
-    by = f"({shown.name})" if "/" in shown.name else shown.name or "1"
+    output_unit = _output_unit(response)
+    by = f"({output_unit.name})" if "/" in output_unit.name else output_unit.name or "1"
     gain_label = f"gain ({by}/{unit})" if unit else f"gain ({by})"
     labels = [gain_label, "phase (deg)", "distortion (%)"]
     if ax is None:
@@ -132,22 +123,10 @@ def plot_bode(
     else:
         count = min(max(np.size(np.asarray(ax, dtype=object)), 2), 3)
         axes = dress_given(ax, title, labels[:count], "frequency (Hz)", legend=legend)
-    swept = shown.factor * response.gain, np.degrees(response.phase), 100.0 * response.distortion
-    marker = "o" if response.frequencies.size == 1 else None
-    for panel, rows in zip(axes, swept, strict=False):
-        for row, moves, look in zip(rows, response.moves, looks.values(), strict=True):
-            style: dict[str, Any] = {"color": look.color, "ls": look.dashes, "lw": LINE}
-            shown_row = np.where(moves, row, np.nan)
-            panel.plot(response.frequencies, shown_row, marker=marker, ms=4.0, **style)
+    _draw_response(axes, response, list(looks.values()))
     if linear is not None:
-        highest = np.inf if linear.rate is None else 0.5 * linear.rate
-        low, high = response.frequencies[0], response.frequencies[-1]
-        fine = np.geomspace(low, min(high, highest), 400)
-        ratio = linear.response(fine)[0]
-        small = (shown.factor * np.abs(ratio), np.degrees(np.unwrap(np.angle(ratio))))
-        for panel, row in zip(axes, small, strict=False):
-            panel.plot(fine, row, color=GREY, linestyle="dashed", linewidth=LINE, zorder=1.8)
-    _scale(axes, response)
+        _draw_linear(axes, linear, response)
+    _scale_axes(axes, response)
     # the lines are at the top there
     write_words(
         axes[0], "\n".join(response.still()), (0.0, 0.0), (4.0, 4.0), color=GREY, va="bottom"
@@ -160,19 +139,71 @@ def plot_bode(
     return figure if ax is None else ax
 
 
-def _scale(axes: list[Axes], response: FrequencyResponse) -> None:
+def _check_ends(linear: LinearModel, response: FrequencyResponse) -> None:
+    """Refuse a linear model between other signals than those of a sweep."""
+    swept = (response.input, response.output)
+    if (linear.input, linear.outputs[0]) != swept:
+        raise InputError(
+            f"The sweep leads from {response.input} to {response.output}, but the linear model "
+            f"from {linear.input} to {linear.outputs[0]}."
+        )
+
+
+def _operating_words(linear: LinearModel) -> str:
+    """Operating point of a drive's linear model, such as ``" about 2 V"``; else empty."""
+    if not isinstance(linear, LinearDrive):
+        return ""
+    point = linear.operating_point
+    if point.voltage is None:
+        return f" about {point.current:.4g} A"
+    return f" about {point.voltage:.4g} V"
+
+
+def _output_unit(response: FrequencyResponse) -> DisplayUnit:
+    """Unit in which a sweep's output is shown."""
+    si = SIGNAL_UNITS.get(response.output, response.units.get(response.output, ""))
+    return display_unit(si, float(response.gain.max()))
+
+
+def _draw_response(
+    axes: Sequence[Axes], response: FrequencyResponse, looks: Sequence[Stroke]
+) -> None:
+    """Draw gain, phase and distortion, in so many axes as there are, a line for each amplitude."""
+    gain = _output_unit(response).factor * response.gain
+    swept = (gain, np.degrees(response.phase), 100.0 * response.distortion)
+    marker = "o" if response.frequencies.size == 1 else None
+    for panel, rows in zip(axes, swept, strict=False):
+        for row, moves, look in zip(rows, response.moves, looks, strict=True):
+            style: dict[str, Any] = {"color": look.color, "ls": look.dashes, "lw": LINE}
+            shown_row = np.where(moves, row, np.nan)
+            panel.plot(response.frequencies, shown_row, marker=marker, ms=4.0, **style)
+
+
+def _draw_linear(axes: Sequence[Axes], linear: LinearModel, response: FrequencyResponse) -> None:
+    """Draw gain and phase of a linear model over the frequencies of a sweep."""
+    highest = np.inf if linear.rate is None else 0.5 * linear.rate
+    low, high = response.frequencies[0], response.frequencies[-1]
+    fine = np.geomspace(low, min(high, highest), 400)
+    ratio = linear.response(fine)[0]
+    gain = _output_unit(response).factor * np.abs(ratio)
+    phase = np.degrees(np.unwrap(np.angle(ratio)))
+    for panel, row in zip(axes, (gain, phase), strict=False):
+        panel.plot(fine, row, color=GREY, linestyle="dashed", linewidth=LINE, zorder=1.8)
+
+
+def _scale_axes(axes: list[Axes], response: FrequencyResponse) -> None:
     gain, phase = axes[:2]
-    ends = response.frequencies[0], response.frequencies[-1]
+    lowest, highest = response.frequencies[0], response.frequencies[-1]
     for ax in axes:  # which need not share their abscissa
         ax.set_xscale("log")
-        if ends[0] < ends[1]:
-            ax.set_xlim(*ends)
-        _number(ax, "x", ends[1] / ends[0])
+        if lowest < highest:
+            ax.set_xlim(lowest, highest)
+        _set_plain_numbers(ax, "x", highest / lowest)
     gain.set_yscale("log")
     low, high = gain.get_ylim()
     low = max(low, high / DEEPEST)
     gain.set_ylim(low, high)
-    _number(gain, "y", high / low)
+    _set_plain_numbers(gain, "y", high / low)
     low, high = phase.get_ylim()
     step = next((step for step in STEPS if (high - low) / step <= MOST_STEPS), STEPS[-1])
     phase.yaxis.set_major_locator(MultipleLocator(step))
@@ -180,8 +211,8 @@ def _scale(axes: list[Axes], response: FrequencyResponse) -> None:
         distortion.set_ylim(0.0, max(1.05 * 100.0 * float(response.distortion.max()), 1e-3))
 
 
-def _number(ax: Axes, which: str, span: float) -> None:
-    """Plain numbers along a logarithmic axis, as many as fit."""
+def _set_plain_numbers(ax: Axes, which: str, span: float) -> None:
+    """Write plain numbers along a logarithmic axis, as many as fit."""
     axis = ax.xaxis if which == "x" else ax.yaxis
     room = DECADE**3 if which == "x" else DECADE**2
     subs = (1.0, 2.0, 5.0) if span < room else (1.0,)

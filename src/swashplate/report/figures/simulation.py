@@ -87,7 +87,7 @@ class Mark(NamedTuple):
 
 
 class Panel(NamedTuple):
-    """What one panel shows: signals in SI, drawn in the units that people read."""
+    """Content of one panel: signals in SI, drawn in the units that people read."""
 
     words: str
     si: str
@@ -129,30 +129,30 @@ def plot_simulation(
     >>> figure = plot_simulation(Drive.preset("hoist").simulate(maneuvers.step(9.0)))
     >>> figure.savefig("step.png")
     """
-    pump, run = simulation.pump, simulation
+    pump = simulation.pump
+    run = simulation
 
     def acting(*limits: Limit) -> tuple[tuple[Shade, Array], ...]:
         return tuple((SHADES[limit], stretches(run.time, run.active(limit))) for limit in limits)
 
-    ends = (pump.Z16_plus, -pump.Z16_minus)
+    spool = _spool(run.spool_position, run.orifice_opening, (pump.Z16_plus, -pump.Z16_minus))
+    swash = _swash(run.swash_angle, (pump.Z13_plus, -pump.Z13_minus))
     current = (
         Curve(run.current_positive, BLUE, "positive"),
         Curve(run.current_negative, VERMILION, "negative"),
     )
     # without a dead zone no current is within it, although its flag stands at exactly 0 A
     dead_zone = (Mark(pump.Z17, f"dead zone {pump.Z17:.2f} A"),) if pump.Z17 else ()
-    electric = acting(*([Limit.DEAD_ZONE] if pump.Z17 else []), Limit.CURRENT_RATE)
+    electric = acting(Limit.CURRENT_RATE)
+    if pump.Z17:
+        electric = acting(Limit.DEAD_ZONE, Limit.CURRENT_RATE)
     panels = [
         Panel("current", "A", current, electric, dead_zone),
-        _spool(run.spool_position, run.orifice_opening, ends)._replace(
-            limits=acting(Limit.ORIFICE, Limit.SPOOL)
-        ),
+        spool._replace(limits=acting(Limit.ORIFICE, Limit.SPOOL)),
         Panel(
             "stroking pressure", "Pa", (Curve(run.stroker_pressure, BLUE),), acting(Limit.RELIEF)
         ),
-        _swash(run.swash_angle, (pump.Z13_plus, -pump.Z13_minus))._replace(
-            limits=acting(Limit.SWASH_STOP)
-        ),
+        swash._replace(limits=acting(Limit.SWASH_STOP)),
         Panel("shaft speed", "rad/s", (Curve(run.shaft_speed, BLUE),), acting(Limit.SWASH_STOP)),
     ]
     if run.voltage is not None:
@@ -259,7 +259,7 @@ def plot_signals(
     for number, (heading, column) in enumerate(columns.items()):
         column_axes = axes[number * longest : (number + 1) * longest]
         for panel_axes, panel in zip(column_axes, column, strict=False):
-            _fill(panel_axes, panel._replace(height=height), run.time, rows)
+            _draw_panel(panel_axes, panel._replace(height=height), run.time, rows)
         above = 4.0 + POINTS_PER_INCH * ROW * (legend_rows(legend) if legend else 0)
         if heading:
             write_words(column_axes[0], heading, (0.0, 1.0), (0.0, above), color=GREY)
@@ -293,9 +293,11 @@ def _draw_given(
     title: str | None,
 ) -> None:
     """Draw signals in axes of a caller, which may have curves already."""
-    curves, labels = [], []
+    curves = []
+    labels = []
     for name in signals:
-        values, definition = run[name][rows], _definition(run, name)
+        values = run[name][rows]
+        definition = _definition(run, name)
         unit = display_unit(definition.unit, float(np.abs(values).max()) or inf)
         curves.append(unit.factor * values)
         labels.append(unit.label(definition.name))
@@ -309,7 +311,8 @@ def _draw_given(
 
 def _panel(run: Run, signal: str, label: str, rows: slice) -> Panel:
     """Panel of one signal, with the ends of its range."""
-    values, definition = run[signal], _definition(run, signal)
+    values = run[signal]
+    definition = _definition(run, signal)
     unit = display_unit(definition.unit, float(np.abs(values[rows]).max()) or inf)
     marks = tuple(
         Mark(end, f"limit {unit.factor * end:.4g} {unit.name}".rstrip().replace("-", "−"))
@@ -323,7 +326,7 @@ def _panel(run: Run, signal: str, label: str, rows: slice) -> Panel:
 
 
 def _definition(run: Run, signal: str) -> Definition:
-    """What a signal is: as a user-defined model declares it, of a drive as `SIGNAL_UNITS` say."""
+    """Definition of a signal: of a user-defined model its own, of a drive from `SIGNAL_UNITS`."""
     words = signal.replace("_", " ")
     if isinstance(run, Simulation | FullOrderSimulation):
         return Definition(words, SIGNAL_UNITS.get(signal, ""))
@@ -341,52 +344,51 @@ def _looks(run: Run) -> dict[str, Shade]:
 # --- two models of one drive ----------------------------------------------------------------------
 
 
-def plot_full_order(found: OrderComparison, *, title: str | None = None) -> Figure:
+def plot_full_order(comparison: OrderComparison, *, title: str | None = None) -> Figure:
     """Figure of both models over one command: speeds, their difference, and what lies between.
 
     Parameters
     ----------
-    found : OrderComparison
-        What `swashplate.full_order.compare` found. Limits that hold are shaded.
+    comparison : OrderComparison
+        Result of `swashplate.full_order.compare`. Limits that hold are shaded.
     """
-    full = found.full
+    full = comparison.full
     machine = full.plant.machine
 
-    def holding(limit: Limit, held: Flags) -> tuple[tuple[Shade, Array], ...]:
-        return ((SHADES[limit], stretches(found.time, held != 0)),)
+    def stretches_of(limit: Limit, flags: Flags) -> tuple[tuple[Shade, Array], ...]:
+        return ((SHADES[limit], stretches(comparison.time, flags != 0)),)
 
-    command = (
-        Panel("current", "A", (Curve(full.current, INK),))
-        if found.voltage is None
-        else Panel("voltage", "V", (Curve(found.voltage, INK),))
-    )
-    error = (
-        Panel("difference", "% of top", (Curve(100.0 * found.error / found.top_speed, INK),))
-        if found.moves
-        else Panel("difference", "rad/s", (Curve(found.error, INK),))
-    )
+    if comparison.voltage is None:
+        command = Panel("current", "A", (Curve(full.current, INK),))
+    else:
+        command = Panel("voltage", "V", (Curve(comparison.voltage, INK),))
+    if comparison.moves:
+        percent = 100.0 * comparison.error / comparison.top_speed
+        error = Panel("difference", "% of top", (Curve(percent, INK),))
+    else:
+        error = Panel("difference", "rad/s", (Curve(comparison.error, INK),))
     speeds = (
         # where the two are the same, the wide line shows on both sides of the narrow one
         Curve(full.shaft_speed, BLUE, "five states", WIDE),
-        Curve(found.reduced_speed, VERMILION, "one state", NARROW),
+        Curve(comparison.reduced_speed, VERMILION, "one state", NARROW),
     )
     openings = (machine.orifice_opening_plus, -machine.orifice_opening_minus)
     stops = (machine.swash_stop_plus, -machine.swash_stop_minus)
     pressure = (Curve(full.stroker_pressure, BLUE),)
     drop = (Curve(full.motor_pressure_drop, BLUE),)
-    relief = holding(Limit.RELIEF, full.relief_hold)
+    spool = _spool(full.spool_position, full.orifice_opening, openings)
+    swash = _swash(full.swash_angle, stops)
+    relief = stretches_of(Limit.RELIEF, full.relief_hold)
     panels = [
         command,
         Panel("shaft speed", "rad/s", speeds, height=1.8),
         error,
-        _spool(full.spool_position, full.orifice_opening, openings)._replace(
-            limits=holding(Limit.SPOOL, full.spool_hold)
-        ),
-        _swash(full.swash_angle, stops)._replace(limits=holding(Limit.SWASH_STOP, full.plate_hold)),
+        spool._replace(limits=stretches_of(Limit.SPOOL, full.spool_hold)),
+        swash._replace(limits=stretches_of(Limit.SWASH_STOP, full.plate_hold)),
         Panel("stroking pressure", "Pa", pressure, relief, least=1e5),
         Panel("motor\npressure drop", "Pa", drop, least=1e5),
     ]
-    return _chain(panels, found.time, full.name if title is None else title)
+    return _chain(panels, comparison.time, full.name if title is None else title)
 
 
 def _spool(position: Array, opening: Array, ends: Stops) -> Panel:
@@ -409,18 +411,20 @@ def _chain(panels: Sequence[Panel], time: Array, title: str, rows: slice = slice
     legend = _legend(panels, tuple(SHADES.values()))
     figure, axes = sheet([panel.height for panel in panels], title, below="time (s)", legend=legend)
     for ax, panel in zip(axes, panels, strict=True):
-        _fill(ax, panel, time, rows)
+        _draw_panel(ax, panel, time, rows)
     fit_time(axes[-1], time[rows])
     return figure
 
 
 def _legend(panels: Sequence[Panel], looks: Sequence[Shade]) -> list[Patch]:
     """Handles of the looks of limits that act in one of the panels, in the order given."""
-    acting = {look for panel in panels for look, spans in panel.limits if spans.size}
+    acting = set[Shade]()
+    for panel in panels:
+        acting.update(look for look, spans in panel.limits if spans.size)
     return [shade_handle(look) for look in looks if look in acting]
 
 
-def _fill(ax: Axes, panel: Panel, time: Array, rows: slice) -> None:
+def _draw_panel(ax: Axes, panel: Panel, time: Array, rows: slice) -> None:
     """Draw signals over time, with the limits that act and the marks that they come near to.
 
     The ordinate begins at zero, unless signals stay far from it and the panel need not show it.
@@ -434,15 +438,14 @@ def _fill(ax: Axes, panel: Panel, time: Array, rows: slice) -> None:
     ax.set_ylabel(label, fontsize=NORMAL, color=INK)
     zero_line(ax)
     shown = [factor * trace.values[rows] for trace in panel.traces]
-    low, high = (
-        min(float(curve.min()) for curve in shown),
-        max(float(curve.max()) for curve in shown),
-    )
+    low = min(float(curve.min()) for curve in shown)
+    high = max(float(curve.max()) for curve in shown)
     labels = []
-    for level, words in ((factor * mark.level, mark.words) for mark in panel.marks):
+    for mark in panel.marks:
+        level = factor * mark.level
         if (high if level > 0.0 else -low) >= NEAR * abs(level):
             ax.axhline(level, color=GREY, linewidth=THIN, dashes=(5.0, 3.0), zorder=1.5)
-            labels.append(MarginLabel(level, words, GREY))
+            labels.append(MarginLabel(level, mark.words, GREY))
     ends = [low, high, *(label.height for label in labels)]
     if panel.from_zero or not 0.0 < high - low < FAR * max(abs(low), abs(high)):
         ends.append(0.0)
@@ -523,9 +526,10 @@ def plot_comparison(simulations: Mapping[str, Simulation], *, title: str | None 
     """
     if not simulations:
         raise InputError("A comparison needs at least one simulation.")
-    looks, speed = strokes(simulations), display_unit("rad/s")
+    looks = strokes(simulations)
+    speed = display_unit("rad/s")
     words = "Shaft speed under the same command" if title is None else title
-    legend = [handle(name, *look) for name, look in looks.items()]
+    legend = [handle(name, look.color, look.dashes) for name, look in looks.items()]
     heights = [1.2, 2.6, 1.6] if len(simulations) > 1 else [1.2, 2.6]
     volts = all(simulation.voltage is not None for simulation in simulations.values())
     labels = ["voltage (V)" if volts else "current (A)", speed.label("shaft speed")]
@@ -539,7 +543,8 @@ def plot_comparison(simulations: Mapping[str, Simulation], *, title: str | None 
         for simulation in simulations.values()
     ]
     for (name, run), command in zip(simulations.items(), commands, strict=True):
-        (color, dashes), time = looks[name], run.time
+        color, dashes = looks[name]
+        time = run.time
         if run is first:
             draw(axes[0], time, command, INK, zorder=3.0)
         elif not np.array_equal(commands[0], command):

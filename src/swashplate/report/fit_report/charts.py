@@ -53,7 +53,8 @@ def profile_chart(profile: Profile, unknown: Unknown) -> Markup:
     first, last = float(values.min()), float(values.max())
     scale = (bottom - top - 12.0) / (high - low or 1.0)
     across = left + 8.0 + (right - left - 16.0) * (values - first) / (last - first or 1.0)
-    up, level = bottom - 6.0 - scale * (rises - low), bottom - 6.0 - scale * (profile.rise - low)
+    up = bottom - 6.0 - scale * (rises - low)
+    level = bottom - 6.0 - scale * (profile.rise - low)
     point = Markup('<circle class="full" cx="{:.1f}" cy="{:.1f}" r="3"><title>{}</title></circle>')
     words = f"{profile.name} ({unknown.unit})" if unknown.unit else profile.name
     elements = [
@@ -77,7 +78,9 @@ def profile_chart(profile: Profile, unknown: Unknown) -> Markup:
 
 def lags_chart(lags: Array, values: Array, band: float, words: str) -> Markup:
     """A correlation over the lag [s], with the band of what has none, by half its width."""
-    wide, tall, edge = 230.0, 64.0, 4.0
+    wide = 230.0
+    tall = 64.0
+    edge = 4.0
     low, high = min(-band, float(values.min()), -0.1), max(band, float(values.max()), 0.1)
 
     def height(value: float | Array) -> Array:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import replace
+from itertools import combinations
 from math import inf
 from pathlib import Path
 
@@ -92,7 +93,8 @@ def write_fit_report(
     The page holds what the eye can tell of every run, a few bytes a sample (`runs.run_data`): it
     grows with the number of runs, not with their length.
     """
-    fit, stages = result.fit, result.fit.stages
+    fit = result.fit
+    stages = fit.stages
     runs = shown_runs(stages, result.predicted)
     held_out = sum(run.role == "validate" for run in runs)
     facts = (
@@ -172,13 +174,12 @@ def _page(
     runs: Sequence[ShownRun],
     judged: Verdict,
     setup: Section,
-    more_sections: Sequence[Section] = (),
+    other_sections: Sequence[Section] = (),
 ) -> str:
     """A page of a fit, which has sections of its own, or of a drive held against runs."""
     stages = fitted.stages if isinstance(fitted, Fit) else ()
-    drive, nominal = (
-        (fitted.parameters, fitted.nominal) if isinstance(fitted, Fit) else (fitted, fitted)
-    )
+    drive = fitted.parameters if isinstance(fitted, Fit) else fitted
+    nominal = fitted.nominal if isinstance(fitted, Fit) else fitted
     named = f"{'Model' if isinstance(nominal, ModelSetup) else 'Drive'} {nominal.name}"
     if isinstance(nominal, ParameterSet) and nominal.title:
         named += f" ({nominal.title})"
@@ -186,27 +187,25 @@ def _page(
     examined = {
         experiment: examine(experiment) for experiment in campaign if experiment.axis in axes
     }
-    listed_findings = [
-        (run.name, ended(f"{run.name}, {quality.signal}: {words}"))
-        for run, qualities in examined.items()
-        for quality in qualities
-        for words in quality.findings
-    ]
     findings: dict[str, list[int]] = {}
-    for number, (name, _) in enumerate(listed_findings, start=1):
-        findings.setdefault(name, []).append(number)
+    sentences = list[str]()
+    for run, qualities in examined.items():
+        for signal in qualities:
+            for words in signal.findings:
+                sentences.append(ended(f"{run.name}, {signal.signal}: {words}"))
+                findings.setdefault(run.name, []).append(len(sentences))
     quality = joined(
         [quality_table(run_qualities, of_run) for run_qualities, of_run in examined.items()]
     )
     known_drive = Drive(drive) if isinstance(drive, ParameterSet) else None
     sections = [
-        summary_section(judged, campaign, known_drive, stages, runs, len(listed_findings)),
+        summary_section(judged, campaign, known_drive, stages, runs, len(sentences)),
         _agreement_section(runs, findings, judged),
         _curves_section(runs, campaign.virtual),
-        *more_sections,
+        *other_sections,
         _residual_section(runs),
-        _verdict_section(judged, len(listed_findings)),
-        _data_section([sentence for _, sentence in listed_findings], quality, campaign.overviews),
+        _verdict_section(judged, len(sentences)),
+        _data_section(sentences, quality, campaign.overviews),
         setup,
     ]
     return page(
@@ -223,8 +222,12 @@ def _page(
 
 
 def _qualities(runs: Sequence[ShownRun], role: str = "") -> list[RunQuality]:
-    """Of all runs, or of those of a role."""
-    return [channel.quality for run in runs if role in ("", run.role) for channel in run.channels]
+    """Qualities of all channels of the runs, or of the runs of a role."""
+    qualities = list[RunQuality]()
+    for run in runs:
+        if role in ("", run.role):
+            qualities += [channel.quality for channel in run.channels]
+    return qualities
 
 
 def _agreement_section(
@@ -252,7 +255,10 @@ def _agreement_section(
             links,
             look=look != "good",
         )
-    agreement = [t for role in ("fit", "validate") for t in runs_tables(_qualities(runs, role))]
+    agreement = [
+        *runs_tables(_qualities(runs, "fit")),
+        *runs_tables(_qualities(runs, "validate")),
+    ]
     words = (
         "RMSE is the root of the mean squared difference of the samples that count; NRMSE is RMSE "
         "over the standard deviation of what was measured; fit % is 100 (1 − NRMSE). Error / "
@@ -286,16 +292,19 @@ def _curves_section(runs: Sequence[ShownRun], virtual: bool) -> Section:
 def _live_section(fit: Fit, campaign: Campaign, runs: Sequence[ShownRun]) -> Section:
     """The drive itself beside the run that it misses most, of those held out if there are any."""
     blocks: list[PageBlock] = []
-    drive, nominal = fit.parameters, fit.nominal
+    drive = fit.parameters
+    nominal = fit.nominal
     if isinstance(drive, ParameterSet) and isinstance(nominal, ParameterSet):
         # the statuses are those of the nominal set: what was fitted is what has moved
-        before, moved = nominal.parameters, {}
+        nominal_parameters = nominal.parameters
+        parameters = {}
         for symbol, parameter in drive.parameters.items():
-            same = symbol in before and before[symbol].values == parameter.values
-            moved[symbol] = replace(parameter, status="fixed" if same else "fitted")
-        drive = replace(drive, parameters=moved)
-        out = [run for run in runs if run.role == "validate"] or runs
-        worst = max(out, key=lambda run: run_error(run, runs)).experiment
+            nominal_parameter = nominal_parameters.get(symbol)
+            same = nominal_parameter is not None and nominal_parameter.values == parameter.values
+            parameters[symbol] = replace(parameter, status="fixed" if same else "fitted")
+        drive = replace(drive, parameters=parameters)
+        held_out = [run for run in runs if run.role == "validate"]
+        worst = max(held_out or runs, key=lambda run: run_error(run, runs)).experiment
         if can_run(drive, worst):
             shown = run_of(at_instants(drive, worst))
             page = live_page(drive, [shown], campaign.title, campaign.virtual, "drive.toml")
@@ -314,8 +323,8 @@ def _residual_section(runs: Sequence[ShownRun]) -> Section:
     table = Table("", tuple(map(Column, (*heads, "verdict"))))
     for quality in _qualities(runs):
         if (test := quality.test) is not None:
-            lag, value = test.peak
-            correlation = f"correlation with the input, largest {value:+.2f} at {lag:.2g} s"
+            lag, largest = test.peak
+            correlation = f"correlation with the input, largest {largest:+.2f} at {lag:.2g} s"
             drawn = charts.lags_chart(test.lags, test.correlation, test.band, correlation)
             run = quality.experiment
             table.add(run.name, run.role, quality.channel, drawn, test.verdict)
@@ -325,7 +334,7 @@ def _residual_section(runs: Sequence[ShownRun]) -> Section:
 def _data_section(
     findings: Sequence[str], quality: Table, overviews: Sequence[Overview]
 ) -> Section:
-    """What is used of long logs, what the check of the logs finds, and the quality of signals."""
+    """Section on the used parts of long logs, the data checks, and the quality of signals."""
     heading = f"{count(len(findings), 'finding')}:" if findings else NO_FINDINGS
     numbered = [
         Markup('<span id="finding-{}">{}</span>').format(number, sentence)
@@ -364,15 +373,18 @@ def _setup_section(
 
 
 def _stage_words(fit: StageFit) -> list[str]:
-    """What a stage was asked to do."""
-    stage, problem = fit.stage, fit.problem
+    """Describe the task of a stage."""
+    stage = fit.stage
+    problem = fit.problem
     words = [f"Simulates {_PARTS[stage.part]}."]
     if stage.part == "pump":
         words.append(f"The current is the {stage.current} one.")
     words.append(f"Fits {listed(list(problem.channels))}.")
     words.append(scales_words(fit))
     for kind, windows in stage.weights.items():
-        words += [f"Weight on {kind.replace('_', ' ')}: {_window(window)}." for window in windows]
+        words += [
+            f"Weight on {kind.replace('_', ' ')}: {_weight_words(window)}." for window in windows
+        ]
     of_runs = sum(unknown.run is not None for unknown in problem.unknowns)
     if of_runs:
         words.append(
@@ -381,11 +393,12 @@ def _stage_words(fit: StageFit) -> list[str]:
     return words
 
 
-def _window(weight: WeightWindow) -> str:
+def _weight_words(weight: WeightWindow) -> str:
     when = "all of the run"
     if weight.start is not None or weight.stop is not None:
         first = "the start" if weight.start is None else f"{weight.start:g} s"
-        when = f"{first} to {'the end' if weight.stop is None else f'{weight.stop:g} s'}"
+        last = "the end" if weight.stop is None else f"{weight.stop:g} s"
+        when = f"{first} to {last}"
     where = f" in '{weight.maneuver}'" if weight.maneuver else ""
     why = f" ({weight.why})" if weight.why else ""
     return f"{weight.factor:g} on {when}{where}{why}"
@@ -478,7 +491,7 @@ def _identifiability_section(stages: Sequence[StageFit]) -> Section:
 
 
 def _effects(identifiability: Identifiability, shown: Sequence[bool]) -> list[PageBlock]:
-    """How much all weighted residuals change for 1 % of each parameter, the largest first."""
+    """Tabulate the change of all weighted residuals for 1 % of each parameter, largest first."""
     table = Table("", (Column("parameter"), Column("change of the residuals for 1 %", ".3g")))
     pairs = zip(identifiability.sensitivity, identifiability.variables.names, shown, strict=True)
     for effect, name in sorted(
@@ -495,13 +508,14 @@ def _correlations(stage: StageFit, general: Sequence[bool]) -> list[PageBlock]:
     except InputError:  # the sentences above say why there are none
         return []
     determined = [k for k, is_general in enumerate(general) if is_general and quoted.determined[k]]
-    names, values = quoted.variables.names, quoted.correlation
+    names = quoted.variables.names
     pairs = [
-        (float(values[i, j]), names[i], names[j]) for i in determined for j in determined if i < j
+        (float(quoted.correlation[i, j]), names[i], names[j])
+        for i, j in combinations(determined, 2)
     ]
     table = Table("", (Column("parameter"), Column("with"), Column("r", "+.3f")))
-    for value, name, second in sorted(pairs, key=lambda pair: -abs(pair[0]))[:MOST_PAIRS]:
-        table.add(name, second, value)
+    for correlation, first, second in sorted(pairs, key=lambda pair: -abs(pair[0]))[:MOST_PAIRS]:
+        table.add(first, second, correlation)
     if not table.rows:
         return []
     shown = PageBlock("table", table, "correlations")
@@ -510,16 +524,17 @@ def _correlations(stage: StageFit, general: Sequence[bool]) -> list[PageBlock]:
 
 def _starts_section(several: Mapping[str, Sequence[Solution]]) -> Section:
     blocks = []
-    for stage, results in several.items():
-        failed = sum(not result.cost < 1e300 for result in results)
+    for stage, solutions in several.items():
+        failed = sum(not solution.cost < 1e300 for solution in solutions)
         failures = f"; {failed} left the model's domain" if failed else ""
-        blocks += [PageBlock("heading", f"Stage {stage}", "h3")] if stage else []
+        if stage:
+            blocks.append(PageBlock("heading", f"Stage {stage}", "h3"))
         table = Table("", (Column("start"), Column("cost, best = 1", ".7g"), Column("ended")))
-        best = min(result.cost for result in results) or 1.0
-        for result in sorted(results, key=lambda result: result.cost):
-            if result.cost < 1e300:
-                table.add(str(result.number), result.cost / best, result.message)
-        words = f"Where each of {len(results)} starts ended, the best first{failures}."
+        best = min(solution.cost for solution in solutions) or 1.0
+        for solution in sorted(solutions, key=lambda solution: solution.cost):
+            if solution.cost < 1e300:
+                table.add(str(solution.number), solution.cost / best, solution.message)
+        words = f"Where each of {len(solutions)} starts ended, the best first{failures}."
         blocks += [text(words), PageBlock("table", table, "starts")]
     return Section("starts", "Starts", blocks)
 

@@ -182,7 +182,12 @@ def html_table(table: Table, look: str = "") -> Markup:
 
 def _html_row(table: Table, row: Row) -> str:
     # every piece is escaped where it is put in: Markup's own formatting takes ten times as long
-    classes = " ".join(w for w, on in (("look", row.look), ("total", row.total)) if on)
+    row_classes = []
+    if row.look:
+        row_classes.append("look")
+    if row.total:
+        row_classes.append("total")
+    classes = " ".join(row_classes)
     pieces = [f'<tr class="{classes}">' if classes else "<tr>"]
     cells = list(zip(table.columns, row.cells, table.texts(row), strict=True))
     meaning = next((words for column, _, words in cells if column.name == "meaning"), "")
@@ -197,10 +202,19 @@ def _html_row(table: Table, row: Row) -> str:
             look = ' class="n"' if column.spec else ""
             pieces.append(f'<th scope="row"{look}>{symbol}</th>')
         else:
-            missed = " miss" if column.name == "holds" and words == "no" else ""
-            look = "unit" if column is UNIT else f"n{missed}" if column.spec else missed.strip()
+            look = _cell_class(column, words)
             pieces.append(f'<td class="{look}">{shown}</td>' if look else f"<td>{shown}</td>")
     return "".join([*pieces, "</tr>\n"])
+
+
+def _cell_class(column: Column, words: str) -> str:
+    """CSS classes of a cell: of units, of numbers, and of an interval that misses the truth."""
+    if column is UNIT:
+        return "unit"
+    classes = ["n"] if column.spec else []
+    if column.name == "holds" and words == "no":
+        classes.append("miss")
+    return " ".join(classes)
 
 
 def typeset(words: str, column: Column) -> str:
@@ -253,7 +267,8 @@ def print_report(page: str | Path, path: str | Path) -> None:
         in ``.pdf``.
     """
     ending(path, PRINTED)
-    browser, address = find_browser(), Path(page).absolute().as_uri()
+    browser = find_browser()
+    address = Path(page).absolute().as_uri()
 
     def write(beside: Path) -> None:
         with TemporaryDirectory() as profile:

@@ -118,7 +118,8 @@ def write_live_page(
         runs = [run_of(at_instants(parameters, experiment)) for experiment in driven]
         page = live_page(parameters, runs, campaign.title, campaign.virtual, name)
     elif command is not None:
-        record, sentences = record_of(command.sample(rate), rate, what="voltage"), ()
+        record = record_of(command.sample(rate), rate, what="voltage")
+        sentences = ()
         run = {**_record(record), "name": command.name, "role": "", "channels": []}
         page = live_page(parameters, [run], parameters.title or parameters.name, False, name)
     else:
@@ -150,7 +151,7 @@ def live_page(
         "limits": [[bit, _word(limit)] for bit, limit in limits],
         "before": before,
         "filter": {"low": LOW_PASS, "high": DIFFERENTIATOR},
-        "unmeasured": [_shown(signal) for signal in UNMEASURED],
+        "unmeasured": [_signal_panel(signal) for signal in UNMEASURED],
         "runs": runs,
     }
     colours = "".join(
@@ -231,12 +232,12 @@ def _design_variables(values: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
     variables = []
     for name in SHOWN:
         powers = DESIGN_VARIABLES[name]
-        moves = [
-            (value["number"], powers[key])
-            for value in values
-            for key in {value["symbol"], value["column"]}  # the same without directions
-            if key in powers and value["value"] not in (0.0, 1e30)
-        ]
+        moves = []
+        for value in values:
+            if value["value"] in (0.0, 1e30):
+                continue
+            keys = {value["symbol"], value["column"]}  # the same without directions
+            moves += [(value["number"], powers[key]) for key in keys if key in powers]
         if moves:
             words = name.replace("_", " ").capitalize()
             ends = (1.0 / SPAN, SPAN)
@@ -249,7 +250,7 @@ def _design_variables(values: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
 
 def run_of(experiment: Experiment) -> dict[str, Any]:
     """A run that a voltage drives, with its channels that a drive simulates."""
-    channels = [_channel(channel) for channel in _comparable(experiment.channels.values())]
+    channels = [_measured_channel(channel) for channel in _comparable(experiment.channels.values())]
     return {
         **_record(voltage_record(experiment)),
         "name": experiment.name,
@@ -284,17 +285,21 @@ def _comparable(channels: Iterable[Channel]) -> list[Channel]:
     return comparable
 
 
-def _channel(channel: Channel) -> dict[str, Any]:
+def _measured_channel(channel: Channel) -> dict[str, Any]:
     """A measured channel with what it is compared with."""
-    signal, values, unit = SIGNALS[channel.kind], channel.values, channel.unit
+    signal = SIGNALS[channel.kind]
+    values = channel.values
+    unit = channel.unit
     name = channel.name
     if channel.is_position:
-        values, unit = speed_of(channel, "exact").speed, f"{channel.unit}/s"
+        values = speed_of(channel, "exact").speed
+        unit = f"{channel.unit}/s"
         name = f"speed from {channel.name}"
     also = ""
     if signal == "current_sum":
-        signal, also = "current_positive", "current_negative"
-    shown = _shown(signal, name, unit, float(np.abs(values).max(initial=0.0)))
+        signal = "current_positive"
+        also = "current_negative"
+    shown = _signal_panel(signal, name, unit, float(np.abs(values).max(initial=0.0)))
     interval = float(np.median(np.diff(channel.time)))
     return {
         **shown,
@@ -307,7 +312,7 @@ def _channel(channel: Channel) -> dict[str, Any]:
     }
 
 
-def _shown(signal: str, name: str = "", unit: str = "", size: float = 0.0) -> dict[str, Any]:
+def _signal_panel(signal: str, name: str = "", unit: str = "", size: float = 0.0) -> dict[str, Any]:
     """A signal's panel: label, unit of people, limits that are shaded behind it."""
     unit = unit or {"current": "A", "shaft_speed": "rad/s"}[signal]
     shown = display_unit(unit, size)

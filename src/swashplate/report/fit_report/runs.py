@@ -52,7 +52,7 @@ class ShownChannel:
 
     @property
     def channel(self) -> Channel:
-        """What was measured."""
+        """The measured channel."""
         return self.quality.experiment[self.quality.channel]
 
 
@@ -94,7 +94,7 @@ class ShownRun:
     @property
     def input_unit(self) -> DisplayUnit:
         """Unit that its input is shown in."""
-        return display_unit(self.experiment.input.unit, _largest(self.experiment.input.values))
+        return display_unit(self.experiment.input.unit, _largest_size(self.experiment.input.values))
 
 
 def shown_runs(stages: Sequence[StageFit], predicted: Sequence[RunQuality]) -> tuple[ShownRun, ...]:
@@ -108,21 +108,29 @@ def shown_runs(stages: Sequence[StageFit], predicted: Sequence[RunQuality]) -> t
         for speed in with_speeds(stage.runs)
     ]
     qualities += [(speed, "") for speed in with_speeds(predicted)]
-    units, runs = {}, dict[tuple[str, str], list[ShownChannel]]()
-    for name in {quality.channel for quality, _ in qualities}:
-        alike = [quality for quality, _ in qualities if quality.channel == name]
-        channels = [run.experiment[name] for run in alike]
-        largest = max(_largest(channel.values) for channel in channels)
-        residual = max(_largest(run.residual) for run in alike)
-        unit = channels[0].shown_unit
-        units[name] = [display_unit(unit, size) for size in (largest, residual)]
+    units = {
+        name: _channel_units([quality for quality, _ in qualities if quality.channel == name])
+        for name in {quality.channel for quality, _ in qualities}
+    }
+    runs = dict[tuple[str, str], list[ShownChannel]]()
     for quality, stage in qualities:
-        of_run = runs.setdefault((quality.experiment.name, quality.experiment.role), [])
-        of_run.append(ShownChannel(quality, stage, *units[quality.channel]))
-    return tuple(ShownRun(*key, tuple(channels)) for key, channels in runs.items())
+        run = quality.experiment
+        unit, small = units[quality.channel]
+        channels = runs.setdefault((run.name, run.role), [])
+        channels.append(ShownChannel(quality, stage, unit, small))
+    return tuple(ShownRun(name, role, tuple(channels)) for (name, role), channels in runs.items())
 
 
-def _largest(values: Array) -> float:
+def _channel_units(qualities: Sequence[RunQuality]) -> tuple[DisplayUnit, DisplayUnit]:
+    """Units of a channel and of its residual that suit all of its runs."""
+    channels = [quality.experiment[quality.channel] for quality in qualities]
+    unit = channels[0].shown_unit
+    largest = max(_largest_size(channel.values) for channel in channels)
+    largest_residual = max(_largest_size(quality.residual) for quality in qualities)
+    return display_unit(unit, largest), display_unit(unit, largest_residual)
+
+
+def _largest_size(values: Array) -> float:
     return float(np.abs(values).max(initial=0.0))
 
 
@@ -138,8 +146,9 @@ def off_scale(channel: Channel, values: Array) -> Mask:
 
 
 def run_words(quality: RunQuality) -> str:
-    """What must stand beside every fit %: RMSE, initial state, what is ignored."""
-    measures, run = quality.measures, quality.experiment
+    """Words that must stand beside every fit %: RMSE, initial state, ignored samples."""
+    measures = quality.measures
+    run = quality.experiment
     channel = run[quality.channel]
     words = [f"RMSE {quantity(measures.rmse, channel.shown_unit)}"]
     if measures.fit_percent is not None and measures.nrmse is not None:
@@ -165,7 +174,8 @@ def write_samples(runs: Sequence[ShownRun], path: str | Path) -> None:
     files = []
     for run in runs:
         for measured in run.channels:
-            channel, quality = measured.channel, measured.quality
+            channel = measured.channel
+            quality = measured.quality
             columns = {
                 "run": run.name,
                 "role": run.role,
@@ -195,27 +205,29 @@ def run_data(run: ShownRun) -> dict[str, Any]:
     drive = run.experiment.input
     return {
         "held": drive.interpolation == "previous",
-        "input": _signals(drive.time, [(run.input_unit.factor * drive.values, None)]),
-        "channels": [_channel(channel) for channel in run.channels],
+        "input": _packed_signals(drive.time, [(run.input_unit.factor * drive.values, None)]),
+        "channels": [_channel_data(channel) for channel in run.channels],
     }
 
 
-def _channel(shown: ShownChannel) -> dict[str, Any]:
-    channel, factor, small = shown.channel, shown.unit.factor, shown.small.factor
+def _channel_data(shown: ShownChannel) -> dict[str, Any]:
+    channel = shown.channel
+    factor = shown.unit.factor
+    small = shown.small.factor
     residual = small * shown.quality.residual
     rms = float(np.sqrt(np.mean(np.square(residual[channel.used])))) if channel.used.any() else 0.0
     signals = [(factor * shown.quality.simulated, None), (residual, rms / FINE or None)]
     return {
-        **_signals(channel.time, signals, off_scale(channel, factor * channel.values)),
+        **_packed_signals(channel.time, signals, off_scale(channel, factor * channel.values)),
         "ratio": factor / small,
         "ignored": ignored_windows(channel),
     }
 
 
-def _signals(
+def _packed_signals(
     time: Array, signals: Sequence[tuple[Array, float | None]], hidden: Mask | None = None
 ) -> dict[str, Any]:
-    """Signals of one clock, each with the step that it is rounded to if that is known."""
+    """Pack signals of one clock, each with the step that it is rounded to if that is known."""
     breaks = gap_rows(time)
     rows = np.arange(time.size)
     if time.size > MOST_ROWS:

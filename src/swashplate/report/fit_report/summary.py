@@ -57,13 +57,13 @@ no interval. [1]"""
 
 Commands = tuple[float, float]
 """Largest command each way, positive and negative, as magnitudes. [V]"""
-ACCELERATION, DELAY, LAG, CREEP = 2, 3, 4, 5
+DEAD_ZONE, TOP_SPEED, ACCELERATION, DELAY, LAG, CREEP = range(6)
 """Rows of the numbers."""
 FULL: Commands = (FULL_VOLTAGE, FULL_VOLTAGE)
 
 
 def machine_numbers_of(drive: Drive, largest: Commands = FULL) -> Array:
-    """What matters about a drive, (6, 2): each way, positive and negative. SI
+    """Characteristic numbers of a drive, (6, 2): each way, positive and negative. SI
 
     Dead zone [V]; top speed [rad/s], steady under ±10 V; largest acceleration [rad/s²], delay and
     lag [s] of a step from rest to the largest command, the delay up to 2 % of the change to the
@@ -71,24 +71,26 @@ def machine_numbers_of(drive: Drive, largest: Commands = FULL) -> Array:
     where the drive has none.
     """
     rest = float(drive.steady_speed(0.0))
-    values = np.full((6, 2), np.nan)
-    for column, direction in enumerate((1.0, -1.0)):
-        volts = direction * largest[column]
+    numbers = np.full((6, 2), np.nan)
+    for side, direction in enumerate((1.0, -1.0)):
+        volts = direction * largest[side]
         command = np.full(int(SECONDS * RATE) + 1, volts)
         command[0] = 0.0
         run = drive.simulate(command, RATE, start="steady")
         final = float(drive.steady_speed(volts))
-        values[0, column] = dead_zone(drive, direction)[0]
-        values[1, column] = float(drive.steady_speed(direction * FULL_VOLTAGE))
-        values[5, column] = rest
+        numbers[DEAD_ZONE, side] = dead_zone(drive, direction)[0]
+        numbers[TOP_SPEED, side] = float(drive.steady_speed(direction * FULL_VOLTAGE))
+        numbers[CREEP, side] = rest
         if final == rest:
             continue
-        values[2, column] = direction * RATE * float((direction * np.diff(run.shaft_speed)).max())
-        done = np.maximum.accumulate((run.shaft_speed - rest) / (final - rest))
-        if done[-1] >= MOST_OF_IT:
-            first, last = np.interp((MOVES, MOST_OF_IT), done, run.time)
-            values[3:5, column] = first, last - first
-    return values
+        steepest = float((direction * np.diff(run.shaft_speed)).max())
+        numbers[ACCELERATION, side] = direction * RATE * steepest
+        change = np.maximum.accumulate((run.shaft_speed - rest) / (final - rest))
+        if change[-1] >= MOST_OF_IT:
+            begin, end = np.interp((MOVES, MOST_OF_IT), change, run.time)
+            numbers[DELAY, side] = begin
+            numbers[LAG, side] = end - begin
+    return numbers
 
 
 def largest_commands(stages: Sequence[StageFit]) -> Commands:
@@ -102,24 +104,23 @@ def largest_commands(stages: Sequence[StageFit]) -> Commands:
 
 def tested_commands(stages: Sequence[StageFit]) -> Commands:
     """Largest command each way of the runs that a fit is of, 0 for a way that none goes."""
-    commands = [
-        run.input.values
-        for stage in stages
-        for run in stage.problem.experiments
-        if run.input.kind == "voltage"
-    ]
+    commands = list[Array]()
+    for stage in stages:
+        runs = stage.problem.experiments
+        commands += [run.input.values for run in runs if run.input.kind == "voltage"]
     size = max((float(np.abs(values).max()) for values in commands), default=0.0)
     plus = max((float(values.max()) for values in commands), default=0.0)
     minus = max((float(-values.min()) for values in commands), default=0.0)
     # noise about 0 V is no command
-    tested = [
-        min(volts, FULL_VOLTAGE) if volts > NO_COMMAND * size else 0.0 for volts in (plus, minus)
-    ]
-    return tested[0], tested[1]
+    noise = NO_COMMAND * size
+    return (
+        min(plus, FULL_VOLTAGE) if plus > noise else 0.0,
+        min(minus, FULL_VOLTAGE) if minus > noise else 0.0,
+    )
 
 
 class _Range(NamedTuple):
-    """How far numbers (6, 2) can be off."""
+    """Possible error of the machine's numbers (6, 2)."""
 
     half: Array
     """Half widths of 95 % intervals, NaN if there is none."""
@@ -138,8 +139,14 @@ def numbers_table(drive: Drive, stages: Sequence[StageFit]) -> tuple[Table, list
     Without stages of a fit there are no intervals.
     """
     largest = largest_commands(stages)
-    values, sentences = machine_numbers_of(drive, largest), list[str]()
-    range_ = _Range(np.full((6, 2), np.nan), np.full((6, 2), "", dtype=object), values, values)
+    values = machine_numbers_of(drive, largest)
+    sentences = list[str]()
+    range_ = _Range(
+        half=np.full((6, 2), np.nan),
+        doubt=np.full((6, 2), "", dtype=object),
+        near=values,
+        far=values,
+    )
     if stages:
         try:
             range_ = _range_of(drive, stages, values, largest)
@@ -156,10 +163,11 @@ def numbers_table(drive: Drive, stages: Sequence[StageFit]) -> tuple[Table, list
     )
     for row, (words, unit) in enumerate(rows):
         factor = display_unit(unit, float(np.nanmax(np.abs(values[row]), initial=0.0))).factor
-        cells = [_cell(factor, values, range_, (row, side)) for side in (0, 1)]
-        if words.startswith("Creep"):
-            cells[1] = Cell(None, "")
-        table.add(words, *cells, unit=unit, spec=".3f")
+        positive = _cell(factor, values, range_, (row, 0))
+        negative = _cell(factor, values, range_, (row, 1))
+        if row == CREEP:  # the same both ways
+            negative = Cell(None, "")
+        table.add(words, positive, negative, unit=unit, spec=".3f")
     if stages and assumed_parameters(stages):
         sentences.append(
             f"Assumed parameters are taken as known to {percent(ASSUMED)} (standard deviation)."
@@ -183,7 +191,8 @@ def _range_of(drive: Drive, stages: Sequence[StageFit], values: Array, largest: 
     def numbers(drive: Drive) -> Array:
         return machine_numbers_of(drive, largest)
 
-    unseen, assumed = unseen_limits(stages), assumed_parameters(stages)
+    unseen = unseen_limits(stages)
+    assumed = assumed_parameters(stages)
     errors = standard_errors(stages, numbers, assumed)
     half = QUANTILE * errors
     nearest, farthest = _at_limits(drive, unseen), without_limits(drive, unseen)
@@ -229,29 +238,30 @@ MEANINGS = {
 
 def _meanings(table: Table) -> list[str]:
     """Meanings of the words that a table of numbers uses."""
-    cells = [cell.text for row in table.rows for cell in row.cells if isinstance(cell, Cell)]
+    cells = list[str]()
+    for row in table.rows:
+        cells += [cell.text for cell in row.cells if isinstance(cell, Cell)]
     return [words for word, words in MEANINGS.items() if any(word in cell for cell in cells)]
 
 
 def mistaken_for_a_lag(
     column: str, stages: Sequence[StageFit], unseen: Mapping[str, float]
 ) -> bool:
-    """Whether an orifice that no stage looks for may have been taken for a lag that one estimates.
+    """Whether an orifice that no stage estimates may have been mistaken for an estimated lag.
 
     Of a limited acceleration a fit without the limit makes a longer lag, and says nothing.
     """
-    free = {
-        target
-        for stage in stages
-        for unknown in stage.problem.unknowns
-        for target in unknown.targets
-    }
+    free = set[str]()
+    for stage in stages:
+        for unknown in stage.problem.unknowns:
+            free.update(unknown.targets)
     return column in unseen and column not in free and "Z8" in free
 
 
 def _cell(factor: float, values: Array, range_: _Range, index: tuple[int, int]) -> Cell:
     """A number as it is printed: with its interval, or as the end of what is possible."""
-    value, half = factor * values[index], factor * range_.half[index]
+    value = factor * values[index]
+    half = factor * range_.half[index]
     near, far = factor * range_.near[index], factor * range_.far[index]
     if not np.isfinite(value):
         return Cell(None, NONE)
@@ -260,8 +270,9 @@ def _cell(factor: float, values: Array, range_: _Range, index: tuple[int, int]) 
         shown = f"{value:.{_decimals(value, half)}f}" if has_half else f"{value:.4g}"
         return Cell(value, f"{_unsigned_zero(shown)} ({range_.doubt[index]})")
     if near != far:
-        least = abs(far) > abs(near)
-        return Cell(near, f"at {'least' if least else 'most'} {_rounded(near, least)}, not seen")
+        at_least = abs(far) > abs(near)
+        end = "least" if at_least else "most"
+        return Cell(near, f"at {end} {_three_digits(near, towards_zero=at_least)}, not seen")
     if half <= 1e-9 * abs(value):
         # it follows from what the fit left at its nominal value alone
         return Cell(value, f"{value:.4g} (fixed)")
@@ -284,13 +295,13 @@ def _unsigned_zero(shown: str) -> str:
     return shown if float(shown) else shown.removeprefix("-")
 
 
-def _rounded(value: float, down: bool) -> str:
-    """Three digits of a number, towards 0 or away from it."""
+def _three_digits(value: float, towards_zero: bool) -> str:
+    """Round a number to three digits, towards 0 or away from it."""
     if value == 0.0:
         return "0"
     decimals = 2 - floor(log10(abs(value)))
     digits = abs(value) * 10.0**decimals
-    size = (floor(digits) if down else ceil(digits)) / 10.0**decimals
+    size = (floor(digits) if towards_zero else ceil(digits)) / 10.0**decimals
     return f"{np.copysign(size, value):.{max(decimals, 0)}f}"
 
 
@@ -314,11 +325,9 @@ def run_error(run: ShownRun, runs: Sequence[ShownRun]) -> float:
     reach = range_of(
         [other_run for other_run in judged if other_run.channel == judged_channel.channel]
     )
-    return (
-        pooled([judged_channel], without_noise=True)[judged_channel.channel].rmse / reach
-        if reach > 0.0
-        else np.inf
-    )
+    if not reach > 0.0:
+        return np.inf
+    return pooled([judged_channel], without_noise=True)[judged_channel.channel].rmse / reach
 
 
 def run_lights(
@@ -365,8 +374,9 @@ def summary_section(
             "verdict", (light(look, "Usable" if judged.usable else "Not usable"), headline), look
         )
     ]
-    shown.append(PageBlock("pair", list(_curves(runs, campaign.virtual))))
-    numbers, limits = [], []
+    shown.append(PageBlock("pair", list(_curve_blocks(runs, campaign.virtual))))
+    numbers = []
+    limits = []
     if drive is not None:
         numbers.append(PageBlock("heading", "Numbers that matter", "h3"))
         table = None
@@ -379,20 +389,20 @@ def summary_section(
             remarks = [INTERVALS, *(_meanings(table) if table else ()), *remarks]
         numbers.append(text(" ".join(remarks), "remark"))
         limits.append(PageBlock("heading", "What limits it", "h3"))
-        limits += listed_block(_limits(drive, stages))
+        limits += listed_block(_limit_sentences(drive, stages))
     limits.append(PageBlock("heading", "What to do next", "h3"))
-    limits += listed_block(_next(judged, campaign, stages, runs, findings))
+    limits += listed_block(_next_steps(judged, campaign, stages, runs, findings))
     shown.append(PageBlock("pair", [PageBlock("tile", tile) for tile in (numbers, limits) if tile]))
     return Section("summary", "Summary", shown)
 
 
-def _curves(runs: Sequence[ShownRun], virtual: bool) -> Iterable[PageBlock]:
+def _curve_blocks(runs: Sequence[ShownRun], virtual: bool) -> Iterable[PageBlock]:
     """The runs that are predicted best and worst, of those held out if there are any."""
     held_out = [k for k, run in enumerate(runs) if run.role == "validate"]
     ordered = sorted(held_out or range(len(runs)), key=lambda k: run_error(runs[k], runs))
     ends = {"Best": ordered[0], "Worst": ordered[-1]} if len(ordered) > 1 else {"The": ordered[0]}
     for which, k in ends.items():
-        kind = "held-out run" if held_out else "run" if runs[k].role == "validate" else "fitted run"
+        kind = "held-out run" if held_out else "fitted run"
         part = run_error(runs[k], runs)
         error = "never moves" if part == np.inf else f"error {percent(part)} of the range"
         content = {
@@ -405,12 +415,13 @@ def _curves(runs: Sequence[ShownRun], virtual: bool) -> Iterable[PageBlock]:
         yield PageBlock("curve", content)
 
 
-def _limits(drive: Drive, stages: Sequence[StageFit]) -> list[str]:
-    """What acts during a step each way, and what to change first.
+def _limit_sentences(drive: Drive, stages: Sequence[StageFit]) -> list[str]:
+    """Say which limits act during a step each way, and which to change first.
 
     The steps go to the largest commands that were tested; what no test reached is no limit here.
     """
-    length, (plus, minus) = int(2.0 * RATE), largest_commands(stages)
+    length = int(2.0 * RATE)
+    plus, minus = largest_commands(stages)
     command = np.repeat((0.0, plus, 0.0, -minus, 0.0), length)
     try:
         limited = without_limits(drive, unseen_limits(stages)) if stages else drive
@@ -418,12 +429,14 @@ def _limits(drive: Drive, stages: Sequence[StageFit]) -> list[str]:
     except SwashplateError as error:
         return [str(error)]
     acting = sorted(limit_times.shares, key=lambda limit: limit.time_share or 0.0, reverse=True)
-    shares = [f"{e.limit} {percent(e.time_share)}" for e in acting[:3] if e.time_share]
+    shares = [
+        f"{limit.limit} {percent(limit.time_share)}" for limit in acting[:3] if limit.time_share
+    ]
     head = f"Share of the time of steps from rest to {plus:.3g} and -{minus:.3g} V and back"
     return [f"{head}: {', '.join(shares) or 'nothing acts'}.", *limit_times.sentences()[:1]]
 
 
-def _next(
+def _next_steps(
     judged: Verdict,
     campaign: Campaign,
     stages: Sequence[StageFit],
@@ -431,16 +444,16 @@ def _next(
     findings: int,
 ) -> list[str | Markup]:
     steps: list[str | Markup] = [f"Settle first: {sentence}." for sentence in judged.unfinished]
-    steps += [f"Settle first: {sentence.sentence}" for sentence in judged.unsound[:3]]
+    steps += [f"Settle first: {finding.sentence}" for finding in judged.unsound[:3]]
     if judged.cause:
         steps.append(f"Error beyond noise: {judged.cause}")
     if findings:
         link = Markup('Look into the <a href="#data">{}</a> on the logs.')
         steps.append(link.format(count(findings, "finding")))
     weak = [name for stage in stages for name in weak_unknowns(stage)]
-    thing = "model" if any(stage.stage.part == "model" for stage in stages) else "drive"
+    subject = "model" if any(stage.stage.part == "model" for stage in stages) else "drive"
     named = listed(weak[:6]) if len(weak) <= 6 else f"{', '.join(weak[:6])} and others"
-    if weak and thing == "model":
+    if weak and subject == "model":
         steps.append(f"Not determined to within ±10 %: {named}. Add tests that move them.")
     elif weak:
         code = Markup(
@@ -451,8 +464,8 @@ def _next(
     if stages and not any(run.role == "validate" for run in runs):
         steps.append('Hold a run out of the fit (role = "validate"): nothing was predicted yet.')
     if judged.usable:
-        what = f"Use the {thing}"
+        what = f"Use the {subject}"
         steps.append(f"{what}. {judged.validity}" if judged.validity else f"{what}.")
-        if stages and thing == "drive":
+        if stages and subject == "drive":
             steps.append(Markup("Try it: <code>swashplate simulate drive.toml step:9</code>."))
     return steps

@@ -131,7 +131,7 @@ def _answers(assessment: Assessment) -> list[PageBlock]:
 
 
 def _remedies(assessment: Assessment, tables: Sequence[Table]) -> list[PageBlock]:
-    """What would do, and what was tried in vain."""
+    """List sufficient remedies, and those that were tried in vain."""
     blocks = [text(words) for words in assessment.remedy_sentences()]
     blocks += [block for table in tables for block in titled(table)]
     if assessment.tried and assessment.remedies:  # else the sentence says so
@@ -156,7 +156,7 @@ def _fit_verdicts(crane: Crane) -> list[PageBlock]:
 
 
 def _drives_limits(assessment: Assessment, acting: Table) -> list[PageBlock]:
-    """What the axes can follow, and for how long limits act; nothing for ideal drives alone."""
+    """Speeds that the axes can follow, and how long limits act; empty for ideal drives alone."""
     if not acting.rows:
         return []
     study = assessment.study
