@@ -16,8 +16,7 @@ from distributed import LocalCluster
 
 from swashplate import Campaign, rig
 from swashplate.executors import Dask, Serial
-from swashplate.identification.estimation.setup import load_setup
-from swashplate.identification.estimation.solving import Solution, sobol_starts, solve_from
+from swashplate.identification import Solution, load_setup, sobol_starts, solve_from
 from swashplate.identification.estimation.stages import stage_problem
 
 WORKERS, STARTS = 3, 16

@@ -23,6 +23,7 @@ import numpy as np
 
 from swashplate.cli.crane_options import control_of
 from swashplate.crane import (
+    Assessment,
     Crane,
     Hull,
     Scatter,
@@ -35,8 +36,8 @@ from swashplate.crane import (
     operability,
     read_ship,
 )
-from swashplate.crane.sea.confidence import rms_of
-from swashplate.crane.studies.crane_assessment import Assessment, largest_of
+from swashplate.crane.sea import rms_of
+from swashplate.crane.studies.crane_assessment import largest_of
 
 IDEAL_DESIGN = (
     control.DelayedFeedback(0.2, 0.2) | control.ShipCompensation() | control.PositionLoop(1.5)

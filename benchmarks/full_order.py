@@ -15,9 +15,13 @@ import polars as pl
 from numpy.typing import NDArray
 
 from swashplate import maneuvers
-from swashplate.equations.marching.derivatives import jacobian, residuals
-from swashplate.equations.marching.observation import Observation, ObservedRecord
-from swashplate.equations.marching.record import record_of
+from swashplate.equations.marching import (
+    Observation,
+    ObservedRecord,
+    jacobian,
+    record_of,
+    residuals,
+)
 from swashplate.full_order import FullOrderDrive, compare
 from swashplate.full_order import validity as validity_of
 

@@ -22,8 +22,7 @@ from campaign_file import campaign_text
 from command_line import Program
 
 from swashplate import Drive, rig
-from swashplate.identification.estimation.setup import load_setup
-from swashplate.identification.fitting import drawn
+from swashplate.identification import drawn, load_setup
 from swashplate.maneuvers import source_tests
 
 COUNTS_PER_TURN = 2526.315789473684

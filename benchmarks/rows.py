@@ -13,9 +13,7 @@ from timing import Timing, cores_used, in_turns, one_core
 
 from swashplate import Drive, Serial, SquaredError, maneuvers
 from swashplate.drive import PUMP_COLUMNS, bound_drive, drive_instance
-from swashplate.equations.marching.observation import Observation, ObservedRecord
-from swashplate.equations.marching.part_code import SignalId
-from swashplate.equations.marching.record import record_of
+from swashplate.equations.marching import Observation, ObservedRecord, SignalId, record_of
 from swashplate.equations.marching.run import arrays_of, planned_march
 
 Array = NDArray[np.float64]

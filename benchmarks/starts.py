@@ -20,11 +20,9 @@ from scipy.optimize import Bounds, minimize
 
 from swashplate import Campaign, DomainError, rig
 from swashplate.executors import Processes
-from swashplate.identification.estimation.problem import Problem
-from swashplate.identification.estimation.setup import load_setup
-from swashplate.identification.estimation.solving import sobol_starts, solve_from
-from swashplate.identification.estimation.stages import smooth, stage_problem
-from swashplate.identification.fitting import fit
+from swashplate.identification import Problem, fit, load_setup, sobol_starts, solve_from
+from swashplate.identification.estimation import smooth
+from swashplate.identification.estimation.stages import stage_problem
 
 REACHED = 1.001
 """A start within a thousandth of the lowest cost has reached it."""

@@ -10,12 +10,14 @@ from processes import limited
 from table import Row, duration
 
 from swashplate import Campaign, maneuvers, rig
-from swashplate.full_order.drive import FullOrderDrive
-from swashplate.identification.assessment import Identification
-from swashplate.identification.estimation.setup import load_setup
-from swashplate.identification.fitting import fit
-from swashplate.identification.statistics.determination import identifiability_of
-from swashplate.identification.statistics.intervals import uncertainty_of
+from swashplate.full_order import FullOrderDrive
+from swashplate.identification import (
+    Identification,
+    fit,
+    identifiability_of,
+    load_setup,
+    uncertainty_of,
+)
 from swashplate.report.fit_report import write_fit_report
 
 ROUNDS = 5

@@ -18,7 +18,7 @@ from pydantic import BaseModel
 
 from swashplate.campaign import CampaignFile, json_schema
 from swashplate.cli import EPILOG, HELP, app
-from swashplate.identification.estimation.setup import FitSetup
+from swashplate.identification import FitSetup
 from swashplate.parameters import CATALOGUE, REFINEMENTS, Block, Definition, SetFile
 from swashplate.results import Drawn
 

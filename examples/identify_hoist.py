@@ -15,13 +15,15 @@ from pathlib import Path
 import numpy as np
 
 from swashplate import Campaign, Drive, identify, rig
+from swashplate.identification import (
+    drawn,
+    load_setup,
+    run_information,
+    uncertainty_of,
+    with_speeds,
+)
+from swashplate.identification.estimation import smooth
 from swashplate.identification.estimation.drive_model import true_value
-from swashplate.identification.estimation.setup import load_setup
-from swashplate.identification.estimation.stages import smooth
-from swashplate.identification.fitting import drawn
-from swashplate.identification.statistics.experiment_design import run_information
-from swashplate.identification.statistics.intervals import uncertainty_of
-from swashplate.identification.validation import with_speeds
 from swashplate.report.figures import plot_channel, save_figure
 
 parser = argparse.ArgumentParser(description="Identify a hoist.")

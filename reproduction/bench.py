@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 from swashplate import rig
 from swashplate.campaign import Campaign, Experiment
 from swashplate.drive import Drive
-from swashplate.parameters.rules import FULL_VOLTAGE
+from swashplate.parameters import FULL_VOLTAGE
 
 SEVERITY: rig.Severity = "realistic"
 REFINEMENTS = {"hoist": {"spool_friction": 0.115, "spool_presliding": 5e-5, "dither_time": 0.6}}

@@ -24,7 +24,7 @@ from reproduction.virtual_figures import encoder_figure, measured_current_figure
 from swashplate.__about__ import __version__
 from swashplate.drive import Drive
 from swashplate.errors import InputError
-from swashplate.parameters.files import AXES
+from swashplate.parameters import AXES
 
 ALL = (*(f"figure {each.number}" for each in FIGURES), *(f"table {number}" for number in TABLES))
 """Names of all that can be reproduced, in the order in which it is made."""

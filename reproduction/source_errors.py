@@ -9,9 +9,9 @@ from typing import Literal, NamedTuple, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.campaign.experiment import Experiment
+from swashplate.campaign import Experiment
 from swashplate.errors import InputError
-from swashplate.identification.validation import RunQuality
+from swashplate.identification import RunQuality
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -25,10 +25,16 @@ from reproduction.source_errors import (
 from swashplate.campaign import Experiment
 from swashplate.drive import Drive
 from swashplate.errors import InputError
-from swashplate.identification.estimation.setup import load_setup
-from swashplate.identification.fitting import Search, drawn, fit
-from swashplate.identification.validation import RunQuality, predict, with_speeds
-from swashplate.parameters.parameter_set import ParameterSet
+from swashplate.identification import (
+    RunQuality,
+    Search,
+    drawn,
+    fit,
+    load_setup,
+    predict,
+    with_speeds,
+)
+from swashplate.parameters import ParameterSet
 
 SPREAD = 0.02
 """Standard deviation of the logarithm by which the fit's start differs from the truth: well within

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swashplate import FileError, InputError
-from swashplate.parameters.definitions import CATALOGUE
+from swashplate.parameters import CATALOGUE
 from swashplate.tables import UNIT, Cell, Column, Table, joined, spread, write_table, write_whole
 from swashplate.units import (
     PLATE_RATE,

@@ -20,12 +20,18 @@ from swashplate.analysis import (
     trial_of,
 )
 from swashplate.campaign import Campaign
-from swashplate.identification.assessment import Identification
-from swashplate.identification.estimation.drive_model import DriveModel
-from swashplate.identification.estimation.setup import FitSetup, Free, load_setup
-from swashplate.identification.estimation.unknowns import Unknown, Unknowns
-from swashplate.identification.fitting import Fit, fit
-from swashplate.identification.statistics.intervals import uncertainty_of
+from swashplate.identification import (
+    DriveModel,
+    Fit,
+    FitSetup,
+    Identification,
+    Unknown,
+    Unknowns,
+    fit,
+    load_setup,
+    uncertainty_of,
+)
+from swashplate.identification.estimation.setup import Free
 from swashplate.maneuvers import source_tests
 
 VOLTAGE = maneuvers.step(9.0, stop=4.0, length=5.0).sample()

@@ -19,10 +19,7 @@ from tests.shown import check_shown
 
 import swashplate
 from swashplate import Campaign, Drive
-from swashplate.identification.assessment import Identification
-from swashplate.identification.estimation.setup import FitSetup
-from swashplate.identification.fitting import Fit, fit
-from swashplate.identification.statistics.intervals import uncertainty_of
+from swashplate.identification import Fit, FitSetup, Identification, fit, uncertainty_of
 from swashplate.locks import locked
 
 Words = Callable[..., str]

@@ -12,8 +12,7 @@ import pytest
 import scipy.io
 
 from swashplate import Drive, Limit, maneuvers
-from swashplate.parameters.definitions import CATALOGUE
-from swashplate.parameters.files import preset_names
+from swashplate.parameters import CATALOGUE, preset_names
 
 NUMBER = re.compile(r"(?<!\S)[-+]?\d[\d.e+-]*(?!\S)")
 

@@ -8,7 +8,7 @@ import pytest
 from scipy.stats import binomtest
 
 from swashplate import Campaign, Drive, rig
-from swashplate.analysis.monte_carlo import Draws, stored_draws
+from swashplate.analysis import Draws, stored_draws
 from swashplate.crane import (
     Crane,
     OperatorCommand,
@@ -26,14 +26,13 @@ from swashplate.crane import (
 from swashplate.crane.closed_loop.result import PUMPS
 from swashplate.crane.rope import GRAVITY
 from swashplate.crane.sea.confidence import fewest_seaways, mean_of, more_seaways, share_of
-from swashplate.crane.studies.assessing import seaways_needed
+from swashplate.crane.studies import seaways_needed
 from swashplate.crane.studies.run_outcome import STOPPED
 from swashplate.drive import Limit
 from swashplate.errors import InputError, ParameterError
 from swashplate.executors import Processes, Serial, Threads
-from swashplate.identification.assessment import Identification
-from swashplate.identification.estimation.setup import FitSetup, Free, load_setup
-from swashplate.identification.fitting import fit
+from swashplate.identification import FitSetup, Identification, fit, load_setup
+from swashplate.identification.estimation.setup import Free
 from swashplate.maneuvers import source_tests
 
 MEANT = control.DelayedFeedback(0.2, 0.2) | control.ShipCompensation() | control.PositionLoop(1.5)

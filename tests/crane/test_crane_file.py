@@ -4,8 +4,7 @@ import re
 
 import pytest
 
-from swashplate.crane import Crane
-from swashplate.crane.crane import preset_text
+from swashplate.crane import Crane, preset_text
 from swashplate.errors import InputError, ParameterError
 
 

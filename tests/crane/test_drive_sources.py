@@ -8,8 +8,15 @@ from typer.testing import CliRunner
 
 from swashplate import Drive
 from swashplate.cli import app
-from swashplate.crane import Crane, OperatorCommand, assess, control, simulate, with_design_change
-from swashplate.crane.crane import preset_text
+from swashplate.crane import (
+    Crane,
+    OperatorCommand,
+    assess,
+    control,
+    preset_text,
+    simulate,
+    with_design_change,
+)
 from swashplate.identification import Verdict, load_setup
 from swashplate.identification.assessment import FitFile, StoredVerdict
 from swashplate.identification.diagnostics.discrepancy import ClassError, PredictionError

@@ -10,13 +10,14 @@ from swashplate.crane import (
     Scatter,
     Seaway,
     Spectrum,
+    Study,
     TransferFunctions,
     control,
     linear_response,
     operability,
 )
-from swashplate.crane.studies.operating import LEFT, NEAR, WORKABLE
-from swashplate.crane.studies.study import Study
+from swashplate.crane.studies import WORKABLE
+from swashplate.crane.studies.operating import LEFT, NEAR
 from swashplate.errors import FileError, InputError
 from swashplate.executors import Serial, Threads
 

@@ -40,7 +40,7 @@ from typer.testing import CliRunner
 from swashplate.campaign import CampaignFile
 from swashplate.cli import app
 from swashplate.documents import validated
-from swashplate.identification.estimation.setup import FitSetup
+from swashplate.identification import FitSetup
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"

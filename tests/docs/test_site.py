@@ -22,7 +22,7 @@ from swashplate.campaign import CHANNEL_KINDS
 from swashplate.cli import app
 from swashplate.drive import SIGNALS
 from swashplate.logs import SUFFIXES
-from swashplate.parameters.definitions import CATALOGUE, REFINEMENTS
+from swashplate.parameters import CATALOGUE, REFINEMENTS
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"

@@ -18,8 +18,8 @@ from swashplate.drafting import (
     guessed_fit_setup,
     guessed_set,
 )
-from swashplate.identification.estimation.setup import FitSetup, Free, Stage, load_setup
-from swashplate.identification.fitting import fit
+from swashplate.identification import FitSetup, Stage, fit, load_setup
+from swashplate.identification.estimation.setup import Free
 
 RATE = 200.0
 TIME = np.arange(int(12.0 * RATE)) / RATE

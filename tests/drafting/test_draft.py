@@ -13,7 +13,7 @@ from swashplate import Campaign, Drive, Experiment, InputError, ParameterError, 
 from swashplate.campaign import Encoder
 from swashplate.drafting import draft_campaign as draft
 from swashplate.drafting import guess_drive, guess_table, guessed_fit_setup, guessed_set
-from swashplate.identification.estimation.setup import FitSetup
+from swashplate.identification import FitSetup
 
 HEADERS = {
     "voltage": ("Joystick voltage", "lever [V]", "command_V", "Joystickspannung"),

@@ -16,11 +16,7 @@ from swashplate.campaign import (
     unsigned_currents,
 )
 from swashplate.drafting import draft_campaign, guess_drive
-from swashplate.identification.diagnostics.data_checks import (
-    check_runs,
-    refuse_unsound,
-    spike_findings,
-)
+from swashplate.identification.diagnostics import check_runs, refuse_unsound, spike_findings
 
 SINE = 5.0 * np.sin(2.0 * np.pi * 0.4 * TIME)
 PER_TURN = {"counts_per_turn": 1000.0}

@@ -26,8 +26,9 @@ from swashplate.drive import drive_instance
 from swashplate.equations import Model, Tap, equation, simulate
 from swashplate.equations.code_generation.lowering import definition_in, lowered
 from swashplate.equations.code_generation.machine_code import optimised
+from swashplate.equations.marching import LANES, lanes_of
 from swashplate.equations.marching.kernels import KERNEL_KINDS
-from swashplate.equations.marching.lanes import LANES, MARCH_KINDS, lanes_of
+from swashplate.equations.marching.lanes import MARCH_KINDS
 from swashplate.equations.marching.run import LIBRARY
 from swashplate.equations.marching.structure import structure_of
 from swashplate.models.displacement_control import PumpOptions

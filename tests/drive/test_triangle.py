@@ -11,9 +11,8 @@ from tests.drive.experiments import triangle
 
 from swashplate import DomainError, Drive
 from swashplate.equations import Model, equation, instance_of
+from swashplate.equations.marching import Observation, ObservedRecord, Record, record_of
 from swashplate.equations.marching import derivatives as engine
-from swashplate.equations.marching.observation import Observation, ObservedRecord
-from swashplate.equations.marching.record import Record, record_of
 
 pytestmark = pytest.mark.traced
 

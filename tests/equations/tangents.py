@@ -9,8 +9,8 @@ from typing import Any, get_type_hints
 
 import numpy as np
 
-from swashplate.equations.fields import floats_of, value_at
-from swashplate.equations.model import Window, arguments_of, linear, mean_over_sample, previous
+from swashplate.equations import Window, arguments_of, floats_of, value_at
+from swashplate.equations.model import linear, mean_over_sample, previous
 
 
 class Tangent:

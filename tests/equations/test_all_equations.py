@@ -18,10 +18,8 @@ from tests.equations.differences import compared, leaves
 import swashplate.equations
 import swashplate.models
 from swashplate import Drive, PhysicalSet
-from swashplate.equations import derive
-from swashplate.equations.declaration import interpreted, is_function
-from swashplate.equations.language import plain
-from swashplate.equations.model import Window
+from swashplate.equations import Window, derive, interpreted, plain
+from swashplate.equations.declaration import is_function
 from swashplate.models import amplifier, full_order, machine, pump
 from swashplate.models import displacement_control as control
 

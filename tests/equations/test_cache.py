@@ -14,8 +14,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from swashplate.equations import closure, closure_hash, derive, equation, generated, kernel, source
-from swashplate.equations.cache import DAY, UNCACHED
+from swashplate.equations import (
+    UNCACHED,
+    closure,
+    closure_hash,
+    derive,
+    equation,
+    generated,
+    kernel,
+    source,
+)
+from swashplate.equations.cache import DAY
 
 SLOPE = 2.0
 

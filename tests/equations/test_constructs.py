@@ -10,8 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tests.equations.differences import compared
 
-from swashplate.equations import declared, derive, equation, interpolate, repeated, root
-from swashplate.equations.declaration import JIT_OFF
+from swashplate.equations import JIT_OFF, declared, derive, equation, interpolate, repeated, root
 from swashplate.errors import EquationError
 
 pytestmark = pytest.mark.interpreted

@@ -8,12 +8,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from swashplate.equations.code_generation.functions import FUNCTIONS
-from swashplate.equations.code_generation.loops import blank, root
+from swashplate.equations import JIT_OFF, plain, root
+from swashplate.equations.code_generation import FUNCTIONS
+from swashplate.equations.code_generation.loops import blank
 from swashplate.equations.code_generation.lowering import definition_in, lowered
 from swashplate.equations.code_generation.machine_code import code_of_function
-from swashplate.equations.declaration import JIT_OFF
-from swashplate.equations.language import plain
 
 LIBRARY = {**vars(math), **FUNCTIONS}
 UNCOMPILED = {

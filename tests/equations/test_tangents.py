@@ -7,7 +7,7 @@ from tests.equations.tangents import marched
 
 from swashplate import Drive
 from swashplate.drive import drive_instance
-from swashplate.equations.fields import floats_of
+from swashplate.equations import floats_of
 from swashplate.parameters import DEFINITIONS, SWITCHES
 
 RATE, SIZE = 512.0, 300

@@ -8,9 +8,8 @@ from typing import Any
 
 import pytest
 
-from swashplate.equations import closure, closure_hash, derive, equation
+from swashplate.equations import closure, closure_hash, derive, equation, plain
 from swashplate.equations.declaration import is_function
-from swashplate.equations.language import plain
 from swashplate.models import amplifier, pump
 from swashplate.models import displacement_control as control
 from swashplate.models.amplifier import CardOptions

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from swashplate import Drive, export
 from swashplate.equations import Definition, Model, equation
-from swashplate.equations.code_generation.printing_c import comment, comment_line, function
+from swashplate.equations.code_generation import comment, comment_line, function
 from swashplate.export.c_source import interface
 
 GCC = shutil.which("gcc")

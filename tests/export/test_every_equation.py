@@ -16,7 +16,7 @@ from tests.equations.test_all_equations import EQUATIONS, equations_of
 from tests.export.twins import InC, flagged
 
 from swashplate.equations import equation, repeated, root
-from swashplate.equations.code_generation.printing_c import Loops, helpers_in
+from swashplate.equations.code_generation import Loops, helpers_in
 from swashplate.errors import EquationError
 from swashplate.export.c_source import equation_in_c
 

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from swashplate.equations.code_generation.printing_c import Loops, helpers_in
-from swashplate.equations.language import is_named_tuple, parsed, plain
-from swashplate.equations.marching.run import module
+from swashplate.equations import is_named_tuple, parsed, plain
+from swashplate.equations.code_generation import Loops, helpers_in
+from swashplate.equations.marching import module
 from swashplate.export.c_source import EquationInC, equation_in_c
 
 CALLS = 3000

@@ -4,7 +4,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from swashplate.drive import Simulation
-from swashplate.equations.declaration import interpreted
+from swashplate.equations import interpreted
 from swashplate.full_order import FullOrderDrive
 from swashplate.models.displacement_control import solenoid_force
 from swashplate.models.full_order import Motion, free_rates

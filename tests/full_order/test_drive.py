@@ -8,7 +8,7 @@ import pytest
 from tests.full_order.referee import solved
 
 from swashplate import DomainError, Drive, InputError, UnknownParameterError, maneuvers
-from swashplate.equations.declaration import interpreted
+from swashplate.equations import interpreted
 from swashplate.full_order import (
     TABLE_MANEUVERS,
     FullOrderDrive,

@@ -8,10 +8,14 @@ import numpy as np
 import pytest
 
 from swashplate import DomainError, FullOrderDrive, PhysicalSet
-from swashplate.equations.declaration import interpreted
-from swashplate.equations.marching.derivatives import jacobian, residuals
-from swashplate.equations.marching.observation import Observation, ObservedRecord
-from swashplate.equations.marching.record import record_of
+from swashplate.equations import interpreted
+from swashplate.equations.marching import (
+    Observation,
+    ObservedRecord,
+    jacobian,
+    record_of,
+    residuals,
+)
 from swashplate.models.displacement_control import Solenoids
 from swashplate.models.full_order import Substeps
 from swashplate.models.machine import ATMOSPHERE, Machine, mixture_modulus, oil_modulus

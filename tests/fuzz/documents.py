@@ -10,8 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from swashplate import Campaign, Drive, SwashplateError
-from swashplate.crane import Crane
-from swashplate.crane.crane import preset_text
+from swashplate.crane import Crane, preset_text
 from swashplate.identification import load_setup
 
 QUOTED = ".".join(['"a"'] * 20_000)

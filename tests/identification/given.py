@@ -10,8 +10,9 @@ from numpy.typing import ArrayLike
 from scipy.signal import lfilter
 
 from swashplate import Campaign, Channel, Experiment, rig
-from swashplate.campaign.experiment import InputSignal, SignalOrigin
+from swashplate.campaign import InputSignal, SignalOrigin
 from swashplate.executors import Serial
+from swashplate.identification import FitSetup, Unknown, Unknowns
 from swashplate.identification.estimation.arrow import RunRows
 from swashplate.identification.estimation.problem import (
     TOLERANCE,
@@ -19,8 +20,6 @@ from swashplate.identification.estimation.problem import (
     LinearisedRun,
     factor_of,
 )
-from swashplate.identification.estimation.setup import FitSetup
-from swashplate.identification.estimation.unknowns import Unknown, Unknowns
 
 UNITS = {
     "voltage": "V",

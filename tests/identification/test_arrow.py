@@ -7,12 +7,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.identification.given import TIME, bench_run
 
+from swashplate.identification import (
+    Linearised,
+    Problem,
+    Unknown,
+    Unknowns,
+    linearised_fit,
+    solve,
+    uncertainty,
+)
 from swashplate.identification.estimation.arrow import RunRows, arrow_factor, whitening
-from swashplate.identification.estimation.model import Linearised
-from swashplate.identification.estimation.problem import Problem, linearised_fit
-from swashplate.identification.estimation.solving import solve
-from swashplate.identification.estimation.unknowns import Unknown, Unknowns
-from swashplate.identification.statistics.intervals import uncertainty
 
 TOLERANCE = 1e-10
 

@@ -8,9 +8,9 @@ from tests.identification.given import model_of, run_of
 
 from swashplate import Drive
 from swashplate.campaign import Experiment
+from swashplate.identification import as_fit_setup, fit
+from swashplate.identification.estimation import smooth
 from swashplate.identification.estimation.between_samples import doubt, joined
-from swashplate.identification.estimation.stages import as_fit_setup, smooth
-from swashplate.identification.fitting import fit
 from swashplate.maneuvers import sine, step
 
 RATE = 128.0

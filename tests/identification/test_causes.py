@@ -8,11 +8,8 @@ import numpy as np
 import pytest
 
 from swashplate import Campaign, Drive, rig
+from swashplate.identification import Fit, Verdict, assess_fit, fit, load_setup, predict
 from swashplate.identification.diagnostics.causes import behind_lag
-from swashplate.identification.diagnostics.verdict import Verdict, assess_fit
-from swashplate.identification.estimation.setup import load_setup
-from swashplate.identification.fitting import Fit, fit
-from swashplate.identification.validation import predict
 from swashplate.maneuvers import ramp, sine, step
 
 TESTS = {

@@ -9,14 +9,11 @@ from tests.identification.given import run_of, virtual
 
 from swashplate import Campaign, Drive, Experiment, InputError, maneuvers
 from swashplate.drafting import guess_drive
-from swashplate.identification.diagnostics.data_checks import (
-    Finding,
-    check_runs,
-    refuse_unsound,
-)
-from swashplate.identification.estimation.setup import FitSetup, Free, Stage
-from swashplate.identification.estimation.stages import smooth
-from swashplate.identification.fitting import fit
+from swashplate.identification import FitSetup, Stage, fit
+from swashplate.identification.diagnostics import check_runs, refuse_unsound
+from swashplate.identification.diagnostics.data_checks import Finding
+from swashplate.identification.estimation import smooth
+from swashplate.identification.estimation.setup import Free
 
 NOMINAL = smooth(Drive.preset("hoist").parameters)
 TRUTH = Drive(NOMINAL).scale(Z10=1.1)

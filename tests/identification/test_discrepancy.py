@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.identification.given import TIME, bench_run, linear_fit, unknowns_of
 
+from swashplate.identification import RunQuality
 from swashplate.identification.diagnostics.discrepancy import (
     ChannelErrors,
     PredictionError,
@@ -21,7 +22,7 @@ from swashplate.identification.diagnostics.discrepancy import (
     variance_function,
 )
 from swashplate.identification.estimation.problem import LinearisedRun
-from swashplate.identification.validation import RunQuality, compared
+from swashplate.identification.validation import compared
 
 STEP = 0.01
 

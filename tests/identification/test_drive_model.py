@@ -7,19 +7,22 @@ import pytest
 from tests.identification.given import TWO_STAGES, run_of, virtual
 
 from swashplate import Campaign, Drive, Experiment, InputError
-from swashplate.campaign.experiment import InputSignal
-from swashplate.identification.estimation.drive_model import (
+from swashplate.campaign import InputSignal
+from swashplate.identification import (
     DriveModel,
-    at_rate_of,
-    measured_current,
-    simulated_current,
+    FitSetup,
+    Stage,
+    Unknown,
+    at_instants,
+    fit,
+    load_setup,
+    predict,
 )
-from swashplate.identification.estimation.setup import FitSetup, Free, Stage, load_setup
-from swashplate.identification.estimation.stages import smooth, stage_problem, start_currents_of
-from swashplate.identification.estimation.unknowns import Unknown
-from swashplate.identification.fitting import fit
+from swashplate.identification.estimation import at_rate_of, smooth
+from swashplate.identification.estimation.drive_model import measured_current, simulated_current
+from swashplate.identification.estimation.setup import Free
+from swashplate.identification.estimation.stages import stage_problem, start_currents_of
 from swashplate.identification.statistics.determination import bounds_reached
-from swashplate.identification.validation import at_instants, predict
 from swashplate.maneuvers import source_tests, step
 from swashplate.parameters import DEFINITIONS
 

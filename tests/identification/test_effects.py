@@ -10,12 +10,10 @@ from tests.identification.given import run_of, virtual
 from tests.identification.test_own_model import FREE, OWN, TRUTH, trial, valve
 
 from swashplate import Campaign, Drive, Experiment, ParameterError
-from swashplate.campaign.experiment import Accuracy, resolution_of_inputs
+from swashplate.campaign import Accuracy, resolution_of_inputs
 from swashplate.equations import simulate
-from swashplate.identification import ModelSetup, fit
-from swashplate.identification.stage_fit import StageFit
+from swashplate.identification import ModelSetup, StageFit, estimates_of, fit, uncertainty_of
 from swashplate.identification.statistics.effects import after_play, changes_of
-from swashplate.identification.statistics.intervals import estimates_of, uncertainty_of
 from swashplate.maneuvers import source_tests
 
 RATE = 512.0
@@ -180,7 +178,7 @@ def test_a_hysteresis_of_the_current_goes_into_the_pump_alone(tmp_path) -> None:
     drive, effect = Drive.preset("slew"), "hysteresis of the current"
 
     def of_pump(width: float, drive: Drive = drive) -> StageFit:
-        from swashplate.identification.estimation.setup import load_setup
+        from swashplate.identification import load_setup
 
         setup = load_setup("slew")
         stages = [stage.model_copy(update={"current_hysteresis": width}) for stage in setup.stages]

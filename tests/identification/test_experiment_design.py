@@ -8,28 +8,29 @@ import pytest
 from tests.identification.given import run_of, unknowns_of, virtual
 
 from swashplate import Campaign, Drive, Experiment, InputError, maneuvers
-from swashplate.identification.estimation.setup import FitSetup, Forces, Free, Stage, load_setup
-from swashplate.identification.estimation.stages import smooth
-from swashplate.identification.estimation.unknowns import Prior
-from swashplate.identification.fitting import fit
-from swashplate.identification.statistics.determination import (
+from swashplate.identification import (
+    FitSetup,
     Identifiability,
-    identifiability,
+    Prior,
+    RunInformation,
+    Stage,
+    advise,
+    fit,
+    load_setup,
+    prior_information,
+    run_information,
+    uncertainty_of,
 )
+from swashplate.identification.estimation import Forces, smooth
+from swashplate.identification.estimation.setup import Free
+from swashplate.identification.statistics import advice_table, best_tests_table, sequential_plan
+from swashplate.identification.statistics.determination import identifiability
 from swashplate.identification.statistics.experiment_design import (
     MEMORY,
     CandidateTest,
-    RunInformation,
     Sensor,
-    advice_table,
-    advise,
-    best_tests_table,
     default_sensors,
-    prior_information,
-    run_information,
-    sequential_plan,
 )
-from swashplate.identification.statistics.intervals import uncertainty_of
 from swashplate.maneuvers import sine, step
 
 AB = unknowns_of("ab", np.ones(2))

@@ -18,17 +18,22 @@ from tests.identification.given import (
 from tests.identification.test_own_model import NOISE, RANGES, RUNS, servo
 
 from swashplate import Campaign, DomainError, Drive, InputError, ParameterError
-from swashplate.identification import ModelSetup, fit
-from swashplate.identification.estimation.problem import (
-    LinearisedRun,
-    Loss,
+from swashplate.identification import (
+    FitSetup,
+    ModelSetup,
+    Prior,
     Problem,
-    influence,
+    Unknown,
+    Unknowns,
+    fit,
     linearised_fit,
+    load_setup,
+    solve,
+    uncertainty,
+    uncertainty_of,
 )
-from swashplate.identification.estimation.setup import FitSetup, load_setup, setup_text
-from swashplate.identification.estimation.solving import solve
-from swashplate.identification.estimation.unknowns import Prior, Unknown, Unknowns
+from swashplate.identification.estimation.problem import LinearisedRun, Loss, influence
+from swashplate.identification.estimation.setup import setup_text
 from swashplate.identification.noise import Covariance
 from swashplate.identification.statistics.interval_ends import checked_ends
 from swashplate.identification.statistics.intervals import (
@@ -36,8 +41,6 @@ from swashplate.identification.statistics.intervals import (
     estimates,
     prior_sentences,
     reach,
-    uncertainty,
-    uncertainty_of,
     weighed,
     with_earlier_stages,
 )

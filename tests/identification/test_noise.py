@@ -6,9 +6,8 @@ from scipy.linalg import matmul_toeplitz
 from scipy.stats import t as student
 from tests.identification.given import first_order, linear_fit, unknowns_of
 
-from swashplate.identification import uncertainty
+from swashplate.identification import Unknown, Unknowns, uncertainty
 from swashplate.identification.estimation.problem import LinearisedFit, LinearisedRun
-from swashplate.identification.estimation.unknowns import Unknown, Unknowns
 from swashplate.identification.noise import (
     NoiseColour,
     band_score_covariance,

@@ -36,9 +36,9 @@ from swashplate.identification import (
     fit,
     predict,
     solve,
+    uncertainty_of,
 )
 from swashplate.identification.estimation.model import linearised
-from swashplate.identification.statistics.intervals import uncertainty_of
 
 RATE = 20.0
 TIME = np.arange(240) / RATE

@@ -16,22 +16,23 @@ from tests.identification.given import (
 )
 
 from swashplate import Campaign, Drive, Experiment, InputError
-from swashplate.identification.estimation.problem import Problem
-from swashplate.identification.estimation.setup import Free, Stage
-from swashplate.identification.estimation.solving import solve
-from swashplate.identification.estimation.unknowns import Unknown, Unknowns
-from swashplate.identification.fitting import fit
-from swashplate.identification.resampling import (
+from swashplate.identification import (
     CrossValidation,
-    Fold,
+    Problem,
+    Stage,
+    StageFit,
+    Unknown,
+    Unknowns,
     cross_validate,
-    deal,
+    fit,
+    predict,
+    profiles_of,
+    solve,
+    uncertainty_of,
 )
-from swashplate.identification.stage_fit import StageFit
-from swashplate.identification.statistics.intervals import uncertainty_of
-from swashplate.identification.statistics.profiles import profiles_of
-from swashplate.identification.validation import predict
-from swashplate.parameters.files import load_preset
+from swashplate.identification.estimation.setup import Free
+from swashplate.identification.resampling import Fold, deal
+from swashplate.parameters import load_preset
 
 
 @pytest.fixture

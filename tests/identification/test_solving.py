@@ -19,18 +19,23 @@ from swashplate import (
     ParameterError,
 )
 from swashplate.executors import Processes, Serial, Threads
-from swashplate.identification.estimation.model import Linearised
-from swashplate.identification.estimation.problem import Evaluation, Problem, noise_scales
-from swashplate.identification.estimation.setup import Free, Stage
-from swashplate.identification.estimation.solving import (
-    Progress,
+from swashplate.identification import (
+    Linearised,
+    Prior,
+    Problem,
     Solution,
+    Stage,
+    Unknown,
+    Unknowns,
     sobol_starts,
     solve,
     solve_from,
 )
+from swashplate.identification.estimation.problem import Evaluation, noise_scales
+from swashplate.identification.estimation.setup import Free
+from swashplate.identification.estimation.solving import Progress
 from swashplate.identification.estimation.stages import stage_problem
-from swashplate.identification.estimation.unknowns import Prior, Unknown, Unknowns, bounded
+from swashplate.identification.estimation.unknowns import bounded
 
 
 def test_tied_directions_and_unknowns_of_one_experiment() -> None:

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from tests.identification.given import bench_run, run_of
 
+from swashplate.identification import RunQuality
 from swashplate.identification.diagnostics.data_checks import Finding, clipped_channels
 from swashplate.identification.diagnostics.soundness import outlying_runs
-from swashplate.identification.validation import RunQuality, compared
+from swashplate.identification.validation import compared
 
 TIME = np.arange(2000) * 0.01
 LEVELS = (0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2)

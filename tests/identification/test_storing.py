@@ -11,12 +11,10 @@ import pytest
 from tests.identification.given import TWO_STAGES, put
 
 from swashplate import Campaign, Drive, FileError, InputError, ParameterError
-from swashplate.identification.assessment import Identification
-from swashplate.identification.estimation.solving import Solution
-from swashplate.identification.fitting import Fit, fingerprint, fit
-from swashplate.identification.resampling import CrossValidation, Fold
+from swashplate.identification import CrossValidation, Fit, Identification, Profile, Solution, fit
+from swashplate.identification.fitting import fingerprint
+from swashplate.identification.resampling import Fold
 from swashplate.identification.statistics.interval_ends import Point
-from swashplate.identification.statistics.profiles import Profile
 from swashplate.identification.validation import Measures
 from swashplate.locks import locked
 

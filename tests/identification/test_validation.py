@@ -9,16 +9,8 @@ from scipy.signal import lfilter
 from tests.identification.given import bench_run, first_order, run_of, virtual
 
 from swashplate import Campaign, Drive, InputError, maneuvers, rig
-from swashplate.identification.diagnostics.verdict import assess_fit
-from swashplate.identification.validation import (
-    compared,
-    ignored_windows,
-    measures,
-    pooled,
-    predict,
-    residual_test,
-    with_speeds,
-)
+from swashplate.identification import assess_fit, ignored_windows, pooled, predict, with_speeds
+from swashplate.identification.validation import compared, measures, residual_test
 
 MEASURED = np.array([0.0, 2.0, 4.0, 6.0])
 SIMULATED = np.array([1.0, 2.0, 4.0, 5.0])

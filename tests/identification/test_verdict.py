@@ -7,13 +7,19 @@ import pytest
 from tests.identification.given import RISE, TIME, bench_run, risen, run_of
 
 from swashplate import Drive
-from swashplate.identification import Verdict, assess_fit
-from swashplate.identification.estimation.problem import Problem
-from swashplate.identification.estimation.setup import Stage
-from swashplate.identification.estimation.solving import solve
-from swashplate.identification.estimation.unknowns import Unknown, Unknowns
-from swashplate.identification.stage_fit import Interval, StageFit
-from swashplate.identification.validation import RunQuality, compared
+from swashplate.identification import (
+    Problem,
+    RunQuality,
+    Stage,
+    StageFit,
+    Unknown,
+    Unknowns,
+    Verdict,
+    assess_fit,
+    solve,
+)
+from swashplate.identification.stage_fit import Interval
+from swashplate.identification.validation import compared
 
 WAVE = 10.0 * np.sin(2.0 * np.pi * TIME / 4.0)
 SWAP = np.where(np.arange(81) % 2, 1.0, -1.0)

@@ -9,11 +9,8 @@ import pytest
 
 from swashplate import DomainError, Drive, InputError
 from swashplate.drive import drive_instance
-from swashplate.equations import instance_of
-from swashplate.equations.declaration import equation
-from swashplate.equations.marching.part_code import SignalId
-from swashplate.equations.marching.run import Instance, PartNumbers, marched
-from swashplate.equations.model import Model, Tap, discretised, join
+from swashplate.equations import Instance, Model, Tap, discretised, equation, instance_of, join
+from swashplate.equations.marching import PartNumbers, SignalId, marched
 from swashplate.linear import LinearModel, linearize
 
 RATE = 100.0

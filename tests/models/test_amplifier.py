@@ -13,7 +13,7 @@ from scipy.optimize import brentq
 
 from swashplate import Drive
 from swashplate.drive import filter_step_limit
-from swashplate.equations.model import Window
+from swashplate.equations import Window
 from swashplate.models import amplifier
 from swashplate.models.amplifier import Channel, Filter
 

@@ -5,8 +5,7 @@ from typing import Any
 
 import pytest
 
-from swashplate.equations import derive
-from swashplate.equations.library import faded, small_arctangent, soft_threshold
+from swashplate.equations import derive, faded, small_arctangent, soft_threshold
 from swashplate.models import amplifier
 from swashplate.models import displacement_control as control
 from swashplate.models.amplifier import Channel

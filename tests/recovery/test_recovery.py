@@ -8,16 +8,24 @@ import pytest
 from tests.identification.given import run_of, virtual
 
 from swashplate import Campaign, DomainError, Drive, FullOrderDrive, ParameterError, maneuvers
-from swashplate.campaign import ChannelKind
-from swashplate.campaign.experiment import Experiment
-from swashplate.identification.estimation.model import Linearised
-from swashplate.identification.estimation.problem import Problem, linearised_fit
-from swashplate.identification.estimation.setup import FitSetup, Free, Stage, load_setup
-from swashplate.identification.estimation.solving import solve
-from swashplate.identification.estimation.unknowns import Unknown, Unknowns
-from swashplate.identification.fitting import Fit, drawn, fit
-from swashplate.identification.stage_fit import StageFit
-from swashplate.identification.statistics.intervals import uncertainty
+from swashplate.campaign import ChannelKind, Experiment
+from swashplate.identification import (
+    Fit,
+    FitSetup,
+    Linearised,
+    Problem,
+    Stage,
+    StageFit,
+    Unknown,
+    Unknowns,
+    drawn,
+    fit,
+    linearised_fit,
+    load_setup,
+    solve,
+    uncertainty,
+)
+from swashplate.identification.estimation.setup import Free
 from swashplate.parameters import OPTIONS, REFINEMENTS
 
 AXES = ("hoist", "slew", "luff")

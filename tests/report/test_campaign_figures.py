@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from swashplate import InputError
 from swashplate.campaign import Channel, Encoder, Experiment, InputSignal, SignalOrigin
-from swashplate.identification.assessment import motion_of
+from swashplate.identification import motion_of
 from swashplate.report.figures import plot_campaign, plot_channel
 
 SOURCE = SignalOrigin(Path("run.csv"), "a column")

@@ -18,30 +18,33 @@ from tests.identification.given import virtual
 from tests.report.conftest import injected, policy_of, with_script
 
 from swashplate import Campaign, Drive, FileError, InputError, maneuvers
-from swashplate.identification import assess_fit
-from swashplate.identification.assessment import Identification
+from swashplate.identification import (
+    CrossValidation,
+    Fit,
+    FitSetup,
+    Identification,
+    Profile,
+    Solution,
+    assess_fit,
+    fit,
+    predict,
+    uncertainty_of,
+    with_speeds,
+)
 from swashplate.identification.diagnostics.causes import Cause
-from swashplate.identification.estimation.setup import FitSetup
-from swashplate.identification.estimation.solving import Solution
-from swashplate.identification.fitting import Fit, fit
-from swashplate.identification.resampling import CrossValidation, Fold
+from swashplate.identification.resampling import Fold
 from swashplate.identification.statistics.interval_ends import Point
-from swashplate.identification.statistics.intervals import uncertainty_of
-from swashplate.identification.statistics.profiles import Profile
-from swashplate.identification.validation import Measures, predict, with_speeds
+from swashplate.identification.validation import Measures
 from swashplate.maneuvers import parse
 from swashplate.report.fit_report import (
     print_report,
+    shown_runs,
     write_fit_report,
     write_live_page,
+    write_samples,
     write_validation_report,
 )
-from swashplate.report.fit_report.runs import (
-    packed_samples,
-    run_data,
-    shown_runs,
-    write_samples,
-)
+from swashplate.report.fit_report.runs import packed_samples, run_data
 from swashplate.report.fit_report.summary import numbers_table
 
 HOSTILE = "</script><img src=x onerror=alert(1)>"

@@ -13,11 +13,8 @@ from tests.identification.given import run_of
 from swashplate import Drive, Experiment, maneuvers
 from swashplate.analysis import envelope, standard_errors, variances_from_bounds
 from swashplate.drafting import guess_drive, guess_table, guessed_fit_setup, guessed_set
-from swashplate.identification import assess_fit
-from swashplate.identification.estimation.setup import FitSetup, Free
-from swashplate.identification.fitting import Fit, fit
-from swashplate.identification.statistics.determination import identifiability_of
-from swashplate.identification.validation import predict
+from swashplate.identification import Fit, FitSetup, assess_fit, fit, identifiability_of, predict
+from swashplate.identification.estimation.setup import Free
 from swashplate.report.fit_report.summary import largest_commands, machine_numbers_of, numbers_table
 from swashplate.tables import Cell
 

@@ -9,8 +9,7 @@ import pytest
 import sympy as sp
 
 from swashplate import Drive, PhysicalSet
-from swashplate.equations.declaration import interpreted
-from swashplate.equations.fields import made
+from swashplate.equations import interpreted, made
 from swashplate.models import displacement_control, machine, pump, refinements
 from swashplate.models.displacement_control import Pump
 from swashplate.models.machine import Machine

@@ -9,9 +9,7 @@ import pint
 import pytest
 
 from swashplate import Drive, maneuvers
-from swashplate.equations import derive
-from swashplate.equations.declaration import interpreted
-from swashplate.equations.fields import made
+from swashplate.equations import derive, interpreted, made
 from swashplate.full_order import QUANTITIES, FullOrderDrive, PhysicalSet
 from swashplate.models import displacement_control as control
 from swashplate.models import machine
