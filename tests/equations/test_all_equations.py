@@ -106,7 +106,7 @@ RANGES = {
     "plate": (-6e5, 6e5), "plate_pressure": (-6e5, 6e5), "number": (0.0, 5.0),
     "tau": (0.014, 0.014),
     "spool_position": (-3e-4, 3e-4), "spool_velocity": (-0.3, 0.3), "piston_pressure": (-6e5, 6e5),
-    "step": (1e-5, 1e-4), "rise": (-0.01, 0.01), "substeps": (2.0, 2.0), "begun": (1.0, 1.0),
+    "step": (1e-5, 1e-4), "rise": (-0.01, 0.01), "substeps": (2.0, 2.0), "initialised": (1.0, 1.0),
     "moment": (-100.0, 100.0),
     "resistance": (0.0, 5.0), "inertia": (0.005, 0.01),
 }  # fmt: skip
@@ -146,7 +146,7 @@ class Draw:
             return H
         if name in ("direction", "sign"):
             return self.random.choice([1.0, -1.0])
-        if name in control.Pump._fields or name in amplifier.Channel._fields:
+        if name in control.Pump._fields or name in amplifier.CardChannel._fields:
             return self.parameter(name)
         raise AssertionError(f"{self.name}: say in RANGES what '{name}' can be")
 
@@ -173,7 +173,7 @@ class Draw:
             return self.random.choice([None, True])
         if kind == control.Pump | control.Solenoids:
             kind = control.Pump
-        if kind in (control.Pump, control.Solenoids, amplifier.Channel):
+        if kind in (control.Pump, control.Solenoids, amplifier.CardChannel):
             return kind(*map(self.parameter, kind._fields))
         if kind in (amplifier.CardSignals, amplifier.ChannelSignals):
             return kind(*(self.uniform(*AMPERES) for _ in kind._fields))

@@ -4,7 +4,7 @@ import pytest
 
 from swashplate import Drive
 from swashplate.drive import card_of, pump_of
-from swashplate.models.amplifier import Channel
+from swashplate.models.amplifier import CardChannel
 from swashplate.models.displacement_control import Pump
 
 
@@ -15,6 +15,6 @@ def pump(hoist: Drive) -> Pump:
 
 
 @pytest.fixture(scope="session")
-def channel(hoist: Drive) -> Channel:
+def channel(hoist: Drive) -> CardChannel:
     """The positive channel of the hoist's card."""
     return card_of(hoist.parameters).plus

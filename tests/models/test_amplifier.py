@@ -15,7 +15,7 @@ from swashplate import Drive
 from swashplate.drive import filter_step_limit
 from swashplate.equations import Window
 from swashplate.models import amplifier
-from swashplate.models.amplifier import Channel, Filter
+from swashplate.models.amplifier import CardChannel, Filter
 
 Array = NDArray[np.float64]
 RATES = (200.0, 512.0, 600.0, 1000.0, 2000.0)
@@ -38,7 +38,7 @@ def test_share_of_an_interval_above_the_dead_zone() -> None:
 # --- the filter's differential equation ----------------------------------------------------------
 
 
-def marched(p: Channel, steady: Array, h: float) -> Array:
+def marched(p: CardChannel, steady: Array, h: float) -> Array:
     """I* of the exact filter under an I_ss straight between samples, settled at the first."""
     state, found = Filter(float(steady[0]), 0.0, 0.0), []
     for begins, ends in pairwise([float(steady[0]), *map(float, steady)]):
@@ -77,7 +77,7 @@ def test_it_converges_with_order_two(axis_side: str) -> None:
     """A command on the rise, solved by SciPy from the moment at which it overcomes C."""
     name, side = axis_side.split("_")
     numbers = Drive.preset(name).parameters.numbers
-    p = Channel(*(numbers[f"{each}_{side}"] for each in Channel._fields))
+    p = CardChannel(*(numbers[f"{each}_{side}"] for each in CardChannel._fields))
 
     def command(t: Array | float) -> Array | float:
         return 0.5 * t**2 * (3.0 - 2.0 * t) + 0.05 * t
@@ -104,7 +104,7 @@ def test_it_converges_with_order_two(axis_side: str) -> None:
 @pytest.mark.parametrize("zeta", [0.1, 1.0, 1.1014, 1.4157])
 def test_it_is_stable_and_sticks_at_any_rate(zeta: float) -> None:
     """After a step it comes to rest within C/ω² of I_ss, and stays there exactly."""
-    p = Channel(0.1, 0.1, 0.1, 0.0, 0.0, zeta, 98.377, 4.8368, inf, inf, inf, 0.0, inf)
+    p = CardChannel(0.1, 0.1, 0.1, 0.0, 0.0, zeta, 98.377, 4.8368, inf, inf, inf, 0.0, inf)
     for rate in (50.0, *RATES):
         assert p.omega / rate < filter_step_limit(zeta, exact=True)
         found = marched(p, np.r_[0.0, np.full(round(3.0 * rate), 0.5)], 1.0 / rate)
@@ -114,7 +114,7 @@ def test_it_is_stable_and_sticks_at_any_rate(zeta: float) -> None:
 
 
 @pytest.mark.interpreted
-def test_friction_takes_the_rate_and_stops_at_zero(channel: Channel) -> None:
+def test_friction_takes_the_rate_and_stops_at_zero(channel: CardChannel) -> None:
     # a filter that nothing else moves: x = x_0 + v h - C h²/2, less where it stops before h
     p, h = channel._replace(zeta=1e-6, omega=1e-3, C=2.5), 0.2
     found = [amplifier.exact_filter(Filter(0.2, v, 0.0), 0.0, 0.0, p, h) for v in (0.8, -0.4)]
@@ -125,7 +125,7 @@ def test_friction_takes_the_rate_and_stops_at_zero(channel: Channel) -> None:
 @pytest.mark.interpreted
 @given(st.lists(st.floats(-3.0, 3.0), min_size=3, max_size=3), st.floats(0.0, 1.0))
 def test_the_course_over_a_step_keeps_integral_and_moment(samples: list[float], f: float) -> None:
-    p = Channel(0.5, 0.3, 0.1, 0.0, 0.0, 1.0, 1.0, 0.0, inf, inf, inf, 0.0, inf)
+    p = CardChannel(0.5, 0.3, 0.1, 0.0, 0.0, 1.0, 1.0, 0.0, inf, inf, inf, 0.0, inf)
     begins, ends = amplifier.steady_course(-1.0, Window(tuple(samples), f), p)
     # time in samples back from the newest; the step goes from f + 1 to f
     back = f + (np.arange(100_000) + 0.5) / 100_000
@@ -158,7 +158,12 @@ LIMITS = {"lim1": 2.0, "lim2": 3.0, "I_t1": 0.3, "I_t2": 0.1, "a": -log(0.9) / 0
     ],
 )
 def test_limiter_branches(
-    channel: Channel, target: float, previous: float, steady: float, output: float, limited: bool
+    channel: CardChannel,
+    target: float,
+    previous: float,
+    steady: float,
+    output: float,
+    limited: bool,
 ) -> None:
     p = channel._replace(**LIMITS)
     found = amplifier.limited_current(target, previous, steady, p, 0.01, None)
@@ -182,7 +187,7 @@ def test_limiter_branches(
     ],
 )
 def test_switches_from_within_a_step(
-    channel: Channel, target: float, previous: float, steady: float, output: float
+    channel: CardChannel, target: float, previous: float, steady: float, output: float
 ) -> None:
     p = channel._replace(**LIMITS)
     found = amplifier.limited_current(target, previous, steady, p, 0.01, True)

@@ -8,7 +8,7 @@ import pytest
 from swashplate.equations import derive, faded, small_arctangent, soft_threshold
 from swashplate.models import amplifier
 from swashplate.models import displacement_control as control
-from swashplate.models.amplifier import Channel
+from swashplate.models.amplifier import CardChannel
 from swashplate.models.displacement_control import Pump, Stroking
 
 pytestmark = pytest.mark.interpreted
@@ -16,9 +16,9 @@ pytestmark = pytest.mark.interpreted
 H = 0.125
 
 
-def channel(**values: float) -> Channel:
+def channel(**values: float) -> CardChannel:
     """A channel of zeros but for some values."""
-    return Channel(*[0.0] * len(Channel._fields))._replace(**values)
+    return CardChannel(*[0.0] * len(CardChannel._fields))._replace(**values)
 
 
 def pump_with(**values: float) -> Pump:

@@ -23,7 +23,7 @@ from swashplate.equations import (
 )
 from swashplate.equations.marching import PartNumbers
 from swashplate.errors import InputError
-from swashplate.models.amplifier import Card, CardOptions, Channel
+from swashplate.models.amplifier import Card, CardChannel, CardOptions
 from swashplate.models.amplifier import step_limit as filter_limit
 from swashplate.models.displacement_control import Pump, PumpOptions, steep_stops
 from swashplate.models.drive import Source as CurrentSource
@@ -104,7 +104,8 @@ def card_of(parameters: ParameterSet) -> Card:
     """The card's numbers."""
     numbers = parameters.numbers
     plus, minus = (
-        Channel(**{name: numbers[f"{name}_{side}"] for name in Channel._fields}) for side in SIDES
+        CardChannel(**{name: numbers[f"{name}_{side}"] for name in CardChannel._fields})
+        for side in SIDES
     )
     return Card(plus, minus, numbers["tau"])
 

@@ -37,7 +37,7 @@ BEYOND = "a command beyond the dead zone"
 CHANGING = "a current that changes"
 
 
-class Channel(NamedTuple):
+class CardChannel(NamedTuple):
     """Parameters of one channel.
 
     Plausible are currents of up to 100 A, alone or by each term of the gain at 10 V: solenoids take
@@ -112,8 +112,8 @@ class Card(NamedTuple):
     """Parameters of the card: two channels and the delay that both share."""
 
     # fmt: off
-    plus: Channel
-    minus: Channel
+    plus: CardChannel
+    minus: CardChannel
     tau: Annotated[float, Definition("delay", "s", lower=0.0, upper=10.0, source="3.4",
         needs=BEYOND, plausible=(0.0, 10.0))]
     # fmt: on
@@ -196,7 +196,7 @@ def jump_share(
 
 
 @equation
-def steady_current(command: float, share: float, p: Channel) -> float:
+def steady_current(command: float, share: float, p: CardChannel) -> float:
     """Current that a channel settles at, of the delayed command in its direction [V].
 
     I_ss = J s + G1 d + G2 d² + G3 d³ with d = max(V - V_dz, 0) and s of `jump_share`; Kruse eq.
@@ -207,7 +207,7 @@ def steady_current(command: float, share: float, p: Channel) -> float:
 
 
 @equation
-def channel_level(voltage: float, p: Channel) -> float:
+def channel_level(voltage: float, p: CardChannel) -> float:
     """Current at which a channel settles under a constant `voltage` in its direction. [A]"""
     return steady_current(voltage, 1.0 if voltage > p.V_dz else 0.0, p)
 
@@ -225,7 +225,7 @@ def coulomb_sign(change: float, h: float, literal: Flag) -> float:
 
 @equation
 def filtered_current(
-    now: float, before: float, steady: float, p: Channel, h: float, literal: Flag
+    now: float, before: float, steady: float, p: CardChannel, h: float, literal: Flag
 ) -> float:
     """I* at the next sample by Kruse's recursion, eq. 3.6. [A]
 
@@ -263,7 +263,7 @@ def step_limit(zeta: float, exact: Flag) -> float:
 
 @equation
 def current_acceleration(
-    current: float, rate: float, steady: float, p: Channel, literal: Flag
+    current: float, rate: float, steady: float, p: CardChannel, literal: Flag
 ) -> float:
     """Second derivative of I*, of which the recursion is the discrete form.
 
@@ -305,7 +305,7 @@ def damped_waves(zeta: float, w: float) -> tuple[float, float]:
 
 @equation
 def piece(
-    first: float, last: float, length: float, centre: float, p: Channel
+    first: float, last: float, length: float, centre: float, p: CardChannel
 ) -> tuple[float, float]:
     """Integral of I_ss over a straight piece of the command, and its moment, in steps. [A]
 
@@ -323,7 +323,7 @@ def piece(
 
 
 @equation
-def steady_course(direction: float, at: Window, p: Channel) -> tuple[float, float]:
+def steady_course(direction: float, at: Window, p: CardChannel) -> tuple[float, float]:
     """I_ss at both ends of the step that ends at this sample, if it went straight between them. [A]
 
     The straight line has the integral and the moment of I_ss over the step: the command goes
@@ -343,7 +343,7 @@ def steady_course(direction: float, at: Window, p: Channel) -> tuple[float, floa
 
 @equation
 def exact_filter(
-    s: Filter, begins: float, ends: float, p: Channel, h: float
+    s: Filter, begins: float, ends: float, p: CardChannel, h: float
 ) -> tuple[float, float]:
     """I* [A] and its rate [A/s] at this sample, from the state and I_ss of the step between.
 
@@ -380,7 +380,7 @@ def exact_filter(
 
 @equation
 def limited_current(
-    target: float, previous: float, steady: float, p: Channel, h: float, split: Flag
+    target: float, previous: float, steady: float, p: CardChannel, h: float, split: Flag
 ) -> float:
     """Channel output: the filter's state `target` behind rate limits and the final decay. [A]
 
@@ -425,7 +425,7 @@ def channel_sample(
     state: Filter,
     inputs: CardInputs,
     direction: float,
-    p: Channel,
+    p: CardChannel,
     h: float,
     options: CardOptions,
 ) -> ChannelSignals:
@@ -448,7 +448,7 @@ def channel_sample(
 
 @equation
 def channel_step(
-    state: Filter, at: ChannelSignals, p: Channel, h: float, options: CardOptions
+    state: Filter, at: ChannelSignals, p: CardChannel, h: float, options: CardOptions
 ) -> Filter:
     """One channel from a sample to the next."""
     if options.exact is None:
@@ -458,7 +458,7 @@ def channel_step(
 
 
 @equation
-def channel_rates(state: Filter, command: float, p: Channel, options: CardOptions) -> Filter:
+def channel_rates(state: Filter, command: float, p: CardChannel, options: CardOptions) -> Filter:
     """Rates of I* and of its rate, which is `before` here, in continuous time."""
     steady = steady_current(command, 1.0, p)
     faster = current_acceleration(state.now, state.before, steady, p, options.literal)

@@ -83,7 +83,7 @@ class PlantState(NamedTuple):
 
     motion: Motion  # One sample earlier.
     current: float  # One sample earlier. [A]
-    begun: float  # 0 at the first sample, 1 from the second on.
+    initialised: float  # 0 at the first sample, 1 from the second on.
 
 
 class PlantSignals(NamedTuple):
@@ -247,7 +247,7 @@ def plant_sample(
     """
     count = given.substeps
     rise = (current - state.current) / count
-    span = Span(state.begun * h / count, state.current, rise)
+    span = Span(state.initialised * h / count, state.current, rise)
     relief = relief_pressures(p.machine)
     motion = repeated(substep, count, state.motion, span, relief, p, options)
     return plant_signals(motion, current, p, options)

@@ -71,7 +71,7 @@ class PumpState(NamedTuple):
     flow_speed: float = 0.0  # Speed that the flow would have given a stiff line then. [rad/s]
     load_torque: float = 0.0  # Torque of the load one sample earlier (line). [N m]
     shaft_angle: float = 0.0  # Since the start, one sample earlier (ripple). [rad]
-    begun: float = 0.0  # 0 at the first sample, 1 from the second on (friction, line, ripple).
+    initialised: float = 0.0  # 0 at the first sample, 1 afterwards (friction, line, ripple).
 
 
 class PumpSignals(NamedTuple):
@@ -165,7 +165,7 @@ def pump_sample(
     deflection = 0.0
     if options.friction is not None:
         balance = stopped_spool(spool, p)
-        before = balance if state.begun == 0.0 else state.spool
+        before = balance if state.initialised == 0.0 else state.spool
         deflection = held_back(
             state.deflection,
             balance,
@@ -199,7 +199,7 @@ def pump_sample(
         torque = stiff_line_torque(
             tangent, rate, inputs.load_torque, p.load_inertia, p.Z10 * inputs.pump_speed
         )
-    elif state.begun == 0.0:
+    elif state.initialised == 0.0:
         torque = inputs.load_torque
         speed = flow - p.motor_leakage * torque
     else:
@@ -214,7 +214,7 @@ def pump_sample(
     turned = 0.0
     if options.ripple is not None:
         moved = 0.5 * h * (state.speed + speed)
-        turned = state.shaft_angle if state.begun == 0.0 else state.shaft_angle + moved
+        turned = state.shaft_angle if state.initialised == 0.0 else state.shaft_angle + moved
 
     return PumpSignals(
         magnetising_current=current,
@@ -270,7 +270,7 @@ def pump_step(
         flow_speed=0.0 if options.line is None else signals.flow_speed,
         load_torque=0.0 if options.line is None else inputs.load_torque,
         shaft_angle=signals.shaft_angle,
-        begun=1.0 if turning or options.friction is not None else 0.0,
+        initialised=1.0 if turning or options.friction is not None else 0.0,
     )
 
 
@@ -284,9 +284,9 @@ def pump_rates(
 ) -> PumpState:
     """Rates of the pump's state in continuous time, in place of `pump_step`. [1/s]
 
-    The sample before them has h = 0 and `begun` = 1, so that the line stands where its state says
-    and the spool is held back by (w x_b + x_s d)/(x_s + w): by what it has moved of its balance
-    x_b and by the state's deflection d, which dither lets go.
+    The sample before them has h = 0 and `initialised` = 1, so that the line is at its state and
+    friction holds the spool at (w x_b + x_s d)/(x_s + w): by the share of its balance x_b that it
+    has moved, and by the state's deflection d, which dither releases.
     """
     Z6 = plate_motion(state.pressure, p) if options.damping is None else 0.0
     stroking = Stroking(Z6, p.Z7, p.Z8, inputs.supply_pressure)
@@ -315,7 +315,7 @@ def pump_rates(
         flow_speed=0.0,
         load_torque=0.0,
         shaft_angle=0.0,
-        begun=0.0,
+        initialised=0.0,
     )
 
 
@@ -335,7 +335,7 @@ def standing(
         flow_speed=0.0,
         load_torque=0.0,
         shaft_angle=0.0,
-        begun=0.0,
+        initialised=0.0,
     )
 
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from swashplate.equations import JIT_OFF, inlined, interpreted, kernel
 from swashplate.errors import ParameterError
-from swashplate.models.amplifier import Channel, channel_level
+from swashplate.models.amplifier import CardChannel, channel_level
 from swashplate.models.displacement_control import (
     Pump,
     moment_sine,
@@ -45,7 +45,7 @@ VOLTAGES = np.linspace(0.0, FULL_VOLTAGE, 101)
 FEW, _alone = 5000, count()
 """Sets checked one by one for which Python takes as long as compiling does, and how many there
 were."""
-N_CHANNEL, N_PUMP = len(Channel._fields), len(Pump._fields)
+N_CHANNEL, N_PUMP = len(CardChannel._fields), len(Pump._fields)
 
 OF_REFINEMENTS: tuple[Rule, ...] = (
     (
@@ -192,7 +192,7 @@ def _static(n: Values, size: int) -> tuple[Array, Array]:
 
     sin φ is the solenoid's moment over the greatest moment of the feedback spring.
     """
-    sides = [[n[f"{name}_{side}"] for name in Channel._fields] for side in SIDES]
+    sides = [[n[f"{name}_{side}"] for name in CardChannel._fields] for side in SIDES]
     channels = np.moveaxis(np.array(sides), -1, 0)
     pumps = np.column_stack([n[name] for name in Pump._fields])
     lowest = np.empty((size, 2))
@@ -202,7 +202,7 @@ def _static(n: Values, size: int) -> tuple[Array, Array]:
         pump = Pump(*pumps[0].tolist())
         volts = VOLTAGES.tolist()
         for k in range(2):
-            channel = Channel(*channels[0, k].tolist())
+            channel = CardChannel(*channels[0, k].tolist())
             lowest[0, k], moment_sines[0, k] = interpreted(_extremes)(channel, pump, k, volts)
     else:
         static_extremes(channels, pumps, VOLTAGES, lowest, moment_sines)
@@ -210,7 +210,7 @@ def _static(n: Values, size: int) -> tuple[Array, Array]:
 
 
 @inlined
-def _extremes(channel: Channel, pump: Pump, side: int, voltages: Array) -> tuple[float, float]:
+def _extremes(channel: CardChannel, pump: Pump, side: int, voltages: Array) -> tuple[float, float]:
     """Lowest steady current [A] and largest |sin φ| of one side within some voltages."""
     least, most = inf, 0.0
     for voltage in voltages:
@@ -237,11 +237,11 @@ def static_extremes(
 ) -> None:
     """Lowest steady current [A] and largest |sin φ| of both sides of many sets, (m, 2) outputs.
 
-    `channels` are the fields of `Channel` of every set and side, (m, 2, 13), `pumps` those of
+    `channels` are the fields of `CardChannel` of every set and side, (m, 2, 13), `pumps` those of
     `Pump`, (m, 43); NaN if what is computed of a set and side has no value.
     """
     for i in range(pumps.shape[0]):
         pump = Pump(*tuple_of(pumps[i], N_PUMP))
         for side in range(2):
-            channel = Channel(*tuple_of(channels[i, side], N_CHANNEL))
+            channel = CardChannel(*tuple_of(channels[i, side], N_CHANNEL))
             lowest[i, side], moment_sines[i, side] = _extremes(channel, pump, side, voltages)

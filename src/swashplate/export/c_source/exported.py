@@ -139,7 +139,7 @@ class Exported:
         set_inputs = [
             f"inputs.measured[{index}].given" for index in range(max(len(self.measured), 1))
         ]
-        return [*options, *limits, *set_inputs, "now.begun", "before.begun", "stale", "settled"]
+        return [*options, *limits, *set_inputs, "now.started", "before.started", "stale", "settled"]
 
     @property
     def taps(self) -> tuple[TapOf, ...]:

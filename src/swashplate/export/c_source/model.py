@@ -153,8 +153,8 @@ class Writer:
             body.append(f"m->now.{integral}_rate = {rate};")
             rates = f"(m->before.{integral}_rate + m->now.{integral}_rate)"
             grown = f"m->before.{integral} + 0.5 * m->step * {rates}"
-            body.append(f"m->now.{integral} = m->before.begun ? {grown} : 0.0;")
-        body.append("m->now.begun = true;")
+            body.append(f"m->now.{integral} = m->before.started ? {grown} : 0.0;")
+        body.append("m->now.started = true;")
         tests = ["all_finite(&m->now)", "finite_outputs(m)"]
         if margins:
             tests.insert(0, "good")

@@ -105,7 +105,7 @@ class _Interface:
             lines.append(f"    struct {part_tags['state']} {member};")
         for name in self.model.integrals:
             lines += [f"    double {c_name(name)};", f"    double {c_name(name)}_rate;"]
-        lines += ["    bool begun; /* a sample was taken */", "};", ""]
+        lines += ["    bool started; /* a sample was taken */", "};", ""]
         lines += [
             f"struct {exported.prefix}_measured {{",
             "    double value;",

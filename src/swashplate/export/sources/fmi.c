@@ -56,7 +56,7 @@ SWP_FMU_API RARE int swp_fmu_fail(swp_fmu *fmu, const char *message) {
 }
 
 SWP_FMU_API RARE int swp_fmu_missing(swp_fmu *fmu) {
-    return swp_fmu_fail(fmu, "an array or the place of a result is missing (NULL)");
+    return swp_fmu_fail(fmu, "an array or a pointer for a result is missing (NULL)");
 }
 
 SWP_FMU_API RARE int swp_fmu_none(swp_fmu *fmu, size_t count) {
@@ -167,7 +167,7 @@ APART static unsigned char *fmu_resource(const char *folder, size_t *size) {
 /* What is wrong with a resource, NULL if it can be used. */
 APART static const char *fmu_fault(const unsigned char *bytes, size_t size, const char *token) {
     if (size < HEADER_LENGTH || memcmp(bytes, RESOURCE_MAGIC, 8) != 0)
-        return "resources/drive.bin holds no numbers of swashplate; export the FMU again";
+        return "resources/drive.bin was not written by swashplate; export the FMU again";
     if (fmu_little_endian(bytes + 8, 4) != RESOURCE_VERSION ||
         fmu_little_endian(bytes + 12, 4) != swp_value_count() ||
         fmu_little_endian(bytes + 16, 8) != SWP_FMI_LAYOUT ||
@@ -186,7 +186,7 @@ APART static uint64_t fmu_hash_of(const unsigned char *bytes, size_t size) { /* 
 }
 
 /* Put the model's numbers into a fresh memory. */
-APART static int fmu_begun(swp_memory *memory, const unsigned char *bytes) {
+APART static int fmu_instantiated(swp_memory *memory, const unsigned char *bytes) {
     size_t count = swp_value_count();
     double *values = malloc(count * sizeof *values);
     if (!values) return SWP_BAD_VALUE;
@@ -219,11 +219,11 @@ SWP_FMU_API RARE swp_fmu *swp_fmu_new(const char *name, const char *token, const
     unsigned char *bytes = folder ? fmu_resource(folder, &size) : NULL;
     const char *wrong = NULL;
     if (!fmu->name || !bytes)
-        wrong = "resources/drive.bin cannot be read; unpack the FMU whole";
+        wrong = "resources/drive.bin cannot be read; unpack the whole FMU";
     else
         wrong = fmu_fault(bytes, size, token ? token : "");
-    if (!wrong && fmu_begun(&fmu->begun, bytes) != SWP_OK)
-        wrong = "resources/drive.bin holds numbers that the model refuses; export the FMU again";
+    if (!wrong && fmu_instantiated(&fmu->initial, bytes) != SWP_OK)
+        wrong = "the model refuses numbers of resources/drive.bin; export the FMU again";
     if (wrong) {
         swp_fmu_fail(fmu, wrong);
         free(bytes);
@@ -232,7 +232,7 @@ SWP_FMU_API RARE swp_fmu *swp_fmu_new(const char *name, const char *token, const
     }
     fmu->resource = fmu_hash_of(bytes, size);
     free(bytes);
-    fmu->memory = fmu->begun;
+    fmu->memory = fmu->initial;
     return fmu;
 }
 
@@ -244,7 +244,7 @@ SWP_FMU_API void swp_fmu_free(swp_fmu *fmu) {
 
 SWP_FMU_API int swp_fmu_reset(swp_fmu *fmu) {
     if (!fmu) return SWP_FMU_ERROR;
-    fmu->memory = fmu->begun;
+    fmu->memory = fmu->initial;
     return SWP_FMU_OK;
 }
 
@@ -489,7 +489,7 @@ SWP_FMU_API int swp_fmu_get_real(swp_fmu *fmu, const uint32_t *references, size_
         else if (r == SWP_FMI_TIME)
             values[i] = m->now;
         else
-            return swp_fmu_fail(fmu, "there is no number of this value reference");
+            return swp_fmu_fail(fmu, "no real number has this value reference");
     }
     return SWP_FMU_OK;
 }
@@ -501,7 +501,7 @@ static int fmu_set_input(swp_fmu *fmu, uint32_t i, double value) {
     if (!isfinite(value))
         return fmu_refuse(fmu, fmu_input_names[i], "must be a finite number");
     if (!(value >= fmu_input_ranges[i][0] && value <= fmu_input_ranges[i][1]))
-        return fmu_refuse(fmu, fmu_input_names[i], "is out of range; it stays as it was");
+        return fmu_refuse(fmu, fmu_input_names[i], "is out of range; it keeps its value");
     if (value != m->input[i]) m->given[i] = 1; /* until then the parameter counts, if tuned, too */
     m->input[i] = value;
     return SWP_FMU_OK;
@@ -511,7 +511,7 @@ static int fmu_set_parameter(swp_fmu *fmu, int i, double value) {
     swp_memory *m = &fmu->memory;
     swp_model tried = m->model;
     if (swp_set(&tried, i, value) != SWP_OK)
-        return fmu_refuse(fmu, swp_parameter_name(i), "is out of range; it stays as it was");
+        return fmu_refuse(fmu, swp_parameter_name(i), "is out of range; it keeps its value");
     if (value == m->wanted[i]) return SWP_FMU_OK;
     m->wanted[i] = value;
     m->changed[i] = 1;
@@ -523,7 +523,7 @@ static int fmu_set_step(swp_fmu *fmu, double step) {
     if (step == m->step) return SWP_FMU_OK;
     if (m->mode == SWP_FMU_STEPPING) return fmu_refuse(fmu, "step", "is fixed after initialization");
     if (!(SWP_FMI_FREE_STEP(&m->model)))
-        return fmu_refuse(fmu, "step", "the card's filter is a recursion for the exported step alone");
+        return fmu_refuse(fmu, "step", "the card's filter is a recursion for the exported step only");
     int status = swp_set_step(&m->model, step);
     if (status == SWP_OK) status = swp_update(&m->model);
     if (status != SWP_OK) return fmu_refuse(fmu, "step", swp_sentence(status));
@@ -547,7 +547,7 @@ SWP_FMU_API int swp_fmu_set_real(swp_fmu *fmu, const uint32_t *references, size_
         else if (r == SWP_FMI_STEP)
             status = fmu_set_step(fmu, values[i]);
         else
-            status = swp_fmu_fail(fmu, "no number of this value reference can be set");
+            status = swp_fmu_fail(fmu, "no real number with this value reference can be set");
         if (status > worst) worst = status;
     }
     return worst;
@@ -561,7 +561,7 @@ SWP_FMU_API int swp_fmu_get_boolean(swp_fmu *fmu, uint32_t reference, int *value
     else if (fmu_within(reference, SWP_FMI_OPTION, SWP_OPTIONS))
         *value = swp_get_option(&fmu->memory.model, (int)(reference - SWP_FMI_OPTION));
     else
-        return swp_fmu_fail(fmu, "there is no Boolean of this value reference");
+        return swp_fmu_fail(fmu, "no Boolean has this value reference");
     return SWP_FMU_OK;
 }
 
@@ -605,7 +605,7 @@ SWP_FMU_API int swp_fmu_save(swp_fmu *fmu, void **state) {
     if (!fmu) return SWP_FMU_ERROR;
     if (!state) return swp_fmu_missing(fmu);
     if (!*state) *state = malloc(sizeof(swp_memory));
-    if (!*state) return swp_fmu_fail(fmu, "there is no memory for a state");
+    if (!*state) return swp_fmu_fail(fmu, "not enough memory for a state");
     memcpy(*state, &fmu->memory, sizeof(swp_memory));
     return SWP_FMU_OK;
 }
@@ -647,7 +647,7 @@ static void fmu_header(const swp_fmu *fmu, unsigned char *bytes) {
 SWP_FMU_API RARE int swp_fmu_write(swp_fmu *fmu, const void *state, unsigned char *bytes,
                                    size_t size) {
     if (!fmu || !state || !bytes || size < STATE_SIZE)
-        return swp_fmu_fail(fmu, "there is no state, or no room for it");
+        return swp_fmu_fail(fmu, "the state is missing (NULL), or its buffer is too small");
     fmu_header(fmu, bytes);
     memcpy(bytes + STATE_HEADER, state, sizeof(swp_memory));
     uint64_t hash = fmu_hash_of(bytes + STATE_HEADER, sizeof(swp_memory));
@@ -668,12 +668,12 @@ SWP_FMU_API RARE int swp_fmu_read(swp_fmu *fmu, const unsigned char *bytes, size
     if (!bytes || !state) return swp_fmu_missing(fmu);
     fmu_header(fmu, own);
     if (size != STATE_SIZE || memcmp(bytes, own, 16) != 0)
-        return swp_fmu_fail(fmu, "this is no state of this library: its header or size is another");
+        return swp_fmu_fail(fmu, "this is not a state of this library: its header or size differs");
     if (memcmp(bytes + 16, own + 16, 16) != 0)
         return swp_fmu_fail(fmu, "this state belongs to another set of numbers");
     uint64_t hash = fmu_hash_of(bytes + STATE_HEADER, sizeof(swp_memory));
     swp_memory *made = malloc(sizeof(swp_memory));
-    if (!made) return swp_fmu_fail(fmu, "there is no memory for a state");
+    if (!made) return swp_fmu_fail(fmu, "not enough memory for a state");
     memcpy(made, bytes + STATE_HEADER, sizeof(swp_memory));
     if (memcmp(bytes + STATE_HASH, &hash, sizeof hash) != 0 || !fmu_possible(made)) {
         free(made);

@@ -58,7 +58,7 @@ enum {
 
 struct swp_fmu {
     swp_memory memory;
-    swp_memory begun;    /* as instantiated, for reset */
+    swp_memory initial;   /* as instantiated, for reset */
     uint64_t resource;   /* hash of the model's numbers */
     swp_fmu_logger *say;
     void *environment;
