@@ -1,4 +1,4 @@
-"""User-defined equations on the actuator's benchmark; the data lie beside the checkout, if at all."""
+"""User-defined equations on the actuator's benchmark; its data may lie beside the checkout."""
 
 import re
 from collections.abc import Callable
