@@ -15,6 +15,7 @@ from typing import Any
 
 import typer.main
 from pydantic import BaseModel
+from sphinx.pycode import ModuleAnalyzer
 
 from swashplate.campaign import CampaignFile, json_schema
 from swashplate.cli import EPILOG, HELP, app
@@ -68,7 +69,8 @@ def api_pages() -> Iterator[tuple[str, str]]:
             short = name.rpartition(".")[2]
             lines += [f"## {short}", "", "```{eval-rst}", f".. {kind}:: {name}"]
             if kind == "autoclass":
-                lines += ["   :members:", "   :exclude-members: model_config"]
+                excluded = ", ".join(["model_config", *fields_without_docstring(found)])
+                lines += ["   :members:", f"   :exclude-members: {excluded}"]
                 if issubclass(found, Drawn):
                     lines += ["", f"   .. automethod:: {name}.plot"]
             lines += ["```", ""]
@@ -85,7 +87,14 @@ def directive(found: Any) -> str:
     """autodoc's word for it."""
     if inspect.isclass(found):
         return "autoexception" if issubclass(found, Exception) else "autoclass"
-    return "autofunction"
+    return "autofunction" if callable(found) else "autodata"
+
+
+def fields_without_docstring(kind: type) -> list[str]:
+    """Fields of a named tuple of which autodoc would say no more than their position."""
+    documented = ModuleAnalyzer.for_module(kind.__module__).find_attr_docs()
+    fields = getattr(kind, "_fields", ())
+    return [field for field in fields if (kind.__qualname__, field) not in documented]
 
 
 def command_line() -> str:

@@ -1,10 +1,10 @@
-"""One's own hydraulic equations against a benchmark: from a valve's opening to the oil's pressure.
+"""User-defined equations of a hydraulic actuator against a benchmark: valve opening to pressure.
 
     .venv/bin/python examples/actuator.py DATA [--splits]
 
 DATA is a folder with actuator.mat, from github.com/zhenwendai/RGP, datasets/system_identification.
 The last 512 samples are run freely, driven by the opening alone, after a fit to the first 512.
-docs/own-models.md has the equations and says what was chosen on what.
+docs/user-defined-models.md has the equations and says what was chosen on what.
 """
 
 import sys

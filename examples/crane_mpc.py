@@ -27,10 +27,10 @@ from swashplate.crane import (
     Seaway,
     control,
     follow,
+    kinematics,
     linearize,
     simulate,
 )
-from swashplate.crane.kinematics import Boom, reach_rate
 
 parser = argparse.ArgumentParser(description="Model predictive control beside the clip.")
 parser.add_argument("--seeds", type=int, default=6, help="number of seaways")
@@ -134,11 +134,12 @@ def predictive(ship: np.ndarray, stick: np.ndarray, omega: float) -> tuple[np.nd
     for n in range(BLOCK, len(stick), BLOCK):
         begun = process_time()
         past, now = (stepper.named(row) for row in out[-1][-2:])
-        boom = Boom(now["boom_cos"], now["boom_sin"])
+        boom = kinematics.Boom(now["boom_cos"], now["boom_sin"])
         slew = np.radians(POSE["slew_deg"]) + now["shaft_slew"]
         turn = np.array([[np.cos(slew), -np.sin(slew)], [-np.sin(slew), -np.cos(slew)]])
         reach = g.foot + g.boom * boom.cos
-        rates = np.array([-reach_rate(boom, g), reach])  # of the tip, for each rad/s of a shaft
+        # speeds of the tip, for each rad/s of a shaft
+        rates = np.array([-kinematics.reach_rate(boom, g), reach])
         # what the ship adds to the tip's place, and how fast
         x, y = g.axis.x + reach * np.cos(slew), g.axis.y - reach * np.sin(slew)
         surge, sway, _, roll, pitch, yaw = ship[n - 2 : n].T

@@ -16,8 +16,7 @@ import mujoco
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from swashplate.crane import Crane, load_motion
-from swashplate.crane.kinematics import Boom, Vector, rotation, tip_of, to_inertial
+from swashplate.crane import Crane, kinematics, load_motion
 
 # %%
 SECONDS, RATE, START = 60.0, 512.0, 0.5  # the last one: swing at the start [rad]
@@ -128,8 +127,10 @@ def referee(crane: Crane, time: np.ndarray) -> np.ndarray:
 def tip_at(crane: Crane, t: float) -> np.ndarray:
     """Tip of the boom. [m]"""
     surge, sway, heave, yaw, pitch, roll, slew, boom, _ = led(t)[0].tolist()
-    tip = tip_of(slew, Boom(cos(boom), sin(boom)), crane.geometry)
-    return np.array(to_inertial(rotation(roll, pitch, yaw), tip, Vector(surge, sway, heave)))
+    tip = kinematics.tip_of(slew, kinematics.Boom(cos(boom), sin(boom)), crane.geometry)
+    rotation = kinematics.rotation(roll, pitch, yaw)
+    shift = kinematics.Vector(surge, sway, heave)
+    return np.array(kinematics.to_inertial(rotation, tip, shift))
 
 
 # %%

@@ -4,7 +4,7 @@
 
 DATA is a folder with exp_data_1_3.csv and exp_data_3_3.csv of
 github.com/ivliev123/Electro-Hydraulic-Actuator, 4_ANALIZE_DATA. Each load case is predicted by fits
-to the other one. The equations and the scores are in docs/own-models.md.
+to the other one. The equations and the scores are in docs/user-defined-models.md.
 """
 
 import argparse

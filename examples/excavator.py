@@ -3,7 +3,7 @@
     .venv/bin/python examples/excavator.py DATA [--figure excavator.png]
 
 DATA is a folder with the trials of github.com/mitchallain/BeagleBone-excavator, tests/data. Each
-trial is left out in turn. The equations and the scores are in docs/own-models.md.
+trial is left out in turn. The equations and the scores are in docs/user-defined-models.md.
 """
 
 import argparse

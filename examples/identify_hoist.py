@@ -19,11 +19,11 @@ from swashplate.identification import (
     drawn,
     load_setup,
     run_information,
+    smooth,
+    true_value,
     uncertainty_of,
     with_speeds,
 )
-from swashplate.identification.estimation import smooth
-from swashplate.identification.estimation.drive_model import true_value
 from swashplate.report.figures import plot_channel, save_figure
 
 parser = argparse.ArgumentParser(description="Identify a hoist.")

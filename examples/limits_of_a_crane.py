@@ -15,7 +15,6 @@ import numpy as np
 
 from swashplate import Drive, maneuvers
 from swashplate.analysis import (
-    DEFAULT_RANGE,
     Requirements,
     envelope,
     limit_shares,
@@ -92,7 +91,7 @@ print(f"  {np.degrees(speed):.1f} -> {np.degrees(then):.1f} deg/s, in {rise:.2f}
 # %%
 now = performance(drive)
 required = Requirements(speed=1.1 * now.speed, acceleration=1.2 * now.acceleration)
-sized = size(drive, required, {"pump": DEFAULT_RANGE, "orifice": DEFAULT_RANGE})
+sized = size(drive, required, {"pump": (0.5, 2.0), "orifice": (0.5, 2.0)})
 for variable, factor in sized.factors.items():
     alone = sized.alone[variable]
     print(f"{variable} x {factor:.3f}, by itself {'never' if alone is None else f'x {alone:.3f}'}")

@@ -4,7 +4,7 @@
 #     .venv/bin/python examples/simulate.py [--figure simulate.png]
 #
 # From a joystick's voltage to the shaft's speed: the packaged drives, a maneuver, what each limit
-# does to it, other parameters, many of them at once, and a loop of one's own. Everything is in SI;
+# does to it, other parameters, many of them at once, and a user-defined loop. Everything is in SI;
 # degrees are for people.
 
 # %%
@@ -91,7 +91,7 @@ for factor, speed in zip(factors[::500], soon[::500], strict=True):
     print(f"orifice x {factor:.1f}: {speed:5.1f} deg/s half a second on")
 
 # %% [markdown]
-# ## A loop of one's own
+# ## A user-defined loop
 # The stepper takes one voltage and gives one sample, with the same numbers as `simulate`. Here the
 # stick is let go once the drum has done a turn. That it goes on is the delay, the orifice, the lag.
 

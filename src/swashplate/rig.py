@@ -229,7 +229,7 @@ def run(
     severity : {"clean", "realistic", "harsh"}
         How bad the instruments are, see `SEVERITIES`.
     instruments : Instruments, optional
-        One's own instead.
+        Used instead of those of `severity`.
     truth : Drive, optional
         What is simulated instead of `drive`, with refinements for example.
     perturb : float

@@ -1,4 +1,4 @@
-"""One's own equations on the actuator's benchmark; the data lie beside the checkout, if at all."""
+"""User-defined equations on the actuator's benchmark; its data may lie beside the checkout."""
 
 import re
 from collections.abc import Callable
@@ -15,7 +15,7 @@ from swashplate.logs import open_log
 
 ROOT = Path(__file__).parents[2]
 DATA = ROOT.parent / "shared" / "data" / "actuator"
-PAGE = (ROOT / "docs" / "own-models.md").read_text("utf-8")
+PAGE = (ROOT / "docs" / "user-defined-models.md").read_text("utf-8")
 
 
 @pytest.fixture(scope="module")

@@ -14,7 +14,7 @@ from swashplate.equations import simulate
 
 ROOT = Path(__file__).parents[2]
 DATA = ROOT.parent / "shared" / "data" / "eha"
-PAGE = (ROOT / "docs" / "own-models.md").read_text("utf-8")
+PAGE = (ROOT / "docs" / "user-defined-models.md").read_text("utf-8")
 RATE = 1000.0
 logs = pytest.mark.skipif(
     not DATA.exists(), reason="the actuator's logs are not beside this checkout"

@@ -570,7 +570,7 @@ def test_a_run_with_a_scale_or_a_delay_of_its_own_is_named(gain, late, said) -> 
 
 # --- the documented model file, against another solver --------------------------------------------
 
-PAGE = Path(__file__).parents[2] / "docs" / "how-to" / "own-model-fit.md"
+PAGE = Path(__file__).parents[2] / "docs" / "how-to" / "user-defined-model-fit.md"
 MACHINE = {"dead_zone": 0.6, "gain": 0.02, "lag": 0.15}
 
 

@@ -427,7 +427,20 @@ def proportional_command(inverse: InverseMap, reference: ArrayLike) -> Array:
 
 
 def speed_of_command(inverse: InverseMap, voltage: ArrayLike) -> Array:
-    """Speed that a command asks for: in proportion, ±10 V for the full speed. [rad/s]"""
+    """Speed that a command asks for: in proportion, ±10 V for the full speed.
+
+    Parameters
+    ----------
+    inverse : InverseMap
+        Of the drive; its `limits` are the full speeds.
+    voltage : float or (n,) array_like
+        Command. [V]
+
+    Returns
+    -------
+    () or (n,) array
+        Speed of the shaft. [rad/s]
+    """
     volts = np.asarray(voltage, dtype=np.float64)
     low, high = inverse.limits
     return np.asarray(np.where(volts >= 0.0, 0.1 * high * volts, -0.1 * low * volts))

@@ -97,6 +97,11 @@ def drawn_drives(stages: Sequence[StageFit], draws: int = 200, seed: int = 0) ->
     seed : int
         The same seed gives the same drives.
 
+    Returns
+    -------
+    Draws
+        The drives, and what was drawn again or stays fixed.
+
     Raises
     ------
     InputError
@@ -402,8 +407,13 @@ def stored_draws(
     campaign : path, optional
         The tests that were fitted; by default where ``fit.json`` says they were. They are needed
         for the whole covariance.
-    draws, seed :
-        As of `drives`.
+    draws, seed : int
+        As of `drawn_drives`.
+
+    Returns
+    -------
+    Draws
+        The drives, and what was drawn again or stays fixed.
 
     Raises
     ------

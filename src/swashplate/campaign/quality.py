@@ -486,6 +486,16 @@ def spiked(experiments: Sequence[Experiment]) -> dict[tuple[str, str], tuple[str
 def campaign_findings(campaign: Campaign) -> tuple[str, ...]:
     """Sentences on the campaign file: idle windows, axes without motion, currents without a sign.
 
+    Parameters
+    ----------
+    campaign : Campaign
+        The tests, read from a file.
+
+    Returns
+    -------
+    tuple of str
+        A sentence for each finding; empty if there is none.
+
     Raises
     ------
     FileError, ParameterError

@@ -1,4 +1,5 @@
 from . import control as control
+from . import kinematics as kinematics
 from .axes import AXES as AXES
 from .axes import RATE as RATE
 from .closed_loop.operator_command import OperatorCommand as OperatorCommand

@@ -13,7 +13,7 @@ from swashplate.equations import equation
 
 
 class Vector(NamedTuple):
-    """A position or velocity. [m] or [m/s]"""
+    """A position or velocity, x forward, y to port, z up. [m] or [m/s]"""
 
     x: float
     y: float
@@ -38,8 +38,9 @@ class Geometry(NamedTuple):
     sheave: float
     """D, foot to the sheave on the tower's top. [m]"""
     sheave_cos: float
+    """Cosine of γ, the elevation of that sheave from the foot. [1]"""
     sheave_sin: float
-    """Cosine and sine of γ, the elevation of that sheave from the foot."""
+    """Sine of γ. [1]"""
     hoist: float
     """r_h/n_h, hoisted height for each radian of the hoist's shaft. [m]"""
     luff: float
@@ -102,7 +103,18 @@ def moved(a: Vector, share: float, b: Vector) -> Vector:
 
 @equation
 def rotation(roll: float, pitch: float, yaw: float) -> Rotation:
-    """R = Rz(yaw) Ry(pitch) Rx(roll); roll lifts port, pitch lowers the bow, yaw turns to port."""
+    """R = Rz(yaw) Ry(pitch) Rx(roll); roll lifts port, pitch lowers the bow, yaw turns to port.
+
+    Parameters
+    ----------
+    roll, pitch, yaw : float
+        Angles of the ship. [rad]
+
+    Returns
+    -------
+    Rotation
+        The ship's axes in the inertial frame.
+    """
     cf, sf = cos(roll), sin(roll)
     ct, st = cos(pitch), sin(pitch)
     cy, sy = cos(yaw), sin(yaw)
@@ -115,7 +127,22 @@ def rotation(roll: float, pitch: float, yaw: float) -> Rotation:
 
 @equation
 def to_inertial(r: Rotation, p: Vector, shift: Vector) -> Vector:
-    """Position in the inertial frame of a point of the ship, R p + s. [m]"""
+    """Position in the inertial frame of a point of the ship, R p + s. [m]
+
+    Parameters
+    ----------
+    r : Rotation
+        The ship's axes R.
+    p : Vector
+        The point p in the ship's frame. [m]
+    shift : Vector
+        Surge, sway and heave s of the ship. [m]
+
+    Returns
+    -------
+    Vector
+        Position in the inertial frame. [m]
+    """
     return moved(moved(moved(shift, p.x, r.forward), p.y, r.port), p.z, r.up)
 
 
@@ -149,7 +176,22 @@ def boom_at(shaft: float, g: Geometry, home: Home) -> Boom:
 
 @equation
 def tip_of(slew: float, boom: Boom, g: Geometry) -> Vector:
-    """Tip in the ship's frame, c + (ρ cos ψ, -ρ sin ψ, B sin β) with ρ = a + B cos β. [m]"""
+    """Tip in the ship's frame, c + (ρ cos ψ, -ρ sin ψ, B sin β) with ρ = a + B cos β. [m]
+
+    Parameters
+    ----------
+    slew : float
+        Slew angle ψ, 0 forward, positive to starboard. [rad]
+    boom : Boom
+        Elevation β of the boom.
+    g : Geometry
+        Lengths of the crane, `Crane.geometry`.
+
+    Returns
+    -------
+    Vector
+        Position of the tip. [m]
+    """
     reach = g.foot + g.boom * boom.cos
     return Vector(
         g.axis.x + reach * cos(slew), g.axis.y - reach * sin(slew), g.axis.z + g.boom * boom.sin
@@ -189,7 +231,20 @@ def boom_rate(boom: Boom, g: Geometry) -> float:
 
 @equation
 def reach_rate(boom: Boom, g: Geometry) -> float:
-    """Loss of reach for each radian of the luff's shaft, -∂ρ/∂θ_l = B sin β ∂β/∂θ_l. [m]"""
+    """Loss of reach for each radian of the luff's shaft, -∂ρ/∂θ_l = B sin β ∂β/∂θ_l. [m]
+
+    Parameters
+    ----------
+    boom : Boom
+        Elevation β of the boom.
+    g : Geometry
+        Lengths of the crane, `Crane.geometry`.
+
+    Returns
+    -------
+    float
+        Loss of reach. [m/rad]
+    """
     return g.boom * boom.sin * boom_rate(boom, g)
 
 

@@ -179,7 +179,8 @@ def kernel(function: Callable[P, R]) -> Callable[P, R]:
     Parameters
     ----------
     function : callable
-        A march. Its equations come in by inlining.
+        A function of arrays and numbers, such as a loop over samples. The equations and kernels
+        that it calls are compiled with it.
 
     Returns
     -------

@@ -27,7 +27,7 @@ ON: Final = True
 
 @dataclass(frozen=True)
 class Definition:
-    """What a parameter is, whatever its value.
+    """Meaning, unit and range of a parameter, state, signal or input, whatever its value.
 
     Examples
     --------

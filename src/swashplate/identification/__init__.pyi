@@ -6,6 +6,7 @@ from .assessment import versions as versions
 from .diagnostics.verdict import Verdict as Verdict
 from .diagnostics.verdict import assess_fit as assess_fit
 from .estimation.drive_model import DriveModel as DriveModel
+from .estimation.drive_model import true_value as true_value
 from .estimation.model import Linearised as Linearised
 from .estimation.model import MachineModel as MachineModel
 from .estimation.model import UserModel as UserModel
@@ -20,6 +21,7 @@ from .estimation.solving import sobol_starts as sobol_starts
 from .estimation.solving import solve as solve
 from .estimation.solving import solve_from as solve_from
 from .estimation.stages import as_fit_setup as as_fit_setup
+from .estimation.stages import smooth as smooth
 from .estimation.unknowns import Prior as Prior
 from .estimation.unknowns import Unknown as Unknown
 from .estimation.unknowns import Unknowns as Unknowns

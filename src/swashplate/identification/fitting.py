@@ -653,9 +653,28 @@ def fingerprint(experiment: Experiment) -> str:
 def drawn(nominal: Drive, setup: FitSetup, seed: int, *, spread: float = SPREAD) -> Drive:
     """A drive that differs from a nominal one in what a fit setup frees, and in nothing else.
 
-    Each free parameter is multiplied by a log-normal factor, both directions apart, of which the
-    logarithm has the standard deviation `spread`. The seed is not negative. A `ParameterError` says
-    that what was drawn breaks a rule: draw with another seed.
+    Each free parameter is multiplied by a log-normal factor, each direction by another.
+
+    Parameters
+    ----------
+    nominal : Drive
+        The drive that the factors apply to.
+    setup : FitSetup
+        Its free parameters are drawn, those of the solenoids if it frees forces.
+    seed : int
+        Not negative. The same seed gives the same drive.
+    spread : float
+        Standard deviation of the logarithm of a factor. [1]
+
+    Returns
+    -------
+    Drive
+        For virtual tests, whose truth it is.
+
+    Raises
+    ------
+    ParameterError
+        If what was drawn breaks a rule: draw with another seed.
     """
     random = np.random.default_rng(seed)
     definitions = nominal.parameters.definitions

@@ -201,7 +201,9 @@ class RunQuality(Result):
     """Errors of the simulation of one channel of one run."""
 
     experiment: Experiment
+    """The run."""
     channel: str
+    """Name of its channel."""
     simulated: Array
     """(m,) at the channel's stamps, its free zero included. [unit of the channel]"""
     measures: Measures
@@ -321,9 +323,19 @@ def with_speeds(qualities: Iterable[RunQuality]) -> tuple[RunQuality, ...]:
     """The qualities, each of a position followed by that of its speed.
 
     Measured and simulated positions go through the same filters (`speed_of`, ``"exact"``), so that
-    both carry the same phase. What the position's noise is behind them is stated as the speed's,
+    both carry the same phase. What the position's noise is after them is stated as the speed's,
     beside measures that contain it. A position whose stamps no filter takes has no speed, nor has
     one in whose noise the speed drowns.
+
+    Parameters
+    ----------
+    qualities : iterable of RunQuality
+        Of predicted runs, such as `Identification.predicted`.
+
+    Returns
+    -------
+    tuple of RunQuality
+        The channel of a speed is named "speed from" that of the position. [unit of the position/s]
     """
     pairs = list[tuple[RunQuality, RunQuality | None]]()
     for quality in qualities:

@@ -199,8 +199,19 @@ def jump_share(
 def steady_current(command: float, share: float, p: CardChannel) -> float:
     """Current that a channel settles at, of the delayed command in its direction [V].
 
-    I_ss = J s + G1 d + G2 d² + G3 d³ with d = max(V - V_dz, 0) and s of `jump_share`; Kruse eq.
-    3.3. [A]
+    Parameters
+    ----------
+    command : float
+        Delayed command V in the channel's direction. [V]
+    share : float
+        Share s of the current jump, see `jump_share`. [1]
+    p : Channel
+        Parameters of the channel.
+
+    Returns
+    -------
+    float
+        I_ss = J s + G1 d + G2 d² + G3 d³ with d = max(V - V_dz, 0); Kruse eq. 3.3. [A]
     """
     d = max(command - p.V_dz, 0.0)
     return p.J * share + d * (p.G1 + d * (p.G2 + d * p.G3))

@@ -163,10 +163,14 @@ class Solenoids(NamedTuple):
 class Stroking(NamedTuple):
     """Parameters of the stroking piston at a sample, those of `Pump` by the same names."""
 
-    Z6: float  # 0 where the plate does not move with the pressure.
+    Z6: float
+    """0 if the plate does not move with the pressure. [1]"""
     Z7: float
+    """Leakage around the piston. [1/s]"""
     Z8: float
-    Z9: float  # Or the supply pressure that was measured.
+    """Flow gain of the valve. [√Pa/(m s)]"""
+    Z9: float
+    """Supply pressure less static pressure, or the supply pressure that was measured. [Pa]"""
 
 
 class PumpOptions(NamedTuple):
@@ -246,11 +250,27 @@ def arm_sine(pressure: float, p: Pump) -> float:
 def spool_balance(force: float, arm_sine: float, p: Pump) -> float:
     """Spool displacement at which solenoid and feedback spring balance, before any stop. [m]
 
+    Parameters
+    ----------
+    force : float
+        Force F of the solenoids. [N]
+    arm_sine : float
+        Sine of the angle α of the feedback arm. [1]
+    p : Pump
+        Parameters; Z4, Z5 and Z18 count.
+
+    Returns
+    -------
+    float
+        Displacement x. [m]
+
+    Notes
+    -----
     x = Z5 tan(φ - α) + Z18 with sin φ = Z5 F/√Z4; Kruse eq. 6.57 in closed form (erratum 21). Valid
-    for |sin φ| < 1 and |sin α| < 1; the caller checks. The first of the two equal forms keeps the
-    square root out of the denominator, so that root and division overlap: it makes a whole march 14
-    % faster. It is singular where φ + α = 90°, far from any real spool; there the second takes
-    over.
+    for sin φ and sin α between -1 and 1; the caller checks. The first of the two equal forms keeps
+    the square root out of the denominator, so that root and division overlap: it makes a whole
+    march 14 % faster. It is singular if φ + α = 90°, far from any real spool; there the second
+    takes over.
     """
     a = moment_sine(force, p)
     s = arm_sine
@@ -341,9 +361,28 @@ def pumped(pressure: float, opening: float, gain: float, root: float, sign: floa
 def tight_step(pressure: float, opening: float, p: Stroking, h: float, symmetric: Flag) -> float:
     """Pressure one step later without leakage, integrated exactly at constant opening. [Pa]
 
+    Parameters
+    ----------
+    pressure : float
+        Stroking pressure δP. [Pa]
+    opening : float
+        Effective opening x_eff of the valve. [m]
+    p : Stroking
+        Parameters; Z7 counts as zero, it is there for the derivative by it.
+    h : float
+        Length of the step. [s]
+    symmetric : flag
+        Symmetric form of the root, see `PumpOptions`; None is the published form.
+
+    Returns
+    -------
+    float
+        Stroking pressure at the end of the step. [Pa]
+
+    Notes
+    -----
     With r = √((Z9 - σδP)/2) the equation reads r' = -σ Z8 x_eff / (4 (1 + Z6)), so that δP is a
-    parabola in time until the head is used up. Z7 counts as zero; it is there for the derivative
-    by it.
+    parabola in time until the head is used up.
     """
     head, sign = flow_head(pressure, opening, p.Z9, symmetric)
     gain = 0.25 * p.Z8 * h / (1.0 + p.Z6)

@@ -183,7 +183,7 @@ class ParameterSet(Entries):
     options: frozenset[str] = frozenset()
     """Terms of the pump that count: of `swashplate.parameters.definitions.OPTIONS`."""
     equations: tuple[Replacement, ...] = ()
-    """One's own equations in the place of the pump's, see `Drive.with_equation`."""
+    """User-defined equations in the place of the pump's, see `Drive.with_equation`."""
     motion: Motion = "shaft"
     """What its last number moves: a shaft, or a rod, whose position in m then stands in the place
     of the shaft's in rad."""

@@ -486,6 +486,21 @@ def kinds_of(part: str) -> tuple[ChannelKind, ...]:
 
 
 def true_value(unknown: Unknown, model: DriveModel, truth: ParameterSet) -> float | None:
-    """What an unknown of the machine really is; None for one of a single experiment."""
+    """True value of an unknown, known for virtual tests.
+
+    Parameters
+    ----------
+    unknown : Unknown
+        Of the model's problem: a parameter, or a force of the solenoids.
+    model : DriveModel
+        The fitted model.
+    truth : ParameterSet
+        What the tests were simulated with.
+
+    Returns
+    -------
+    float or None
+        In the unit of the unknown [SI]; None for an unknown of a single experiment.
+    """
     forces = model.forces.values(truth) if model.forces is not None else {}
     return {**truth.numbers, **forces}[unknown.targets[0]] if unknown.run is None else None

@@ -578,12 +578,31 @@ class _Derivatives:
 
 
 def linearised_fit(problem: Problem, vector: Array, loss: Loss = "linear") -> LinearisedFit:
-    """Residuals and derivatives of every run at a point (K,), ignored samples left out.
+    """Residuals and derivatives of every run at a point, ignored samples left out.
 
-    `loss` is what of each residual the fit summed. With a robust one each residual stands as ψ over
-    the mean of ψ', by channel: the covariance of these is that of the estimates (Huber 1981,
-    equation 6.5), whatever their spectrum. An `InputError` says that so many residuals lie in the
-    tails of the loss that it has no optimum there.
+    Parameters
+    ----------
+    problem : Problem
+        The runs and their unknowns.
+    vector : (K,) array
+        The point, as of `Solution.vector`.
+    loss : Loss
+        The loss on each residual whose sum the fit minimised.
+
+    Returns
+    -------
+    LinearisedFit
+        For `uncertainty`.
+
+    Raises
+    ------
+    InputError
+        If so many residuals lie in the tails of the loss that it has no optimum there.
+
+    Notes
+    -----
+    With a robust loss each residual stands as ψ over the mean of ψ', by channel: the covariance of
+    these is that of the estimates (Huber 1981, equation 6.5), whatever their spectrum.
     """
     derivatives, runs = _Derivatives(problem, vector), list[LinearisedRun]()
 

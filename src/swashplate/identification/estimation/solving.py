@@ -317,10 +317,26 @@ def _with_effect_again(memory: _Memory, vector: Array) -> tuple[Array | None, ND
 
 
 def sobol_starts(problem: Problem, count: int, seed: int) -> Iterator[Array]:
-    """So many points (K,) spread evenly over the bounds, all in the model's domain.
+    """Starting points spread evenly over the bounds, all in the model's domain.
 
-    The same seed gives the same points, however many are asked for. If hardly any point can be
-    used, an `InputError` says so.
+    Parameters
+    ----------
+    problem : Problem
+        Its bounds and its model's domain count.
+    count : int
+        Number of points.
+    seed : int
+        The same seed gives the same points, whatever their number.
+
+    Yields
+    ------
+    (K,) array
+        A point of the scrambled Sobol sequence, for `solve_from`.
+
+    Raises
+    ------
+    InputError
+        If hardly any point within the bounds lies in the model's domain.
     """
     from scipy.stats.qmc import Sobol
 

@@ -68,10 +68,20 @@ LARGEST_START_PRESSURE = 4e6
 
 
 def smooth(parameters: Fitted) -> Fitted:
-    """The set with the decay's switch split within the step; a user-defined model has none.
+    """The parameters as a fit takes them: the card's switches act within a sample.
 
-    Sampled, as published, it makes the current jump by up to 0.7 mA as any of the card's parameters
-    varies, and a fit ends where it was caught (docs/decisions/0008).
+    Sampled, as published, the switch to the decay makes the current jump by up to 0.7 mA as any of
+    the card's parameters varies, and a fit ends where it was caught (docs/decisions/0008).
+
+    Parameters
+    ----------
+    parameters : ParameterSet or ModelSetup
+        A drive's, or a user-defined model with its numbers, which has no such switch.
+
+    Returns
+    -------
+    ParameterSet or ModelSetup
+        The set with ``card_switch="split"``; a user-defined model as it is.
     """
     if isinstance(parameters, ParameterSet):
         return replace(parameters, card_switch="split")

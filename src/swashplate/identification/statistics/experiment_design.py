@@ -153,7 +153,7 @@ def run_information(
 ) -> RunInformation:
     """What runs can tell of a stage's unknowns, before any fit.
 
-    At the nominal values, best those that `stages.smooth` makes, as a fit takes them. Raises
+    At the nominal values, best those that `smooth` makes, as a fit takes them. Raises
     as `stages.stage_problem`, and a `DomainError` if the model does not hold there.
     """
     problem = stage_problem(stage, set_of(nominal), experiments)

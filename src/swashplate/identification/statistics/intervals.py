@@ -398,9 +398,26 @@ def uncertainty(
 ) -> Uncertainty:
     """Errors of a fit's estimates for coloured residuals.
 
-    `earlier_stages` are the estimates that this stage takes for granted, `systematic` what each
-    systematic effect changes, `runs` how runs differ. An `InputError` says that there are no more
-    samples than unknowns.
+    Parameters
+    ----------
+    fit : LinearisedFit
+        The fit at its optimum, see `linearised_fit`.
+    earlier_stages : sequence of EarlierStage
+        Estimates that this stage takes for granted.
+    systematic : mapping of str to (K,) array
+        Changes of the solver's vector for a standard uncertainty of each systematic effect.
+    runs : RunToRun, optional
+        How runs differ.
+
+    Returns
+    -------
+    Uncertainty
+        With `estimates`, which have intervals of 95 %.
+
+    Raises
+    ------
+    InputError
+        If there are no more samples than unknowns.
     """
     bounded, fit = fit.variables, released(fit)
     own = replace(with_runs(coloured_noise_covariance(fit), runs), variables=bounded)
