@@ -458,7 +458,7 @@ def _gaps_with_wraps(
     cuts = dict[float, str]()
     for row in ambiguous_gaps(time, channel.values, factor * size):
         cuts[float(time[row])] = (
-            f"within the gap of {time[row] - time[row - 1]:.3g} s the {signal} '{channel.name}', "
+            f"during the gap of {time[row] - time[row - 1]:.3g} s the {signal} '{channel.name}', "
             f"which wraps at {size:.12g}, may have wrapped once more or less"
         )
     return cuts

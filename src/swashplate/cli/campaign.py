@@ -623,4 +623,4 @@ def _show_determined(
         note(f"run {number}: {name}")
     say(INFORMATION)
     if all(information.identifiability.complete for information in stage_information):
-        note("The fit setup can stay as it is.")
+        note("The fit setup needs no change.")

@@ -308,7 +308,7 @@ def guess_table(guess: Guess) -> Table:
         Column("minus", ".4g", none="not seen"),
         UNIT,
     )
-    table = Table(f"Axis {guess.axis}, at first sight", columns)
+    table = Table(f"Axis {guess.axis}, first guess", columns)
     rows = (
         ("dead zone", guess.dead_zone, "V", ".3g"),
         ("gain beyond it", guess.gain, f"{guess.unit}/V", ""),

@@ -177,7 +177,7 @@ def _card_sides(parameters: ParameterSet, voltage: float) -> list[str]:
     if channel.V_dz == channel.J == voltage == 0.0:
         return ["card at 0 V: the side of positive voltage"]
     if abs(voltage) <= channel.V_dz:
-        zone = f"{voltage:g} V lies in the card's dead zone"
+        zone = f"{voltage:g} V is in the card's dead zone"
         raise DomainError(
             f"{parameters.name}: {zone}, so the gain is 0; {_beyond(parameters, voltage)}."
         )
@@ -197,7 +197,7 @@ def _solenoid_sides(
     if voltage is not None:
         instead = _beyond(parameters, voltage)
     raise DomainError(
-        f"{parameters.name}: {cause}{current:.6g} A, which lies in the solenoids' dead zone of "
+        f"{parameters.name}: {cause}{current:.6g} A, which is in the solenoids' dead zone of "
         f"Z17 = ±{dead_zone:g} A, so the gain is 0; {instead}."
     )
 

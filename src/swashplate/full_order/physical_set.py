@@ -526,7 +526,7 @@ SHOWN = {
 def choices_table(axis: str, given: Mapping[str, Change]) -> Table:
     """Tabulate the values that complete a physical set: assumed ones, and given ones."""
     columns = (Column("Physical value"), Column("", "s"), Column(""), Column(""))
-    table = Table("What the drive's parameters do not say", columns)
+    table = Table("Physical values not given by the drive's parameters", columns)
     entries = chosen_over(_assumed(axis)[1], given)
     for name, entry in entries.items():
         unit, factor = SHOWN.get(entry.unit, (unit_text(entry.unit), 1.0))

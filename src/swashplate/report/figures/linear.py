@@ -144,7 +144,7 @@ def _check_ends(linear: LinearModel, response: FrequencyResponse) -> None:
     swept = (response.input, response.output)
     if (linear.input, linear.outputs[0]) != swept:
         raise InputError(
-            f"The sweep leads from {response.input} to {response.output}, but the linear model "
+            f"The sweep is from {response.input} to {response.output}, but the linear model "
             f"from {linear.input} to {linear.outputs[0]}."
         )
 
