@@ -138,7 +138,7 @@ def test_missing_samples_are_refused_or_dropped_and_counted(edited: Edit) -> Non
         ('column = "joystick"', 'column = "lever"', "the input: "),
         ('unit = "mV"', 'unit = "bar"', "'bar', ... V"),
         ('unit = "mA"', 'unit = "mAA"', "unknown unit 'mAA'"),
-        ('file = "up.csv"', 'file = "left.csv"', r"campaign\.toml"),
+        ('file = "up.csv"', 'file = "left.csv"', "left.csv"),
         ('unit = "ms"', 'unit = "V"', "'V', ... s"),
         ("[[runs]]", "[[runs]", "TOML"),
         ('role = "validate"', "axes.winch.channels.count.sign = 1", "channel 'count'"),
