@@ -104,19 +104,19 @@ def test_measured_inputs_without_sense_are_refused(hoist: Drive, measured, input
 @pytest.mark.parametrize(
     ("name", "value", "sentence"),
     [
-        ("pump_speed", 1e308, "1e.308, .* at most 10: check"),
-        ("pump_speed", 75.0, "75, .* at most 10: .* per cent"),
-        ("load_torque", -1e300, "-1e.300 N m, .* at most 1e.10 N m either way: look at"),
-        ("load_torque", 4e10, "4e.10 N m, .* perhaps it is in N mm instead of N m"),
-        ("supply_pressure", 1e10, "1e.10 Pa, .* 10000 to 1e.09 Pa: look at"),
-        ("supply_pressure", 107.0, "107 Pa, .* 10000 to 1e.09 Pa: .* bar instead of Pa"),
+        ("pump_speed", 1e308, "1e.308, .* 10"),
+        ("pump_speed", 75.0, "75, .* 10: .* per cent"),
+        ("load_torque", -1e300, "-1e.300 N m, .* 1e.10 N m"),
+        ("load_torque", 4e10, "4e.10 N m, .* N mm .* N m"),
+        ("supply_pressure", 1e10, "1e.10 Pa, .* 10000 to 1e.09 Pa"),
+        ("supply_pressure", 107.0, "107 Pa, .* 10000 to 1e.09 Pa: .* bar .* Pa"),
     ],
 )
 def test_what_no_machine_has_is_refused_with_its_range(
     hoist: Drive, name: str, value: float, sentence: str
 ) -> None:
     """The largest sample decides: a pump that stops leaves next to no pressure."""
-    with pytest.raises(InputError, match=rf"{name} .* is {sentence}"):
+    with pytest.raises(InputError, match=rf"{name} .* {sentence}"):
         hoist.simulate(np.full(10, 1.0), **{name: value})
     stopping = np.r_[np.full(5, 8e6), np.full(5, 2.0)]
     assert hoist.simulate(np.full(10, 1.0), supply_pressure=stopping).shaft_speed.size == 10
