@@ -121,7 +121,7 @@ def test_map_of_delayed_feedback_has_the_roots_that_were_found_apart():
     np.testing.assert_allclose(table, [[0.005, -0.005], [0.01, -0.01]], rtol=0.15)
     with refuse("gain .* above 0 and below 1"):
         control.feedback_damping(1.0, 0.25)
-    with refuse("delay.* 0 .* 1 period"):
+    with refuse("0 .* 1 period"):
         control.feedback_damping(0.2, 0.0)
 
 
@@ -214,7 +214,7 @@ def test_a_controller_without_a_number_stops_the_run(crane):
     # the load hangs straight at first: 0/0
     divides = Model("divides", Gains, Filtered, follow, sample=along_the_swing)
     controller = control.Controller(divides, Gains(0.1, 1.0))
-    with pytest.raises(DomainError, match="0.00 s .* controller .* nan"):
+    with pytest.raises(DomainError, match="0.00 s .* controller .* finite"):
         simulate(crane, OperatorCommand.rest(0.1), control=controller)
 
 

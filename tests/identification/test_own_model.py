@@ -240,7 +240,7 @@ REFUSED = {
     "'lead'; .* lag": lambda: tried(OWN, Unknown("lead", 1.0, 0.0, 2.0)),
     "state 'speed'": lambda: tried(OWN, Unknown("start.speed", 1.0, 0.0, 2.0)),
     "value of gain": lambda: solve(problem(OWN, trial("a"), free=FREE[:1])),
-    "valve .*'y'": lambda: solve(Problem(OWN, (trial("a", y=COMMAND),), *BOTH)),
+    "gives no 'y'": lambda: solve(Problem(OWN, (trial("a", y=COMMAND),), *BOTH)),
     "signals command, supply; a ": lambda: solve(Problem(servo, (trial("a", place=TIME),), *PLACE)),
     "given .* a Load": lambda: tried(UserModel(valve)),
     "given .* for a": lambda: tried(UserModel(valve, given={"b": Load()})),
