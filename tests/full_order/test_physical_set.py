@@ -196,7 +196,7 @@ def test_a_set_is_changed_copied_and_refused_in_words() -> None:
     past = atan(n["control_arm"] / n["swash_arm"]) + 0.01  # where the arm lies at 90°
     for changes, said in (
         ({"swash_stop": (past, 0.2)}, "feedback arm .* 90°"),
-        ({"spool_frequency": 200.0}, "spool_frequency .* completed"),
+        ({"spool_frequency": 200.0}, "spool_frequency.* completed"),
         ({"air_fraction": 1.0}, "air_fraction .* 1, .* below 1"),
         ({"air_fraction": 1.5}, "air_fraction .* 1.5, .* 1: .* per cent"),
         ({"bulk_modulus": 1.4}, "bulk_modulus .* 1.4 Pa, .* 1e.11 Pa: .* GPa"),
