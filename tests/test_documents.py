@@ -27,15 +27,16 @@ class Document(BaseModel):
 @pytest.mark.parametrize(
     ("entries", "said"),
     [
-        ({"colunm": "u", "unit": "V"}, "no entry 'colunm': perhaps 'column' is meant"),
-        ({"rate": 1, "unit": "V"}, "[signal] needs an entry 'column'."),
-        ({"column": "u", "unit": "V", "unti": "V"}, "no entry 'unti': perhaps 'unit' is meant"),
+        ({"colunm": "u", "unit": "V"}, "'colunm': ... 'column'"),
+        ({"rate": 1, "unit": "V"}, "entry 'column'"),
+        ({"column": "u", "unit": "V", "unti": "V"}, "'unti': ... 'unit'"),
     ],
 )
 def test_one_sentence(entries, said):
     with pytest.raises(ParameterError) as refused:
         validated({"signal": entries}, Document, "a.toml")
-    assert said in str(refused.value)
+    for part in said.split("..."):
+        assert part in str(refused.value)
     assert str(refused.value).startswith("a.toml: [signal]")
 
 
@@ -45,7 +46,7 @@ def test_one_sentence(entries, said):
         (f"a = {'[' * 500}{']' * 500}", "nests its tables or lists too deeply"),
         (f"a = {'[' * 100_000}{']' * 100_000}", "nests its tables or lists too deeply"),
         (f"a = {'{a=' * 3000}1{'}' * 3000}", "nests its tables or lists too deeply"),
-        (f"a = {'9' * 5000}", "a number with too many digits"),
+        (f"a = {'9' * 5000}", "many digits"),
         (f"{'.'.join('a' * 20_000)} = 1", "a key of more than 40 parts"),
         (f"[{' . '.join('a' * 20_000)}]", "a key of more than 40 parts"),
         (f"{QUOTED} = 1", "a key of more than 40 parts"),
@@ -58,10 +59,10 @@ def test_one_sentence(entries, said):
         # behind quotes that end later than a hasty reader thinks
         (f'a = ["""b"""", {{ {QUOTED} = 1 }}]', "a key of more than 40 parts"),
         (f"# it's\n{QUOTED} = 1", "a key of more than 40 parts"),
-        (f"a = 0x{'f' * 100_000}", "a number with too many digits"),
-        (f"a = [0o{'7' * 100_000}]", "a number with too many digits"),
-        (f"a = {{ b = 0b{'1' * 100_000} }}", "a number with too many digits"),
-        (f"a = {2**63}", "a number with too many digits"),
+        (f"a = 0x{'f' * 100_000}", "many digits"),
+        (f"a = [0o{'7' * 100_000}]", "many digits"),
+        (f"a = {{ b = 0b{'1' * 100_000} }}", "many digits"),
+        (f"a = {2**63}", "many digits"),
         ('name = "\\u001b[31mred"', "the character U+001B"),
         ('[runs]\n"a\\u0007" = 1', "the character U+0007"),
         ('title = "\\uFFFE"', "the character U+FFFE"),
@@ -106,10 +107,10 @@ def test_texts_that_are_no_files(tmp_path, monkeypatch):
     os.mkfifo(tmp_path / "fifo.toml")
     (tmp_path / "zero.toml").symlink_to("/dev/zero")
     for name in ("fifo.toml", "zero.toml", "."):
-        with pytest.raises(FileError, match="is (not an ordinary|a folder, not a) file"):
+        with pytest.raises(FileError, match="(ordinary|folder, not a) file"):
             read_text(tmp_path / name)
     monkeypatch.setattr(documents, "LARGEST", 5)
-    with pytest.raises(FileError, match="it is too large for such a file"):
+    with pytest.raises(FileError, match=r"bom\.toml.* large"):
         read_text(tmp_path / "bom.toml")
 
 

@@ -101,7 +101,7 @@ def test_numbers_of_a_drive(tmp_path):
         Drive.preset("hoist").to_toml(path)
         long = re.sub(f"^{name} = .*", f'{name} = "{"x" * 10_000}"', path.read_text(), flags=re.M)
         path.write_text(long)
-        with pytest.raises(ParameterError, match=f"drive.toml: {name} is .* at most 100"):
+        with pytest.raises(ParameterError, match=f"drive.toml: {name} .* 100"):
             Drive.from_toml(path)
 
 

@@ -45,10 +45,10 @@ def test_a_missing_file_is_pythons_too(read: Callable[[Path], object], tmp_path:
 
 def test_a_file_that_is_there_but_cannot_be_read_is_an_os_error(tmp_path: Path) -> None:
     (tmp_path / "drive.toml").write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(OSError, match="is not UTF-8") as caught:
+    with pytest.raises(OSError, match=r"drive\.toml .*UTF-8") as caught:
         Drive.from_toml(tmp_path)
     assert not isinstance(caught.value, FileNotFoundError)
-    with pytest.raises(OSError, match="does not exist"):
+    with pytest.raises(OSError, match=r"/no\b"):
         Drive.preset("hoist").to_toml(tmp_path / "no" / "drive.toml")
 
 

@@ -101,7 +101,7 @@ def test_a_file_system_without_locks(tmp_path: Path, monkeypatch: pytest.MonkeyP
         raise OSError(37, "No locks available")
 
     monkeypatch.setattr(locks, "_lock", refuse)
-    with pytest.warns(RuntimeWarning, match="No locks available.*no other fit"), locked(tmp_path):
+    with pytest.warns(RuntimeWarning, match="No locks available"), locked(tmp_path):
         pass
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
@@ -111,8 +111,8 @@ def test_a_file_system_without_locks(tmp_path: Path, monkeypatch: pytest.MonkeyP
 
 def test_a_place_that_cannot_be_locked(tmp_path: Path) -> None:
     (tmp_path / NAME).mkdir()
-    with pytest.raises(FileError, match=f"{tmp_path.name} cannot be locked"), locked(tmp_path):
+    with pytest.raises(FileError, match=f"{tmp_path.name}.* locked"), locked(tmp_path):
         pass
     (tmp_path / "file").write_text("")
-    with pytest.raises(FileError, match="file"), locked(tmp_path / "file" / "fitted"):
+    with pytest.raises(FileError, match=r"file.fitted"), locked(tmp_path / "file" / "fitted"):
         pass

@@ -17,7 +17,7 @@ def test_parameters_with_units() -> None:
     assert drive["Z16"].value == pytest.approx((1.2e-4, 1.5e-4), rel=1e-15)
     assert drive.replace(Z16_minus=0.2 * UNITS.mm)["Z16"].value.minus == pytest.approx(2e-4)
     assert HOIST.replace(omega=3.0 * UNITS.Hz)["omega_plus"].value == pytest.approx(6.0 * np.pi)
-    with pytest.raises(ParameterError, match=r"Z16 .*'bar'.* give it in m\."):
+    with pytest.raises(ParameterError, match=r"Z16 .*'bar'.* in m\."):
         HOIST.replace(Z16=3.0 * UNITS.bar)
     with pytest.raises(ParameterError, match="factor of Z16"):
         HOIST.scale(Z16=3.0 * UNITS.mm)
@@ -40,7 +40,7 @@ def test_records_with_units() -> None:
     current = HOIST.simulate_current(COMMAND / 30.0)
     again = HOIST.simulate_current(COMMAND / 30.0 * 1e3 * UNITS.mA)
     np.testing.assert_allclose(again.shaft_speed, current.shaft_speed, rtol=1e-12)
-    with pytest.raises(InputError, match=r"voltage is given in 'A'.* give it in V"):
+    with pytest.raises(InputError, match=r"voltage .*'A'.* in V"):
         HOIST.simulate(COMMAND * UNITS.A)
 
 

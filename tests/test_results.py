@@ -176,11 +176,11 @@ def test_a_run_is_read_by_its_signals_names() -> None:
     run = hoist.simulate(TESTS[0])
     assert run["shaft_speed"] is run.shaft_speed
     assert all(run[name].shape == run.time.shape for name in run.names)
-    with pytest.raises(InputError, match=r"no signal 'shaft_sped': did you mean shaft_speed\?"):
+    with pytest.raises(InputError, match=r"'shaft_sped'.* shaft_speed"):
         run["shaft_sped"]
     assert np.array_equal(run.active("orifice"), run.active(Limit.ORIFICE))
     assert run.active("orifice").any()
-    with pytest.raises(InputError, match="There is no limit 'orifise'; there are dead_zone"):
+    with pytest.raises(InputError, match="limit 'orifise'.* dead_zone"):
         run.active("orifise")
     current = hoist.simulate_current(run.current)
     assert "voltage" not in current.names
@@ -221,7 +221,7 @@ def test_frames_of_other_libraries(monkeypatch: pytest.MonkeyPatch) -> None:
     assert data["shaft_speed"][0] == "time"
     assert np.array_equal(data["shaft_speed"][1], run.shaft_speed)
     monkeypatch.setitem(sys.modules, "xarray", None)
-    with pytest.raises(InputError, match="xarray is not installed"):
+    with pytest.raises(InputError, match="xarray"):
         run.to_xarray()
 
 
@@ -249,7 +249,7 @@ def test_a_figure_of_chosen_signals() -> None:
     run.plot("shaft_speed", ax=bare)
     assert bare.get_legend() is None
     assert np.allclose(axes.lines[0].get_ydata(), np.degrees(run.shaft_speed))
-    with pytest.raises(InputError, match="1 axes for 2 signals"):
+    with pytest.raises(InputError, match="1 axes .* 2 signals"):
         run.plot(["current", "shaft_speed"], ax=axes)
 
 
@@ -436,7 +436,7 @@ def test_a_bode_plot_takes_axes_for_gain_and_phase(count: int, good: bool) -> No
     response = Drive.preset("hoist").frequency_response([0.1, 0.3, 1.0], [2.0, 4.0])
     given = axes(count)
     if not good:
-        with pytest.raises(InputError, match=f"There are {count} axes for"):
+        with pytest.raises(InputError, match=f"{count} axes"):
             response.plot(ax=given)
         return
     assert response.plot(ax=given) is given
@@ -453,18 +453,18 @@ def test_figures_of_one_panel_draw_in_given_axes() -> None:
         assert result.plot(ax=ax, title="as measured") is ax
         assert ax.get_title(loc="left") == "as measured"
         assert ax.lines
-    with pytest.raises(InputError, match="2 axes for 1 panel"):
+    with pytest.raises(InputError, match="2 axes .* 1 panel"):
         whole.plot(ax=axes(2))
     both = axes(2)
     assert inverse.plot(ax=both) is both
     narrow, wide = (np.ptp(both[k].get_xlim()) for k in (1, 0))
     assert narrow < 0.5 * wide
-    with pytest.raises(InputError, match="3 axes for 2 panels"):
+    with pytest.raises(InputError, match="3 axes .* 2 panels"):
         inverse.plot(ax=axes(3))
     two = axes(2)
     assert tornado.plot(ax=two) is two
     assert [ax.get_xlabel() for ax in two] == ["final speed (deg/s)", "rise time (s)"]
-    with pytest.raises(InputError, match="1 axes for 2 outcomes"):
+    with pytest.raises(InputError, match="1 axes .* 2 outcomes"):
         tornado.plot(ax=axes(1))
 
 

@@ -147,21 +147,21 @@ def test_tests_of_middle_size_are_kept_for_validation() -> None:
 @pytest.mark.parametrize(
     ("options", "sentence"),
     [
-        ({"severity": "awful"}, "severity is 'awful'; it is one of clean, realistic, harsh."),
-        ({"seed": -1}, "seed must be a whole number of at least 0, not -1."),
-        ({"maneuvers": []}, "A campaign needs at least one maneuver."),
-        ({"maneuvers": [STEP, STEP]}, "Two maneuvers have the same name"),
-        ({"maneuvers": {"a b": STEP, "a/b": STEP, "a_b": SINE}}, "would have the same file"),
-        ({"channels": ("counts",)}, "There is no channel 'counts'; there are signed_current"),
-        ({"channels": ()}, "channels must be one or more kinds, each once."),
-        ({"validate": ["step 4 V"]}, "There is no run 'step 4 V' to validate"),
-        ({"perturb": 0.9}, "perturb must be above 0 and at most 0.5, not 0.9."),
-        ({"axis": "boom", "maneuvers": [STEP]}, "The encoder of 'boom' is not known"),
+        ({"severity": "awful"}, "severity ...'awful'... clean, realistic, harsh"),
+        ({"seed": -1}, "seed ... whole number ... -1"),
+        ({"maneuvers": []}, "one maneuver"),
+        ({"maneuvers": [STEP, STEP]}, "maneuvers ... same name"),
+        ({"maneuvers": {"a b": STEP, "a/b": STEP, "a_b": SINE}}, "same file"),
+        ({"channels": ("counts",)}, "channel 'counts'... signed_current"),
+        ({"channels": ()}, "channels ... once"),
+        ({"validate": ["step 4 V"]}, "run 'step 4 V'"),
+        ({"perturb": 0.9}, "perturb ... 0.5, ... 0.9"),
+        ({"axis": "boom", "maneuvers": [STEP]}, "encoder of 'boom'"),
         ({"maneuvers": [20.0 * STEP]}, "±10 V"),
-        ({"instruments": {"jitter": -1.0}}, "jitter must be 0 or more, not -1."),
-        ({"instruments": {"dither": np.nan}}, "dither must be finite, not nan."),
-        ({"instruments": {"lost_rows": 2.0}}, "lost_rows must be a share, at most 1, not 2."),
-        ({"instruments": {"dither_frequency": 0.0}}, "dither_frequency must be positive, not 0."),
+        ({"instruments": {"jitter": -1.0}}, "jitter ... 0 ... -1"),
+        ({"instruments": {"dither": np.nan}}, "dither ... nan"),
+        ({"instruments": {"lost_rows": 2.0}}, "lost_rows ... 1, ... 2"),
+        ({"instruments": {"dither_frequency": 0.0}}, "dither_frequency ... positive"),
     ],
 )
 def test_what_cannot_be_run_is_refused(options: dict, sentence: str) -> None:
@@ -171,7 +171,8 @@ def test_what_cannot_be_run_is_refused(options: dict, sentence: str) -> None:
 
     with pytest.raises(InputError) as error:
         run(**options)
-    assert sentence in str(error.value)
+    for part in sentence.split("..."):
+        assert part in str(error.value)
 
 
 # --- instruments ---------------------------------------------------------------------------------
@@ -297,11 +298,11 @@ def test_the_truth_lies_apart_and_a_drive_of_ones_own_beside(tmp_path: Path) -> 
 
 def test_a_folder_that_holds_something_is_kept(harsh: rig.VirtualTests, tmp_path: Path) -> None:
     (tmp_path / "notes.txt").write_text("mine")
-    with pytest.raises(FileError, match="is not empty; name a new folder, or allow overwriting"):
+    with pytest.raises(FileError, match=rf"{tmp_path.name} .* new folder, .* overwrit"):
         rig.write(harsh, tmp_path)
     assert [each.name for each in tmp_path.iterdir()] == ["notes.txt"]
     rig.write(harsh, tmp_path, overwrite=True)
     rig.write(harsh, tmp_path, overwrite=True)
     assert (tmp_path / "notes.txt").read_text() == "mine"
-    with pytest.raises(FileError, match="is a file; name a folder"):
+    with pytest.raises(FileError, match=r"notes\.txt .* folder"):
         rig.write(harsh, tmp_path / "notes.txt")

@@ -114,11 +114,11 @@ def test_units_of_choice(words, drum, si, name, factor) -> None:
 @pytest.mark.parametrize(
     ("words", "drum", "said"),
     [
-        (["m/min"], None, "needs the drum's diameter"),
-        (["m/min"], 0.0, "diameter must be above 0 m, not 0"),
-        (["kelvin"], None, "No table shows a quantity in 'kelvin'"),
-        (["rpm", "deg/s"], None, "two units of one quantity, rpm and deg/s"),
-        (["bar", "MPa"], None, "two units of one quantity, bar and MPa"),
+        (["m/min"], None, "m/min.* drum"),
+        (["m/min"], 0.0, "diameter .* 0 m, .* 0"),
+        (["kelvin"], None, "'kelvin'"),
+        (["rpm", "deg/s"], None, "rpm and deg/s"),
+        (["bar", "MPa"], None, "bar and MPa"),
     ],
 )
 def test_units_that_are_refused(words, drum, said) -> None:
@@ -224,7 +224,7 @@ def half_written(beside: Path) -> None:
 @pytest.mark.parametrize("write", [no_room, stumbling, half_written])
 def test_a_full_disk_is_a_sentence(tmp_path: Path, write: Callable[..., None]) -> None:
     (tmp_path / "a.csv").write_text("old")
-    with pytest.raises(FileError, match=r"a\.csv cannot be written: No space left on device\."):
+    with pytest.raises(FileError, match=r"a\.csv .*No space left on device"):
         write_whole(tmp_path / "a.csv", write)
     assert [each.read_text() for each in tmp_path.iterdir()] == ["old"]
 
@@ -271,9 +271,9 @@ def test_units_that_are_no_whole_powers_of_base_units_have_none(unit: str) -> No
 
 
 def test_wrong_and_unknown_units() -> None:
-    with pytest.raises(InputError, match="the stop is given in 'V', which does not measure .* rad"):
+    with pytest.raises(InputError, match="stop .* 'V', .* rad"):
         to_si(1.0, "V", "rad", "the stop")
-    with pytest.raises(InputError, match="unknown unit 'furlongs_per_blink'"):
+    with pytest.raises(InputError, match="'furlongs_per_blink'"):
         to_si(1.0, "furlongs_per_blink", "m/s", "it")
 
 
@@ -286,7 +286,7 @@ def test_wrong_and_unknown_units() -> None:
     ],
 )
 def test_a_unit_that_would_take_for_ever(unit):
-    with pytest.raises(InputError, match="column 'u' has the unreadable unit"):
+    with pytest.raises(InputError, match="column 'u' .* unit"):
         to_si(1.0, unit, "V", "column 'u'")
 
 

@@ -43,7 +43,7 @@ def test_whatever_a_header_has_for_a_unit(unit):
 
 
 def test_a_number_too_large_in_si():
-    with pytest.raises(InputError, match="the stroke is 1e.308 km, too large a number in m"):
+    with pytest.raises(InputError, match="stroke .* 1e.308 km, .* in m"):
         to_si(1e308, "km", "m", "the stroke")
 
 

@@ -63,11 +63,11 @@ def test_command_runs_ahead(hoist: Drive) -> None:
 @pytest.mark.parametrize(
     ("speed", "rate", "said"),
     [
-        ([1.0], 512.0, "two or more samples"),
-        ([[1.0, 1.0]], 512.0, "two or more samples"),
-        ([1.0, 1.0], 0.0, "a rate above 0 Hz"),
-        ([1.0, 4.0], 512.0, "hoist cannot settle at 229.183 deg/s: its speeds reach"),
-        ([1.0, -4.0], 512.0, "hoist cannot settle at -229.183 deg/s: its speeds reach"),
+        ([1.0], 512.0, "two .* samples"),
+        ([[1.0, 1.0]], 512.0, "two .* samples"),
+        ([1.0, 1.0], 0.0, "rate .* 0 Hz"),
+        ([1.0, 4.0], 512.0, "hoist .* 229.183 deg/s"),
+        ([1.0, -4.0], 512.0, "hoist .* -229.183 deg/s"),
         ([1.0, np.nan], 512.0, "finite"),
         ("fast", 512.0, "a number"),
     ],
@@ -110,19 +110,19 @@ def test_files(tmp_path) -> None:
         assert stored[way]["voltage"] == getattr(hoist, way).voltage.tolist()
     assert (stored["drive"], stored["rest"]["speed"]) == ("hoist", hoist.creep)
     assert stored["acceleration"] == list(hoist.acceleration)
-    with pytest.raises(FileError, match="written as .toml, .csv or .parquet"):
+    with pytest.raises(FileError, match="txt.* .toml, .csv or .parquet"):
         hoist.write(tmp_path / "map.txt")
 
 
 def test_drives_without_an_inverse(hoist: Drive) -> None:
-    with pytest.raises(DomainError, match="No positive command up to 10 V moves hoist"):
+    with pytest.raises(DomainError, match="positive .* 10 V .* hoist"):
         inverse_map(hoist.replace(Z17=5.0))
     bent = hoist.replace(G1=0.1, G2=-0.006, G3=0.0, Z13=1.0)
-    with pytest.raises(DomainError, match="does not rise from .* to .* V"):
+    with pytest.raises(DomainError, match="hoist .* from .* to .* V.* G1, G2 and G3"):
         inverse_map(bent)
-    with pytest.raises(InputError, match="takes 2 to 10001 points"):
+    with pytest.raises(InputError, match="2 to 10001 points"):
         inverse_map(hoist, 10_002)
-    with pytest.raises(InputError, match="standstill throughout"):
+    with pytest.raises(InputError, match="reference speed .* standstill"):
         improvement(hoist, np.zeros(10))
 
 

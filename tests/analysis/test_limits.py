@@ -116,7 +116,7 @@ def test_a_speed_that_was_reference_and_a_load(hoist: Drive) -> None:
     (delay,) = (each for each in found.shares if each.limit == "delay")
     without = leaking.replace(tau=0.0).simulate(SINE, load_torque=3e4).shaft_speed
     assert delay.error == pytest.approx(rms(without), rel=1e-12)
-    with pytest.raises(InputError, match="finite numbers, one a sample"):
+    with pytest.raises(InputError, match=r"reference speed .* \d+ finite numbers"):
         limit_shares(hoist, SINE, reference=np.zeros(3))
 
 
@@ -148,7 +148,7 @@ def test_a_command_outside_the_domain_is_refused() -> None:
     nervous = drive.replace(Z19=k, Z20=0.0, Z21=0.0, Z22=0.0, zeta=0.6, lim1=1.0, I_t1=1e-3)
     step = maneuvers.step(10.0).sample()
     nervous.simulate(step)  # its ramp keeps it from overshooting
-    with pytest.raises(DomainError, match="Without its limits the drive cannot be simulated"):
+    with pytest.raises(DomainError, match="limits the drive"):
         limit_shares(nervous, step)
     found = limit_shares(nervous, step, reference=np.zeros(step.size))
     (share,) = (each for each in found.shares if each.limit == "current rate")

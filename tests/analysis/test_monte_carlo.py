@@ -72,11 +72,11 @@ def test_draws_outside_the_bounds_are_drawn_again(hoist):
     assert "Widen the bounds in the fit setup" in redrawn
     # of one in a thousand nobody decides anything
     assert len(drawn(4e-5, 300).sentences()) == 1
-    with pytest.raises(InputError, match="the errors are too large for a Monte Carlo"):
+    with pytest.raises(InputError, match=r"Of \d+ draws .*Monte Carlo"):
         drawn(1e10, 10)
-    with pytest.raises(InputError, match="at least one draw, not 0"):
+    with pytest.raises(InputError, match="draw, .* 0"):
         drawn(1e-4, 0)
-    with pytest.raises(InputError, match="at least one stage"):
+    with pytest.raises(InputError, match="one stage of a fit"):
         drawn_drives([])
 
 
@@ -102,7 +102,7 @@ def test_standard_errors_where_no_draw_stays_within_the_bounds(hoist):
     without_creep = hoist.parameters.numbers["Z10"] * hoist.parameters.numbers["Z13_plus"]
     assert speed == pytest.approx(100.0 * without_creep, rel=1e-6)
     assert delay == 0.0
-    with pytest.raises(InputError, match="errors are too large for a Monte Carlo"):
+    with pytest.raises(InputError, match=r"Of \d+ draws .*Monte Carlo"):
         drawn_drives([stage], 10)
 
 
@@ -130,7 +130,7 @@ def test_a_band_by_hand(hoist):
     with pytest.raises(InputError, match="level 1 of a band"):
         bands(drawn, command, level=1.0)
     endless = np.broadcast_to(0.0, 100_000_000)
-    with pytest.raises(InputError, match="take too much memory: use 1 drives at most"):
+    with pytest.raises(InputError, match="memory: .* 1 drives"):
         bands(drawn, Trial(endless, 512.0, endless))
     # of the speed limits each way and of the final speed
     down = hoist.parameters.numbers["Z13_minus"] / angle
@@ -213,14 +213,14 @@ def test_the_campaign_may_have_moved(fit_and_folder, tmp_path):
     assert content["campaign"] == "virtual/campaign.toml"
     content["campaign"] = "elsewhere.toml"
     (tmp_path / "fit.json").write_text(json.dumps(content), "utf-8")
-    with pytest.raises(FileNotFoundError, match=r"was fitted to \S*elsewhere.toml, which is not"):
+    with pytest.raises(FileNotFoundError, match=r"elsewhere\.toml"):
         stored_draws(tmp_path)
     drawn = stored_draws(tmp_path, campaign=old, draws=2)
     assert len(drawn.drives) == 2
     with pytest.raises(InputError, match="another drive .* differ"):
         stored_draws(tmp_path, campaign=old, drive=Drive.preset("luff"))
-    with pytest.raises(FileNotFoundError, match="no fit.json in .*virtual: give a folder that"):
+    with pytest.raises(FileNotFoundError, match="fit.json in .*virtual: .* folder"):
         stored_draws(tmp_path / "virtual")
     (tmp_path / "fit.json").write_text("{}", "utf-8")
-    with pytest.raises(ParameterError, match="fit.json: .* needs an entry"):
+    with pytest.raises(ParameterError, match="fit.json: .* entry"):
         stored_draws(tmp_path)

@@ -87,21 +87,21 @@ def test_what_cannot_be_met_says_what_can(hoist, monkeypatch):
     monkeypatch.setattr(sizing, "performance", made_up)
     required = Requirements(speed=np.radians(300.0), tracking_error=np.radians(12.0))
     follow = Trial(np.zeros(2), 512.0, np.array([0.0, 1.0]))
-    with pytest.raises(InputError, match="each requirement, but not all at the same time"):
+    with pytest.raises(InputError, match="each .* not all"):
         size(hoist, required, {"pump": DEFAULT_RANGE}, follow=follow)
 
 
 @pytest.mark.parametrize(
     ("required", "ranges", "said"),
     [
-        ({}, {"pump": DEFAULT_RANGE}, "give a speed, an acceleration, a tracking error"),
-        ({"speed": -1.0}, {"pump": DEFAULT_RANGE}, "required speed is -1, but must be positive"),
-        ({"speed": 1.0}, {}, "Name at least one design variable"),
-        ({"speed": 1.0}, {"pump": (1.2, 2.0)}, "rise from 0 or more and have 1 between them"),
+        ({}, {"pump": DEFAULT_RANGE}, "speed, an acceleration, a tracking error"),
+        ({"speed": -1.0}, {"pump": DEFAULT_RANGE}, "speed .* -1, .* positive"),
+        ({"speed": 1.0}, {}, "design variable"),
+        ({"speed": 1.0}, {"pump": (1.2, 2.0)}, "pump.* 0 .* 1 "),
         (
             {"tracking_error": 0.1},
             {"pump": DEFAULT_RANGE},
-            "needs a reference speed",
+            "reference speed",
         ),
     ],
 )

@@ -105,7 +105,7 @@ def test_a_long_log_whose_columns_differ_in_length(long, tmp_path, monkeypatch):
     (found,) = long(toml=toml)
     assert found.input.time.size == 2 * found["speed"].time.size == ROWS
     monkeypatch.setattr("swashplate.logs.log.MOST", 3 * ROWS - 1)
-    with pytest.raises(FileError, match="has 36000 numbers in the 4 requested columns, more"):
+    with pytest.raises(FileError, match="36000 numbers .* 4 "):
         long(toml=toml)
 
 
@@ -142,9 +142,9 @@ def test_stamps_of_a_calendar_count_from_the_first_of_the_file(long):
 @pytest.mark.parametrize(
     ("old", "new", "error", "said"),
     [
-        ("\n90.0,", "\nx,", FileError, "'time' holds 'x', .* in data row 9001"),
-        ("\n75.0,", "\n1.0,", FileError, "'time' goes back from 74.99 to 1.0 in data row 7501"),
-        ("\n21.0,", "\n21.0,,", FileError, "data row 2101 .* has 5 fields instead of 4"),
+        ("\n90.0,", "\nx,", FileError, "'time' .*'x'.* row 9001"),
+        ("\n75.0,", "\n1.0,", FileError, "'time' .*74.99 .*1.0 .* row 7501"),
+        ("\n21.0,", "\n21.0,,", FileError, "row 2101 .* 5 .* 4"),
     ],
 )
 def test_what_is_wrong_names_its_row_in_the_file(long, tmp_path, old, new, error, said):
@@ -156,16 +156,16 @@ def test_what_is_wrong_names_its_row_in_the_file(long, tmp_path, old, new, error
 
 def test_a_log_without_motion_and_a_table_that_cannot_be_written(long, tmp_path):
     rest = "time,u,n\n" + "".join(f"{k / RATE},0,0\n" for k in range(ROWS))
-    with pytest.raises(InputError, match="12000 rows, but its input never moves"):
+    with pytest.raises(InputError, match="12000 rows.* input"):
         long(rest)
     beside = tmp_path / "log.csv.parquet"
     beside.unlink()
     beside.mkdir()
-    with pytest.raises(FileError, match=r"its table log.csv.parquet cannot be written next to it"):
+    with pytest.raises(FileError, match=r"log\.csv\.parquet"):
         long(table())
     beside.rmdir()
     pl.DataFrame({"a": [1]}).write_parquet(beside)
-    with pytest.raises(FileError, match="has the name of the table of a long log; rename it"):
+    with pytest.raises(FileError, match="table .*rename"):
         long(table())
 
 

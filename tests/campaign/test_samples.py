@@ -55,16 +55,16 @@ def test_any_motion_slower_than_half_the_range_is_recovered(steps, first, modulu
 
 
 REFUSED = {
-    r"row 2 \(the first is 0\) has 1.0 s after 1.0 s": lambda: increasing([0.0, 1.0, 1.0, 2.0]),
-    "time must be finite, but row 1": lambda: increasing([0.0, np.nan, 1.0]),
-    "at least two rows": lambda: increasing([0.0]),
+    "row 2 .* 1.0 s .* 1.0 s": lambda: increasing([0.0, 1.0, 1.0, 2.0]),
+    "time .* finite.* row 1": lambda: increasing([0.0, np.nan, 1.0]),
+    "two rows": lambda: increasing([0.0]),
     "one row of numbers": lambda: increasing([[0.0, 1.0]]),
-    "half the range of a counter of 8.*row 2 .* is 7": lambda: unwrap_counts([2, 3, 7], 8),
-    "from 0 to 7, the range of a counter of 8 .* row 1 .* is 9": lambda: unwrap_counts([0, 9], 8),
-    "from -4 to 3, the range of a signed .* row 1 .* is 7": lambda: unwrap_counts([-1, 7], 8),
-    "whole numbers, but row 1": lambda: unwrap_counts([0, 0.5], 8),
-    "from 2 to 2.53 readings": lambda: unwrap_counts([0, 1], 2**64),
-    "finite, but row 1": lambda: unwrap_counts([0, np.nan], 256),
+    "half .* 8.* row 2 .* 7": lambda: unwrap_counts([2, 3, 7], 8),
+    "0 to 7, .* 8 .* row 1 .* 9": lambda: unwrap_counts([0, 9], 8),
+    "-4 to 3, .* signed .* row 1 .* 7": lambda: unwrap_counts([-1, 7], 8),
+    "whole .* row 1": lambda: unwrap_counts([0, 0.5], 8),
+    "2 to 2.53": lambda: unwrap_counts([0, 1], 2**64),
+    "finite.* row 1": lambda: unwrap_counts([0, np.nan], 256),
 }
 
 

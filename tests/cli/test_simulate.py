@@ -119,7 +119,7 @@ def test_a_part_of_a_run_is_drawn(done, refused, tmp_path):
     instants = ["1.0", "1.2", "1.4", "1.6", "1.8", "2.0"]
     assert any(ticks[k : k + len(instants)] == instants for k in range(len(ticks)))
     said = refused("simulate", "hoist", "step:9", "--plot", "none.svg", "--from", "90")
-    assert "The window from 90 s to 10 s holds 0 samples of hoist" in said
+    assert "90 s to 10 s holds 0 samples of hoist" in said
 
 
 # --- records --------------------------------------------------------------------------------------
@@ -155,12 +155,14 @@ def test_what_was_measured_beside_the_voltage_counts(done, refused):
     slower = done("simulate", "hoist", "step:9", "--measured", "pump_speed=0.8")
     assert "156.80" in slower  # 0.8 times 196.00 deg/s, at the plate's stop
     for wrong, said in (
-        ("pump_speed=n", "a maneuver has no columns, so give a number in SI"),
-        ("speed=1", "write NAME=COLUMN, once for each of load_torque, pump_speed"),
-        ("supply_pressure=-3", "falls to -3 Pa, but must be from 1 to 1e+09 Pa"),
-        ("pump_speed=1e308", "is 1e+308, but on a machine it is at most 10"),
+        ("pump_speed=n", "number in SI"),
+        ("speed=1", "NAME=COLUMN"),
+        ("supply_pressure=-3", "1 to 1e+09 Pa"),
+        ("pump_speed=1e308", "1e+308"),
     ):
-        assert said in refused("simulate", "hoist", "step:9", "--measured", wrong)
+        sentence = refused("simulate", "hoist", "step:9", "--measured", wrong)
+        assert wrong.partition("=")[0] in sentence
+        assert said in sentence
 
 
 def test_a_recursion_for_another_rate_becomes_its_equation(done):
@@ -180,15 +182,15 @@ def test_a_recursion_for_another_rate_becomes_its_equation(done):
     [
         (
             "time,voltage\n0,1\n1,x\n2,1\n",
-            "'voltage' holds 'x', which is not a number",
+            "'voltage' ... 'x'",
         ),
-        ("time,voltage\n0,1\n2,1\n1,1\n", "'time' goes back from 2.0 to 1.0 in data row 3"),
-        ("time,voltage\n0,1\n1,-10.5\n", "-10.5 V at 1 s, but the card takes ±10 V"),
+        ("time,voltage\n0,1\n2,1\n1,1\n", "'time' ... 2.0 ... 1.0 ... row 3"),
+        ("time,voltage\n0,1\n1,-10.5\n", "-10.5 V ... 1 s... ±10 V"),
         (
             "t,u\n0,1\n1,1\n",
-            "no column 'time'; it has 't', 'u': name the one to take, with --time-",
+            "'time'... 't', 'u'... --time-",
         ),
-        ("time,u\n0,1\n1,1\n", "it has 'time', 'u': name the one to take, with --column."),
+        ("time,u\n0,1\n1,1\n", "'time', 'u'... --column."),
     ],
 )
 def test_a_bad_record_is_refused(refused, tmp_path, text, said):
@@ -196,7 +198,8 @@ def test_a_bad_record_is_refused(refused, tmp_path, text, said):
     words = ("--interpolation", "previous", "--out", "run.csv", "--plot", "run.png")
     sentence = refused("simulate", "hoist", "log.csv", *words)
     assert "log.csv" in sentence
-    assert said in sentence
+    for part in said.split("..."):
+        assert part in sentence
 
 
 # --- compare, axes and show -----------------------------------------------------------------------
@@ -250,9 +253,9 @@ def test_a_packaged_name_goes_before_a_folder(done, refused, tmp_path):
     (tmp_path / "hoist").mkdir()
     (tmp_path / "hoist" / "drive.TOML").write_text(done("show", "slew", "--toml"), "utf-8")
     assert done("show", "hoist/drive.TOML") == done("show", "slew") != done("show", "hoist")
-    assert "There is no drive.toml in hoist: give a folder" in refused("limits", "./hoist")
+    assert "drive.toml in hoist: give a folder" in refused("limits", "./hoist")
     Path("hoist/parameters.toml").touch()
-    assert "hoist is the fit of a user-defined model" in refused("limits", "./hoist")
+    assert "user-defined model" in refused("limits", "./hoist")
     said = refused("export", "./hoist", "--fmu", "hoist.fmu")
     assert 'swashplate.export.fmu(model, "model.fmu", parameters=..., step=...)' in said
     assert "hoist/parameters.toml" in said

@@ -156,9 +156,9 @@ def test_a_crane_without_limits_is_asked_for_harm_alone(crane):
     found = assess(bare, CLIPPED, seeds=range(3), drives=("identified",), **QUICK)
     assert found.questions == ("harm",)
     assert found.sufficient is None
-    with pytest.raises(InputError, match="has no limits by which"):
+    with pytest.raises(InputError, match=r"tg3637 .* \[limits\]"):
         assess(bare, CLIPPED, seeds=range(3), questions=["sufficiency"], **QUICK)
-    with pytest.raises(InputError, match="no question 'safety'; there are harm, sufficiency"):
+    with pytest.raises(InputError, match="question 'safety'.* harm, sufficiency"):
         assess(crane, CLIPPED, seeds=range(3), questions=["safety"], **QUICK)
 
 
@@ -425,7 +425,7 @@ def test_own_logs_lead_to_the_verdict_on_the_own_crane(crane, fitted):
     given = crane.with_drive(luff=result)
     assert given.luff.parameters.numbers == result.drive.parameters.numbers
     assert crane.with_drive(luff="hoist").luff.name == "hoist"
-    with pytest.raises(ParameterError, match="slew: the fit has a drive of the luff"):
+    with pytest.raises(ParameterError, match="slew: .* luff"):
         crane.with_drive(slew=result)
     drawn = drawn_cranes(own, luff=stored_draws(place, draws=3, seed=1))
     assert len(drawn) == 3
@@ -454,7 +454,7 @@ def test_cranes_are_drawn_axis_by_axis(crane):
     assert {each.luff for each in drawn} == set(luff.drives)
     assert {each.hoist for each in drawn} < set(hoist.drives)
     assert all(each.slew == crane.slew for each in drawn)
-    with pytest.raises(InputError, match="draws of at least one axis"):
+    with pytest.raises(InputError, match="tg3637 .* luff=FOLDER"):
         drawn_cranes(crane)
 
 
@@ -499,28 +499,28 @@ def test_what_makes_no_study_is_said(crane):
         with pytest.raises(InputError, match=message):
             assess(crane, MEANT, **{"seeds": [0], **how})
 
-    refuse("one controller, one set of drives and one seed", seeds=[])
-    refuse("one controller, one set of drives and one seed", drives=())
-    refuse(r"drawn. are \[\], but must be a name, a crane or a list", drives={"drawn": []})
-    refuse("3. are 3, but must be a name, a crane or a list of cranes", drives=[3])
-    refuse("drives is 3, but must be a list of names", drives=3)
+    refuse("controller, .* set of drives .* seed", seeds=[])
+    refuse("controller, .* set of drives .* seed", drives=())
+    refuse(r"drawn. .*\[\], .* a name, a crane or a list", drives={"drawn": []})
+    refuse("3. .* 3, .* a name, a crane or a list", drives=[3])
+    refuse("drives .* 3, .* list of names", drives=3)
     refuse(
-        "evaluated for 30 s after a run-in of 120 s, but must be evaluated for at least 60 s",
+        "30 s .* 120 s, .* 60 s",
         length=30.0,
     )
     refuse(
-        "stick is 100 s long, but a run is evaluated from 120 s on",
+        "stick .* 100 s .* 120 s",
         stick=OperatorCommand.rest(100.0),
     )
     moving = OperatorCommand.record(np.full((153_600, 3), [0.0, 0.01, 0.0]))
-    refuse("Ideal drives follow instantaneously, .* put a row of zeros before it", stick=moving)
-    refuse("seeds is 3, but must be a sequence, as range", seeds=3)
-    refuse("A sea is a name, as 'ss3', or a Spectrum, not of type ndarray", sea=np.zeros((9, 6)))
-    refuse("A study has no 'see'; it has seeds, sea, drives, .*, slew_deg", see="ss3")
-    refuse("A study has no 'actuation'; it has seeds", actuation="direct")
-    with pytest.raises(InputError, match="Periods to follow must be above 0 s"):
+    refuse("Ideal drives .* stick .* row of zeros", stick=moving)
+    refuse("seeds .* 3, .* sequence, as range", seeds=3)
+    refuse("sea .* 'ss3', or a Spectrum, .* ndarray", sea=np.zeros((9, 6)))
+    refuse("'see'.* seeds, sea, drives, .*, slew_deg", see="ss3")
+    refuse("'actuation'.* seeds", actuation="direct")
+    with pytest.raises(InputError, match="Periods .* 0 s"):
         follow(crane, [0.0])
-    with pytest.raises(InputError, match="Points of the height must be .* from 0.001 to 30 m"):
+    with pytest.raises(InputError, match="height .* 0.001 to 30 m"):
         sweep(crane, "height", MEANT, points=[-1.0])
-    with pytest.raises(InputError, match="A sweep over the bearing sets slew_deg itself"):
+    with pytest.raises(InputError, match="bearing .* slew_deg"):
         sweep(crane, "bearing", MEANT, slew_deg=90.0)

@@ -256,18 +256,18 @@ def test_wrong_words_end_in_one_sentence(words, sentence):
 @pytest.mark.parametrize(
     ("change", "sentence"),
     [
-        ({"boom_length": 0.0}, "boom_length is 0 m, but on a crane it is 1 to 300 m"),
-        ({"tower_sheave_angle": 1.0}, "tower_sheave_angle is 57.2958 deg, but the luff rope only"),
-        ({"boom_limits": (0.9, 0.5)}, "boom_limits are 51.5662 and 28.6479 deg, but must rise"),
-        ({"boom_limits": (0.9, 2.0)}, "boom_limits is 2 rad, but on a crane it is 0 to 90 deg"),
-        ({"rope_limits": (0.0, 50.0)}, "rope_limits is 0 m, but on a crane it is 0.05 to 6000 m"),
-        ({"rope_limits": (9.0, 5.0)}, "rope_limits are 9 and 5 m, but the second must be larger"),
-        ({"boom_length": 28000.0}, "boom_length is 28000 m, but on a crane it is 1 to 300 m"),
-        ({"boom_length": True}, "boom_length is True, but must be one number"),
-        ({"boom_limits": "39"}, "boom_limits is '39', but must be a list of 2 numbers"),
-        ({"slew_axis": 3.0}, "slew_axis must be a list of 3 numbers, not 1"),
-        ({"swing_damping": 0.5}, "swing_damping is 0.5, but on a crane it is 0 to 0.2"),
-        ({"jib": 3.0}, "A crane has no jib; it has boom_length"),
+        ({"boom_length": 0.0}, "boom_length .* 0 m, .* 1 to 300 m"),
+        ({"tower_sheave_angle": 1.0}, "tower_sheave_angle .* 57.2958 deg, .* luff rope"),
+        ({"boom_limits": (0.9, 0.5)}, "boom_limits .* 51.5662 and 28.6479 deg, .* rise"),
+        ({"boom_limits": (0.9, 2.0)}, "boom_limits .* 2 rad, .* 0 to 90 deg"),
+        ({"rope_limits": (0.0, 50.0)}, "rope_limits .* 0 m, .* 0.05 to 6000 m"),
+        ({"rope_limits": (9.0, 5.0)}, "rope_limits .* 9 and 5 m, .* second"),
+        ({"boom_length": 28000.0}, "boom_length .* 28000 m, .* 1 to 300 m"),
+        ({"boom_length": True}, "boom_length .* True, .* one number"),
+        ({"boom_limits": "39"}, "boom_limits .*'39', .* 2 numbers"),
+        ({"slew_axis": 3.0}, "slew_axis .* 3 numbers, .* 1"),
+        ({"swing_damping": 0.5}, "swing_damping .* 0.5, .* 0 to 0.2"),
+        ({"jib": 3.0}, "jib; .* boom_length"),
     ],
 )
 def test_impossible_geometry_is_refused(change, sentence):
@@ -292,11 +292,11 @@ def test_a_cranes_file_takes_the_folder_of_a_fit_beside_it(tmp_path):
 def test_drives_of_another_axis_and_campaigns_are_refused(tmp_path):
     crane, place = Crane.preset("tg3637"), tmp_path / "drive.toml"
     crane.slew.to_toml(place)
-    with pytest.raises(ParameterError, match=r"luff: .*drive.toml has a drive of the slew"):
+    with pytest.raises(ParameterError, match=r"luff: .*drive.toml .* slew"):
         crane.with_drive(luff=tmp_path)
     assert crane.with_drive(slew=place).slew == crane.slew
     (tmp_path / "campaign.toml").write_text('[[runs]]\nfile = "a.csv"\n', "utf-8")
-    with pytest.raises(ParameterError, match=r"hoist: .*campaign.toml is a campaign: fit it first"):
+    with pytest.raises(ParameterError, match=r"hoist: .*campaign.toml .* campaign: fit"):
         crane.with_drive(hoist=tmp_path / "campaign.toml")
 
 
@@ -319,10 +319,10 @@ def test_files_are_refused_by_their_entry(tmp_path):
     text = said("show", "tg3637", "--toml").stdout
     path = tmp_path / "mine.toml"
     path.write_text(text.replace("boom_length", "boom_lenght"), "utf-8")
-    with pytest.raises(ParameterError, match=r"mine.toml: .*needs an entry 'boom_length'"):
+    with pytest.raises(ParameterError, match=r"mine.toml: .* 'boom_length'"):
         Crane.from_toml(path)
     path.write_text(text.replace('value = 36.0, unit = "m"', 'value = 36.0, unit = "kg"'), "utf-8")
-    with pytest.raises(InputError, match="boom_length is given in 'kg', which does not measure"):
+    with pytest.raises(InputError, match="boom_length .* 'kg'"):
         Crane.from_toml(path)
     with pytest.raises(FileError, match="There is no file"):
         Crane.from_toml(tmp_path / "none.toml")

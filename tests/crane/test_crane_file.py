@@ -32,7 +32,7 @@ def quantity(value, unit):
     "value", ["true", '"36"', "[36.0, true]", "nan", "inf", "1979-05-27", "{ a = 1 }"]
 )
 def test_what_is_no_number_is_refused(read, value):
-    with pytest.raises(ParameterError, match=r"mine\.toml: geometry\.boom_length\.value is "):
+    with pytest.raises(ParameterError, match=r"mine\.toml: geometry\.boom_length\.value "):
         read(boom_length=quantity(value, "m"))
 
 
@@ -74,7 +74,7 @@ RANGES = {
     [(name, *each) for name, all_ in IMPLAUSIBLE.items() for each in all_],
 )
 def test_implausible_values_are_refused_with_the_plausible_range(read, name, value, unit):
-    with pytest.raises(ParameterError, match=rf"mine\.toml: {name} is .* {RANGES[name]}:") as error:
+    with pytest.raises(ParameterError, match=rf"mine\.toml: {name} .* {RANGES[name]}") as error:
         read(**{name: quantity(value, unit)})
     assert str(error.value).count(". ") == 0
 
@@ -143,7 +143,7 @@ def test_a_source_does_not_stay_with_another_value(read):
     reading = "type name read as 36 t at 37 m outreach: 2.5 m + 36 m cos 15 deg = 37.3 m"
     boom = f'status = "assumed", source = "{reading}"'
     with pytest.raises(
-        ParameterError, match=r"mine\.toml: boom_length and slew_axis have .* than tg3637.*source"
+        ParameterError, match=r"mine\.toml: boom_length and slew_axis .* tg3637.*source"
     ):
         read(
             slew_axis=f'{{ value = [40.0, 8.5, 19.0], unit = "m", {starboard} }}',
@@ -158,7 +158,7 @@ def test_a_source_does_not_stay_with_another_value(read):
 def test_a_limits_source_does_not_stay_with_another_value(tmp_path):
     path = tmp_path / "mine.toml"
     path.write_text(preset_text("tg3637").replace("value = 4.0", "value = 3.0"), "utf-8")
-    with pytest.raises(ParameterError, match=r"mine\.toml: side_lead has another value than tg"):
+    with pytest.raises(ParameterError, match=r"mine\.toml: side_lead .* tg3637"):
         Crane.from_toml(path)
 
 
@@ -172,10 +172,10 @@ def test_a_value_from_python_is_the_users(read):
     for name in ("slew_axis", "safe_load"):
         changed = crane.quantities[name]
         assert (changed.status, changed.source) == ("user", "")
-    with pytest.raises(ParameterError, match="safe_load is True, but must be one number"):
+    with pytest.raises(ParameterError, match="safe_load .* True, .* one number"):
         crane.with_geometry(safe_load=True)
 
 
 def test_units_that_measure_something_else_are_refused(read):
-    with pytest.raises(InputError, match="boom_length is given in 'kg'"):
+    with pytest.raises(InputError, match="boom_length .* 'kg'"):
         read(boom_length=quantity("36.0", "kg"))

@@ -59,21 +59,21 @@ def test_logs_that_are_no_free_swing_are_refused():
     grown = 0.01 * np.exp(0.01 * TIME) * np.cos(OMEGA * TIME)
     random = np.random.default_rng(1).standard_normal(TIME.size)
     cases = [
-        (TIME[:400], free_swing(0.01)[:400], r"The log has 4\.[89] swings, but 5 are needed"),
-        (TIME, grown, "does not show that the swing decays: its damping ratio would be -0.013"),
-        (TIME, 0.1 * np.cos(OMEGA * TIME) + noise(2), "does not show that the swing decays"),
-        (TIME, 0.1 * random, "A decaying sine explains"),
-        (TIME, np.abs(free_swing(0.01)), "never changes its sign: use the signed angle"),
-        (TIME, np.degrees(free_swing(0.01)), r"reaches 7.\d+ rad, .* if it is in degrees"),
-        (TIME[::-1], free_swing(0.01), "the time must rise"),
-        (TIME, free_swing(0.01)[:9], "two rows of equal length"),
+        (TIME[:400], free_swing(0.01)[:400], r"4\.[89] swings, .* 5 "),
+        (TIME, grown, "decays: .*-0.013"),
+        (TIME, 0.1 * np.cos(OMEGA * TIME) + noise(2), "swing decays"),
+        (TIME, 0.1 * random, "decaying sine"),
+        (TIME, np.abs(free_swing(0.01)), "signed angle"),
+        (TIME, np.degrees(free_swing(0.01)), r"7.\d+ rad, .* degrees"),
+        (TIME[::-1], free_swing(0.01), "time .* rise"),
+        (TIME, free_swing(0.01)[:9], "equal length"),
     ]
     for time, angle, sentence in cases:
         with pytest.raises(InputError, match=sentence):
             swing_damping(time, angle)
-    with pytest.raises(InputError, match="once in 8.27 s, but a load on 30 m of rope once in 11 s"):
+    with pytest.raises(InputError, match="8.27 s, .* 30 m .* 11 s"):
         swing_damping(TIME, free_swing(0.01), rope=30.0)
-    with pytest.raises(InputError, match="The rope is -1 m long"):
+    with pytest.raises(InputError, match="rope .* -1 m"):
         swing_damping(TIME, free_swing(0.01), rope=-1.0)
 
 

@@ -175,15 +175,15 @@ def test_a_ship_that_does_not_reach_a_sea_of_the_diagram_is_refused_by_that_sea(
     grid = np.linspace(0.2, 1.5, 20)
     ship = Short("short.csv", np.zeros(1), np.radians([0.0, 180.0]), grid,
                  np.zeros((1, 2, 20, 6), complex))  # fmt: skip
-    with pytest.raises(InputError, match=r"short\.csv has waves .*0\.5 m, 5 s"):
+    with pytest.raises(InputError, match=r"short\.csv .*0\.5 m, 5 s"):
         operability(crane, CLIPPED, Scatter.of([0.5], [5.0], [1.0]), sea=Seaway(
             Spectrum(1.0, 12.0), ship=ship))  # fmt: skip
 
 
 def test_a_crane_without_limits_has_no_operability(crane, scatter):
-    with pytest.raises(InputError, match=r"has no limits: give its file a table \[limits\]"):
+    with pytest.raises(InputError, match=r"tg3637 .* table \[limits\]"):
         operability(replace(crane, limits={}), CLIPPED, scatter)
-    with pytest.raises(InputError, match="simulated for 100 s, but .* need at least 300 s"):
+    with pytest.raises(InputError, match="100 s, .* 300 s"):
         operability(crane, CLIPPED, scatter, length=100.0)
 
 
@@ -203,15 +203,15 @@ def test_a_diagram_is_read_whatever_the_order_of_its_columns(tmp_path):
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
-        ("", "has the columns hs, tp and share in its first line; hs is missing"),
-        ("hs,tp\n1,2\n", "share is missing"),
-        ("hs,tp,share\n1,2\n", "line 2 has 2 entries, but the first has 3"),
-        ("hs,tp,share\n1,two,3\n", "line 2: tp is 'two', but must be a number"),
-        ("# x\nhs,tp,share\n1,-2,3\n", "Row 1 of the scatter diagram has a period of -2"),
-        ("hs,tp,share\n1,2,3\n1,2,4\n", "has the sea of 1 m and 2 s twice"),
-        ("hs,tp,share\n1,2,0\n", "All shares of the scatter diagram are 0"),
-        ("hs,tp,share\n", "needs at least one row"),
-        ("hs,tp,share\n1,nan,1\n", "Row 1 of the scatter diagram has a period of nan"),
+        ("", "hs, tp and share ... first line; hs "),
+        ("hs,tp\n1,2\n", "first line; share "),
+        ("hs,tp,share\n1,2\n", "line 2 ... 2 entries, ... 3"),
+        ("hs,tp,share\n1,two,3\n", "line 2: tp ...'two', ... number"),
+        ("# x\nhs,tp,share\n1,-2,3\n", "Row 1 ... period of -2"),
+        ("hs,tp,share\n1,2,3\n1,2,4\n", "1 m and 2 s twice"),
+        ("hs,tp,share\n1,2,0\n", "shares ... 0"),
+        ("hs,tp,share\n", "one row: height, period, share"),
+        ("hs,tp,share\n1,nan,1\n", "Row 1 ... period of nan"),
     ],
 )
 def test_what_is_no_diagram_is_said(tmp_path, text, sentence):
@@ -219,7 +219,8 @@ def test_what_is_no_diagram_is_said(tmp_path, text, sentence):
     path.write_text(text, "utf-8")
     with pytest.raises(InputError) as error:
         Scatter.from_csv(path)
-    assert sentence in str(error.value)
+    for part in sentence.split("..."):
+        assert part in str(error.value)
     assert str(path) in str(error.value)
 
 

@@ -212,11 +212,11 @@ def test_drag_leads_to_a_terminal_lean():
 def test_rope_too_short_for_the_step_is_refused():
     tip = still(1.0)
     tip[100:, 0] = 5.0
-    with pytest.raises(InputError, match=r"At 0.195312 s the boom's tip moves .* rope of 2 m"):
+    with pytest.raises(InputError, match=r"0.195312 s .* rope of 2 m"):
         load_motion(tip, 2.0)
-    with pytest.raises(InputError, match="rope longer than 0 m"):
+    with pytest.raises(InputError, match="rope .* 0 m"):
         load_motion(tip, 0.0)
-    with pytest.raises(InputError, match="two or more rows of x, y and z"):
+    with pytest.raises(InputError, match="rows of x, y and z"):
         load_motion(tip[:, :2], 2.0)
 
 
@@ -297,7 +297,7 @@ def test_first_mode_of_a_hook_with_slings_decays_by_about_the_damping_ratio():
 
 
 def test_damping_beyond_its_range_is_refused():
-    with pytest.raises(InputError, match="swing_damping is 0.3, .* at most 0.2; loads on ropes"):
+    with pytest.raises(InputError, match="swing_damping .* 0.3, .* 0.2"):
         load_motion(still(1.0), 20.0, swing_damping=0.3)
 
 
@@ -364,23 +364,23 @@ def test_hook_and_load_fall_together_and_are_caught_together():
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: Suspension(stiffness=0.0), "rope's stiffness is 0 N, but must be 1000 to 1e.12 N"),
-        (lambda: Suspension(stiffness=1e300), "rope's stiffness is 1e.300 N, .* inf for a rigid"),
-        (lambda: Suspension(hook=1e300, sling=2.0), "hook is 1e.300, .* at most 1e.06"),
-        (lambda: Suspension(hook=500.0, sling=1e300), "sling is 1e.300, .* at most 200"),
-        (lambda: Suspension(bounce_damping=inf), "bounce_damping is inf, .* at most 1"),
-        (lambda: load_motion(still(1.0), 3.0, mass=1e-300), "load is 1e-300 kg, .* at least 0.1"),
-        (lambda: Suspension(hook=500.0), "500 kg with slings of 0 m: both are above 0, or both 0"),
-        (lambda: Suspension(bounce_damping=-1.0), "bounce_damping is -1, but must be at least 0"),
+        (lambda: Suspension(stiffness=0.0), "stiffness .* 0 N, .* 1000 to 1e.12 N"),
+        (lambda: Suspension(stiffness=1e300), "stiffness .* 1e.300 N, .* inf for a rigid"),
+        (lambda: Suspension(hook=1e300, sling=2.0), "hook .* 1e.300, .* 1e.06"),
+        (lambda: Suspension(hook=500.0, sling=1e300), "sling .* 1e.300, .* 200"),
+        (lambda: Suspension(bounce_damping=inf), "bounce_damping .* inf, .* 1"),
+        (lambda: load_motion(still(1.0), 3.0, mass=1e-300), "load .* 1e-300 kg, .* 0.1"),
+        (lambda: Suspension(hook=500.0), "500 kg .* 0 m: .* 0"),
+        (lambda: Suspension(bounce_damping=-1.0), "bounce_damping .* -1, .* 0"),
         (
             lambda: load_motion(still(1.0), 3.0, suspension=Suspension(1e9), mass=100.0),
-            "100 kg on 3 m of rope with 1e.09 N bounce at 291 Hz, too fast for 512 samples",
+            "100 kg .* 3 m .* 1e.09 N .* 291 Hz, .* 512",
         ),
         (
             lambda: load_motion(
                 still(1.0), 3.0, start=[0, 0, -1], suspension=Suspension(hook=1.0, sling=2.0)
             ),
-            "starts 1 m from the tip, but hangs on slings of 2 m",
+            "1 m from the tip, .* 2 m",
         ),
     ],
 )

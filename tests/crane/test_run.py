@@ -119,9 +119,9 @@ def test_map_of_delayed_feedback_has_the_roots_that_were_found_apart():
     table = control.feedback_damping(np.array([0.01, 0.02])[:, None], [0.25, 0.75])
     assert table.shape == (2, 2)
     np.testing.assert_allclose(table, [[0.005, -0.005], [0.01, -0.01]], rtol=0.15)
-    with refuse("gain of delayed feedback must be above 0 and below 1"):
+    with refuse("gain .* above 0 and below 1"):
         control.feedback_damping(1.0, 0.25)
-    with refuse("more than 0 and at most 1 period"):
+    with refuse("0 .* 1 period"):
         control.feedback_damping(0.2, 0.0)
 
 
@@ -214,9 +214,7 @@ def test_a_controller_without_a_number_stops_the_run(crane):
     # the load hangs straight at first: 0/0
     divides = Model("divides", Gains, Filtered, follow, sample=along_the_swing)
     controller = control.Controller(divides, Gains(0.1, 1.0))
-    with pytest.raises(
-        DomainError, match="at 0.00 s the controller gives an offset .* not a finite"
-    ):
+    with pytest.raises(DomainError, match="0.00 s .* controller .* finite"):
         simulate(crane, OperatorCommand.rest(0.1), control=controller)
 
 
@@ -405,12 +403,12 @@ def test_stepper_takes_the_samples_of_a_loaded_run_with_a_hook(leaking):
 
 @pytest.mark.slow
 def test_loads_that_no_drive_can_take_are_refused(crane, leaking, slewed):
-    with refuse("No drive of tg3637 feels a load: give one a motor_leakage"):
+    with refuse("tg3637 .* load: .* motor_leakage"):
         simulate(crane, slewed, loaded=True)
-    with refuse("Ideal drives follow instantaneously, whatever the load"):
+    with refuse("Ideal drives .* load"):
         simulate(leaking, slewed, loaded=True, actuation="ideal")
     worn = crane.with_drive(hoist=crane.hoist.replace(motor_leakage=3e-6))
-    with refuse("The hoist of tg3637 gives way to 35000 kg on a rigid rope within a sample"):
+    with refuse("hoist of tg3637 .* 35000 kg .* rigid rope"):
         simulate(worn, slewed, loaded=True)
     run = simulate(worn, slewed, loaded=True, suspension=Suspension(6e7))
     assert run.tension.max() < 1.1 * 35000.0 * G
@@ -695,35 +693,35 @@ def refuse(message, error=InputError):
 
 MOVING = OperatorCommand.record(np.full((600, 3), [0.0, 0.5, 0.0]))
 REFUSED = [
-    ({"stick": slew(45.0, length=5.0)}, "stick of the slew ends at 12.11 s, but .* at 5 s"),
-    ({"stick": slew(-45.0)}, "The slew moves away from slew_deg = -45"),
+    ({"stick": slew(45.0, length=5.0)}, "slew .* 12.11 s, .* 5 s"),
+    ({"stick": slew(-45.0)}, "slew .* slew_deg = -45"),
     (
         {"stick": MOVING, "actuation": "ideal"},
-        "Ideal drives follow instantaneously, .* a row of zeros",
+        "Ideal drives .* stick .* row of zeros",
     ),
-    ({"stick": 3}, "The stick is 3, but must be an OperatorCommand"),
-    ({"boom_deg": 85.0}, "boom of tg3637 is at 85 deg, but moves between 15 and 80"),
-    ({"load": 36000.0}, "The load is 36000 kg, but tg3637 lifts 35000 kg: use a smaller"),
-    ({"rope_m": 2.0}, "rope of tg3637 is 2 m, but can be 3 to 50 m"),
-    ({"sea": np.zeros((5121, 6))}, "is 60 s long, but the ship's motion only 10 s"),
-    ({"sea": "ss3"}, r"A sea is a Seaway, as Seaway\('ss3'\), or the ship's motion in rows"),
-    ({"actuation": "hydraulic"}, "actuation is 'hydraulic'; it is ideal, volts, inverse"),
-    ({"actuation": "direct"}, "With direct actuation commands are voltages, .* CraneStepper"),
-    ({"winds": 3.0}, "A crane's run has no 'winds'; it has control, .*, drag_area, wind"),
-    ({"wind": 3.0}, "wind is 3.0, but must be two speeds, forward and to port"),
-    ({"wind": (1.0, 2.0, 0.0)}, r"wind is \(1.0, 2.0, 0.0\), but must be two speeds"),
-    ({"wind": (float("nan"), 0.0)}, r"wind is \(nan, 0.0\), but must be two speeds"),
-    ({"suspension": 6e7}, "suspension is 60000000.0, but must be a Suspension"),
-    ({"rope_m": "20"}, "rope_m is '20', but must be a number"),
-    ({"drag_area": 1e308}, "drag_area is 1e.308 m², .* at most 100000 m²"),
-    ({"wind": (1e308, 0.0)}, "wind is .*, but must be within 100 m/s"),
-    ({"slew_deg": 1e308}, "slew at the start is 1e.308 deg, but must be within 720 deg"),
-    ({"drag_area": None}, "drag_area is None, but must be a number"),
-    ({"swing_damping": 0.3}, "swing_damping is 0.3, but must be .* at most 0.2"),
-    ({"swing_damping": "low"}, "swing_damping is 'low', but must be a number"),
-    ({"load_offset": (18.0, 0.0)}, "load_offset is 18 m long, .* shorter than 0.9 of the rope"),
-    ({"load_offset": 3.0}, "load_offset is 3.0, but must be two lengths, forward and to port"),
-    ({"load_velocity": (1e9, 0.0)}, "load_velocity is .*, but must be within 100 m/s"),
+    ({"stick": 3}, "stick .* 3, .* OperatorCommand"),
+    ({"boom_deg": 85.0}, "boom of tg3637 .* 85 deg, .* 15 and 80"),
+    ({"load": 36000.0}, "load .* 36000 kg, .* tg3637 .* 35000 kg"),
+    ({"rope_m": 2.0}, "rope of tg3637 .* 2 m, .* 3 to 50 m"),
+    ({"sea": np.zeros((5121, 6))}, "60 s .* ship's motion .* 10 s"),
+    ({"sea": "ss3"}, r"sea .* Seaway\('ss3'\), .* rows"),
+    ({"actuation": "hydraulic"}, "actuation .*'hydraulic'.* ideal, volts, inverse"),
+    ({"actuation": "direct"}, "direct actuation .* CraneStepper"),
+    ({"winds": 3.0}, "'winds'.* control, .*, drag_area, wind"),
+    ({"wind": 3.0}, "wind .* 3.0, .* two speeds, forward and to port"),
+    ({"wind": (1.0, 2.0, 0.0)}, r"wind .*\(1.0, 2.0, 0.0\), .* two speeds"),
+    ({"wind": (float("nan"), 0.0)}, r"wind .*\(nan, 0.0\), .* two speeds"),
+    ({"suspension": 6e7}, "suspension .* 60000000.0, .* Suspension"),
+    ({"rope_m": "20"}, "rope_m .*'20', .* number"),
+    ({"drag_area": 1e308}, "drag_area .* 1e.308 m², .* 100000 m²"),
+    ({"wind": (1e308, 0.0)}, "wind .*, .* 100 m/s"),
+    ({"slew_deg": 1e308}, "slew .* 1e.308 deg, .* 720 deg"),
+    ({"drag_area": None}, "drag_area .* None, .* number"),
+    ({"swing_damping": 0.3}, "swing_damping .* 0.3, .* 0.2"),
+    ({"swing_damping": "low"}, "swing_damping .*'low', .* number"),
+    ({"load_offset": (18.0, 0.0)}, "load_offset .* 18 m .* 0.9 of the rope"),
+    ({"load_offset": 3.0}, "load_offset .* 3.0, .* two lengths, forward and to port"),
+    ({"load_velocity": (1e9, 0.0)}, "load_velocity .*, .* 100 m/s"),
 ]
 
 
@@ -734,9 +732,9 @@ def test_what_a_crane_cannot_do_is_said(crane, slewed, how, message):
 
 
 def test_limits_of_travel_stop_a_run(crane):
-    with refuse("the boom meets the limits of its travel, 15 to 80 deg", DomainError):
+    with refuse("boom .* 15 to 80 deg", DomainError):
         simulate(crane, OperatorCommand.trapezoid(luff=1.0, duration=45.0), actuation="ideal")
-    with refuse("the rope is 3.00 m long, but can be 3 to 50 m", DomainError):
+    with refuse("rope .* 3.00 m .* 3 to 50 m", DomainError):
         simulate(crane, OperatorCommand.trapezoid(hoist=1.0, duration=40.0), actuation="ideal")
     # what ideal drives refuse, real ones begin from rest
     assert simulate(crane, MOVING).slew_deg[0] == 0.0
@@ -744,46 +742,46 @@ def test_limits_of_travel_stop_a_run(crane):
 
 def test_residual_swing_needs_a_run_that_is_long_enough(crane):
     short = simulate(crane, slew(45.0, length=15.0))
-    with refuse("15 s long, but its residual swing is evaluated from 16.11 s on"):
+    with refuse("15 s .* residual swing .* 16.11 s"):
         _ = short.residual_deg
 
 
 def test_sticks_and_controllers_that_make_no_sense_are_refused():
-    with refuse("stick of the luff is 2, but must be from -1 to 1"):
+    with refuse("luff .* 2, .* -1 to 1"):
         OperatorCommand.trapezoid(luff=2.0, duration=1.0)
-    with refuse("The slew needs until=.* or a duration"):
+    with refuse("slew .* until=.* duration"):
         OperatorCommand.trapezoid(slew=1.0)
-    with refuse("no command hoist"):
+    with refuse("target rope_m.* hoist"):
         OperatorCommand.trapezoid(slew=1.0, until={"slew_deg": 45.0, "rope_m": 10.0})
-    with refuse(r"length above 0 and at most 86400 s, not 1, 0.5 and 1e\+308 s"):
+    with refuse(r"length .* 86400 s, .* 1e\+308 s"):
         OperatorCommand.rest(1e308)
-    with refuse(r"recorded stick lasts 1e\+300 s at 1e-300 Hz, .* at most 86400 s"):
+    with refuse(r"stick .* 1e\+300 s .* 1e-300 Hz, .* 86400 s"):
         OperatorCommand.record(np.zeros((2, 3)), 1e-300)
-    with refuse("Row 1 of the stick is not within -1 to 1"):
+    with refuse("Row 1 of the stick .* -1 to 1"):
         OperatorCommand.record([[0.0, 0.0, 0.0], [0.0, 1.5, 0.0]])
-    with refuse("A controller has one shaper, not 2"):
+    with refuse("one shaper, .* 2"):
         TIP | control.TipShaper("zvd")
-    with refuse("A shaper is 'zv', 'zvd' or 'ei', not 'zz'"):
+    with refuse("'zv', 'zvd' or 'ei', .*'zz'"):
         control.TipShaper("zz")
     for stage, sentence in (
-        (lambda: control.DelayedFeedback(-1.0), "gain of delayed feedback is -1.0, .* at most 2"),
-        (lambda: control.DelayedFeedback(1e308, 0.2), r"gain of .* is 1e\+308, .* at most 2"),
-        (lambda: control.DelayedFeedback(0.2, 1.5), "delay of delayed .* is 1.5, .* at most 1"),
-        (lambda: control.PositionLoop(1e308), r"gain of position loop is 1e\+308, .* at most 50"),
-        (lambda: control.Clip(1e308), r"size of a clip is 1e\+308, .* at most 100"),
-        (lambda: control.Sensors(rate=1e4), "rate of sensors is 10000.0, .* from 1 to 512"),
-        (lambda: control.Sensors(delay=-1.0), "delay of sensors is -1.0, .* from 0 to 5"),
-        (lambda: control.Sensors(seed=-1), "seed of sensors is -1, but must be a whole number"),
-        (lambda: control.Sensors() | control.Sensors(), "has one set of sensors, not 2"),
-        (lambda: control.Clip("wide"), "size of a clip is 'wide', but must be a number"),
-        (lambda: control.Clip(share=float("nan")), "share of a clip is nan"),
+        (lambda: control.DelayedFeedback(-1.0), "gain of delayed feedback .* -1.0, .* 2"),
+        (lambda: control.DelayedFeedback(1e308, 0.2), r"gain of .* 1e\+308, .* 2"),
+        (lambda: control.DelayedFeedback(0.2, 1.5), "delay of delayed .* 1.5, .* 1"),
+        (lambda: control.PositionLoop(1e308), r"gain of position loop .* 1e\+308, .* 50"),
+        (lambda: control.Clip(1e308), r"size of a clip .* 1e\+308, .* 100"),
+        (lambda: control.Sensors(rate=1e4), "rate of sensors .* 10000.0, .* 1 to 512"),
+        (lambda: control.Sensors(delay=-1.0), "delay of sensors .* -1.0, .* 0 to 5"),
+        (lambda: control.Sensors(seed=-1), "seed of sensors .* -1, .* whole number"),
+        (lambda: control.Sensors() | control.Sensors(), "one set of sensors, .* 2"),
+        (lambda: control.Clip("wide"), "size of a clip .*'wide', .* number"),
+        (lambda: control.Clip(share=float("nan")), "share of a clip .* nan"),
     ):
         with refuse(sentence):
             stage()
     strange = Model("strange", Gains, Filtered, follow_wind, sample=offset)
-    with refuse("needs 'wind', but a crane's controller has swing_x"):
+    with refuse("strange.* 'wind', .* swing_x"):
         control.Controller(strange, Gains(1.0, 1.0))
-    with refuse("must have the signals tip_x and tip_y"):
+    with refuse("signals tip_x and tip_y"):
         control.Controller(Model("mute", Gains, Filtered, follow), Gains(1.0, 1.0))
 
 

@@ -144,7 +144,7 @@ def test_a_record_comes_again_only_at_its_end():
     power = np.abs(np.fft.rfft(heave[:-1])) ** 2
     correlation = np.fft.irfft(power)
     assert np.abs(correlation[600 * 8 : 4096 * 8]).max() < 0.3 * correlation[0]
-    with pytest.raises(InputError, match=r"repeats after 8192 s, .*record=16384\)"):
+    with pytest.raises(InputError, match=r"8192 s, .*record=16384\)"):
         sea.motion(8192 * 8 + 2, rate=8.0)
 
 
@@ -319,26 +319,24 @@ def test_cut_files_and_other_conventions_are_refused(tmp_path):
         with pytest.raises(error, match=message):
             read_ship(path, 80.0)
 
-    refused("there is no yaw for 0.5 rad/s and 180 deg; the file is truncated", lines[:-7])
-    refused("line 3: motion is missing, .* needed are period", [*lines[:2], lines[2][:30]])
-    refused("has no motions in waves", [])
+    refused("yaw for 0.5 rad/s and 180 deg; .* truncated", lines[:-7])
+    refused("line 3: motion .* period", [*lines[:2], lines[2][:30]])
+    refused("ship.4 .* no motions", [])
     # headings counted from where waves come: everything but heave the other way
     turned = [
         line[:14] + f" {(180.0 - float(line.split()[1])) % 360.0:13.6e}" + line[28:]
         for line in lines
     ]
-    refused("of 0 deg surge is .* must go with the water, .*-1j times", turned, InputError)
-    with pytest.raises(InputError, match="ULEN is 0 m"):
+    refused("0 deg surge .* water, .*-1j times", turned, InputError)
+    with pytest.raises(InputError, match="ULEN .* 0 m"):
         read_ship(path, 0.0)
     capytaine(nc, sign=1.0)
-    with pytest.raises(InputError, match="in the longest wave of 0 deg surge is"):
+    with pytest.raises(InputError, match="longest wave of 0 deg surge"):
         read_ship(nc)
     with h5py.File(nc, "a") as file:
         del file["RAO"]
     for _ in range(2):
-        with pytest.raises(
-            FileError, match="is not a file of netCDF 4 with an array RAO over complex"
-        ):
+        with pytest.raises(FileError, match=r"ship\.nc .*RAO"):
             read_ship(nc)
         nc.write_text("nothing", "utf-8")
 
@@ -360,13 +358,13 @@ def test_waves_from_the_other_side_follow_by_symmetry(tmp_path):
 
 def test_rotations_in_degrees_and_single_headings_are_refused(table):
     degrees_ = [1.0, 1.0, 1.0, 180.0 / pi, 180.0 / pi, 180.0 / pi]
-    with pytest.raises(InputError, match="of 0.1 rad/s, pitch is .* must be in rad"):
+    with pytest.raises(InputError, match="0.1 rad/s, pitch .* in rad"):
         table(small_body, factors=degrees_)
-    with pytest.raises(FileError, match="up to 180 deg apart, but must be within 90 deg"):
+    with pytest.raises(FileError, match="180 deg .* 90 deg"):
         table(small_body, (0.0, 180.0))
     beam = table(small_body, (90.0,))
     assert beam.response(np.array([0.2]), np.array([pi / 2.0]))[2] == pytest.approx(1.0)
-    with pytest.raises(InputError, match="has waves of 90 deg only"):
+    with pytest.raises(InputError, match="waves of 90 deg"):
         beam.response(np.array([0.2]), np.array([0.0]))
 
 
@@ -382,22 +380,22 @@ def test_measured_motion_comes_from_a_log(tmp_path):
     assert not made[:, [0, 1, 4, 5]].any()
     run = simulate(Crane.preset("tg3637"), OperatorCommand.rest(20.0), sea=made, actuation="ideal")
     assert run.swing_deg.max() > 0.05
-    with pytest.raises(InputError, match="no column .surge.; it has .*: name the one"):
+    with pytest.raises(InputError, match="column .surge.; .*: name the one"):
         ship_motion(path)
-    with pytest.raises(InputError, match="A ship's motions are surge, .* not rolling"):
+    with pytest.raises(InputError, match="surge, .* rolling"):
         ship_motion(path, {"rolling": "roll"})
     # degrees under a header that says nothing, or says radians
     path.write_text("\n".join(["time [s];heave [m];roll [rad]", *rows]), "utf-8")
-    with pytest.raises(InputError, match=r"ship.csv: roll reaches 2 rad, .* roll \[deg\]"):
+    with pytest.raises(InputError, match=r"ship.csv: roll .* 2 rad, .* roll \[deg\]"):
         ship_motion(path, {"roll": "roll"})
-    with pytest.raises(InputError, match="The sea's motion: pitch reaches 3 rad, which no ship"):
+    with pytest.raises(InputError, match="sea's motion: pitch .* 3 rad"):
         simulate(
             Crane.preset("tg3637"),
             OperatorCommand.rest(1.0),
             sea=np.full((600, 6), 3.0) * [0, 0, 0, 0, 1, 0],
         )
     path.write_text("\n".join(["time [s];heave [m];roll [deg]", *rows[:100], *rows[301:]]), "utf-8")
-    with pytest.raises(InputError, match="has no heave from 9.9 to 30.1 s"):
+    with pytest.raises(InputError, match="heave from 9.9 to 30.1 s"):
         ship_motion(path, {"heave": "heave"})
 
 
@@ -408,28 +406,26 @@ def test_cut_and_strange_files_are_refused_by_their_line(tmp_path, s175):
     lines = S175.read_text("utf-8").splitlines()
     cut = tmp_path / "cut.re1"
     cut.write_text("\n".join(lines[:500]), "utf-8")
-    with pytest.raises(
-        FileError, match=r"cut.re1, line 501: .* is missing, .*the file is truncated"
-    ):
+    with pytest.raises(FileError, match=r"cut.re1, line 501: .* missing, .*truncated"):
         read_ship(cut)
     cut.write_text("\n".join(["something else", *lines[1:]]), "utf-8")
-    with pytest.raises(FileError, match="is not a VERES file"):
+    with pytest.raises(FileError, match="VERES"):
         read_ship(cut)
 
 
 def test_tables_that_lack_something_or_mean_something_else_are_refused(tmp_path, table):
-    with pytest.raises(FileError, match="no surge for 0.5 rad/s and 180 deg"):
+    with pytest.raises(FileError, match="surge for 0.5 rad/s and 180 deg"):
         table(hull_motions, without=1)
-    with pytest.raises(FileError, match="must reach from 0 to 180 deg"):
+    with pytest.raises(FileError, match="0 to 180 deg"):
         table(hull_motions, (0.0, 90.0))
-    with pytest.raises(InputError, match=r"in the longest wave heave is -1.00.* near 1 \+ 0i"):
+    with pytest.raises(InputError, match=r"longest wave heave .* -1.00.* 1 \+ 0i"):
         table(hull_motions, factors=[1.0, 1.0, -1.0, 1.0, 1.0, 1.0])  # z down
-    with pytest.raises(InputError, match="wave of 90 deg roll is .* must go with the water"):
+    with pytest.raises(InputError, match="wave of 90 deg roll .* water"):
         table(hull_motions, factors=[1.0, 1.0, 1.0, -1.0, 1.0, 1.0])
     table(hull_motions)
     path = tmp_path / "ship.csv"
     path.write_text(path.read_text("utf-8").replace("heave_im", "heave"), "utf-8")
-    with pytest.raises(FileError, match="line 2: heave_im is missing"):
+    with pytest.raises(FileError, match="line 2: heave_im "):
         read_ship(path)
 
 
@@ -437,33 +433,33 @@ def test_files_that_lack_much_of_the_sea_are_refused(table):
     ship = table(hull_motions, frequencies=(0.1, 0.5, 1.4))
     # Bretschneider's energy above ω is 1 - exp(-1.25 (ω_p/ω)⁴): 14.8 % with a peak at 7.5 s, of
     # which hardly any lies beyond 6 rad/s; below 0.7 rad/s there are 7.7 %, above 2.5 rad/s 1.6 %
-    with pytest.raises(InputError, match=r"waves of 0.1 to 1.4 rad/s, but 15 % .* \(ss3\) lies"):
+    with pytest.raises(InputError, match=r"0.1 to 1.4 rad/s, .* 15 % .* \(ss3\)"):
         Seaway("ss3", ship=ship)
     swell = Seaway("ss3-swell", ship=ship)
     assert swell.motion(10).shape == (10, 6)
     # above 1.4 rad/s: 1 - exp(-1.25 (2π/11/1.4)⁴)
     (sentence,) = swell.sentences()
     assert "0.1 to 1.4 rad/s: for the 3.4 % of the energy of the sea (ss3-swell)" in sentence
-    with pytest.raises(InputError, match=r"waves of 0.7 to 2.5 rad/s, but 9 % .* \(ss3\) lies"):
+    with pytest.raises(InputError, match=r"0.7 to 2.5 rad/s, .* 9 % .* \(ss3\)"):
         Seaway("ss3", ship=table(hull_motions, frequencies=(0.7, 1.0, 2.5)))
 
 
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: Seaway("ss3", seed=-1), "The seed of a seaway is -1"),
-        (lambda: Spectrum(0.0, 7.5), "height of a sea is 0, but must be above 0"),
-        (lambda: Seaway("ss3", heading_deg=1e308), "heading within 720 deg .*, not 1e.308 deg"),
-        (lambda: Seaway("ss3", record=100.0), "record of a seaway is 100 s, .* 4096 to 131072 s"),
-        (lambda: Seaway("ss3", list_deg=60.0), "List and trim are 60 and 0 deg, .* within 45 deg"),
-        (lambda: Seaway("ss3", reference=(1.0, 2.0)), "must be a point forward, port and up"),
-        (lambda: Spectrum(1e308, 7.5), "height of a sea is 1e.308, .* at most 30"),
-        (lambda: Spectrum(1.0, 7.5, 50.0), "peak_factor of a sea is 50, .* at most 10"),
-        (lambda: Hull(1e300, 20.0, 9.0), "hull's length is 1e.300, but must be 1 to 600"),
-        (lambda: Hull(80.0, 20.0, 1e-300), "hull's draught is 1e-300, but must be 0.05 to 50"),
-        (lambda: Spectrum(1.0, 60.0), "has little energy between waves of 1.05 and 31.4 s"),
-        (lambda: Hull(0.0, 20.0, 9.0), "The hull's length is 0"),
-        (lambda: read_ship("hull.dat"), "hull.dat: transfer functions are read from .re1 of VERES"),
+        (lambda: Seaway("ss3", seed=-1), "seed of a seaway .* -1"),
+        (lambda: Spectrum(0.0, 7.5), "height of a sea .* 0, .* above 0"),
+        (lambda: Seaway("ss3", heading_deg=1e308), "heading .* 720 deg .* 1e.308 deg"),
+        (lambda: Seaway("ss3", record=100.0), "record of a seaway .* 100 s, .* 4096 to 131072 s"),
+        (lambda: Seaway("ss3", list_deg=60.0), "List and trim .* 60 and 0 deg, .* 45 deg"),
+        (lambda: Seaway("ss3", reference=(1.0, 2.0)), "point forward, port and up"),
+        (lambda: Spectrum(1e308, 7.5), "height of a sea .* 1e.308, .* 30"),
+        (lambda: Spectrum(1.0, 7.5, 50.0), "peak_factor of a sea .* 50, .* 10"),
+        (lambda: Hull(1e300, 20.0, 9.0), "hull's length .* 1e.300, .* 1 to 600"),
+        (lambda: Hull(80.0, 20.0, 1e-300), "hull's draught .* 1e-300, .* 0.05 to 50"),
+        (lambda: Spectrum(1.0, 60.0), "60 s .* 1.05 and 31.4 s"),
+        (lambda: Hull(0.0, 20.0, 9.0), "hull's length .* 0"),
+        (lambda: read_ship("hull.dat"), "hull.dat: .* .re1 of VERES"),
         (lambda: Seaway("ss3").motion(100, 500.0), "multiple of 8 Hz"),
     ],
 )
@@ -473,5 +469,5 @@ def test_seas_that_make_no_sense_are_refused(make, message):
 
 
 def test_speed_beyond_the_table_is_refused(s175):
-    with pytest.raises(InputError, match=r"has speeds from 0 to .* m/s, but 45 m/s"):
+    with pytest.raises(InputError, match=r"0 to .* m/s, .* 45 m/s"):
         Seaway("ss3", ship=s175, speed=45.0).motion(10)

@@ -88,7 +88,7 @@ def test_objects_of_another_kind_are_refused(ship):
     with h5py.File(ship, "a") as file:
         del file["RAO"]
         file.create_group("RAO")
-    with pytest.raises(FileError, match="netCDF 4 with an array RAO over complex"):
+    with pytest.raises(FileError, match=r"ship\.nc .*RAO"):
         read_ship(ship)
 
 
@@ -96,15 +96,15 @@ def test_frequencies_at_the_limits_are_refused(ship):
     for limit in (0.0, inf):
         with h5py.File(ship, "a") as file:
             file["omega"][-1] = limit
-        with pytest.raises(FileError, match=rf"ship.nc: omega is {limit:g} .* 0.001 to 100"):
+        with pytest.raises(FileError, match=rf"ship.nc: omega .* {limit:g} .* 0.001 to 100"):
             read_ship(ship)
 
 
 def test_a_folder_and_no_file_are_refused(tmp_path):
     (tmp_path / "ship.nc").mkdir()
-    with pytest.raises(FileError, match="ship.nc is a folder"):
+    with pytest.raises(FileError, match="ship.nc .* folder"):
         read_ship(tmp_path / "ship.nc")
-    with pytest.raises(FileError, match=r"There is no file .*none.nc"):
+    with pytest.raises(FileError, match=r"none\.nc"):
         read_ship(tmp_path / "none.nc")
 
 
@@ -114,7 +114,7 @@ def test_a_folder_and_no_file_are_refused(tmp_path):
 def test_a_quotation_mark_that_is_never_closed_is_refused(refused):
     lines = ship_table_lines(WAVES)
     long = [lines[0], '"' + lines[1], *["x" * 100] * 2000]
-    assert "quotation mark that is not closed" in refused(long)
+    assert "quotation mark" in refused(long)
 
 
 @pytest.mark.parametrize("suffix", [".csv", ".4"])
@@ -133,21 +133,21 @@ def test_waves_on_no_grid_are_refused_before_it_is_made(refused, suffix):
     assert time.process_time() - begun < 10.0  # 28 s for 6000 waves, when the grid was made
     for number in ("54000 of the 486000000 amplitudes", "9000 headings and 9000 frequencies"):
         assert number in sentence
-    assert "no surge for 0.1" in sentence
+    assert "surge for 0.1" in sentence
 
 
 @pytest.mark.parametrize(
     ("column", "number", "expected"),
     [
-        ("period", "5e-324", "a number from 0.06 to 6300"),
-        ("period", "-1", "a number from 0.06 to 6300"),
-        ("heading", "1e308", "a number from -720 to 720"),
-        ("motion", "5.7", "a whole number from 1 to 6"),
-        ("motion", "0", "a whole number from 1 to 6"),
-        ("motion", "-3", "a whole number from 1 to 6"),
-        ("motion", "7", "a whole number from 1 to 6"),
-        ("real part", "1e308", "a number from -10000 to 10000"),
-        ("imaginary part", "1_0", "a number from -10000 to 10000"),
+        ("period", "5e-324", "0.06 to 6300"),
+        ("period", "-1", "0.06 to 6300"),
+        ("heading", "1e308", "-720 to 720"),
+        ("motion", "5.7", "whole number from 1 to 6"),
+        ("motion", "0", "whole number from 1 to 6"),
+        ("motion", "-3", "whole number from 1 to 6"),
+        ("motion", "7", "whole number from 1 to 6"),
+        ("real part", "1e308", "-10000 to 10000"),
+        ("imaginary part", "1_0", "-10000 to 10000"),
     ],
 )
 def test_numbers_of_wamit_that_no_ship_has_are_refused(refused, column, number, expected):
@@ -157,7 +157,8 @@ def test_numbers_of_wamit_that_no_ship_has_are_refused(refused, column, number, 
     cells[names.index(column)] = number
     lines[4] = " ".join(cells)
     sentence = refused(lines, ".4")
-    assert f"line 5: {column} is '{number}', but must be {expected};" in sentence
+    for item in (f"line 5: {column} ", f"'{number}'", expected):
+        assert item in sentence
 
 
 @pytest.mark.parametrize("column", ["heading_deg", "omega", "heave_re", "yaw_im"])
@@ -167,20 +168,24 @@ def test_numbers_of_a_table_that_no_ship_has_are_refused(refused, column, number
     cells = lines[3].split(",")
     cells[lines[0].split(",").index(column)] = number
     lines[3] = ",".join(cells)
-    assert f"line 4: {column} is '{number}', but must be a number from " in refused(lines)
+    sentence = refused(lines)
+    assert f"line 4: {column} " in sentence
+    assert f"'{number}'" in sentence
 
 
 @pytest.mark.parametrize("length", [1e-300, 1e300, nan, -175.0])
 def test_lengths_of_wamit_that_no_ship_has_are_refused(tmp_path, length):
     path = tmp_path / "ship.4"
     path.write_text("\n".join(wamit_lines(WAVES)), "utf-8")
-    with pytest.raises(InputError, match=r"ship.4: WAMIT's length ULEN is .* 0.01 to 10000 m"):
+    with pytest.raises(InputError, match=r"ship.4: .* ULEN .* 0.01 to 10000 m"):
         read_ship(path, length)
 
 
 def test_counts_of_veres_are_whole(refused):
     lines = ["VERES", *["text"] * 8, "1 1.5 1 6", "0", "0", "0.5"]
-    assert "line 10: headings is '1.5', but must be a whole number from 1" in refused(lines, ".re1")
+    sentence = refused(lines, ".re1")
+    assert "line 10: headings " in sentence
+    assert "'1.5'" in sentence
 
 
 def test_text_at_random_ends_in_a_sentence_or_in_numbers(tmp_path):
@@ -224,25 +229,25 @@ ROLL = (0.1 * np.sin(0.6 * np.array(TIME))).tolist()
 
 @pytest.mark.parametrize("rate", [nan, inf, 0.0, -1.0, 1e9, "512"])
 def test_rates_out_of_range_are_refused(log, rate):
-    with pytest.raises(InputError, match=r"rate of a ship's motion is .* 10 to 100000 Hz"):
+    with pytest.raises(InputError, match="rate .* 10 to 100000 Hz"):
         ship_motion(log(TIME, ROLL), {"roll": "roll"}, rate=rate)
 
 
 def test_motions_that_last_too_long_or_are_sampled_too_seldom_are_refused(log):
     seldom = (1e7 * np.arange(6)).tolist()
-    with pytest.raises(InputError, match=r"log.csv: samples of roll are 1e\+07 s apart"):
+    with pytest.raises(InputError, match=r"log.csv: .* roll .* 1e\+07 s"):
         ship_motion(log(seldom, ROLL[:6]), {"roll": "roll"})
     long = np.arange(0.0, 40_000.0, 4.0).tolist()
-    with pytest.raises(InputError, match=r"log.csv lasts 39996 s: at 512 Hz .* lower rate"):
+    with pytest.raises(InputError, match=r"log.csv .* 39996 s: .* 512 Hz .* rate"):
         ship_motion(log(long, [0.0] * len(long)), {"roll": "roll"})
 
 
 def test_sizes_that_no_ship_has_are_refused_by_their_samples(log):
     values = list(ROLL)
     values[50] = 1e308
-    with pytest.raises(InputError, match=r"log.csv: roll reaches 1e\+308 rad"):
+    with pytest.raises(InputError, match=r"log.csv: roll .* 1e\+308 rad"):
         ship_motion(log(TIME, values), {"roll": "roll"})
-    with pytest.raises(InputError, match=r"log.csv: heave reaches 1e\+308 m"):
+    with pytest.raises(InputError, match=r"log.csv: heave .* 1e\+308 m"):
         ship_motion(log(TIME, values, "heave [m]"), {"heave": "heave"})
 
 
@@ -250,10 +255,10 @@ def test_a_spike_and_stamps_nearly_alike_are_refused_by_their_rows(log):
     time_, values = list(TIME), list(ROLL)
     time_.insert(41, time_[40] + 1e-9)
     values.insert(41, 0.3)
-    with pytest.raises(InputError, match=r"log.csv: data rows 41 and 42 are only 1e-09 s apart"):
+    with pytest.raises(InputError, match=r"log.csv: .* rows 41 and 42 .* 1e-09 s"):
         ship_motion(log(time_, values), {"roll": "roll"})
     time_[41] = time_[40] + 2e-3
-    with pytest.raises(InputError, match=r"log.csv: a curve .* of roll swings .* data row 4\d"):
+    with pytest.raises(InputError, match=r"log.csv: .* roll .* row 4\d"):
         ship_motion(log(time_, values), {"roll": "roll"})
 
 

@@ -82,7 +82,7 @@ def test_leads_of_a_run_have_the_signs_of_the_frequency_domain(crane):
 
 
 def test_swing_without_damping_has_no_stationary_state(crane):
-    with pytest.raises(InputError, match="swing_damping must be above 0"):
+    with pytest.raises(InputError, match="swing_damping .* 0"):
         linear_response(crane, swing_damping=0.0)
 
 

@@ -47,7 +47,7 @@ def test_a_draft_can_be_read(drafted: Drafted) -> None:
     on = 1.0 * (row > 20)
     columns = {"time [s]": row / 100, "voltage [V]": 4 * on, "current [A]": 0.4 * on}
     logs = {f"run{number}.csv": {**columns, "counts": 7 * row} for number in range(4)}
-    with pytest.raises(ParameterError, match="encoder_counts need counts_per_turn"):
+    with pytest.raises(ParameterError, match="encoder_counts .* counts_per_turn"):
         drafted(logs, draft={"drive": "hoist"})
     tests = drafted(logs, draft={"drive": "hoist", "counts_per_turn": 2526.3})
     text = tests.path.read_text("utf-8")
@@ -82,18 +82,18 @@ def test_an_axis_for_each_prefix_and_logs_without_some(drafted: Drafted) -> None
 
 def test_a_log_without_a_command_leaves_a_line_to_fill_in(drafted: Drafted, tmp_path: Path) -> None:
     logs = {"log.csv": {"time": [0.0, 1.0], "current": [1.0, 2.0], "Kanal 3": [2.0, 3.0]}}
-    with pytest.raises(InputError, match="For the input: .* has no column 'FIXME'; it has 'time'"):
+    with pytest.raises(InputError, match="input: .* column 'FIXME'; .* 'time'"):
         drafted(logs)
     text = (tmp_path / "campaign.toml").read_text("utf-8")
     assert "column = \"FIXME\"    # which of 'time', 'current', 'Kanal 3' commands?" in text
     columns = {"Kanal 3": "voltage"}
     drive = drafted(logs, draft={"columns": columns, "units": {"Kanal 3": "mV"}})["log"].input
     assert (drive.kind, drive.values.tolist()) == ("voltage", [0.002, 0.003])
-    with pytest.raises(InputError, match="No log has a column 'Kanal 4'"):
+    with pytest.raises(InputError, match="column 'Kanal 4'"):
         drafted(logs, draft={"columns": {"Kanal 4": "voltage"}})
-    with pytest.raises(InputError, match="cannot be a 'volts': it is time, voltage"):
+    with pytest.raises(InputError, match="'volts': .* time, voltage"):
         drafted(logs, draft={"columns": {"Kanal 3": "volts"}})
-    with pytest.raises(InputError, match="at least one log"):
+    with pytest.raises(InputError, match="one log"):
         draft([], tmp_path)
 
 
@@ -364,13 +364,13 @@ def test_what_tells_nothing_is_refused() -> None:
     (sine, *_) = runs()
     speed = sine["shaft_speed"]
     for changes, said in (
-        ({"values": -speed.values}, "opposite to the command: reverse it with sign = -1"),
-        ({"weight": np.zeros(TIME.size)}, "No run measures a motion"),
-        ({"weight": np.where(TIME[3] > TIME, 1.0, 0.0)}, "too short to guess from"),
+        ({"values": -speed.values}, "command: .* sign = -1"),
+        ({"weight": np.zeros(TIME.size)}, "run .* shaft_speed, position or encoder_counts"),
+        ({"weight": np.where(TIME[3] > TIME, 1.0, 0.0)}, "short"),
     ):
         with pytest.raises(InputError, match=said):
             guess_drive([replace(sine, channels={"speed": replace(speed, **changes)})])
-    with pytest.raises(InputError, match="needs a command in V"):
+    with pytest.raises(InputError, match=r"kind = .voltage., unit = .V."):
         guess_drive([replace(sine, input=replace(sine.input, kind="other", unit="%"))])
 
 
@@ -419,7 +419,5 @@ file = "{(DATA / "exp_data_1_3.csv").as_posix()}"
 def test_a_run_that_goes_the_other_way_is_named() -> None:
     first, second, *others = runs()
     turned = replace(second["shaft_speed"], values=-second["shaft_speed"].values)
-    with pytest.raises(
-        InputError, match=f"In {second.name} 'shaft_speed' moves opposite to the command, in"
-    ):
+    with pytest.raises(InputError, match=f"In {second.name} 'shaft_speed' .* command"):
         guess_drive([first, replace(second, channels={"shaft_speed": turned}), *others])

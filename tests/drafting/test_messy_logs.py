@@ -369,9 +369,9 @@ def test_an_axis_whose_only_channel_is_empty_in_a_run(drafted: Drafted) -> None:
     assert [each.name for each in tests] == ["a boom", "a stick", "b boom"]
     only = 'only = ["boom"]'
     assert only in text_of(tests)
-    with pytest.raises(InputError, match=r"axis 'stick' have 0 samples.* with only = \["):
+    with pytest.raises(InputError, match=r"axis 'stick' .* 0 samples.* only = \["):
         edit(tests, only, "")
-    said = r"'shaft_speed' of the axis 'stick'.* with only = \[\"boom"
+    said = r"'shaft_speed' .* axis 'stick'.* only = \[\"boom"
     with pytest.raises(FileError, match=said):
         edit(tests, 'missing = "drop"', "# missing")
 
@@ -383,7 +383,7 @@ def test_what_cannot_be_read_is_drafted_as_ignored_and_not_opened(drafted: Draft
     (tests.path.parent / "back.csv").unlink()
     tests = Campaign.from_toml(tests.path)
     assert (len(tests), tests.ignored) == (1, ("back",))
-    with pytest.raises(InputError, match="the run 'back' has the role 'ignore'"):
+    with pytest.raises(InputError, match="run 'back' .* role 'ignore'"):
         tests["back"]
 
 
@@ -434,7 +434,7 @@ def test_the_unit_at_the_end_of_a_name_that_is_given(tmp_path, name, kind, unit)
 
 
 def test_a_log_without_a_clock_leaves_its_rate_open(drafted: Drafted, tmp_path: Path) -> None:
-    with pytest.raises(ParameterError, match="needs an entry 'time'; line 10 is marked FIXME"):
+    with pytest.raises(ParameterError, match="entry 'time'; line 10 .* FIXME"):
         drafted({"log.csv": {"voltage": BOTH, "speed": lagged(BOTH)}})
     path = tmp_path / "campaign.toml"
     text = path.read_text("utf-8")
@@ -494,7 +494,7 @@ def test_dashes_are_missing_numbers_and_commas_between_commas_are_named(drafted:
     tests = drafted(speed=cells)
     assert 'missing = "drop"    # guessed: 3 cells are empty' in text_of(tests)
     assert tests["log"]["shaft_speed"].dropped == 3
-    with pytest.raises(FileError, match="Are decimal commas mixed with commas"):
+    with pytest.raises(FileError, match="decimal commas"):
         drafted({"log.csv": "time,voltage,speed\n0,0,1,0,2,0\n0,1,1,5,2,5\n"})
 
 

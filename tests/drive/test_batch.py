@@ -155,9 +155,7 @@ def test_outputs_are_streamed_to_files(tmp_path: Path, monkeypatch, per_file: in
             seen.append(int(name))
             assert np.array_equal(table[name].to_numpy(), wanted[int(name)], equal_nan=True)
     assert sorted(seen) == [k for k in range(COUNT) if k not in (5, 9)]
-    with pytest.raises(
-        FileError, match=r"outputs already contains 0.*\.parquet; name an empty folder"
-    ):
+    with pytest.raises(FileError, match=r"outputs .*0.*\.parquet; .* empty folder"):
         many(output="position", to=tmp_path / "outputs")
 
 
@@ -197,19 +195,19 @@ def test_executors_give_the_same(tmp_path: Path) -> None:
 
 
 REFUSED = {
-    "parameter": ({"changes": {"lead": [1.0]}}, "no parameter 'lead'; it has lag, gain, delay"),
-    "no sets": ({"changes": {}}, "at least one"),
-    "text": ({"changes": {"lag": ["slow"]}}, "one number per set, in one row"),
-    "output": ({"output": "speed"}, "valve has no signal 'speed'; it has opening, position"),
-    "nothing wanted": ({"output": ""}, "valve: name the output of the sets"),
-    "cost": ({"cost": SquaredError(COMMAND)}, "valve has no signal 'shaft_speed'"),
-    "given": ({"given": None}, "its given must be a Stroke, not None"),
-    "no input": ({"inputs": {}}, "valve: valve needs the signal 'command'"),
+    "parameter": ({"changes": {"lead": [1.0]}}, "parameter 'lead'.* lag, gain, delay"),
+    "no sets": ({"changes": {}}, "number of sets"),
+    "text": ({"changes": {"lag": ["slow"]}}, "lag.* one number per set"),
+    "output": ({"output": "speed"}, "valve .*'speed'.* opening, position"),
+    "nothing wanted": ({"output": ""}, "valve: .* output"),
+    "cost": ({"cost": SquaredError(COMMAND)}, "valve .* 'shaft_speed'"),
+    "given": ({"given": None}, "given .* Stroke, .*None"),
+    "no input": ({"inputs": {}}, "valve .* 'command'"),
     "memory": (
         {"changes": {"lag": np.full(100_000, 0.1)}, "inputs": {"command": np.zeros(2_000_000)}},
-        "100000 sets, 2000000 samples each, take 1.49e.03 GiB, .* give a cost, or .* to=FOLDER",
+        "100000 sets, 2000000 .* 1.49e.03 GiB, .* cost, or .* to=FOLDER",
     ),
-    "processes": ({"executor": Processes(2)}, "valve cannot be sent to another process"),
+    "processes": ({"executor": Processes(2)}, "valve .* another process"),
 }
 
 
@@ -300,9 +298,9 @@ def test_overflow_fails_only_its_set(hoist: Drive) -> None:
 
 
 def test_bad_sets_of_a_drive_are_refused(hoist: Drive) -> None:
-    with pytest.raises(InputError, match="Z16_plus is given twice"):
+    with pytest.raises(InputError, match="Z16_plus .* twice"):
         hoist.simulate_many({"Z16": [1e-4], "Z16_plus": [1e-4]}, voltage=[0.0])
-    with pytest.raises(InputError, match="either a voltage or a current"):
+    with pytest.raises(InputError, match="voltage or a current"):
         hoist.simulate_many({"Z10": [3.0]}, voltage=[0.0], current=[0.0])
 
 

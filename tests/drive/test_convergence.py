@@ -75,13 +75,13 @@ def test_the_filters_equation_answers_alike_at_every_rate(
 def test_a_recursion_that_alternates_is_no_filter_of_another_rate() -> None:
     """By hand ωh = 0.7, ζ = 1.4: a pole at 1 - 0.98 - 0.7 √0.96 = -0.67."""
     drive = recursive(1.4).replace(omega=0.7 * 512.0)
-    with pytest.raises(InputError, match="plus channel's filter .* from sample to sample"):
+    with pytest.raises(InputError, match="plus channel"):
         drive.at_every_rate()
 
 
 @pytest.mark.parametrize("rate", [9.99, 100_001.0, float("nan"), 0.0, -512.0])
 def test_rates_out_of_range_are_refused(hoist: Drive, rate: float) -> None:
-    with pytest.raises(InputError, match="between 10 and 100000 Hz"):
+    with pytest.raises(InputError, match="10 and 100000 Hz"):
         hoist.simulate([0.0, 1.0], rate)
 
 
@@ -94,18 +94,18 @@ def recursive(zeta: float) -> Drive:
 @pytest.mark.parametrize("zeta", [0.05, 0.3, 0.9, 1.0, 1.2, 5.0, 40.0])
 def test_an_unstable_filter_is_refused_with_the_least_substeps_that_do(zeta: float) -> None:
     drive, voltage = recursive(zeta).replace(omega=1500.0), np.full(64, 5.0)
-    with pytest.raises(InputError, match="unstable") as refused:
+    with pytest.raises(InputError, match="zeta = .* omega = 1500 .* unstable") as refused:
         drive.simulate(voltage)
     least = int(re.findall(r"substeps=(\d+)", str(refused.value))[0])
     assert np.isfinite(drive.simulate(voltage, substeps=least).current).all()
     if least > 2:
-        with pytest.raises(InputError, match="unstable"):
+        with pytest.raises(InputError, match="omega = 1500 .* unstable"):
             drive.simulate(voltage, substeps=least - 1)
 
 
 @pytest.mark.parametrize("zeta", [1e300, 1e-5])
 def test_a_filter_that_no_step_would_do_for_is_refused(zeta: float) -> None:
-    with pytest.raises(InputError, match="simulate with a zeta nearer to 1"):
+    with pytest.raises(InputError, match="zeta nearer to 1"):
         recursive(zeta).simulate(np.ones(10))
 
 
@@ -113,12 +113,12 @@ def test_a_filter_that_no_step_would_do_for_is_refused(zeta: float) -> None:
 def test_the_differential_equation_bears_half_a_swing_in_a_step() -> None:
     """By hand: ωh √(1 - ζ²) = π at ω = 512 π/0.8 = 2011 rad/s and ζ = 0.6."""
     drive, voltage = Drive.preset("neutral").replace(zeta=0.6, omega=2012.0), np.full(512, 5.0)
-    with pytest.raises(InputError, match=r"swings too fast for a step of 1/512 s; .* substeps=2"):
+    with pytest.raises(InputError, match=r"1/512 s; .* substeps=2"):
         drive.simulate(voltage)
     slower = drive.replace(omega=2e3)
     for settled in (drive.simulate(voltage, substeps=2), slower.simulate(voltage)):
         assert settled.current[-1] == pytest.approx(0.015 * 5.0, rel=1e-9)
-    with pytest.raises(InputError, match="swings too fast .* lower omega"):
+    with pytest.raises(InputError, match="lower omega"):
         drive.replace(omega=1e6).simulate(voltage)
     batch = drive.simulate_many({"omega": [2e3, 2012.0]}, voltage=voltage)
     assert list(batch.failures) == [1]

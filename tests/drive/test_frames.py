@@ -47,14 +47,14 @@ def test_chosen_units_are_those_of_the_table() -> None:
 
 
 def test_other_units_are_refused() -> None:
-    with pytest.raises(InputError, match="'bar'; it is 'SI' or 'display'"):
+    with pytest.raises(InputError, match="'bar'.* 'SI' or 'display'"):
         RUN.to_polars(units="bar")  # type: ignore[arg-type]
 
 
 def test_a_single_number_is_not_a_record() -> None:
     hoist = Drive.preset("hoist")
-    with pytest.raises(InputError, match=r"voltage is a single number, 9: .*maneuvers\.step\(9\)"):
+    with pytest.raises(InputError, match=r"voltage .* 9: .*maneuvers\.step\(9\)"):
         hoist.simulate(9.0)
-    with pytest.raises(InputError, match="current is a single number, 0.3") as caught:
+    with pytest.raises(InputError, match="current .* 0.3") as caught:
         hoist.simulate_current(0.3)
     assert "maneuver" not in str(caught.value)

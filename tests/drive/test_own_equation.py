@@ -65,9 +65,9 @@ def test_its_parameter_is_one_of_the_drive() -> None:
     assert DRAGGED["test_seal"].definition.unit == "m"
     assert "test_seal" not in PLAIN.parameters
     assert DRAGGED.plain.parameters == PLAIN.parameters.plain
-    with pytest.raises(ParameterError, match="test_seal.* at least 0"):
+    with pytest.raises(ParameterError, match="test_seal.* 0"):
         SEALED.replace(test_seal=-1.0)
-    with pytest.raises(ParameterError, match="There is no parameter 'test_seal'"):
+    with pytest.raises(ParameterError, match="parameter 'test_seal'"):
         PLAIN.replace(test_seal=1e-5)
 
 
@@ -112,7 +112,7 @@ def test_limits_of_one_s_own_are_those_of_march_and_analysis() -> None:
     assert run.shaft_speed.max() < 0.6 * speed_limits(PLAIN)[1]
     records, beyond = drive_records("voltage", COMMAND, RATE), 1.5 * run.stroker_pressure.max()
     simulate_drive(PLAIN.parameters, records, "rest", beyond)
-    with pytest.raises(DomainError, match="the pressure at the start is"):
+    with pytest.raises(DomainError, match="pressure at the start"):
         simulate_drive(relieved.parameters, records, "rest", beyond)
 
 
@@ -133,15 +133,15 @@ class Taken(NamedTuple):
 
 
 def test_what_does_not_fit_is_refused() -> None:
-    with pytest.raises(InputError, match="faster is not an equation of the drive"):
+    with pytest.raises(InputError, match="faster .* drive"):
         PLAIN.with_equation(faster, faster)
-    with pytest.raises(InputError, match="steady_current is an equation of the card"):
+    with pytest.raises(InputError, match="steady_current .* card"):
         PLAIN.with_equation(steady_current, faster, Seal)
-    with pytest.raises(InputError, match="must begin with the arguments of spool_balance"):
+    with pytest.raises(InputError, match="arguments of spool_balance"):
         PLAIN.with_equation(spool_balance, faster)
-    with pytest.raises(InputError, match="has a parameter Z6 already"):
+    with pytest.raises(InputError, match="Z6 already"):
         PLAIN.with_equation(spool_balance, sealed_balance, Taken)
-    with pytest.raises(ParameterError, match="Unnamed.another needs a Definition"):
+    with pytest.raises(ParameterError, match="Unnamed.another .* Definition"):
         PLAIN.with_equation(shaft_speed, faster, Unnamed)
 
 
@@ -155,7 +155,7 @@ def test_a_file_keeps_its_equations(tmp_path: Path) -> None:
     assert again.steady_speed(3.0) != PLAIN.steady_speed(3.0)
     text = path.read_text("utf-8")
     path.write_text(text.replace(f"{__name__}:faster", "nobodys_module:faster"))
-    with pytest.raises(ParameterError, match="faster of the module nobodys_module: import that"):
+    with pytest.raises(ParameterError, match="faster .* nobodys_module: import"):
         Drive.from_toml(path)
 
 
@@ -184,7 +184,7 @@ USED = "swashplate.models.pump:shaft_speed"
                 "new": "swashplate.models.amplifier:steady_current",
                 "parameters": f"{__name__}:Seal",
             },
-            "steady_current is an equation of the card",
+            "steady_current",
         ),
     ],
 )

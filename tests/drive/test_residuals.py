@@ -223,11 +223,11 @@ def test_threads_do_not_disturb_each_other(hoist: Drive) -> None:
 
 def test_refusals(hoist: Drive) -> None:
     observed = observed_at_samples(HARD, signals=["shaft_speed"])
-    with pytest.raises(InputError, match="Z16_plus is requested twice"):
+    with pytest.raises(InputError, match="Z16_plus .* twice"):
         jacobian(hoist.parameters, observed, ["Z16", "Z16_plus"])
-    with pytest.raises(InputError, match="no signal 'torque'"):
+    with pytest.raises(InputError, match="signal 'torque'"):
         residuals(hoist.parameters, observed_at_samples(HARD, signals=["torque"]))
-    with pytest.raises(ParameterError, match="no parameter 'Z99'"):
+    with pytest.raises(ParameterError, match="parameter 'Z99'"):
         triangle(hoist.parameters, observed, ["Z99"])
-    with pytest.raises(DomainError, match="the pressure at the start is 1e\\+07 Pa, but"):
+    with pytest.raises(DomainError, match="pressure .* 1e.07 Pa"):
         residuals(hoist.parameters, observed, RunValues({"pump.pressure": 1e7}))

@@ -21,19 +21,19 @@ def test_held_between_stamps(hoist: Drive) -> None:
 @pytest.mark.parametrize(
     ("voltage", "options", "sentence"),
     [
-        ([], {}, "The voltage is empty"),
-        ([1.0, np.nan, 2.0], {}, "not finite, the first nan at sample 1"),
-        ([[1.0, 2.0]], {}, "2-dimensional"),
-        (["a"], {}, "sequence of real numbers"),
-        ([0.0, 10.5], {}, r"10.5 V at 0.00195312 s, but the card takes ±10 V"),
-        ([0.0, 1.0], {"time": [0.0], "interpolation": "linear"}, "1 time stamps for 2 samples"),
-        ([0.0, 1.0], {"time": [0.0, 0.0], "interpolation": "linear"}, "from 0 s at sample 0 to 0"),
-        ([0.0, 1.0], {"time": [0.0, np.nan], "interpolation": "linear"}, "The time has 1 sample"),
+        ([], {}, "voltage .* empty"),
+        ([1.0, np.nan, 2.0], {}, "nan .* sample 1"),
+        ([[1.0, 2.0]], {}, "voltage .* 2-dimensional"),
+        (["a"], {}, "voltage .* real numbers"),
+        ([0.0, 10.5], {}, "10.5 V .* 0.00195312 s.* ±10 V"),
+        ([0.0, 1.0], {"time": [0.0], "interpolation": "linear"}, "1 .* 2 samples"),
+        ([0.0, 1.0], {"time": [0.0, 0.0], "interpolation": "linear"}, "0 s .* sample 0 .* 0"),
+        ([0.0, 1.0], {"time": [0.0, np.nan], "interpolation": "linear"}, "time .* 1 sample"),
         ([0.0, 1.0], {"interpolation": "cubic"}, "'linear' or 'previous'"),
         ([0.0, 1.0], {"start": "warm"}, "'rest' or 'steady'"),
-        ([0.0, 1.0], {"rate": 100.0, "substeps": 3}, "at least 6 are needed"),
+        ([0.0, 1.0], {"rate": 100.0, "substeps": 3}, "3.* 6 "),
         ([0.0, 1.0], {"time": [0.0, 1.0]}, "interpolation='previous'"),
-        ([0.0, 1.0], {"time": [0.0, 3.6e6], "interpolation": "linear"}, "check the unit of the"),
+        ([0.0, 1.0], {"time": [0.0, 3.6e6], "interpolation": "linear"}, "3.6e.06 s.* unit"),
     ],
 )
 def test_bad_records_are_refused_in_a_sentence(
@@ -59,7 +59,7 @@ def test_a_result_does_not_change_with_the_users_array(hoist: Drive) -> None:
 
 def test_solenoid_overpowering_the_spring_is_an_error() -> None:
     hoist = Drive.preset("hoist")
-    with pytest.raises(DomainError, match="Z5·F/√Z4 reaches .* below 1"):
+    with pytest.raises(DomainError, match="Z5·F/√Z4 .* 1"):
         hoist.simulate_current(np.full(10, 4.0))
 
 
@@ -68,7 +68,7 @@ def test_bad_command_leaves_the_state(hoist: Drive) -> None:
     stepper.step(1.0)
     before = stepper.state
     for bad in (10.1, float("nan"), float("-inf")):
-        with pytest.raises(InputError, match="must be a finite number within ±10"):
+        with pytest.raises(InputError, match="±10"):
             stepper.step(bad)
     assert (stepper.state.inputs == before.inputs).all()
     assert (stepper.state.context.states == before.context.states).all()
@@ -89,11 +89,11 @@ def test_what_is_measured_goes_into_a_step_as_into_a_simulation(hoist: Drive, ra
 @pytest.mark.parametrize(
     ("measured", "inputs", "said"),
     [
-        (["lad"], (1.0, 2.0), "hoist has no input 'lad'; it has voltage, pump_speed"),
-        (["pump_speed"], (1.0, -1.0), "pump_speed is -1.0, but must be .* from 0 to 10"),
-        (["supply_pressure"], (1.0, 0.0), "supply_pressure is 0.0, but must be .* from 1 to"),
-        (["pump_speed"], (1.0, 1800.0), "pump_speed is 1800.0, but must be .* from 0 to 10"),
-        (["pump_speed"] * 2, (1.0, 1.0, 1.0), "takes each input once"),
+        (["lad"], (1.0, 2.0), "hoist .*'lad'.* voltage, pump_speed"),
+        (["pump_speed"], (1.0, -1.0), "pump_speed .*-1.0, .* 0 to 10"),
+        (["supply_pressure"], (1.0, 0.0), "supply_pressure .* 0.0, .* 1 to"),
+        (["pump_speed"], (1.0, 1800.0), "pump_speed .* 1800.0, .* 0 to 10"),
+        (["pump_speed"] * 2, (1.0, 1.0, 1.0), "input once"),
     ],
 )
 def test_measured_inputs_without_sense_are_refused(hoist: Drive, measured, inputs, said) -> None:
@@ -104,19 +104,19 @@ def test_measured_inputs_without_sense_are_refused(hoist: Drive, measured, input
 @pytest.mark.parametrize(
     ("name", "value", "sentence"),
     [
-        ("pump_speed", 1e308, "1e.308, .* at most 10: check"),
-        ("pump_speed", 75.0, "75, .* at most 10: .* per cent"),
-        ("load_torque", -1e300, "-1e.300 N m, .* at most 1e.10 N m either way: look at"),
-        ("load_torque", 4e10, "4e.10 N m, .* perhaps it is in N mm instead of N m"),
-        ("supply_pressure", 1e10, "1e.10 Pa, .* 10000 to 1e.09 Pa: look at"),
-        ("supply_pressure", 107.0, "107 Pa, .* 10000 to 1e.09 Pa: .* bar instead of Pa"),
+        ("pump_speed", 1e308, "1e.308, .* 10"),
+        ("pump_speed", 75.0, "75, .* 10: .* per cent"),
+        ("load_torque", -1e300, "-1e.300 N m, .* 1e.10 N m"),
+        ("load_torque", 4e10, "4e.10 N m, .* N mm .* N m"),
+        ("supply_pressure", 1e10, "1e.10 Pa, .* 10000 to 1e.09 Pa"),
+        ("supply_pressure", 107.0, "107 Pa, .* 10000 to 1e.09 Pa: .* bar .* Pa"),
     ],
 )
 def test_what_no_machine_has_is_refused_with_its_range(
     hoist: Drive, name: str, value: float, sentence: str
 ) -> None:
     """The largest sample decides: a pump that stops leaves next to no pressure."""
-    with pytest.raises(InputError, match=rf"{name} .* is {sentence}"):
+    with pytest.raises(InputError, match=rf"{name} .* {sentence}"):
         hoist.simulate(np.full(10, 1.0), **{name: value})
     stopping = np.r_[np.full(5, 8e6), np.full(5, 2.0)]
     assert hoist.simulate(np.full(10, 1.0), supply_pressure=stopping).shaft_speed.size == 10
@@ -126,10 +126,10 @@ def test_a_sample_that_is_not_finite_is_an_error_that_names_it(hoist: Drive) -> 
     """Numbers that overflow in an output alone: the states stay finite."""
     huge, voltage = Drive(hoist.parameters.with_numbers({"Z10": 1e308})), np.full(6000, 9.0)
     speed = np.where(np.arange(6000) < 512, 1.0, 10.0)
-    with pytest.raises(DomainError, match=r"hoist: shaft_speed is \S+ at 1 s.* this voltage"):
+    with pytest.raises(DomainError, match=r"hoist: shaft_speed .* at 1 s.* voltage"):
         huge.simulate(voltage, pump_speed=speed, interpolation="previous")
     stepper = huge.stepper(measured=("pump_speed",))
-    with pytest.raises(DomainError, match=r"hoist: shaft_speed is \S+: .* this voltage"):
+    with pytest.raises(DomainError, match=r"hoist: shaft_speed .* voltage"):
         [stepper.step(*pair) for pair in zip(voltage, speed, strict=True)]
     many = hoist.simulate_many({"Z10": np.array([12.0, 1e308])}, voltage=voltage, pump_speed=speed)
     assert list(many.failures) == [1]
@@ -141,21 +141,21 @@ def test_an_integral_that_overflows_is_an_error_that_names_it(hoist: Drive) -> N
     run = huge.simulate(voltage)
     assert np.isfinite(run.shaft_speed).all()
     for _ in range(2):
-        with pytest.raises(DomainError, match="hoist: shaft_position overflows"):
+        with pytest.raises(DomainError, match="hoist: shaft_position"):
             run["shaft_position"]
     stepper = huge.stepper()
-    with pytest.raises(DomainError, match="integral overflows"):
+    with pytest.raises(DomainError, match="hoist: .*integral .* voltage"):
         [stepper.step(volts) for volts in voltage]
 
 
 def test_state_of_another_rate_is_refused(hoist: Drive) -> None:
-    with pytest.raises(InputError, match="of another model, delay or rate"):
+    with pytest.raises(InputError, match="delay or rate"):
         hoist.stepper(1e3).state = hoist.stepper(1e4).state
 
 
 @pytest.mark.parametrize("rate", [0.0, -1.0, float("nan"), 1.0, 1e6])
 def test_bad_rates_are_refused(hoist: Drive, rate: float) -> None:
-    with pytest.raises(InputError, match="between 10 and 100000 Hz"):
+    with pytest.raises(InputError, match="10 and 100000 Hz"):
         hoist.stepper(rate)
 
 
@@ -180,9 +180,9 @@ REFINED = {"line_stiffness": 1e3, "motor_leakage": 1e-3, "load_inertia": 1.0}
 )
 def test_numbers_that_overflow_are_refused(hoist: Drive, refinements: dict[str, float]) -> None:
     drive = Drive(hoist.parameters.with_numbers(LARGE | refinements))
-    with pytest.raises(DomainError, match="overflow under this voltage"):
+    with pytest.raises(DomainError, match="hoist: .* overflow.* voltage"):
         drive.simulate(np.full(600, 5.0))
-    with pytest.raises(DomainError, match="overflow under this current"):
+    with pytest.raises(DomainError, match="hoist: .* overflow.* current"):
         drive.simulate_current(np.full(600, 0.5))
     stepper = drive.stepper()
 
@@ -190,7 +190,7 @@ def test_numbers_that_overflow_are_refused(hoist: Drive, refinements: dict[str, 
         for _ in range(600):
             assert np.isfinite(stepper.step(5.0)).all()
 
-    with pytest.raises(DomainError, match="overflow"):
+    with pytest.raises(DomainError, match="hoist: .*overflow"):
         go_on()
 
 
@@ -246,9 +246,9 @@ def test_files_give_back_what_was_written(hoist: Drive, tmp_path, ending: str) -
 
 def test_unknown_ending_is_refused(hoist: Drive, tmp_path) -> None:
     run = hoist.simulate([0.0, 1.0])
-    with pytest.raises(FileError, match=r"\.csv or \.parquet"):
+    with pytest.raises(FileError, match=r"xlsx.* \.csv or \.parquet"):
         run.write(tmp_path / "run.xlsx")
-    with pytest.raises(FileError, match="cannot be written"):
+    with pytest.raises(FileError, match=r"nowhere/run\.csv"):
         run.write(tmp_path / "nowhere" / "run.csv")
     assert not list(tmp_path.iterdir())
 

@@ -120,7 +120,7 @@ def test_derivatives_that_overflow_end_in_a_sentence(hoist: Drive) -> None:
     record = record_of(current, 512.0, what="current")
     huge = Observation("shaft_speed", stamps, np.zeros(64), weight=1e170)
     observed = ObservedRecord(record, [huge], driven_by="current")
-    with pytest.raises(DomainError, match="Z8: the derivatives are too large"):
+    with pytest.raises(DomainError, match="Z8: .* derivatives"):
         triangle(hoist.parameters, observed, ["Z8", "Z10"])
 
 

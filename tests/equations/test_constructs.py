@@ -176,7 +176,7 @@ def looked(s: tuple[float, ...], f: float, gain: float) -> float:
 
 
 def test_tuples_of_any_length() -> None:
-    with pytest.raises(EquationError, match=r"s is a tuple of unknown length: say lengths="):
+    with pytest.raises(EquationError, match=r"s .* length: .* lengths="):
         derive(looked, "s")
     lengths = {"s": 3}
     derived = check(looked, "s", lengths=lengths, s=(1.0, 2.0, 3.0), f=0.3, gain=2.0)
@@ -217,7 +217,7 @@ def test_options_decide_what_there_is(damped: bool | None, doubled: bool | None)
 def test_an_option_that_is_tested_has_to_be_known() -> None:
     with pytest.raises(EquationError, match=r'option o.damped.*options=\{"o.damped": None\}'):
         derive(optional, "x")
-    with pytest.raises(EquationError, match=r"The option extra is False"):
+    with pytest.raises(EquationError, match=r"option extra .* False"):
         derive(optional, "x", options={"o": Options(), "extra": False})
 
 

@@ -124,10 +124,10 @@ def of_the_step(state: Arm, h: float) -> Arm:
 @pytest.mark.parametrize(
     ("equations", "options", "sentence"),
     [
-        ((rates, "rk5"), {}, "no method 'rk5'; there are euler, heun, midpoint, rk4"),
-        ((rates,), {"substeps": 0}, "substeps is 0, but must be a whole number, at least 1"),
-        ((leaves_out,), {}, "leaves_out must take the state and return its type"),
-        ((of_the_step,), {}, "of_the_step asks for 'h', which is known only at samples"),
+        ((rates, "rk5"), {}, "method 'rk5'; .* euler, heun, midpoint, rk4"),
+        ((rates,), {"substeps": 0}, "substeps .* 0, .* whole number"),
+        ((leaves_out,), {}, "leaves_out .* state"),
+        ((of_the_step,), {}, "of_the_step .* 'h', .* samples"),
     ],
 )
 def test_what_is_no_right_hand_side_is_refused(equations, options, sentence: str) -> None:

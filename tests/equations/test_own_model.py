@@ -96,7 +96,7 @@ def test_simulation_is_the_loop_by_hand() -> None:
 @pytest.mark.parametrize("method", ["to_polars", "to_pandas"])
 def test_units_that_no_signal_has_are_refused(method: str) -> None:
     run = simulate(valve, P, {"command": COMMAND}, RATE, given=STROKE)
-    with pytest.raises(InputError, match=r"run of \S+ has one .* units is 'display', .*'SI'"):
+    with pytest.raises(InputError, match=r"units .* 'display', .*'SI'"):
         getattr(run, method)(units="display")
 
 
@@ -171,7 +171,7 @@ def test_a_stepper_gives_the_bits_of_the_run(way: str) -> None:
         assert [each[name] for each in samples + later] == run[name].tolist()
     for limit in Stops._fields:
         assert [each[limit] for each in samples + later] == run.active(limit).tolist()
-    with pytest.raises(InputError, match="The command is nan, but must be a finite number"):
+    with pytest.raises(InputError, match="command .* nan, .* finite"):
         made.step(np.nan)
 
 
@@ -180,7 +180,7 @@ def test_a_number_stands_for_a_constant_input() -> None:
     levels = {"command": COMMAND, "push": np.full(COMMAND.size, 0.2)}
     expected = simulate(both, P, levels, RATE)["position"]
     assert (simulate(both, P, {**levels, "push": 0.2}, RATE)["position"] == expected).all()
-    with pytest.raises(InputError, match="single number: give an array"):
+    with pytest.raises(InputError, match="single number: .* array"):
         simulate(both, P, {"command": 1.0, "push": 0.2}, RATE)
 
 
@@ -227,23 +227,23 @@ def wobbling(state: Rod, command: float, p: Valve, h: float) -> Rod:
 
 def test_bad_inputs_are_named() -> None:
     given, good = {"given": STROKE}, {"command": COMMAND}
-    with pytest.raises(InputError, match="no input 'voltage'; it has command"):
+    with pytest.raises(InputError, match="input 'voltage'; .* command"):
         simulate(valve, P, {"voltage": COMMAND}, RATE, **given)
-    with pytest.raises(InputError, match="must be a Valve"):
+    with pytest.raises(InputError, match="a Valve"):
         simulate(valve, STROKE, good, RATE, **given)
-    with pytest.raises(InputError, match="command has .* the first nan at sample 3"):
+    with pytest.raises(InputError, match="command .* nan at sample 3"):
         simulate(valve, P, {"command": np.array([0.0, 0.0, 0.0, np.nan])}, RATE, **given)
-    with pytest.raises(InputError, match="no parameter 'lead'"):
+    with pytest.raises(InputError, match="parameter 'lead'"):
         sensitivities(valve, P, good, RATE, parameters=["lead"], **given)
 
 
 def test_names_and_numbers_that_mean_nothing_are_refused() -> None:
     made = stepper(stopped, P, ["command"], given=SHORT, rate=100.0)
     for wrong in ((), (1.0, 2.0), ("a",), (None,), (np.zeros(2),)):
-        with pytest.raises(InputError, match="A step takes command: 1 numbers|The command is"):
+        with pytest.raises(InputError, match="step takes command: 1 |command is"):
             made.step(*wrong)
     way: Any = {"order": "previous"}
-    with pytest.raises(InputError, match="interpolation names 'order', but the inputs"):
+    with pytest.raises(InputError, match="interpolation .* 'order', .* inputs"):
         simulate(stopped, P, {"command": COMMAND}, rate=100.0, given=SHORT, interpolation=way)
 
 
@@ -272,9 +272,9 @@ def test_an_option_that_is_false_is_off() -> None:
     for options, end in ((Ways(True), 6.0), (Ways(False), 3.0), (Ways(), 3.0)):
         run = simulate(made, Gain(1.0), {"command": np.ones(4)}, rate=1.0, options=options)
         assert run["place"][-1] == end
-    with pytest.raises(InputError, match="None or False .off. or True"):
+    with pytest.raises(InputError, match="None or False .* or True"):
         simulate(made, Gain(1.0), {"command": np.ones(4)}, rate=1.0, options=Ways(2))
-    with pytest.raises(InputError, match="counter has no given, but is passed"):
+    with pytest.raises(InputError, match="counter .* given"):
         simulate(made, Gain(1.0), {"command": np.ones(4)}, rate=1.0, given=Ways())
 
 
@@ -417,34 +417,34 @@ def run(step: Any = filled, p: Any = WIDE, flow: Any = None, rate: Any = 1.0, **
 
 NO_STATE = "must return a Fill of numbers on every path"
 REFUSED = {
-    "nothing": ({"step": nothing}, f"Model tank: nothing {NO_STATE}"),
+    "nothing": ({"step": nothing}, f"tank: nothing {NO_STATE}"),
     "row": ({"step": row}, f"row {NO_STATE}"),
-    "text": ({"step": "filled"}, "step must be an equation, not 'filled'"),
-    "complex state": ({"state": Odd}, "Odd.level is of type complex, but must be a float"),
-    "signals": ({"sample": bare}, "bare must return a named tuple, and say so"),
-    "margins": ({"domain": two_margins}, "two_margins must return one number, the margin"),
-    "rest": ({"rest": no_state}, "no_state must return a Fill, not Outlet"),
-    "p complex": ({"p": Outlet(1j)}, "width is 1j, but must be a real number"),
-    "p list": ({"p": Outlet([1.0])}, r"width is \[1.0\]"),
-    "flow complex": ({"flow": np.ones(5) * 1j}, "flow must be a sequence of real numbers"),
-    "flow none": ({"flow": [None]}, "flow must be a sequence of real numbers"),
-    "rate": ({"rate": "fast"}, "The rate is 'fast' Hz, but must be a number above 0"),
-    "no such state": ({"begin": {"depth": 1.0}}, "no state 'depth' to start from; it has level"),
-    "hold": ({"taps": {"flow": Tap("flow", hold="cubic")}}, "hold 'cubic'; there are linear"),
+    "text": ({"step": "filled"}, "step .* equation, .*'filled'"),
+    "complex state": ({"state": Odd}, "Odd.level .* complex, .* float"),
+    "signals": ({"sample": bare}, "bare .* named tuple"),
+    "margins": ({"domain": two_margins}, "two_margins .* one number"),
+    "rest": ({"rest": no_state}, "no_state .* a Fill, .* Outlet"),
+    "p complex": ({"p": Outlet(1j)}, "width .* 1j, .* real number"),
+    "p list": ({"p": Outlet([1.0])}, r"width .*\[1.0\]"),
+    "flow complex": ({"flow": np.ones(5) * 1j}, "flow .* real numbers"),
+    "flow none": ({"flow": [None]}, "flow .* real numbers"),
+    "rate": ({"rate": "fast"}, "rate .*'fast' Hz, .* above 0"),
+    "no such state": ({"begin": {"depth": 1.0}}, "state 'depth' .* level"),
+    "hold": ({"taps": {"flow": Tap("flow", hold="cubic")}}, "hold 'cubic'; .* linear"),
     "delay": (
         {"taps": {"flow": Tap("flow", "width")}, "p": Outlet(-0.1)},
-        "tank: width is -0.1 s, but a delay is at least 0",
+        "tank: width .* -0.1 s, .* 0",
     ),
     "input and state": (
         {"step": mixed},
-        "Model tank: 'level' is both an input and in Fill: rename",
+        "tank: 'level' .* input .* Fill: rename",
     ),
-    "tap and state": ({"taps": {"flow": Tap("level")}}, "'level' is both an input and in Fill"),
-    "input time": ({"taps": {"flow": Tap("time")}}, "an input cannot be called 'time'"),
-    "input and signal": ({"sample": passed_on}, "'flow' is both an input and in Flow: rename one"),
-    "time": ({"integrals": {"time": "level"}}, "'time' is in the integrals, but means the time st"),
-    "no input": ({"step": still}, "tank has no input 'flow'; it has none"),
-    "no delay": ({"taps": {"flow": Tap("flow", "width")}, "p": Outlet(np.nan)}, "width is nan s"),
+    "tap and state": ({"taps": {"flow": Tap("level")}}, "'level' .* input .* Fill"),
+    "input time": ({"taps": {"flow": Tap("time")}}, "input .* 'time'"),
+    "input and signal": ({"sample": passed_on}, "'flow' .* input .* Flow: rename"),
+    "time": ({"integrals": {"time": "level"}}, "'time' .* integrals"),
+    "no input": ({"step": still}, "tank .* input 'flow'; .* none"),
+    "no delay": ({"taps": {"flow": Tap("flow", "width")}, "p": Outlet(np.nan)}, "width .* nan s"),
 }
 
 
@@ -462,10 +462,10 @@ LOAD = Model("load", Outlet, Load, pulled)
 JOINED = {
     "order": ((PUMP, FED), {}, f"Model x: pump {LATE}"),
     "loop": ((TANK, PUMP), {}, f"tank needs 'flow', which is known only after pump: {LOOP}"),
-    "load": ((LOAD, *pump_drive.parts), {}, "load needs 'shaft_speed', .* after pump: a loop"),
-    "drive": ((*pump_drive.parts, LOAD), {}, "pump needs 'load_torque', .* after load: a loop"),
+    "load": ((LOAD, *pump_drive.parts), {}, "load .* 'shaft_speed', .* after pump: "),
+    "drive": ((*pump_drive.parts, LOAD), {}, "pump .* 'load_torque', .* after load: "),
     "link": ((TANK,), {"flow": doubled}, f"tank needs 'flow', .* after tank: {LOOP}"),
-    "text": ((TANK, "pump"), {}, "Model x is joined from models, not from 'pump'"),
+    "text": ((TANK, "pump"), {}, "x .* models, .*'pump'"),
 }
 
 
@@ -477,16 +477,16 @@ def test_models_that_cannot_be_in_series_are_refused(parts, links, sentence: str
 
 def test_a_part_of_a_joined_model_is_named_in_its_numbers() -> None:
     whole = join("whole", FED, PUMP)
-    with pytest.raises(InputError, match=r"whole are its parameters\(tank=..., pump=...\)"):
+    with pytest.raises(InputError, match=r"whole .*parameters\(tank=..., pump=...\)"):
         simulate(whole, WIDE, {"inflow": np.ones(5)}, 1.0)
 
 
 def test_a_derivative_that_overflows_is_named() -> None:
     tank = Model("tank", Outlet, Fill, growing)
     columns = {"parameters": ["width", "start.level"], "begin": {"level": 0.0}}
-    with pytest.raises(DomainError, match=r"of level by start\.level is inf at sample 2"):
+    with pytest.raises(DomainError, match=r"level by start\.level .* inf at sample 2"):
         print(sensitivities(tank, WIDE, {"flow": np.zeros(5)}, 1.0, **columns)["level"])
-    with pytest.raises(InputError, match="no limit 'full'; there are none"):
+    with pytest.raises(InputError, match="limit 'full'; .* none"):
         simulate(tank, WIDE, {"flow": np.zeros(5)}, 1.0).active("full")
 
 
@@ -509,9 +509,9 @@ OUTSIDE = {
         },
         r"tank: 1 m too high by the flow\.$",
     ),
-    "parameters": ({"step": drained}, "tank's level is -inf at the end of the record"),
-    "rest": ({"rest": full}, r"full cannot be computed for these numbers \(.*zero\)"),
-    "overflow": ({"step": growing}, "tank's level is inf at the end of the record"),
+    "parameters": ({"step": drained}, "tank's level .* -inf at the end"),
+    "rest": ({"rest": full}, r"full .*\(.*zero\)"),
+    "overflow": ({"step": growing}, "tank's level .* inf at the end"),
 }
 
 
@@ -526,7 +526,7 @@ def test_a_margin_that_is_no_number_at_one_sample_is_outside(sets: int) -> None:
     tank = Model("tank", Outlet, Fill, filled, domain=unknown_below)
     inputs = {"flow": np.ones(9)}
     if sets == 1:
-        with pytest.raises(DomainError, match="equations do not hold"):
+        with pytest.raises(DomainError, match="tank: "):
             simulate(tank, Outlet(1.0), inputs, 1.0)
         return
     made = simulate_many(tank, Outlet(1.0), {"width": np.ones(sets)}, inputs, 1.0, output="level")
@@ -552,5 +552,5 @@ def test_of_two_models_in_series_both_say_what_may_have_happened() -> None:
 
 def test_a_model_goes_to_other_processes_by_its_name() -> None:
     assert pickle.loads(pickle.dumps(pump_drive)) is pump_drive
-    with pytest.raises(InputError, match=r"tank cannot be sent .* a name of a module .*--jobs 1"):
+    with pytest.raises(InputError, match=r"tank .* module .*--jobs 1"):
         pickle.dumps(Model("tank", Outlet, Fill, filled))

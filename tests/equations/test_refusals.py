@@ -106,9 +106,9 @@ def test_refused_at_import(statement: str) -> None:
     [
         ("def f(*x: float) -> float:\n    return x[0]", "an argument with"),
         ("def f(**x: float) -> float:\n    return 1.0", "an argument with"),
-        ("def f(x) -> float:\n    return x", "x without a type"),
-        ("def f(x: float) -> float:\n    y = x", "an end without return"),
-        ("def f(x: float) -> float:\n    if x > 0.0:\n        return x", "an end without return"),
+        ("def f(x) -> float:\n    return x", "x .* type"),
+        ("def f(x: float) -> float:\n    y = x", "end without return"),
+        ("def f(x: float) -> float:\n    if x > 0.0:\n        return x", "end without return"),
     ],
 )
 def test_refused_heads_and_ends(text: str, what: str) -> None:

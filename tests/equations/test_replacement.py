@@ -131,7 +131,7 @@ def test_an_equation_is_replaced_again() -> None:
     assert level_of(again).tolist() == [60.0, *(10.0 * (2.0 * COMMAND[:3] + 4.0) + 1.0)]
     other = replaced(replaced(tank, twice, ten_times), ten_times, three_times)
     assert level_of(other).tolist() == [6.0, *(6.0 * COMMAND[:3] + 1.0)]
-    with pytest.raises(InputError, match="does not use one_more"):
+    with pytest.raises(InputError, match="one_more"):
         replaced(replaced(tank, one_more, shifted), one_more, around)
 
 
@@ -280,7 +280,7 @@ def test_the_equation_of_a_link_is_replaced() -> None:
         run = simulate(model, numbers, inputs, 1.0)
         assert run["deep"].tolist() == [factor * each for each in run["level"]]
         assert run["depth"][1:].tolist() == run["deep"][:-1].tolist()
-    with pytest.raises(InputError, match="doubled is an equation of a link"):
+    with pytest.raises(InputError, match="doubled .* link"):
         replaced(both, doubled, tripled, Gain)
 
 

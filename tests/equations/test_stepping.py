@@ -97,14 +97,14 @@ def test_step_of_ones_own_model_waits_as_its_simulation_does():
 
 def test_what_no_step_has_is_refused():
     hoist = Drive.preset("hoist")
-    with pytest.raises(InputError, match="shaft_position is the integral of shaft_speed, and not"):
+    with pytest.raises(InputError, match="shaft_position .* integral of shaft_speed"):
         hoist.compiled_step(("shaft_position",))
-    with pytest.raises(InputError, match="hoist has no input 'wind'; it has voltage, "):
+    with pytest.raises(InputError, match="hoist .* input 'wind'; .* voltage, "):
         hoist.compiled_step(inputs=("voltage", "wind"))
-    with pytest.raises(InputError, match="hoist: card needs the signal 'voltage'"):
+    with pytest.raises(InputError, match="hoist: card .* 'voltage'"):
         hoist.compiled_step(inputs=("load_torque",))
-    with pytest.raises(InputError, match=r"is unstable at a step of 1/20 s"):
+    with pytest.raises(InputError, match=r"step of 1/20 s"):
         hoist.compiled_step(rate=20.0)
     compiled = compiled_step(lag, Lag(0.001, 0.0), ("command",), ("level",), 100.0)
-    with pytest.raises(DomainError, match="lag: lag's level is .* at the end of the record"):
+    with pytest.raises(DomainError, match="lag: lag's level .* end of the record"):
         marched(compiled, compiled.context(), np.ones((700, 1)))

@@ -142,9 +142,7 @@ def test_an_equation_in_c_has_the_bits_of_the_compiled_one(
 
 @pytest.mark.parametrize("name", REFUSED)
 def test_what_has_no_counterpart_in_c_is_refused_by_name(name: str) -> None:
-    with pytest.raises(
-        EquationError, match=r"constructs.py, line \d+: rub.* p\.friction is .*None"
-    ):
+    with pytest.raises(EquationError, match=r"constructs.py, line \d+: rub.* p\.friction .*None"):
         equation_in_c(CONSTRUCTS[name], Loops())
 
 

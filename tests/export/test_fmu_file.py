@@ -146,7 +146,7 @@ def test_outputs_say_what_they_follow_at_once(files, fmi):
 
 
 def test_outputs_follow_the_voltage_at_once_without_a_delay(tmp_path, fmi):
-    with pytest.warns(UserWarning, match=r"neutral: tau is 0 s, below 1.5 steps"):
+    with pytest.warns(UserWarning, match=r"neutral: tau .* 0 s, .* 1.5 steps"):
         path = export.fmu(Drive.preset("neutral"), tmp_path / "n.fmu", fmi=fmi)
     read = fmpy.read_model_description(str(path))
     follow = {
@@ -159,7 +159,7 @@ def test_outputs_follow_the_voltage_at_once_without_a_delay(tmp_path, fmi):
 
 def test_a_short_delay_is_warned_of_with_a_step_that_would_do(hoist, tmp_path):
     short = hoist.replace(tau=2.4e-3)
-    with pytest.warns(UserWarning, match=r"choose a step of 0.0016 s or less"):
+    with pytest.warns(UserWarning, match=r"step of 0.0016 s"):
         export.fmu(short, tmp_path / "a.fmu", platforms=["linux64"])
     exact = short.at_every_rate()
     with warnings.catch_warnings():
@@ -366,11 +366,11 @@ def test_an_equation_of_ones_own_is_compiled(hoist, tmp_path):
 @pytest.mark.parametrize(
     ("options", "sentence"),
     [
-        ({"platforms": ["linux32"]}, "no platform 'linux32'; there are linux64, aarch64-linux"),
-        ({"fmi": "1.0"}, "it is '2.0' or '3.0'"),
-        ({"step": 0.01}, "at most 1/512 s"),
-        ({"step": float("nan")}, "above 0"),
-        ({"step": 1e-6}, "line holds 1020 steps"),
+        ({"platforms": ["linux32"]}, "platform 'linux32'.* linux64, aarch64-linux"),
+        ({"fmi": "1.0"}, "'1.0'.*'2.0' or '3.0'"),
+        ({"step": 0.01}, "0.01 s.* 1/512 s"),
+        ({"step": float("nan")}, "step .* nan.* above 0"),
+        ({"step": 1e-6}, "1020 steps"),
     ],
 )
 @pytest.mark.filterwarnings("ignore:.*recursion for")
@@ -381,15 +381,15 @@ def test_refuses_options_that_there_are_not(hoist, tmp_path, options, sentence):
 
 
 def test_refuses_another_ending_and_a_folder_that_is_not_there(hoist, tmp_path):
-    with pytest.raises(InputError, match=r"must end in \.fmu"):
+    with pytest.raises(InputError, match=r"end in \.fmu"):
         export.fmu(hoist, tmp_path / "a.zip")
-    with pytest.raises(FileError, match="does not exist"):
+    with pytest.raises(FileError, match=r"/no\b"):
         export.fmu(hoist, tmp_path / "no" / "a.fmu")
 
 
 def test_a_recursion_for_another_rate_is_converted_or_refused(hoist, tmp_path):
     recursion = Drive(replace(hoist.parameters, rate=512.0))
-    with pytest.warns(UserWarning, match="recursion for 512 Hz"):
+    with pytest.warns(UserWarning, match="512 Hz"):
         path = export.fmu(recursion, tmp_path / "a.fmu", step=1e-3, platforms=["linux64"])
     if LINUX:
         assert export.compare(path, recursion, np.full(400, 7.0)).equal

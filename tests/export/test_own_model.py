@@ -225,7 +225,7 @@ def numbered(state: Place, p: Lag, options: Numbered) -> Place:
 
 
 def test_an_option_that_is_a_number_is_refused_by_name() -> None:
-    with pytest.raises(EquationError, match=r"Numbered\.height is of type .*float.*bool \| None"):
+    with pytest.raises(EquationError, match=r"Numbered\.height .*float.*bool \| None"):
         interface(Exported(Model("numbered", Lag, Place, numbered, options=Numbered), "swp"))
 
 

@@ -184,13 +184,11 @@ def test_steady_start_stays(hoist: FullOrderDrive) -> None:
 
 
 def test_wrong_options_are_sentences(hoist: FullOrderDrive, step: np.ndarray) -> None:
-    with pytest.raises(DomainError, match="more than 20000; use a larger mass"):
+    with pytest.raises(DomainError, match="20000; .*mass"):
         hoist.replace(spool_mass=1e-20, feedback_arm_inertia=0.0).simulate(step)
-    with pytest.raises(InputError, match="substeps is 5, but .* needs at least 6 to be stable"):
+    with pytest.raises(InputError, match="substeps .* 5, .* 6 "):
         hoist.simulate(step, substeps=5)
-    with pytest.raises(
-        UnknownParameterError, match="no parameter 'spool_weight'.*; the parameters are "
-    ):
+    with pytest.raises(UnknownParameterError, match="'spool_weight'.*; .* spool_mass"):
         hoist.sensitivities(step, parameters=["spool_weight"])
 
 

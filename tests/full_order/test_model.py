@@ -165,7 +165,7 @@ def test_masses_that_make_the_march_unstable_are_told(hoist: FullOrderDrive) -> 
     parts = (instance.parts[0], light.instance(1.0 / 512.0).parts[1]._replace(given=Substeps(8.0)))
     record = record_of(CALM, 512.0, what="voltage")
     observed = ObservedRecord(record, [Observation("shaft_speed", TIME, np.zeros(TIME.size))])
-    with pytest.raises(DomainError, match=r"turns 2\.\d+ rad in a sub-step, .* stable below 2"):
+    with pytest.raises(DomainError, match=r"2\.\d+ rad in a sub-step, .* 2"):
         jacobian(replace(instance, parts=parts), observed, ())
 
 

@@ -151,23 +151,23 @@ def test_an_inertia_takes_the_place_of_its_frequency() -> None:
     # one that follows from the lumps may be given where it agrees
     agreeing = from_lumped(hoist.parameters, control_arm=0.08 / 0.62542).numbers
     assert agreeing == pytest.approx(from_lumped(hoist.parameters).numbers)
-    with pytest.raises(ParameterError, match="feedback_arm_inertia and spool_frequency are both"):
+    with pytest.raises(ParameterError, match="feedback_arm_inertia and spool_frequency "):
         FullOrderDrive.from_drive(hoist, feedback_arm_inertia=2e-6, spool_frequency=250.0)
-    with pytest.raises(ParameterError, match="piston_damping and swash_damping_ratio are both"):
+    with pytest.raises(ParameterError, match="piston_damping and swash_damping_ratio "):
         from_lumped(hoist.parameters, piston_damping=90.0, swash_damping_ratio=0.2)
 
 
 @pytest.mark.parametrize(
     ("changes", "chosen", "sentence"),
     [
-        ({}, {"spool_mas": 0.1}, "no quantity 'spool_mas'"),
-        ({}, {"spool_mass": 0.0}, r"mine: spool_mass \(mass of the spool\) is 0 kg, but must"),
-        ({}, {"oil_volume": "big"}, r"oil_volume must be a number in m\^3"),
-        ({}, {"spool_mass": 0.1}, "spool_mass on spool_arm alone has 6.331e-06 kg m², but spool_f"),
-        ({}, {"control_arm": 0.2}, "control_arm is given as 0.2 m, but 0.127914042 follows from"),
-        ({}, {"load_torque": 1e8}, "the load holds a stroking pressure of .* Pa at rest"),
-        ({"Z2": 0.01}, {}, "mine: Z2 is 0.01, but a physical set has Z2 = 0"),
-        ({"Z11": 0.01}, {}, "Z11 is 0.01, but without load_torque no speed is lost to it"),
+        ({}, {"spool_mas": 0.1}, "'spool_mas'"),
+        ({}, {"spool_mass": 0.0}, r"mine: spool_mass .* 0 kg"),
+        ({}, {"oil_volume": "big"}, r"oil_volume .* m\^3"),
+        ({}, {"spool_mass": 0.1}, "spool_mass .* spool_arm .* 6.331e-06 kg m², .* spool_f"),
+        ({}, {"control_arm": 0.2}, "control_arm .* 0.2 m, .* 0.127914042"),
+        ({}, {"load_torque": 1e8}, "load .* stroking pressure of .* Pa"),
+        ({"Z2": 0.01}, {}, "mine: Z2 .* 0.01, .* Z2 = 0"),
+        ({"Z11": 0.01}, {}, "Z11 .* 0.01, .* load_torque"),
     ],
 )
 def test_what_no_machine_has_is_refused(changes: dict, chosen: dict, sentence: str) -> None:
@@ -178,7 +178,7 @@ def test_what_no_machine_has_is_refused(changes: dict, chosen: dict, sentence: s
 
 def test_the_inertia_that_agrees_is_said() -> None:
     drive = Drive.preset("hoist").replace(Z7=0.5, Z11=0.01, Z12=0.03)
-    with pytest.raises(ParameterError, match=r"for example load_inertia = [\d.]+ kg") as refusal:
+    with pytest.raises(ParameterError, match=r"load_inertia = [\d.]+ kg") as refusal:
         FullOrderDrive.from_drive(drive, load_torque=2e3)
     said = float(str(refusal.value).partition("load_inertia = ")[2].split()[0])
     # K_mL = Z11/C_g and Z12 = K_mL Z10 C_i
@@ -195,16 +195,16 @@ def test_a_set_is_changed_copied_and_refused_in_words() -> None:
     n = hoist.numbers
     past = atan(n["control_arm"] / n["swash_arm"]) + 0.01  # where the arm lies at 90°
     for changes, said in (
-        ({"swash_stop": (past, 0.2)}, "turn the feedback arm past 90°"),
-        ({"spool_frequency": 200.0}, "chosen only if a set is completed"),
-        ({"air_fraction": 1.0}, "air_fraction .* at least 0 and below 1"),
-        ({"air_fraction": 1.5}, "air_fraction .* is 1.5, .* at most 1: .* per cent"),
-        ({"bulk_modulus": 1.4}, "bulk_modulus .* is 1.4 Pa, .* to 1e.11 Pa: .* GPa"),
+        ({"swash_stop": (past, 0.2)}, "feedback arm .* 90°"),
+        ({"spool_frequency": 200.0}, "spool_frequency.* completed"),
+        ({"air_fraction": 1.0}, "air_fraction .* 1, .* below 1"),
+        ({"air_fraction": 1.5}, "air_fraction .* 1.5, .* 1: .* per cent"),
+        ({"bulk_modulus": 1.4}, "bulk_modulus .* 1.4 Pa, .* 1e.11 Pa: .* GPa"),
     ):
         with pytest.raises(ParameterError, match=said):
             hoist.replace(**changes)
-    with pytest.raises(ParameterError, match="no packaged physical set 'winch'; there are hoist"):
+    with pytest.raises(ParameterError, match="physical set 'winch'; .* hoist"):
         PhysicalSet.preset("winch")
     rough = Drive.preset("hoist").replace(spool_friction=1.0)
-    with pytest.raises(InputError, match="the five-state model has no refinements, but .* spool_f"):
+    with pytest.raises(InputError, match="refinements, .* spool_friction"):
         FullOrderDrive.from_drive(rough)

@@ -73,37 +73,41 @@ REFUSED = {
     "all of the wrong sign": (
         [run(f"run {v:g}", held(v), np.negative) for v in (8.0, -3.0, 2.0)],
         PUMP,
-        "In all 3 runs 'shaft_speed' moves opposite to the command",
+        "all 3 runs 'shaft_speed' .* command",
     ),
     "two samples": (
         (run("few", held(8.0), weight=FEW),),
         pump("Z8", "Z16"),
-        "2 samples cannot determine 3 parameters",
+        "2 samples .* 3 parameters",
     ),
     "dead zone": (
         (run("timid", held(0.1)), run("shy", held(-0.05))),
         PUMP,
-        "timid: its command stays between 0 and 0.1 V, within the dead zone .*-0.0979 to 0.127 V",
+        "timid: .* 0 and 0.1 V, .* dead zone .*-0.0979 to 0.127 V",
     ),
-    "still": ((*GOOD, run("dead", held(8.0), np.zeros_like)), PUMP, "dead: .* never changes"),
+    "still": (
+        (*GOOD, run("dead", held(8.0), np.zeros_like)),
+        PUMP,
+        "dead: .*'shaft_speed' .*changes",
+    ),
     "no number": (
         (*GOOD, run("empty", held(8.0), empty)),
         PUMP,
-        "empty: 'shaft_speed' is not finite in 2,049 samples",
+        "empty: 'shaft_speed' .* 2,049 samples",
     ),
     "one hole": (
         (run("holed", held(8.0), put(512, np.nan)),),
         PUMP,
-        "in 1 sample, the first at 1 s",
+        "holed: .* 1 sample, .* 1 s",
     ),
-    "input": ((*GOOD, replace(GOOD[0], input=INFINITE)), PUMP, "up: its input is not finite at"),
-    "input of one sample": ((replace(GOOD[0], input=SHORT),), PUMP, "up: its input has 1 sample"),
+    "input": ((*GOOD, replace(GOOD[0], input=INFINITE)), PUMP, "up: .*input .* at sample"),
+    "input of one sample": ((replace(GOOD[0], input=SHORT),), PUMP, "up: .*input .* 1 sample"),
     "one sample": (
         (*GOOD, run("one", held(8.0), lambda speed: speed[:1])),
         PUMP,
-        "one: .* has 1 sample in use",
+        "one: .* 1 sample",
     ),
-    "nothing depends on it": (GOOD, pump("Z14", "Z15"), "no run depends on any of Z14, Z15"),
+    "nothing depends on it": (GOOD, pump("Z14", "Z15"), "Z14, Z15"),
 }
 
 
@@ -131,7 +135,7 @@ def test_what_is_odd_is_said_once(runs, said: str | None) -> None:
 
 def test_a_gross_spike_is_refused_with_the_line_that_leaves_it_out() -> None:
     spoilt = (*GOOD, run("spoilt", held(5.0), put(900, 100.0)))
-    with pytest.raises(InputError, match=r"spoilt: .* has 1 spike.*ignore = \[\{ from = 1.75"):
+    with pytest.raises(InputError, match=r"spoilt: .* 1 spike.*ignore = \[\{ from = 1.75"):
         fit(NOMINAL, spoilt, PUMP)
     with pytest.raises(InputError, match="1 spike"):
         guess_drive(spoilt)

@@ -158,7 +158,7 @@ def test_residuals_of_a_fit_tell_the_noise() -> None:
     assert fitted.sensors[0].noise == pytest.approx(0.04, rel=0.05)
     # white: each sample counts, or nearly, as the larger of two estimates of the error is quoted
     assert 1.0 / 512.0 <= fitted.sensors[0].memory < 2.0 / 512.0
-    with pytest.raises(InputError, match="The drive misses 'shaft_speed' by .* % of its range"):
+    with pytest.raises(InputError, match="'shaft_speed' .* % of its range"):
         prior_information(HOIST.parameters, setup("Z10"), [run("exact", 5.0)], fitted=True)
 
 
@@ -199,7 +199,7 @@ def test_runs_driven_by_a_current_are_counted() -> None:
     expected = np.linalg.norm(speed) / (0.01 * np.sqrt(MEMORY * 512.0))
     np.testing.assert_allclose(np.abs(known.present), [[expected]])
     current = Sensor("rectified_current", 0.01)
-    with pytest.raises(InputError, match="A pump shows nothing to rectified_current"):
+    with pytest.raises(InputError, match="pump .* rectified_current"):
         prior_information(HOIST.parameters, setup("Z10"), sensors=[current])
 
 

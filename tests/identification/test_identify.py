@@ -80,9 +80,9 @@ def test_names_follow_the_contract_of_a_mapping(result: Identification) -> None:
     assert set(result) == set(result.fit.estimates)
     assert len(result) == len(list(result))
     assert result["Z10"] == result.fit["Z10"]
-    with pytest.raises(KeyError, match="J has two directions: name J_plus or J_minus"):
+    with pytest.raises(KeyError, match="J .* J_plus or J_minus"):
         result["J"]
-    with pytest.raises(KeyError, match="did you mean Z10"):
+    with pytest.raises(KeyError, match="mean Z10"):
         result["Z100"]
 
 
@@ -237,7 +237,7 @@ REFUSED: Mapping[str, tuple[Callable[[Campaign], object], type[Exception], str]]
     "another axis": (
         lambda tests: swashplate.identify(tests, axis="slew"),
         InputError,
-        "no axis 'slew'; it has hoist",
+        "axis 'slew'; .* hoist",
     ),
     "logs instead of a campaign": (
         lambda tests: swashplate.identify(["up.csv", "down.csv"]),
@@ -247,49 +247,49 @@ REFUSED: Mapping[str, tuple[Callable[[Campaign], object], type[Exception], str]]
     "several axes": (
         lambda tests: swashplate.identify(two_axes(tests)),
         InputError,
-        "the axes hoist, slew; name one",
+        "axes hoist, slew; name one",
     ),
     "no run": (
         lambda tests: swashplate.identify(replace(tests, experiments=tests.experiments[2:])),
         InputError,
-        "no run of the axis 'hoist' has the role 'fit'",
+        "axis 'hoist' .* role 'fit'",
     ),
     "an unknown parameter": (
         lambda tests: swashplate.identify(tests, free={"Z88": (0.5, 2)}),
         ParameterError,
-        "did you mean Z8",
+        "Z88.* mean Z8",
     ),
     "one number": (
         lambda tests: swashplate.identify(tests, free={"Z8": 0.5}),
         ParameterError,
-        "Z8 is free as 0.5: give two factors",
+        "Z8 .* 0.5: .* two factors",
     ),
     "falling factors": (
         lambda tests: swashplate.identify(tests, free={"Z8": (2, 0.5)}),
         ParameterError,
-        r"free, Z8: .*must rise: write \[0.5, 2\]",
+        r"free, Z8: .*\[0.5, 2\]",
     ),
     "a factor that no machine has": (
         lambda tests: swashplate.identify(tests, free={"Z8": (0.5, 1e300)}),
         ParameterError,
-        r"a bound of Z8 .* is 1.6514e\+306 sqrt\(Pa\)/\(m s\), .* 10 to 1e\+11 sqrt",
+        r"bound of Z8 .* 1.6514e\+306 sqrt\(Pa\)/\(m s\), .* 10 to 1e\+11 sqrt",
     ),
     "a bound in another unit": (
         lambda tests: swashplate.identify(tests, free={"Z9": {"bounds": (50.0, 2e7)}}),
         ParameterError,
-        r"a bound of Z9 .* is 50 Pa, .* 10000 to 1e\+09 Pa: .* bar instead of Pa",
+        r"bound of Z9 .* 50 Pa, .* 10000 to 1e\+09 Pa: .* bar .* Pa",
     ),
     "a force that no solenoid has": (
         lambda tests: swashplate.identify(
             tests, free=pump(forces=FORCES | {"relative": (0.5, 1e6)})
         ),
         ParameterError,
-        r"a bound of force_plus_1 .* N, .* at most 10000 N",
+        r"bound of force_plus_1 .* N, .* 10000 N",
     ),
     "a start pressure that no machine has": (
         lambda tests: swashplate.identify(tests, free=pump(start_pressure=1e300)),
         ParameterError,
-        r"start_pressure is 1e\+300, .* 10000000000",
+        r"start_pressure .* 1e\+300, .* 10000000000",
     ),
     "a prior in another unit": (
         lambda tests: swashplate.identify(
@@ -297,7 +297,7 @@ REFUSED: Mapping[str, tuple[Callable[[Campaign], object], type[Exception], str]]
             free={"Z9": {"bounds": (5e6, 2e7), "prior": {"mean": 107.0, "deviation": 10.0}}},
         ),
         ParameterError,
-        r"the prior mean of Z9 .* is 107 Pa, .* bar instead of Pa",
+        r"prior mean of Z9 .* 107 Pa, .* bar .* Pa",
     ),
     "nothing": (
         lambda tests: swashplate.identify(tests, free={}),
@@ -307,69 +307,69 @@ REFUSED: Mapping[str, tuple[Callable[[Campaign], object], type[Exception], str]]
     "an unknown fit setup": (
         lambda tests: swashplate.identify(tests, free="hoost"),
         ParameterError,
-        "no packaged fit setup 'hoost' .did you mean hoist",
+        "fit setup 'hoost' .* hoist",
     ),
     "an unknown drive": (
         lambda tests: swashplate.identify(tests, "hoost"),
         FileNotFoundError,
-        "no packaged set, file or folder 'hoost' .did you mean hoist",
+        "set, file or folder 'hoost' .* hoist",
     ),
     "a model without what is free": (
         lambda tests: swashplate.identify(tests, lag_model()),
         InputError,
-        "needs a mapping of its free parameters",
+        "mapping of .* free",
     ),
     "neither a drive nor a model": (
         lambda tests: swashplate.identify(tests, 5),
         TypeError,
-        "model is 5: give a Drive, the name of a packaged one such as 'hoist'",
+        "model .* 5: give a Drive, .* 'hoist'",
     ),
     "starts below none": (
         lambda tests: swashplate.identify(tests, starts=-1),
         InputError,
-        "starts is -1, but must be a whole number of 0 or more",
+        "starts .* -1, .* whole number of 0",
     ),
     "half an evaluation": (
         lambda tests: swashplate.identify(tests, max_evaluations=0.5),
         InputError,
-        "max_evaluations is 0.5, but must be a whole number of 1 or more",
+        "max_evaluations .* 0.5, .* whole number of 1",
     ),
     "another loss": (
         lambda tests: swashplate.identify(tests, loss="lin"),
         InputError,
-        "loss is 'lin', but must be one of linear, soft_l1, cauchy",
+        "loss .* 'lin', .* linear, soft_l1, cauchy",
     ),
     "no error at all": (
         lambda tests: swashplate.identify(tests, required=0.0),
         InputError,
-        "required is 0.0, but must be an error over the range, above 0",
+        "required .* 0.0, .* above 0",
     ),
     "an unknown parameter of a stage": (
         lambda tests: swashplate.identify(tests, free={"stages": [stage_of("Z88")]}),
         KeyError,
-        "stage 'pump', free: .*'Z88'.*did you mean Z8",
+        "stage 'pump', free: .*'Z88'.* Z8",
     ),
     "an unknown parameter that is uncertain": (
         lambda tests: swashplate.identify(
             tests, free={"stages": [stage_of("Z8")], "standard_uncertainty": {"Z99": 1.0}}
         ),
         KeyError,
-        "standard_uncertainty: .*'Z99'.*did you mean Z9",
+        "standard_uncertainty: .*'Z99'.* Z9",
     ),
     "another name in a model's free": (
         lambda tests: swashplate.identify(tests, lag_model(), {"lagg": (0.01, 0.1, 3.0)}),
         KeyError,
-        "lag has no parameter 'lagg', which free names .did you mean lag",
+        "lag .* 'lagg', .* free .* lag",
     ),
     "another name in a model's fixed": (
         lambda tests: ModelSetup(lag_model(), {"lag": (0.01, 0.1, 3.0)}, fixed={"gian": 1.0}),
         KeyError,
-        "'gian', which fixed names .did you mean gain",
+        "'gian', .* fixed .* gain",
     ),
     "a profile of nothing": (
         lambda tests: swashplate.identify(tests, free={"Z8": (0.5, 2)}, profiles=["Z9"]),
         InputError,
-        "no parameter 'Z9'; there are Z8",
+        "parameter 'Z9'; .* Z8",
     ),
     "an identification to export": (
         lambda tests: swashplate.export.fmu(Identification(tests, None), "hoist.fmu"),
@@ -379,17 +379,17 @@ REFUSED: Mapping[str, tuple[Callable[[Campaign], object], type[Exception], str]]
     "a campaign with an unknown drive": (
         lambda tests: swashplate.identify(with_drive(tests, "hoost")),
         ParameterError,
-        r"campaign.toml, \[axes.hoist\]: .*'hoost' .did you mean hoist",
+        r"campaign.toml, \[axes.hoist\]: .*'hoost' .* hoist",
     ),
     "an unknown packaged drive": (
         lambda _: Drive.preset("hoost"),
         ParameterError,
-        "'hoost' .did you mean hoist",
+        "'hoost' .* hoist",
     ),
     "a fit without what is free": (
         lambda tests: fit(Drive.preset("hoist"), tests),
         InputError,
-        "swashplate.identify takes drive and fit setup from the campaign",
+        "swashplate.identify .* campaign",
     ),
 }
 
@@ -420,7 +420,7 @@ def test_runs_that_no_drive_fits_are_refused_after_a_few_evaluations(tmp_path: P
     tests = virtual(tmp_path, "hoist", SINES)
     strange = spoiled(tests, "counts", lambda own, other: other)
     iterations = []
-    with pytest.raises(InputError, match=r"pump does not fit: .* 7 starts explains \d+ % .*counts"):
+    with pytest.raises(InputError, match=r"pump .* 7 starts .* \d+ % .*counts"):
         fit(Drive.preset("hoist"), strange, PUMP, watch=lambda *now: iterations.append(now))
     assert len(iterations) <= 31  # of the first search
     # whoever asks for it gets the search to its end, and a verdict
@@ -535,16 +535,16 @@ def test_a_user_defined_model_has_the_same_interface(turning: Campaign, tmp_path
     assert found["lag"].unit == "s"
     assert found.verdict.usable
     assert found.to_polars()["parameter"].to_list() == ["lag", "gain"]
-    with pytest.raises(InputError, match="user-defined|model of your own"):
+    with pytest.raises(InputError, match="user-defined model, not a drive"):
         _ = found.drive
     setup = ModelSetup(lag_model(), RANGES)
     again = swashplate.identify(turning, setup)
     assert again["lag"].value == found["lag"].value
-    with pytest.raises(InputError, match="defines its free parameters"):
+    with pytest.raises(InputError, match="free parameters"):
         swashplate.identify(turning, setup, RANGES)
     files = found.save(tmp_path)
     assert [file.name for file in files] == ["parameters.toml", "estimates.csv", "fit.json"]
     back = Identification.load(tmp_path, model=setup)
     assert back["gain"] == found["gain"]
-    with pytest.raises(FileNotFoundError, match="fit of a user-defined model"):
+    with pytest.raises(FileNotFoundError, match=f"{tmp_path.name} .*user-defined model"):
         Drive.from_toml(tmp_path)

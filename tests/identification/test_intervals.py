@@ -108,7 +108,7 @@ def test_an_undetermined_unknown_does_not_spoil_the_others() -> None:
 
 def test_one_sample_is_refused() -> None:
     run = LinearisedRun("a", "speed", np.zeros(1), np.ones(1))
-    with pytest.raises(InputError, match="1 sample for 1 parameter leave nothing"):
+    with pytest.raises(InputError, match="1 sample .* 1 parameter"):
         uncertainty(linear_fit([run], [np.ones((1, 1))], unknowns_of(["p"], [1.0])))
 
 
@@ -382,7 +382,7 @@ def test_intervals_hold_the_truth_among_outliers(loss: Loss) -> None:
 
 def test_a_loss_that_takes_all_for_outliers_is_refused() -> None:
     made = problem(None, memory=0.0, scale=1e-3)
-    with pytest.raises(InputError, match="state a larger noise"):
+    with pytest.raises(InputError, match="larger noise"):
         linearised_fit(made, np.array([2.0]), "cauchy")
 
 
@@ -456,8 +456,8 @@ def test_what_is_added_to_a_model_of_ones_own_is_that_of_other_fits() -> None:
 @pytest.mark.parametrize(
     ("name", "doubt", "words"),
     [
-        ("Z16_plus", "5 %", "Z16_plus is free in the stage 'pump'"),
-        ("Z20", 0.1, "Z20 is free in the stage 'pump'"),
+        ("Z16_plus", "5 %", "Z16_plus .* stage 'pump'"),
+        ("Z20", 0.1, "Z20 .* stage 'pump'"),
         ("Z9", "5", "standard_uncertainty.Z9"),
         ("Z9", -1.0, "standard_uncertainty.Z9"),
     ],

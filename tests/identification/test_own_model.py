@@ -163,7 +163,7 @@ def test_uneven_stamps_are_put_on_a_grid(hold: str) -> None:
     run = moved(run, np.interp(time, fine, level))
     values = found(problem(UserModel(valve, given=Load(), rate=200.0), run))
     assert values == pytest.approx(TRUTH._asdict(), rel=1e-3)
-    with pytest.raises(InputError, match=r"a: the stamps of its input are not even, .* rate=100.0"):
+    with pytest.raises(InputError, match=r"a: .* input .* rate=100.0"):
         problem(OWN, run).cost(Unknowns(FREE).start)
 
 
@@ -184,7 +184,7 @@ def test_sub_steps_of_a_fit_are_those_of_a_simulation(hold) -> None:
     values = found(problem(UserModel(coarse, substeps=3), run, free=FREE[:2]))
     assert values == pytest.approx(expected, rel=1e-7)
     assert found(problem(coarse, run, free=FREE[:2]))["lag"] != pytest.approx(TRUTH.lag, rel=0.01)
-    with pytest.raises(InputError, match="substeps is 0, but must be a whole number"):
+    with pytest.raises(InputError, match="substeps .* 0, .* whole number"):
         problem(UserModel(coarse, substeps=0), run).cost(Unknowns(FREE).start)
 
 
@@ -237,15 +237,13 @@ def tried(model: object, *more: Unknown) -> None:
 PLACE = Unknowns(FREE[:2]), ("place",), {"place": 1.0}
 BOTH = Unknowns(FREE), ("y", "position"), {"y": 1.0, "position": 1.0}
 REFUSED = {
-    "no parameter 'lead'; it has lag": lambda: tried(OWN, Unknown("lead", 1.0, 0.0, 2.0)),
-    "no state 'speed' to begin at": lambda: tried(OWN, Unknown("start.speed", 1.0, 0.0, 2.0)),
-    "no value of gain": lambda: solve(problem(OWN, trial("a"), free=FREE[:1])),
+    "'lead'; .* lag": lambda: tried(OWN, Unknown("lead", 1.0, 0.0, 2.0)),
+    "state 'speed'": lambda: tried(OWN, Unknown("start.speed", 1.0, 0.0, 2.0)),
+    "value of gain": lambda: solve(problem(OWN, trial("a"), free=FREE[:1])),
     "gives no 'y'": lambda: solve(Problem(OWN, (trial("a", y=COMMAND),), *BOTH)),
-    "needs the signals command, supply; a has one input": lambda: solve(
-        Problem(servo, (trial("a", place=TIME),), *PLACE)
-    ),
-    "its given must be a Load": lambda: tried(UserModel(valve)),
-    "no given numbers for a": lambda: tried(UserModel(valve, given={"b": Load()})),
+    "signals command, supply; a ": lambda: solve(Problem(servo, (trial("a", place=TIME),), *PLACE)),
+    "given .* a Load": lambda: tried(UserModel(valve)),
+    "given .* for a": lambda: tried(UserModel(valve, given={"b": Load()})),
 }
 
 
@@ -375,9 +373,9 @@ def test_a_fit_comes_back_with_its_model_alone(tmp_path: Path) -> None:
     starts = [name for name in result.to_polars()["parameter"] if name.startswith("start.place")]
     assert len(starts) == len(RUNS)
     assert f"{len(RUNS)} numbers of single runs, such as {starts[0]}" in result.summary()
-    with pytest.raises(InputError, match=r"user-defined.* Python as model=.*--model FILE"):
+    with pytest.raises(InputError, match=r"user-defined.* model=.*--model FILE"):
         Identification.load(path, tests)
-    with pytest.raises(InputError, match="another model or other bounds"):
+    with pytest.raises(InputError, match="model or other bounds"):
         Identification.load(
             path, tests, model=ModelSetup(servo, {**RANGES, "lag": (0.1, 0.2, 3.0)})
         )
@@ -444,14 +442,14 @@ def test_starts_of_other_steps_are_not_resumed(tmp_path: Path) -> None:
     search = Search(1, store=tmp_path, resume=True)
     made = fit(UserModel(servo), RUNS, RANGES, noise=NOISE, search=search)
     assert len(made.stages[0].starts) == 2
-    with pytest.raises(FileError, match="nominal values differ"):
+    with pytest.raises(FileError, match="nominal values"):
         fit(UserModel(servo, substeps=2), RUNS, RANGES, noise=NOISE, search=search)
 
 
 def test_data_are_checked_before_the_search() -> None:
     first, second = RUNS
     holed = np.where(np.arange(COUNT) == 50, np.nan, first["place"].values)
-    with pytest.raises(InputError, match="one: 'place' is not finite in 1 sample"):
+    with pytest.raises(InputError, match="one: 'place' .* 1 sample"):
         fit(servo, [moved(first, holed), second], RANGES, noise=NOISE)
     twice = fit(servo, [*RUNS, replace(first, name="copy")], RANGES, noise=NOISE)
     assert "copy has the samples of one" in twice.doubts[0]
@@ -459,7 +457,7 @@ def test_data_are_checked_before_the_search() -> None:
     still = fit(servo, [*RUNS, rest], RANGES, noise=NOISE)
     assert "still: 'place' never changes" in still.doubts[0]
     idle = [replace(each, input=replace(each.input, values=np.zeros(COUNT))) for each in RUNS]
-    with pytest.raises(InputError, match="servo: no run depends on any of gain"):
+    with pytest.raises(InputError, match="servo: .* gain"):
         fit(servo, idle, {"gain": RANGES["gain"]}, noise=NOISE, fixed={"lag": 0.3})
     assert fit(servo, RUNS, RANGES, noise=NOISE).doubts == ()
 
@@ -469,30 +467,30 @@ def lag_alone(**stated: object) -> None:
 
 
 SENSELESS = {
-    r"servo, a bound: lag .* is 500 s, .* 0.001 to 100 s: .* ms instead of s": lambda: ModelSetup(
+    r"servo, a bound: lag .* 500 s, .* 0.001 to 100 s: .* ms .* s": lambda: ModelSetup(
         documented, {"lag": (0.1, 1.0, 500.0)}
     ),
-    r"servo: lag .* is 1e-05 s, .* 0.001 to 100 s": lambda: ModelSetup(
+    r"servo: lag .* 1e-05 s, .* 0.001 to 100 s": lambda: ModelSetup(
         documented, {"lag": Unknown("lag", 1e-5, 0.0, 10.0)}
     ),
-    "servo, fixed: lag .* is 500 s, .* 0.001 to 100 s": lambda: ModelSetup(
+    "servo, fixed: lag .* 500 s, .* 0.001 to 100 s": lambda: ModelSetup(
         documented, {"gain": (0.1, 1.0, 10.0)}, fixed={"lag": 500.0}
     ),
-    "A dict is not a model": lambda: fit({}, RUNS, RANGES),
-    "Nothing of servo is free": lambda: fit(servo, RUNS, {}),
-    "lag is free as 3: give lower bound": lambda: fit(servo, RUNS, {"lag": 3}),
-    "no parameter 'lagg', which free names .*it has gain, lag": lambda: fit(
+    "dict .* model": lambda: fit({}, RUNS, RANGES),
+    "servo .* free": lambda: fit(servo, RUNS, {}),
+    "lag .* 3: .* lower bound": lambda: fit(servo, RUNS, {"lag": 3}),
+    "'lagg', .* free .* gain, lag": lambda: fit(
         servo, RUNS, {"lagg": (0.1, 0.2, 3.0)}, fixed={"gain": 1.0, "lag": 1.0}
     ),
-    "There is no run to fit": lambda: fit(servo, [], RANGES),
-    "servo gives none": lambda: fit(servo, [run_of("x", TIME, {"y": TIME}, kind="other")], RANGES),
-    "noise is stated for 'speed', but the": lambda: lag_alone(noise={"speed": 0.1}),
-    "the noise of 'place' is 0.0, but must be above 0": lambda: lag_alone(noise={"place": 0.0}),
-    "the noise of 'place' is nan, but must be above 0": lambda: lag_alone(noise={"place": nan}),
-    "noise is 0.1, but must be a mapping": lambda: lag_alone(noise=0.1),
-    r"Give the channels as \('place',\)": lambda: lag_alone(channels="place"),
-    "fixed value of 'gain' is '1', but must be finite": lambda: lag_alone(fixed={"gain": "1"}),
-    "servo: standard_uncertainty.gain.* is -1.0": lambda: lag_alone(
+    "no run to fit": lambda: fit(servo, [], RANGES),
+    "servo .* none": lambda: fit(servo, [run_of("x", TIME, {"y": TIME}, kind="other")], RANGES),
+    "noise .* 'speed'": lambda: lag_alone(noise={"speed": 0.1}),
+    "noise of 'place' .* 0.0, .* above 0": lambda: lag_alone(noise={"place": 0.0}),
+    "noise of 'place' .* nan, .* above 0": lambda: lag_alone(noise={"place": nan}),
+    "noise .* 0.1, .* mapping": lambda: lag_alone(noise=0.1),
+    r"channels .*\('place',\)": lambda: lag_alone(channels="place"),
+    "fixed .* 'gain' .*'1', .* finite": lambda: lag_alone(fixed={"gain": "1"}),
+    "servo: standard_uncertainty.gain.* -1.0": lambda: lag_alone(
         fixed={"gain": 1.0}, standard_uncertainty={"gain": -1.0}
     ),
 }
@@ -507,12 +505,12 @@ def test_fits_and_statements_without_sense_are_refused(sentence: str, make) -> N
 def test_files_without_a_model_are_refused(tmp_path: Path, monkeypatch) -> None:
     monkeypatch.syspath_prepend(tmp_path)
     for name, text, error, sentence in (
-        ("bare", "model = 1\n", InputError, "bare.py has no 'free'"),
-        ("json", "model = free = 1\n", FileError, "another module is called json"),
-        ("none", "", FileError, "name a Python file"),
+        ("bare", "model = 1\n", InputError, "bare.py .* 'free'"),
+        ("json", "model = free = 1\n", FileError, "module .* json"),
+        ("none", "", FileError, "none.py: .*Python file"),
         ("half", "model = 1\nfree = (\n", FileError, "half.py, line 2: SyntaxError"),
         ("fails", "import math\nmath.sqrt(-1)\n", FileError, "fails.py, line 2: ValueError"),
-        ("listed", "model = 1\nfree = ['lag']\n", InputError, "free is .'lag'., but must be a map"),
+        ("listed", "model = 1\nfree = ['lag']\n", InputError, "free .*.'lag'., .* map"),
     ):
         if text:
             (tmp_path / f"{name}.py").write_text(text, "utf-8")

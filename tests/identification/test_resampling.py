@@ -90,7 +90,7 @@ def test_runs_of_a_kind_are_dealt_apart(kinds, folds, seed) -> None:
         most = max(sum(place in part for place in alike) for part in parts)
         assert most <= ceil(len(alike) / folds)
     assert deal(runs, folds, seed) == parts
-    for number, said in ((1, "at least 2 folds, not 1"), (21, "21 folds need at least as many")):
+    for number, said in ((1, "2 folds, .* 1"), (21, "21 folds")):
         with pytest.raises(InputError, match=said):
             deal(runs, number, seed)
 

@@ -87,16 +87,16 @@ def test_the_truth_is_found(problem: Problem) -> None:
 
 
 WRONG = {
-    "nothing": ("simulate", lambda y, by: None, "mapping of channel names to an array.* not None"),
-    "no mapping": ("simulate", lambda y, by: y, "a mapping of channel names .*'y'.* not an array"),
-    "complex": ("simulate", lambda y, by: {"y": y + 1j}, "real numbers for y, not .* complex128"),
-    "text": ("simulate", lambda y, by: {"y": "fast"}, "real numbers for y, not a str"),
-    "a list": ("simulate", lambda y, by: {"y": y.tolist()}, "real numbers for y, not a list"),
-    "objects": ("simulate", lambda y, by: {"y": y.astype(object)}, "for y, not an array of object"),
+    "nothing": ("simulate", lambda y, by: None, "mapping of channel names .* None"),
+    "no mapping": ("simulate", lambda y, by: y, "mapping of channel names .*'y'.* array"),
+    "complex": ("simulate", lambda y, by: {"y": y + 1j}, "real numbers for y, .* complex128"),
+    "text": ("simulate", lambda y, by: {"y": "fast"}, "real numbers for y, .* str"),
+    "a list": ("simulate", lambda y, by: {"y": y.tolist()}, "real numbers for y, .* list"),
+    "objects": ("simulate", lambda y, by: {"y": y.astype(object)}, "for y, .* object"),
     "too few": ("simulate", lambda y, by: {"y": y[1:]}, r"shape \(80,\) for y, .* \(81,\)"),
-    "values alone": ("linearise", lambda y, by: {"y": y}, "a Linearised for y, not an array"),
+    "values alone": ("linearise", lambda y, by: {"y": y}, "Linearised for y, .* array"),
     "complex slopes": ("linearise", lambda y, by: {"y": Linearised(y, by + 0j)}, "real numbers"),
-    "turned": ("linearise", lambda y, by: {"y": Linearised(y, by.T)}, r"\(81, 2\): a row"),
+    "turned": ("linearise", lambda y, by: {"y": Linearised(y, by.T)}, r"\(81, 2\)"),
 }
 
 
@@ -135,24 +135,22 @@ def made(*runs: Experiment, unknowns: Unknowns = UNKNOWNS) -> Problem:
 
 ZERO = Unknown("offset y", 0.0, -1.0, 1.0, run="lift", kind="zero", channel="y")
 REFUSED = {
-    "Z2 is nominally 0.*absolute bounds": lambda: bounded("Z2", 0.0, factors=(0.5, 2.0)),
-    "begins at 5, outside its bounds 0 and 2": lambda: bounded("a", 5.0, **LOW),
-    "from another value; 'swashplate guess' estimates": lambda: Unknown("a", np.nan, 0.0, 2.0),
-    "lower one first": lambda: bounded("a", 1.0, bounds=(2.0, 0.0)),
-    "above 0": lambda: bounded("a", 1.0, **LOW, log=True),
-    "positive": lambda: bounded("a", 1.0, **LOW, prior=Prior(1.0, 0.0)),
-    "the zero of a sensor, and nothing else, names a channel": lambda: Unknown(
-        "offset y", 0.0, -1.0, 1.0, kind="zero"
-    ),
-    "offset y is set by two": lambda: Unknowns((ZERO, ZERO)),
-    "a is set by two parameters": lambda: Unknowns(
+    "Z2 .* 0.*absolute bounds": lambda: bounded("Z2", 0.0, factors=(0.5, 2.0)),
+    "a .* 5, .* bounds 0 and 2": lambda: bounded("a", 5.0, **LOW),
+    "a .*'swashplate guess'": lambda: Unknown("a", np.nan, 0.0, 2.0),
+    "a .* 2.* 0; .* lower one first": lambda: bounded("a", 1.0, bounds=(2.0, 0.0)),
+    "a .* above 0": lambda: bounded("a", 1.0, **LOW, log=True),
+    "prior of a .* positive": lambda: bounded("a", 1.0, **LOW, prior=Prior(1.0, 0.0)),
+    "zero of a sensor, .* channel": lambda: Unknown("offset y", 0.0, -1.0, 1.0, kind="zero"),
+    "offset y .* two": lambda: Unknowns((ZERO, ZERO)),
+    "a .* set by two parameters": lambda: Unknowns(
         (Unknown("a", 1, 0, 2), Unknown("b", 1, 0, 2, sets=("a",)))
     ),
-    "at least one parameter": lambda: made(RUN, unknowns=Unknowns(())),
-    "at least one experiment": lambda: made(),
-    "No sample of y counts": lambda: made(bench_run("run", 1.0, TIME, weight=0.0)),
-    "No experiment has a channel 'x'; there are y": lambda: noise_scales((RUN,), ("x",)),
-    "'y' never changes": lambda: noise_scales((bench_run("flat", 1.0, np.zeros(81)),), ("y",)),
+    "one parameter": lambda: made(RUN, unknowns=Unknowns(())),
+    "one experiment": lambda: made(),
+    "sample of y": lambda: made(bench_run("run", 1.0, TIME, weight=0.0)),
+    "channel 'x'; .* y": lambda: noise_scales((RUN,), ("x",)),
+    "'y' .*changes": lambda: noise_scales((bench_run("flat", 1.0, np.zeros(81)),), ("y",)),
 }
 
 
@@ -208,14 +206,14 @@ def test_what_is_done_is_on_disk_and_is_not_done_again(problem: Problem, tmp_pat
 def test_results_of_another_fit_are_not_resumed(problem: Problem, tmp_path: Path) -> None:
     starts = list(sobol_starts(problem, 2, seed=2))
     solve_from(problem, starts, store=tmp_path, origin={"data": "x"})
-    with pytest.raises(FileError, match="resume it, or remove the folder"):
+    with pytest.raises(FileError, match="resume .*remove"):
         solve_from(problem, starts, store=tmp_path, origin={"data": "x"})
-    with pytest.raises(FileError, match="its data differ"):
+    with pytest.raises(FileError, match="data differ"):
         solve_from(problem, starts, store=tmp_path, origin={"data": "y"}, resume=True)
 
 
 POISON = {
-    "no object": (lambda text: "[1]", "not the result of a start"),
+    "no object": (lambda text: "[1]", "result of a start"),
     "a key more": (put('"cost"', '"more": 1, "cost"'), "more"),
     "no number": (put(r'"cost": [^,]+', '"cost": NaN'), "cost"),
     "text for a vector": (put(r'"vector": \[[^]]+\]', '"vector": "abc"'), "vector"),

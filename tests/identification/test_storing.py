@@ -131,7 +131,7 @@ def test_two_do_not_save_into_one_folder_at_once(campaign, fitted, tmp_path) -> 
     result = Identification(campaign, fitted)
     with locked(tmp_path / "fitted"), ThreadPoolExecutor(1) as threads:
         other = threads.submit(result.save, tmp_path / "fitted")
-        with pytest.raises(OSError, match="fitted is in use.*name another folder"):
+        with pytest.raises(OSError, match="fitted .*another folder"):
             other.result()
         result.save(tmp_path / "fitted")  # who has the lock can
     assert Identification.load(tmp_path / "fitted", campaign)["Z10"] == result["Z10"]
@@ -168,7 +168,7 @@ def test_profiles_folds_and_notes_come_back(tmp_path, campaign, fitted) -> None:
     assert (older.name, older.stage, older.rise) == (profile.name, "card", profile.rise)
     entry["index"] = 99
     path.write_text(json.dumps(content), "utf-8")
-    with pytest.raises(FileError, match="stage card has no parameter 100"):
+    with pytest.raises(FileError, match="stage card .* parameter 100"):
         Identification.load(path, campaign)
 
 
@@ -186,14 +186,14 @@ def test_fit_and_campaign_may_be_moved_together(
 def test_another_campaign_is_refused(path: Path, campaign: Campaign) -> None:
     first, second = campaign.experiments
     alone = replace(campaign, experiments=(first,))
-    with pytest.raises(InputError, match="was fitted to the run '.*', which .* has not"):
+    with pytest.raises(InputError, match="run '.*'"):
         Identification.load(path, alone)
     current = second["current"]
     current = replace(current, weight=current.weight * (current.time > 0.1))
     ignored = replace(second, channels={**second.channels, "current": current})
     assert fingerprint(ignored) != fingerprint(second)
     changed = replace(campaign, experiments=(first, ignored))
-    with pytest.raises(InputError, match="has changed since .* was fitted"):
+    with pytest.raises(InputError, match="changed since .*fit.json"):
         Identification.load(path, changed)
 
 
@@ -201,11 +201,11 @@ POISON = {
     "cut": (lambda text: text[:-100], "is not JSON"),
     "another key": (put('"axis"', '"ax"'), "'ax'.*'axis' is meant"),
     "other parameters": (put('"Z10"', '"Z3"', 1), "stage pump has other parameters .* fit again"),
-    "another kind": (put('"kind": "parameter"', '"kind": "force"', 1), "stage card has other"),
+    "another kind": (put('"kind": "parameter"', '"kind": "force"', 1), "stage card"),
     "other version": (put('"swashplate": "[^"]*"', '"swashplate": "9.9"'), "9.9"),
     "text for a vector": (put(r'"vector": \[[^]]+\]', '"vector": "abc"'), "finite numbers"),
-    "wrong length": (put(r'"vector": \[[^]]+\]', '"vector": [1.0]', 1), "stage card has other"),
-    "too few intervals": (put(r'("intervals": \[)[^]]+\],', r"\1", 1), "stage card has other"),
+    "wrong length": (put(r'"vector": \[[^]]+\]', '"vector": [1.0]', 1), "stage card"),
+    "too few intervals": (put(r'("intervals": \[)[^]]+\],', r"\1", 1), "stage card"),
     "a number for the drive": (put('"nominal": ', '"nominal": 3, "was": '), "nominal"),
 }
 

@@ -44,8 +44,8 @@ def test_a_constant_has_no_fit(level: float, count: int) -> None:
 @pytest.mark.parametrize(
     ("run", "said"),
     [
-        ((MEASURED, SIMULATED, np.zeros(4)), "No sample is used"),
-        ((MEASURED, np.full(4, np.nan), None), "Sample 1 of what was simulated is not finite"),
+        ((MEASURED, SIMULATED, np.zeros(4)), "No sample"),
+        ((MEASURED, np.full(4, np.nan), None), "Sample 1 .* simulated"),
     ],
 )
 def test_what_cannot_be_measured_is_refused(run: tuple, said: str) -> None:
@@ -215,5 +215,5 @@ def test_windows_that_do_not_count() -> None:
 
 def test_a_run_that_no_drive_simulates_is_refused() -> None:
     run = bench_run("bench", 1.0, np.zeros(81))
-    with pytest.raises(InputError, match="bench has no channel that a drive has"):
+    with pytest.raises(InputError, match="bench .* channel"):
         predict(Drive.preset("hoist").parameters, [run])

@@ -173,7 +173,7 @@ def test_a_position_loop_has_margins() -> None:
     assert not model.is_stable
     np.testing.assert_allclose(model.gains, [inf, 1.0])
     np.testing.assert_allclose(model.response([0.0])[:, 0].real, [inf, 1.0])
-    with pytest.raises(DomainError, match="position integrates command, .* no bandwidth"):
+    with pytest.raises(DomainError, match="position .* command, .* bandwidth"):
         print(model.bandwidth)
     # z² - (2 - h/T) z + 1 - h/T + K h²/T has its roots on the circle at K = 1/h
     assert model.largest_gain == pytest.approx(1.0 / H)
@@ -187,7 +187,7 @@ def test_a_position_loop_has_margins() -> None:
     tiny = model.margins(1e-12)  # its crossover lies far below all else
     assert tiny.crossover == pytest.approx(1e-12 / (2.0 * np.pi))
     assert tiny.phase_margin == pytest.approx(np.pi / 2.0)
-    with pytest.raises(DomainError, match="the closed loop is unstable"):
+    with pytest.raises(DomainError, match="closed loop"):
         model.margins(-2.0)
     # the speed alone: its response is that of the lag, whatever the position does
     speed = table(table_rates, 0.2, ("speed",))
@@ -198,7 +198,7 @@ def test_a_position_loop_has_margins() -> None:
 def test_two_integrators_need_a_lead() -> None:
     model = table(table_coasts, -0.2, ("position",))
     assert model.gain == -inf
-    with pytest.raises(DomainError, match="the closed loop is unstable"):
+    with pytest.raises(DomainError, match="closed loop"):
         model.margins(-1.0)
 
     gain, lead = 1.0, 0.5 / H  # in samples
@@ -215,13 +215,11 @@ def test_two_integrators_need_a_lead() -> None:
 
 def test_refusals() -> None:
     alone = Instance(valve("linear"), (PartNumbers(VALVE),), "mine")
-    with pytest.raises(InputError, match="'wind' is not an input"):
+    with pytest.raises(InputError, match="'wind' .* input"):
         linearize(alone, {"command": 0.2}, RATE, inputs=("wind",))
     with pytest.raises(DomainError, match="the valve is wide open under this operating point"):
         linearize(alone, {"command": 1.5}, RATE)
-    with pytest.raises(
-        InputError, match=r"rod has no equation for its steady.*=\[Opening\(\.{3}\), Place"
-    ):
+    with pytest.raises(InputError, match=r"rod .*steady.*=\[Opening\(\.{3}\), Place"):
         linearize(machine(), {"command": 0.2, "leak": 1.0}, RATE)
 
 

@@ -75,15 +75,15 @@ def test_switches_are_declared(hoist: Drive) -> None:
 @pytest.mark.parametrize(
     ("where", "said"),
     [
-        ({"at": 0.1}, "the card's dead zone, so the gain is 0; linearise at \\+0.2065 V or beyond"),
+        ({"at": 0.1}, "card's dead zone, .* .0.2065 V"),
         (
             {"at": 0.14},
-            "gives 0.275.* A, which is in the solenoids' dead zone of Z17 = ±0.27867 A",
+            "0.275.* A, .* dead zone of Z17 = ±0.27867 A",
         ),
-        ({"at": 9.0}, "at its stop, so the gain is 0"),
-        ({"current": 5.0}, "overpowers the feedback spring"),
+        ({"at": 9.0}, "at its stop"),
+        ({"current": 5.0}, "feedback spring"),
         ({"at": 4.0, "changes": {"Z15": 2e5}}, "at its limit Z15"),
-        ({"at": 4.0, "changes": {"Z7": 3000.0}}, "leakage takes all"),
+        ({"at": 4.0, "changes": {"Z7": 3000.0}}, "leakage"),
     ],
 )
 def test_where_nothing_moves(hoist: Drive, where: dict, said: str) -> None:
@@ -95,11 +95,11 @@ def test_where_nothing_moves(hoist: Drive, where: dict, said: str) -> None:
 @pytest.mark.parametrize(
     ("where", "said"),
     [
-        ({}, "exactly one"),
-        ({"at": 11.0}, "the card takes ±10 V"),
-        ({"at": 4.0, "input": "pressure"}, "must be one of voltage, current"),
-        ({"at": 4.0, "outputs": ["torque"]}, "'torque' is not an output"),
-        ({"at": 4.0, "coulomb": "half"}, "coulomb is 'half'"),
+        ({}, "voltage or a current; .* one"),
+        ({"at": 11.0}, "11 V.* ±10 V"),
+        ({"at": 4.0, "input": "pressure"}, "'pressure', .* voltage, current"),
+        ({"at": 4.0, "outputs": ["torque"]}, "'torque' .* output"),
+        ({"at": 4.0, "coulomb": "half"}, "coulomb .*'half'"),
     ],
 )
 def test_refusals(hoist: Drive, where: dict, said: str) -> None:
@@ -110,7 +110,7 @@ def test_refusals(hoist: Drive, where: dict, said: str) -> None:
 def test_a_literal_sign_has_no_tangent() -> None:
     slew = Drive.preset("slew")
     literal = Drive(replace(slew.parameters, coulomb_sign="literal"))
-    with pytest.raises(InputError, match="has no slope"):
+    with pytest.raises(InputError, match="coulomb='ignored'"):
         literal.linearize(2.0, coulomb="tangent")
     assert literal.linearize(2.0).gain == slew.linearize(2.0).gain
 
@@ -125,7 +125,7 @@ def test_what_is_proposed_is_the_first_that_has_a_model(axis: Drive, way: float)
     assert axis.linearize(volts).gain > 0.0
     with pytest.raises(DomainError):
         axis.linearize(volts - way * 2e-4)
-    with pytest.raises(DomainError, match=r"no voltage up to .*10 V leaves it"):
+    with pytest.raises(DomainError, match=r"10 V"):
         axis.replace(Z17=5.0).linearize(way)
 
 
@@ -154,7 +154,7 @@ def test_without_delay(hoist: Drive) -> None:
     late = hoist.linearize(4.0)
     without = late.response(F)[0] * np.exp(2j * np.pi * F * 0.014)
     np.testing.assert_allclose(of_scipy(late.to_scipy(without_delay=True), F, 0), without)
-    with pytest.raises(InputError, match="has a delay of 0.014 s, which no state space represents"):
+    with pytest.raises(InputError, match="delay of 0.014 s, .*without_delay=True"):
         late.to_scipy()
 
 

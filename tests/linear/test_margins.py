@@ -85,24 +85,24 @@ def test_an_integrator_with_delay(delay: float) -> None:
 def test_unstable_loops_have_no_margins(hoist: Drive) -> None:
     model = hoist.linearize(4.0)
     for gain in (1.001 * model.largest_gain, 1e3 * model.largest_gain, -1.5 / model.gain):
-        with pytest.raises(DomainError, match="closed loop is unstable"):
+        with pytest.raises(DomainError, match="hoist: .*closed loop"):
             model.margins(gain)
-    with pytest.raises(DomainError, match="closed loop is unstable"):
+    with pytest.raises(DomainError, match="hoist: .*closed loop"):
         model.margins(lambda f: -0.1 / (2j * pi * f))
-    with pytest.raises(DomainError, match="closed loop is unstable"):
+    with pytest.raises(DomainError, match="hoist: .*closed loop"):
         model.discrete(512.0).margins(1.01 * model.discrete(512.0).largest_gain)
 
 
 def test_loops_without_sense(hoist: Drive) -> None:
     model = hoist.linearize(4.0)
-    with pytest.raises(InputError, match="is not finite"):
+    with pytest.raises(InputError, match="hoist: .*controller"):
         model.margins(float("nan"))
     closed = hoist.linearize(4.0, outputs=["spool_position"])
     for value in ("bandwidth", "largest_gain"):
-        with pytest.raises(DomainError, match="does not follow a steady input"):
+        with pytest.raises(DomainError, match="gain is 0"):
             getattr(closed, value)
     unstable = replace(hoist.linearize(current=0.45), A=np.array([[1.0]]))
-    with pytest.raises(DomainError, match="linear model is unstable"):
+    with pytest.raises(DomainError, match="unstable .poles"):
         print(unstable.bandwidth)
 
 
@@ -208,9 +208,7 @@ def test_the_table_and_its_parts(hoist: Drive, tmp_path) -> None:
     assert table["gain"].to_list()[4] == swept.gain[1, 1]
     swept.write(tmp_path / "bode.csv")
     assert pl.read_csv(tmp_path / "bode.csv").columns == table.columns
-    with pytest.raises(
-        InputError, match="not computed at 0.15 Hz; the nearest frequency is 0.1 Hz"
-    ):
+    with pytest.raises(InputError, match="0.15 Hz; .* 0.1 Hz"):
         response_table(swept, 0.15)
 
 
@@ -226,18 +224,18 @@ def test_phases_are_followed(axis: Drive) -> None:
 @pytest.mark.parametrize(
     ("arguments", "options", "said"),
     [
-        (([], [1.0]), {}, "The frequencies must be one or more finite numbers above 0"),
-        (([0.3, 0.2], [1.0]), {}, "must rise from 0.001 Hz"),
-        (([0.3, 100.0], [1.0]), {}, "to at most 64 Hz"),
-        (([0.3], [11.0]), {}, "reach 11 V, but the card takes ±10 V"),
-        (([0.3], [1.0]), {"bias": 9.5}, "reach 10.5 V"),
+        (([], [1.0]), {}, "frequencies .* above 0"),
+        (([0.3, 0.2], [1.0]), {}, "rise from 0.001 Hz"),
+        (([0.3, 100.0], [1.0]), {}, "64 Hz"),
+        (([0.3], [11.0]), {}, "11 V, .* ±10 V"),
+        (([0.3], [1.0]), {"bias": 9.5}, "10.5 V, .* ±10 V"),
         (
             ([0.3], [1.0]),
             {"output": "torque"},
-            "'torque' is not an output of a sweep",
+            "'torque' .* output of a sweep",
         ),
-        (([0.3], [1.0]), {"rate": 100.0}, "between 512 and 100000 Hz"),
-        (([0.3, 1.0], [0.05, 0.08]), {}, "nothing moves about 0 V with amplitudes up to 0.08"),
+        (([0.3], [1.0]), {"rate": 100.0}, "512 and 100000 Hz"),
+        (([0.3, 1.0], [0.05, 0.08]), {}, "0 V .* 0.08"),
     ],
 )
 def test_sweeps_without_sense_are_refused(
@@ -249,5 +247,5 @@ def test_sweeps_without_sense_are_refused(
 
 def test_an_answer_that_does_not_settle(hoist: Drive) -> None:
     slow = hoist.replace(Z6=1e4)  # a lag of twenty minutes
-    with pytest.raises(DomainError, match="at 1 Hz and an amplitude of 4 .* settled to 1e-06"):
+    with pytest.raises(DomainError, match="1 Hz .* 4 .* 1e-06"):
         slow.frequency_response([1.0], [4.0], bias=2.0, tolerance=1e-6)

@@ -122,17 +122,17 @@ def test_small_steps_lead_to_the_continuous_model(hoist: Drive, changes: dict) -
 
 def test_refusals(hoist: Drive) -> None:
     model = hoist.linearize(4.0)
-    with pytest.raises(InputError, match="The rate is nan Hz, but must be between 10 and"):
+    with pytest.raises(InputError, match="rate .* nan Hz, .* 10 and 100000"):
         model.discrete(float("nan"))
-    with pytest.raises(InputError, match="between 10 and 100000 Hz"):
+    with pytest.raises(InputError, match="10 and 100000 Hz"):
         model.discrete(1.0)
-    with pytest.raises(InputError, match="interpolation is 'cubic'"):
+    with pytest.raises(InputError, match="interpolation .*'cubic'"):
         model.discrete(100.0, "cubic")
-    with pytest.raises(InputError, match="is unstable at a step"):
+    with pytest.raises(InputError, match="step of 1/512 s"):
         Drive.preset("slew").scale(zeta=2.0, omega=2.0).linearize(2.0).discrete(512.0)
-    with pytest.raises(InputError, match="from 0 on"):
+    with pytest.raises(InputError, match="Frequencies .* row"):
         model.response([[1.0]])
-    with pytest.raises(InputError, match="to half the rate, 256 Hz"):
+    with pytest.raises(InputError, match="half the rate, 256 Hz"):
         model.discrete(512.0).response(257.0)
 
 
@@ -188,11 +188,11 @@ def test_the_line_s_resonance(hoist: Drive) -> None:
 def test_where_friction_or_hysteresis_holds(hoist: Drive) -> None:
     lagging = hoist.replace(solenoid_hysteresis=0.008)
     for where in ({"at": 4.0}, {"current": 0.45}):
-        with pytest.raises(DomainError, match="the solenoids' hysteresis of ±0.008 A"):
+        with pytest.raises(DomainError, match="hysteresis of ±0.008 A"):
             lagging.linearize(**where)
     force = lagging.linearize(4.0, input="solenoid_force")
     assert force.gain == hoist.linearize(4.0, input="solenoid_force").gain
-    with pytest.raises(DomainError, match="prevents small motions of the spool"):
+    with pytest.raises(DomainError, match="spool_friction of 0.1 N .* presliding"):
         hoist.replace(spool_friction=0.1).linearize(4.0)
 
 
@@ -245,13 +245,13 @@ def test_each_input_by_itself(hoist: Drive) -> None:
 @pytest.mark.parametrize(
     ("inputs", "said"),
     [
-        (("load_torque", "voltage"), "only the first may be a command"),
-        (("voltage", "voltage"), "several different ones"),
-        (("voltage", "wind"), "'wind', but must be one of voltage"),
+        (("load_torque", "voltage"), "first .* command"),
+        (("voltage", "voltage"), "different"),
+        (("voltage", "wind"), "'wind', .* voltage"),
     ],
 )
 def test_inputs_that_do_not_go_together(hoist: Drive, inputs: tuple, said: str) -> None:
     with pytest.raises(InputError, match=said):
         hoist.linearize(4.0, input=inputs)
-    with pytest.raises(InputError, match="has no input 'wind'"):
+    with pytest.raises(InputError, match="input 'wind'"):
         hoist.linearize(4.0).response(1.0, "wind")

@@ -22,14 +22,14 @@ from swashplate.logs import open_log, subprocess_reader
 from swashplate.logs.binary import look
 
 NO_FILES = {
-    "log.csv": "log.csv is a folder, not a log",
-    ".": "is a folder, not a log",
-    "none.csv": "There is no file",
-    "log.xyz": r"ends in '\.xyz'; a log is read from \.csv, ",
-    "log.xlsx": r"ends in '\.xlsx'.*: save a spreadsheet as CSV",
-    "pipe.csv": "pipe.csv is not an ordinary file",
-    "zero.csv": "zero.csv is not an ordinary file",
-    "a" * 300 + ".csv": "cannot be read",
+    "log.csv": "log.csv .* folder",
+    ".": "folder",
+    "none.csv": r"none\.csv",
+    "log.xyz": r"'\.xyz'; .* \.csv, ",
+    "log.xlsx": r"'\.xlsx'.* CSV",
+    "pipe.csv": "pipe.csv .* ordinary file",
+    "zero.csv": "zero.csv .* ordinary file",
+    "a" * 300 + ".csv": r"a{300}\.csv",
 }
 
 
@@ -54,7 +54,7 @@ def test_an_extra_that_is_not_installed(tmp_path, monkeypatch, content, library,
     path.write_bytes(content)
     for name in ("nptdms", "asammdf"):
         monkeypatch.setitem(sys.modules, name, None)
-    with pytest.raises(FileError, match=rf"needs the library {library}.*'swashplate\[{extra}\]'"):
+    with pytest.raises(FileError, match=rf"library {library}.*'swashplate\[{extra}\]'"):
         look(extra.upper(), path)
 
 
@@ -69,13 +69,13 @@ def test_a_process_that_ends_or_hangs_is_replaced(table, monkeypatch):
     log = open_log(table)
     other = subprocess_reader._ReaderProcess.running
     os.kill(other._process.pid, signal.SIGKILL)
-    with pytest.raises(FileError, match="log.parquet is damaged: reading it stops"):
+    with pytest.raises(FileError, match="log.parquet .* damaged"):
         log.read(["time"])
     assert log.read(["time"])["time"].tolist() == [0.0, 1.0]
     monkeypatch.setattr(subprocess_reader, "_PATIENCE", 0.2)
     other = subprocess_reader._ReaderProcess.running
     os.kill(other._process.pid, signal.SIGSTOP)
-    with pytest.raises(FileError, match="log.parquet could not be read within 0 s"):
+    with pytest.raises(FileError, match="log.parquet .* 0 s"):
         log.read(["time"])
     assert other._process.poll() is not None
     monkeypatch.undo()
@@ -102,7 +102,7 @@ def test_files_may_change_and_paths_are_relative(table, monkeypatch, tmp_path):
     pl.DataFrame({"time": [5.0, 6.0, 7.0]}).write_parquet(table)
     assert log.read(["time"])["time"].tolist() == [5.0, 6.0, 7.0]
     table.rename(tmp_path / "log.csv")
-    with pytest.raises(FileError, match="^log.csv ends in"):
+    with pytest.raises(FileError, match="^log.csv "):
         open_log("log.csv")
 
 
@@ -234,65 +234,65 @@ def unwritten(path: Path) -> None:
 # name of the file, how it is made, what the sentence says
 DAMAGED = [
     # text
-    ("empty.csv", text(""), "empty.csv is empty"),
+    ("empty.csv", text(""), "empty.csv ... empty"),
     ("comments.csv", text("# a\n% b\n"), "only comments and empty lines"),
     ("header.csv", text("time,voltage\n"), "only 1 line of text"),
-    ("word.csv", rows("0.25,x"), "'voltage' holds 'x', ... in data row 3 (line 4)"),
-    ("first.csv", text("time,voltage\nx,1\n1,2\n2,3\n"), "holds 'x', ... in data row 1 (line 2)"),
+    ("word.csv", rows("0.25,x"), "'voltage' ... 'x', ... row 3 (line 4)"),
+    ("first.csv", text("time,voltage\nx,1\n1,2\n2,3\n"), "'x', ... row 1 (line 2)"),
     ("mixed.csv", text("time,u\n10:00:00,1\n11,2\n"), "'11', ... date ... row 2 (line 3)"),
     (
         "late.csv",
         text("time,u\n" + "10:00:00.5,1\n" * 200_000 + "7,1\n8,1\n"),
-        "'7', which is not a date ... row 200001 (line 200002)",
+        "'7', ... date ... row 200001 (line 200002)",
     ),
-    ("control.csv", rows("0.25,\x1b[2J"), "control.csv has the byte 0x1b in line 4"),
-    ("short.csv", rows("0.25"), "data row 3 (line 4) has 1 field instead of 2"),
-    ("gap.txt", text("a b c\n1 2 3\n1   3\n"), "data row 2 (line 3) has 2 fields instead of 3"),
-    ("names.csv", text("time,a,b\n0,1\n1,2\n2,3\n"), "3 names in line 1, but 2 fields in the rows"),
+    ("control.csv", rows("0.25,\x1b[2J"), "control.csv ... 0x1b ... line 4"),
+    ("short.csv", rows("0.25"), "row 3 (line 4) ... 1 field ... 2"),
+    ("gap.txt", text("a b c\n1 2 3\n1   3\n"), "row 2 (line 3) ... 2 fields ... 3"),
+    ("names.csv", text("time,a,b\n0,1\n1,2\n2,3\n"), "3 names in line 1, ... 2 fields"),
     (
         "nuls.csv",
         text("time,u\n" + "0,1\n" * 20000 + "\0" * 50),
-        "NUL byte in data row 20001 (line ",
+        "NUL ... row 20001 (line ",
     ),
     (
         "thousands.csv",
         text("a;b\n1,234;5\n2,345;6\n"),
-        "'1,234', in which the comma may be a decimal",
+        "'1,234', ... comma",
     ),
-    ("either.csv", text("voltage\n0,5\n1,5\n"), "has no column 'voltage'; it has 'column 1',"),
-    ("open.csv", text('a,b\n1,"2\n3,4\n'), "misplaced quotes in data row 1 (line 2)"),
-    ("wide.csv", text("time,u\n0,1\n".encode("utf-16")[:-1]), "is not text in utf-16-le"),
-    ("excel.csv", text(b"PK\x03\x04" + bytes(50)), "ends in '.csv' but holds Excel or zip"),
-    ("parquet.csv", disguised, "ends in '.csv' but holds Parquet"),
+    ("either.csv", text("voltage\n0,5\n1,5\n"), "'voltage'; ... 'column 1',"),
+    ("open.csv", text('a,b\n1,"2\n3,4\n'), "quotes in data row 1 (line 2)"),
+    ("wide.csv", text("time,u\n0,1\n".encode("utf-16")[:-1]), "utf-16-le"),
+    ("excel.csv", text(b"PK\x03\x04" + bytes(50)), "'.csv' ... Excel or zip"),
+    ("parquet.csv", disguised, "'.csv' ... Parquet"),
     # Parquet
-    ("text.parquet", text("time,voltage\n0,1\n"), "cannot be read as Parquet"),
+    ("text.parquet", text("time,voltage\n0,1\n"), "as Parquet"),
     ("cut.parquet", cut(parquet, 0.6), "cut.parquet"),
-    ("note.parquet", parquet, "'note' cannot be read as numbers: it is of the type String"),
+    ("note.parquet", parquet, "'note' ... String"),
     # MATLAB
-    ("text.mat", text("time,voltage\n0,1\n"), "cannot be read as MATLAB"),
+    ("text.mat", text("time,voltage\n0,1\n"), "as MATLAB"),
     ("head.mat", text(b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM"), "no vectors of numbers"),
     ("five.mat", cut(matlab5, 0.5), "five.mat"),
-    ("bomb.mat", bomb, "cannot be read as MATLAB"),
-    ("cell.mat", matlab5, "'cell' cannot be read as numbers: it holds text"),
-    ("complex.mat", matlab5, "'z' cannot be read as numbers: it holds complex numbers"),
+    ("bomb.mat", bomb, "as MATLAB"),
+    ("cell.mat", matlab5, "'cell' ... text"),
+    ("complex.mat", matlab5, "'z' ... complex numbers"),
     # HDF5
-    ("text.h5", text("time,voltage\n0,1\n"), "cannot be read as HDF5"),
-    ("cut.h5", cut(hdf5, 0.7), "cut.h5 cannot be read as HDF5, it is damaged ...truncated"),
-    ("block.h5", changed(hdf5, b"x^", b"\xff" * 20), "block.h5 cannot be read as HDF5"),
-    ("larger.h5", claims(10**12), "has 1000000000000 numbers in the 1 requested columns"),
-    ("huge.h5", claims(10**7), "'/voltage' claims 10000000 numbers, but none is stored"),
-    ("unwritten.h5", unwritten, "'/voltage' has only 1 of its 4 blocks"),
-    ("external.h5", external, "'/voltage' cannot be read as numbers: its numbers are in"),
-    ("linked.h5", linked, "linked.h5 has no column 'voltage'; it has '/time'"),
+    ("text.h5", text("time,voltage\n0,1\n"), "as HDF5"),
+    ("cut.h5", cut(hdf5, 0.7), "cut.h5 ... HDF5... damaged ...truncated"),
+    ("block.h5", changed(hdf5, b"x^", b"\xff" * 20), "block.h5 ... HDF5"),
+    ("larger.h5", claims(10**12), "1000000000000 ... 1 requested"),
+    ("huge.h5", claims(10**7), "'/voltage' ... 10000000 ... none"),
+    ("unwritten.h5", unwritten, "'/voltage' ... 1 of its 4 blocks"),
+    ("external.h5", external, "'/voltage' ... numbers are in"),
+    ("linked.h5", linked, "linked.h5 ... 'voltage'; ... '/time'"),
     # TDMS
-    ("text.tdms", text("time,voltage\n0,1\n"), "cannot be read as TDMS"),
+    ("text.tdms", text("time,voltage\n0,1\n"), "as TDMS"),
     ("cut.tdms", cut(tdms, 0.9), "as TDMS, it is ...: Last segment of file has less data"),
     ("open.tdms", changed(tdms, 12, b"\xff" * 8), "Last segment of file has less data"),
-    ("note.tdms", tdms, "note' cannot be read as numbers: it holds text"),
+    ("note.tdms", tdms, "note' ... text"),
     # MDF
-    ("text.mf4", text("time,voltage\n0,1\n"), "text.mf4 is not an MDF file"),
-    ("three.mf4", text(b"MDF     3.30    ".ljust(64, b"\0")), "is MDF '3.30'; convert it to MDF 4"),
-    ("unfinished.mf4", text(b"UnFinMF 4.10    ".ljust(64, b"\0")), "was not finished by"),
+    ("text.mf4", text("time,voltage\n0,1\n"), "text.mf4 ... MDF"),
+    ("three.mf4", text(b"MDF     3.30    ".ljust(64, b"\0")), "MDF '3.30'; ... MDF 4"),
+    ("unfinished.mf4", text(b"UnFinMF 4.10    ".ljust(64, b"\0")), "not finished"),
     ("cut.mf4", cut(mdf, 0.5), "cut.mf4"),
 ]
 
@@ -331,5 +331,5 @@ def test_nothing_is_left_behind_of_a_damaged_file(tmp_path):
     ended = subprocess.run(
         [sys.executable, "-c", reading], env=environment, capture_output=True, text=True
     )
-    assert "cannot be read as MDF" in ended.stderr
+    assert "as MDF" in ended.stderr
     assert not list(spare.iterdir())

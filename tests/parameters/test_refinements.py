@@ -95,9 +95,9 @@ def test_values_that_change_take_their_own_option_along(hoist: Drive) -> None:
 @pytest.mark.parametrize(
     ("options", "sentence"),
     [
-        ({"stiction"}, "there is no option 'stiction'; there are leaky, loaded, friction"),
-        ({"friction"}, "friction is on, but spool_friction is 0; give at least 1e-07 N, or"),
-        ({"ripple"}, "ripple is on, but cam_ripple and cam_ripple_per_torque are 0; give at"),
+        ({"stiction"}, "option 'stiction'.* leaky, loaded, friction"),
+        ({"friction"}, "friction .* spool_friction .* 0; .* 1e-07 N"),
+        ({"ripple"}, "ripple .* cam_ripple and cam_ripple_per_torque .* 0"),
     ],
 )
 def test_options_without_a_size_are_refused(hoist: Drive, options: set[str], sentence: str) -> None:

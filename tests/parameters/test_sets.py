@@ -48,38 +48,38 @@ def test_replace_and_scale(hoist: Drive) -> None:
 @pytest.mark.parametrize(
     ("changes", "sentence"),
     [
-        ({"Z99": 1.0}, r"no parameter 'Z99' .*Z22"),
-        ({"Z_16": 1.0}, r"did you mean Z16"),
-        ({"Z10": (1.0, 2.0)}, "Z10 has one value, not a plus and a minus"),
-        ({"Z16_plus": (1.0, 2.0)}, "Z16_plus has one value"),
-        ({"Z16": (1.0, 2.0, 3.0)}, "one value or two"),
-        ({"Z16": "0.18mm"}, "Z16 must be a number in m, or a pair of them, not '0.18mm'"),
-        ({"Z13_minus": -0.26}, r"Z13_minus .* is -0.26 rad, .* above 0 .*magnitudes"),
-        ({"Z13": pi / 2}, "below 1.5708"),
-        ({"Z13_plus": 1.2}, r"Z3·tan Z13_plus is 1.609, but must be below 1"),
-        ({"Z19_plus": 120.0}, r"Z5·F/√Z4 reaches .* within 10 V \(plus\), but must be below 1"),
+        ({"Z99": 1.0}, r"'Z99' .*Z22"),
+        ({"Z_16": 1.0}, r"mean Z16"),
+        ({"Z10": (1.0, 2.0)}, "Z10 .* one value"),
+        ({"Z16_plus": (1.0, 2.0)}, "Z16_plus .* one value"),
+        ({"Z16": (1.0, 2.0, 3.0)}, "Z16 .* one value or two"),
+        ({"Z16": "0.18mm"}, "Z16 .* in m, .* '0.18mm'"),
+        ({"Z13_minus": -0.26}, r"Z13_minus .* -0.26 rad, .* above 0 .*magnitudes"),
+        ({"Z13": pi / 2}, "Z13_plus .* 1.5708"),
+        ({"Z13_plus": 1.2}, r"Z3·tan Z13_plus .* 1.609, .* 1"),
+        ({"Z19_plus": 120.0}, r"Z5·F/√Z4 .* 10 V \(plus\), .* 1"),
         ({"Z4": 1e-4}, r"Z5·F/√Z4"),
-        ({"I_t2_minus": 0.5}, r"I_t2_minus is 0.5 A, but must be below I_t1_minus = 0.34863 A"),
-        ({"G3_plus": -0.01}, "steady current of the plus channel falls to"),
-        ({"Z2": 10.0}, "pressure at rest Z2/Z1"),
-        ({"Z1": 0.0}, "Z1 .* is 0 1/Pa, but must be above 0"),
-        ({"Z1": nan}, "must be above 0"),
-        ({"Z1": inf}, "must be above 0"),
-        ({"Z14": -inf}, "or inf for none"),
-        ({"tau": -0.01}, "at least 0"),
-        ({"tau": 10.0}, "below 10"),
+        ({"I_t2_minus": 0.5}, r"I_t2_minus .* 0.5 A, .* I_t1_minus = 0.34863 A"),
+        ({"G3_plus": -0.01}, "current of the plus channel"),
+        ({"Z2": 10.0}, "Z2/Z1"),
+        ({"Z1": 0.0}, "Z1 .* 0 1/Pa, .* above 0"),
+        ({"Z1": nan}, "Z1 .* nan .* above 0"),
+        ({"Z1": inf}, "Z1 .* inf .* above 0"),
+        ({"Z14": -inf}, "Z14 .*-inf.* inf for none"),
+        ({"tau": -0.01}, "tau .*-0.01 s.* at least 0"),
+        ({"tau": 10.0}, "tau .* below 10"),
         # refinements
-        ({"spool_friction": -0.1}, r"spool_friction .* is -0.1 N, but must be at least 0"),
-        ({"spool_friction": (0.1, 0.2)}, "spool_friction has one value"),
-        ({"dither_time": 0.0}, "dither_time .* must be above 0, or inf for none"),
-        ({"spool_friction": 0.1, "dither_time": 0.6}, "spool_presliding is 0.* give that travel"),
-        ({"line_stiffness": 1e6}, "line_stiffness is 1e.06 N m/rad, but load_inertia is 0: give"),
+        ({"spool_friction": -0.1}, r"spool_friction .* -0.1 N, .* at least 0"),
+        ({"spool_friction": (0.1, 0.2)}, "spool_friction .* one value"),
+        ({"dither_time": 0.0}, "dither_time .* above 0, or inf for none"),
+        ({"spool_friction": 0.1, "dither_time": 0.6}, "spool_presliding .* 0.* travel"),
+        ({"line_stiffness": 1e6}, "line_stiffness .* 1e.06 N m/rad, .* load_inertia .* 0"),
         ({"cam_ripple": 1.0}, "cam_ripple .* at least 0 and below 1"),
         (
             {"cam_ripple": 0.5, "cam_ripple_per_torque": 1e-5, "load_torque": -6e4},
-            r"cam_ripple \+ cam_ripple_per_torque·\|load_torque\| is 1.1, but must be below 1",
+            r"cam_ripple \+ cam_ripple_per_torque·\|load_torque\| .* 1.1, .* below 1",
         ),
-        ({"spool_frction": 0.1}, "did you mean spool_friction"),
+        ({"spool_frction": 0.1}, "mean spool_friction"),
     ],
 )
 def test_broken_rules_are_sentences(hoist: Drive, changes: dict, sentence: str) -> None:
@@ -155,28 +155,32 @@ def test_users_units_are_converted(lines: dict[str, str], tmp_path: Path) -> Non
     ("symbol", "line", "sentence"),
     [
         ("Z13", 'Z13 = { value = 1.0, unit = "m" }', r"mine.toml: Z13 .* 'm', .* same as rad"),
-        ("Z13", 'Z13 = { value = 1.0, unit = "wheel" }', "unknown unit 'wheel'"),
-        ("Z13", 'Z13 = { value = 1.0, unit = "3 **" }', "unreadable unit"),
-        ("Z13", "Z13 = { value = 0.2 }", r"\[pump_motor.Z13\] needs an entry 'unit'"),
+        ("Z13", 'Z13 = { value = 1.0, unit = "wheel" }', "Z13.*unit 'wheel'"),
+        ("Z13", 'Z13 = { value = 1.0, unit = "3 **" }', "Z13.*unit '3"),
+        ("Z13", "Z13 = { value = 0.2 }", r"\[pump_motor.Z13\] .* 'unit'"),
         ("Z13", 'Z13 = { value = "x", unit = "rad" }', r"pump_motor.Z13.value"),
         ("Z13", 'Z13 = { value = [0.2, 0.2, 0.2], unit = "rad" }', r"pump_motor.Z13.value"),
-        ("Z1", 'Z1 = { value = [1e-7, 1e-7], unit = "1/Pa" }', "Z1 .* has one value"),
-        ("Z13", "", "no value for Z13"),
-        ("Z23", 'Z23 = { value = 1.0, unit = "1" }', "no parameter 'Z23'"),
-        ("tau", 'tau = { value = 1.0, unit = "s" }', r"\[pump_motor\] has no parameter 'tau'"),
+        ("Z1", 'Z1 = { value = [1e-7, 1e-7], unit = "1/Pa" }', "Z1 .* one value"),
+        ("Z13", "", "value for Z13"),
+        ("Z23", 'Z23 = { value = 1.0, unit = "1" }', "parameter 'Z23'"),
+        ("tau", 'tau = { value = 1.0, unit = "s" }', r"\[pump_motor\] .* 'tau'"),
         (
             "Z1",
             'Z1 = { value = 1e-7, unit = "1/Pa", sauce = "" }',
-            "no entry 'sauce': perhaps 'source' is meant",
+            "'sauce'.* 'source'",
         ),
         ("Z1", 'Z1 = { value = 1e-7, unit = "1/Pa", status = "good" }', "pump_motor.Z1.status"),
-        ("Z9", 'Z9 = { value = 1e7, unit = "Pa", bounds = [1e6, 2e6] }', "outside its bounds"),
-        ("Z1", "Z1 = = 3", "is not TOML"),
+        ("Z9", 'Z9 = { value = 1e7, unit = "Pa", bounds = [1e6, 2e6] }', "Z9.* bounds"),
+        ("Z1", "Z1 = = 3", "TOML"),
         # a table behind the pump's
-        ("", REFINED + 'Z1 = { value = 1.0, unit = "1/Pa" }', r"\[refinements\] has no .* 'Z1'"),
+        ("", REFINED + 'Z1 = { value = 1.0, unit = "1/Pa" }', r"\[refinements\] .* 'Z1'"),
         ("", REFINED + 'spool_friction = { value = 1.0, unit = "m" }', "spool_friction"),
-        ("", REFINED + 'spool_friction = { value = [0.1, 0.2], unit = "N" }', "has one value, not"),
-        ("", REFINED + 'friction = { value = 1.0, unit = "N" }', "no parameter 'friction'"),
+        (
+            "",
+            REFINED + 'spool_friction = { value = [0.1, 0.2], unit = "N" }',
+            "spool_friction .* one value",
+        ),
+        ("", REFINED + 'friction = { value = 1.0, unit = "N" }', "parameter 'friction'"),
     ],
 )
 def test_files_with_errors(
@@ -190,9 +194,9 @@ def test_files_with_errors(
 
 
 def test_missing_file_and_card(lines: dict[str, str], tmp_path: Path) -> None:
-    with pytest.raises(FileError, match="There is no file"):
+    with pytest.raises(FileError, match=r"nothing\.toml"):
         Drive.from_toml(tmp_path / "nothing.toml")
-    with pytest.raises(FileError, match="no drive.toml in .*: give a folder that"):
+    with pytest.raises(FileError, match="drive.toml in .*: give a folder"):
         Drive.from_toml(tmp_path)
     with pytest.raises(ParameterError, match="rexroth_mdsd_1k_2x_4"):
         load(lines, tmp_path, HOIST.replace("2x_2", "9x_9"))
@@ -229,17 +233,17 @@ def test_a_limit_that_no_test_reached_must_be_a_parameter(tmp_path: Path) -> Non
 
 
 WRONG_UNIT = [
-    ({"Z9": 107.0}, r"Z9 .* is 107 Pa, .* 10000 to 1e\+09 Pa: .* bar instead of Pa"),
-    ({"Z16": 0.12}, r"Z16_plus .* is 0\.12 m, .* 1e-08 to 0\.1 m: .* mm instead of m"),
-    ({"Z16_minus": 0.15}, r"Z16_minus .* is 0\.15 m, .* mm instead of m"),
-    ({"Z13": 15.8}, r"Z13_plus .* is 15\.8 rad, .* deg instead of rad"),
-    ({"J": 275.0}, r"J_plus .* is 275 A, .* at most 100 A: .* mA instead of A"),
-    ({"Z1": 0.046}, r"Z1 .* is 0\.046 1/Pa, .* 1/bar instead of 1/Pa"),
-    ({"tau": 14.0}, r"tau .* is 14 s, .* at most 10 s: .* ms instead of s"),
-    ({"cam_ripple": 3.0}, r"cam_ripple .* is 3, .* at most 1: .* per cent"),
-    ({"motor_leakage": 3.19}, r"motor_leakage .* is 3\.19 rad/\(s N m\), .* at most 1 rad/\(s N"),
-    ({"load_torque": -1e300}, r"load_torque .* -1e\+300 N m, .* 1e\+10 N m either way: look at"),
-    ({"Z10": 1e-300}, r"Z10 .* is 1e-300 1/s, .* 1e-06 to 1e\+06 1/s: look at"),
+    ({"Z9": 107.0}, r"Z9 .* 107 Pa, .* 10000 to 1e\+09 Pa: .* bar .* Pa"),
+    ({"Z16": 0.12}, r"Z16_plus .* 0\.12 m, .* 1e-08 to 0\.1 m: .* mm .* m"),
+    ({"Z16_minus": 0.15}, r"Z16_minus .* 0\.15 m, .* mm .* m"),
+    ({"Z13": 15.8}, r"Z13_plus .* 15\.8 rad, .* deg .* rad"),
+    ({"J": 275.0}, r"J_plus .* 275 A, .* 100 A: .* mA .* A"),
+    ({"Z1": 0.046}, r"Z1 .* 0\.046 1/Pa, .* 1/bar .* 1/Pa"),
+    ({"tau": 14.0}, r"tau .* 14 s, .* 10 s: .* ms .* s"),
+    ({"cam_ripple": 3.0}, r"cam_ripple .* 3, .* 1: .* per cent"),
+    ({"motor_leakage": 3.19}, r"motor_leakage .* 3\.19 rad/\(s N m\), .* 1 rad/\(s N"),
+    ({"load_torque": -1e300}, r"load_torque .* -1e\+300 N m, .* 1e\+10 N m"),
+    ({"Z10": 1e-300}, r"Z10 .* 1e-300 1/s, .* 1e-06 to 1e\+06 1/s"),
 ]
 """Numbers in a unit that people write, or in none: value, unit, range and likely slip are named."""
 
@@ -264,7 +268,7 @@ def test_a_number_that_can_hardly_be_meant_is_refused(
 
 def test_a_bound_that_can_hardly_be_meant_is_refused(lines: dict[str, str], tmp_path: Path) -> None:
     lines["Z9"] = 'Z9 = { value = 1e7, unit = "Pa", bounds = [50.0, 2e7] }'
-    with pytest.raises(ParameterError, match=r"mine\.toml: a bound of Z9 .* 50 Pa, .* bar instead"):
+    with pytest.raises(ParameterError, match=r"mine\.toml: .*bound of Z9 .* 50 Pa, .* bar"):
         load(lines, tmp_path)
 
 

@@ -112,7 +112,7 @@ def test_pages_of_eight_runs_and_axes_apart(assert_legible: Callable[[Figure], N
         "Trials: slew",
     ]
     assert_legible(pages[0])
-    with pytest.raises(InputError, match="at least one experiment"):
+    with pytest.raises(InputError, match="one experiment"):
         plot_campaign([])
 
 
@@ -156,7 +156,7 @@ def test_a_channel_and_its_window(assert_legible: Callable[[Figure], None]) -> N
     assert figure.axes[0].get_ylabel() == "position (mm)"
     assert figure.axes[1].get_xlim() == pytest.approx((0.5, 1.0))
     assert_legible(figure)
-    with pytest.raises(InputError, match="holds 0 samples of run.csv"):
+    with pytest.raises(InputError, match="0 samples .* run.csv"):
         plot_channel(position(), window=(5.0, 6.0))
 
 

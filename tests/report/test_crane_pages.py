@@ -225,10 +225,10 @@ def test_nothing_runs_in_a_page_but_its_own_scripts(tmp_path, scene, assessed, y
 
 
 def test_scenes_that_cannot_be_are_refused(tmp_path, crane, runs):
-    with pytest.raises(InputError, match="shows 1 to 4 runs of a crane, not 0"):
+    with pytest.raises(InputError, match="1 to 4 .* 0"):
         write_scene({}, tmp_path / "scene.html")
     longer = simulate(crane, OperatorCommand.rest(21.0))
-    with pytest.raises(InputError, match="must be of one length"):
+    with pytest.raises(InputError, match="one length"):
         write_scene({**runs, "longer": longer}, tmp_path / "scene.html")
     assert not list(tmp_path.iterdir())
 
@@ -426,5 +426,5 @@ def test_figure_of_runs_shows_them_by_name_what_moves_and_the_sea(crane, runs):
     assert labels == ["swing (deg)", "slew (deg)", "boom (deg)", "limits"]
     texts = [each.get_text() for ax in figure.axes for each in ax.texts]
     assert any("14 of 15 quantities of the crane are assumed" in each for each in texts)
-    with pytest.raises(InputError, match="shows 1 to 6 runs of a crane, not 0"):
+    with pytest.raises(InputError, match="1 to 6 .* 0"):
         figures.plot_crane({})

@@ -464,11 +464,11 @@ def test_a_validation_has_no_fit(validated: Path, campaign: Campaign, fitted: Fi
 
 
 def test_a_page_that_cannot_be_written_leaves_the_old_one(tmp_path, write, judged) -> None:
-    with pytest.raises(FileError, match="cannot be written"):
+    with pytest.raises(FileError, match=r"fit\.html"):
         write_fit_report(judged, tmp_path / "none" / "fit.html")
     (tmp_path / "fit.html").write_text("old")
     profile = Profile(0, 1.0, (), 1.0, None, None, ("open", "open"), None, "Z1", "brake")
-    with pytest.raises(InputError, match="no stage 'brake'; there are card, pump"):
+    with pytest.raises(InputError, match="stage 'brake'.* card, pump"):
         write(profiles=[profile])
     assert [each.read_text() for each in tmp_path.iterdir()] == ["old"]
 
@@ -542,7 +542,7 @@ def test_a_report_is_printed(page: Path, tmp_path: Path, browsed) -> None:
     content = printed.read_bytes()
     assert content.startswith(b"%PDF")
     assert len(re.findall(rb"/Type /Page\b", content)) >= 5
-    with pytest.raises(FileError, match=r"ends in '.txt'; a printed report is written as \.pdf"):
+    with pytest.raises(FileError, match=r"'\.txt'.* \.pdf"):
         print_report(page, tmp_path / "fit.txt")
 
 
@@ -637,9 +637,9 @@ def test_errors_are_those_of_the_prediction(tests: Campaign, tmp_path: Path, bro
 
 def test_what_cannot_be_shown_is_refused(tests: Campaign, tmp_path: Path) -> None:
     drive, page = Drive.preset("hoist"), tmp_path / "live.html"
-    with pytest.raises(InputError, match="needs the runs of a campaign, or a command"):
+    with pytest.raises(InputError, match="campaign, or a command"):
         write_live_page(drive, page)
-    with pytest.raises(InputError, match="no axis 'slew'"):
+    with pytest.raises(InputError, match="axis 'slew'"):
         write_live_page(drive, page, campaign=tests, axis="slew")
     assert not page.exists()
 
