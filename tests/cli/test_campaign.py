@@ -229,4 +229,4 @@ def test_a_guess_looks_for_its_folder_first(refused, virtual, tmp_path, monkeypa
     monkeypatch.setattr(drafting, "guess_drive", lambda runs: pytest.fail("it searched"))
     (tmp_path / "file").write_text("")
     sentence = refused("guess", "virtual/campaign.toml", "--out", "file/guessed")
-    assert "file/guessed cannot be made" in sentence
+    assert "file/guessed cannot be created" in sentence
