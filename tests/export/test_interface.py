@@ -39,7 +39,8 @@ def test_what_is_refused_leaves_the_drive_as_it_was(hoist: Drive, in_c: Any) -> 
             assert call(voltage) == BAD_VALUE
     for name, bad in (("Z10", 0.0), ("tau", 10.0), ("Z13_plus", 2.0), ("zeta_plus", float("nan"))):
         assert model.set(model.number("", name), bad) == BAD_VALUE, name
-    assert model.set(-1, 1.0) == model.set(70, 1.0) == BAD_VALUE
+    beyond = 1 + max(model.number("", name) for name in hoist.parameters.numbers)
+    assert model.set(-1, 1.0) == model.set(beyond, 1.0) == BAD_VALUE
     assert model.set_input(3, 1.0) == model.set_input(0, float("nan")) == BAD_VALUE
     assert model.clear_input(-1) == model.set_option(99, True) == BAD_VALUE
     assert bytes(model.model) == before

@@ -14,7 +14,7 @@ from swashplate.drive.signals import FIRST_SIGNALS, MOTOR, SIGNALS, UNITS
 from swashplate.equations import Run
 from swashplate.equations.marching import read_only
 from swashplate.errors import InputError
-from swashplate.models.displacement_control import Pump
+from swashplate.models.displacement_control import PUBLISHED_FORMS, Pump
 from swashplate.results import Named, figures
 from swashplate.tables import UNIT, Column, Table, share_cell
 from swashplate.units import SHAFT_ANGLE, display_unit
@@ -105,10 +105,11 @@ class Simulation(Run):
     @property
     def refined(self) -> bool:
         """Whether an option beyond Kruse's equations is on, or the motor's constant known."""
+        if self.pump.motor_constant > 0.0:
+            return True
         options = self.instance.parts[1].options
-        names = ("friction", "hysteresis", "ripple", "damping", "leakage", "line")
-        has_motor_constant = self.pump.motor_constant > 0.0
-        return has_motor_constant or any(getattr(options, name) is not None for name in names)
+        refinements = [name for name in options._fields if name not in PUBLISHED_FORMS]
+        return any(getattr(options, name) is not None for name in refinements)
 
     @property
     def voltage(self) -> Array | None:

@@ -188,6 +188,10 @@ class PumpOptions(NamedTuple):
     line: Flag = OFF  # Line and inertia, see `line_step`.
 
 
+PUBLISHED_FORMS = frozenset({"symmetric", "leaky", "loaded", "steep"})
+"""Options that choose a form of Kruse's equations; every other option is a refinement of them."""
+
+
 class PressureLimits(NamedTuple):
     """Pressures at which the stroking pressure is limited. [Pa]"""
 

@@ -238,7 +238,7 @@ def static_extremes(
     """Lowest steady current [A] and largest |sin φ| of both sides of many sets, (m, 2) outputs.
 
     `channels` are the fields of `CardChannel` of every set and side, (m, 2, 13), `pumps` those of
-    `Pump`, (m, 43); NaN if what is computed of a set and side has no value.
+    `Pump`, (m, N_PUMP); NaN if what is computed of a set and side has no value.
     """
     for i in range(pumps.shape[0]):
         pump = Pump(*tuple_of(pumps[i], N_PUMP))
