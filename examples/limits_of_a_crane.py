@@ -94,7 +94,7 @@ now = performance(drive)
 required = Requirements(speed=1.1 * now.speed, acceleration=1.2 * now.acceleration)
 sized = size(drive, required, {"pump": DEFAULT_RANGE, "orifice": DEFAULT_RANGE})
 for variable, factor in sized.factors.items():
-    alone = sized.alone[variable]
+    alone = sized.sufficient_factors[variable]
     print(f"{variable} x {factor:.3f}, by itself {'never' if alone is None else f'x {alone:.3f}'}")
 
 # %%

@@ -800,8 +800,9 @@ def source_tests(axis: str) -> dict[str, Maneuver]:
     if axis not in SOURCE_TESTS:
         raise InputError(f"no tests of axis {axis!r}: Kruse (2001) has {', '.join(SOURCE_TESTS)}.")
     runs = []
-    for words in SOURCE_TESTS[axis].split():
-        run = parse(words)
-        signed = words.startswith("sine") or "-" in words
-        runs.append(run if signed else replace(run, name=run.name.replace(" ", " +", 1)))
+    for notation in SOURCE_TESTS[axis].split():
+        run = parse(notation)
+        if not (notation.startswith("sine") or "-" in notation):
+            run = replace(run, name=run.name.replace(" ", " +", 1))
+        runs.append(run)
     return {run.name: run for run in runs}

@@ -300,14 +300,16 @@ def quantity(value: float, unit: str, digits: int = 3, spec: str = "") -> str:
     return f"{format(number, spec) if spec else plain(number, digits)} {shown.name}".rstrip()
 
 
-def listed(words: Sequence[str]) -> str:
+def listed(items: Sequence[str]) -> str:
     """``a, b and c``; empty for none."""
-    return " and ".join([*([", ".join(words[:-1])] if words[:-1] else []), *words[-1:]])
+    if len(items) < 2:
+        return "".join(items)
+    return f"{', '.join(items[:-1])} and {items[-1]}"
 
 
-def ended(words: str) -> str:
+def ended(sentence: str) -> str:
     """Words with a stop at their end, unless they ask."""
-    return words if words.endswith("?") else f"{words}."
+    return sentence if sentence.endswith("?") else f"{sentence}."
 
 
 def count(number: int, what: str, several: str = "") -> str:

@@ -181,9 +181,9 @@ class DisplayUnit(NamedTuple):
     """Empty for a number without unit."""
     factor: float
 
-    def label(self, words: str) -> str:
+    def label(self, name: str) -> str:
         """Label of an axis, with the unit in parentheses if there is one."""
-        return f"{words} ({self.name})" if self.name else words
+        return f"{name} ({self.name})" if self.name else name
 
 
 SHAFT_ANGLE = "rad of the shaft"
@@ -223,7 +223,7 @@ _chosen: ContextVar[Mapping[str, DisplayUnit]] = ContextVar(
 )
 
 
-def units_of_choice(words: Sequence[str], drum: float | None = None) -> dict[str, DisplayUnit]:
+def units_of_choice(names: Sequence[str], drum: float | None = None) -> dict[str, DisplayUnit]:
     """The units that someone names, ``"rpm"`` or ``"bar"``, by the SI unit each is shown for.
 
     With the diameter of a drum on the shaft [m], ``"m/min"`` and ``"m/s"`` of its rope stand for
@@ -241,7 +241,7 @@ def units_of_choice(words: Sequence[str], drum: float | None = None) -> dict[str
     named: dict[str, str] = {}
     units: dict[str, DisplayUnit] = {}
     beside: dict[str, DisplayUnit] = {}
-    for word in words:
+    for word in names:
         shown, turns = _chosen_by(word, drum)
         for si in shown:
             if named.setdefault(si, word) != word:
@@ -284,9 +284,9 @@ def _chosen_by(
 
 
 @contextmanager
-def shown_in(words: Sequence[str], drum: float | None = None) -> Iterator[None]:
+def shown_in(names: Sequence[str], drum: float | None = None) -> Iterator[None]:
     """Show tables, plots and pages in the units named, as of `units_of_choice`, for a while."""
-    token = _chosen.set({**_chosen.get(), **units_of_choice(words, drum)})
+    token = _chosen.set({**_chosen.get(), **units_of_choice(names, drum)})
     try:
         yield
     finally:

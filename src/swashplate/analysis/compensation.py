@@ -364,7 +364,7 @@ def inverse_map(drive: Drive, points: int = 101) -> InverseMap:
 
 def _branch(drive: Drive, direction: float, points: int) -> MapBranch:
     """Points of one direction, from the lower voltage to the higher."""
-    _, start = dead_zone(drive, direction)
+    start = dead_zone(drive, direction).outside
     saturated = saturation(drive, direction)
     end = direction * FULL_VOLTAGE if saturated is None else saturated
     if start is None or start == end:
@@ -401,13 +401,20 @@ class Improvement(Result):
 
     @property
     def rms(self) -> dict[str, float]:
-        """Rms of speed less reference speed, by the way of commanding it. [rad/s]"""
-        return {k: rms_difference(run.shaft_speed, self.reference) for k, run in self.runs.items()}
+        """Rms of speed less reference speed, by controller. [rad/s]"""
+        return {
+            name: rms_difference(run.shaft_speed, self.reference) for name, run in self.runs.items()
+        }
 
     def table(self) -> Table:
         """Errors of the speed, controller by controller."""
-        columns = (Column("rms", ".3f", "rad/s"), Column("largest", ".3f", "rad/s"))
-        table = Table("Error of the speed", (Column("Controller"), *columns, Column("rms", ".1%")))
+        columns = (
+            Column("Controller"),
+            Column("rms", ".3f", "rad/s"),
+            Column("largest", ".3f", "rad/s"),
+            Column("rms", ".1%"),
+        )
+        table = Table("Error of the speed", columns)
         rms = self.rms
         for name, run in self.runs.items():
             largest = float(np.abs(run.shaft_speed - self.reference).max())
@@ -465,16 +472,16 @@ def improvement(
         For a reference speed beyond the drive's limits, one of standstill only, or a record that
         cannot be simulated.
     """
-    chosen = inverse_map(drive) if inverse is None else inverse
-    with_lead = chosen.command(reference_speed, rate)
+    inverse_used = inverse_map(drive) if inverse is None else inverse
+    with_lead = inverse_used.command(reference_speed, rate)
     reference = np.array(reference_speed, dtype=np.float64)
     if not reference.any():
         raise InputError(
             "The reference speed is standstill throughout; use one that moves the drive."
         )
     commands = {
-        "straight line": proportional_command(chosen, reference),
-        "inverse map": chosen.voltage(reference),
+        "straight line": proportional_command(inverse_used, reference),
+        "inverse map": inverse_used.voltage(reference),
         "inverse map and lead": with_lead,
     }
     runs = {name: drive.simulate(voltage, rate) for name, voltage in commands.items()}

@@ -149,18 +149,18 @@ class Requirements(Result):
         slacks = np.array([self.slacks(performance) for performance in performances])
         best = slacks.argmax(axis=0)
         missed = [
-            self._beside(name, performances[best[k]])
+            self._compared(name, performances[best[k]])
             for k, name in enumerate(self.given)
             if slacks[best[k], k] < 0.0
         ]
         if missed:
             return f"reaches {listed(missed)}"
         nearest = performances[int(slacks.min(axis=1).argmax())]
-        numbers = listed([self._beside(name, nearest) for name in self.given])
+        numbers = listed([self._compared(name, nearest) for name in self.given])
         return f"meets each requirement, but not all at the same time: nearest is {numbers}"
 
-    def _beside(self, name: str, performance: Performance) -> str:
-        """A number that was reached, beside the required one."""
+    def _compared(self, name: str, performance: Performance) -> str:
+        """A number that was reached, with the required one."""
         unit, _ = REQUIRED[name]
         number = quantity(getattr(performance, name), unit, spec=".4g")
         required = quantity(self.given[name], unit, spec=".4g")
@@ -178,8 +178,8 @@ class Sizing(Result):
     """The changed drive."""
     before: Performance
     after: Performance
-    alone: Mapping[str, float | None]
-    """By design variable the factor that is enough without the others, None if there is none."""
+    sufficient_factors: Mapping[str, float | None]
+    """By design variable the factor that suffices if only this one changes; None if none does."""
 
     @property
     def change(self) -> float:
@@ -198,8 +198,8 @@ class Sizing(Result):
             ),
         )
         for name, factor in self.factors.items():
-            factors.add(name, factor, factor - 1.0, self.alone[name])
-        columns = (Column(head, ".2f") for head in ("required", "as it is", "changed"))
+            factors.add(name, factor, factor - 1.0, self.sufficient_factors[name])
+        columns = (Column(heading, ".2f") for heading in ("required", "as it is", "changed"))
         requirements = Table("", (Column(""), *columns, UNIT))
         for name, (unit, sign) in REQUIRED.items():
             before = getattr(self.before, name)
@@ -296,14 +296,14 @@ def size(
         simulated = [reached for reached in tried.values() if reached is not None]
         raise InputError(f"Within {searched} the {drive.name} {requirements.reached(simulated)}.")
     factors = dict(zip(names, point.tolist(), strict=True))
-    alone = {name: smallest_alone(slack, low, high, k) for k, name in enumerate(names)}
+    sufficient = {name: smallest_single(slack, low, high, k) for k, name in enumerate(names)}
     return Sizing(
         requirements=requirements,
         factors=factors,
         drive=with_factors(drive, factors),
         before=before,
         after=after,
-        alone=alone,
+        sufficient_factors=sufficient,
     )
 
 
@@ -344,7 +344,7 @@ def smallest_change(slack: Slack, low: Array, high: Array) -> Array | None:
     inner = np.clip(2.0 * Sobol(low.size, scramble=False).random_base2(SCANNED) - 0.5, 0.0, 1.0)
     points = [low, high, *(low + inner * (high - low))]
     for k in range(low.size):
-        factor = smallest_alone(slack, low, high, k)
+        factor = smallest_single(slack, low, high, k)
         if factor is not None:
             points.append(_with(unchanged, k, factor))
 
@@ -372,18 +372,18 @@ def smallest_change(slack: Slack, low: Array, high: Array) -> Array | None:
     return min(solutions, key=_change, default=None)
 
 
-def smallest_alone(slack: Slack, low: Array, high: Array, index: int) -> float | None:
-    """The factor nearest to 1 that satisfies by itself, the others being 1; None if none does."""
+def smallest_single(slack: Slack, low: Array, high: Array, index: int) -> float | None:
+    """The factor nearest to 1 that satisfies while all others are 1; None if none does."""
     unchanged = np.ones(low.size)
     reached = list[float]()
     for end in (float(low[index]), float(high[index])):
-        before = unchanged
+        previous = unchanged
         for factor in np.linspace(1.0, end, ALONG + 1):
             goal = _with(unchanged, index, float(factor))
             if _is_met(slack, goal):
-                reached.append(float(_edge(slack, before, goal)[index]))
+                reached.append(float(_edge(slack, previous, goal)[index]))
                 break
-            before = goal
+            previous = goal
     return min(reached, key=lambda factor: abs(factor - 1.0), default=None)
 
 
@@ -402,9 +402,9 @@ def _edge(slack: Slack, start: Array, goal: Array) -> Array:
 
 
 def _with(point: Array, index: int, factor: float) -> Array:
-    other = point.copy()
-    other[index] = factor
-    return other
+    changed = point.copy()
+    changed[index] = factor
+    return changed
 
 
 def _is_met(slack: Slack, point: Array) -> bool:

@@ -372,7 +372,7 @@ def rig(
             seed=seed,
             severity=severity,
             instruments=replace(bench.SEVERITIES[severity], backlash=radians(backlash_deg)),
-            truth=drive.chosen if drive.values or drive.factors else None,
+            truth=drive.loaded_drive if drive.values or drive.factors else None,
             perturb=perturb,
         )
     with spinner("Writing"):

@@ -1,4 +1,4 @@
-"""``swashplate fit``, ``validate``, ``report`` and ``demo``: from tests to a judged drive."""
+"""``swashplate fit``, ``validate``, ``report`` and ``demo``: from tests to an assessed drive."""
 
 from __future__ import annotations
 
@@ -278,7 +278,7 @@ def _reported(result: Identification, out: Path, truth: ParameterSet | None = No
 def _say_verdict(verdict: Verdict) -> None:
     """Print the stated errors, what the verdict rests on, its answers, and the headline.
 
-    Ends with code 1 if what was judged is not usable.
+    Ends with code 1 if the assessed drive is not usable.
     """
     show(verdict.table())
     bullets(verdict.remarks)
@@ -349,7 +349,7 @@ def validate(
         predicted = predict(parameters, runs)
         if not predicted:
             raise InputError(f"{path}: all samples of these runs are ignored; nothing is left.")
-        judged = assess_fit((), predicted, required=require / 100.0)
+        verdict = assess_fit((), predicted, required=require / 100.0)
         measures = runs_tables(with_speeds(predicted))
     lines = []
     if out is not None:
@@ -360,7 +360,7 @@ def validate(
             page = out / "report.html"
             notes = {**versions(), "drive from": drive}
             write_validation_report(
-                parameters, campaign, page, predicted, judged=judged, notes=notes
+                parameters, campaign, page, predicted, verdict=verdict, notes=notes
             )
         lines = [f"Measures:  {out / 'measures.csv'}", f"Report:    {page}"]
     note(f"{parsing.title_of(campaign)}, {axis_name}: {parameters.name} from {drive}")
@@ -368,7 +368,7 @@ def validate(
     say(MEASURES)
     for line in lines:
         note(line)
-    _say_verdict(judged)
+    _say_verdict(verdict)
 
 
 @command(

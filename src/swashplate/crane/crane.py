@@ -425,13 +425,27 @@ class Crane:
 
 
 def _table(title: str, quantities: Mapping[str, CraneQuantity], names: Mapping[str, str]) -> Table:
-    """Quantities with unit, status and source, by what they are called."""
-    heads = ("quantity", "value", "unit", "status")
-    table = Table(title, (*map(Column, heads), Column("source", wrap=True)))
-    for name, quantity in quantities.items():
-        value = ", ".join(f"{number:g}" for number in quantity.values)
-        assumed = quantity.status == "assumed"
-        table.add(names[name], value, quantity.unit, quantity.status, quantity.source, look=assumed)
+    """Quantities with unit, status and source; the rows of assumed ones are marked.
+
+    `names` are the names to show, by the keys of the quantities.
+    """
+    columns = (
+        Column("quantity"),
+        Column("value"),
+        Column("unit"),
+        Column("status"),
+        Column("source", wrap=True),
+    )
+    table = Table(title, columns)
+    for key, quantity in quantities.items():
+        table.add(
+            names[key],
+            ", ".join(f"{number:g}" for number in quantity.values),
+            quantity.unit,
+            quantity.status,
+            quantity.source,
+            look=quantity.status == "assumed",
+        )
     return table
 
 
@@ -470,7 +484,7 @@ def _geometry_of(content: CraneFile, origin: str) -> dict[str, CraneQuantity]:
 
 
 def _read(text: str, origin: str, folder: Path) -> Crane:
-    """A crane of a file's text, its drives beside it."""
+    """A crane of a file's text; paths of its drives count from a folder."""
     content = validated(parse_toml(text, origin), CraneFile, origin)
     quantities = _geometry_of(content, origin)
     quantities_in_si(quantities, origin)

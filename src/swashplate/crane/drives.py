@@ -54,7 +54,7 @@ class DriveSource(NamedTuple):
         """Whether the fit is usable; without a verdict it counts as usable."""
         return self.fit_usable is not False
 
-    def words(self) -> str:
+    def description(self) -> str:
         """Describe the drive's origin, the verdict on its fit and the range it holds for.
 
         It ends a sentence, and may go on with another one.
@@ -65,7 +65,7 @@ class DriveSource(NamedTuple):
 
     def sentence(self, axis: str) -> str:
         """The same of the drive of an axis."""
-        return f"The {axis}'s drive is {self.words()}"
+        return f"The {axis}'s drive is {self.description()}"
 
 
 def drives_of(

@@ -95,7 +95,7 @@ def norm(a: Vector) -> float:
 
 
 @equation
-def moved(a: Vector, share: float, b: Vector) -> Vector:
+def add_scaled(a: Vector, share: float, b: Vector) -> Vector:
     """The vector a + share b."""
     return Vector(a.x + share * b.x, a.y + share * b.y, a.z + share * b.z)
 
@@ -116,7 +116,7 @@ def rotation(roll: float, pitch: float, yaw: float) -> Rotation:
 @equation
 def to_inertial(r: Rotation, p: Vector, shift: Vector) -> Vector:
     """Position in the inertial frame of a point of the ship, R p + s. [m]"""
-    return moved(moved(moved(shift, p.x, r.forward), p.y, r.port), p.z, r.up)
+    return add_scaled(add_scaled(add_scaled(shift, p.x, r.forward), p.y, r.port), p.z, r.up)
 
 
 @equation

@@ -227,12 +227,12 @@ def shade(ax: Axes, spans: Array, look: Shade) -> None:
     )
 
 
-def shade_handle(look: Shade, words: str = "") -> Patch:
+def shade_handle(look: Shade, label: str = "") -> Patch:
     """Handle for a legend of shaded stretches."""
     from matplotlib.patches import Patch
 
     style: dict[str, Any] = {"facecolor": look.color, "edgecolor": look.edge or "#00000030"}
-    return Patch(hatch=look.hatch, linewidth=0.5, label=words or look.name, **style)
+    return Patch(hatch=look.hatch, linewidth=0.5, label=label or look.name, **style)
 
 
 def mark_gaps(ax: Axes, time: Array) -> None:

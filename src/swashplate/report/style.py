@@ -265,9 +265,9 @@ def zero_line(ax: Axes, *, upright: bool = False) -> None:
         ax.axvline(0.0, color=FAINT, linewidth=0.8, zorder=1.2)
 
 
-def write_words(
+def write_text(
     ax: Axes,
-    words: str,
+    text: str,
     position: tuple[float, float],
     shift: tuple[float, float] = (4.0, 3.0),
     *,
@@ -279,7 +279,7 @@ def write_words(
 ) -> None:
     """Write small words at a position, shifted by some points."""
     ax.annotate(
-        words,
+        text,
         position,
         xycoords=coords,
         xytext=shift,
@@ -319,7 +319,7 @@ def label_margin(ax: Axes, labels: Sequence[MarginLabel], inches: float) -> None
     for position, index in zip(spread_out([heights[i] for i in order], gap), order, strict=True):
         label = labels[index]
         style: dict[str, Any] = {"va": "center", "annotation_clip": False}
-        write_words(ax, label.words, (1.0, position), (5.0, 0.0), color=label.color, **style)
+        write_text(ax, label.words, (1.0, position), (5.0, 0.0), color=label.color, **style)
 
 
 def spread_out(positions: Sequence[float], gap: float) -> list[float]:
@@ -375,9 +375,9 @@ def save_figure(figure: Figure, path: str | Path) -> None:
 
     kind = ending(path, FIGURE).removeprefix(".")
 
-    def write_words(beside: Path) -> None:
+    def write_text(beside: Path) -> None:
         # without a salt of its own, an SVG's clip paths get random names
         with matplotlib.rc_context({"svg.hashsalt": "swashplate"}):
             figure.savefig(beside, format=kind, metadata=_METADATA[kind])
 
-    write_whole(path, write_words)
+    write_whole(path, write_text)

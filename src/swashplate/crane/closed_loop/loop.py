@@ -31,8 +31,8 @@ from swashplate.crane.kinematics import (
     Rotation,
     Shafts,
     Vector,
+    add_scaled,
     boom_at,
-    moved,
     norm,
     reach_rate,
     rope_length,
@@ -399,9 +399,9 @@ def braked(
 def led_load(
     hung: Hung,
     tip: Vector,
-    following: Vector,
+    next_tip: Vector,
     rope: float,
-    rope_before: float,
+    previous_rope: float,
     sample: int,
     h: float,
     fixed: Fixed,
@@ -410,14 +410,14 @@ def led_load(
     s = fixed.hanging
     start = fixed.start
     if sample == 0:
-        return hanging_load(following, start.offset[0], start.offset[1], rope, s)
+        return hanging_load(next_tip, start.offset[0], start.offset[1], rope, s)
     square = h * h
     if sample == 1:
         square = 0.5 * square
-        lead = moved(following, -1.0, tip)
+        tip_step = add_scaled(next_tip, -1.0, tip)
         v = start.velocity
-        hung = set_off(hung, tip, lead, rope - rope_before, v[0], v[1], h)
-    return rope_step(hung, tip, following, rope, s, h, square)
+        hung = set_off(hung, tip, tip_step, rope - previous_rope, v[0], v[1], h)
+    return rope_step(hung, tip, next_tip, rope, s, h, square)
 
 
 @inlined
@@ -426,8 +426,8 @@ def rope_torques(
 ) -> Shafts:
     """Torques of the rope's tension on the three shafts. [N m]"""
     tension = fixed.mass * hung.pull
-    along = moved(hung.hook, -1.0, tip)
-    force = moved(Vector(0.0, 0.0, 0.0), tension / norm(along), along)
+    along = add_scaled(hung.hook, -1.0, tip)
+    force = add_scaled(Vector(0.0, 0.0, 0.0), tension / norm(along), along)
     return shaft_torques(to_ship(r, force), slew, boom, tension, fixed.geometry)
 
 
@@ -532,7 +532,7 @@ def loop_of(
                 reference[i] = limited(stick[m, i], inverses[i])
             if settings.path:
                 # 1. what control sees
-                swing = moved(hung.hook, -1.0, tip)
+                swing = add_scaled(hung.hook, -1.0, tip)
                 slew = home.slew + shafts.slew
                 seen = Seen(swing.x, swing.y, rope, slew, boom, tip.z - shift.z, shift, angles)
                 seen_r = r
@@ -596,7 +596,7 @@ def loop_of(
             # 4. kinematics and rope
             advance(axes, ANGLE, SHAFT_SPEED, omega, h, sample > 0)
             shafts = shafts_of(axes, ANGLE)
-            rope_before = rope
+            previous_rope = rope
             boom = boom_at(shafts.luff, g, home)
             rope = rope_length(shafts, g, home)
             following = to_inertial(r, tip_of(home.slew + shafts.slew, boom, g), shift)
@@ -606,7 +606,7 @@ def loop_of(
             if not (fixed.boom[0] <= boom.sin <= fixed.boom[1] and boom.cos > 0.0):
                 ended = BOOM_OUT
                 break
-            hung = led_load(hung, tip, following, rope, rope_before, sample, h, fixed)
+            hung = led_load(hung, tip, following, rope, previous_rope, sample, h, fixed)
             if hung.pull < 0.0:
                 ended = TOO_FAST
                 break

@@ -90,8 +90,8 @@ class OperatorCommand(Result):
         Examples
         --------
         >>> from swashplate.crane import OperatorCommand
-        >>> stick = OperatorCommand.trapezoid(slew=1.0, until={"slew_deg": 45.0})
-        >>> stick.length
+        >>> command = OperatorCommand.trapezoid(slew=1.0, until={"slew_deg": 45.0})
+        >>> command.length
         60.0
         """
         parts = {"hoist": hoist, "slew": slew, "luff": luff}
@@ -218,8 +218,8 @@ class OperatorCommand(Result):
         --------
         >>> from swashplate.crane import Crane, OperatorCommand
         >>> crane = Crane.preset("tg3637")
-        >>> stick = OperatorCommand.trapezoid(slew=1.0, until={"slew_deg": 45.0})
-        >>> commands, end = stick.sample(crane, crane.home(), 512.0)
+        >>> command = OperatorCommand.trapezoid(slew=1.0, until={"slew_deg": 45.0})
+        >>> commands, end = command.sample(crane, crane.home(), 512.0)
         >>> commands.shape
         (30721, 3)
         >>> round(end, 1)

@@ -48,7 +48,7 @@ HEADINGS = {
 """Names of headings of the waves. [deg]"""
 
 
-def seaway_words(sea: Seaway, height: bool = True) -> str:
+def seaway_label(sea: Seaway, height: bool = True) -> str:
     """A seaway in a few words, with the height of its waves or without.
 
     ``"ss3 0.88 m, 7.5 s, abeam from starboard, roll 13 s"``
@@ -60,12 +60,12 @@ def seaway_words(sea: Seaway, height: bool = True) -> str:
     elif isinstance(sea.sea, str):
         first = f"{sea.sea} {first}"
     heading = HEADINGS.get(sea.heading_deg % 360.0, f"waves at {sea.heading_deg:g}°")
-    words = [first, heading]
+    texts = [first, heading]
     if spectrum.peak_factor != 1.0:
-        words.insert(1, f"γ {spectrum.peak_factor:g}")
+        texts.insert(1, f"γ {spectrum.peak_factor:g}")
     if isinstance(sea.ship, Hull):
-        words.append(f"roll {sea.ship.roll_period:g} s")
-    return ", ".join(words)
+        texts.append(f"roll {sea.ship.roll_period:g} s")
+    return ", ".join(texts)
 
 
 def remarks(texts: Sequence[str]) -> str:
@@ -73,11 +73,9 @@ def remarks(texts: Sequence[str]) -> str:
     return "\n".join(wrap("; ".join(filter(None, texts)), LETTERS))
 
 
-def remark(ax: Axes, words: str, rows: int = 0) -> None:
+def remark(ax: Axes, text: str, rows: int = 0) -> None:
     """Write grey words above a panel, over so many rows of a legend."""
-    style.write_words(
-        ax, words, (0.0, 1.0), (0.0, 3.0 + 13.0 * rows), color=style.GREY, va="bottom"
-    )
+    style.write_text(ax, text, (0.0, 1.0), (0.0, 3.0 + 13.0 * rows), color=style.GREY, va="bottom")
 
 
 def _panels(
@@ -246,7 +244,7 @@ def plot_sweep(result: Sweep, *, title: str | None = None) -> Figure:
         means = "RMS over {}"
     some_left = bool(np.isnan(result.rms()).any())
     texts = (
-        seaway_words(result.seaway, result.over != "height"),
+        seaway_label(result.seaway, result.over != "height"),
         means.format(count(len(result.values), "seaway")),
         "" if result.over == "bearing" else "thin line: no control, by its spectrum",
         "×: a run left the model" if some_left else "",
@@ -283,7 +281,7 @@ def plot_sweep(result: Sweep, *, title: str | None = None) -> Figure:
         low = max(LEAST, 0.5 * float(finite.min(initial=highest)))
         _logarithmic(ax, low, 2.0 * highest)
         ax.axvline(1.0, color=style.FAINT, linewidth=0.8, zorder=1.0)
-        style.write_words(ax, "as built", (1.0, low), (4.0, 4.0), coords="data", color=style.GREY)
+        style.write_text(ax, "as built", (1.0, low), (4.0, 4.0), coords="data", color=style.GREY)
     return figure
 
 
@@ -472,4 +470,4 @@ def _name_seas(ax: Axes, tops: Mapping[str, tuple[float, float]]) -> None:
         ):
             up += 0.01
         names.append((across, up, width))
-        style.write_words(ax, name, (across, up), (0.0, 6.0), ha="center", bbox=box)
+        style.write_text(ax, name, (across, up), (0.0, 6.0), ha="center", bbox=box)

@@ -24,7 +24,7 @@ from swashplate.report.style import (
     handle,
     sheet,
     strokes,
-    write_words,
+    write_text,
 )
 from swashplate.results import GivenAxes
 from swashplate.units import DisplayUnit, display_unit
@@ -110,16 +110,20 @@ def plot_bode(
     looks = strokes(f"{amplitude:g} {unit}" for amplitude in response.amplitudes)
     legend = [handle(name, look.color, look.dashes) for name, look in looks.items()]
     if linear is not None:
-        legend.append(handle(f"small motions{_operating_words(linear)}", GREY, "dashed"))
+        legend.append(handle(f"small motions{_operating_point_label(linear)}", GREY, "dashed"))
     output = WORDS.get(response.output, response.output.replace("_", " "))
-    words = f"{response.name}: {response.input} to {output}, sines about {response.bias:g} {unit}"
+    default_title = (
+        f"{response.name}: {response.input} to {output}, sines about {response.bias:g} {unit}"
+    )
     output_unit = _output_unit(response)
     by = f"({output_unit.name})" if "/" in output_unit.name else output_unit.name or "1"
     gain_label = f"gain ({by}/{unit})" if unit else f"gain ({by})"
     labels = [gain_label, "phase (deg)", "distortion (%)"]
     if ax is None:
-        words = words if title is None else title
-        figure, axes = sheet([2.3, 2.3, 1.3], words, labels, "frequency (Hz)", legend=legend)
+        default_title = default_title if title is None else title
+        figure, axes = sheet(
+            [2.3, 2.3, 1.3], default_title, labels, "frequency (Hz)", legend=legend
+        )
     else:
         count = min(max(np.size(np.asarray(ax, dtype=object)), 2), 3)
         axes = dress_given(ax, title, labels[:count], "frequency (Hz)", legend=legend)
@@ -128,14 +132,14 @@ def plot_bode(
         _draw_linear(axes, linear, response)
     _scale_axes(axes, response)
     # the lines are at the top there
-    write_words(
+    write_text(
         axes[0], "\n".join(response.still()), (0.0, 0.0), (4.0, 4.0), color=GREY, va="bottom"
     )
     if mark is not None and response.frequencies[0] <= mark <= response.frequencies[-1]:
         for panel in axes:
             panel.axvline(mark, color=FAINT, linewidth=1.0, zorder=1.3)
         position: dict[str, Any] = {"coords": ("data", "axes fraction"), "va": "bottom"}
-        write_words(axes[0], f"{mark:g} Hz", (mark, 0.0), (3.0, 3.0), color=GREY, **position)
+        write_text(axes[0], f"{mark:g} Hz", (mark, 0.0), (3.0, 3.0), color=GREY, **position)
     return figure if ax is None else ax
 
 
@@ -149,7 +153,7 @@ def _check_ends(linear: LinearModel, response: FrequencyResponse) -> None:
         )
 
 
-def _operating_words(linear: LinearModel) -> str:
+def _operating_point_label(linear: LinearModel) -> str:
     """Operating point of a drive's linear model, such as ``" about 2 V"``; else empty."""
     if not isinstance(linear, LinearDrive):
         return ""

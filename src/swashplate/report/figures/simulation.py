@@ -51,7 +51,7 @@ from swashplate.report.style import (
     sheet,
     signed,
     strokes,
-    write_words,
+    write_text,
     zero_line,
 )
 from swashplate.results import GivenAxes
@@ -83,13 +83,13 @@ class Mark(NamedTuple):
     """A level that the signal should be compared with."""
 
     level: float
-    words: str
+    label: str
 
 
 class Panel(NamedTuple):
     """Content of one panel: signals in SI, drawn in the units that people read."""
 
-    words: str
+    label: str
     si: str
     traces: tuple[Curve, ...]
     limits: tuple[tuple[Shade, Array], ...] = ()
@@ -262,7 +262,7 @@ def plot_signals(
             _draw_panel(panel_axes, panel._replace(height=height), run.time, rows)
         above = 4.0 + POINTS_PER_INCH * ROW * (legend_rows(legend) if legend else 0)
         if heading:
-            write_words(column_axes[0], heading, (0.0, 1.0), (0.0, above), color=GREY)
+            write_text(column_axes[0], heading, (0.0, 1.0), (0.0, above), color=GREY)
         last = column_axes[len(column) - 1]
         last.tick_params(labelbottom=True)
         label_below(last, "time (s)")
@@ -320,17 +320,17 @@ def _panel(run: Run, signal: str, label: str, rows: slice) -> Panel:
         if isfinite(end)
     )
     color = INK if signal in run.records else BLUE
-    words = in_lines(definition.name, LETTERS)
+    panel_label = in_lines(definition.name, LETTERS)
     trace = Curve(values, color, label)
-    return Panel(words, definition.unit, (trace,), marks=marks, from_zero=False)
+    return Panel(panel_label, definition.unit, (trace,), marks=marks, from_zero=False)
 
 
 def _definition(run: Run, signal: str) -> Definition:
     """Definition of a signal: of a user-defined model its own, of a drive from `SIGNAL_UNITS`."""
-    words = signal.replace("_", " ")
+    name = signal.replace("_", " ")
     if isinstance(run, Simulation | FullOrderSimulation):
-        return Definition(words, SIGNAL_UNITS.get(signal, ""))
-    return run.instance.model.definitions.get(signal, Definition(words, ""))
+        return Definition(name, SIGNAL_UNITS.get(signal, ""))
+    return run.instance.model.definitions.get(signal, Definition(name, ""))
 
 
 def _looks(run: Run) -> dict[str, Shade]:
@@ -434,7 +434,7 @@ def _draw_panel(ax: Axes, panel: Panel, time: Array, rows: slice) -> None:
     largest = max(float(np.abs(trace.values[rows]).max()) for trace in panel.traces)
     unit = display_unit(panel.si, max(largest, panel.least) or inf)
     name, factor = unit
-    label = f"{panel.words}\n({name})" if name else panel.words
+    label = f"{panel.label}\n({name})" if name else panel.label
     ax.set_ylabel(label, fontsize=NORMAL, color=INK)
     zero_line(ax)
     shown = [factor * trace.values[rows] for trace in panel.traces]
@@ -445,7 +445,7 @@ def _draw_panel(ax: Axes, panel: Panel, time: Array, rows: slice) -> None:
         level = factor * mark.level
         if (high if level > 0.0 else -low) >= NEAR * abs(level):
             ax.axhline(level, color=GREY, linewidth=THIN, dashes=(5.0, 3.0), zorder=1.5)
-            labels.append(MarginLabel(level, mark.words, GREY))
+            labels.append(MarginLabel(level, mark.label, GREY))
     ends = [low, high, *(label.height for label in labels)]
     if panel.from_zero or not 0.0 < high - low < FAR * max(abs(low), abs(high)):
         ends.append(0.0)
@@ -497,8 +497,8 @@ def plot_maneuver(
     even = np.linspace(0.0, maneuver.length, COLUMNS)
     time = np.union1d(even, np.concatenate([starts, before]))
     if ax is None:
-        words = maneuver.name if title is None else title
-        figure, (panel,) = sheet([2.4], words, ["voltage (V)"], "time (s)")
+        title_text = maneuver.name if title is None else title
+        figure, (panel,) = sheet([2.4], title_text, ["voltage (V)"], "time (s)")
     else:
         (panel,) = dress_given(ax, title, ["voltage (V)"], "time (s)", what="panel")
     zero_line(panel)
@@ -528,13 +528,13 @@ def plot_comparison(simulations: Mapping[str, Simulation], *, title: str | None 
         raise InputError("A comparison needs at least one simulation.")
     looks = strokes(simulations)
     speed = display_unit("rad/s")
-    words = "Shaft speed under the same command" if title is None else title
+    title_text = "Shaft speed under the same command" if title is None else title
     legend = [handle(name, look.color, look.dashes) for name, look in looks.items()]
     heights = [1.2, 2.6, 1.6] if len(simulations) > 1 else [1.2, 2.6]
     volts = all(simulation.voltage is not None for simulation in simulations.values())
     labels = ["voltage (V)" if volts else "current (A)", speed.label("shaft speed")]
     labels.append(speed.label("difference"))
-    figure, axes = sheet(heights, words, labels, "time (s)", legend=legend)
+    figure, axes = sheet(heights, title_text, labels, "time (s)", legend=legend)
     for ax in axes:
         zero_line(ax)
     (reference, first), *_ = simulations.items()
@@ -557,6 +557,6 @@ def plot_comparison(simulations: Mapping[str, Simulation], *, title: str | None 
             draw(axes[2], at, speed.factor * difference, color, dashes=dashes)
     if len(simulations) > 1:
         label = f"speed minus that of {reference}"
-        write_words(axes[2], label, (0.0, 1.0), color=looks[reference].color)
+        write_text(axes[2], label, (0.0, 1.0), color=looks[reference].color)
     fit_time(axes[-1], *(simulation.time for simulation in simulations.values()))
     return figure

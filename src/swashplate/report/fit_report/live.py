@@ -239,9 +239,9 @@ def _design_variables(values: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
             keys = {value["symbol"], value["column"]}  # the same without directions
             moves += [(value["number"], powers[key]) for key in keys if key in powers]
         if moves:
-            words = name.replace("_", " ").capitalize()
+            label = name.replace("_", " ").capitalize()
             ends = (1.0 / SPAN, SPAN)
-            variables.append({"name": name, "words": words, "moves": moves, "range": ends})
+            variables.append({"name": name, "words": label, "moves": moves, "range": ends})
     return variables
 
 
@@ -317,13 +317,13 @@ def _signal_panel(signal: str, name: str = "", unit: str = "", size: float = 0.0
     unit = unit or {"current": "A", "shaft_speed": "rad/s"}[signal]
     shown = display_unit(unit, size)
     electric = "current" in signal
-    words = name or signal.replace("_", " ")
+    label = name or signal.replace("_", " ")
     return {
         "signal": signal,
-        "name": words,
+        "name": label,
         "unit": shown.name,
         "factor": shown.factor,
-        "label": in_lines(shown.label(words), 24),
+        "label": in_lines(shown.label(label), 24),
         "residual": in_lines(shown.label("residual"), 14),
         "shaded": [_word(limit) for limit in Limit if bool(limit & BEFORE_CURRENT) == electric],
     }

@@ -84,8 +84,8 @@ class ShownRun:
         first = self.input_unit.label("input" if kind == "other" else kind)
         panel_labels: list[Any] = [in_lines(first, LETTERS["input"])]
         for channel, name in zip(self.channels, names, strict=True):
-            words = f"{name}, {channel.stage}" if names.count(name) > 1 and several else name
-            signal = in_lines(channel.unit.label(words), LETTERS["overlay"])
+            label = f"{name}, {channel.stage}" if names.count(name) > 1 and several else name
+            signal = in_lines(channel.unit.label(label), LETTERS["overlay"])
             panel_labels.append(
                 (signal, in_lines(channel.small.label("residual"), LETTERS["residual"]))
             )
@@ -145,17 +145,17 @@ def off_scale(channel: Channel, values: Array) -> Mask:
     return far
 
 
-def run_words(quality: RunQuality) -> str:
+def measures_line(quality: RunQuality) -> str:
     """Words that must stand beside every fit %: RMSE, initial state, ignored samples."""
     measures = quality.measures
     run = quality.experiment
     channel = run[quality.channel]
-    words = [f"RMSE {quantity(measures.rmse, channel.shown_unit)}"]
+    texts = [f"RMSE {quantity(measures.rmse, channel.shown_unit)}"]
     if measures.fit_percent is not None and measures.nrmse is not None:
-        words.insert(0, f"fit {measures.fit_percent:.2f} %")
-        words.append(f"NRMSE {measures.nrmse:.3g}")
-    words.append(f"initial state {start_words(run)}")
-    return " · ".join([*words, f"ignored: {ignored_words(run, channel)}"])
+        texts.insert(0, f"fit {measures.fit_percent:.2f} %")
+        texts.append(f"NRMSE {measures.nrmse:.3g}")
+    texts.append(f"initial state {start_words(run)}")
+    return " · ".join([*texts, f"ignored: {ignored_words(run, channel)}"])
 
 
 def write_samples(runs: Sequence[ShownRun], path: str | Path) -> None:

@@ -11,7 +11,7 @@ from markupsafe import Markup
 from numpy.typing import NDArray
 
 from swashplate.analysis import (
-    ASSUMED,
+    ERROR_OF_ASSUMED,
     assumed_parameters,
     changes_left_open,
     dead_zone,
@@ -78,7 +78,7 @@ def machine_numbers_of(drive: Drive, largest: Commands = FULL) -> Array:
         command[0] = 0.0
         run = drive.simulate(command, RATE, start="steady")
         final = float(drive.steady_speed(volts))
-        numbers[DEAD_ZONE, side] = dead_zone(drive, direction)[0]
+        numbers[DEAD_ZONE, side] = dead_zone(drive, direction).inside
         numbers[TOP_SPEED, side] = float(drive.steady_speed(direction * FULL_VOLTAGE))
         numbers[CREEP, side] = rest
         if final == rest:
@@ -161,16 +161,17 @@ def numbers_table(drive: Drive, stages: Sequence[StageFit]) -> tuple[Table, list
         ("Lag, from there to 63 %", "s"),
         ("Creep at 0 V", "rad/s"),
     )
-    for row, (words, unit) in enumerate(rows):
+    for row, (label, unit) in enumerate(rows):
         factor = display_unit(unit, float(np.nanmax(np.abs(values[row]), initial=0.0))).factor
         positive = _cell(factor, values, range_, (row, 0))
         negative = _cell(factor, values, range_, (row, 1))
         if row == CREEP:  # the same both ways
             negative = Cell(None, "")
-        table.add(words, positive, negative, unit=unit, spec=".3f")
+        table.add(label, positive, negative, unit=unit, spec=".3f")
     if stages and assumed_parameters(stages):
         sentences.append(
-            f"Assumed parameters are taken as known to {percent(ASSUMED)} (standard deviation)."
+            f"Assumed parameters are taken as known to {percent(ERROR_OF_ASSUMED)} (standard "
+            "deviation)."
         )
     if largest != FULL:
         sentences.append(
@@ -241,7 +242,7 @@ def _meanings(table: Table) -> list[str]:
     cells = list[str]()
     for row in table.rows:
         cells += [cell.text for cell in row.cells if isinstance(cell, Cell)]
-    return [words for word, words in MEANINGS.items() if any(word in cell for cell in cells)]
+    return [meaning for word, meaning in MEANINGS.items() if any(word in cell for cell in cells)]
 
 
 def mistaken_for_a_lag(
@@ -308,11 +309,11 @@ def _three_digits(value: float, towards_zero: bool) -> str:
 # --- lights ---------------------------------------------------------------------------------------
 
 
-def light(look: Light, words: str) -> Markup:
+def light(look: Light, meaning: str) -> Markup:
     """A traffic light with its meaning, which does not rest on colour alone."""
     sign = {"good": "✓", "look": "!", "bad": "✗"}[look]
     template = Markup('<span class="light {}" title="{}" role="img" aria-label="{}">{}</span>')
-    return template.format(look, words, words, sign)
+    return template.format(look, meaning, meaning, sign)
 
 
 def run_error(run: ShownRun, runs: Sequence[ShownRun]) -> float:
