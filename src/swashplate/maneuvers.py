@@ -315,7 +315,7 @@ def _settled(
     def stays(part: float) -> bool:
         change = part * slope * duration
         turn = 3.0 * (2.0 * level + change)
-        # where its one extremum beside the end lies, as a part of the duration
+        # time of its one extremum other than the end, as a part of the duration
         at = change / turn if turn else 0.0
         return not 0.0 < at < 1.0 or (1.0 - at) ** 2 * abs(level + change / 3.0) <= bound
 

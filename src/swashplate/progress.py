@@ -28,7 +28,7 @@ OFTEN = 0.1
 """Least time between two details that are shown: a search has up to a thousand a second. [s]"""
 
 enabled = True
-"""Whether a line is shown; set it to False where the output is published."""
+"""Whether a line is shown; set it to False if the output is published."""
 
 
 class Display(Protocol):

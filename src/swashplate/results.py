@@ -203,7 +203,7 @@ class Tabular(Result, ABC):
     def write(self, path: str | Path) -> None:
         """Write the table of `to_polars` as CSV or Parquet, by the path's ending.
 
-        The file appears whole or not at all: it is written beside and renamed.
+        The file appears whole or not at all: it is written under another name and renamed.
 
         Raises
         ------

@@ -1,6 +1,6 @@
 """Tables of numbers with names and units, and files that are written whole or not at all.
 
-A `Table` is made once, beside the result that it shows. The terminal, the report's page and a CSV
+A `Table` is made once, by the result that it shows. The terminal, the report's page and a CSV
 or Parquet file render it: people get their units and as many digits as mean something, files all
 digits in SI.
 """
@@ -49,7 +49,7 @@ class Column:
     spec: str = ""
     """Of numbers, as of `format`: ``".2f"``, ``".3g"``, ``".1%"``. Empty: words."""
     unit: str = ""
-    """Unit of its numbers as of `display_unit`, which people get converted and named behind the
+    """Unit of its numbers as of `display_unit`, which people get converted and named after the
     name; ``"1"`` for pure numbers in rows that have a unit of their own."""
     none: str = ""
     """What stands for no number."""
@@ -247,7 +247,7 @@ def _text(value: Any, spec: str, column: Column, factor: float) -> str:
 # --- numbers as an engineer's table shows them ----------------------------------------------------
 
 NONE = "–"
-"""Stands where a table has no number."""
+"""Stands for a number that a table does not have."""
 
 
 def plain(value: float, digits: int = 5) -> str:
@@ -336,7 +336,7 @@ def ending(path: str | Path, form: Form) -> str:
 
 
 def check_place(path: str | Path) -> None:
-    """See to it that a file can be where it shall be, as far as that shows beforehand."""
+    """Refuse a path at which a file certainly cannot be written."""
     target = Path(path)
     reason = None
     folder = target.parent
@@ -376,7 +376,7 @@ def check_folder(folder: Path) -> None:
 
 
 def write_whole(path: str | Path, write: Callable[[Path], object]) -> None:
-    """Have a file written at a path beside its place, and renamed when it is complete.
+    """Have a file written under another name in its folder, and renamed when it is complete.
 
     It has the permissions of the file that it replaces. A link in its place is replaced as a file
     would be: what it points to stays as it is.
@@ -384,30 +384,30 @@ def write_whole(path: str | Path, write: Callable[[Path], object]) -> None:
     Raises
     ------
     FileError
-        If it cannot be written; nothing is left behind and an older file stays.
+        If it cannot be written; nothing is left and an older file stays.
     """
     target = Path(path)
     check_place(target)
-    beside = target.parent / f".{target.stem}-{token_hex(4)}{target.suffix}"
+    temporary = target.parent / f".{target.stem}-{token_hex(4)}{target.suffix}"
     try:
         try:
-            beside.touch(exist_ok=False)
+            temporary.touch(exist_ok=False)
             mode = _permissions(target)
             # before anybody else can read it, and again, as a library may have made another file
             if mode is not None:
-                beside.chmod(mode | S_IWUSR)
-            write(beside)
+                temporary.chmod(mode | S_IWUSR)
+            write(temporary)
             if mode is not None:
-                beside.chmod(mode)
-            with beside.open("rb") as written:  # a power cut leaves the old file or the new one
+                temporary.chmod(mode)
+            with temporary.open("rb") as written:  # a power cut leaves the old file or the new one
                 os.fsync(written.fileno())
-            beside.replace(target)
+            temporary.replace(target)
         finally:
             try:
-                beside.unlink(missing_ok=True)
+                temporary.unlink(missing_ok=True)
             except KeyboardInterrupt:
                 # on Ctrl-C Polars raises one of its own and leaves Python's to come: it comes here
-                beside.unlink(missing_ok=True)
+                temporary.unlink(missing_ok=True)
                 raise
     except FileError:
         raise
@@ -440,7 +440,7 @@ def _disk_message(error: BaseException) -> str | None:
 
 def write_bytes(content: bytes, path: str | Path) -> None:
     """Write bytes, whole or not at all."""
-    write_whole(path, lambda beside: beside.write_bytes(content))
+    write_whole(path, lambda temporary: temporary.write_bytes(content))
 
 
 def write_text(text: str, path: str | Path) -> None:
@@ -466,7 +466,7 @@ def write_text(text: str, path: str | Path) -> None:
     >>> Path("notes.txt").read_text("utf-8")
     'Z16 is fitted.'
     """
-    write_whole(path, lambda beside: beside.write_text(text, "utf-8"))
+    write_whole(path, lambda temporary: temporary.write_text(text, "utf-8"))
 
 
 def write_table(table: polars.DataFrame, path: str | Path) -> None:
@@ -486,6 +486,6 @@ def write_table(table: polars.DataFrame, path: str | Path) -> None:
         formula = r"^([=@\t\r]|[+-][^\d.])"
         plain = table.with_columns(pl.col(pl.String).str.replace(formula, "'${1}"))
         plain = plain.rename({name: re.sub(formula, r"'\1", name) for name in table.columns})
-        write_whole(path, lambda beside: plain.write_csv(beside))
+        write_whole(path, lambda temporary: plain.write_csv(temporary))
     else:
-        write_whole(path, lambda beside: table.write_parquet(beside))
+        write_whole(path, lambda temporary: table.write_parquet(temporary))

@@ -56,7 +56,7 @@ def to_si(value: float, unit: str, si: str, what: str) -> float:
     """A value in a unit such as ``"bar"``, in the SI unit that the model computes in.
 
     An angular frequency in Hz, 1/min or another of a nameplate's turns counts each as 2π; ``"1"``
-    is no unit. `what` the value is stands in the error's sentence.
+    is not a unit. `what` names the value in the error's sentence.
 
     Raises
     ------
@@ -240,7 +240,7 @@ def units_of_choice(names: Sequence[str], drum: float | None = None) -> dict[str
         raise InputError(f"A drum's diameter must be above 0 m, not {drum:g}: --drum 0.4.")
     named: dict[str, str] = {}
     units: dict[str, DisplayUnit] = {}
-    beside: dict[str, DisplayUnit] = {}
+    turn_units: dict[str, DisplayUnit] = {}
     for word in names:
         shown, turns = _chosen_by(word, drum)
         for si in shown:
@@ -249,10 +249,10 @@ def units_of_choice(names: Sequence[str], drum: float | None = None) -> dict[str
                     f"--units names two units of one quantity, {named[si]} and {word}: give one."
                 )
         units |= shown
-        beside |= turns
-    if "rad" in units and beside:
-        beside[SHAFT_ANGLE] = units["rad"]
-    return {**beside, **units}
+        turn_units |= turns
+    if "rad" in units and turn_units:
+        turn_units[SHAFT_ANGLE] = units["rad"]
+    return {**turn_units, **units}
 
 
 def _chosen_by(

@@ -140,7 +140,7 @@ def acceleration_curve(drive: Drive, voltage: float, points: int = 201) -> Accel
     Returns
     -------
     AccelerationCurve
-        The ends lie a hair's breadth inside, where the plate still moves.
+        The ends lie a hair's breadth inside the range, so that the plate still moves.
     """
     low, high = (_settled_pressure(drive, end) for end in (-FULL_VOLTAGE, FULL_VOLTAGE))
     inside = INSIDE * (high - low)
@@ -236,7 +236,7 @@ class DirectionLimits(Result):
     """Command beyond which the speed stays; None if it grows up to ±10 V."""
     top_speed: float = _row("speed at full voltage", "rad/s")  # Steady, at ±10 V.
     speed_limit: float = _row("speed limit", "rad/s")
-    """Speed with the swash plate at its stop, or where Z15 holds the pressure."""
+    """Speed with the swash plate at its stop, or with the pressure held by Z15."""
     acceleration: float = _row("acceleration at rest", "rad/s^2", "z.2f")  # Under ±10 V.
     starting_rise: float | None = _row("starting, 10 to 90 %", "s")
     """Time from 10 % to 90 % of a step to ±10 V from rest; None if nothing moves."""
@@ -248,7 +248,7 @@ class DirectionLimits(Result):
 
 
 class OpenRange(NamedTuple):
-    """Range of a number that limits decide which no test reached; None where it is undefined."""
+    """Range of a number that limits decide which no test reached; None if it is undefined."""
 
     at_test_end: float | None
     """If those limits act just beyond what was tested."""

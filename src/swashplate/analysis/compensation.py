@@ -126,7 +126,7 @@ class InverseMap(Result):
         return cast("Figure", draw(self, improvement, ax=ax, title=title))
 
     def voltage(self, speed: ArrayLike, *, clip: bool = False) -> Array:
-        """Voltage for reference speeds, element by element; it never falls where the speed rises.
+        """Voltage for reference speeds, element by element; it never falls if the speed rises.
 
         Parameters
         ----------
@@ -315,7 +315,7 @@ def inverse_map(drive: Drive, points: int = 101) -> InverseMap:
     InputError
         For another number of points.
     DomainError
-        Where there is no inverse: no command moves the drive one way, or a larger command makes it
+        If there is no inverse: no command moves the drive one way, or a larger command makes it
         slower.
 
     Examples

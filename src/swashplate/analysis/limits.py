@@ -31,10 +31,10 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Removal(Result):
-    """A limit, the component behind it, and the changes that take it away."""
+    """A limit, the component that sets it, and the changes that remove it."""
 
     limit: str
-    """Its name in words."""
+    """Its name with spaces."""
     component: str
     """What would have to change in the machine."""
     flag: Limit | None

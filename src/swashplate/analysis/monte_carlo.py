@@ -406,7 +406,7 @@ def stored_draws(
     drive : Drive, optional
         What the draws are to belong to: refused if it is not the fitted one.
     campaign : path, optional
-        The tests that were fitted; by default where ``fit.json`` says they were. They are needed
+        The tests that were fitted; by default those that ``fit.json`` names. They are needed
         for the whole covariance.
     draws, seed :
         As of `drives`.

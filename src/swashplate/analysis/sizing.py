@@ -28,7 +28,7 @@ STEP_LENGTH = 2.0
 STEP_RATE = 512.0
 """Its samples a second. [Hz]"""
 SMALLEST = 1e-300
-"""In place of zero where a number is divided by, or its logarithm taken."""
+"""In place of zero as a divisor or as the argument of a logarithm."""
 
 
 class Performance(NamedTuple):
@@ -187,7 +187,7 @@ class Sizing(Result):
         return float(np.sqrt(_change(np.array([*self.factors.values()]))))
 
     def tables(self) -> tuple[Table, Table]:
-        """Each design variable's factor, together and alone; what is required, before and after."""
+        """A table of the factors, and one of the requirements with the values before and after."""
         factors = Table(
             "",
             (
@@ -329,8 +329,8 @@ def smallest_change(slack: Slack, low: Array, high: Array) -> Array | None:
 
     Notes
     -----
-    The box is scanned (each factor alone, and a Sobol sequence with faces and corners); from the
-    two best points on, SLSQP minimises the change under the inequalities, with derivatives by
+    The box is scanned (single factors, and a Sobol sequence with faces and corners); from the two
+    best points on, SLSQP minimises the change under the inequalities, with derivatives by
     differences; what it finds is drawn towards 1, as a whole and factor by factor, as far as the
     inequalities allow.
     """
@@ -367,7 +367,7 @@ def smallest_change(slack: Slack, low: Array, high: Array) -> Array | None:
             constraints={"type": "ineq", "fun": lambda x: slack(np.clip(x, low, high))},
             options={"maxiter": 60, "ftol": 1e-10, "eps": 1e-5},
         )
-        # SLSQP may have stopped on the wrong side: back towards where it began
+        # SLSQP may have stopped on the wrong side: back towards its start
         solutions.append(drawn_in(_edge(slack, np.clip(solved.x, low, high), start)))
     return min(solutions, key=_change, default=None)
 

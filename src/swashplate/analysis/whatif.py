@@ -1,4 +1,4 @@
-"""What if: a drive before and after design variables are scaled, and each of them alone."""
+"""What if: a drive before and after design variables are scaled, together and one at a time."""
 
 from __future__ import annotations
 

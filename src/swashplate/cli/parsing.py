@@ -63,7 +63,7 @@ def file_kind(path: Path) -> str:
 
 
 def check_file_kind(path: Path, expected: str) -> None:
-    """Refuse a file that is plainly of another kind than expected; say where such a file goes."""
+    """Refuse a file of another kind than expected; name the right place for such a file."""
     kind = file_kind(path)
     instead = _INSTEAD.get((kind, expected))
     if path.is_file() and instead is not None:

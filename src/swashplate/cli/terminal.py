@@ -28,8 +28,10 @@ RESOURCES: ContextVar[ExitStack] = ContextVar("RESOURCES")
 BETWEEN = 2
 """Characters between two columns."""
 NARROW = "\N{NO-BREAK SPACE}%"
-LEAST, LONGEST = 9, 30
-"""Characters of a head that is broken, and of a name beside too many numbers."""
+LEAST = 9
+"""Least width of the lines of a wrapped heading. [characters]"""
+LONGEST = 30
+"""Largest width of a name in a split table. [characters]"""
 CLOSED_PIPE = 141
 """Exit code if whoever reads the output has closed it, as a shell reports a SIGPIPE: 128 + 13."""
 
@@ -229,7 +231,7 @@ class TerminalProgress:
         self._update(line)
 
     def end(self, work: Work) -> None:
-        """Leave the last line where it is."""
+        """Leave the last line as it is."""
 
 
 @contextmanager

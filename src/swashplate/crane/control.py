@@ -331,7 +331,7 @@ class Sensors(Control):
 class Controller(Control):
     """User-defined controller: a model of the engine whose outputs offset the reference tip.
 
-    The position loop acts beside it, at 0.7 /s unless a `PositionLoop` says otherwise.
+    The position loop acts in addition to it, at 0.7 /s unless a `PositionLoop` says otherwise.
     """
 
     model: Model

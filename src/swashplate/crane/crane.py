@@ -42,7 +42,7 @@ class Deck(NamedTuple):
 
 
 class CraneFile(BaseModel):
-    """A crane's file; drives are packaged names, or files and folders of fits beside it."""
+    """A crane's file; drives are packaged names, or files and folders of fits next to it."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 

@@ -1,4 +1,4 @@
-"""Drives of a crane: in what form they are given, where they come from, verdicts on their fits."""
+"""Drives of a crane: their forms, their sources, and the verdicts on their fits."""
 
 from __future__ import annotations
 
@@ -159,7 +159,7 @@ def _assessed_source(origin: str, fit: Path | None, verdict: Verdict) -> DriveSo
 
 
 def _source_of_file(path: Path, drive: Drive) -> DriveSource:
-    """The source of a drive's file, with the verdict of the fit beside it."""
+    """The source of a drive's file, with the verdict of the fit next to it."""
     stored = path.with_name(FIT_FILE)
     fit = None
     unknown_because = "there is no fit next to it"

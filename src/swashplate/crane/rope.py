@@ -1,6 +1,6 @@
 """The load: a point mass on a rope that can only pull, by Störmer and Verlet's step.
 
-The step needs nothing but positions of the boom's tip: no angles, which are singular where the rope
+The step needs nothing but positions of the boom's tip: no angles, which are singular if the rope
 lies level, and no accelerations of the tip, which drives with jumps do not have. The rope's pull is
 the multiplier that puts the load back on the sphere around the new tip; it follows from a quadratic
 in closed form, is zero if the rope is slack, and there is no drift.

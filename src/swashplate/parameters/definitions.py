@@ -88,7 +88,7 @@ class Definitions:
     """Parameters that a model has, by symbol, and what their public names stand for.
 
     A symbol such as ``Z16`` stands for all its columns, a column such as ``Z16_plus`` for one
-    number of the model. Here alone a name becomes a path in the model.
+    number of the model. Only here a name becomes a path in the model.
     """
 
     by_symbol: Mapping[str, Definition]

@@ -104,7 +104,7 @@ SETS = files("swashplate.parameters").joinpath("sets")
 
 
 NEUTRAL = "neutral"
-"""The packaged set that is no machine's, but where any may begin."""
+"""The packaged set that is not that of a machine, but an initial set for any."""
 
 
 def preset_names() -> tuple[str, ...]:

@@ -82,7 +82,7 @@ class Parameter(Result):
         return self.definition.unit
 
     def table(self) -> Table:
-        """Its value with its unit, its status, and where it comes from."""
+        """Its value with its unit, its status, and its source."""
         columns = (
             Column("symbol"),
             Column("name", wrap=True),
@@ -147,7 +147,7 @@ class Entries(Mapping[str, Parameter]):
         return len(self.parameters)
 
     def __reduce__(self) -> tuple[object, ...]:
-        # read-only views cannot be pickled, so a copy in another process is built anew
+        # read-only views cannot be pickled, so a copy in another process is built again
         instance: Any = self
         members = [getattr(self, field.name) for field in fields(instance) if field.init]
         return type(self), tuple(
@@ -373,7 +373,7 @@ class ParameterSet(Entries):
             numbers = {symbol: parameters[symbol].values[0] for symbol in parameters}
             touched = {SWITCHES[name] for name in changes if name in SWITCHES}
             options = (self.options - touched) | (options_of(numbers) & touched)
-        # a number that someone gives is no longer one that tests left open
+        # a number that is set is not an end of what the tests reached any more
         columns = self.definitions.columns_of(changes)
         unreached = {k: v for k, v in self.unreached.items() if k not in columns}
         return replace(self, parameters=parameters, options=options, unreached=unreached)

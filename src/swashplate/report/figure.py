@@ -26,7 +26,7 @@ takes 90 to 330 kB; as SVG 60 to 130 kB, but as much more as its signals are lon
 class PlainFigure(Figure):
     """A figure made without pyplot, which shows itself all the same.
 
-    A notebook shows it where it is the last value of a cell. `show` shows it anywhere. Its texts
+    A notebook shows it if it is the last value of a cell. `show` shows it anywhere. Its texts
     are drawn as they are: names come from files, and a dollar in one does not begin a formula.
     """
 

@@ -28,7 +28,7 @@ COLUMNS = 8192
 """Stretches of time of which a long line keeps the extremes; twice as many samples, 32 s at 512 Hz,
 are drawn as they are."""
 COARSE = 1000
-"""The same where many panels share a page: two or three a dot of a panel."""
+"""The same if many panels share a page: two or three a dot of a panel."""
 LONG = 131_072
 """A line of more samples is likely to fill its panel, and is drawn thinner."""
 
@@ -122,7 +122,7 @@ def draw(
     label: str | None = None,
     columns: int = COLUMNS,
 ) -> None:
-    """Draw a signal over stamps [s]: no line across a gap, a dot where a sample is alone.
+    """Draw a signal over stamps [s]: no line across a gap, a dot for a sample between two gaps.
 
     A long signal is drawn by its extremes in so many columns (`thinned`). With
     `zero_order` each sample stays up to the next.

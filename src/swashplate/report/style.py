@@ -35,12 +35,12 @@ SMALL, NORMAL, LARGE = 8.0, 9.0, 11.5
 THIN, LINE = 0.8, 1.3
 """Widths of lines. [pt]"""
 DPI = 150
-"""A picture's dots an inch: 8 pt letters stay readable where a page shows it at half its size."""
+"""A picture's dots an inch: 8 pt letters stay readable if a page shows it at half its size."""
 POINTS_PER_INCH = 72.0
 WIDTH = 8.6
 """Of a sheet. [inch]"""
 ROOM = WIDTH - 1.2
-"""Of a legend, beside a panel's ordinate. [inch]"""
+"""Space for a legend next to a panel's ordinate. [inch]"""
 GAP, HEAD, FOOT, ROW = 0.24, 0.38, 0.42, 0.18
 """Between panels, for the title, for the abscissa, for a row of a legend. [inch]"""
 
@@ -150,7 +150,7 @@ def dress_given(
 
 
 def legend_within(ax: Axes, handles: Sequence[Artist], location: Any = "best") -> None:
-    """Write a legend into a caller's panel, on white: lines may pass behind it."""
+    """Write a legend into a caller's panel, on white: lines may pass under it."""
     ax.legend(
         handles=handles,
         loc=location,
@@ -265,7 +265,7 @@ def zero_line(ax: Axes, *, upright: bool = False) -> None:
         ax.axvline(0.0, color=FAINT, linewidth=0.8, zorder=1.2)
 
 
-def write_text(
+def put_text(
     ax: Axes,
     text: str,
     position: tuple[float, float],
@@ -307,7 +307,7 @@ class MarginLabel(NamedTuple):
 
 
 def label_margin(ax: Axes, labels: Sequence[MarginLabel], inches: float) -> None:
-    """Write labels beside a panel of a height, each near its place but never over one another.
+    """Write labels next to a panel of a height, each near its place but never over one another.
 
     The panel's limits must be final.
     """
@@ -319,7 +319,7 @@ def label_margin(ax: Axes, labels: Sequence[MarginLabel], inches: float) -> None
     for position, index in zip(spread_out([heights[i] for i in order], gap), order, strict=True):
         label = labels[index]
         style: dict[str, Any] = {"va": "center", "annotation_clip": False}
-        write_text(ax, label.words, (1.0, position), (5.0, 0.0), color=label.color, **style)
+        put_text(ax, label.words, (1.0, position), (5.0, 0.0), color=label.color, **style)
 
 
 def spread_out(positions: Sequence[float], gap: float) -> list[float]:
@@ -375,9 +375,9 @@ def save_figure(figure: Figure, path: str | Path) -> None:
 
     kind = ending(path, FIGURE).removeprefix(".")
 
-    def write_text(beside: Path) -> None:
+    def write_file(temporary: Path) -> None:
         # without a salt of its own, an SVG's clip paths get random names
         with matplotlib.rc_context({"svg.hashsalt": "swashplate"}):
-            figure.savefig(beside, format=kind, metadata=_METADATA[kind])
+            figure.savefig(temporary, format=kind, metadata=_METADATA[kind])
 
-    write_whole(path, write_text)
+    write_whole(path, write_file)

@@ -64,7 +64,7 @@ given; drives that were simulated before."""
 FINE, TOO_FAST, BOOM_OUT, ROPE_OUT, NO_NUMBER = range(5)
 """How a pass ended."""
 ANGLE, SHAFT_SPEED, OPERATOR_ANGLE, OPERATOR_SPEED, REFERENCE_ANGLE, TORQUE = range(6)
-"""Shafts' angles and speeds; angles to which the stick alone would have brought them, and its
+"""Shafts' angles and speeds; angles to which only the stick would have brought them, and its
 speeds; reference angles of control; torques of the rope. [rad], [rad/s], [N m]"""
 BRAKE_WAITS, BRAKE_TAKES = 0.3, 0.2
 """Time at rest before the hoist's brake falls in, and time in which it stops the drum. [s]"""
@@ -239,7 +239,7 @@ def shaped(
 def operator_path(
     reference: Array, axes: Array, memory: Array, sample: int, half: float, h: float, fixed: Fixed
 ) -> tuple[float, float]:
-    """Position of the tip by the operator's speeds alone, shaped, in the ship's frame. [m]
+    """Position of the tip by only the operator's speeds, shaped, in the ship's frame. [m]
 
     `half` is half a period of the load. [samples]
     """
@@ -461,7 +461,7 @@ def store(
 
 @kernel
 def open_voltages(stick: Array, inverse: Inverse, actuation: int) -> Array:
-    """Voltages of a drive under the stick alone. [V]"""
+    """Voltages of a drive without control of the tip. [V]"""
     voltages = np.empty(stick.size)
     for m in range(stick.size):
         voltages[m] = voltage_for(limited(stick[m], inverse), inverse, actuation)

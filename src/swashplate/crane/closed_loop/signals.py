@@ -43,7 +43,7 @@ class Columns(NamedTuple):
     limits: int
     """First of the limits of the three drives; ideal ones have none."""
     hook: int
-    """First of the hook with slings; without one it is where the load is."""
+    """First of the hook with slings; without one it is the position of the load."""
     torque: int
     """First of the torques, if the rope loads the drives."""
     width: int

@@ -39,7 +39,7 @@ class Scatter(Result):
     share: Array
     """Of the year, adding up to 1."""
     note: str = ""
-    """Sentence on where it comes from; empty if that is the user's matter."""
+    """Sentence on its source; empty for a diagram of the user."""
 
     @classmethod
     def of(cls, height: ArrayLike, period: ArrayLike, share: ArrayLike, note: str = "") -> Scatter:

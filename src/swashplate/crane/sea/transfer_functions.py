@@ -301,7 +301,7 @@ def read_ship(path: str | Path, length: float | None = None) -> TransferFunction
     ------
     FileError
         If a line does not belong to such a file, a number is not plausible (`RANGES`), or a motion
-        is missing; the sentence says where. A ``.nc`` is read in a process of its own, which a
+        is missing; the sentence names the line. A ``.nc`` is read in a process of its own, which a
         damaged file cannot hang.
     InputError
         For another ending, a length that is missing or that no other file takes, and another

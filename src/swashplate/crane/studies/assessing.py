@@ -67,7 +67,7 @@ def assess(
     allowed_share_worse : float
         Share of seaways in which control may be worse than none.
     questions : sequence of {"harm", "sufficiency"}, optional
-        Questions that `Assessment.passed` answers; by default both, or harm alone if the crane has
+        Questions that `Assessment.passed` answers; by default both, or only harm if the crane has
         no limits.
     remedies : bool
         Whether to look for a larger orifice and for a clip that would do on the crane's own drives,

@@ -138,8 +138,8 @@ def linear_response(
 
     Notes
     -----
-    With the tip's horizontal motion T by the ship alone, the load's place d from the tip obeys
-    d (ω₀² - ω² + 2 i ζ ω₀ ω - ω² k e^{-iωτ}) = ω² (1 - c) T, with gain k and delay τ of the
+    With the tip's horizontal motion T due only to the ship, the load's position d from the tip
+    obeys d (ω₀² - ω² + 2 i ζ ω₀ ω - ω² k e^{-iωτ}) = ω² (1 - c) T, with gain k and delay τ of the
     feedback, and c = 1 if the ship's motion is compensated. ω is the frequency as the ship meets
     the waves.
     """

@@ -45,7 +45,7 @@ ACTUATED: Mapping[str, Actuation] = {IDEAL: "ideal", BUILT: "inverse", "volts": 
 """Drives that follow instantaneously; the crane's own after their inverse maps; the same, 10 V for
 full speed."""
 NONE = "no control"
-"""The crane as it is built, under the operator's stick alone."""
+"""The crane as it is built, under the operator's command only."""
 LENGTH, RUN_IN = 600.0, 120.0
 """Time for which a run counts, and that of its run-in: seven decay times of a swing that control
 damps by 10 %. [s]"""

@@ -64,9 +64,9 @@ from swashplate.report.style import (
     legend_within,
     new_figure,
     put_legend,
+    put_text,
     sheet,
     signed,
-    write_text,
     write_title,
     zero_line,
 )
@@ -120,7 +120,7 @@ def plot_envelope(
     envelope : Envelope
         What to show.
     ax : matplotlib axes, optional
-        Where to draw, with a legend of the colours alone; by default in a new figure.
+        Where to draw, with a legend of only the colours; by default in a new figure.
 
     Returns
     -------
@@ -205,7 +205,7 @@ def _mark_direction(ax: Axes, limits: DirectionLimits, color: str, height: float
     speed_text = signed(speed, 3 if abs(speed) < 10.0 else 1)
     line = "solid" if is_at_swash_stop else "dotted"
     ax.axvline(speed, color=color, linewidth=1.0, linestyle=line)
-    write_text(
+    put_text(
         ax,
         f"{cause}\n{speed_text} {speed_unit.name}",
         (speed, -0.96 * height if is_positive else 0.96 * height),
@@ -217,7 +217,7 @@ def _mark_direction(ax: Axes, limits: DirectionLimits, color: str, height: float
     )
     ax.plot([0.0], [acceleration], "o", color=color, markersize=4.5)
     acceleration_text = signed(acceleration, 2 if abs(acceleration) < 10.0 else 1)
-    write_text(
+    put_text(
         ax,
         f"{limits.accelerated_by}, at rest\n{acceleration_text} {acceleration_unit.name}",
         (0.0, acceleration),
@@ -293,7 +293,7 @@ def _bars(ax: Axes, run: Simulation, acting: list[Limit]) -> None:
             edgecolor=GREY,
             linewidth=0.4,
         )
-        write_text(
+        put_text(
             ax,
             share_cell(run.time_share(limit)).text,
             (1.0, row),
@@ -603,12 +603,12 @@ def _draw_map(inverse: InverseMap, full_range: Axes, close_up: Axes | None = Non
         point = (unit.factor * end, height)
         full_range.plot([point[0]], [point[1]], "o", color=INK, markersize=4.5)
         text = f"{point[0]:.4g} {unit.name}, {height:.3g} V".replace("-", "−")
-        write_text(full_range, text, point, (0.0, shift), coords="data", ha=side, va="center")
+        put_text(full_range, text, point, (0.0, shift), coords="data", ha=side, va="center")
     if close_up is None:
         return
     below, above = (unit.factor * edge for edge in inverse.gap)
     close_up.axvspan(below, above, color="#ededed", linewidth=0.0, zorder=0.5)
-    write_text(
+    put_text(
         close_up,
         "cannot be held",
         (0.5 * (below + above), 0.0),
@@ -617,7 +617,7 @@ def _draw_map(inverse: InverseMap, full_range: Axes, close_up: Axes | None = Non
         color=GREY,
         ha="center",
     )
-    write_text(close_up, "close-up around standstill", (0.0, 1.0), (4.0, -10.0), color=GREY)
+    put_text(close_up, "close-up around standstill", (0.0, 1.0), (4.0, -10.0), color=GREY)
 
 
 def _draw_improvement(speed: Axes, error: Axes, improvement: Improvement) -> None:

@@ -47,9 +47,9 @@ from swashplate.report.style import (
     in_lines,
     label_below,
     new_figure,
+    put_text,
     right_axis,
     sheet,
-    write_text,
     write_title,
     zero_line,
 )
@@ -207,7 +207,7 @@ def _page_figure(
                 _draw_signal(ax, column, signals[column.key], experiment)
             else:
                 ax.set_yticks([])
-                write_text(ax, "not measured", (0.5, 0.5), (0.0, 0.0), ha="center", va="center")
+                put_text(ax, "not measured", (0.5, 0.5), (0.0, 0.0), ha="center", va="center")
             # space for the heading, and in the first row for the columns' names
             column_title = " "
             pad = 6.0
@@ -392,7 +392,7 @@ def _largest(ranges: BlockRanges) -> float:
 
 
 def _draw_ranges(ax: Axes, ranges: BlockRanges, factor: float, color: str) -> None:
-    """Draw a signal between its extremes, open where it has none and over gaps of the stamps."""
+    """Draw a signal between its extremes, open over missing numbers and gaps of the stamps."""
     first = np.arange(0, ranges.time.size, -(-ranges.time.size // STRETCHES))
     time = ranges.time[first]
     low = np.fmin.reduceat(ranges.low, first)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from textwrap import wrap
-from typing import Any, NamedTuple, overload
+from typing import Any, Literal, NamedTuple, overload
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -75,13 +75,13 @@ def remarks(texts: Sequence[str]) -> str:
 
 def remark(ax: Axes, text: str, rows: int = 0) -> None:
     """Write grey words above a panel, over so many rows of a legend."""
-    style.write_text(ax, text, (0.0, 1.0), (0.0, 3.0 + 13.0 * rows), color=style.GREY, va="bottom")
+    style.put_text(ax, text, (0.0, 1.0), (0.0, 3.0 + 13.0 * rows), color=style.GREY, va="bottom")
 
 
 def _panels(
     heights: list[float],
     labels: Sequence[str],
-    below: str,
+    x_label: str,
     title: str,
     looks: Mapping[str, style.Stroke],
     texts: Sequence[str],
@@ -90,10 +90,10 @@ def _panels(
     legend = []
     if len(looks) > 1:
         legend = [style.handle(name, look.color, look.dashes) for name, look in looks.items()]
-    words = remarks(texts)
-    lines = 1 + words.count("\n")
-    figure, axes = style.sheet(heights, title, labels, below, legend=legend, lines=lines)
-    remark(axes[0], words, style.legend_rows(legend) if legend else 0)
+    joined_remarks = remarks(texts)
+    lines = 1 + joined_remarks.count("\n")
+    figure, axes = style.sheet(heights, title, labels, x_label, legend=legend, lines=lines)
+    remark(axes[0], joined_remarks, style.legend_rows(legend) if legend else 0)
     return figure, axes
 
 
@@ -224,8 +224,10 @@ LOOKS = {
 """Title of a sweep over a quantity, and its abscissa."""
 RADII = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0)
 """Circles of a polar figure. [deg]"""
-ACROSS, AROUND = 5.0, 0.46
-"""Size of a polar figure, and room for the words around it. [inch]"""
+DIAMETER = 5.0
+"""Diameter of a polar figure. [inch]"""
+AROUND = 0.46
+"""Space for the names of bearings around it. [inch]"""
 CENTRE = 0.05
 """Swing at the centre of a polar figure, whose radius is logarithmic. [deg]"""
 
@@ -238,7 +240,7 @@ def plot_sweep(result: Sweep, *, title: str | None = None) -> Figure:
     a gap there, and a cross marks it.
     """
     looks = style.strokes(result.names)
-    usual, below = LOOKS[result.over]
+    default_title, x_label = LOOKS[result.over]
     means = "over {} with its 95 % interval"
     if result.over == "bearing":
         means = "RMS over {}"
@@ -251,9 +253,9 @@ def plot_sweep(result: Sweep, *, title: str | None = None) -> Figure:
         assumed(result.crane),
     )
     if result.over == "bearing":
-        return _polar(result, title or usual, looks, texts)
+        return _polar(result, title or default_title, looks, texts)
     labels = ("swing, RMS (deg)",)
-    figure, (ax,) = _panels([3.0], labels, below, title or usual, looks, texts)
+    figure, (ax,) = _panels([3.0], labels, x_label, title or default_title, looks, texts)
     swings = np.degrees(result.values)
     points = result.points
     highest = LEAST
@@ -281,17 +283,21 @@ def plot_sweep(result: Sweep, *, title: str | None = None) -> Figure:
         low = max(LEAST, 0.5 * float(finite.min(initial=highest)))
         _logarithmic(ax, low, 2.0 * highest)
         ax.axvline(1.0, color=style.FAINT, linewidth=0.8, zorder=1.0)
-        style.write_text(ax, "as built", (1.0, low), (4.0, 4.0), coords="data", color=style.GREY)
+        style.put_text(ax, "as built", (1.0, low), (4.0, 4.0), coords="data", color=style.GREY)
     return figure
 
 
-def _side_of(bearings: Array) -> tuple[str, float]:
-    """Side of the ship that bearings [rad] lie on, empty if they are on both; its first bearing."""
-    if bearings.size and (bearings >= 0.0).all() and (bearings <= np.pi).all():
-        return "starboard", 0.0
-    if bearings.size and (bearings >= np.pi).all() and (bearings <= 2.0 * np.pi).all():
-        return "port", np.pi
-    return "", 0.0
+Side = Literal["starboard", "port"]
+SIDES: dict[Side, float] = {"starboard": 0.0, "port": np.pi}
+"""Sides of the ship, with the first bearing of each. [rad]"""
+
+
+def _side_of(bearings: Array) -> Side | None:
+    """Side of the ship that all bearings [rad] lie on; None if they are on both."""
+    for side, first in SIDES.items():
+        if bearings.size and (bearings >= first).all() and (bearings <= first + np.pi).all():
+            return side
+    return None
 
 
 def _polar(
@@ -300,27 +306,27 @@ def _polar(
     """Swing over the bearing around the ship, or over the half of it that the bearings are on."""
     legend = [style.handle(name, look.color, look.dashes) for name, look in looks.items()]
     rows = style.legend_rows(legend)
-    words = remarks(texts)
-    above = style.HEAD + style.ROW * (rows + 1 + words.count("\n"))
-    side, first = _side_of(result.points)
-    tall = 0.5 * ACROSS if side else ACROSS
-    height = above + tall + 2.0 * AROUND
+    joined_remarks = remarks(texts)
+    header_height = style.HEAD + style.ROW * (rows + 1 + joined_remarks.count("\n"))
+    side = _side_of(result.points)
+    plot_height = DIAMETER if side is None else 0.5 * DIAMETER
+    height = header_height + plot_height + 2.0 * AROUND
     figure = style.new_figure(style.WIDTH, height, layout="none")
     style.write_title(figure, title)
     # the axes are a square, of which half a circle takes the middle
-    left = 0.5 * (style.WIDTH - ACROSS)
-    bottom = AROUND + 0.5 * (tall - ACROSS)
-    square = left / style.WIDTH, bottom / height, ACROSS / style.WIDTH, ACROSS / height
+    left = 0.5 * (style.WIDTH - DIAMETER)
+    bottom = AROUND + 0.5 * (plot_height - DIAMETER)
+    square = (left / style.WIDTH, bottom / height, DIAMETER / style.WIDTH, DIAMETER / height)
     ax: Any = figure.add_axes(square, projection="polar")
-    if side:
-        _dress_half_circle(ax, first)
-    else:
+    if side is None:
         _dress_circle(ax)
+    else:
+        _dress_half_circle(ax, SIDES[side])
     _draw_polar(ax, result, looks)
-    head = figure.add_axes((0.012, 1.0 - (above + 0.02) / height, 0.9, 0.001))
-    head.set_axis_off()
-    style.put_legend(head, legend)
-    remark(head, words, rows)
+    header = figure.add_axes((0.012, 1.0 - (header_height + 0.02) / height, 0.9, 0.001))
+    header.set_axis_off()
+    style.put_legend(header, legend)
+    remark(header, joined_remarks, rows)
     return figure
 
 
@@ -338,10 +344,10 @@ def _dress_circle(ax: Any) -> None:
         text.set_horizontalalignment("center" if angle % 180 == 0 else alignment)
 
 
-def _dress_half_circle(ax: Any, first: float) -> None:
-    """Show half a circle from a bearing [rad] on, which lies flat, and name its bearings."""
-    first_deg = np.degrees(first)
-    ax.set_theta_offset(first + np.pi)
+def _dress_half_circle(ax: Any, first_bearing: float) -> None:
+    """Show half a circle from a bearing [rad] on, with its diameter level and named bearings."""
+    first_deg = np.degrees(first_bearing)
+    ax.set_theta_offset(first_bearing + np.pi)
     ax.set_thetamin(first_deg)
     ax.set_thetamax(first_deg + 180.0)
     ax.spines["start"].set_color(style.FAINT)
@@ -365,22 +371,22 @@ def _draw_polar(ax: Any, result: Sweep, looks: Mapping[str, style.Stroke]) -> No
     mean = np.degrees(result.rms())
     largest = float(np.nanmax(np.append(mean, RADII[1])))
     # closed if the bearings go all the way around, not if they are part of a circle
-    again = result.points[:1] + 2.0 * np.pi
-    gap = again - result.points[-1]
-    again = again[gap <= 1.5 * np.diff(result.points).max(initial=0.0)]
-    around = np.append(result.points, again)
-    edge = float(np.log10(1.3 * largest / CENTRE))
+    closing_bearing = result.points[:1] + 2.0 * np.pi
+    gap = closing_bearing - result.points[-1]
+    closing_bearing = closing_bearing[gap <= 1.5 * np.diff(result.points).max(initial=0.0)]
+    bearings = np.append(result.points, closing_bearing)
+    outer_radius = float(np.log10(1.3 * largest / CENTRE))
     for swing, (color, dashes) in zip(mean.T, looks.values(), strict=True):
-        radius = np.log10(np.maximum(np.append(swing, swing[: again.size]), CENTRE) / CENTRE)
-        ax.plot(around, radius, color=color, linestyle=dashes, linewidth=1.4, marker="o", ms=2.5)
+        closed_swing = np.append(swing, swing[: closing_bearing.size])
+        radius = np.log10(np.maximum(closed_swing, CENTRE) / CENTRE)
+        ax.plot(bearings, radius, color=color, linestyle=dashes, linewidth=1.4, marker="o", ms=2.5)
         left_model = result.points[np.isnan(swing)]
-        rim = np.full(left_model.size, edge)
+        rim = np.full(left_model.size, outer_radius)
         ax.plot(left_model, rim, "x", color=color, ms=6.0, clip_on=False)
     circles = [radius for radius in RADII if radius <= 1.3 * largest]
-    ax.set_ylim(0.0, edge)
+    ax.set_ylim(0.0, outer_radius)
     ax.set_yticks(np.log10(np.array(circles) / CENTRE), [f"{radius:g}°" for radius in circles])
-    side, _ = _side_of(result.points)
-    if not side:
+    if _side_of(result.points) is None:
         ax.set_rlabel_position(52.5)  # lines cross it straight on
 
 
@@ -406,26 +412,29 @@ def plot_follow(result: Followable, *, ax: GivenAxes, title: str | None = None) 
 def plot_follow(
     result: Followable, *, ax: Axes | Sequence[Axes] | None = None, title: str | None = None
 ) -> Figure | Axes | Sequence[Axes]:
-    """Figure of the amplitude that each axis can follow over the period, and what seas ask of it.
+    """Figure of the amplitude that each axis can follow over the period, and of the seas' demands.
 
-    What a sea asks is a diamond in the axis's colour, filled if it is more than the axis can, or a
-    triangle at the lower end of the ordinate if it is less than that.
+    The demand of a sea is a diamond in the axis's colour, filled if the axis cannot follow it. If
+    it is below the ordinate, it is a triangle at the lower end.
 
     By default a new figure; with `ax` it is drawn there, without the remark above, and `ax`
     returned.
     """
     looks = style.strokes(AXIS_LINES)
-    words = title or "What the axes can follow"
     label = "amplitude (m)"
-    below = "period (s)"
+    x_label = "period (s)"
     if ax is None:
-        boom = f"boom at {result.boom_deg:.0f}°"
         figure, (panel,) = _panels(
-            [3.6], [label], below, words, looks, texts=(boom, DEMANDED, assumed(result.crane))
+            heights=[3.6],
+            labels=[label],
+            x_label=x_label,
+            title=title or "What the axes can follow",
+            looks=looks,
+            texts=(f"boom at {result.boom_deg:.0f}°", DEMANDED, assumed(result.crane)),
         )
     else:
         legend = [style.handle(name, look.color, look.dashes) for name, look in looks.items()]
-        (panel,) = style.dress_given(ax, title, [label], below, what="panel", legend=legend)
+        (panel,) = style.dress_given(ax, title, [label], x_label, what="panel", legend=legend)
     lines = list(zip(looks.values(), result.amplitude.T, strict=True))
     for (color, dashes), amplitudes in lines:
         panel.plot(result.periods, amplitudes, color=color, linestyle=dashes, linewidth=1.4)
@@ -470,4 +479,4 @@ def _name_seas(ax: Axes, tops: Mapping[str, tuple[float, float]]) -> None:
         ):
             up += 0.01
         names.append((across, up, width))
-        style.write_text(ax, name, (across, up), (0.0, 6.0), ha="center", bbox=box)
+        style.put_text(ax, name, (across, up), (0.0, 6.0), ha="center", bbox=box)

@@ -30,7 +30,7 @@ Array = NDArray[np.float64]
 
 SWING = "swing, RMS of a seaway (deg)"
 NAME, ROOM = 30, style.WIDTH - 2.4
-"""Letters of a line of a variant's name; room for a legend beside such names. [inch]"""
+"""Letters of a line of a variant's name; room for a legend next to such names. [inch]"""
 # positions on the axis, in parts of the largest swing
 END = 1.03
 """End of the axis if no run left the model."""
@@ -68,7 +68,7 @@ def plot_assessment(
     root mean square; runs that left the model are counted beyond a break of the axis. The second
     one has the most probable largest values in three hours as shares of their limits.
 
-    By default a new figure; with `ax`, of one panel, the swing alone is drawn there, without the
+    By default a new figure; with `ax`, of one panel, only the swing is drawn there, without the
     remark above, and `ax` returned.
     """
     if ax is not None:
@@ -147,7 +147,7 @@ def _draw_swings(ax: Axes, result: Assessment) -> None:
         if departures:
             point = (DEPARTURES * edge, row)
             ax.plot(*point, "x", color=style.INK, ms=6.0)
-            style.write_text(ax, f"{departures}", point, (7.0, -3.0), coords="data")
+            style.put_text(ax, f"{departures}", point, (7.0, -3.0), coords="data")
         label = style.in_lines(name, NAME)
         if name != NONE:
             worse = round(result.share_worse(name).value * swing.size)
@@ -305,7 +305,7 @@ LIMIT_COLORS = (
 )
 """Colours of limits, the most frequent first; the first five can be distinguished if pale."""
 PALEST = 0.3
-"""Strength of the colour of a cell that one heading alone spoils."""
+"""Strength of the colour of a cell that only one heading spoils."""
 ABREAST = 3
 """Panels side by side."""
 

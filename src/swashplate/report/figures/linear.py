@@ -22,9 +22,9 @@ from swashplate.report.style import (
     Stroke,
     dress_given,
     handle,
+    put_text,
     sheet,
     strokes,
-    write_text,
 )
 from swashplate.results import GivenAxes
 from swashplate.units import DisplayUnit, display_unit
@@ -72,7 +72,7 @@ def plot_bode(
 ) -> Figure | Axes | Sequence[Axes]:
     """Figure of gain, phase and distortion over the frequency, a line for each amplitude.
 
-    Lines end where nothing moves any more, which is said at the foot of the gain.
+    Lines end at the frequency from which nothing moves, which the foot of the gain's panel states.
 
     Parameters
     ----------
@@ -120,10 +120,9 @@ def plot_bode(
     gain_label = f"gain ({by}/{unit})" if unit else f"gain ({by})"
     labels = [gain_label, "phase (deg)", "distortion (%)"]
     if ax is None:
-        default_title = default_title if title is None else title
-        figure, axes = sheet(
-            [2.3, 2.3, 1.3], default_title, labels, "frequency (Hz)", legend=legend
-        )
+        sheet_title = default_title if title is None else title
+        heights = [2.3, 2.3, 1.3]
+        figure, axes = sheet(heights, sheet_title, labels, "frequency (Hz)", legend=legend)
     else:
         count = min(max(np.size(np.asarray(ax, dtype=object)), 2), 3)
         axes = dress_given(ax, title, labels[:count], "frequency (Hz)", legend=legend)
@@ -132,14 +131,12 @@ def plot_bode(
         _draw_linear(axes, linear, response)
     _scale_axes(axes, response)
     # the lines are at the top there
-    write_text(
-        axes[0], "\n".join(response.still()), (0.0, 0.0), (4.0, 4.0), color=GREY, va="bottom"
-    )
+    put_text(axes[0], "\n".join(response.still()), (0.0, 0.0), (4.0, 4.0), color=GREY, va="bottom")
     if mark is not None and response.frequencies[0] <= mark <= response.frequencies[-1]:
         for panel in axes:
             panel.axvline(mark, color=FAINT, linewidth=1.0, zorder=1.3)
         position: dict[str, Any] = {"coords": ("data", "axes fraction"), "va": "bottom"}
-        write_text(axes[0], f"{mark:g} Hz", (mark, 0.0), (3.0, 3.0), color=GREY, **position)
+        put_text(axes[0], f"{mark:g} Hz", (mark, 0.0), (3.0, 3.0), color=GREY, **position)
     return figure if ax is None else ax
 
 

@@ -48,10 +48,10 @@ from swashplate.report.style import (
     label_margin,
     legend_rows,
     legend_within,
+    put_text,
     sheet,
     signed,
     strokes,
-    write_text,
     zero_line,
 )
 from swashplate.results import GivenAxes
@@ -210,7 +210,7 @@ def plot_signals(
 
     A user-defined model says what they are: their `Definition` has words and unit of the ordinate
     and the range, whose ends are drawn if the signal comes near to them. Stretches in which a limit
-    of the model acts are shaded in each panel; where several act, the last that the model names is
+    of the model acts are shaded in each panel; if several act, the last that the model names is
     seen. In given axes neither range nor limits are drawn.
 
     Parameters
@@ -262,7 +262,7 @@ def plot_signals(
             _draw_panel(panel_axes, panel._replace(height=height), run.time, rows)
         above = 4.0 + POINTS_PER_INCH * ROW * (legend_rows(legend) if legend else 0)
         if heading:
-            write_text(column_axes[0], heading, (0.0, 1.0), (0.0, above), color=GREY)
+            put_text(column_axes[0], heading, (0.0, 1.0), (0.0, above), color=GREY)
         last = column_axes[len(column) - 1]
         last.tick_params(labelbottom=True)
         label_below(last, "time (s)")
@@ -368,7 +368,7 @@ def plot_full_order(comparison: OrderComparison, *, title: str | None = None) ->
     else:
         error = Panel("difference", "rad/s", (Curve(comparison.error, INK),))
     speeds = (
-        # where the two are the same, the wide line shows on both sides of the narrow one
+        # if the two are the same, the wide line shows on both sides of the narrow one
         Curve(full.shaft_speed, BLUE, "five states", WIDE),
         Curve(comparison.reduced_speed, VERMILION, "one state", NARROW),
     )
@@ -557,6 +557,6 @@ def plot_comparison(simulations: Mapping[str, Simulation], *, title: str | None 
             draw(axes[2], at, speed.factor * difference, color, dashes=dashes)
     if len(simulations) > 1:
         label = f"speed minus that of {reference}"
-        write_text(axes[2], label, (0.0, 1.0), color=looks[reference].color)
+        put_text(axes[2], label, (0.0, 1.0), color=looks[reference].color)
     fit_time(axes[-1], *(simulation.time for simulation in simulations.values()))
     return figure

@@ -18,12 +18,13 @@ STRETCHES = 120
 
 
 def _svg(
-    width: float, height: float, description: str, elements: Iterable[Markup], look: str
+    width: float, height: float, description: str, elements: Iterable[Markup], css_class: str
 ) -> Markup:
-    """A chart; `words` say what it shows to those who cannot see it."""
-    head = Markup('<svg class="{0}" width="{1:g}" viewBox="0 0 {1:g} {2:g}" role="img" ')
+    """A chart, with a description for those who cannot see it."""
+    opening = Markup('<svg class="{0}" width="{1:g}" viewBox="0 0 {1:g} {2:g}" role="img" ')
     label = Markup('aria-label="{}">').format(description)
-    return Markup("").join([head.format(look, width, height), label, *elements, Markup("</svg>")])
+    start = opening.format(css_class, width, height)
+    return Markup("").join([start, label, *elements, Markup("</svg>")])
 
 
 def _text(x: float, y: float, text: str, anchor: str = "start", turn: float = 0.0) -> Markup:
@@ -45,7 +46,7 @@ def _polyline(x: Array, y: Array) -> Markup:
 
 
 def profile_chart(profile: Profile, unknown: Unknown) -> Markup:
-    """The least cost over one unknown, above that of the optimum, and where the interval ends."""
+    """The least cost over one unknown, above that of the optimum, with the ends of the interval."""
     values = np.array([unknown.to_value(point.number) for point in profile.points])
     rises = np.array([point.cost - profile.cost for point in profile.points])
     if not values.size:

@@ -79,7 +79,7 @@ def write_fit_report(
     path : path
         The file, which replaces an older one.
     truth : ParameterSet, optional
-        What virtual tests were simulated with; it stands beside the estimates.
+        Parameters of which virtual tests were simulated, to show next to the estimates.
 
     Raises
     ------
@@ -347,9 +347,8 @@ def _residual_section(runs: Sequence[ShownRun]) -> Section:
             drawn = charts.lags_chart(test.lags, test.correlation, test.band, correlation)
             run = quality.experiment
             table.add(run.name, run.role, quality.channel, drawn, test.verdict)
-    return Section(
-        "residuals", "Residuals", [text(explanation), PageBlock("table", table, "residuals")]
-    )
+    blocks = [text(explanation), PageBlock("table", table, "residuals")]
+    return Section("residuals", "Residuals", blocks)
 
 
 def _data_section(

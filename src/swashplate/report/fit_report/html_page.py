@@ -125,7 +125,7 @@ def rendered(
         policy=content_policy(allowed, compiles=live),
         date=f"{date.today():%d %B %Y}",
     )
-    # control characters of a name, and what turns the direction of writing, are no part of HTML
+    # control characters of a name, and what turns the direction of writing, are not part of HTML
     return re.sub(
         "[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069\ud800-\udfff\ufffe\uffff]",
         "\ufffd",
@@ -184,7 +184,7 @@ def html_table(table: Table, css_class: str = "") -> Markup:
 def _html_row(table: Table, row: Row) -> str:
     """HTML of a row; the text of its column "meaning" is put before the symbol in the first cell.
 
-    Every piece is escaped where it is inserted: Markup's own formatting takes ten times as long.
+    Every piece is escaped when it is inserted: Markup's own formatting takes ten times as long.
     """
     row_classes = []
     if row.look:

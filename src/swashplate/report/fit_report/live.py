@@ -1,4 +1,4 @@
-"""Live page of a drive: one HTML file in which it runs, with sliders beside what was measured."""
+"""Live page of a drive: one HTML file in which it runs, with sliders and measured signals."""
 
 from __future__ import annotations
 
@@ -44,9 +44,9 @@ SPAN = 4.0
 SHOWN = ("orifice", "pump", "supply_pressure", "rate_limits", "dead_zone", "spool_offset")
 """Design variables that have a slider of their own; each parameter has one too."""
 BEFORE_CURRENT = Limit.DEAD_ZONE | Limit.CURRENT_RATE
-"""Limits that are shaded behind a current; the others are behind what the pump does."""
+"""Limits that are shaded in a panel of a current; the others are shaded in those of the pump."""
 UNMEASURED = ("current", "shaft_speed")
-"""Signals that are shown of a command alone."""
+"""Signals that are shown of a command without measured signals."""
 
 
 def write_live_page(
@@ -71,7 +71,7 @@ def write_live_page(
     path : path
         The file, which replaces an older one.
     campaign : Campaign, optional
-        Its runs with a voltage as their input are shown beside what the drive makes of them.
+        Its runs with a voltage as their input are shown with the drive's simulated response.
     axis : str, optional
         The axis, if the campaign has several.
     command : Maneuver, optional
@@ -131,7 +131,7 @@ def write_live_page(
 def live_page(
     parameters: ParameterSet, runs: Sequence[dict[str, Any]], title: str, virtual: bool, name: str
 ) -> str:
-    """HTML of a live page beside runs of `run_of`; see `write_live_page`."""
+    """HTML of a live page with runs of `run_of`; see `write_live_page`."""
     if parameters.equations:
         raise InputError(
             f"{parameters.name} has a user-defined equation, which the WebAssembly of the package "
@@ -175,7 +175,7 @@ def live_page(
 
 
 def can_run(parameters: ParameterSet, experiment: Experiment) -> bool:
-    """Whether a page can run a drive as it is beside a run: see `write_live_page`."""
+    """Whether a page can run a drive over the input of a run; see `write_live_page`."""
     driven = experiment.input.kind == "voltage" and not parameters.equations
     return driven and not at_rate_of([experiment], parameters)[1]
 
@@ -313,7 +313,7 @@ def _measured_channel(channel: Channel) -> dict[str, Any]:
 
 
 def _signal_panel(signal: str, name: str = "", unit: str = "", size: float = 0.0) -> dict[str, Any]:
-    """A signal's panel: label, unit of people, limits that are shaded behind it."""
+    """A signal's panel: label, displayed unit, limits that are shaded in it."""
     unit = unit or {"current": "A", "shaft_speed": "rad/s"}[signal]
     shown = display_unit(unit, size)
     electric = "current" in signal

@@ -146,7 +146,7 @@ def off_scale(channel: Channel, values: Array) -> Mask:
 
 
 def measures_line(quality: RunQuality) -> str:
-    """Words that must stand beside every fit %: RMSE, initial state, ignored samples."""
+    """Text that must accompany every fit %: RMSE, initial state, ignored samples."""
     measures = quality.measures
     run = quality.experiment
     channel = run[quality.channel]

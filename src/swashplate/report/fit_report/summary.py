@@ -111,7 +111,7 @@ def tested_commands(stages: Sequence[StageFit]) -> Commands:
     size = max((float(np.abs(values).max()) for values in commands), default=0.0)
     plus = max((float(values.max()) for values in commands), default=0.0)
     minus = max((float(-values.min()) for values in commands), default=0.0)
-    # noise about 0 V is no command
+    # noise about 0 V is not a command
     noise = NO_COMMAND * size
     return (
         min(plus, FULL_VOLTAGE) if plus > noise else 0.0,
@@ -135,7 +135,8 @@ class _Range(NamedTuple):
 def numbers_table(drive: Drive, stages: Sequence[StageFit]) -> tuple[Table, list[str]]:
     """The numbers that matter, each with its 95 % interval, and what these leave out.
 
-    A number that a limit decides which no test reached has one end alone, "at least" or "at most".
+    A number that depends on a limit which no test reached has only one end, "at least" or "at
+    most".
     Without stages of a fit there are no intervals.
     """
     largest = largest_commands(stages)
@@ -202,7 +203,7 @@ def _range_of(drive: Drive, stages: Sequence[StageFit], values: Array, largest: 
     left_open = np.abs(far - near) > OPEN * np.abs(near)
     doubt = np.full((6, 2), "", dtype=object)
     for name, variances in variances_from_bounds(stages, numbers, unseen).items():
-        # what has one end alone has no interval to lose
+        # a number with only one end has no interval to lose
         doubt[~left_open & (variances > LEANS * errors**2)] = f"{name} {AT_BOUND}"
     doubt[changes_left_open(stages, numbers, unseen) > FOLLOWS * np.abs(values)] = "not determined"
     for side, volts in enumerate(tested_commands(stages)):
@@ -234,7 +235,7 @@ MEANINGS = {
     "(fixed)": "Fixed: depends on parameters that were not fitted.",
     "Z16_": "Z16 fixed: the fit did not estimate an orifice, which can be mistaken for a lag.",
 }
-"""What words beside a number mean."""
+"""Meaning of the words that are shown next to a number."""
 
 
 def _meanings(table: Table) -> list[str]:
@@ -310,7 +311,7 @@ def _three_digits(value: float, towards_zero: bool) -> str:
 
 
 def light(look: Light, meaning: str) -> Markup:
-    """A traffic light with its meaning, which does not rest on colour alone."""
+    """A traffic light with its meaning, which does not rest only on its colour."""
     sign = {"good": "✓", "look": "!", "bad": "✗"}[look]
     template = Markup('<span class="light {}" title="{}" role="img" aria-label="{}">{}</span>')
     return template.format(look, meaning, meaning, sign)
@@ -419,7 +420,8 @@ def _curve_blocks(runs: Sequence[ShownRun], virtual: bool) -> Iterable[PageBlock
 def _limit_sentences(drive: Drive, stages: Sequence[StageFit]) -> list[str]:
     """Say which limits act during a step each way, and which to change first.
 
-    The steps go to the largest commands that were tested; what no test reached is no limit here.
+    The steps go to the largest commands that were tested; a value that no test reached does not
+    count as a limit.
     """
     length = int(2.0 * RATE)
     plus, minus = largest_commands(stages)
