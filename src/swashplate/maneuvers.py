@@ -217,12 +217,12 @@ class Maneuver(Drawn):
     def __add__(self, after: Maneuver) -> Maneuver:
         if not isinstance(after, Maneuver):
             return NotImplemented
-        moved = ((self.length + start, curve) for start, curve in after.pieces)
+        shifted = ((self.length + start, curve) for start, curve in after.pieces)
         name = f"{self.name} + {after.name}"
         length = self.length + after.length
         amplitude = max(self.amplitude, after.amplitude)
         highest = max(self.highest, after.highest)
-        return Maneuver(name, length, (*self.pieces, *moved), amplitude, highest)
+        return Maneuver(name, length, (*self.pieces, *shifted), amplitude, highest)
 
     def __mul__(self, factor: float) -> Maneuver:
         factor = finite("factor", factor)

@@ -240,10 +240,10 @@ class TerminalLine:
     def show(self, line: str) -> None:
         """Show a line in the place of the one before, cut to the terminal's width."""
         width = get_terminal_size().columns - 1
-        shown = line if len(line) <= width else f"{line[: width - 1]}…"
-        sys.stderr.write(f"\r{shown:{self._length}}")
+        cut_line = line if len(line) <= width else f"{line[: width - 1]}…"
+        sys.stderr.write(f"\r{cut_line:{self._length}}")
         sys.stderr.flush()
-        self._length = len(shown)
+        self._length = len(cut_line)
 
     def end(self, work: Work) -> None:
         """Wipe out the line."""

@@ -110,16 +110,16 @@ class Table:
         assert len(cells) == count, f"{len(cells)} cells for {count} columns of {self.title}"
         values = iter(cells)
         si = "rad" if unit == SHAFT_ANGLE else unit
-        every = tuple(si if column is UNIT else next(values) for column in self.columns)
-        self.rows.append(Row(every, unit, spec, look, section or total, total))
+        all_cells = tuple(si if column is UNIT else next(values) for column in self.columns)
+        self.rows.append(Row(all_cells, unit, spec, look, section or total, total))
 
     def of(self, medium: str) -> Table:
         """The table with the columns of a medium: ``"t"`` terminal, ``"p"`` page, ``"f"`` file."""
-        shown = [k for k, column in enumerate(self.columns) if medium in column.of]
-        rows = [row._replace(cells=tuple(row.cells[k] for k in shown)) for row in self.rows]
-        return Table(self.title, [self.columns[k] for k in shown], self.caption, rows, self.si)
+        kept = [k for k, column in enumerate(self.columns) if medium in column.of]
+        rows = [row._replace(cells=tuple(row.cells[k] for k in kept)) for row in self.rows]
+        return Table(self.title, [self.columns[k] for k in kept], self.caption, rows, self.si)
 
-    def heads(self) -> list[str]:
+    def headings(self) -> list[str]:
         """The columns' names with their units, for people."""
         return [
             f"{column.name} {display_unit(column.unit).name if column.unit else ''}".strip()
@@ -127,7 +127,7 @@ class Table:
         ]
 
     def texts(self, row: Row) -> list[str]:
-        """A row's cells as words for people."""
+        """A row's cells as texts for people."""
         pairs = list(zip(self.columns, row.cells, strict=True))
         in_row_unit = [
             (column, value) for column, value in pairs if not (column is UNIT or column.pure)
@@ -137,13 +137,13 @@ class Table:
             (row.spec or column.spec).endswith("f") for column, _ in in_row_unit if column.spec
         )
         size = float("inf") if fixed else largest([value for _, value in in_row_unit])
-        shown = chosen_unit(row.unit) if self.si else display_unit(row.unit, size)
+        row_unit = chosen_unit(row.unit) if self.si else display_unit(row.unit, size)
         texts = []
         for column, value in pairs:
-            unit = display_unit(column.unit) if column.unit else shown
+            unit = display_unit(column.unit) if column.unit else row_unit
             spec = column.spec if column.pure else row.spec or column.spec
             is_unit = column is UNIT
-            texts.append(shown.name if is_unit else _text(value, spec, column, unit.factor))
+            texts.append(row_unit.name if is_unit else _text(value, spec, column, unit.factor))
         return texts
 
     def to_polars(self) -> polars.DataFrame:
@@ -165,14 +165,14 @@ class Table:
 
     def __str__(self) -> str:
         """The table as plain text, numbers to the right."""
-        shown = self.of("t")
-        heads = [[line.strip() for line in head.split("\n")] for head in shown.heads()]
-        height = max(map(len, heads), default=1)
-        # a head of fewer lines stands right above its column
-        stacked = [[""] * (height - len(head)) + head for head in heads]
-        lines = [*zip(*stacked, strict=True), *map(shown.texts, shown.rows)]
+        table = self.of("t")
+        headings = [[line.strip() for line in name.split("\n")] for name in table.headings()]
+        height = max(map(len, headings), default=1)
+        # a heading of fewer lines stands right above its column
+        stacked = [[""] * (height - len(lines)) + lines for lines in headings]
+        lines = [*zip(*stacked, strict=True), *map(table.texts, table.rows)]
         sizes = [max(map(len, cells)) for cells in zip(*lines, strict=True)]
-        right = [">" if column.spec else "<" for column in shown.columns]
+        right = [">" if column.spec else "<" for column in table.columns]
         text = [
             "  ".join(f"{c:{r}{s}}" for c, r, s in zip(line, right, sizes, strict=True)).rstrip()
             for line in lines
@@ -180,16 +180,16 @@ class Table:
         return "\n".join(line for line in (self.title, *text, self.caption) if line)
 
     def _repr_html_(self) -> str:
-        shown = self.of("t")
-        sides = ["right" if column.spec else "left" for column in shown.columns]
+        table = self.of("t")
+        sides = ["right" if column.spec else "left" for column in table.columns]
         pieces = ["<table>"]
         if self.title:
             pieces.append(f'<caption style="{_CAPTION}">{escape(self.title)}</caption>')
-        pieces += ["<thead>", _html_row("th", shown.heads(), sides), "</thead>", "<tbody>"]
-        for row in shown.rows:
+        pieces += ["<thead>", _html_row("th", table.headings(), sides), "</thead>", "<tbody>"]
+        for row in table.rows:
             # between sections a line that is seen on light and on dark pages
             line = "border-top: 1px solid #888; " if row.section else ""
-            pieces.append(_html_row("td", shown.texts(row), sides, line))
+            pieces.append(_html_row("td", table.texts(row), sides, line))
         pieces += ["</tbody>", "</table>"]
         if self.caption:
             pieces.append(f"<p>{escape(self.caption)}</p>")

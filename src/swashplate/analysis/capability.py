@@ -436,16 +436,16 @@ def _limits_of(drive: Drive, direction: float, speed_limit: float) -> DirectionL
     return DirectionLimits(**limits)
 
 
-def _times(drive: Drive, before: float, after: float) -> tuple[float | None, float | None]:
+def _times(drive: Drive, from_volts: float, to_volts: float) -> tuple[float | None, float | None]:
     """Times from 10 % to 90 % and to 90 % of a step between two settled commands. [s]"""
-    first = float(drive.steady_speed(before))
-    last = float(drive.steady_speed(after))
+    initial_speed = float(drive.steady_speed(from_volts))
+    final_speed = float(drive.steady_speed(to_volts))
     length = SHORTEST
-    while first != last and length <= LONGEST:
-        command = np.full(int(length * SOURCE_RATE) + 1, after)
-        command[0] = before
+    while initial_speed != final_speed and length <= LONGEST:
+        command = np.full(int(length * SOURCE_RATE) + 1, to_volts)
+        command[0] = from_volts
         run = drive.simulate(command, start="steady")
-        progress = (run.shaft_speed - first) / (last - first)
+        progress = (run.shaft_speed - initial_speed) / (final_speed - initial_speed)
         if progress.max() >= HIGH:
             low = float(run.time[np.argmax(progress >= LOW)])
             high = float(run.time[np.argmax(progress >= HIGH)])

@@ -161,7 +161,7 @@ class InverseMap(Result):
         if not np.isfinite(reference).all():
             raise InputError("The reference speed must be finite everywhere.")
         low, high = self.limits
-        below, above = self.gap
+        gap_start, gap_end = self.gap
         inside = np.clip(reference, low, high)
         beyond = reference[np.abs(reference - inside) > ROUNDING * (high - low)]
         if beyond.size and not clip:
@@ -172,13 +172,13 @@ class InverseMap(Result):
                 f"{self.name} cannot settle at {worst}: its speeds reach from {least} to {most}."
             )
         # the creep comes first, so that it wins a tie
-        slowest = np.array([self.creep, below, above])
+        slowest = np.array([self.creep, gap_start, gap_end])
         slowest_voltages = np.array([0.0, self.minus.voltage[-1], self.plus.voltage[0]])
         nearest = np.argmin(np.abs(inside[..., np.newaxis] - slowest), axis=-1)
         upwards = np.interp(inside, self.plus.speed, self.plus.voltage)
         downwards = np.interp(inside, self.minus.speed, self.minus.voltage)
-        voltage = np.where(inside > above, upwards, slowest_voltages[nearest])
-        return np.asarray(np.where(inside < below, downwards, voltage))
+        voltage = np.where(inside > gap_end, upwards, slowest_voltages[nearest])
+        return np.asarray(np.where(inside < gap_start, downwards, voltage))
 
     def command(self, speed: ArrayLike, rate: float) -> Array:
         """Voltage over time for a reference speed over time, with the drive's lag made up for.
@@ -240,9 +240,9 @@ class InverseMap(Result):
         settled = np.interp(voltages, map_voltages, map_speeds)
         for row in zip(speeds, voltages, settled, strict=True):
             voltages_table.add(*map(float, row))
-        below, above = self.gap
-        if any(below < speed < above for speed in speeds):
-            low, high = (quantity(edge, "rad/s", spec="z.3f") for edge in (below, above))
+        gap_start, gap_end = self.gap
+        if any(gap_start < speed < gap_end for speed in speeds):
+            low, high = (quantity(edge, "rad/s", spec="z.3f") for edge in (gap_start, gap_end))
             voltages_table.caption = f"between {low} and {high} only the creep at 0 V can be held"
         points = self._points(MOST_SHOWN)
         total = self.minus.speed.size + self.plus.speed.size + 1
@@ -254,7 +254,7 @@ class InverseMap(Result):
         )
         lowest, highest = self.limits
         limits.add("speed", lowest, highest, unit="rad/s")
-        limits.add("slowest that can be held", below, above, unit="rad/s", spec="z.3f")
+        limits.add("slowest that can be held", gap_start, gap_end, unit="rad/s", spec="z.3f")
         limits.add("acceleration at rest", -down, up, unit="rad/s^2", spec=".2f")
         limits.add("lag", "", 1e3 * self.lag, unit="ms", spec=".1f")
         limits.add("interpolation error", "", self.error, unit="rad/s", spec=".2g")

@@ -71,8 +71,8 @@ def performance(
             accelerations.append(float(change.max() * STEP_RATE))
     error = None
     if follow is not None:
-        up, down = (max(speed_per_volt(drive, sign), SMALLEST) for sign in (1.0, -1.0))
-        volts = follow.reference / np.where(follow.reference >= 0.0, up, down)
+        plus_gain, minus_gain = (max(speed_per_volt(drive, sign), SMALLEST) for sign in (1.0, -1.0))
+        volts = follow.reference / np.where(follow.reference >= 0.0, plus_gain, minus_gain)
         run = drive.simulate(np.clip(volts, -FULL_VOLTAGE, FULL_VOLTAGE), follow.rate)
         error = rms_difference(run.shaft_speed, follow.reference)
     return Performance(min(speeds), min(accelerations), error)

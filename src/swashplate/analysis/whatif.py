@@ -118,8 +118,8 @@ class WhatIf(Result):
             if bands:
                 columns.append(Column("±", "z.2f", none="none"))
                 cells.append(bands[name].half_widths)
-        before, after = cells[0], cells[2 if bands else 1]
-        change = after / np.where(before == 0.0, np.nan, before) - 1.0
+        as_it_is, changed = cells[0], cells[2 if bands else 1]
+        change = changed / np.where(as_it_is == 0.0, np.nan, as_it_is) - 1.0
         table = Table("", (Column(""), *columns, Column("change", "+z.1%"), UNIT))
         plus, minus, *outcome_rows = np.array([*cells, change]).T.tolist()
         table.add("top speed, positive", *plus, unit="rad/s")

@@ -274,14 +274,14 @@ def assess(
     crane = study.loaded_crane
     side.print(seaways_needed(study.seeds or SEAWAYS, allowed / 100.0))
     assessment: Assessment = study.through(assess_control, crane, **keywords)
-    what = "Numbers of every seaway, in SI"
+    content = "Numbers of every seaway, in SI"
     write = assessment.write
     if out is not None and out.suffix.lower() == ".html":
         from swashplate.report.scene import write_assessment
 
-        what = "Verdict"
+        content = "Verdict"
         write = partial(write_assessment, assessment)
-    save(out, what, write)
+    save(out, content, write)
     draw_figure(plot, "plot_assessment", assessment)
     _print_result(study.loaded_crane, assessment.tables(), assessment.sentences()[1:])
     say_saved()

@@ -82,9 +82,9 @@ class StageClock:
         begin = perf_counter()
         from swashplate.equations.code_generation import generating_time
 
-        before = generating_time()
+        generated_before = generating_time()
         yield
-        kernels = generating_time() - before
+        kernels = generating_time() - generated_before
         self.parts["start and kernels"] += kernels
         self.parts[name] = self.parts.get(name, 0.0) + perf_counter() - begin - kernels
 
@@ -226,10 +226,10 @@ def fit(
             resume=resume,
         )
     if result.fit.interrupted and starts:
-        last = result.fit.stages[-1]
+        stage_fit = result.fit.stages[-1]
         note(
-            f"Interrupted in the stage '{last.stage.name}': {last.solution.message}. Only the "
-            "starts are written; the same command with --resume continues."
+            f"Interrupted in the stage '{stage_fit.stage.name}': {stage_fit.solution.message}. "
+            "Only the starts are written; the same command with --resume continues."
         )
         raise typer.Exit(INTERRUPTED)
     with spinner("Assessing"), clock.part("assessment"):
@@ -516,8 +516,8 @@ def demo(
     note(f"Campaign:  {path}")
     estimates = [estimates_table(e, truth=truth.parameters) for e in result.fit.stages]
     show(*estimates)
-    inside, counted = truth_count(estimates)
-    say(f"The truth lies within the 95 % interval for {inside} of {counted} parameters.")
+    inside, total = truth_count(estimates)
+    say(f"The truth lies within the 95 % interval for {inside} of {total} parameters.")
     note("\nHeld out of the fit, and predicted")
     show(*runs_tables(result.predicted))
     say(verdict.headline)

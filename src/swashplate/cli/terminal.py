@@ -110,7 +110,7 @@ def _blocks(table: Table, line_width: int) -> Iterator[rich.table.Table]:
     """
     columns = table.columns
     all_columns = range(len(table.columns))
-    headings = ["" if columns[k] is UNIT else name for k, name in enumerate(table.heads())]
+    headings = ["" if columns[k] is UNIT else name for k, name in enumerate(table.headings())]
     rows = [table.texts(row) for row in table.rows]
     natural_widths = _widths([headings, *rows])
 

@@ -174,9 +174,9 @@ def window_of(
     """The part of a record that --from and --to name; None for all of it. [s]"""
     if begin is None and end is None:
         return None
-    first = float(time[0]) if begin is None else begin
-    last = float(time[-1]) if end is None else end
-    return first, last
+    start = float(time[0]) if begin is None else begin
+    stop = float(time[-1]) if end is None else end
+    return start, stop
 
 
 def named_trial(drive: Drive, command: str, options: CommandSampling) -> tuple[str, Trial]:

@@ -228,9 +228,9 @@ class Crane:
         }
         if not known_to_controller:
             for axis, drive in replacements.items():
-                before = self.controller_drive(axis)
-                if before != drive:
-                    counted_on[axis] = before
+                counted_drive = self.controller_drive(axis)
+                if counted_drive != drive:
+                    counted_on[axis] = counted_drive
         sources = {
             axis: source for axis, source in self.sources.items() if axis not in replacements
         }

@@ -173,10 +173,10 @@ def shafts_for(x: float, y: float, now: Shafts, g: Geometry, home: Home) -> Shaf
     e_y = y - g.axis.y
     c = min(max((sqrt(e_x * e_x + e_y * e_y) - g.foot) / g.boom, 0.0), 1.0)
     rope = luff_rope(Boom(c, sqrt(1.0 - c * c)), g)
-    before = home.slew + now.slew
-    # the turn from where it stands, within ±180 degrees: no jump when it passes the stern
-    cross = -e_y * cos(before) - e_x * sin(before)
-    along = e_x * cos(before) - e_y * sin(before)
+    slew = home.slew + now.slew
+    # the turn from the present angle, within ±180 degrees: no jump when it passes the stern
+    cross = -e_y * cos(slew) - e_x * sin(slew)
+    along = e_x * cos(slew) - e_y * sin(slew)
     return Shafts(now.hoist, now.slew + atan2(cross, along), (home.luff_rope - rope) / g.luff)
 
 

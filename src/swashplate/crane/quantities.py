@@ -134,9 +134,9 @@ def values_in_si(
     values = [to_si(number, quantity.unit, definition.unit, subject) for number in numbers]
     in_degrees = definition.unit == "rad"
     for number, value in zip(numbers, values, strict=True):
-        shown = degrees(value) if in_degrees else value
+        displayed = degrees(value) if in_degrees else value
         # an angle in degrees may come back a rounding beyond its end
-        if not definition.low - ROUNDING <= shown <= definition.high + ROUNDING:
+        if not definition.low - ROUNDING <= displayed <= definition.high + ROUNDING:
             unit = "deg" if in_degrees else definition.unit.replace("1", "")
             written = f"{number:g} {quantity.unit}".removesuffix(" 1")
             raise ParameterError(

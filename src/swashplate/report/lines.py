@@ -40,7 +40,7 @@ def fit_time(ax: Axes, *times: Array) -> None:
     ax.set_xlim(first, last if last > first else first + 1.0)
 
 
-def rows_within(time: Array, window: tuple[float, float] | None, what: str) -> slice:
+def rows_within(time: Array, window: tuple[float, float] | None, source: str) -> slice:
     """Rows of stamps [s] within a window, its ends included, two at least; all without one."""
     if window is None:
         return slice(0, time.size)
@@ -49,8 +49,8 @@ def rows_within(time: Array, window: tuple[float, float] | None, what: str) -> s
     if after - first < 2:
         raise InputError(
             f"The window from {window[0]:g} s to {window[1]:g} s holds {max(after - first, 0)} "
-            f"samples of {what}, which goes from {time[0]:g} s to {time[-1]:g} s; choose one with "
-            "at least two."
+            f"samples of {source}, which goes from {time[0]:g} s to {time[-1]:g} s; choose one "
+            "with at least two."
         )
     return slice(first, after)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
@@ -222,6 +222,11 @@ def handle(name: str, color: str, dashes: Dashes = "solid", width: float = 2.0) 
     from matplotlib.lines import Line2D
 
     return Line2D([], [], color=color, linestyle=dashes, linewidth=width, label=name)
+
+
+def stroke_handles(strokes: Mapping[str, Stroke]) -> list[Line2D]:
+    """Handles for a legend of lines by their names."""
+    return [handle(name, stroke.color, stroke.dashes) for name, stroke in strokes.items()]
 
 
 def put_legend(

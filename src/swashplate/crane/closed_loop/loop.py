@@ -138,7 +138,7 @@ class State(NamedTuple):
     """(6, 3) of hoist, slew and luff: rows `ANGLE` to `TORQUE`."""
     tip: Vector
     hung: Hung
-    still: float
+    rest_time: float
     """Time for which the hoist's command has been within the dead zone. [s]"""
     brake: float
     """How far the brake has fallen in, 0 to 1."""
@@ -385,14 +385,14 @@ def limited(u: float, inverse: Inverse) -> float:
 
 @inlined
 def braked(
-    volts: float, still: float, brake: float, h: float, slow: Inverse
+    volts: float, rest_time: float, brake: float, h: float, inverse: Inverse
 ) -> tuple[float, float]:
     """Time for which the hoist's command has been in its dead zone, and how far the brake is in."""
-    gap = slow.gap
-    within_zone = slow.voltage[gap] < volts < slow.voltage[gap + 1]
-    still = still + h if within_zone else 0.0
-    falls = h / BRAKE_TAKES if still >= BRAKE_WAITS else -h / BRAKE_TAKES
-    return still, min(max(brake + falls, 0.0), 1.0)
+    gap = inverse.gap
+    is_in_dead_zone = inverse.voltage[gap] < volts < inverse.voltage[gap + 1]
+    rest_time = rest_time + h if is_in_dead_zone else 0.0
+    change = h / BRAKE_TAKES if rest_time >= BRAKE_WAITS else -h / BRAKE_TAKES
+    return rest_time, min(max(brake + change, 0.0), 1.0)
 
 
 @inlined
@@ -509,7 +509,7 @@ def loop_of(
         margins = arrays.margins
         marched = arrays.marched
         moving = ship.shape[1] > 1
-        sample, axes, tip, hung, still, brake = state
+        sample, axes, tip, hung, rest_time, brake = state
         shafts = shafts_of(axes, ANGLE)
         boom = boom_at(shafts.luff, g, home)
         rope = rope_length(shafts, g, home)
@@ -591,7 +591,7 @@ def loop_of(
                 omega[0], omega[1], omega[2] = a.outputs[0], b.outputs[0], c.outputs[0]
                 limits[0], limits[1], limits[2] = a.outputs[1], b.outputs[1], c.outputs[1]
             if fixed.brake and actuation != IDEAL:
-                still, brake = braked(volts[0], still, brake, h, inverses[0])
+                rest_time, brake = braked(volts[0], rest_time, brake, h, inverses[0])
                 omega[0] = omega[0] * (1.0 - brake)
             # 4. kinematics and rope
             advance(axes, ANGLE, SHAFT_SPEED, omega, h, sample > 0)
@@ -616,6 +616,6 @@ def loop_of(
                 torques = rope_torques(hung, tip, r, home.slew + shafts.slew, boom, fixed)
                 axes[TORQUE, 0], axes[TORQUE, 1], axes[TORQUE, 2] = torques
             sample += 1
-        return State(sample, axes, tip, hung, still, brake), ended
+        return State(sample, axes, tip, hung, rest_time, brake), ended
 
     return loop

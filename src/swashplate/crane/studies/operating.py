@@ -129,8 +129,8 @@ class Operability(Tabular):
             for limit in self.shares(name):
                 if limit != WORKABLE and limit not in limits:
                     limits.append(limit)
-        heads = [Column(label_of(limit), ".1%", wrap=True) for limit in limits]
-        columns = (Column("variant", wrap=True), Column("workable", ".1%"), *heads)
+        limit_columns = [Column(label_of(limit), ".1%", wrap=True) for limit in limits]
+        columns = (Column("variant", wrap=True), Column("workable", ".1%"), *limit_columns)
         table = Table("Share of the year, and what limits the rest first", columns)
         for name in self.names:
             shares = self.shares(name)

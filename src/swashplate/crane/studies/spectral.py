@@ -75,9 +75,9 @@ class LinearResponse(Result):
             names = [name for name in self.values if _unit(name) == unit]
             spec = ".2f" if unit == "rad" else ".3f"
             title = f"In the frequency domain, largest in {self.duration / 3600.0:g} h"
-            shown = "" if unit == "1" else unit
-            columns = [Column("quantity", wrap=True), Column("rms", spec, shown)]
-            columns += [Column("period", ".1f", "s"), Column("largest", spec, shown)]
+            shown_unit = "" if unit == "1" else unit
+            columns = [Column("quantity", wrap=True), Column("rms", spec, shown_unit)]
+            columns += [Column("period", ".1f", "s"), Column("largest", spec, shown_unit)]
             table = Table(title, columns)
             for name in names:
                 value = self.values[name]

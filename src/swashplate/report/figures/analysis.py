@@ -67,6 +67,7 @@ from swashplate.report.style import (
     put_text,
     sheet,
     signed,
+    stroke_handles,
     write_title,
     zero_line,
 )
@@ -333,7 +334,7 @@ def plot_whatif(
     for name, color in zip(single_changes[:MOST_SINGLE_CHANGES], colors, strict=False):
         strokes[name] = Stroke(color, "dashed")
     strokes[CHANGED] = Stroke(VERMILION, "solid")
-    legend = [handle(name, stroke.color, stroke.dashes) for name, stroke in strokes.items()]
+    legend = stroke_handles(strokes)
     legend.append(handle("reference", GREY, "dotted"))
     changes = ", ".join(f"{name} x {factor:g}" for name, factor in result.factors.items())
     sheet_title = f"{result.before.drive.name}: {changes}" if title is None else title

@@ -187,18 +187,18 @@ def _page_figure(
 ) -> Figure:
     """Figure of a page: a row for each run, its signals side by side."""
     rows = len(experiments)
-    across = len(columns)
-    width = max(WIDTH, across * (NARROWEST + BETWEEN))
-    column_width = width / across - 1.3 * BETWEEN
+    column_count = len(columns)
+    width = max(WIDTH, column_count * (NARROWEST + BETWEEN))
+    column_width = width / column_count - 1.3 * BETWEEN
     figure = new_figure(width, HEAD + 2.0 * ROW + rows * (PANEL + ABOVE) + FOOT)
-    grid = figure.subplots(rows, across, sharex="row", squeeze=False)
+    grid = figure.subplots(rows, column_count, sharex="row", squeeze=False)
     for number, (row, experiment) in enumerate(zip(grid, experiments, strict=True)):
         signals = _signals(experiment)
-        first = min(float(signal.time[0]) for signal in signals.values())
-        last = max(float(signal.time[-1]) for signal in signals.values())
-        if 0.0 < first < _NEAR_ZERO * (last - first):
-            first = 0.0
-        row[0].set_xlim(first, last if last > first else first + 1.0)
+        begin = min(float(signal.time[0]) for signal in signals.values())
+        end = max(float(signal.time[-1]) for signal in signals.values())
+        if 0.0 < begin < _NEAR_ZERO * (end - begin):
+            begin = 0.0
+        row[0].set_xlim(begin, end if end > begin else begin + 1.0)
         for ax, column in zip(row, columns, strict=True):
             dress(ax)
             ax.xaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))

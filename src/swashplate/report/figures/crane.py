@@ -83,13 +83,13 @@ def _panels(
     labels: Sequence[str],
     x_label: str,
     title: str,
-    looks: Mapping[str, style.Stroke],
+    strokes: Mapping[str, style.Stroke],
     texts: Sequence[str],
 ) -> tuple[Figure, list[Axes]]:
     """Make panels with a legend of lines, if there are several, and remarks above them."""
     legend = []
-    if len(looks) > 1:
-        legend = [style.handle(name, look.color, look.dashes) for name, look in looks.items()]
+    if len(strokes) > 1:
+        legend = style.stroke_handles(strokes)
     joined_remarks = remarks(texts)
     lines = 1 + joined_remarks.count("\n")
     figure, axes = style.sheet(heights, title, labels, x_label, legend=legend, lines=lines)
@@ -126,7 +126,7 @@ def plot_crane(
     """
     named = named_runs(runs, MOST_RUNS, "A figure")
     first = next(iter(named.values()))
-    looks = style.strokes(named)
+    strokes = style.strokes(named)
     driven = {name: run for name, run in named.items() if run.actuation != "ideal"}
     panels = _signal_panels(named, sea or {})
     heights = [panel.height for panel in panels]
@@ -141,13 +141,13 @@ def plot_crane(
         labels,
         "time (s)",
         title or first.crane.title,
-        looks,
+        strokes,
         texts=(stick_remark, assumed(first.crane)),
     )
     for ax, panel in zip(axes, panels, strict=False):
-        _draw_signal(ax, panel, looks)
+        _draw_signal(ax, panel, strokes)
     if driven:
-        _draw_limits(axes[-1], driven, looks)
+        _draw_limits(axes[-1], driven, strokes)
     for ax in axes:
         fit_time(ax, first.time)
         if stick_moves:
@@ -184,16 +184,18 @@ def _moves(panel: SignalPanel) -> bool:
     return any(np.ptp(getattr(run, panel.signal)) > MOVED for run in panel.runs.values())
 
 
-def _draw_signal(ax: Axes, panel: SignalPanel, looks: Mapping[str, style.Stroke]) -> None:
+def _draw_signal(ax: Axes, panel: SignalPanel, strokes: Mapping[str, style.Stroke]) -> None:
     """Draw the signal of a panel, a line for each run."""
     for name, run in panel.runs.items():
-        look = looks[name]
-        draw(ax, run.time, getattr(run, panel.signal), look.color, dashes=look.dashes)
+        stroke = strokes[name]
+        draw(ax, run.time, getattr(run, panel.signal), stroke.color, dashes=stroke.dashes)
     if panel.signal == "swing_deg":
         ax.set_ylim(bottom=0.0)
 
 
-def _draw_limits(ax: Axes, runs: Mapping[str, CraneRun], looks: Mapping[str, style.Stroke]) -> None:
+def _draw_limits(
+    ax: Axes, runs: Mapping[str, CraneRun], strokes: Mapping[str, style.Stroke]
+) -> None:
     """Draw bars while limits of slew and luff act, a row for each run and axis."""
     rows = [(name, axis) for name in runs for axis in ("slew", "luff")]
     ax.set_ylim(len(rows) - 0.4, -0.6)
@@ -206,7 +208,7 @@ def _draw_limits(ax: Axes, runs: Mapping[str, CraneRun], looks: Mapping[str, sty
     ax.grid(False, axis="y")
     ax.set_yticks(range(len(rows)), [axis for _, axis in rows], fontsize=style.SMALL)
     for (name, _), text in zip(rows, ax.get_yticklabels(), strict=True):
-        text.set_color(looks[name].color if len(runs) > 1 else style.INK)
+        text.set_color(strokes[name].color if len(runs) > 1 else style.INK)
     style.put_legend(ax, [shade_handle(SHADES[limit]) for limit in ACTING])
 
 
@@ -239,7 +241,7 @@ def plot_sweep(result: Sweep, *, title: str | None = None) -> Figure:
     bearings are on one side of the ship. If one of the runs at a point left the model, the line has
     a gap there, and a cross marks it.
     """
-    looks = style.strokes(result.names)
+    strokes = style.strokes(result.names)
     default_title, x_label = LOOKS[result.over]
     means = "over {} with its 95 % interval"
     if result.over == "bearing":
@@ -253,13 +255,13 @@ def plot_sweep(result: Sweep, *, title: str | None = None) -> Figure:
         assumed(result.crane),
     )
     if result.over == "bearing":
-        return _polar(result, title or default_title, looks, texts)
+        return _polar(result, title or default_title, strokes, texts)
     labels = ("swing, RMS (deg)",)
-    figure, (ax,) = _panels([3.0], labels, x_label, title or default_title, looks, texts)
+    figure, (ax,) = _panels([3.0], labels, x_label, title or default_title, strokes, texts)
     swings = np.degrees(result.values)
     points = result.points
     highest = LEAST
-    for variant, (color, dashes) in enumerate(looks.values()):
+    for variant, (color, dashes) in enumerate(strokes.values()):
         of_variant = swings[:, :, variant].T
         estimates = np.array([rms_of(seaways) for seaways in of_variant])
         left_model = np.isnan(of_variant).any(axis=1)
@@ -269,10 +271,8 @@ def plot_sweep(result: Sweep, *, title: str | None = None) -> Figure:
         ax.plot(points, middle, color=color, linestyle=dashes, linewidth=1.4, marker="o", ms=3.0)
         # crosses of several variants at a point stand below one another
         height = np.full(int(left_model.sum()), 0.97 - 0.05 * variant)
-        across = ax.get_xaxis_transform()
-        ax.plot(
-            points[left_model], height, "x", color=color, ms=5.0, transform=across, clip_on=False
-        )
+        x = ax.get_xaxis_transform()
+        ax.plot(points[left_model], height, "x", color=color, ms=5.0, transform=x, clip_on=False)
         highest = max(highest, float(np.nanmax(np.append(middle, LEAST))))
     ax.plot(points, np.degrees(result.spectrum), color=style.GREY, linewidth=0.8, zorder=1.5)
     if result.over == "height":
@@ -301,10 +301,10 @@ def _side_of(bearings: Array) -> Side | None:
 
 
 def _polar(
-    result: Sweep, title: str, looks: dict[str, style.Stroke], texts: Sequence[str]
+    result: Sweep, title: str, strokes: dict[str, style.Stroke], texts: Sequence[str]
 ) -> Figure:
     """Swing over the bearing around the ship, or over the half of it that the bearings are on."""
-    legend = [style.handle(name, look.color, look.dashes) for name, look in looks.items()]
+    legend = style.stroke_handles(strokes)
     rows = style.legend_rows(legend)
     joined_remarks = remarks(texts)
     header_height = style.HEAD + style.ROW * (rows + 1 + joined_remarks.count("\n"))
@@ -322,7 +322,7 @@ def _polar(
         _dress_circle(ax)
     else:
         _dress_half_circle(ax, SIDES[side])
-    _draw_polar(ax, result, looks)
+    _draw_polar(ax, result, strokes)
     header = figure.add_axes((0.012, 1.0 - (header_height + 0.02) / height, 0.9, 0.001))
     header.set_axis_off()
     style.put_legend(header, legend)
@@ -366,7 +366,7 @@ def _dress_bearings(ax: Any, angles: range) -> None:
     ax.spines["polar"].set_color(style.FAINT)
 
 
-def _draw_polar(ax: Any, result: Sweep, looks: Mapping[str, style.Stroke]) -> None:
+def _draw_polar(ax: Any, result: Sweep, strokes: Mapping[str, style.Stroke]) -> None:
     """Draw the swing of each variant over the bearing, on a logarithmic radius."""
     mean = np.degrees(result.rms())
     largest = float(np.nanmax(np.append(mean, RADII[1])))
@@ -376,7 +376,7 @@ def _draw_polar(ax: Any, result: Sweep, looks: Mapping[str, style.Stroke]) -> No
     closing_bearing = closing_bearing[gap <= 1.5 * np.diff(result.points).max(initial=0.0)]
     bearings = np.append(result.points, closing_bearing)
     outer_radius = float(np.log10(1.3 * largest / CENTRE))
-    for swing, (color, dashes) in zip(mean.T, looks.values(), strict=True):
+    for swing, (color, dashes) in zip(mean.T, strokes.values(), strict=True):
         closed_swing = np.append(swing, swing[: closing_bearing.size])
         radius = np.log10(np.maximum(closed_swing, CENTRE) / CENTRE)
         ax.plot(bearings, radius, color=color, linestyle=dashes, linewidth=1.4, marker="o", ms=2.5)
@@ -420,7 +420,7 @@ def plot_follow(
     By default a new figure; with `ax` it is drawn there, without the remark above, and `ax`
     returned.
     """
-    looks = style.strokes(AXIS_LINES)
+    strokes = style.strokes(AXIS_LINES)
     label = "amplitude (m)"
     x_label = "period (s)"
     if ax is None:
@@ -429,13 +429,13 @@ def plot_follow(
             labels=[label],
             x_label=x_label,
             title=title or "What the axes can follow",
-            looks=looks,
+            strokes=strokes,
             texts=(f"boom at {result.boom_deg:.0f}°", DEMANDED, assumed(result.crane)),
         )
     else:
-        legend = [style.handle(name, look.color, look.dashes) for name, look in looks.items()]
+        legend = style.stroke_handles(strokes)
         (panel,) = style.dress_given(ax, title, [label], x_label, what="panel", legend=legend)
-    lines = list(zip(looks.values(), result.amplitude.T, strict=True))
+    lines = list(zip(strokes.values(), result.amplitude.T, strict=True))
     for (color, dashes), amplitudes in lines:
         panel.plot(result.periods, amplitudes, color=color, linestyle=dashes, linewidth=1.4)
     first = float(result.periods[0])
@@ -470,13 +470,13 @@ def _name_seas(ax: Axes, tops: Mapping[str, tuple[float, float]]) -> None:
     first, last = ax.get_xlim()
     names: list[tuple[float, float, float]] = []
     for name, (period, top) in sorted(tops.items(), key=lambda entry: entry[1]):
-        across = (period - first) / (last - first)
-        up = (np.log(top) - low) / (high - low)
+        x = (period - first) / (last - first)
+        y = (np.log(top) - low) / (high - low)
         width = 0.012 * len(name)
         while any(
-            abs(across - named_across) < 0.5 * (width + named_width) and abs(up - named_up) < 0.06
+            abs(x - named_across) < 0.5 * (width + named_width) and abs(y - named_up) < 0.06
             for named_across, named_up, named_width in names
         ):
-            up += 0.01
-        names.append((across, up, width))
-        style.put_text(ax, name, (across, up), (0.0, 6.0), ha="center", bbox=box)
+            y += 0.01
+        names.append((x, y, width))
+        style.put_text(ax, name, (x, y), (0.0, 6.0), ha="center", bbox=box)

@@ -24,6 +24,7 @@ from swashplate.report.style import (
     handle,
     put_text,
     sheet,
+    stroke_handles,
     strokes,
 )
 from swashplate.results import GivenAxes
@@ -107,8 +108,8 @@ def plot_bode(
     if linear is not None:
         _check_ends(linear, response)
     unit = response.units.get(response.input, "")
-    looks = strokes(f"{amplitude:g} {unit}" for amplitude in response.amplitudes)
-    legend = [handle(name, look.color, look.dashes) for name, look in looks.items()]
+    stroke_by_name = strokes(f"{amplitude:g} {unit}" for amplitude in response.amplitudes)
+    legend = stroke_handles(stroke_by_name)
     if linear is not None:
         legend.append(handle(f"small motions{_operating_point_label(linear)}", GREY, "dashed"))
     output = WORDS.get(response.output, response.output.replace("_", " "))
@@ -126,7 +127,7 @@ def plot_bode(
     else:
         count = min(max(np.size(np.asarray(ax, dtype=object)), 2), 3)
         axes = dress_given(ax, title, labels[:count], "frequency (Hz)", legend=legend)
-    _draw_response(axes, response, list(looks.values()))
+    _draw_response(axes, response, list(stroke_by_name.values()))
     if linear is not None:
         _draw_linear(axes, linear, response)
     _scale_axes(axes, response)
@@ -167,15 +168,15 @@ def _output_unit(response: FrequencyResponse) -> DisplayUnit:
 
 
 def _draw_response(
-    axes: Sequence[Axes], response: FrequencyResponse, looks: Sequence[Stroke]
+    axes: Sequence[Axes], response: FrequencyResponse, stroke_by_name: Sequence[Stroke]
 ) -> None:
     """Draw gain, phase and distortion, in so many axes as there are, a line for each amplitude."""
     gain = _output_unit(response).factor * response.gain
     swept = (gain, np.degrees(response.phase), 100.0 * response.distortion)
     marker = "o" if response.frequencies.size == 1 else None
     for panel, rows in zip(axes, swept, strict=False):
-        for row, moves, look in zip(rows, response.moves, looks, strict=True):
-            style: dict[str, Any] = {"color": look.color, "ls": look.dashes, "lw": LINE}
+        for row, moves, stroke in zip(rows, response.moves, stroke_by_name, strict=True):
+            style: dict[str, Any] = {"color": stroke.color, "ls": stroke.dashes, "lw": LINE}
             shown_row = np.where(moves, row, np.nan)
             panel.plot(response.frequencies, shown_row, marker=marker, ms=4.0, **style)
 
@@ -215,8 +216,8 @@ def _scale_axes(axes: list[Axes], response: FrequencyResponse) -> None:
 def _set_plain_numbers(ax: Axes, which: str, span: float) -> None:
     """Write plain numbers along a logarithmic axis, as many as fit."""
     axis = ax.xaxis if which == "x" else ax.yaxis
-    room = DECADE**3 if which == "x" else DECADE**2
-    subs = (1.0, 2.0, 5.0) if span < room else (1.0,)
+    margin = DECADE**3 if which == "x" else DECADE**2
+    subs = (1.0, 2.0, 5.0) if span < margin else (1.0,)
     axis.set_major_locator(LogLocator(subs=subs, numticks=15))
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axis.set_minor_locator(NullLocator())

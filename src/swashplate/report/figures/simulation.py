@@ -42,7 +42,6 @@ from swashplate.report.style import (
     VERMILION,
     MarginLabel,
     dress_given,
-    handle,
     in_lines,
     label_below,
     label_margin,
@@ -51,6 +50,7 @@ from swashplate.report.style import (
     put_text,
     sheet,
     signed,
+    stroke_handles,
     strokes,
     zero_line,
 )
@@ -242,13 +242,15 @@ def plot_signals(
     if ax is not None:
         _draw_given(run, signals, ax, label, rows, title)
         return ax
-    looks = _looks(run)
-    limits = tuple((look, stretches(run.time, run.active(name))) for name, look in looks.items())
+    shades = _limit_shades(run)
+    limits = tuple(
+        (limit_shade, stretches(run.time, run.active(name))) for name, limit_shade in shades.items()
+    )
     panels = {name: _panel(run, name, label, rows)._replace(limits=limits) for name in signals}
     columns = _columns(run, panels)
     longest = max(map(len, columns.values()))
     height = PANEL if len(panels) > 1 else ALONE
-    legend = _legend(list(panels.values()), tuple(looks.values()))
+    legend = _legend(list(panels.values()), tuple(shades.values()))
     figure, axes = sheet(
         [height] * longest,
         run.title if title is None else title,
@@ -333,7 +335,7 @@ def _definition(run: Run, signal: str) -> Definition:
     return run.instance.model.definitions.get(signal, Definition(name, ""))
 
 
-def _looks(run: Run) -> dict[str, Shade]:
+def _limit_shades(run: Run) -> dict[str, Shade]:
     """Looks of the limits of a user-defined model by name; a drive's stand in its chain."""
     if isinstance(run, Simulation | FullOrderSimulation):
         return {}
@@ -416,12 +418,12 @@ def _chain(panels: Sequence[Panel], time: Array, title: str, rows: slice = slice
     return figure
 
 
-def _legend(panels: Sequence[Panel], looks: Sequence[Shade]) -> list[Patch]:
-    """Handles of the looks of limits that act in one of the panels, in the order given."""
+def _legend(panels: Sequence[Panel], shades: Sequence[Shade]) -> list[Patch]:
+    """Handles of the shades of limits that act in one of the panels, in the order given."""
     acting = set[Shade]()
     for panel in panels:
         acting.update(look for look, spans in panel.limits if spans.size)
-    return [shade_handle(look) for look in looks if look in acting]
+    return [shade_handle(shade) for shade in shades if shade in acting]
 
 
 def _draw_panel(ax: Axes, panel: Panel, time: Array, rows: slice) -> None:
@@ -437,9 +439,9 @@ def _draw_panel(ax: Axes, panel: Panel, time: Array, rows: slice) -> None:
     label = f"{panel.label}\n({name})" if name else panel.label
     ax.set_ylabel(label, fontsize=NORMAL, color=INK)
     zero_line(ax)
-    shown = [factor * trace.values[rows] for trace in panel.traces]
-    low = min(float(curve.min()) for curve in shown)
-    high = max(float(curve.max()) for curve in shown)
+    curves = [factor * trace.values[rows] for trace in panel.traces]
+    low = min(float(curve.min()) for curve in curves)
+    high = max(float(curve.max()) for curve in curves)
     labels = []
     for mark in panel.marks:
         level = factor * mark.level
@@ -452,7 +454,7 @@ def _draw_panel(ax: Axes, panel: Panel, time: Array, rows: slice) -> None:
     span = max(ends) - min(ends)
     spare = max(0.09 * span, 0.5 * (factor * panel.least - span)) or 1.0
     ax.set_ylim(min(ends) - spare, max(ends) + spare)
-    for trace, values in zip(panel.traces, shown, strict=True):
+    for trace, values in zip(panel.traces, curves, strict=True):
         draw(ax, time[rows], values, trace.color, width=trace.width)
         if trace.name:
             labels.append(MarginLabel(float(values[-1]), trace.name, trace.color))
@@ -493,9 +495,9 @@ def plot_maneuver(
     Figure, or `ax` as it was given
     """
     starts = np.array([start for start, _ in maneuver.pieces])
-    before = starts[starts > 0.0] - JUST_BEFORE * maneuver.length
+    before_steps = starts[starts > 0.0] - JUST_BEFORE * maneuver.length
     even = np.linspace(0.0, maneuver.length, COLUMNS)
-    time = np.union1d(even, np.concatenate([starts, before]))
+    time = np.union1d(even, np.concatenate([starts, before_steps]))
     if ax is None:
         title_text = maneuver.name if title is None else title
         figure, (panel,) = sheet([2.4], title_text, ["voltage (V)"], "time (s)")
@@ -526,10 +528,10 @@ def plot_comparison(simulations: Mapping[str, Simulation], *, title: str | None 
     """
     if not simulations:
         raise InputError("A comparison needs at least one simulation.")
-    looks = strokes(simulations)
+    stroke_by_name = strokes(simulations)
     speed = display_unit("rad/s")
     title_text = "Shaft speed under the same command" if title is None else title
-    legend = [handle(name, look.color, look.dashes) for name, look in looks.items()]
+    legend = stroke_handles(stroke_by_name)
     heights = [1.2, 2.6, 1.6] if len(simulations) > 1 else [1.2, 2.6]
     volts = all(simulation.voltage is not None for simulation in simulations.values())
     labels = ["voltage (V)" if volts else "current (A)", speed.label("shaft speed")]
@@ -543,7 +545,7 @@ def plot_comparison(simulations: Mapping[str, Simulation], *, title: str | None 
         for simulation in simulations.values()
     ]
     for (name, run), command in zip(simulations.items(), commands, strict=True):
-        color, dashes = looks[name]
+        color, dashes = stroke_by_name[name]
         time = run.time
         if run is first:
             draw(axes[0], time, command, INK, zorder=3.0)
@@ -557,6 +559,6 @@ def plot_comparison(simulations: Mapping[str, Simulation], *, title: str | None 
             draw(axes[2], at, speed.factor * difference, color, dashes=dashes)
     if len(simulations) > 1:
         label = f"speed minus that of {reference}"
-        put_text(axes[2], label, (0.0, 1.0), color=looks[reference].color)
+        put_text(axes[2], label, (0.0, 1.0), color=stroke_by_name[reference].color)
     fit_time(axes[-1], *(simulation.time for simulation in simulations.values()))
     return figure

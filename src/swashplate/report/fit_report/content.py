@@ -360,11 +360,11 @@ def _data_section(
         Markup('<span id="finding-{}">{}</span>').format(number, sentence)
         for number, sentence in enumerate(findings, start=1)
     ]
-    shown = PageBlock(
+    details = PageBlock(
         "details", [PageBlock("table", quality, "data")], count(len(quality.rows), "signal")
     )
     used = listed_block([overview.sentence for overview in overviews])
-    return Section("data", "Data quality", [*used, text(heading), *listed_block(numbered), shown])
+    return Section("data", "Data quality", [*used, text(heading), *listed_block(numbered), details])
 
 
 def _setup_section(
@@ -414,14 +414,14 @@ def _stage_sentences(fit: StageFit) -> list[str]:
 
 
 def _weight_text(weight: WeightWindow) -> str:
-    when = "all of the run"
+    period = "all of the run"
     if weight.start is not None or weight.stop is not None:
         first = "the start" if weight.start is None else f"{weight.start:g} s"
-        last = "the end" if weight.stop is None else f"{weight.stop:g} s"
-        when = f"{first} to {last}"
-    where = f" in '{weight.maneuver}'" if weight.maneuver else ""
+        stop = "the end" if weight.stop is None else f"{weight.stop:g} s"
+        period = f"{first} to {stop}"
+    place = f" in '{weight.maneuver}'" if weight.maneuver else ""
     why = f" ({weight.why})" if weight.why else ""
-    return f"{weight.factor:g} on {when}{where}{why}"
+    return f"{weight.factor:g} on {period}{place}{why}"
 
 
 # --- verdict --------------------------------------------------------------------------------------
@@ -457,11 +457,11 @@ def _parameter_section(fit: Fit, stages: Sequence[StageFit], truth: ParameterSet
     )
     blocks = [text(explanation)]
     if truth is not None:
-        inside, counted = truth_count(estimates)
+        inside, total = truth_count(estimates)
         blocks.append(
             text(
                 "Truth is the simulated value. Fixed parameters with other values shift the "
-                f"estimates. {inside} of {counted} intervals contain it."
+                f"estimates. {inside} of {total} intervals contain it."
             )
         )
     for table, stage in zip(estimates, stages, strict=True):
@@ -510,10 +510,15 @@ def _identifiability_section(stages: Sequence[StageFit]) -> Section:
     return Section("identifiability", "Uncertainty", blocks)
 
 
-def _effects(identifiability: Identifiability, shown: Sequence[bool]) -> list[PageBlock]:
+def _effects(identifiability: Identifiability, shown_mask: Sequence[bool]) -> list[PageBlock]:
     """Tabulate the change of all weighted residuals for 1 % of each parameter, largest first."""
     table = Table("", (Column("parameter"), Column("change of the residuals for 1 %", ".3g")))
-    pairs = zip(identifiability.sensitivity, identifiability.variables.names, shown, strict=True)
+    pairs = zip(
+        identifiability.sensitivity,
+        identifiability.variables.names,
+        shown_mask,
+        strict=True,
+    )
     for effect, name in sorted(
         ((float(e), name) for e, name, is_shown in pairs if is_shown), reverse=True
     ):
@@ -538,8 +543,8 @@ def _correlations(stage: StageFit, general: Sequence[bool]) -> list[PageBlock]:
         table.add(first, second, correlation)
     if not table.rows:
         return []
-    shown = PageBlock("table", table, "correlations")
-    return [PageBlock("details", [shown], "Strongest correlations of the estimates")]
+    block = PageBlock("table", table, "correlations")
+    return [PageBlock("details", [block], "Strongest correlations of the estimates")]
 
 
 def _starts_section(several: Mapping[str, Sequence[Solution]]) -> Section:

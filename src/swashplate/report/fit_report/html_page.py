@@ -173,7 +173,7 @@ def html_table(table: Table, css_class: str = "") -> Markup:
     """HTML of a table for a page. A symbol stands below its meaning, a role is a badge."""
     page_table = table.of("p")
     pieces = [f'<table class="{escape(css_class)}"><thead><tr>']
-    for column, heading in zip(page_table.columns, page_table.heads(), strict=True):
+    for column, heading in zip(page_table.columns, page_table.headings(), strict=True):
         if column.name != "meaning":
             pieces.append(f'<th class="{"n" if column.spec else ""}">{escape(heading)}</th>')
     pieces.append("</tr></thead><tbody>")

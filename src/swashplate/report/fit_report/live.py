@@ -141,7 +141,7 @@ def live_page(
     limits = [(1 << k, Limit[name.upper()]) for k, (_, name) in enumerate(exported.limits)]
     numbers = values_of(Drive(parameters), runs[0]["step"])
     values = _parameters(parameters)
-    before = "as fitted" if any(value["main"] for value in values) else "as it is"
+    present_label = "as fitted" if any(value["main"] for value in values) else "as it is"
     content = {
         "wasm": b64encode(packaged(WASM)).decode("ascii"),
         "values": b64encode(numbers.astype("<f8").tobytes()).decode("ascii"),
@@ -149,7 +149,7 @@ def live_page(
         "design_variables": _design_variables(values),
         "outputs": [{"name": output, "number": k} for k, output in enumerate(exported.names)],
         "limits": [[bit, _word(limit)] for bit, limit in limits],
-        "before": before,
+        "before": present_label,
         "filter": {"low": LOW_PASS, "high": DIFFERENTIATOR},
         "unmeasured": [_signal_panel(signal) for signal in UNMEASURED],
         "runs": runs,
@@ -167,8 +167,8 @@ def live_page(
         drive=parameters.title or parameters.name,
         virtual=virtual,
         measured=any(run["channels"] for run in runs),
-        fitted=before == "as fitted",
-        before=before,
+        fitted=present_label == "as fitted",
+        before=present_label,
         limits=[(SHADES[limit].name, SHADES[limit].color) for limit in SHADES],
         file=name,
     )
@@ -299,14 +299,14 @@ def _measured_channel(channel: Channel) -> dict[str, Any]:
     if signal == "current_sum":
         signal = "current_positive"
         also = "current_negative"
-    shown = _signal_panel(signal, name, unit, float(np.abs(values).max(initial=0.0)))
+    panel = _signal_panel(signal, name, unit, float(np.abs(values).max(initial=0.0)))
     interval = float(np.median(np.diff(channel.time)))
     return {
-        **shown,
+        **panel,
         "also": also,
         "speed": channel.is_position,
         "time": packed_samples(channel.time, interval / 2**20),
-        "measured": packed_samples(shown["factor"] * values),
+        "measured": packed_samples(panel["factor"] * values),
         "breaks": [int(row) for row in gap_rows(channel.time)],
         "ignored": ignored_windows(channel),
     }
@@ -315,16 +315,16 @@ def _measured_channel(channel: Channel) -> dict[str, Any]:
 def _signal_panel(signal: str, name: str = "", unit: str = "", size: float = 0.0) -> dict[str, Any]:
     """A signal's panel: label, displayed unit, limits that are shaded in it."""
     unit = unit or {"current": "A", "shaft_speed": "rad/s"}[signal]
-    shown = display_unit(unit, size)
+    displayed = display_unit(unit, size)
     electric = "current" in signal
     label = name or signal.replace("_", " ")
     return {
         "signal": signal,
         "name": label,
-        "unit": shown.name,
-        "factor": shown.factor,
-        "label": in_lines(shown.label(label), 24),
-        "residual": in_lines(shown.label("residual"), 14),
+        "unit": displayed.name,
+        "factor": displayed.factor,
+        "label": in_lines(displayed.label(label), 24),
+        "residual": in_lines(displayed.label("residual"), 14),
         "shaded": [_word(limit) for limit in Limit if bool(limit & BEFORE_CURRENT) == electric],
     }
 

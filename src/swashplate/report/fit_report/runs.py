@@ -136,12 +136,12 @@ def _largest_size(values: Array) -> float:
 
 def off_scale(channel: Channel, values: Array) -> Mask:
     """(m,) ignored samples so far from those that count that they would press these flat."""
-    used = channel.used
-    if not used.any():
+    used_samples = channel.used
+    if not used_samples.any():
         return np.zeros(values.size, dtype=np.bool_)
-    low, high = float(values[used].min()), float(values[used].max())
-    room = 0.5 * (high - low)
-    far: Mask = ~used & ((values < low - room) | (values > high + room))
+    low, high = float(values[used_samples].min()), float(values[used_samples].max())
+    margin = 0.5 * (high - low)
+    far: Mask = ~used_samples & ((values < low - margin) | (values > high + margin))
     return far
 
 
@@ -210,13 +210,13 @@ def run_data(run: ShownRun) -> dict[str, Any]:
     }
 
 
-def _channel_data(shown: ShownChannel) -> dict[str, Any]:
-    channel = shown.channel
-    factor = shown.unit.factor
-    small = shown.small.factor
-    residual = small * shown.quality.residual
+def _channel_data(displayed: ShownChannel) -> dict[str, Any]:
+    channel = displayed.channel
+    factor = displayed.unit.factor
+    small = displayed.small.factor
+    residual = small * displayed.quality.residual
     rms = float(np.sqrt(np.mean(np.square(residual[channel.used])))) if channel.used.any() else 0.0
-    signals = [(factor * shown.quality.simulated, None), (residual, rms / FINE or None)]
+    signals = [(factor * displayed.quality.simulated, None), (residual, rms / FINE or None)]
     return {
         **_packed_signals(channel.time, signals, off_scale(channel, factor * channel.values)),
         "ratio": factor / small,

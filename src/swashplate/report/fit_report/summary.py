@@ -199,7 +199,7 @@ def _range_of(drive: Drive, stages: Sequence[StageFit], values: Array, largest: 
     half = QUANTILE * errors
     nearest, farthest = _at_limits(drive, unseen), without_limits(drive, unseen)
     near, far = machine_numbers_of(nearest, largest), machine_numbers_of(farthest, largest)
-    moved = np.maximum(np.abs(near - values), np.abs(far - values))
+    largest_change = np.maximum(np.abs(near - values), np.abs(far - values))
     left_open = np.abs(far - near) > OPEN * np.abs(near)
     doubt = np.full((6, 2), "", dtype=object)
     for name, variances in variances_from_bounds(stages, numbers, unseen).items():
@@ -219,7 +219,7 @@ def _range_of(drive: Drive, stages: Sequence[StageFit], values: Array, largest: 
         )
         cautious = QUANTILE * at_ends * np.sign(near)
         near = np.where(np.abs(far) > np.abs(near), near - cautious, near + cautious)
-    half = np.where(left_open, np.nan, half + moved)
+    half = np.where(left_open, np.nan, half + largest_change)
     near, far = np.where(left_open, near, values), np.where(left_open, far, values)
     return _Range(half, doubt, near, far)
 
@@ -269,21 +269,21 @@ def _cell(factor: float, values: Array, range_: _Range, index: tuple[int, int]) 
         return Cell(None, NONE)
     if range_.doubt[index]:
         has_half = 0.0 < half < np.inf
-        shown = f"{value:.{_decimals(value, half)}f}" if has_half else f"{value:.4g}"
-        return Cell(value, f"{_unsigned_zero(shown)} ({range_.doubt[index]})")
+        number = f"{value:.{_decimals(value, half)}f}" if has_half else f"{value:.4g}"
+        return Cell(value, f"{_unsigned_zero(number)} ({range_.doubt[index]})")
     if near != far:
         at_least = abs(far) > abs(near)
         end = "least" if at_least else "most"
         return Cell(near, f"at {end} {_three_digits(near, towards_zero=at_least)}, not seen")
     if half <= 1e-9 * abs(value):
-        # it follows from what the fit left at its nominal value alone
+        # it depends only on parameters that the fit left at their nominal values
         return Cell(value, f"{value:.4g} (fixed)")
     if not np.isfinite(half):
         return Cell(value, f"{value:.4g}")
     decimals = _decimals(value, half)
     upwards = ceil(half * 10.0**decimals - 1e-9) / 10.0**decimals
-    shown = _unsigned_zero(f"{value:.{decimals}f}")
-    return Cell(value, f"{shown} ± {upwards:.{decimals}f}")
+    number = _unsigned_zero(f"{value:.{decimals}f}")
+    return Cell(value, f"{number} ± {upwards:.{decimals}f}")
 
 
 def _decimals(value: float, half: float) -> int:
@@ -292,9 +292,9 @@ def _decimals(value: float, half: float) -> int:
     return max(min(decimals, 3 - floor(log10(max(abs(value), half)))), 0)
 
 
-def _unsigned_zero(shown: str) -> str:
+def _unsigned_zero(number: str) -> str:
     """A number as it is printed, a zero without a sign."""
-    return shown if float(shown) else shown.removeprefix("-")
+    return number if float(number) else number.removeprefix("-")
 
 
 def _three_digits(value: float, towards_zero: bool) -> str:
@@ -371,12 +371,12 @@ def summary_section(
     """The first screen: `drive` is None for a user-defined model, which has no such numbers."""
     look: Light = "good" if judged.usable else "bad"
     headline = judged.headline.replace(" %", "\N{NO-BREAK SPACE}%")
-    shown = [
+    blocks = [
         PageBlock(
             "verdict", (light(look, "Usable" if judged.usable else "Not usable"), headline), look
         )
     ]
-    shown.append(PageBlock("pair", list(_curve_blocks(runs, campaign.virtual))))
+    blocks.append(PageBlock("pair", list(_curve_blocks(runs, campaign.virtual))))
     numbers = []
     limits = []
     if drive is not None:
@@ -394,8 +394,10 @@ def summary_section(
         limits += listed_block(_limit_sentences(drive, stages))
     limits.append(PageBlock("heading", "What to do next", "h3"))
     limits += listed_block(_next_steps(judged, campaign, stages, runs, findings))
-    shown.append(PageBlock("pair", [PageBlock("tile", tile) for tile in (numbers, limits) if tile]))
-    return Section("summary", "Summary", shown)
+    blocks.append(
+        PageBlock("pair", [PageBlock("tile", tile) for tile in (numbers, limits) if tile])
+    )
+    return Section("summary", "Summary", blocks)
 
 
 def _curve_blocks(runs: Sequence[ShownRun], virtual: bool) -> Iterable[PageBlock]:
@@ -435,8 +437,8 @@ def _limit_sentences(drive: Drive, stages: Sequence[StageFit]) -> list[str]:
     shares = [
         f"{limit.limit} {percent(limit.time_share)}" for limit in acting[:3] if limit.time_share
     ]
-    head = f"Share of the time of steps from rest to {plus:.3g} and -{minus:.3g} V and back"
-    return [f"{head}: {', '.join(shares) or 'nothing acts'}.", *limit_times.sentences()[:1]]
+    heading = f"Share of the time of steps from rest to {plus:.3g} and -{minus:.3g} V and back"
+    return [f"{heading}: {', '.join(shares) or 'nothing acts'}.", *limit_times.sentences()[:1]]
 
 
 def _next_steps(
@@ -467,8 +469,8 @@ def _next_steps(
     if stages and not any(run.role == "validate" for run in runs):
         steps.append('Hold a run out of the fit (role = "validate"): nothing was predicted yet.')
     if judged.usable:
-        what = f"Use the {subject}"
-        steps.append(f"{what}. {judged.validity}" if judged.validity else f"{what}.")
+        advice = f"Use the {subject}"
+        steps.append(f"{advice}. {judged.validity}" if judged.validity else f"{advice}.")
         if stages and subject == "drive":
             steps.append(Markup("Try it: <code>swashplate simulate drive.toml step:9</code>."))
     return steps
