@@ -105,7 +105,7 @@ def without_limits(drive: Drive, columns: Iterable[str]) -> Drive:
 # --- acceleration ---------------------------------------------------------------------------------
 
 AcceleratedBy = Literal["valve", "spool stop", "orifice"]
-"""What sets the flow to the stroking piston: the opening that the solenoids can give, the spool's
+"""Limit of the flow to the stroking piston: the opening that the solenoids can give, the spool's
 stop Z14, or the in-line orifice Z16."""
 
 INSIDE = 1e-9

@@ -248,14 +248,20 @@ class InverseMap(Result):
         total = self.minus.speed.size + self.plus.speed.size + 1
         if len(points.rows) < total:
             points.caption = f"{len(points.rows)} of {total} points shown"
-        up, down = self.acceleration
+        plus, minus = self.acceleration
         limits = Table(
             "", (Column("Limit"), Column("negative", ".3f"), Column("positive", ".3f"), UNIT)
         )
         lowest, highest = self.limits
         limits.add("speed", lowest, highest, unit="rad/s")
         limits.add("slowest that can be held", gap_start, gap_end, unit="rad/s", spec="z.3f")
-        limits.add("acceleration at rest", -down, up, unit="rad/s^2", spec=".2f")
+        limits.add(
+            "acceleration at rest",
+            -minus,
+            plus,
+            unit="rad/s^2",
+            spec=".2f",
+        )
         limits.add("lag", "", 1e3 * self.lag, unit="ms", spec=".1f")
         limits.add("interpolation error", "", self.error, unit="rad/s", spec=".2g")
         return [voltages_table, points, limits] if speeds else [points, limits]
@@ -429,8 +435,9 @@ def proportional_command(inverse: InverseMap, reference: ArrayLike) -> Array:
     """
     speed = np.asarray(reference, dtype=np.float64)
     low, high = inverse.limits
-    up, down = inverse.plus.voltage[-1] / high, inverse.minus.voltage[0] / low
-    return np.asarray(np.where(speed >= 0.0, up * speed, down * speed))
+    positive_gain = inverse.plus.voltage[-1] / high
+    negative_gain = inverse.minus.voltage[0] / low
+    return np.asarray(np.where(speed >= 0.0, positive_gain * speed, negative_gain * speed))
 
 
 def speed_of_command(inverse: InverseMap, voltage: ArrayLike) -> Array:

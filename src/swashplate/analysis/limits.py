@@ -36,9 +36,9 @@ class Removal(Result):
     limit: str
     """Its name with spaces."""
     component: str
-    """What would have to change in the machine."""
+    """Component of the machine to change."""
     flag: Limit | None
-    """How a simulation marks it; None for what acts always or is not marked."""
+    """Flag of a simulation that marks it; None if it acts always or is not marked."""
     changes: dict[str, Change]
     """Parameters that take it away, SI."""
     signal: str = field(default="", kw_only=True)
@@ -134,7 +134,7 @@ class LimitShares(Tabular):
     """Rms tracking error of the drive as it is. [rad/s]"""
     shares: tuple[LimitShare, ...]
     compared_with: str = "a drive without limits"
-    """What the drive is compared with, in words."""
+    """Name of the drive or speed that the drive is compared with."""
     unreached: tuple[str, ...] = ()
     """Columns of limits that act here and that no test of the drive reached."""
 

@@ -85,7 +85,7 @@ REQUIRED = {
     "acceleration": ("rad/s^2", 1.0),
     "tracking_error": ("rad/s", -1.0),
 }
-"""What can be required, its unit, and 1 for at least, -1 for at most."""
+"""Requirements by name, with unit, and 1 for at least, -1 for at most."""
 
 
 @dataclass(frozen=True)

@@ -205,7 +205,7 @@ class OneAtATime(Drawn):
     high: Array
     """(L, K) with each design variable at its upper factor."""
     sentences: tuple[str, ...]
-    """What could not be simulated, or has no such outcome."""
+    """Sentences on changes that could not be simulated, or that lack an outcome."""
 
     @property
     def swings(self) -> Array:

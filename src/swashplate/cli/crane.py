@@ -79,14 +79,14 @@ def show_crane(
         read = read_text if crane.endswith(".toml") else preset_text
         typer.echo(read(crane), nl=False)
         return
-    chosen_crane = crane_of(crane)
-    tables = [chosen_crane.table()]
-    if chosen_crane.limits:
-        tables.append(chosen_crane.limit_table())
+    loaded_crane = crane_of(crane)
+    tables = [loaded_crane.table()]
+    if loaded_crane.limits:
+        tables.append(loaded_crane.limit_table())
     show(*tables)
     for axis in AXES:
-        note(f"{axis}: {getattr(chosen_crane, axis).parameters.title}")
-    for sentence in chosen_crane.provenance():
+        note(f"{axis}: {getattr(loaded_crane, axis).parameters.title}")
+    for sentence in loaded_crane.provenance():
         say(sentence)
 
 
@@ -156,7 +156,7 @@ def run(
     the controller has ended its command.
     """
     runs = {}
-    last = ""
+    variants = variant or ["inverse"]
     if out is not None and len(variant or ()) > 1:
         raise InputError("--out writes one run's signals: use one --variant.")
     with spinner("Simulating"):
@@ -169,15 +169,14 @@ def run(
             hoist=hoist, slew=slew, luff=luff, until=targets, duration=duration, length=length
         )
         ship = seaway or operated.motion(round(command.length * RATE) + 1)
-        for last in variant or ["inverse"]:
-            drives, _, controller = last.partition(":")
-            how: dict[str, Any] = {"control": control_of(controller)}
-            how["actuation"] = "inverse" if drives == "identified" else drives
-            runs[last] = simulate(
-                crane, command, sea=ship, brake=brake, **how, **operated.run_options
-            )
+        for variant_name in variants:
+            drives, _, controller = variant_name.partition(":")
+            options = operated.run_options
+            options["control"] = control_of(controller)
+            options["actuation"] = "inverse" if drives == "identified" else drives
+            runs[variant_name] = simulate(crane, command, sea=ship, brake=brake, **options)
         tables = run_tables(runs)
-    save(out, "All signals, in SI", runs[last].write)
+    save(out, "All signals, in SI", runs[variants[-1]].write)
     draw_figure(plot, "plot_crane", runs)
     if scene is not None:
         from swashplate.report.scene import write_scene

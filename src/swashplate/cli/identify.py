@@ -58,7 +58,7 @@ FILES = {
     "estimates.csv": "Estimates",
     "fit.json": "Fit",
 }
-"""What `Identification.save` writes, of a drive or of a user-defined model."""
+"""Files that `Identification.save` writes, of a drive or of a user-defined model."""
 MEASURES = (
     "NRMSE is the RMSE over the standard deviation of what was measured, fit % is 100 (1 - "
     "NRMSE); 'of range' below: over the range of the signal, its largest minus its smallest value."

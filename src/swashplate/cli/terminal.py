@@ -1,4 +1,4 @@
-"""What reaches the terminal: tables and notes, and a sign of life while a person waits."""
+"""Output to the terminal: tables and notes, and a sign of life while a person waits."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from swashplate.tables import UNIT, Form, Table, check_place, ending
 SAVED: ContextVar[list[str]] = ContextVar("SAVED")
 """Lines on the files that a command wrote."""
 RESOURCES: ContextVar[ExitStack] = ContextVar("RESOURCES")
-"""What is released when a command ends, such as the lock of a folder."""
+"""Resources that are released when a command ends, such as the lock of a folder."""
 BETWEEN = 2
 """Characters between two columns."""
 NARROW = "\N{NO-BREAK SPACE}%"

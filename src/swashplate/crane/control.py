@@ -41,9 +41,9 @@ SEEN = (
     *("reference_x", "reference_y"),
     *("surge", "sway", "heave", "roll", "pitch", "yaw"),
 )
-"""What a user-defined controller may take as inputs: load less tip, horizontal, inertial [m]; rope
-[m]; slew and boom [rad]; the operator's tip in the ship's frame, shaped [m]; the ship's motion [m],
-[rad]."""
+"""Signals that a user-defined controller may take as inputs: load less tip, horizontal, inertial
+[m]; rope [m]; slew and boom [rad]; the operator's tip in the ship's frame, shaped [m]; the ship's
+motion [m], [rad]."""
 SENSED = (
     ("rope_angle_noise_deg", 0.0, 10.0),
     ("motion_noise_deg", 0.0, 10.0),

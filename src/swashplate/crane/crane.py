@@ -77,9 +77,9 @@ class Crane:
     known_to_controller: Mapping[str, Drive] = field(default_factory=dict)
     """Drives that the controller counts on, by axis, if they are not those that move the crane."""
     sources: Mapping[str, DriveSource] = field(default_factory=dict)
-    """Where drives come from that are neither packaged nor made in Python, by axis."""
+    """Sources of drives that are neither packaged nor made in Python, by axis."""
     limits: Mapping[str, CraneQuantity] = field(default_factory=dict)
-    """What an operation may reach, by names of `swashplate.crane.LIMITED`."""
+    """Limits of an operation, by names of `swashplate.crane.LIMITED`."""
 
     def __post_init__(self) -> None:
         _ = self._si, self.limits_si
@@ -192,7 +192,7 @@ class Crane:
         ----------
         known_to_controller : bool
             Whether the controller knows the new drives, as after a redesign. If not, it counts on
-            the drives before, as if a drive has worn: inverse maps, the stick's full speed and the
+            the present drives, as if a drive has worn: inverse maps, the stick's full speed and the
             clip are theirs.
         **drives
             Each is a drive, ``luff=crane.luff.scale(Z16=1.5)``; the result of a fit; a packaged

@@ -16,9 +16,9 @@ if TYPE_CHECKING:
     from swashplate.identification import Verdict
 
 DRIVE_FILE, FIT_FILE = "drive.toml", "fit.json"
-"""What a fit writes into its folder: the drive, and the fit itself with its verdict."""
+"""Files in the folder of a fit: the drive, and the fit itself with its verdict."""
 UNUSABLE: Final = "Not usable"
-"""How the verdict begins on a fit that nothing should rest on; the title of such a drive has it."""
+"""Beginning of the verdict on a fit that is not usable; the title of such a drive has it."""
 
 
 class Fitted(Protocol):

@@ -158,7 +158,7 @@ DEFINITIONS = Definitions(
     CATALOGUE | REFINEMENTS,
     {column: path for declared in _DECLARED for column, path in declared.paths.items()},
 )
-"""What a drive of the package's equations has."""
+"""Definitions of the parameters of a drive with the package's equations."""
 
 
 @lru_cache(maxsize=64)

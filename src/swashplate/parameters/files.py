@@ -94,7 +94,7 @@ class SetFile(FileTable):
     pump_motor: dict[str, ParameterEntry]
     model: ModelOptions = ModelOptions()
     refinements: dict[str, ParameterEntry] = Field({})
-    """What goes beyond Kruse's equations; all of it is off if it is not given."""
+    """Options beyond Kruse's equations; all are off by default."""
 
 
 # --- reading --------------------------------------------------------------------------------------

@@ -61,7 +61,7 @@ VOLTAGES = np.linspace(0.0, FULL_VOLTAGE, 101)
 MOST_INTERPRETED = 5000
 """Number of single sets whose check by Python takes as long as compiling the check does."""
 _single_checks = count()
-"""How many sets have been checked one by one."""
+"""Counts the sets that are checked one by one."""
 N_CHANNEL = len(CardChannel._fields)
 N_PUMP = len(Pump._fields)
 

@@ -1,4 +1,4 @@
-"""How figures look: colours, sheets of panels, axes, legends. Matplotlib's global state is left."""
+"""Style of figures: colours, sheets of panels, axes, legends. Matplotlib's global state is left."""
 
 from __future__ import annotations
 
@@ -350,7 +350,7 @@ _METADATA: dict[str, dict[str, None]] = {
     "svg": {"Date": None},
     "pdf": {"CreationDate": None},
 }
-"""What to leave out, because it would differ between two runs on the same figure."""
+"""Metadata to leave out, because they would differ between two runs on the same figure."""
 
 
 def save_figure(figure: Figure, path: str | Path) -> None:

@@ -62,7 +62,7 @@ IDEAL, VOLTS, INVERSE, DIRECT, MARCHED = range(5)
 """Actuation: instantaneous speeds; 10 V for full speed; the inverse map's voltage; voltages as
 given; drives that were simulated before."""
 FINE, TOO_FAST, BOOM_OUT, ROPE_OUT, NO_NUMBER = range(5)
-"""How a pass ended."""
+"""End of a pass."""
 ANGLE, SHAFT_SPEED, OPERATOR_ANGLE, OPERATOR_SPEED, REFERENCE_ANGLE, TORQUE = range(6)
 """Shafts' angles and speeds; angles to which only the stick would have brought them, and its
 speeds; reference angles of control; torques of the rope. [rad], [rad/s], [N m]"""
@@ -141,7 +141,7 @@ class State(NamedTuple):
     rest_time: float
     """Time for which the hoist's command has been within the dead zone. [s]"""
     brake: float
-    """How far the brake has fallen in, 0 to 1."""
+    """Share by which the brake has fallen in, 0 to 1."""
 
 
 class Seen(NamedTuple):

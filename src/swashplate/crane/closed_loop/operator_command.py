@@ -1,4 +1,4 @@
-"""What the operator commands over time, as parts of each drive's full speed."""
+"""Commands of the operator over time, as fractions of each drive's full speed."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 LONGEST = 86_400.0
 """A day, longer than any run. [s]"""
 TARGETS = {"hoist": "rope_m", "slew": "slew_deg", "luff": "boom_deg"}
-"""What the target of an axis is called: rope below the tip, slew, elevation of the boom."""
+"""Name of the target of each axis: rope below the tip, slew, elevation of the boom."""
 
 
 @dataclass(frozen=True, eq=False)

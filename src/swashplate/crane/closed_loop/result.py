@@ -78,9 +78,9 @@ class CraneRun(Tabular):
     ship: Array
     """(n, 6) surge, sway, heave [m], roll, pitch, yaw [rad]; (n, 1) zeros for a ship at rest."""
     stored: Array = field(repr=False)
-    """What the loop stores of each sample, by `fixed.columns`, SI."""
+    """Stored signals of each sample, by `fixed.columns`, SI."""
     fixed: Fixed = field(repr=False)
-    """What stayed as it was: home, mass of load and hook, settings of the controller."""
+    """Constants of the run: home, mass of load and hook, settings of the controller."""
     stick_end: float
     """When the last command has returned to zero. [s]"""
 

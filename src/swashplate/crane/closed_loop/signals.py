@@ -30,7 +30,7 @@ SPEED, SHAFT, TIP, LOAD, PULL = 0, 3, 6, 9, 12
 """First columns of what the loop stores of every run: four groups of three, and the pull."""
 ABSENT = -1
 BOOM_AND_ROPE = ("rope", "boom_cos", "boom_sin")
-"""What follows from the angles of the shafts."""
+"""Signals that follow from the angles of the shafts."""
 PARTS = {"hoist": 0, "slew": 1, "luff": 2, "x": 0, "y": 1, "z": 2}
 """Position of an axis in its group."""
 

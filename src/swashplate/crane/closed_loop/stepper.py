@@ -38,7 +38,7 @@ Actuation = Literal["ideal", "volts", "inverse", "direct"]
 ACTUATIONS: tuple[str, ...] = get_args(Actuation)
 """In the order of `loop.IDEAL` and the others."""
 OUTPUTS = ("shaft_speed", "limits")
-"""What the loop takes of each drive."""
+"""Signals of each drive that the loop uses."""
 RIGID = Suspension()
 """A point on a rigid rope."""
 WIDEST, STRONGEST = 1e5, 100.0

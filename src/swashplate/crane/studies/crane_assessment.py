@@ -46,7 +46,7 @@ QUESTIONS: tuple[Question, ...] = ("harm", "sufficiency")
 Decision = Literal["yes", "no", "not decided"]
 
 LOOP = PositionLoop()
-"""What a clip is tried with: a stiffer loop brings back what the clip takes."""
+"""Position loop with which clips are tried: a stiff one compensates for the motion clipped."""
 NO_TIPPING_POINT = (
     "In short runs, no other value tried for damping, roll period, height, period, peak factor, "
     "heading or drum, each alone, clearly changes the answer."
@@ -134,7 +134,7 @@ class Assessment(Tabular, Drawn):
     """The crane without control in the frequency domain; None if its swing is not damped."""
     remedies: tuple[Remedy, ...] = ()
     tried: tuple[str, ...] = ()
-    """What else was tried, and does not pass all that was asked."""
+    """Other changes that were tried, and that do not meet all requirements."""
     tipping_points: tuple[TippingPoint, ...] | None = None
     """Assumed or given numbers that would turn the answer, if they were others; None if none were
     looked for."""

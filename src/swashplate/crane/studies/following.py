@@ -1,4 +1,4 @@
-"""What an axis can follow: the largest sine of the tip, known beforehand from its drive."""
+"""The largest sine of the tip that an axis can follow, computed from its drive."""
 
 from __future__ import annotations
 

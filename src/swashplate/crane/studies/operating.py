@@ -60,9 +60,9 @@ SHORTEST = 300.0
 ACTS = 0.05
 """Share of time at a limit from which on a drive is what limits a cell."""
 WORKABLE = ""
-"""What limits a cell that can be worked: nothing."""
+"""In place of a limit, for a cell that can be worked."""
 LEFT = "leaves the model"
-"""What limits a cell in which a run is not an operation any more."""
+"""In place of a limit, for a cell in which a run is not a valid operation to its end."""
 DRIVES_LIMITS: Mapping[Limit, str] = {
     Limit.ORIFICE: "orifice",
     Limit.SWASH_STOP: "swash stop",
@@ -96,7 +96,7 @@ class Operability(Tabular):
     seaway: Seaway
     """Ship, peak factor, spreading."""
     case: str
-    """Where the crane stands and what controls it, in a sentence, and how cells are simulated."""
+    """Sentences on pose and control of the crane, and on the simulation of cells."""
     hoist_limit: tuple[float, float, float]
     """Least significant height at which the hoist is too slow for the hook, with period and
     heading; inf if none. [m], [s], [deg]"""

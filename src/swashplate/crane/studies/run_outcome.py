@@ -1,4 +1,4 @@
-"""What counts of a run: swing, peaks of all that has a limit, limits of the drives, the end."""
+"""Outcome of a run: swing, peaks of limited quantities, limits of the drives, the end."""
 
 from __future__ import annotations
 

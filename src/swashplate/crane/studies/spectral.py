@@ -40,8 +40,8 @@ PER_RESONANCE = 4.0
 SPREAD_HEADINGS = 19
 """Headings of a sea whose directions spread."""
 DEMANDS = ("slew_speed", "slew_acceleration", "luff_speed", "luff_acceleration", "clip")
-"""What control asks of slew and luff, as shares of what their drives can do, and of its clip, if it
-has one, as a share of its size."""
+"""Demands of control on slew and luff, as shares of what their drives can do, and on its clip, if
+it has one, as a share of the clip's size."""
 
 
 class LinearValue(NamedTuple):

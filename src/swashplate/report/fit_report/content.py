@@ -1,4 +1,4 @@
-"""What a report says: the sections of a fit's page and of a validation's, from the results."""
+"""Content of a report: the sections of a fit's page and of a validation's, from the results."""
 
 from __future__ import annotations
 
