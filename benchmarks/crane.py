@@ -31,10 +31,10 @@ CLIPPED = control.DelayedFeedback(0.2, 0.2) | control.ShipCompensation() | contr
 
 def crane_rows() -> Iterator[Row]:
     """60 s at 512 Hz unless said otherwise, in processor time but for what says so."""
-    crane, stick = Crane.preset("tg3637"), OperatorCommand.rest(60.0)
+    crane, command = Crane.preset("tg3637"), OperatorCommand.rest(60.0)
     how = {"slew_deg": 90.0, "rope_m": 27.0}
     ship = Seaway("ss3", seed=1).motion(60 * 512 + 1)
-    tip = simulate(crane, stick, sea=ship, **how).tip
+    tip = simulate(crane, command, sea=ship, **how).tip
     lengths = np.full(len(tip), 27.0)
 
     def row(what: str, seconds: float, target: float) -> Row:
@@ -53,18 +53,18 @@ def crane_rows() -> Iterator[Row]:
     moving = {**how, "sea": ship}
     yield over_rope(
         "crane: ideal drives in a seaway, 60 s",
-        lambda: simulate(crane, stick, actuation="ideal", **moving),
+        lambda: simulate(crane, command, actuation="ideal", **moving),
         IDEAL,
     )
     yield over_rope(
         "crane: open loop, three drives, in a seaway, 60 s",
-        lambda: simulate(crane, stick, **moving),
+        lambda: simulate(crane, command, **moving),
         OPEN,
     )
     law = control.TipShaper("zv") | CLIPPED
     yield over_rope(
         "crane: closed loop, three drives, in a seaway, 60 s",
-        lambda: simulate(crane, stick, control=law, **moving),
+        lambda: simulate(crane, command, control=law, **moving),
         CLOSED,
     )
     short = {"remedies": False, "tipping_points": False}

@@ -67,11 +67,11 @@ def slew_tables(crane: Crane) -> Iterator[str]:
     ):
         yield f"\n### {title}\n\n| stick | {heads} |\n|--:|{'--:|' * len(variants)}"
         for part, numbers in others.items():
-            stick = OperatorCommand.trapezoid(slew=part, until={"slew_deg": 45.0}, length=160.0)
+            command = OperatorCommand.trapezoid(slew=part, until={"slew_deg": 45.0}, length=160.0)
             cells = []
             for (actuation, law), other in zip(variants, numbers, strict=True):
                 run = simulate(
-                    crane, stick, control=law, actuation=actuation, swing_damping=UNDAMPED
+                    crane, command, control=law, actuation=actuation, swing_damping=UNDAMPED
                 )
                 cells.append(f"{run.residual_deg:.3g} / {other:g}")
             yield f"| {part:g} | {' | '.join(cells)} |"

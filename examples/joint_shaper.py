@@ -50,7 +50,7 @@ def shaped(commands: np.ndarray, rope: float) -> np.ndarray:
 # %%
 operator = OperatorCommand.trapezoid(slew=1.0, until={"slew_deg": 45.0}, length=60.0)
 plain = simulate(crane, operator, actuation="ideal", rope_m=ROPE, swing_damping=0.0)
-sticks = {
+commands = {
     "as it is": operator,
     "shaped": OperatorCommand.record(shaped(plain.stick, ROPE), RATE),
 }
@@ -58,8 +58,8 @@ sticks = {
 # %%
 runs = {}
 for actuation in ("ideal", "volts", "inverse"):
-    for name, stick in sticks.items():
-        run = simulate(crane, stick, actuation=actuation, rope_m=ROPE, swing_damping=0.0)
+    for name, command in commands.items():
+        run = simulate(crane, command, actuation=actuation, rope_m=ROPE, swing_damping=0.0)
         runs[f"{actuation}, {name}"] = run
         print(
             f"{actuation:8s} {name:9s} {run.residual_deg:5.2f} deg are left, "

@@ -93,7 +93,7 @@ now = performance(drive)
 required = Requirements(speed=1.1 * now.speed, acceleration=1.2 * now.acceleration)
 sized = size(drive, required, {"pump": (0.5, 2.0), "orifice": (0.5, 2.0)})
 for variable, factor in sized.factors.items():
-    alone = sized.alone[variable]
+    alone = sized.sufficient_factors[variable]
     print(f"{variable} x {factor:.3f}, by itself {'never' if alone is None else f'x {alone:.3f}'}")
 
 # %%

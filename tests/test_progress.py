@@ -27,7 +27,7 @@ class Lines:
         self.shown.append(line)
 
     def end(self, work: progress.Work) -> None:
-        self.ended.append(work.words)
+        self.ended.append(work.activity)
 
 
 def test_work_is_logged_and_shown_from_its_beginning_to_its_end(caplog) -> None:

@@ -116,16 +116,16 @@ def analyses(drive: Drive) -> list[Any]:
 def cranes() -> list[object]:
     """A crane, a run of it, and what they are made of."""
     crane = Crane.preset("tg3637")
-    stick = OperatorCommand.trapezoid(slew=0.5, duration=2.0, length=10.0)
+    command = OperatorCommand.trapezoid(slew=0.5, duration=2.0, length=10.0)
     waves = Seaway("ss3", 90.0, seed=1)
     feedback = control.TipShaper("zv") | control.DelayedFeedback(0.2, delay=0.2) | control.Clip()
-    run = simulate(crane, stick, sea=waves, control=feedback)
+    run = simulate(crane, command, sea=waves, control=feedback)
     values = np.zeros((1, 2, 30, 6), dtype=np.complex128)
     grid = TransferFunctions(
         "box", np.zeros(1), np.array([0.0, np.pi]), np.linspace(0.5, 2.0, 30), values
     )
     parts = (control.TipShaper("zvd"), control.ShipCompensation(), control.PositionLoop(0.7))
-    return [crane, stick, waves, feedback, *parts, run, grid, CraneStepper(crane)]
+    return [crane, command, waves, feedback, *parts, run, grid, CraneStepper(crane)]
 
 
 @pytest.mark.slow  # all that the package makes is made once

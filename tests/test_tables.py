@@ -47,16 +47,16 @@ def table() -> Table:
 
 
 def test_people_get_their_units_and_words(table: Table) -> None:
-    assert table.heads() == ["run", "speed deg/s", "error", "unit", "share", "samples"]
+    assert table.headings() == ["run", "speed deg/s", "error", "unit", "share", "samples"]
     assert [table.texts(row) for row in table.rows] == [
         ["a", "57.30", "5", "mA", "25.0 %", "5,000"],
         ["b", "never", "two", "A", "", "10"],
         ["all", "114.59", "1.5", "A", "100.0 %", "5,010"],
     ]
     with shown_in(["rpm"]):
-        assert table.heads()[1] == "speed rpm"
+        assert table.headings()[1] == "speed rpm"
         assert table.texts(table.rows[0])[1] == "9.55"
-    assert table.of("t").heads()[-1] == "share"
+    assert table.of("t").headings()[-1] == "share"
 
 
 def test_files_get_all_digits_in_si(table: Table, tmp_path: Path) -> None:

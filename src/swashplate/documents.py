@@ -185,7 +185,7 @@ def validated(content: Any, model: type[Model], origin: str) -> Model:
 
 
 def read_json(path: str | Path, model: type[Model], *, strict: bool = True) -> Model:
-    """A JSON file checked against a schema; strictly, a text is no number, not even `"12"`.
+    """A JSON file checked against a schema; strictly, a text is not a number, not even `"12"`.
 
     A `FileError` if it cannot be read or is not JSON, else an error as of `validated`.
     """

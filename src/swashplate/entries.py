@@ -1,7 +1,7 @@
 """Tables and entries of files.
 
-A number in a file is a number: pydantic alone would accept ``true`` and ``"36"`` as well, and 1 as
-a truth value.
+A number in a file is a number: pydantic by itself would accept ``true`` and ``"36"`` as well, and
+1 as a truth value.
 """
 
 from typing import Annotated, Any, Literal

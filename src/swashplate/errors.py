@@ -45,7 +45,7 @@ class DomainError(SwashplateError):
     """A simulation that left the range in which the model's equations hold."""
 
 
-# OSError comes first, since its `__new__` alone can make these: what unpickles errors calls it
+# OSError comes first, since only its `__new__` can make these: what unpickles errors calls it
 class FileError(OSError, SwashplateError):
     """A file that cannot be read or written; also an ``OSError``."""
 

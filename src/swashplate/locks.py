@@ -28,7 +28,7 @@ def locked(folder: Path) -> Iterator[None]:
     """Keep other processes from writing into a folder meanwhile; it is made if there is none.
 
     The operating system holds the lock, so that it ends with the process however that ends: a lock
-    file that a killed process has left is taken over. It holds between machines too, where their
+    file that a killed process has left is taken over. It holds between machines too, if their
     network file system has locks, as NFS with its lock service does. The thread that has locked a
     folder may lock it again: a command does so, and what it saves there does as well.
 

@@ -217,12 +217,12 @@ class Maneuver(Drawn):
     def __add__(self, after: Maneuver) -> Maneuver:
         if not isinstance(after, Maneuver):
             return NotImplemented
-        moved = ((self.length + start, curve) for start, curve in after.pieces)
+        shifted = ((self.length + start, curve) for start, curve in after.pieces)
         name = f"{self.name} + {after.name}"
         length = self.length + after.length
         amplitude = max(self.amplitude, after.amplitude)
         highest = max(self.highest, after.highest)
-        return Maneuver(name, length, (*self.pieces, *moved), amplitude, highest)
+        return Maneuver(name, length, (*self.pieces, *shifted), amplitude, highest)
 
     def __mul__(self, factor: float) -> Maneuver:
         factor = finite("factor", factor)
@@ -315,7 +315,7 @@ def _settled(
     def stays(part: float) -> bool:
         change = part * slope * duration
         turn = 3.0 * (2.0 * level + change)
-        # where its one extremum beside the end lies, as a part of the duration
+        # time of its one extremum other than the end, as a part of the duration
         at = change / turn if turn else 0.0
         return not 0.0 < at < 1.0 or (1.0 - at) ** 2 * abs(level + change / 3.0) <= bound
 
@@ -800,8 +800,9 @@ def source_tests(axis: str) -> dict[str, Maneuver]:
     if axis not in SOURCE_TESTS:
         raise InputError(f"no tests of axis {axis!r}: Kruse (2001) has {', '.join(SOURCE_TESTS)}.")
     runs = []
-    for words in SOURCE_TESTS[axis].split():
-        run = parse(words)
-        signed = words.startswith("sine") or "-" in words
-        runs.append(run if signed else replace(run, name=run.name.replace(" ", " +", 1)))
+    for notation in SOURCE_TESTS[axis].split():
+        run = parse(notation)
+        if not (notation.startswith("sine") or "-" in notation):
+            run = replace(run, name=run.name.replace(" ", " +", 1))
+        runs.append(run)
     return {run.name: run for run in runs}

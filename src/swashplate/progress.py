@@ -28,7 +28,7 @@ OFTEN = 0.1
 """Least time between two details that are shown: a search has up to a thousand a second. [s]"""
 
 enabled = True
-"""Whether a line is shown; set it to False where the output is published."""
+"""Whether a line is shown; set it to False if the output is published."""
 
 
 class Display(Protocol):
@@ -44,21 +44,21 @@ class Display(Protocol):
 class Work:
     """Work under way, as `working` gives it."""
 
-    def __init__(self, words: str, detail: str = "") -> None:
-        self.words = words
+    def __init__(self, activity: str, detail: str = "") -> None:
+        self.activity = activity
         self.detail = detail
         self.started = perf_counter()
 
     def at(self, detail: str) -> None:
         """Say how far it is."""
         self.detail = detail
-        LOGGER.debug("%s: %s", self.words, detail)
+        LOGGER.debug("%s: %s", self.activity, detail)
         _refresh(OFTEN)
 
     @property
     def line(self) -> str:
         """The work and how far it is."""
-        return f"{self.words}: {self.detail}" if self.detail else self.words
+        return f"{self.activity}: {self.detail}" if self.detail else self.activity
 
     @property
     def seconds(self) -> float:
@@ -84,23 +84,23 @@ _state = _State()
 
 
 @contextmanager
-def working(words: str) -> Iterator[Work]:
+def working(activity: str) -> Iterator[Work]:
     """Announce work that may take long: log its beginning and end, show it to who waits.
 
     Parameters
     ----------
-    words : str
-        What is done, such as ``"Fitting hoist to 10 runs"``.
+    activity : str
+        Such as ``"Fitting hoist to 10 runs"``.
     """
-    work = begin(words)
+    work = begin(activity)
     try:
         yield work
     finally:
         end(work)
 
 
-def counted(items: Iterable[T], total: int, what: str, words: str) -> Iterator[T]:
-    """Items as they come, each announced when it was dealt with: ``words: 3 of 40 seaways``.
+def counted(items: Iterable[T], total: int, item_name: str, activity: str) -> Iterator[T]:
+    """Iterate over items, and announce each one that is done: ``activity: 3 of 40 seaways``.
 
     Parameters
     ----------
@@ -108,18 +108,20 @@ def counted(items: Iterable[T], total: int, what: str, words: str) -> Iterator[T
         Such as what an executor's ``run`` yields.
     total : int
         How many there will be.
-    what, words : str
-        What an item is, in the plural, and what is done, as of `working`.
+    item_name : str
+        In the plural.
+    activity : str
+        As of `working`.
     """
-    with working(words) as work:
+    with working(activity) as work:
         for done, item in enumerate(items, 1):
             yield item
-            work.at(f"{done} of {total} {what}")
+            work.at(f"{done} of {total} {item_name}")
 
 
-def begin(words: str, detail: str = "") -> Work:
+def begin(activity: str, detail: str = "") -> Work:
     """Begin work whose end is not in the same function; `end` must follow."""
-    work = Work(words, detail)
+    work = Work(activity, detail)
     LOGGER.info("%s", work.line)
     with _state.lock:
         if not _state.works:
@@ -131,7 +133,7 @@ def begin(words: str, detail: str = "") -> Work:
 
 def end(work: Work) -> None:
     """End work, and all that began within it and was broken off."""
-    LOGGER.info("%s: %.1f s", work.words, work.seconds)
+    LOGGER.info("%s: %.1f s", work.activity, work.seconds)
     with _state.lock:
         if work not in _state.works:
             return
@@ -168,7 +170,7 @@ def _refresh(least: float = 0.0) -> None:
             return
         _state.shown = now
         outer, *inner = _state.works
-        _state.display.show(_joined(outer.words, inner[-1].line) if inner else outer.line)
+        _state.display.show(_joined(outer.activity, inner[-1].line) if inner else outer.line)
 
 
 # --- a notebook and a terminal --------------------------------------------------------------------
@@ -199,30 +201,30 @@ class NotebookLine:
         self._cell = -1
         self._handle: Any = None
         self._seconds = dict[str, float]()
-        """Times of the works of this cell that ended, in all, by their words. [s]"""
+        """Total times of the works of this cell that ended, by activity. [s]"""
 
     def show(self, line: str) -> None:
-        """Show a line in the place of the one before, behind what the cell did so far."""
+        """Replace the line; it stands after the works of the cell that ended."""
         cell = sys.modules["IPython"].get_ipython().execution_count
         if cell != self._cell:
             self._cell = cell
             self._handle = None
             self._seconds = {}
-        ended = [f"{words}: {seconds:.1f} s" for words, seconds in self._seconds.items()]
+        ended = [f"{activity}: {seconds:.1f} s" for activity, seconds in self._seconds.items()]
         text = "; ".join([*ended, line] if line else ended)
-        words = {
+        formats = {
             "text/plain": text,
             "text/html": f'<span style="opacity: 0.65">{escape(text)}</span>',
         }
         if self._handle is None:
             display = import_module("IPython.display").display
-            self._handle = display(words, raw=True, display_id=True)
+            self._handle = display(formats, raw=True, display_id=True)
         else:
-            self._handle.update(words, raw=True)
+            self._handle.update(formats, raw=True)
 
     def end(self, work: Work) -> None:
         """Show how long it took."""
-        self._seconds[work.words] = self._seconds.get(work.words, 0.0) + work.seconds
+        self._seconds[work.activity] = self._seconds.get(work.activity, 0.0) + work.seconds
         self.show("")
 
 
@@ -238,10 +240,10 @@ class TerminalLine:
     def show(self, line: str) -> None:
         """Show a line in the place of the one before, cut to the terminal's width."""
         width = get_terminal_size().columns - 1
-        shown = line if len(line) <= width else f"{line[: width - 1]}…"
-        sys.stderr.write(f"\r{shown:{self._length}}")
+        cut_line = line if len(line) <= width else f"{line[: width - 1]}…"
+        sys.stderr.write(f"\r{cut_line:{self._length}}")
         sys.stderr.flush()
-        self._length = len(shown)
+        self._length = len(cut_line)
 
     def end(self, work: Work) -> None:
         """Wipe out the line."""

@@ -116,11 +116,11 @@ class Result:
     def _repr_html_(self) -> str | None:
         headline = self._headline()
         tables = self._tables()
-        shown = "".join(table._repr_html_() for table in tables)
+        html = "".join(table._repr_html_() for table in tables)
         sentences = listing(self._sentences())
         if headline:
-            return f"<p><strong>{escape(headline)}</strong></p>{sentences}{shown}"
-        return f"{shown}{sentences}" or None
+            return f"<p><strong>{escape(headline)}</strong></p>{sentences}{html}"
+        return f"{html}{sentences}" or None
 
     def summary(self) -> str:
         """Text: its headline or its repr, its tables in the units that people read, sentences."""
@@ -163,8 +163,8 @@ def listing(sentences: Sequence[str]) -> str:
 
 def folded(title: str, tables: Sequence[Table], sentences: Sequence[str] = ()) -> str:
     """HTML of tables and sentences that are shown when a reader opens them by their title."""
-    shown = "".join(table._repr_html_() for table in tables)
-    return f"<details><summary>{escape(title)}</summary>{shown}{listing(sentences)}</details>"
+    html = "".join(table._repr_html_() for table in tables)
+    return f"<details><summary>{escape(title)}</summary>{html}{listing(sentences)}</details>"
 
 
 class Tabular(Result, ABC):
@@ -203,7 +203,7 @@ class Tabular(Result, ABC):
     def write(self, path: str | Path) -> None:
         """Write the table of `to_polars` as CSV or Parquet, by the path's ending.
 
-        The file appears whole or not at all: it is written beside and renamed.
+        The file appears whole or not at all: it is written under another name and renamed.
 
         Raises
         ------

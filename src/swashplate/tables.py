@@ -1,6 +1,6 @@
 """Tables of numbers with names and units, and files that are written whole or not at all.
 
-A `Table` is made once, beside the result that it shows. The terminal, the report's page and a CSV
+A `Table` is made once, by the result that it shows. The terminal, the report's page and a CSV
 or Parquet file render it: people get their units and as many digits as mean something, files all
 digits in SI.
 """
@@ -49,7 +49,7 @@ class Column:
     spec: str = ""
     """Of numbers, as of `format`: ``".2f"``, ``".3g"``, ``".1%"``. Empty: words."""
     unit: str = ""
-    """Unit of its numbers as of `display_unit`, which people get converted and named behind the
+    """Unit of its numbers as of `display_unit`, which people get converted and named after the
     name; ``"1"`` for pure numbers in rows that have a unit of their own."""
     none: str = ""
     """What stands for no number."""
@@ -110,16 +110,16 @@ class Table:
         assert len(cells) == count, f"{len(cells)} cells for {count} columns of {self.title}"
         values = iter(cells)
         si = "rad" if unit == SHAFT_ANGLE else unit
-        every = tuple(si if column is UNIT else next(values) for column in self.columns)
-        self.rows.append(Row(every, unit, spec, look, section or total, total))
+        all_cells = tuple(si if column is UNIT else next(values) for column in self.columns)
+        self.rows.append(Row(all_cells, unit, spec, look, section or total, total))
 
     def of(self, medium: str) -> Table:
         """The table with the columns of a medium: ``"t"`` terminal, ``"p"`` page, ``"f"`` file."""
-        shown = [k for k, column in enumerate(self.columns) if medium in column.of]
-        rows = [row._replace(cells=tuple(row.cells[k] for k in shown)) for row in self.rows]
-        return Table(self.title, [self.columns[k] for k in shown], self.caption, rows, self.si)
+        kept = [k for k, column in enumerate(self.columns) if medium in column.of]
+        rows = [row._replace(cells=tuple(row.cells[k] for k in kept)) for row in self.rows]
+        return Table(self.title, [self.columns[k] for k in kept], self.caption, rows, self.si)
 
-    def heads(self) -> list[str]:
+    def headings(self) -> list[str]:
         """The columns' names with their units, for people."""
         return [
             f"{column.name} {display_unit(column.unit).name if column.unit else ''}".strip()
@@ -127,7 +127,7 @@ class Table:
         ]
 
     def texts(self, row: Row) -> list[str]:
-        """A row's cells as words for people."""
+        """A row's cells as texts for people."""
         pairs = list(zip(self.columns, row.cells, strict=True))
         in_row_unit = [
             (column, value) for column, value in pairs if not (column is UNIT or column.pure)
@@ -137,13 +137,13 @@ class Table:
             (row.spec or column.spec).endswith("f") for column, _ in in_row_unit if column.spec
         )
         size = float("inf") if fixed else largest([value for _, value in in_row_unit])
-        shown = chosen_unit(row.unit) if self.si else display_unit(row.unit, size)
+        row_unit = chosen_unit(row.unit) if self.si else display_unit(row.unit, size)
         texts = []
         for column, value in pairs:
-            unit = display_unit(column.unit) if column.unit else shown
+            unit = display_unit(column.unit) if column.unit else row_unit
             spec = column.spec if column.pure else row.spec or column.spec
             is_unit = column is UNIT
-            texts.append(shown.name if is_unit else _text(value, spec, column, unit.factor))
+            texts.append(row_unit.name if is_unit else _text(value, spec, column, unit.factor))
         return texts
 
     def to_polars(self) -> polars.DataFrame:
@@ -165,14 +165,14 @@ class Table:
 
     def __str__(self) -> str:
         """The table as plain text, numbers to the right."""
-        shown = self.of("t")
-        heads = [[line.strip() for line in head.split("\n")] for head in shown.heads()]
-        height = max(map(len, heads), default=1)
-        # a head of fewer lines stands right above its column
-        stacked = [[""] * (height - len(head)) + head for head in heads]
-        lines = [*zip(*stacked, strict=True), *map(shown.texts, shown.rows)]
+        table = self.of("t")
+        headings = [[line.strip() for line in name.split("\n")] for name in table.headings()]
+        height = max(map(len, headings), default=1)
+        # a heading of fewer lines stands right above its column
+        stacked = [[""] * (height - len(lines)) + lines for lines in headings]
+        lines = [*zip(*stacked, strict=True), *map(table.texts, table.rows)]
         sizes = [max(map(len, cells)) for cells in zip(*lines, strict=True)]
-        right = [">" if column.spec else "<" for column in shown.columns]
+        right = [">" if column.spec else "<" for column in table.columns]
         text = [
             "  ".join(f"{c:{r}{s}}" for c, r, s in zip(line, right, sizes, strict=True)).rstrip()
             for line in lines
@@ -180,16 +180,16 @@ class Table:
         return "\n".join(line for line in (self.title, *text, self.caption) if line)
 
     def _repr_html_(self) -> str:
-        shown = self.of("t")
-        sides = ["right" if column.spec else "left" for column in shown.columns]
+        table = self.of("t")
+        sides = ["right" if column.spec else "left" for column in table.columns]
         pieces = ["<table>"]
         if self.title:
             pieces.append(f'<caption style="{_CAPTION}">{escape(self.title)}</caption>')
-        pieces += ["<thead>", _html_row("th", shown.heads(), sides), "</thead>", "<tbody>"]
-        for row in shown.rows:
+        pieces += ["<thead>", _html_row("th", table.headings(), sides), "</thead>", "<tbody>"]
+        for row in table.rows:
             # between sections a line that is seen on light and on dark pages
             line = "border-top: 1px solid #888; " if row.section else ""
-            pieces.append(_html_row("td", shown.texts(row), sides, line))
+            pieces.append(_html_row("td", table.texts(row), sides, line))
         pieces += ["</tbody>", "</table>"]
         if self.caption:
             pieces.append(f"<p>{escape(self.caption)}</p>")
@@ -247,7 +247,7 @@ def _text(value: Any, spec: str, column: Column, factor: float) -> str:
 # --- numbers as an engineer's table shows them ----------------------------------------------------
 
 NONE = "–"
-"""Stands where a table has no number."""
+"""Stands for a number that a table does not have."""
 
 
 def plain(value: float, digits: int = 5) -> str:
@@ -300,14 +300,16 @@ def quantity(value: float, unit: str, digits: int = 3, spec: str = "") -> str:
     return f"{format(number, spec) if spec else plain(number, digits)} {shown.name}".rstrip()
 
 
-def listed(words: Sequence[str]) -> str:
+def listed(items: Sequence[str]) -> str:
     """``a, b and c``; empty for none."""
-    return " and ".join([*([", ".join(words[:-1])] if words[:-1] else []), *words[-1:]])
+    if len(items) < 2:
+        return "".join(items)
+    return f"{', '.join(items[:-1])} and {items[-1]}"
 
 
-def ended(words: str) -> str:
+def ended(sentence: str) -> str:
     """Words with a stop at their end, unless they ask."""
-    return words if words.endswith("?") else f"{words}."
+    return sentence if sentence.endswith("?") else f"{sentence}."
 
 
 def count(number: int, what: str, several: str = "") -> str:
@@ -334,7 +336,7 @@ def ending(path: str | Path, form: Form) -> str:
 
 
 def check_place(path: str | Path) -> None:
-    """See to it that a file can be where it shall be, as far as that shows beforehand."""
+    """Refuse a path at which a file certainly cannot be written."""
     target = Path(path)
     reason = None
     folder = target.parent
@@ -374,7 +376,7 @@ def check_folder(folder: Path) -> None:
 
 
 def write_whole(path: str | Path, write: Callable[[Path], object]) -> None:
-    """Have a file written at a path beside its place, and renamed when it is complete.
+    """Have a file written under another name in its folder, and renamed when it is complete.
 
     It has the permissions of the file that it replaces. A link in its place is replaced as a file
     would be: what it points to stays as it is.
@@ -382,30 +384,30 @@ def write_whole(path: str | Path, write: Callable[[Path], object]) -> None:
     Raises
     ------
     FileError
-        If it cannot be written; nothing is left behind and an older file stays.
+        If it cannot be written; nothing is left and an older file stays.
     """
     target = Path(path)
     check_place(target)
-    beside = target.parent / f".{target.stem}-{token_hex(4)}{target.suffix}"
+    temporary = target.parent / f".{target.stem}-{token_hex(4)}{target.suffix}"
     try:
         try:
-            beside.touch(exist_ok=False)
+            temporary.touch(exist_ok=False)
             mode = _permissions(target)
             # before anybody else can read it, and again, as a library may have made another file
             if mode is not None:
-                beside.chmod(mode | S_IWUSR)
-            write(beside)
+                temporary.chmod(mode | S_IWUSR)
+            write(temporary)
             if mode is not None:
-                beside.chmod(mode)
-            with beside.open("rb") as written:  # a power cut leaves the old file or the new one
+                temporary.chmod(mode)
+            with temporary.open("rb") as written:  # a power cut leaves the old file or the new one
                 os.fsync(written.fileno())
-            beside.replace(target)
+            temporary.replace(target)
         finally:
             try:
-                beside.unlink(missing_ok=True)
+                temporary.unlink(missing_ok=True)
             except KeyboardInterrupt:
                 # on Ctrl-C Polars raises one of its own and leaves Python's to come: it comes here
-                beside.unlink(missing_ok=True)
+                temporary.unlink(missing_ok=True)
                 raise
     except FileError:
         raise
@@ -438,7 +440,7 @@ def _disk_message(error: BaseException) -> str | None:
 
 def write_bytes(content: bytes, path: str | Path) -> None:
     """Write bytes, whole or not at all."""
-    write_whole(path, lambda beside: beside.write_bytes(content))
+    write_whole(path, lambda temporary: temporary.write_bytes(content))
 
 
 def write_text(text: str, path: str | Path) -> None:
@@ -464,7 +466,7 @@ def write_text(text: str, path: str | Path) -> None:
     >>> Path("notes.txt").read_text("utf-8")
     'Z16 is fitted.'
     """
-    write_whole(path, lambda beside: beside.write_text(text, "utf-8"))
+    write_whole(path, lambda temporary: temporary.write_text(text, "utf-8"))
 
 
 def write_table(table: polars.DataFrame, path: str | Path) -> None:
@@ -484,6 +486,6 @@ def write_table(table: polars.DataFrame, path: str | Path) -> None:
         formula = r"^([=@\t\r]|[+-][^\d.])"
         plain = table.with_columns(pl.col(pl.String).str.replace(formula, "'${1}"))
         plain = plain.rename({name: re.sub(formula, r"'\1", name) for name in table.columns})
-        write_whole(path, lambda beside: plain.write_csv(beside))
+        write_whole(path, lambda temporary: plain.write_csv(temporary))
     else:
-        write_whole(path, lambda beside: table.write_parquet(beside))
+        write_whole(path, lambda temporary: table.write_parquet(temporary))

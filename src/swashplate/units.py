@@ -56,7 +56,7 @@ def to_si(value: float, unit: str, si: str, what: str) -> float:
     """A value in a unit such as ``"bar"``, in the SI unit that the model computes in.
 
     An angular frequency in Hz, 1/min or another of a nameplate's turns counts each as 2π; ``"1"``
-    is no unit. `what` the value is stands in the error's sentence.
+    is not a unit. `what` names the value in the error's sentence.
 
     Raises
     ------
@@ -181,9 +181,9 @@ class DisplayUnit(NamedTuple):
     """Empty for a number without unit."""
     factor: float
 
-    def label(self, words: str) -> str:
+    def label(self, name: str) -> str:
         """Label of an axis, with the unit in parentheses if there is one."""
-        return f"{words} ({self.name})" if self.name else words
+        return f"{name} ({self.name})" if self.name else name
 
 
 SHAFT_ANGLE = "rad of the shaft"
@@ -223,7 +223,7 @@ _chosen: ContextVar[Mapping[str, DisplayUnit]] = ContextVar(
 )
 
 
-def units_of_choice(words: Sequence[str], drum: float | None = None) -> dict[str, DisplayUnit]:
+def units_of_choice(names: Sequence[str], drum: float | None = None) -> dict[str, DisplayUnit]:
     """The units that someone names, ``"rpm"`` or ``"bar"``, by the SI unit each is shown for.
 
     With the diameter of a drum on the shaft [m], ``"m/min"`` and ``"m/s"`` of its rope stand for
@@ -240,8 +240,8 @@ def units_of_choice(words: Sequence[str], drum: float | None = None) -> dict[str
         raise InputError(f"A drum's diameter must be above 0 m, not {drum:g}: --drum 0.4.")
     named: dict[str, str] = {}
     units: dict[str, DisplayUnit] = {}
-    beside: dict[str, DisplayUnit] = {}
-    for word in words:
+    turn_units: dict[str, DisplayUnit] = {}
+    for word in names:
         shown, turns = _chosen_by(word, drum)
         for si in shown:
             if named.setdefault(si, word) != word:
@@ -249,10 +249,10 @@ def units_of_choice(words: Sequence[str], drum: float | None = None) -> dict[str
                     f"--units names two units of one quantity, {named[si]} and {word}: give one."
                 )
         units |= shown
-        beside |= turns
-    if "rad" in units and beside:
-        beside[SHAFT_ANGLE] = units["rad"]
-    return {**beside, **units}
+        turn_units |= turns
+    if "rad" in units and turn_units:
+        turn_units[SHAFT_ANGLE] = units["rad"]
+    return {**turn_units, **units}
 
 
 def _chosen_by(
@@ -284,9 +284,9 @@ def _chosen_by(
 
 
 @contextmanager
-def shown_in(words: Sequence[str], drum: float | None = None) -> Iterator[None]:
+def shown_in(names: Sequence[str], drum: float | None = None) -> Iterator[None]:
     """Show tables, plots and pages in the units named, as of `units_of_choice`, for a while."""
-    token = _chosen.set({**_chosen.get(), **units_of_choice(words, drum)})
+    token = _chosen.set({**_chosen.get(), **units_of_choice(names, drum)})
     try:
         yield
     finally:

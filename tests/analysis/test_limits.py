@@ -45,7 +45,7 @@ def test_a_single_limit_has_all_of_the_error(limit: str, changes: dict[str, floa
     assert first.limit == limit
     assert first.error == pytest.approx(0.0, abs=1e-12)
     assert first.error_share == pytest.approx(1.0)
-    assert first.alone == pytest.approx(found.error, rel=1e-12)
+    assert first.error_as_only_limit == pytest.approx(found.error, rel=1e-12)
     # independently: the ideal drive itself is the one without limits
     expected = drive.simulate(SINE).shaft_speed - ideal.simulate(SINE).shaft_speed
     assert found.error == pytest.approx(rms(expected), rel=1e-9)
@@ -93,7 +93,7 @@ def test_shares_are_what_a_changed_drive_gains(hoist: Drive, shares: LimitShares
     assert by["delay"].error == pytest.approx(without, rel=1e-12)
     assert by["delay"].error_share == pytest.approx(1.0 - without / error, rel=1e-9)
     only = ideal.replace(tau=0.014).simulate(SINE).shaft_speed - reference
-    assert by["delay"].alone == pytest.approx(rms(only), rel=1e-12)
+    assert by["delay"].error_as_only_limit == pytest.approx(rms(only), rel=1e-12)
     # shares of time
     assert by["swash stop"].time_share == run.active(Limit.SWASH_STOP).mean()
     assert by["delay"].time_share is None

@@ -82,8 +82,8 @@ def test_place_is_where_the_tip_hangs_without_waves(crane):
     lean = np.tile(seaway.lean, (1025, 1))
     run = simulate(crane, OperatorCommand.rest(2.0), sea=lean, slew_deg=90.0, rope_m=27.0)
     assert case.target(seaway) == pytest.approx(tuple(run.tip[-1, :2]), abs=1e-9)
-    stick = OperatorCommand.trapezoid(slew=0.5, duration=30.0, length=200.0)
-    moving = Study.of(crane, CLIPPED, seeds=[0], stick=stick)
+    command = OperatorCommand.trapezoid(slew=0.5, duration=30.0, length=200.0)
+    moving = Study.of(crane, CLIPPED, seeds=[0], command=command)
     assert moving.cases["no control"].target(seaway) is None
 
 
@@ -213,10 +213,10 @@ def test_what_would_do(crane):
     )
     assert found.harmless == "no"
     assert "luff at its acceleration limit" in found.verdict()
-    clip = next(remedy for remedy in found.remedies if "clip" in remedy.what)
+    clip = next(remedy for remedy in found.remedies if "clip" in remedy.change)
     assert clip.harmless == "yes"
     assert clip.sufficient is None
-    assert f"{clip.what.capitalize()} would do." in found.verdict()
+    assert f"{clip.change.capitalize()} would do." in found.verdict()
     # a remedy, assessed by itself, is what it was said to be
     alone = assess(
         crane, CLIPPED, seeds=range(8), allowed_share_worse=0.4, drives=("identified",), **QUICK
@@ -231,7 +231,7 @@ def test_what_would_do(crane):
         drives=("identified",),
         **SHORT,
     )
-    assert f"{clip.what.capitalize()} would do no harm, " in both.verdict()
+    assert f"{clip.change.capitalize()} would do no harm, " in both.verdict()
     assert "No change that was tried certainly meets all requirements." in both.verdict()
 
 
@@ -301,12 +301,12 @@ def test_an_undamped_swing_has_no_stationary_answer(crane):
 def test_what_would_turn_the_answer(crane):
     """Control that harms in sea state 3 passes in waves a quarter as high: a tipping point."""
     found = assess(crane, CLIPPED, seeds=range(6), drives=("identified",), remedies=False)
-    points = {(point.what, point.other): point for point in found.tipping_points}
+    points = {(point.quantity, point.other_value): point for point in found.tipping_points}
     for point in found.tipping_points:
         assert point.passes is not found.passed
-        assert point.words().endswith("by a short run.")
+        assert point.sentence().endswith("by a short run.")
     # along the ship's axis nothing rolls: a heading that is another turns it, if anything does
-    assert all(point.what in point.words() for point in points.values())
+    assert all(point.quantity in point.sentence() for point in points.values())
 
 
 def test_intervals_against_published_tables():
@@ -321,9 +321,9 @@ def test_intervals_against_published_tables():
 
 def test_a_stopped_run_is_counted(crane):
     # lowering while the load is held 3 m above the longest rope ends beyond it
-    stick = OperatorCommand.trapezoid(hoist=-0.5, duration=30.0, length=80.0)
+    command = OperatorCommand.trapezoid(hoist=-0.5, duration=30.0, length=80.0)
     found = assess(
-        crane, {"none": control.Clip()}, seeds=[0], stick=stick, run_in=5.0, rope_m=47.0,
+        crane, {"none": control.Clip()}, seeds=[0], command=command, run_in=5.0, rope_m=47.0,
         remedies=False, tipping_points=False,
     )  # fmt: skip
     assert np.isnan(found.swing("no control")).all()
@@ -382,11 +382,11 @@ SLEWS = {
 
 @pytest.mark.parametrize("part", SLEWS)
 def test_residual_swing_over_the_stick_is_that_of_the_independent_crane(crane, part):
-    stick = OperatorCommand.trapezoid(
+    command = OperatorCommand.trapezoid(
         slew=part, until={"slew_deg": 45.0}, length=45.0 / (4.2 * part) + 60.0
     )
     runs = [
-        simulate(crane, stick, actuation=actuation, swing_damping=0.0)
+        simulate(crane, command, actuation=actuation, swing_damping=0.0)
         for actuation in ("ideal", "volts", "inverse")
     ]
     # order of a sample differs: 1.5 %, or half a unit as printed
@@ -470,13 +470,13 @@ def test_draws_of_two_axes_from_one_seed_are_not_correlated(crane):
 
 def test_control_does_not_know_the_draw_that_moves_the_crane(crane):
     weaker = crane.slew.scale(Z17=1.05)
-    stick = OperatorCommand.trapezoid(slew=0.5, until={"slew_deg": 30.0}, length=30.0)
+    command = OperatorCommand.trapezoid(slew=0.5, until={"slew_deg": 30.0}, length=30.0)
     (drawn,) = drawn_cranes(crane, slew=Draws((weaker,), 0))
     known, unknown = (
         crane.with_drive(slew=weaker),
         crane.with_drive(slew=weaker, known_to_controller=False),
     )
-    runs = [simulate(each, stick) for each in (crane, drawn, unknown, known)]
+    runs = [simulate(each, command) for each in (crane, drawn, unknown, known)]
     volts, ends = [each.voltage[:, 1] for each in runs], [each.slew_deg[-1] for each in runs]
     # the map of the drive before: the same voltages, and another end
     np.testing.assert_array_equal(volts[1], volts[0])
@@ -510,10 +510,10 @@ def test_what_makes_no_study_is_said(crane):
     )
     refuse(
         "stick .* 100 s .* 120 s",
-        stick=OperatorCommand.rest(100.0),
+        command=OperatorCommand.rest(100.0),
     )
     moving = OperatorCommand.record(np.full((153_600, 3), [0.0, 0.01, 0.0]))
-    refuse("Ideal drives .* stick .* row of zeros", stick=moving)
+    refuse("Ideal drives .* stick .* row of zeros", command=moving)
     refuse("seeds .* 3, .* sequence, as range", seeds=3)
     refuse("sea .* 'ss3', or a Spectrum, .* ndarray", sea=np.zeros((9, 6)))
     refuse("'see'.* seeds, sea, drives, .*, slew_deg", see="ss3")

@@ -72,8 +72,8 @@ PATHS = [
 def test_shaped_paths_leave_what_they_do_on_the_independent_crane(
     crane, part, actuation, controller, residual
 ):
-    stick = OperatorCommand.trapezoid(slew=part, until={"slew_deg": 45.0}, length=110.0)
-    run = simulate(crane, stick, control=controller, actuation=actuation, swing_damping=0.0)
+    command = OperatorCommand.trapezoid(slew=part, until={"slew_deg": 45.0}, length=110.0)
+    run = simulate(crane, command, control=controller, actuation=actuation, swing_damping=0.0)
     # steps of the shaper's delay and order of a sample differ: 1.5 %, or half a unit as printed
     assert run.residual_deg == pytest.approx(residual, rel=0.015, abs=7e-4)
 
@@ -82,10 +82,10 @@ def test_shaping_the_tips_path_on_ideal_drives_exceeds_40_db(crane):
     # Parker, Robinett, Driessen and Dohrmann (1996): residual sway down by "in excess of 40 dB"
     for part in (0.2, 1.0):
         length = 45.0 / (4.2 * part) + 60.0
-        stick = OperatorCommand.trapezoid(slew=part, until={"slew_deg": 45.0}, length=length)
+        command = OperatorCommand.trapezoid(slew=part, until={"slew_deg": 45.0}, length=length)
         plain, shaped = (
             simulate(
-                crane, stick, control=controller, actuation="ideal", swing_damping=0.0
+                crane, command, control=controller, actuation="ideal", swing_damping=0.0
             ).residual_deg
             for controller in (None, TIP)
         )
@@ -126,11 +126,11 @@ def test_map_of_delayed_feedback_has_the_roots_that_were_found_apart():
 
 
 def test_linear_crane_swings_as_the_whole_one_does_by_little(crane):
-    stick = OperatorCommand.trapezoid(
+    command = OperatorCommand.trapezoid(
         hoist=-0.005, slew=0.005, luff=-0.005, duration=8.0, length=20.0
     )
     how = {"actuation": "ideal", "boom_deg": 50.0, "rope_m": 25.0, "swing_damping": 0.0}
-    run = simulate(crane, stick, **how)
+    run = simulate(crane, command, **how)
     model = linearize(crane, 50.0, 25.0)
     system = StateSpace(model.A, model.B, model.C, np.zeros((5, 3)))
     _, made, _ = lsim(system, run.shaft_speed, run.time)
@@ -232,9 +232,9 @@ def test_user_defined_controller_damps_in_the_same_loop(crane, slewed):
     np.testing.assert_allclose(same.load, none.load, atol=3e-3)
 
 
-def same_by_steps(crane, stick, ship, **setup):
+def same_by_steps(crane, command, ship, **setup):
     """A run, which a stepper makes as well."""
-    run, stepper = simulate(crane, stick, sea=ship, **setup), CraneStepper(crane, **setup)
+    run, stepper = simulate(crane, command, sea=ship, **setup), CraneStepper(crane, **setup)
     made = [list(stepper.step(tuple(u), s).values()) for u, s in zip(run.stick, ship, strict=True)]
     *signals, swing = np.array(made).T
     np.testing.assert_array_equal(np.transpose(signals), run.out)
@@ -260,13 +260,13 @@ def test_loads_below_the_waterline_are_named(crane):
 
 @pytest.mark.interpreted
 def test_stepper_takes_the_samples_of_a_run(crane):
-    stick = OperatorCommand.trapezoid(
+    command = OperatorCommand.trapezoid(
         slew=-0.8, luff=0.5, duration=1.0, start=0.1, ramp=0.2, length=1.5
     )
     controller = TIP | control.DelayedFeedback() | control.ShipCompensation() | control.Clip()
     controller |= control.Controller(lagging, Gains(0.1, 1.0))
     ship = Seaway("ss3", seed=1).motion(769)
-    same_by_steps(crane, stick, ship, control=controller)
+    same_by_steps(crane, command, ship, control=controller)
 
 
 def test_drives_in_the_loop_are_those_that_are_simulated_alone(crane, slewed):
@@ -283,17 +283,17 @@ def test_mirrored_crane_on_ideal_drives_mirrors_everything(crane):
     mirrored = crane.with_geometry(slew_axis=(c.x, -c.y, c.z))
     controller = control.DelayedFeedback() | control.ShipCompensation()
     ship = Seaway("ss3", heading_deg=60.0, seed=4).motion(30 * 512 + 1)
-    how, stick = {"control": controller, "actuation": "ideal"}, OperatorCommand.rest(30.0)
-    one = simulate(crane, stick, sea=ship, slew_deg=70.0, **how)
+    how, command = {"control": controller, "actuation": "ideal"}, OperatorCommand.rest(30.0)
+    one = simulate(crane, command, sea=ship, slew_deg=70.0, **how)
     ship = ship * [1.0, -1.0, 1.0, -1.0, 1.0, -1.0]
-    two = simulate(mirrored, stick, sea=ship, slew_deg=-70.0, **how)
+    two = simulate(mirrored, command, sea=ship, slew_deg=-70.0, **how)
     np.testing.assert_allclose(two.load, one.load * [1.0, -1.0, 1.0], atol=1e-9)
 
 
 def test_voltages_in_the_loop_follow_the_inverse_maps_rule(crane):
     parts = np.concatenate([np.linspace(-1.0, 1.0, 301), np.linspace(-0.3, 0.3, 301), [0.0]])
-    stick = OperatorCommand.record(np.tile(parts[:, None], 3))
-    inverse, volts = (simulate(crane, stick, actuation=each) for each in ("inverse", "volts"))
+    command = OperatorCommand.record(np.tile(parts[:, None], 3))
+    inverse, volts = (simulate(crane, command, actuation=each) for each in ("inverse", "volts"))
     for i, axis in enumerate(("hoist", "slew", "luff")):
         low, high = crane.inverse(axis).limits
         wanted = np.where(parts > 0.0, parts * high, -parts * low)
@@ -315,8 +315,8 @@ def test_hoist_creeps_without_its_brake(crane):
 
 
 def test_lowered_load_goes_down_and_stretches_its_rope_by_its_weight(crane):
-    stick = OperatorCommand.trapezoid(hoist=-0.5, until={"rope_m": 30.0}, length=60.0)
-    run = simulate(crane, stick, actuation="ideal")
+    command = OperatorCommand.trapezoid(hoist=-0.5, until={"rope_m": 30.0}, length=60.0)
+    run = simulate(crane, command, actuation="ideal")
     assert run.rope[-1] == pytest.approx(30.0, abs=1e-3)
     assert run.load[-1, 2] - run.load[0, 2] == pytest.approx(-10.0, abs=2e-3)
     assert run.tension[-1] == pytest.approx(35000.0 * G, rel=1e-4)
@@ -326,8 +326,8 @@ def test_lowered_load_goes_down_and_stretches_its_rope_by_its_weight(crane):
 @pytest.mark.parametrize(("luff", "how"), [(0.8, {"boom_deg": 52.7}), (-0.8, {})])
 def test_hoist_ends_at_its_rope_while_the_luff_pays_out(crane, luff, how):
     until = {"rope_m": 15.0, **how}
-    stick = OperatorCommand.trapezoid(luff=luff, hoist=0.6, until=until, duration=10.0)
-    run = simulate(crane, stick, actuation="ideal")
+    command = OperatorCommand.trapezoid(luff=luff, hoist=0.6, until=until, duration=10.0)
+    run = simulate(crane, command, actuation="ideal")
     assert run.rope[-1] == pytest.approx(15.0, abs=1e-6)
     # with the hoist at rest the luff changes the rope by half a metre or more
     moved = simulate(
@@ -337,8 +337,8 @@ def test_hoist_ends_at_its_rope_while_the_luff_pays_out(crane, luff, how):
 
 
 def test_luffing_lifts_the_load(crane):
-    stick = OperatorCommand.trapezoid(luff=0.8, until={"boom_deg": 53.5})
-    run = simulate(crane, stick, actuation="ideal")
+    command = OperatorCommand.trapezoid(luff=0.8, until={"boom_deg": 53.5})
+    run = simulate(crane, command, actuation="ideal")
     assert run.boom_deg[-1] == pytest.approx(53.5, abs=1e-3)
     # luff ropes at 45 and 53.5 degrees, worked out by hand
     assert run.rope[-1] == pytest.approx(20.0 + 0.5 * (31.505 - 30.112), abs=1e-3)
@@ -356,9 +356,9 @@ def leaking(crane):
 
 @pytest.mark.slow
 def test_loaded_hoist_lowers_faster_by_its_leakage(leaking):
-    stick = OperatorCommand.trapezoid(hoist=-1.0, duration=10.0, length=12.0)
+    command = OperatorCommand.trapezoid(hoist=-1.0, duration=10.0, length=12.0)
     plain, loaded = (
-        simulate(leaking, stick, actuation="volts", loaded=each, brake=False)
+        simulate(leaking, command, actuation="volts", loaded=each, brake=False)
         for each in (False, True)
     )
     n = 9 * 512
@@ -380,22 +380,22 @@ def test_loaded_hoist_lowers_faster_by_its_leakage(leaking):
 @pytest.mark.slow
 @pytest.mark.interpreted
 def test_drives_that_feel_a_load_are_loaded_by_default(crane, leaking):
-    stick = OperatorCommand.trapezoid(hoist=-0.5, duration=2.0, length=4.0)
-    default, asked = (simulate(leaking, stick, **how) for how in ({}, {"loaded": True}))
+    command = OperatorCommand.trapezoid(hoist=-0.5, duration=2.0, length=4.0)
+    default, asked = (simulate(leaking, command, **how) for how in ({}, {"loaded": True}))
     np.testing.assert_array_equal(default.out, asked.out)
     assert default.load_torque[-1, 0] > 0.0
-    assert not simulate(crane, stick).load_torque.any()
-    assert not simulate(leaking, stick, actuation="ideal").load_torque.any()
+    assert not simulate(crane, command).load_torque.any()
+    assert not simulate(leaking, command, actuation="ideal").load_torque.any()
 
 
 def test_stepper_takes_the_samples_of_a_loaded_run_with_a_hook(leaking):
-    stick = OperatorCommand.trapezoid(
+    command = OperatorCommand.trapezoid(
         hoist=0.5, luff=0.5, duration=0.6, start=0.1, ramp=0.2, length=0.8
     )
     setup = {"loaded": True, "suspension": Suspension(6e7, hook=2000.0, sling=4.0)}
     setup |= {"control": TIP | control.DelayedFeedback()}
     ship = Seaway("ss3", seed=1).motion(411)
-    run = same_by_steps(leaking, stick, ship, **setup)
+    run = same_by_steps(leaking, command, ship, **setup)
     np.testing.assert_allclose(np.linalg.norm(run.load - run.hook, axis=1), 4.0, atol=1e-12)
     # 37 t on 20 m of rope stretch it by 0.121 m
     assert run.stretch.mean() == pytest.approx(0.121, abs=0.01)
@@ -482,7 +482,7 @@ def test_a_delay_of_the_sensors_adds_to_that_of_the_feedback(crane):
 
 @pytest.mark.interpreted
 def test_stepper_takes_the_samples_of_a_run_with_sensors(crane):
-    stick = OperatorCommand.trapezoid(
+    command = OperatorCommand.trapezoid(
         slew=-0.8, luff=0.5, duration=1.0, start=0.1, ramp=0.2, length=1.5
     )
     controller = TIP | control.DelayedFeedback(0.2, 0.01) | control.ShipCompensation()
@@ -490,7 +490,7 @@ def test_stepper_takes_the_samples_of_a_run_with_sensors(crane):
         rate=30.0, delay=0.07, seed=4
     )
     ship = Seaway("ss3", seed=1).motion(769)
-    same_by_steps(crane, stick, ship, control=controller, slew_deg=90.0)
+    same_by_steps(crane, command, ship, control=controller, slew_deg=90.0)
 
 
 ECHO = control.Controller(lagging, Gains(0.1, 1.0 / 512.0)) | control.PositionLoop(50.0)
@@ -728,7 +728,7 @@ REFUSED = [
 @pytest.mark.parametrize(("how", "message"), REFUSED, ids=range(len(REFUSED)))
 def test_what_a_crane_cannot_do_is_said(crane, slewed, how, message):
     with refuse(message):
-        simulate(crane, **{"stick": slewed, **how})
+        simulate(crane, **{"command": slewed, **how})
 
 
 def test_limits_of_travel_stop_a_run(crane):

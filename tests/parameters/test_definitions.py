@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from swashplate import Drive
-from swashplate.parameters import REFINEMENTS, broken_rules
+from swashplate.parameters import REFINEMENTS, check_rules
 
 
 def test_what_is_switched_on_can_be_estimated() -> None:
@@ -31,9 +31,9 @@ def test_a_thousand_sets_are_checked_as_one(
 ) -> None:
     sets = {name: np.full(1000, number) for name, number in hoist.parameters.numbers.items()}
     sets[column][123] = value
-    found = {int(i): s(int(i)) for mask, s in broken_rules(sets) for i in np.flatnonzero(mask)}
+    found = {int(i): s(int(i)) for mask, s in check_rules(sets) for i in np.flatnonzero(mask)}
     assert list(found) == [123]
     alone = {name: values[123:124] for name, values in sets.items()}
-    sentences = [sentence(0) for mask, sentence in broken_rules(alone) if mask[0]]
+    sentences = [sentence(0) for mask, sentence in check_rules(alone) if mask[0]]
     assert found[123] in sentences
     assert any(part in each for each in sentences)

@@ -33,7 +33,7 @@ from swashplate.crane import (
 )
 from swashplate.crane.studies.operating import SeaCell
 from swashplate.report import figures
-from swashplate.report.figures.crane import seaway_words
+from swashplate.report.figures.crane import seaway_label
 from swashplate.report.scene import write_assessment, write_operability, write_scene
 from swashplate.report.scene.pages import COLUMNS
 from swashplate.report.style import BLUE, GREEN, VERMILION
@@ -173,7 +173,7 @@ def test_verdicts_page_says_what_the_answer_hangs_on(tmp_path, assessed):
         "The ship's roll period is 13 s, assumed.",
         "14 of 15 quantities of the crane are assumed.",
         "Limits that are assumed: swing, off-lead, side-lead",
-        point.words(),
+        point.sentence(),
     ):
         assert words in hangs
     # of the limits and of the geometry, every assumed row is marked
@@ -237,11 +237,11 @@ def test_scenes_that_cannot_be_are_refused(tmp_path, crane, runs):
 
 
 def test_seaways_in_words_have_height_period_heading_and_roll():
-    assert seaway_words(Seaway()) == "ss3 0.88 m, 7.5 s, abeam from starboard, roll 13 s"
+    assert seaway_label(Seaway()) == "ss3 0.88 m, 7.5 s, abeam from starboard, roll 13 s"
     hull = Hull(100.0, 20.0, 6.0, roll_period=10.0)
     other = Seaway(Spectrum(1.2, 8.0, 3.3), heading_deg=45.0, ship=hull)
-    assert seaway_words(other) == "1.2 m, 8 s, γ 3.3, waves at 45°, roll 10 s"
-    assert seaway_words(Seaway(heading_deg=-180.0), height=False).startswith("peak at 7.5 s, head")
+    assert seaway_label(other) == "1.2 m, 8 s, γ 3.3, waves at 45°, roll 10 s"
+    assert seaway_label(Seaway(heading_deg=-180.0), height=False).startswith("peak at 7.5 s, head")
 
 
 def test_figure_of_an_assessment_tells_seaways_from_the_means_interval(assessed, assert_legible):
@@ -420,8 +420,8 @@ def test_figure_of_runs_shows_them_by_name_what_moves_and_the_sea(crane, runs):
     assert labels == ["swing (deg)", "in sea (deg)", "limits"]
     names = [each.get_text() for each in figure.axes[0].get_legend().get_texts()]
     assert names == list(runs)
-    stick = OperatorCommand.trapezoid(slew=0.5, luff=0.5, duration=9.0, length=12.0)
-    figure = simulate(crane, stick).plot()
+    command = OperatorCommand.trapezoid(slew=0.5, luff=0.5, duration=9.0, length=12.0)
+    figure = simulate(crane, command).plot()
     labels = [ax.get_ylabel() for ax in figure.axes]
     assert labels == ["swing (deg)", "slew (deg)", "boom (deg)", "limits"]
     texts = [each.get_text() for ax in figure.axes for each in ax.texts]

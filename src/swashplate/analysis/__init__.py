@@ -1,4 +1,4 @@
-"""What a drive can do, what limits it, and what a change would buy."""
+"""Capabilities of a drive, its limits, and the effects of changes."""
 
 import lazy_loader
 

@@ -24,7 +24,7 @@ from .limits import LimitShare as LimitShare
 from .limits import LimitShares as LimitShares
 from .limits import limit_shares as limit_shares
 from .limits import shares_of as shares_of
-from .monte_carlo import ASSUMED as ASSUMED
+from .monte_carlo import ERROR_OF_ASSUMED as ERROR_OF_ASSUMED
 from .monte_carlo import Bands as Bands
 from .monte_carlo import Draws as Draws
 from .monte_carlo import assumed_parameters as assumed_parameters

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, fields, replace
 from math import atan, inf
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,24 +27,32 @@ Array = NDArray[np.float64]
 
 # --- steady edges ---------------------------------------------------------------------------------
 
+
+class Edge(NamedTuple):
+    """Commands at most 1e-12 V apart, on both sides of the point at which a condition fails."""
+
+    inside: float
+    """Last command at which it holds; 0 V if it does not even hold there. [V]"""
+    outside: float | None
+    """First command at which it does not hold; None if it holds up to the end. [V]"""
+
+
 GRID = 200
 """Parts into which an interval is cut at each refinement."""
 CLOSE = 1e-12
 """Width at which an edge counts as found. [V]"""
 NEARLY_FULL = (1.0 - 1e-9) * FULL_VOLTAGE
-"""An edge beyond is not one: the speed grows up to full voltage. [V]"""
+"""Above this voltage a drive counts as not saturated: its speed grows up to full voltage. [V]"""
 
 
-def edge(holds: Callable[[Array], NDArray[np.bool_]], end: float) -> tuple[float, float | None]:
-    """The last command on the way from 0 V to `end` [V] before something first fails to hold. [V]
+def edge(holds: Callable[[Array], NDArray[np.bool_]], end: float) -> Edge:
+    """First command on the way from 0 V to `end` [V] at which a condition fails.
 
-    `holds` says of commands [V], element by element, whether it does. Both sides of the edge, at
-    most 1e-12 V apart: the one inside, 0 V if it does not even hold there, and the one outside,
-    None if it holds up to the end.
+    `holds` evaluates the condition for commands [V], element by element.
     """
     low, high = 0.0, end
     if holds(np.linspace(low, high, GRID + 1)).all():
-        return end, None
+        return Edge(end, None)
     while abs(high - low) > CLOSE:
         grid = np.linspace(low, high, GRID + 1)
         first = int(np.argmax(~holds(grid)))
@@ -52,15 +60,11 @@ def edge(holds: Callable[[Array], NDArray[np.bool_]], end: float) -> tuple[float
         if closer == (low, high):  # the numbers end before the width does
             break
         low, high = closer
-    return low, high
+    return Edge(low, high)
 
 
-def dead_zone(drive: Drive, direction: float) -> tuple[float, float | None]:
-    """Commands of one direction, +1 or -1, up to which the current stays within Z17.
-
-    The last one [V], and the first one beyond [V] under which a force acts, None if there is none
-    up to ±10 V.
-    """
+def dead_zone(drive: Drive, direction: float) -> Edge:
+    """Edge of the dead zone in one direction, +1 or -1: up to it the current stays within Z17."""
     dead = drive.parameters.numbers["Z17"]
     return edge(lambda volts: np.abs(drive.steady_current(volts)) <= dead, direction * FULL_VOLTAGE)
 
@@ -101,11 +105,11 @@ def without_limits(drive: Drive, columns: Iterable[str]) -> Drive:
 # --- acceleration ---------------------------------------------------------------------------------
 
 AcceleratedBy = Literal["valve", "spool stop", "orifice"]
-"""What sets the flow to the stroking piston: the opening that the solenoids can give, the spool's
+"""Limit of the flow to the stroking piston: the opening that the solenoids can give, the spool's
 stop Z14, or the in-line orifice Z16."""
 
 INSIDE = 1e-9
-"""Share of the range of pressure by which a curve ends before it. [1]"""
+"""Distance of a curve's ends from the ends of the pressure range, as a share of it. [1]"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,14 +133,14 @@ def acceleration_curve(drive: Drive, voltage: float, points: int = 201) -> Accel
     drive : Drive
         The drive.
     voltage : float
-        Command, within ±10 V; 0 is the stick let go. [V]
+        Command, within ±10 V; 0 if the joystick is released. [V]
     points : int
         Speeds, evenly spaced in stroking pressure between those that ±10 V settle at.
 
     Returns
     -------
     AccelerationCurve
-        The ends lie a hair's breadth inside, where the plate still moves.
+        The ends lie a hair's breadth inside the range, so that the plate still moves.
     """
     low, high = (_settled_pressure(drive, end) for end in (-FULL_VOLTAGE, FULL_VOLTAGE))
     inside = INSIDE * (high - low)
@@ -181,8 +185,8 @@ def _curve(drive: Drive, voltage: float, pressure: Array) -> AccelerationCurve:
     # a line at rest leaks as a stiff one does
     leaks = options.leakage if options.line is None else options.line
     forms = PumpOptions(symmetric=options.symmetric, steep=options.steep, leakage=leaks)
-    still = PartNumbers(p._replace(Z12=0.0, load_inertia=0.0), forms)
-    instance = Instance(instance.model, (front, still), instance.name)
+    standing_load = PartNumbers(p._replace(Z12=0.0, load_inertia=0.0), forms)
+    instance = Instance(instance.model, (front, standing_load), instance.name)
     arguments = instance.start({"current": drive.steady_current(voltage)}, 1.0).arguments[1]
     pump: Any = instance.model.parts[1]
     samples = [
@@ -211,9 +215,9 @@ SHORTEST, LONGEST = 8.0, 256.0
 """A step lasts so long at first, and at most, until the speed has come to stay. [s]"""
 
 
-def _row(words: str, unit: str, spec: str = "") -> Any:
-    """A field that is a row of the table: its words, unit and format. None if it is not known."""
-    return field(default=None, metadata={"row": (words, unit, spec)})
+def _row(label: str, unit: str, spec: str = "") -> Any:
+    """A field that is a row of the table, with its label, unit and format; None if not known."""
+    return field(default=None, metadata={"row": (label, unit, spec)})
 
 
 @dataclass(frozen=True)
@@ -232,7 +236,7 @@ class DirectionLimits(Result):
     """Command beyond which the speed stays; None if it grows up to ±10 V."""
     top_speed: float = _row("speed at full voltage", "rad/s")  # Steady, at ±10 V.
     speed_limit: float = _row("speed limit", "rad/s")
-    """Speed with the swash plate at its stop, or where Z15 holds the pressure."""
+    """Speed with the swash plate at its stop, or with the pressure held by Z15."""
     acceleration: float = _row("acceleration at rest", "rad/s^2", "z.2f")  # Under ±10 V.
     starting_rise: float | None = _row("starting, 10 to 90 %", "s")
     """Time from 10 % to 90 % of a step to ±10 V from rest; None if nothing moves."""
@@ -241,6 +245,15 @@ class DirectionLimits(Result):
     stopping_rise: float | None = _row("stopping, 10 to 90 %", "s")
     """The same two when the command goes back to 0 V."""
     stopping_reach: float | None = _row("stopping, to 90 %", "s")
+
+
+class OpenRange(NamedTuple):
+    """Range of a number that limits decide which no test reached; None if it is undefined."""
+
+    at_test_end: float | None
+    """If those limits act just beyond what was tested."""
+    unlimited: float | None
+    """Without those limits."""
 
 
 PLUS, MINUS = 0, 1
@@ -262,12 +275,12 @@ class Envelope(Tabular, Drawn):
     accelerating: tuple[AccelerationCurve, AccelerationCurve]
     """Largest acceleration over the speed under +10 V and -10 V."""
     released: AccelerationCurve
-    """Acceleration over the speed with the stick let go."""
-    nearest: tuple[DirectionLimits, DirectionLimits] | None = None
-    """Both directions if limits that no test reached lie where the tests ended; None without
-    such limits."""
-    farthest: tuple[DirectionLimits, DirectionLimits] | None = None
-    """Both directions if there are no such limits."""
+    """Acceleration over the speed with the joystick released."""
+    with_limits_at_test_end: tuple[DirectionLimits, DirectionLimits] | None = None
+    """Both directions if each limit that no test reached acts just beyond what was tested; None if
+    the tests reached all limits."""
+    with_limits_removed: tuple[DirectionLimits, DirectionLimits] | None = None
+    """Both directions without the limits that no test reached; None if there are none."""
     orifice_unknown: tuple[bool, bool] = (False, False)
     """Whether it is not known how far the tests opened the orifice of a direction."""
 
@@ -283,9 +296,9 @@ class Envelope(Tabular, Drawn):
         for quantity in fields(DirectionLimits):
             name = quantity.name
             if "row" in quantity.metadata:
-                words, unit, spec = quantity.metadata["row"]
+                label, unit, spec = quantity.metadata["row"]
                 cells = (self._cell(name, index, unit) for index in (PLUS, MINUS))
-                table.add(Cell(name, words), *cells, unit=unit, spec=spec)
+                table.add(Cell(name, label), *cells, unit=unit, spec=spec)
             if name == "acceleration":
                 causes = (self._accelerated_by(index) for index in (PLUS, MINUS))
                 table.add(Cell("accelerated_by", "... set by the"), *causes)
@@ -293,34 +306,37 @@ class Envelope(Tabular, Drawn):
         table.add(creep, self.creep, Cell(self.creep, ""), unit="rad/s", section=True)
         return table
 
-    def _open(self, name: str, index: int) -> tuple[float | None, float | None] | None:
-        """A number by its nearest and farthest limits, if those that no test reached decide it."""
-        if self.nearest is None or self.farthest is None:
+    def _open_range(self, name: str, index: int) -> OpenRange | None:
+        """Range of a number that limits decide which no test reached; None if they do not."""
+        if self.with_limits_at_test_end is None or self.with_limits_removed is None:
             return None
-        near = getattr(self.nearest[index], name)
-        far = getattr(self.farthest[index], name)
-        if near is None or far is None:
-            return None if near is far else (near, far)
-        return (near, far) if abs(far - near) > DECIDES * abs(near) else None
+        at_test_end = getattr(self.with_limits_at_test_end[index], name)
+        unlimited = getattr(self.with_limits_removed[index], name)
+        if at_test_end is None or unlimited is None:
+            is_open = at_test_end is not unlimited
+        else:
+            is_open = abs(unlimited - at_test_end) > DECIDES * abs(at_test_end)
+        return OpenRange(at_test_end, unlimited) if is_open else None
 
     def _cell(self, name: str, index: int, unit: str) -> float | Cell | None:
-        """A number, or the end that is known of it."""
-        ends = self._open(name, index)
-        if ends is None:
+        """A number, or its bound if limits decide it which no test reached."""
+        open_range = self._open_range(name, index)
+        if open_range is None:
             value: float | None = getattr((self.plus, self.minus)[index], name)
             return value
-        near, far = ends
-        if near is None or far is None or self._orifice_decides(index, name):
+        at_test_end, unlimited = open_range
+        if at_test_end is None or unlimited is None or self._orifice_decides(index, name):
             return Cell(None, "not seen")
-        words = "at least" if abs(far) > abs(near) else "at most"
-        return Cell(near, f"{words} {plain(display_unit(unit).factor * near, 4)}, not seen")
+        relation = "at least" if abs(unlimited) > abs(at_test_end) else "at most"
+        bound = plain(display_unit(unit).factor * at_test_end, 4)
+        return Cell(at_test_end, f"{relation} {bound}, not seen")
 
     def _orifice_decides(self, index: int, name: str) -> bool:
         """Whether a number follows from an orifice whose largest opening the tests do not show."""
         return self.orifice_unknown[index] and name.startswith(("acceleration", "start", "stop"))
 
     def _accelerated_by(self, index: int) -> Cell:
-        if self._open("acceleration", index) is not None:
+        if self._open_range("acceleration", index) is not None:
             return Cell(None, "not seen")
         return Cell(None, (self.plus, self.minus)[index].accelerated_by)
 
@@ -334,9 +350,10 @@ class Envelope(Tabular, Drawn):
 def envelope(drive: Drive) -> Envelope:
     """Compute the capabilities of a drive in each direction.
 
-    Dead zone, creep and gains of the steady map, limits of speed and acceleration, and the times
-    of a full step, which are those of a simulation. Of a drive that was fitted or guessed, a number
-    that a limit decides which no test reached has one end, or none.
+    Dead zone, creep and gains come from the steady map, as do the limits of speed and
+    acceleration; the times of a full step come from a simulation. The tests of a fitted or guessed
+    drive may not have reached a limit: a number that depends on it is shown as a bound, "at least"
+    or "at most", or as not seen.
 
     Parameters
     ----------
@@ -371,12 +388,13 @@ def envelope(drive: Drive) -> Envelope:
     unreached = drive.parameters.unreached
     if not unreached:
         return capability
-    where_tests_ended = {column: value for column, value in unreached.items() if value}
-    nearest = Drive(drive.parameters.with_numbers(where_tests_ended))
+    # 0 stands for an orifice that no test opened by a known amount: its value stays
+    test_ends = {column: value for column, value in unreached.items() if value != 0.0}
+    limited_at_test_ends = Drive(drive.parameters.with_numbers(test_ends))
     return replace(
         capability,
-        nearest=_both_directions(nearest),
-        farthest=_both_directions(without_limits(drive, unreached)),
+        with_limits_at_test_end=_both_directions(limited_at_test_ends),
+        with_limits_removed=_both_directions(without_limits(drive, unreached)),
         orifice_unknown=(
             unreached.get("Z16_plus") == 0.0,
             unreached.get("Z16_minus") == 0.0,
@@ -418,16 +436,16 @@ def _limits_of(drive: Drive, direction: float, speed_limit: float) -> DirectionL
     return DirectionLimits(**limits)
 
 
-def _times(drive: Drive, before: float, after: float) -> tuple[float | None, float | None]:
+def _times(drive: Drive, from_volts: float, to_volts: float) -> tuple[float | None, float | None]:
     """Times from 10 % to 90 % and to 90 % of a step between two settled commands. [s]"""
-    first = float(drive.steady_speed(before))
-    last = float(drive.steady_speed(after))
+    initial_speed = float(drive.steady_speed(from_volts))
+    final_speed = float(drive.steady_speed(to_volts))
     length = SHORTEST
-    while first != last and length <= LONGEST:
-        command = np.full(int(length * SOURCE_RATE) + 1, after)
-        command[0] = before
+    while initial_speed != final_speed and length <= LONGEST:
+        command = np.full(int(length * SOURCE_RATE) + 1, to_volts)
+        command[0] = from_volts
         run = drive.simulate(command, start="steady")
-        progress = (run.shaft_speed - first) / (last - first)
+        progress = (run.shaft_speed - initial_speed) / (final_speed - initial_speed)
         if progress.max() >= HIGH:
             low = float(run.time[np.argmax(progress >= LOW)])
             high = float(run.time[np.argmax(progress >= HIGH)])

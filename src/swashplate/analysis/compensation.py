@@ -126,7 +126,7 @@ class InverseMap(Result):
         return cast("Figure", draw(self, improvement, ax=ax, title=title))
 
     def voltage(self, speed: ArrayLike, *, clip: bool = False) -> Array:
-        """Voltage for reference speeds, element by element; it never falls where the speed rises.
+        """Voltage for reference speeds, element by element; it never falls if the speed rises.
 
         Parameters
         ----------
@@ -161,7 +161,7 @@ class InverseMap(Result):
         if not np.isfinite(reference).all():
             raise InputError("The reference speed must be finite everywhere.")
         low, high = self.limits
-        below, above = self.gap
+        gap_start, gap_end = self.gap
         inside = np.clip(reference, low, high)
         beyond = reference[np.abs(reference - inside) > ROUNDING * (high - low)]
         if beyond.size and not clip:
@@ -172,13 +172,13 @@ class InverseMap(Result):
                 f"{self.name} cannot settle at {worst}: its speeds reach from {least} to {most}."
             )
         # the creep comes first, so that it wins a tie
-        slowest = np.array([self.creep, below, above])
+        slowest = np.array([self.creep, gap_start, gap_end])
         slowest_voltages = np.array([0.0, self.minus.voltage[-1], self.plus.voltage[0]])
         nearest = np.argmin(np.abs(inside[..., np.newaxis] - slowest), axis=-1)
         upwards = np.interp(inside, self.plus.speed, self.plus.voltage)
         downwards = np.interp(inside, self.minus.speed, self.minus.voltage)
-        voltage = np.where(inside > above, upwards, slowest_voltages[nearest])
-        return np.asarray(np.where(inside < below, downwards, voltage))
+        voltage = np.where(inside > gap_end, upwards, slowest_voltages[nearest])
+        return np.asarray(np.where(inside < gap_start, downwards, voltage))
 
     def command(self, speed: ArrayLike, rate: float) -> Array:
         """Voltage over time for a reference speed over time, with the drive's lag made up for.
@@ -240,22 +240,28 @@ class InverseMap(Result):
         settled = np.interp(voltages, map_voltages, map_speeds)
         for row in zip(speeds, voltages, settled, strict=True):
             voltages_table.add(*map(float, row))
-        below, above = self.gap
-        if any(below < speed < above for speed in speeds):
-            low, high = (quantity(edge, "rad/s", spec="z.3f") for edge in (below, above))
+        gap_start, gap_end = self.gap
+        if any(gap_start < speed < gap_end for speed in speeds):
+            low, high = (quantity(edge, "rad/s", spec="z.3f") for edge in (gap_start, gap_end))
             voltages_table.caption = f"between {low} and {high} only the creep at 0 V can be held"
         points = self._points(MOST_SHOWN)
         total = self.minus.speed.size + self.plus.speed.size + 1
         if len(points.rows) < total:
             points.caption = f"{len(points.rows)} of {total} points shown"
-        up, down = self.acceleration
+        plus, minus = self.acceleration
         limits = Table(
             "", (Column("Limit"), Column("negative", ".3f"), Column("positive", ".3f"), UNIT)
         )
         lowest, highest = self.limits
         limits.add("speed", lowest, highest, unit="rad/s")
-        limits.add("slowest that can be held", below, above, unit="rad/s", spec="z.3f")
-        limits.add("acceleration at rest", -down, up, unit="rad/s^2", spec=".2f")
+        limits.add("slowest that can be held", gap_start, gap_end, unit="rad/s", spec="z.3f")
+        limits.add(
+            "acceleration at rest",
+            -minus,
+            plus,
+            unit="rad/s^2",
+            spec=".2f",
+        )
         limits.add("lag", "", 1e3 * self.lag, unit="ms", spec=".1f")
         limits.add("interpolation error", "", self.error, unit="rad/s", spec=".2g")
         return [voltages_table, points, limits] if speeds else [points, limits]
@@ -315,7 +321,7 @@ def inverse_map(drive: Drive, points: int = 101) -> InverseMap:
     InputError
         For another number of points.
     DomainError
-        Where there is no inverse: no command moves the drive one way, or a larger command makes it
+        If there is no inverse: no command moves the drive one way, or a larger command makes it
         slower.
 
     Examples
@@ -364,7 +370,7 @@ def inverse_map(drive: Drive, points: int = 101) -> InverseMap:
 
 def _branch(drive: Drive, direction: float, points: int) -> MapBranch:
     """Points of one direction, from the lower voltage to the higher."""
-    _, start = dead_zone(drive, direction)
+    start = dead_zone(drive, direction).outside
     saturated = saturation(drive, direction)
     end = direction * FULL_VOLTAGE if saturated is None else saturated
     if start is None or start == end:
@@ -401,13 +407,20 @@ class Improvement(Result):
 
     @property
     def rms(self) -> dict[str, float]:
-        """Rms of speed less reference speed, by the way of commanding it. [rad/s]"""
-        return {k: rms_difference(run.shaft_speed, self.reference) for k, run in self.runs.items()}
+        """Rms of speed less reference speed, by controller. [rad/s]"""
+        return {
+            name: rms_difference(run.shaft_speed, self.reference) for name, run in self.runs.items()
+        }
 
     def table(self) -> Table:
         """Errors of the speed, controller by controller."""
-        columns = (Column("rms", ".3f", "rad/s"), Column("largest", ".3f", "rad/s"))
-        table = Table("Error of the speed", (Column("Controller"), *columns, Column("rms", ".1%")))
+        columns = (
+            Column("Controller"),
+            Column("rms", ".3f", "rad/s"),
+            Column("largest", ".3f", "rad/s"),
+            Column("rms", ".1%"),
+        )
+        table = Table("Error of the speed", columns)
         rms = self.rms
         for name, run in self.runs.items():
             largest = float(np.abs(run.shaft_speed - self.reference).max())
@@ -422,8 +435,9 @@ def proportional_command(inverse: InverseMap, reference: ArrayLike) -> Array:
     """
     speed = np.asarray(reference, dtype=np.float64)
     low, high = inverse.limits
-    up, down = inverse.plus.voltage[-1] / high, inverse.minus.voltage[0] / low
-    return np.asarray(np.where(speed >= 0.0, up * speed, down * speed))
+    positive_gain = inverse.plus.voltage[-1] / high
+    negative_gain = inverse.minus.voltage[0] / low
+    return np.asarray(np.where(speed >= 0.0, positive_gain * speed, negative_gain * speed))
 
 
 def speed_of_command(inverse: InverseMap, voltage: ArrayLike) -> Array:
@@ -478,16 +492,16 @@ def improvement(
         For a reference speed beyond the drive's limits, one of standstill only, or a record that
         cannot be simulated.
     """
-    chosen = inverse_map(drive) if inverse is None else inverse
-    with_lead = chosen.command(reference_speed, rate)
+    inverse_used = inverse_map(drive) if inverse is None else inverse
+    with_lead = inverse_used.command(reference_speed, rate)
     reference = np.array(reference_speed, dtype=np.float64)
     if not reference.any():
         raise InputError(
             "The reference speed is standstill throughout; use one that moves the drive."
         )
     commands = {
-        "straight line": proportional_command(chosen, reference),
-        "inverse map": chosen.voltage(reference),
+        "straight line": proportional_command(inverse_used, reference),
+        "inverse map": inverse_used.voltage(reference),
         "inverse map and lead": with_lead,
     }
     runs = {name: drive.simulate(voltage, rate) for name, voltage in commands.items()}

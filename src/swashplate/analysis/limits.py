@@ -31,14 +31,14 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Removal(Result):
-    """A limit, the component behind it, and the changes that take it away."""
+    """A limit, the component that sets it, and the changes that remove it."""
 
     limit: str
-    """Its name in words."""
+    """Its name with spaces."""
     component: str
-    """What would have to change in the machine."""
+    """Component of the machine to change."""
     flag: Limit | None
-    """How a simulation marks it; None for what acts always or is not marked."""
+    """Flag of a simulation that marks it; None if it acts always or is not marked."""
     changes: dict[str, Change]
     """Parameters that take it away, SI."""
     signal: str = field(default="", kw_only=True)
@@ -110,7 +110,7 @@ class LimitShare(Removal):
     """Rms tracking error without it; None if there is none, see `failure`. [rad/s]"""
     error_share: float | None
     """By how much of itself the rms error falls without it; negative if it grows. [1]"""
-    alone: float | None
+    error_as_only_limit: float | None
     """Rms tracking error with this limit and none of the others. [rad/s]"""
     failure: str = ""
     """Why a drive without it cannot be simulated."""
@@ -120,8 +120,8 @@ class LimitShare(Removal):
 class LimitShares(Tabular):
     """Costs of the limits of a drive under one command, the costliest first.
 
-    The shares need not add up to 1: where one limit hides another, taking either away alone helps
-    little, and where they take turns each helps on its own.
+    The shares need not add up to 1: if one limit hides another, the removal of either by itself
+    helps little; if they take turns, the removal of each helps.
     """
 
     name: str
@@ -129,13 +129,13 @@ class LimitShares(Tabular):
     run: Simulation
     """The drive as it is."""
     reference: Array
-    """Wanted speed, (n,). [rad/s]"""
+    """Required speed, (n,). [rad/s]"""
     error: float
     """Rms tracking error of the drive as it is. [rad/s]"""
     shares: tuple[LimitShare, ...]
     compared_with: str = "a drive without limits"
-    """What the drive is compared with, in words."""
-    unseen: tuple[str, ...] = ()
+    """Name of the drive or speed that the drive is compared with."""
+    unreached: tuple[str, ...] = ()
     """Columns of limits that act here and that no test of the drive reached."""
 
     @property
@@ -157,10 +157,10 @@ class LimitShares(Tabular):
                 f"speed, against {self.compared_with}, falls by {100.0 * reduction:.1f} % to "
                 f"{quantity(first.error, 'rad/s', spec='.3f')}."
             ]
-        if self.unseen:
+        if self.unreached:
             sentences.append(
-                f"No test reached {listed(self.unseen)}: its value only marks how far the tests "
-                "went."
+                f"No test reached {listed(self.unreached)}: its value only marks how far the "
+                "tests went."
             )
         for share in self.shares:
             if share.failure:
@@ -180,8 +180,8 @@ class LimitShares(Tabular):
         )
         table = Table("", columns)
         for share in self.shares:
-            acts = share.time_share or share.error_share or share.failure or share.alone
-            if acting and not acts:
+            has_effect = share.error_share or share.error_as_only_limit
+            if acting and not (share.time_share or has_effect or share.failure):
                 continue
             table.add(
                 share.limit,
@@ -190,12 +190,12 @@ class LimitShares(Tabular):
                 share_cell(share.time_share),
                 share.error,
                 share.error_share,
-                share.alone,
+                share.error_as_only_limit,
             )
         return table
 
     def plot(self, *, title: str | None = None) -> Figure:
-        """Figure of command and speed, beside the reference speed, and of when each limit acts."""
+        """Figure of command, speed and reference speed, and of when each limit acts."""
         draw = figures().plot_limit_timeline
         return cast("Figure", draw(self.run, reference=self.reference, title=title))
 
@@ -220,7 +220,7 @@ def limit_shares(
     drive : Drive
         The drive.
     voltage, rate, start, **keywords :
-        The command and what was measured beside it, as in `Drive.simulate`.
+        The command and the signals measured with it, as in `Drive.simulate`.
     reference : (n,) array_like, optional
         Reference speed at the samples; by default what the drive would do without any of its
         limits. [rad/s]
@@ -238,15 +238,16 @@ def limit_shares(
     DomainError
         If the drive as it is leaves the model's domain, or the one without any limits does and no
         reference speed is given. A limit whose removal breaks a rule of the parameters has a share
-        with a `failure`, and stays where all others are taken away.
+        with a `failure`, and is kept when all limits are removed.
 
     Notes
     -----
-    A counterfactual: one limit is taken away (the dead zone's V_dz and as much of Z17 as the card's
+    A counterfactual: one limit is removed (the dead zone's V_dz and as much of Z17 as the card's
     jump does not cover, lim1 and lim2, I_t2, tau, Z16, Z14, Z13, Z15, Z18), the command is
     simulated again and compared with the same reference speed. By default that speed still has the
-    lags of the card's filter and of the valve, so that only the limits make an error. A measured
-    pump speed or supply pressure is a limit, too: without it the value of the parameter set counts.
+    lags of the card's filter and of the valve, so that the error is due only to the limits. A
+    measured pump speed or supply pressure is a limit, too: without it the value of the parameter
+    set counts.
 
     Examples
     --------
@@ -263,35 +264,36 @@ def shares_of(drive: Drive, run: Simulation, reference: ArrayLike | None = None)
     """Shares of each limit in a run of a drive; see `limit_shares`."""
 
     def speed_without(removed: Sequence[Removal]) -> Array | str:
-        """Speed over the same command, or why there is none."""
+        """Speed under the same command without some limits, or why it cannot be simulated."""
         changes: dict[str, Change] = {}
         for removal in removed:
             changes |= removal.changes
         signals = {removal.signal for removal in removed}
         records = {name: record for name, record in run.records.items() if name not in signals}
         try:
-            other = drive.parameters.with_numbers(changes)
-            return simulate_drive(other, records, run.start).shaft_speed
-        except SwashplateError as refusal:
-            return str(refusal)
+            parameters = drive.parameters.with_numbers(changes)
+            return simulate_drive(parameters, records, run.start).shaft_speed
+        except SwashplateError as error:
+            return str(error)
 
-    present = removals(drive) + [removal for removal in MEASURED if removal.signal in run.records]
+    present = removals(drive)
+    present += [removal for removal in MEASURED if removal.signal in run.records]
     removable = _removable_together(drive, present)
     unlimited = speed_without(removable)
     if reference is not None:
-        compared = checked_speed(reference, run.shaft_speed.size)
+        reference_speed = checked_speed(reference, run.shaft_speed.size)
     elif isinstance(unlimited, str):
         raise DomainError(
             "Without its limits the drive cannot be simulated, so there is no speed to compare "
             f"with; give a reference speed ({unlimited.rstrip('.')})."
         )
     else:
-        compared = checked_speed(unlimited, run.shaft_speed.size)
+        reference_speed = checked_speed(unlimited, run.shaft_speed.size)
 
     def error_of(speed: Array | str) -> float | None:
-        return None if isinstance(speed, str) else rms_difference(speed, compared)
+        return None if isinstance(speed, str) else rms_difference(speed, reference_speed)
 
-    error = rms_difference(run.shaft_speed, compared)
+    error = rms_difference(run.shaft_speed, reference_speed)
     shares = []
     for removal in present:
         speed = speed_without([removal])
@@ -306,28 +308,29 @@ def shares_of(drive: Drive, run: Simulation, reference: ArrayLike | None = None)
                 time_share=None if removal.flag is None else run.time_share(removal.flag),
                 error=error_without,
                 error_share=error_share,
-                alone=error_of(speed_without(others)),
+                error_as_only_limit=error_of(speed_without(others)),
                 failure=speed if isinstance(speed, str) else "",
             )
         )
     shares.sort(key=lambda share: inf if share.error is None else share.error)
-    acting = set[str]()
+    acting_columns = set[str]()
     for share in shares:
         if share.time_share:
-            acting.update(share.changes)
+            acting_columns.update(share.changes)
+    unreached = [column for column in drive.parameters.unreached if column in acting_columns]
     result = LimitShares(
         name=drive.name,
         run=run,
-        reference=compared,
+        reference=reference_speed,
         error=error,
         shares=tuple(shares),
-        unseen=tuple(column for column in drive.parameters.unreached if column in acting),
+        unreached=tuple(unreached),
     )
     return result if reference is None else replace(result, compared_with="the reference speed")
 
 
 def _removable_together(drive: Drive, present: Sequence[Removal]) -> list[Removal]:
-    """As many limits as the model's domain allows to be taken away at the same time."""
+    """As many limits as can be removed at the same time within the model's domain."""
     removable = []
     unlimited = drive.parameters
     for removal in present:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from math import isfinite, sqrt
 from pathlib import Path
 from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +30,7 @@ from swashplate.results import Result
 
 Array = NDArray[np.float64]
 
-ASSUMED = 0.2
+ERROR_OF_ASSUMED = 0.2
 """Standard deviation of an assumed parameter over its value: a guess takes 0.2 rad for the plate's
 largest angle, machines have 0.25 to 0.35. [1]"""
 STEP = 0.1
@@ -40,8 +41,8 @@ NEGLIGIBLE = 1e-12
 """Change of the solver's numbers that counts as none. [1]"""
 MOST_REDRAWN = 20
 """Draws outside the model's domain for each one inside from which the drawing is given up."""
-NARROWED = 0.1
-"""Share of all draws from which those that were left out narrow the bands. [1]"""
+LARGEST_SHARE_REDRAWN = 0.1
+"""Largest share of draws left out for which the bands do not count as too narrow. [1]"""
 
 # --- drives that the tests allow ------------------------------------------------------------------
 
@@ -75,7 +76,7 @@ class Draws(Result):
                 "bands do not include their errors."
             )
         attempts = self.redrawn + len(self.drives)
-        if self.redrawn > NARROWED * attempts:
+        if self.redrawn > LARGEST_SHARE_REDRAWN * attempts:
             sentences.append(
                 f"The bands are too narrow: {100.0 * self.redrawn / attempts:.0f} % of the drives "
                 "that the errors of the estimates allow lie beyond the parameters' bounds or the "
@@ -143,25 +144,28 @@ def drawn_drives(stages: Sequence[StageFit], draws: int = 200, seed: int = 0) ->
 
 
 def assumed_parameters(stages: Sequence[StageFit]) -> list[dict[str, float]]:
-    """Fixed parameters that nobody measured, by column, and what they may be off by.
+    """Standard deviations of the fixed parameters that nobody measured, by column.
 
-    Those of the set that a fit begins from whose status is "assumed" or "approximate", both
-    directions together, without those that a stage moves or whose uncertainty is stated.
+    A mapping for each parameter of the fit's initial set whose status is "assumed" or
+    "approximate"; it holds both directions. Left out are parameters that a stage estimates and
+    those whose uncertainty is stated.
     """
     model = stages[0].problem.model
     assert isinstance(model, DriveModel)
-    moved = set[str]()
+    estimated = set[str]()
     for stage in stages:
         for unknown in stage.problem.unknowns:
-            moved.update(unknown.targets)
-    stated = {name for together in stages[0].problem.uncertain for name in together}
+            estimated.update(unknown.targets)
     if any(stage.stage.forces is not None for stage in stages):
-        moved |= set(Forces.columns)
-    left_out = moved | stated | LIMIT_COLUMNS.keys()
+        estimated.update(Forces.columns)
+    with_stated_uncertainty = set[str]()
+    for columns in stages[0].problem.uncertain:
+        with_stated_uncertainty.update(columns)
+    left_out = estimated | with_stated_uncertainty | LIMIT_COLUMNS.keys()
     assumed = []
     for parameter in model.parameters.values():
         numbers = {
-            column: ASSUMED * value
+            column: ERROR_OF_ASSUMED * value
             for column, value in parameter.numbers.items()
             if isfinite(value) and value != 0.0
         }
@@ -185,9 +189,9 @@ def standard_errors(
     numbers : callable
         From a drive to an array of any shape.
     assumed : sequence of mappings
-        What other fixed numbers may be off by, by column, as of `assumed_parameters`. The
-        estimates are refitted to first order for each of them, so that what the tests show stays
-        as it is. [SI]
+        Standard deviations of other fixed numbers, by column, as of `assumed_parameters`. For
+        each of them the estimates are refitted to first order, so that the drive still agrees
+        with the tests. [SI]
 
     Raises
     ------
@@ -196,15 +200,16 @@ def standard_errors(
 
     Notes
     -----
-    To first order: the root of the sum of squares of what the numbers change by for one standard
-    error along each principal axis of every stage's covariance, from a step of a tenth of it or of
-    5 % of the parameter that moves most. Draws would leave the bounds where one estimate is hardly
-    known; its neighbours, and what depends on them alone, are known all the same.
+    To first order: the root of the sum of squares of the numbers' changes for one standard error
+    along each principal axis of every stage's covariance. The change is that of a step of a tenth
+    of the standard error, or of 5 % of the parameter that moves most. Draws would leave the bounds
+    if one estimate is hardly known; its neighbours, and what depends only on them, are known all
+    the same.
     """
     base = numbers(stages[-1].drive)
     variance = np.zeros_like(base)
     for stage in stages:
-        # what belongs to a run alone is no part of the drive
+        # unknowns of a single run are not part of the drive
         machine = stage.problem.unknowns.shared
         covariance = uncertainty_of(stage).own.matrix[np.ix_(machine, machine)]
         variances, axes = np.linalg.eigh(covariance)
@@ -284,19 +289,20 @@ def _slope(
     base: Array,
     assumed: Mapping[str, float] = MappingProxyType({}),
 ) -> Array:
-    """Change of numbers for errors of the stages' vectors and effects, by a small step along them.
+    """Directional derivative of numbers of the drive, by a small step along errors.
 
-    Systematic effects are by name, in standard uncertainties. The uncertainties that a stage needs
-    are computed when they are first asked for, and kept with it.
+    The errors are those of the stages' vectors, of systematic effects by name, in standard
+    uncertainties, and of assumed numbers. The uncertainties of a stage are computed at their first
+    use, and kept with it.
     """
     largest = max((float(np.abs(error).max()) for error in errors.values()), default=0.0)
     for stage in stages:
         for effect, size in effects.items():
             change = size * uncertainty_of(stage).systematic.get(effect, np.zeros(1))
             largest = max(largest, float(np.abs(change).max()))
-    first = min(STEP, LARGEST_STEP / largest) if largest else STEP
-    for step in (first, -first, 0.1 * first, -0.1 * first):
-        parameters = _moved(
+    first_step = min(STEP, LARGEST_STEP / largest) if largest else STEP
+    for step in (first_step, -first_step, 0.1 * first_step, -0.1 * first_step):
+        parameters = _with_errors(
             stages,
             {name: step * error for name, error in errors.items()},
             {effect: step * size for effect, size in effects.items()},
@@ -311,7 +317,7 @@ def _slope(
 
 
 def _drawn(stages: Sequence[StageFit], random: np.random.Generator) -> ParameterSet | None:
-    """A set with each stage's vector off by a drawn error, None outside bounds or domain."""
+    """A set with drawn errors of each stage's vector; None outside bounds or domain."""
     names = _effects(stages)
     effects = dict(zip(names, random.normal(size=len(names)).tolist(), strict=True))
     errors = {}
@@ -320,7 +326,7 @@ def _drawn(stages: Sequence[StageFit], random: np.random.Generator) -> Parameter
         errors[stage.stage.name] = random.multivariate_normal(
             np.zeros(len(covariance)), covariance, check_valid="ignore", method="eigh"
         )
-    return _moved(stages, errors, effects)
+    return _with_errors(stages, errors, effects)
 
 
 def _effects(stages: Sequence[StageFit]) -> list[str]:
@@ -337,16 +343,16 @@ def _effects(stages: Sequence[StageFit]) -> list[str]:
     return list(moving)
 
 
-def _moved(
+def _with_errors(
     stages: Sequence[StageFit],
     own_errors: Mapping[str, Array],
     effects: Mapping[str, float],
     assumed: Mapping[str, float] = MappingProxyType({}),
 ) -> ParameterSet | None:
-    """A set with each stage's vector off by an error of its own, 0 if none is given.
+    """A set with errors of each stage's vector, 0 if none is given; None outside bounds or domain.
 
     `effects` are systematic effects, fixed numbers among them, in standard uncertainties; `assumed`
-    are errors of other fixed numbers. None outside bounds or domain.
+    are errors of other fixed numbers.
     """
     model = stages[0].problem.model
     assert isinstance(model, DriveModel)
@@ -405,7 +411,7 @@ def stored_draws(
     drive : Drive, optional
         What the draws are to belong to: refused if it is not the fitted one.
     campaign : path, optional
-        The tests that were fitted; by default where ``fit.json`` says they were. They are needed
+        The tests that were fitted; by default those that ``fit.json`` names. They are needed
         for the whole covariance.
     draws, seed : int
         As of `drawn_drives`.
@@ -439,6 +445,15 @@ def stored_draws(
 MOST_SAMPLES = 150_000_000  # Samples of speed that are kept at once: 1.2 GB.
 
 
+class BandWidth(NamedTuple):
+    """Width of a band at an instant."""
+
+    width: float
+    """[rad/s]"""
+    time: float
+    """[s]"""
+
+
 @dataclass(frozen=True, eq=False)
 class Bands(Result):
     """Bands of the speed at each instant, and of each outcome."""
@@ -456,11 +471,11 @@ class Bands(Result):
     """Drives that it is taken from."""
 
     @property
-    def widest(self) -> tuple[float, float]:
-        """Largest width [rad/s] and when. [s]"""
+    def widest(self) -> BandWidth:
+        """The largest width of the band."""
         width = self.upper - self.lower
-        at = int(np.argmax(width))
-        return float(width[at]), float(self.time[at])
+        index = int(np.argmax(width))
+        return BandWidth(float(width[index]), float(self.time[index]))
 
 
 def bands(

@@ -164,23 +164,23 @@ Compute = Callable[[Array, Trial], Array]
 
 @dataclass(frozen=True)
 class Outcome(Result):
-    """One number that says what a drive made of a command."""
+    """One number that describes the response of a drive to a command."""
 
     name: str
     unit: str
     meaning: str
     compute: Compute
     undefined: str = ""
-    """Why there may be none, as a half sentence."""
+    """Why it may be undefined, as a half sentence."""
 
     @property
-    def words(self) -> str:
-        """Its name as words."""
+    def label(self) -> str:
+        """Its name with spaces."""
         return self.name.replace("_", " ")
 
     @property
-    def shown(self) -> DisplayUnit:
-        """Unit to show it in: that of its quantity, and per cent for a share."""
+    def shown_unit(self) -> DisplayUnit:
+        """Unit to show it in: that of its quantity, or per cent for a share."""
         return DisplayUnit("%", 100.0) if self.unit == "1" else display_unit(of_shaft(self.unit))
 
     @property
@@ -191,7 +191,7 @@ class Outcome(Result):
     def add_to(self, table: Table, cells: Sequence[float]) -> None:
         """Add a row of its values, SI."""
         unit = "" if self.unit == "1" else of_shaft(self.unit)
-        table.add(self.words, *cells, unit=unit, spec=self.spec)
+        table.add(self.label, *cells, unit=unit, spec=self.spec)
 
 
 OUTCOMES: dict[str, Outcome] = {}
@@ -199,13 +199,18 @@ OUTCOMES: dict[str, Outcome] = {}
 
 
 def _outcome(unit: str, undefined: str = "") -> Callable[[Compute], Compute]:
-    def keep(compute: Compute) -> Compute:
+    """Register a function as an outcome: its name, and its docstring as the meaning.
+
+    `undefined` is the reason why the outcome may be NaN.
+    """
+
+    def register(compute: Compute) -> Compute:
         name = compute.__name__
         meaning = str(compute.__doc__)
         OUTCOMES[name] = Outcome(name, unit, meaning, compute, undefined)
         return compute
 
-    return keep
+    return register
 
 
 _NEVER = "the shaft does not move while the command is at its largest"
@@ -278,18 +283,18 @@ def _reached(speed: Array, trial: Trial, share: float) -> Array:
     rising = speed[:, trial.begin : trial.last + 1]
     final = rising[:, -1]
     excess = rising * np.sign(final)[:, None] - share * np.abs(final)[:, None]
-    after = np.argmax(excess >= 0.0, axis=1)  # the last sample always is
-    before = np.maximum(after - 1, 0)
+    first_beyond = np.argmax(excess >= 0.0, axis=1)  # the last sample always is
+    last_within = np.maximum(first_beyond - 1, 0)
     rows = np.arange(len(speed))
-    low, high = excess[rows, before], excess[rows, after]
+    low, high = excess[rows, last_within], excess[rows, first_beyond]
     rise = np.where(high > low, high - low, 1.0)
-    samples = np.where(after > 0, before + np.clip(-low / rise, 0.0, 1.0), 0.0)
+    samples = np.where(first_beyond > 0, last_within + np.clip(-low / rise, 0.0, 1.0), 0.0)
     return np.asarray(np.where(final != 0.0, samples / trial.rate, np.nan))
 
 
-def rms_difference(speed: Array, other: Array) -> float:
+def rms_difference(speed: Array, reference: Array) -> float:
     """Root of the mean squared difference of two speeds, (n,) each. [rad/s]"""
-    return float(np.sqrt(np.mean((speed - other) ** 2)))
+    return float(np.sqrt(np.mean((speed - reference) ** 2)))
 
 
 def meant(name: str, names: Iterable[str]) -> str:
@@ -324,11 +329,11 @@ def side_by_side(runs: Mapping[str, Simulation]) -> Table:
     """Outcomes of drives under the same command, by the drives' names."""
     first = next(iter(runs.values()))
     assert first.voltage is not None  # runs by voltage only
-    task = Trial(first.voltage, first.record.rate, first.shaft_speed)
+    trial = Trial(first.voltage, first.record.rate, first.shaft_speed)
     speeds = np.array([run.shaft_speed for run in runs.values()])
     columns = (Column(name, "z.2f", none="none") for name in runs)
     table = Table("", (Column(""), *columns, UNIT))
     for outcome in OUTCOMES.values():
         if outcome.name != "tracking_error":  # there is no reference
-            outcome.add_to(table, outcome.compute(speeds, task).tolist())
+            outcome.add_to(table, outcome.compute(speeds, trial).tolist())
     return table

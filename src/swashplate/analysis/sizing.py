@@ -28,7 +28,7 @@ STEP_LENGTH = 2.0
 STEP_RATE = 512.0
 """Its samples a second. [Hz]"""
 SMALLEST = 1e-300
-"""In place of zero where a number is divided by, or its logarithm taken."""
+"""In place of zero as a divisor or as the argument of a logarithm."""
 
 
 class Performance(NamedTuple):
@@ -84,8 +84,8 @@ def performance(
             accelerations.append(float(change.max() * STEP_RATE))
     error = None
     if follow is not None:
-        up, down = (max(speed_per_volt(drive, sign), SMALLEST) for sign in (1.0, -1.0))
-        volts = follow.reference / np.where(follow.reference >= 0.0, up, down)
+        plus_gain, minus_gain = (max(speed_per_volt(drive, sign), SMALLEST) for sign in (1.0, -1.0))
+        volts = follow.reference / np.where(follow.reference >= 0.0, plus_gain, minus_gain)
         run = drive.simulate(np.clip(volts, -FULL_VOLTAGE, FULL_VOLTAGE), follow.rate)
         error = rms_difference(run.shaft_speed, follow.reference)
     return Performance(min(speeds), min(accelerations), error)
@@ -98,7 +98,7 @@ REQUIRED = {
     "acceleration": ("rad/s^2", 1.0),
     "tracking_error": ("rad/s", -1.0),
 }
-"""What can be required, its unit, and 1 for at least, -1 for at most."""
+"""Requirements by name, with unit, and 1 for at least, -1 for at most."""
 
 
 @dataclass(frozen=True)
@@ -162,18 +162,18 @@ class Requirements(Result):
         slacks = np.array([self.slacks(performance) for performance in performances])
         best = slacks.argmax(axis=0)
         missed = [
-            self._beside(name, performances[best[k]])
+            self._compared(name, performances[best[k]])
             for k, name in enumerate(self.given)
             if slacks[best[k], k] < 0.0
         ]
         if missed:
             return f"reaches {listed(missed)}"
         nearest = performances[int(slacks.min(axis=1).argmax())]
-        numbers = listed([self._beside(name, nearest) for name in self.given])
+        numbers = listed([self._compared(name, nearest) for name in self.given])
         return f"meets each requirement, but not all at the same time: nearest is {numbers}"
 
-    def _beside(self, name: str, performance: Performance) -> str:
-        """A number that was reached, beside the required one."""
+    def _compared(self, name: str, performance: Performance) -> str:
+        """A number that was reached, with the required one."""
         unit, _ = REQUIRED[name]
         number = quantity(getattr(performance, name), unit, spec=".4g")
         required = quantity(self.given[name], unit, spec=".4g")
@@ -191,8 +191,8 @@ class Sizing(Result):
     """The changed drive."""
     before: Performance
     after: Performance
-    alone: Mapping[str, float | None]
-    """By design variable the factor that is enough without the others, None if there is none."""
+    sufficient_factors: Mapping[str, float | None]
+    """By design variable the factor that suffices if only this one changes; None if none does."""
 
     @property
     def change(self) -> float:
@@ -200,7 +200,7 @@ class Sizing(Result):
         return float(np.sqrt(_change(np.array([*self.factors.values()]))))
 
     def tables(self) -> tuple[Table, Table]:
-        """Each design variable's factor, together and alone; what is required, before and after."""
+        """A table of the factors, and one of the requirements with the values before and after."""
         factors = Table(
             "",
             (
@@ -211,8 +211,8 @@ class Sizing(Result):
             ),
         )
         for name, factor in self.factors.items():
-            factors.add(name, factor, factor - 1.0, self.alone[name])
-        columns = (Column(head, ".2f") for head in ("required", "as it is", "changed"))
+            factors.add(name, factor, factor - 1.0, self.sufficient_factors[name])
+        columns = (Column(heading, ".2f") for heading in ("required", "as it is", "changed"))
         requirements = Table("", (Column(""), *columns, UNIT))
         for name, (unit, sign) in REQUIRED.items():
             before = getattr(self.before, name)
@@ -309,14 +309,14 @@ def size(
         simulated = [reached for reached in tried.values() if reached is not None]
         raise InputError(f"Within {searched} the {drive.name} {requirements.reached(simulated)}.")
     factors = dict(zip(names, point.tolist(), strict=True))
-    alone = {name: smallest_alone(slack, low, high, k) for k, name in enumerate(names)}
+    sufficient = {name: smallest_single(slack, low, high, k) for k, name in enumerate(names)}
     return Sizing(
         requirements=requirements,
         factors=factors,
         drive=with_factors(drive, factors),
         before=before,
         after=after,
-        alone=alone,
+        sufficient_factors=sufficient,
     )
 
 
@@ -342,8 +342,8 @@ def smallest_change(slack: Slack, low: Array, high: Array) -> Array | None:
 
     Notes
     -----
-    The box is scanned (each factor alone, and a Sobol sequence with faces and corners); from the
-    two best points on, SLSQP minimises the change under the inequalities, with derivatives by
+    The box is scanned (single factors, and a Sobol sequence with faces and corners); from the two
+    best points on, SLSQP minimises the change under the inequalities, with derivatives by
     differences; what it finds is drawn towards 1, as a whole and factor by factor, as far as the
     inequalities allow.
     """
@@ -357,7 +357,7 @@ def smallest_change(slack: Slack, low: Array, high: Array) -> Array | None:
     inner = np.clip(2.0 * Sobol(low.size, scramble=False).random_base2(SCANNED) - 0.5, 0.0, 1.0)
     points = [low, high, *(low + inner * (high - low))]
     for k in range(low.size):
-        factor = smallest_alone(slack, low, high, k)
+        factor = smallest_single(slack, low, high, k)
         if factor is not None:
             points.append(_with(unchanged, k, factor))
 
@@ -380,23 +380,23 @@ def smallest_change(slack: Slack, low: Array, high: Array) -> Array | None:
             constraints={"type": "ineq", "fun": lambda x: slack(np.clip(x, low, high))},
             options={"maxiter": 60, "ftol": 1e-10, "eps": 1e-5},
         )
-        # SLSQP may have stopped on the wrong side: back towards where it began
+        # SLSQP may have stopped on the wrong side: back towards its start
         solutions.append(drawn_in(_edge(slack, np.clip(solved.x, low, high), start)))
     return min(solutions, key=_change, default=None)
 
 
-def smallest_alone(slack: Slack, low: Array, high: Array, index: int) -> float | None:
-    """The factor nearest to 1 that satisfies by itself, the others being 1; None if none does."""
+def smallest_single(slack: Slack, low: Array, high: Array, index: int) -> float | None:
+    """The factor nearest to 1 that satisfies while all others are 1; None if none does."""
     unchanged = np.ones(low.size)
     reached = list[float]()
     for end in (float(low[index]), float(high[index])):
-        before = unchanged
+        previous = unchanged
         for factor in np.linspace(1.0, end, ALONG + 1):
             goal = _with(unchanged, index, float(factor))
             if _is_met(slack, goal):
-                reached.append(float(_edge(slack, before, goal)[index]))
+                reached.append(float(_edge(slack, previous, goal)[index]))
                 break
-            before = goal
+            previous = goal
     return min(reached, key=lambda factor: abs(factor - 1.0), default=None)
 
 
@@ -415,9 +415,9 @@ def _edge(slack: Slack, start: Array, goal: Array) -> Array:
 
 
 def _with(point: Array, index: int, factor: float) -> Array:
-    other = point.copy()
-    other[index] = factor
-    return other
+    changed = point.copy()
+    changed[index] = factor
+    return changed
 
 
 def _is_met(slack: Slack, point: Array) -> bool:

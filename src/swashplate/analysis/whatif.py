@@ -1,4 +1,4 @@
-"""What if: a drive before and after design variables are scaled, and each of them alone."""
+"""What if: a drive before and after design variables are scaled, together and one at a time."""
 
 from __future__ import annotations
 
@@ -118,8 +118,8 @@ class WhatIf(Result):
             if bands:
                 columns.append(Column("±", "z.2f", none="none"))
                 cells.append(bands[name].half_widths)
-        before, after = cells[0], cells[2 if bands else 1]
-        change = after / np.where(before == 0.0, np.nan, before) - 1.0
+        as_it_is, changed = cells[0], cells[2 if bands else 1]
+        change = changed / np.where(as_it_is == 0.0, np.nan, as_it_is) - 1.0
         table = Table("", (Column(""), *columns, Column("change", "+z.1%"), UNIT))
         plus, minus, *outcome_rows = np.array([*cells, change]).T.tolist()
         table.add("top speed, positive", *plus, unit="rad/s")
@@ -152,7 +152,7 @@ def what_if(
     Returns
     -------
     WhatIf
-        Outcomes and runs of the drive as it is, with each factor alone, and with all of them.
+        Outcomes and runs of the drive as it is, with each factor by itself, and with all of them.
 
     Raises
     ------
@@ -174,16 +174,16 @@ def what_if(
     with_factors(drive, factors)  # refuses what no drive can have
     if not isinstance(trial, Trial):
         trial = trial_of(drive, trial)
-    chosen = find_outcomes(outcomes)
-    scaled: dict[str, Mapping[str, float]] = {AS_IS: {}}
+    computed = find_outcomes(outcomes)
+    variants = {AS_IS: _variant(drive, {}, trial, computed)}
     if len(factors) > 1:
-        scaled |= {f"{name} x {factor:g}": {name: factor} for name, factor in factors.items()}
-    scaled[CHANGED] = factors
-    variants = {name: _variant(drive, alone, trial, chosen) for name, alone in scaled.items()}
-    return WhatIf(dict(factors), trial, chosen, variants)
+        for name, factor in factors.items():
+            variants[f"{name} x {factor:g}"] = _variant(drive, {name: factor}, trial, computed)
+    variants[CHANGED] = _variant(drive, factors, trial, computed)
+    return WhatIf(dict(factors), trial, computed, variants)
 
 
-# --- each design variable alone -------------------------------------------------------------------
+# --- each design variable by itself ---------------------------------------------------------------
 
 LEAST_SWING = 5e-4
 """A design variable that changes an outcome by less than this share has no row of its own. [1]"""
@@ -191,7 +191,7 @@ LEAST_SWING = 5e-4
 
 @dataclass(frozen=True, eq=False)
 class OneAtATime(Drawn):
-    """Outcomes with each design variable alone scaled down and up."""
+    """Outcomes with each design variable scaled down and up by itself."""
 
     drawn_by: ClassVar[str] = "plot_tornado"
 
@@ -205,7 +205,7 @@ class OneAtATime(Drawn):
     high: Array
     """(L, K) with each design variable at its upper factor."""
     sentences: tuple[str, ...]
-    """What could not be simulated, or has no such outcome."""
+    """Sentences on changes that could not be simulated, or that lack an outcome."""
 
     @property
     def swings(self) -> Array:
@@ -215,7 +215,7 @@ class OneAtATime(Drawn):
     def tables(self, *, every: bool = False) -> list[Table]:
         """A table for each outcome, the strongest design variable first.
 
-        Those that do not change it stand in the caption, unless every one shall have its row.
+        Those that do not change it stand in the caption; with `every` they have rows, too.
         """
         return [self._table(k, every) for k in range(len(self.outcomes))]
 
@@ -237,7 +237,7 @@ class OneAtATime(Drawn):
             Column("swing", ".1%"),
         )
         table = Table("", columns)
-        table.title = f"{outcome.words}, {shown_base} as it is"
+        table.title = f"{outcome.label}, {shown_base} as it is"
         names = list(self.ranges)
         without_effect = list[str]()
         for j in np.argsort(-np.nan_to_num(swings), kind="stable"):
@@ -270,7 +270,7 @@ def one_at_a_time(
     *,
     outcomes: Sequence[str],
 ) -> OneAtATime:
-    """Scale each design variable alone, down and up.
+    """Scale each design variable by itself, down and up.
 
     Parameters
     ----------
@@ -291,24 +291,24 @@ def one_at_a_time(
         If the drive as it is leaves the model's domain under the command.
     """
     check_ranges(ranges)
-    chosen = find_outcomes(outcomes)
-    values = {AS_IS: _variant(drive, {}, trial, chosen).values}
-    ends = np.full((2, len(ranges), len(chosen)), np.nan)
+    computed = find_outcomes(outcomes)
+    values = {AS_IS: _variant(drive, {}, trial, computed).values}
+    ends = np.full((2, len(ranges), len(computed)), np.nan)
     sentences = list[str]()
     for j, (name, factors) in enumerate(ranges.items()):
         for end, factor in enumerate(factors):
             variant = f"{name} x {factor:g}"
             try:
-                ends[end, j] = _variant(drive, {name: factor}, trial, chosen).values
+                ends[end, j] = _variant(drive, {name: factor}, trial, computed).values
             except (ParameterError, DomainError) as refusal:
                 sentences.append(f"{variant} cannot be simulated: {refusal}")
             else:
                 values[variant] = ends[end, j]
     return OneAtATime(
         ranges=dict(ranges),
-        outcomes=chosen,
+        outcomes=computed,
         base=values[AS_IS],
         low=ends[0],
         high=ends[1],
-        sentences=(*sentences, *_undefined(chosen, values)),
+        sentences=(*sentences, *_undefined(computed, values)),
     )

@@ -219,7 +219,7 @@ def main() -> None:
     except InputError as error:
         say_error(error)
         sys.exit(2)
-    except OSError as error:  # such as a full disk behind > FILE
+    except OSError as error:  # such as a full disk of > FILE
         say_error(FileError(f"The output cannot be written: {error.strerror or error}"))
         close_output()  # what is left in the buffer could not be written either
         sys.exit(2)

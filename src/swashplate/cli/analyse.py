@@ -89,21 +89,21 @@ def limits(
 
     if maneuver is None:
         with spinner("Measuring"):
-            limits_found = envelope(drive.chosen)
-        save(out, "Envelope, in SI", limits_found.write)
-        draw_figure(plot, "plot_envelope", limits_found)
+            capability = envelope(drive.loaded_drive)
+        save(out, "Envelope, in SI", capability.write)
+        draw_figure(plot, "plot_envelope", capability)
         drive.note(f"{drive.title}: performance envelope")
-        show(limits_found.table())
+        show(capability.table())
         return
     with spinner("Simulating"):
-        marched = trials.at_rate(drive.chosen, sampling.rate)
+        marched = trials.at_rate(drive.loaded_drive, sampling.rate)
         name, run = trials.simulated_as(marched, maneuver, sampling)
         shares = shares_of(marched, run)
     title = f"{drive.title}, {name}"
     save(out, "Shares of each limit, in SI", shares.write)
     draw_figure(plot, "plot_limit_timeline", run, reference=shares.reference, title=title)
     error = quantity(shares.error, "rad/s", spec=".3f")
-    # which of the limits that act here no test reached is said below, by the result itself
+    # the sentences of the result name the limits that act here and that no test reached
     drive.note(f"{title}: {error} rms from a drive without limits", unreached=False)
     acting = shares.table(acting=True)
     if acting.rows:
@@ -183,36 +183,37 @@ def whatif(
     from swashplate import analysis
     from swashplate.analysis import AS_IS, CHANGED, what_if
 
-    moved = parsing.factors_of(factors)
+    scaled = parsing.factors_of(factors)
     choice = DriveChoice(drive)
     with spinner("Simulating"):
-        name, trial = trials.named_trial(choice.chosen, maneuver, sampling)
-        result = what_if(choice.chosen, moved, trial, outcomes=(*OUTCOMES, "travel"))
+        name, trial = trials.named_trial(choice.loaded_drive, maneuver, sampling)
+        result = what_if(choice.loaded_drive, scaled, trial, outcomes=(*OUTCOMES, "travel"))
     bands = dict[str, analysis.Bands]()
     sentences = list[str]()
     if uncertainty is not None:
         with spinner("Drawing drives"):
-            draws = analysis.stored_draws(uncertainty, drive=choice.chosen, campaign=campaign)
-            drawn = {AS_IS: draws, CHANGED: draws.with_factors(moved)}
+            draws = analysis.stored_draws(uncertainty, drive=choice.loaded_drive, campaign=campaign)
+            draws_by_variant = {AS_IS: draws, CHANGED: draws.with_factors(scaled)}
             sentences.append(
                 f"± is half of the interval that contains {100.0 * LEVEL:g} % of the drives."
             )
-            for name_of_variant, variant in drawn.items():
-                band = analysis.bands(variant, trial, result.outcomes, level=LEVEL)
-                bands[name_of_variant] = band
-                width, when = band.widest
+            for variant, draws_of_variant in draws_by_variant.items():
+                band = analysis.bands(draws_of_variant, trial, result.outcomes, level=LEVEL)
+                bands[variant] = band
+                widest = band.widest
                 sentences.append(
-                    f"Band of {band.draws} drives, {name_of_variant}: at most "
-                    f"{quantity(width, 'rad/s', spec='.3g')} wide, at {when:.3g} s."
+                    f"Band of {band.draws} drives, {variant}: at most "
+                    f"{quantity(widest.width, 'rad/s', spec='.3g')} wide, at {widest.time:.3g} s."
                 )
             sentences += draws.sentences()
     save(out, "Changed drive", result.after.drive.to_toml)
     title = f"{choice.title}, {name}"
-    changes = ", ".join(f"{name} x {factor:g}" for name, factor in moved.items())
+    changes = ", ".join(f"{name} x {factor:g}" for name, factor in scaled.items())
     draw_figure(plot, "plot_whatif", result, bands=bands, title=f"{title}: {changes}")
     choice.note(title)
-    before, after = (variant.drive.parameters for variant in (result.before, result.after))
-    for line in parsing.changes_between(before, after):
+    for line in parsing.changes_between(
+        result.before.drive.parameters, result.after.drive.parameters
+    ):
         note(line)
     show(result.table(bands))
     bullets(result.sentences(), sentences)
@@ -273,32 +274,33 @@ def size(
 
     if (tracking_deg_s is None) != (maneuver is None):
         raise InputError("--tracking-deg-s and --maneuver belong together: give both or neither.")
-    requested = (speed_deg_s, acceleration_deg_s2, tracking_deg_s)
-    speed, acceleration, error = (
-        None if degrees is None else radians(degrees) for degrees in requested
+    requirements = analysis.Requirements(
+        _radians(speed_deg_s), _radians(acceleration_deg_s2), _radians(tracking_deg_s), direction
     )
-    required = analysis.Requirements(speed, acceleration, error, direction)
     with spinner("Sizing"):
-        follow = None
+        trial_to_follow = None
         ranges = parsing.factor_ranges_of(variables or SIZED, analysis.DEFAULT_RANGE)
         if maneuver is not None:
-            voltage = trials.named_maneuver(maneuver, drive.chosen).sample()
-            # a larger drive may well be what it takes to reach it
-            reference = proportional_speed(drive.chosen, voltage, limited=False)
-            follow = trial_of(drive.chosen, voltage, reference=reference)
-        result = analysis.size(drive.chosen, required, ranges, follow=follow)
+            voltage = trials.named_maneuver(maneuver, drive.loaded_drive).sample()
+            # not limited to the speeds of the present drive: a larger one may reach more
+            reference = proportional_speed(drive.loaded_drive, voltage, limited=False)
+            trial_to_follow = trial_of(drive.loaded_drive, voltage, reference=reference)
+        result = analysis.size(drive.loaded_drive, requirements, ranges, follow=trial_to_follow)
     save(out, "Changed drive", result.drive.to_toml)
     drive.note(drive.title)
     show(*result.tables())
     if result.change == 0.0:
         say("The drive meets the requirements as it is.")
-    elif not drive.changes:  # whatif begins at a drive as its file has it
-        moved = [f"{name}={factor!r}" for name, factor in result.factors.items() if factor != 1.0]
-        words = ["swashplate", "whatif", drive.drive]
-        for factor in moved:
-            words += ["--scale", factor]
-        command_line = shlex.join(words)
-        note(f"To simulate the change: {command_line}")
+    elif not drive.changes:  # whatif has no --set: it begins at the drive of the file
+        arguments = ["swashplate", "whatif", drive.drive]
+        for name, factor in result.factors.items():
+            if factor != 1.0:
+                arguments += ["--scale", f"{name}={factor!r}"]
+        note(f"To simulate the change: {shlex.join(arguments)}")
+
+
+def _radians(degrees: float | None) -> float | None:
+    return None if degrees is None else radians(degrees)
 
 
 @command(
@@ -335,9 +337,10 @@ def sensitivity(
     from swashplate.analysis import one_at_a_time
 
     with spinner("Simulating"):
-        name, trial = trials.named_trial(drive.chosen, maneuver, sampling)
+        name, trial = trials.named_trial(drive.loaded_drive, maneuver, sampling)
         ranges = parsing.factor_ranges_of(variables or (*VARIED, "spool_offset"), SPAN)
-        result = one_at_a_time(drive.chosen, ranges, trial, outcomes=tuple(outcomes or OUTCOMES))
+        names = tuple(outcomes or OUTCOMES)
+        result = one_at_a_time(drive.loaded_drive, ranges, trial, outcomes=names)
     title = f"{drive.title}, {name}"
     save(out, "All numbers, in SI", joined(result.tables(every=True)).write)
     draw_figure(plot, "plot_tornado", result, title=f"{title}: one design variable at a time")
@@ -407,7 +410,7 @@ def compensate(
             f"--speed-deg-s {stick}."
         )
     with spinner("Inverting"):
-        marched = trials.at_rate(drive.chosen, sampling.rate)
+        marched = trials.at_rate(drive.loaded_drive, sampling.rate)
         inverse = analysis.inverse_map(marched, points)
         improvement = None
         tables = inverse.tables([radians(speed) for speed in speeds_deg_s or ()])
@@ -491,19 +494,21 @@ def linearize(
     if current is not None and input == "voltage":
         raise InputError("--input voltage needs --at, not --current.")
     with spinner("Linearising"):
-        model = drive.chosen.linearize(at, current=current, input=input)
+        model = drive.loaded_drive.linearize(at, current=current, input=input)
         if sample_time is not None:
             if not sample_time > 0.0:
                 raise InputError(f"--sample-time is {sample_time:g} s, but must be above 0.")
             model = model.discrete(1.0 / sample_time, interpolation)
-        tables = model_tables(model, frequency, None if loop_gain is None else degrees(loop_gain))
+        # from V/(deg/s) to V/(rad/s)
+        gain = None if loop_gain is None else degrees(loop_gain)
+        tables = model_tables(model, frequency, gain)
     save(out, "Model, in SI", model.write)
-    kind = "" if sample_time is None else f", sampled at {sample_time:g} s"
-    drive.note(f"{drive.title}, small motions of the {model.input.replace('_', ' ')}{kind}")
+    sampled = "" if sample_time is None else f", sampled at {sample_time:g} s"
+    drive.note(f"{drive.title}, small motions of the {model.input.replace('_', ' ')}{sampled}")
     for switch in model.operating_point.one_sided:
         note(f"One-sided at the {switch}.")
-    coulomb = "C_plus" if (at or 0.0) >= 0.0 else "C_minus"
-    if model.input == "voltage" and model.parameters.numbers[coulomb] > 0.0:
+    coulomb_term = "C_plus" if (at or 0.0) >= 0.0 else "C_minus"
+    if model.input == "voltage" and model.parameters.numbers[coulomb_term] > 0.0:
         note("The card's Coulomb term C is left out: it acts only on motions below 0.01 A/s.")
     show(*tables)
 
@@ -566,9 +571,9 @@ def bode(
             f"--from and --to must rise from above 0 Hz, not {lowest:g} to {highest:g}."
         )
     with spinner("Sweeping"):
-        linear = None if linear_at is None else drive.chosen.linearize(linear_at)
+        linear = None if linear_at is None else drive.loaded_drive.linearize(linear_at)
         grid = np.union1d(np.geomspace(lowest, highest, points), [frequency])
-        response = drive.chosen.frequency_response(grid, amplitudes or AMPLITUDES, bias=bias)
+        response = drive.loaded_drive.frequency_response(grid, amplitudes or AMPLITUDES, bias=bias)
         table = response_table(response, frequency)
     save(out, "Gain, phase and distortion, in SI", response.write)
     draw_figure(plot, "plot_bode", response, linear=linear, mark=frequency)
@@ -633,7 +638,7 @@ def full_order(
         raise InputError("--plot draws one run; name a maneuver or a log, such as step:9.")
     physical_values = parsing.physical_values(physical or ())
     with spinner("Completing the physical values"):
-        marched = trials.at_rate(drive.chosen, sampling.rate)
+        marched = trials.at_rate(drive.loaded_drive, sampling.rate)
         axis = full.nearest_set(marched.name) if like is None else like
         full_drive = full.FullOrderDrive.from_drive(marched.plain, axis, **physical_values)
         tables = [full.choices_table(axis, physical_values), full_drive.modes().table()]

@@ -214,8 +214,8 @@ def check(
         }
         of_file = dict.fromkeys((*tests.campaign_findings(campaign), *beside_the_drives(campaign)))
     roles = [experiment.role for experiment in campaign]
-    counted = ", ".join(f"{roles.count(role)} to {role}" for role in dict.fromkeys(roles))
-    note(f"{parsing.title_of(campaign)}: {len(campaign)} experiments ({counted})")
+    counts_by_role = ", ".join(f"{roles.count(role)} to {role}" for role in dict.fromkeys(roles))
+    note(f"{parsing.title_of(campaign)}: {len(campaign)} experiments ({counts_by_role})")
     for overview in campaign.overviews:
         show(overview.table())
         bullets([overview.sentence])
@@ -293,16 +293,16 @@ def plot(
         )
     if run is not None and channel is not None:
         experiment = campaign[run]
-        shown = experiment[channel]
+        signal = experiment[channel]
         simulated = None
         drive = campaign.axes[experiment.axis].drive
-        if shown.kind in SIGNALS and drive is not None and not shown.is_position:
+        if signal.kind in SIGNALS and drive is not None and not signal.is_position:
             for prediction in predict(campaign.drive(experiment.axis), [experiment]):
                 if prediction.channel == channel:
                     simulated = prediction.simulated
-        window = trials.window_of(shown.time, begin, end)
+        window = trials.window_of(signal.time, begin, end)
         labels = {"window": window, "title": f"{run}, {channel}"}
-        draw_figure(out, "plot_channel", shown, simulated, **labels)
+        draw_figure(out, "plot_channel", signal, simulated, **labels)
     else:
         figures = campaign.plot(title=parsing.title_of(campaign))
         several = [out.with_stem(f"{out.stem}-{k}") for k in range(1, len(figures) + 1)]
@@ -372,7 +372,7 @@ def rig(
             seed=seed,
             severity=severity,
             instruments=replace(bench.SEVERITIES[severity], backlash=radians(backlash_deg)),
-            truth=drive.chosen if drive.values or drive.factors else None,
+            truth=drive.loaded_drive if drive.values or drive.factors else None,
             perturb=perturb,
         )
     with spinner("Writing"):

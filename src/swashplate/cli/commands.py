@@ -65,9 +65,9 @@ def command(
             display = _gathered(DisplayUnits, arguments) if units else DisplayUnits()
             for parameter, group in groups.items():
                 arguments[parameter] = _gathered(group, arguments)
-            shown = [unit.strip() for unit in display.units.split(",") if unit.strip()]
+            unit_names = [unit.strip() for unit in display.units.split(",") if unit.strip()]
             SAVED.set([])
-            with shown_in(shown, display.drum), ExitStack() as resources:
+            with shown_in(unit_names, display.drum), ExitStack() as resources:
                 RESOURCES.set(resources)
                 function(**arguments)
             say_saved()

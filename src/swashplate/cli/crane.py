@@ -79,14 +79,14 @@ def show_crane(
         read = read_text if crane.endswith(".toml") else preset_text
         typer.echo(read(crane), nl=False)
         return
-    shown = crane_of(crane)
-    tables = [shown.table()]
-    if shown.limits:
-        tables.append(shown.limit_table())
+    loaded_crane = crane_of(crane)
+    tables = [loaded_crane.table()]
+    if loaded_crane.limits:
+        tables.append(loaded_crane.limit_table())
     show(*tables)
     for axis in AXES:
-        note(f"{axis}: {getattr(shown, axis).parameters.title}")
-    for sentence in shown.provenance():
+        note(f"{axis}: {getattr(loaded_crane, axis).parameters.title}")
+    for sentence in loaded_crane.provenance():
         say(sentence)
 
 
@@ -156,28 +156,27 @@ def run(
     the controller has ended its command.
     """
     runs = {}
-    last = ""
+    variants = variant or ["inverse"]
     if out is not None and len(variant or ()) > 1:
         raise InputError("--out writes one run's signals: use one --variant.")
     with spinner("Simulating"):
         from swashplate.crane import RATE, OperatorCommand, run_tables, simulate
 
-        crane = operated.chosen
+        crane = operated.loaded_crane
         seaway = operated.seaway(seed=seed, length=length)
         targets = named_numbers("--until", until, "slew_deg=45")
-        stick = OperatorCommand.trapezoid(
+        command = OperatorCommand.trapezoid(
             hoist=hoist, slew=slew, luff=luff, until=targets, duration=duration, length=length
         )
-        ship = seaway or operated.motion(round(stick.length * RATE) + 1)
-        for last in variant or ["inverse"]:
-            drives, _, controller = last.partition(":")
-            how: dict[str, Any] = {"control": control_of(controller)}
-            how["actuation"] = "inverse" if drives == "identified" else drives
-            runs[last] = simulate(
-                crane, stick, sea=ship, brake=brake, **how, **operated.run_options
-            )
+        ship = seaway or operated.motion(round(command.length * RATE) + 1)
+        for variant_name in variants:
+            drives, _, controller = variant_name.partition(":")
+            options = operated.run_options
+            options["control"] = control_of(controller)
+            options["actuation"] = "inverse" if drives == "identified" else drives
+            runs[variant_name] = simulate(crane, command, sea=ship, brake=brake, **options)
         tables = run_tables(runs)
-    save(out, "All signals, in SI", runs[last].write)
+    save(out, "All signals, in SI", runs[variants[-1]].write)
     draw_figure(plot, "plot_crane", runs)
     if scene is not None:
         from swashplate.report.scene import write_scene
@@ -185,10 +184,10 @@ def run(
         save(scene, "Scene", lambda path: write_scene(runs, path))
     sentences = list[str]()
     for name, simulated in runs.items():
-        sentences += [f"{name}: {words}" for words in simulated.sentences()]
+        sentences += [f"{name}: {sentence}" for sentence in simulated.sentences()]
     damping = crane.swing_damping if operated.swing_damping is None else operated.swing_damping
     if seaway is not None and damping > 0.0:
-        sentences.insert(0, _stationary_words(operated, seaway, damping))
+        sentences.insert(0, _stationary_sentence(operated, seaway, damping))
     _print_result(crane, tables, [*sea_sentences(seaway), *sentences, *crane.provenance()])
 
 
@@ -271,19 +270,19 @@ def assess(
     from swashplate.crane import assess as assess_control
     from swashplate.crane.studies import SEAWAYS, seaways_needed
 
-    crane = study.chosen
+    crane = study.loaded_crane
     side.print(seaways_needed(study.seeds or SEAWAYS, allowed / 100.0))
     assessment: Assessment = study.through(assess_control, crane, **keywords)
-    what = "Numbers of every seaway, in SI"
+    content = "Numbers of every seaway, in SI"
     write = assessment.write
     if out is not None and out.suffix.lower() == ".html":
         from swashplate.report.scene import write_assessment
 
-        what = "Verdict"
+        content = "Verdict"
         write = partial(write_assessment, assessment)
-    save(out, what, write)
+    save(out, content, write)
     draw_figure(plot, "plot_assessment", assessment)
-    _print_result(study.chosen, assessment.tables(), assessment.sentences()[1:])
+    _print_result(study.loaded_crane, assessment.tables(), assessment.sentences()[1:])
     say_saved()
     if not assessment.passed:
         side.print(assessment.headline)
@@ -348,19 +347,21 @@ def operability(
         note("Only the peak factor and the spreading of --sea are used.")
     keywords: dict[str, Any] = {}
     if headings is not None:
-        words = headings.split(",")
-        keywords["headings"] = [number_of(f"--headings {headings}", word) for word in words]
-    year: Operability = study.through(operable, study.chosen, scatter=diagram, **keywords)
-    what = "Cells of the year, in SI"
+        keywords["headings"] = [
+            number_of(f"--headings {headings}", heading) for heading in headings.split(",")
+        ]
+    year: Operability = study.through(operable, study.loaded_crane, scatter=diagram, **keywords)
+    content = "Cells of the year, in SI"
     write = year.write
     if out is not None and out.suffix.lower() == ".html":
         from swashplate.report.scene import write_operability
 
-        what = "Operability"
+        content = "Operability"
         write = partial(write_operability, year)
-    save(out, what, write)
+    save(out, content, write)
     draw_figure(plot, "plot_operability", year)
-    _print_result(study.chosen, year.tables(), [*year.sentences(), *study.chosen.provenance()])
+    crane = study.loaded_crane
+    _print_result(crane, year.tables(), [*year.sentences(), *crane.provenance()])
 
 
 @command(
@@ -385,11 +386,12 @@ def follow(at_sea: AtSea, *, out: TableFile = None, plot: FigureFile = None) -> 
         keywords: dict[str, Any] = {}
         if at_sea.sea and seaway is not None:
             keywords["seas"] = (seaway.sea,)
-        followable = largest_sines(at_sea.chosen, seaway=seaway, **keywords, **at_sea.pose)
+        followable = largest_sines(at_sea.loaded_crane, seaway=seaway, **keywords, **at_sea.pose)
     save(out, "Amplitudes, in SI", followable.tables()[0].write)
     draw_figure(plot, "plot_follow", followable)
     about_sea = sea_sentences(seaway) if at_sea.sea else ()
-    _print_result(at_sea.chosen, followable.tables(), [*about_sea, *at_sea.chosen.provenance()])
+    crane = at_sea.loaded_crane
+    _print_result(crane, followable.tables(), [*about_sea, *crane.provenance()])
 
 
 @command(
@@ -425,11 +427,11 @@ def sweep(
         keywords["points"] = [number_of(f"--points {points}", word) for word in points.split(",")]
     from swashplate.crane import sweep as swing_over
 
-    swept: Sweep = study.through(swing_over, study.chosen, over, **keywords)
+    swept: Sweep = study.through(swing_over, study.loaded_crane, over, **keywords)
     save(out, "Swing, in SI", swept.tables()[0].write)
     draw_figure(plot, "plot_sweep", swept)
-    sentences = [*sea_sentences(study.waters), *study.chosen.provenance()]
-    _print_result(study.chosen, swept.tables(), sentences)
+    sentences = [*sea_sentences(study.waters), *study.loaded_crane.provenance()]
+    _print_result(study.loaded_crane, swept.tables(), sentences)
 
 
 @command(
@@ -501,7 +503,7 @@ def _print_result(crane: Crane, tables: Iterable[Table], sentences: Iterable[str
         say(sentence)
 
 
-def _stationary_words(operated: Operated, seaway: Seaway, damping: float) -> str:
+def _stationary_sentence(operated: Operated, seaway: Seaway, damping: float) -> str:
     """The swing without control that this sea has in the long run, by its spectrum."""
     from math import degrees
 
@@ -511,7 +513,7 @@ def _stationary_words(operated: Operated, seaway: Seaway, damping: float) -> str
     names = ("slew_deg", "boom_deg", "rope_m", "swing_damping", "load", "suspension")
     start = {"slew_deg": 0.0, "boom_deg": 45.0, "rope_m": 20.0}
     hung = start | {name: options[name] for name in names if name in options}
-    response = linear_response(operated.chosen, seaway, **hung)
+    response = linear_response(operated.loaded_crane, seaway, **hung)
     return (
         f"Without control the long-run swing is {degrees(response.values['swing'].rms):.2f} deg "
         f"RMS, from the sea's spectrum and a damping of {100.0 * damping:g} %; a run begins at "

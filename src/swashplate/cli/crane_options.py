@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
@@ -60,7 +60,7 @@ class Placed:
     ] = False
 
     @cached_property
-    def chosen(self) -> Crane:
+    def loaded_crane(self) -> Crane:
         """The crane, with its drives; one whose fit is not usable is refused without --force."""
         drives = dict(pairs_of("--drive", self.drive, "luff=mine.toml"))
         crane = crane_of(self.crane).with_drive(known_to_controller=True, **drives)
@@ -171,16 +171,16 @@ class AtSea(Placed):
         from swashplate.crane import Seaway
         from swashplate.crane.sea import RECORDS
 
-        words = self.sea or ([] if default is None else [default])
-        if not words:
+        seas = self.sea or ([] if default is None else [default])
+        if not seas:
             options_at_sea = [*self._at_sea, *_without_none(seed=seed)]
             if options_at_sea:
                 option = options_at_sea[0].replace("_", "-")
                 raise InputError(f"--{option} needs a sea: give --sea, such as --sea ss3.")
             return None
-        if len(words) > 1:
-            raise InputError(f"--sea {' --sea '.join(words)}: give one sea.")
-        sea, spread = _sea_of(words[0])
+        if len(seas) > 1:
+            raise InputError(f"--sea {' --sea '.join(seas)}: give one sea.")
+        sea, spread = _sea_of(seas[0])
         options = self._lean | _without_none(heading_deg=self.heading, speed=self.speed, seed=seed)
         if self.reference is not None:
             options["reference"] = _vector("--reference", self.reference, "-12,0,9")
@@ -328,7 +328,7 @@ class Studied(Operated):
     ] = None
 
     def through(self, study: Callable[..., Any], *arguments: Any, **keywords: Any) -> Any:
-        """A study of the controller, whose progress is shown."""
+        """Run a study with the controller and the options, and show its progress."""
         controller = control_of(self.control)
         if controller is None:
             raise InputError("--control is empty: there is nothing to assess.")
@@ -340,58 +340,71 @@ class Studied(Operated):
         if self.seeds is not None:
             options["seeds"] = range(self.seeds)
         if self.drives is not None or self.scale:
-            options["drives"] = self.sets()
-        with long_work("Seaways") as shown:
-            options["progress"] = lambda done, of: shown(f"{done} of {of} seaways", done / of)
+            options["drives"] = self.drive_sets()
+        with long_work("Seaways") as show:
+            options["progress"] = lambda done, of: show(f"{done} of {of} seaways", done / of)
             return study(*arguments, controller, **options)
 
     @cached_property
     def waters(self) -> Seaway | None:
-        """The seaway, in ss3 if only the ship is given; None if nothing of either is."""
+        """The seaway, in ss3 if only options of the ship are given; None if no option is."""
         from swashplate.crane.studies import LENGTH, RUN_IN
 
-        counted = LENGTH if self.length is None else self.length
-        before = RUN_IN if self.run_in is None else self.run_in
+        evaluated = LENGTH if self.length is None else self.length
+        run_in = RUN_IN if self.run_in is None else self.run_in
         is_stated = self._at_sea or self._lean or self.length or self.run_in
-        return self.seaway(default="ss3" if is_stated else None, length=counted + before)
+        return self.seaway(default="ss3" if is_stated else None, length=evaluated + run_in)
 
-    def sets(self) -> dict[str, Any]:
-        """Sets of drives by name."""
-        from swashplate.analysis import powers_of
-        from swashplate.crane import drawn_cranes, with_design_change
+    def drive_sets(self) -> dict[str, Any]:
+        """Sets of drives by name: those of --drives, and last the crane of --scale.
 
-        names = filter(None, map(str.strip, (self.drives or "ideal,identified").split(",")))
-        sets: dict[str, Any] = {name: name for name in names}
+        A set is "ideal", "identified" or "volts", the crane with changed drives, or many cranes
+        with drawn drives.
+        """
+        names = [name.strip() for name in (self.drives or "ideal,identified").split(",")]
+        sets: dict[str, Any] = {name: name for name in names if name}
         if "drawn" in sets:
-            sources = self.chosen.sources
-            drawn = [axis for axis, source in sources.items() if source.fit is not None]
-            if not drawn:
-                raise InputError("--drives drawn needs the folder of a fit: --drive luff=FOLDER.")
-            sets["drawn"] = drawn_cranes(self.chosen)
-            not_drawn = [axis for axis in AXES if axis not in drawn]
-            as_given = f"; not drawn, without a fit: {', '.join(not_drawn)}" if not_drawn else ""
-            side.print(f"Drawn: {', '.join(drawn)}{as_given}")
-        crane = self.chosen
-        changed = []
+            sets["drawn"] = self._drawn_cranes()
+        return sets | self._scaled_crane()
+
+    def _drawn_cranes(self) -> tuple[Crane, ...]:
+        """Cranes with drives drawn from the errors of their fits; says which axes are drawn."""
+        from swashplate.crane import drawn_cranes
+
+        sources = self.loaded_crane.sources
+        fitted = [axis for axis, source in sources.items() if source.fit is not None]
+        if not fitted:
+            raise InputError("--drives drawn needs the folder of a fit: --drive luff=FOLDER.")
+        cranes = drawn_cranes(self.loaded_crane)
+        unfitted = [axis for axis in AXES if axis not in fitted]
+        not_drawn = f"; not drawn, without a fit: {', '.join(unfitted)}" if unfitted else ""
+        side.print(f"Drawn: {', '.join(fitted)}{not_drawn}")
+        return cranes
+
+    def _scaled_crane(self) -> dict[str, Crane]:
+        """The crane with the changes of --scale, by their names; empty without changes."""
+        from swashplate.analysis import powers_of
+        from swashplate.crane import with_design_change
+
+        crane = self.loaded_crane
+        changes = []
         for name, text in pairs_of("--scale", self.scale, "luff.orifice=1.5"):
             axis, _, variable = name.partition(".")
-            words = f"--scale {name}={text}"
+            option = f"--scale {name}={text}"
             if not variable or axis not in AXES:
                 raise InputError(
-                    f"{words}: write the axis first, luff.orifice=1.5; the axes are "
+                    f"{option}: write the axis first, luff.orifice=1.5; the axes are "
                     f"{', '.join(AXES)}."
                 )
-            powers_of(variable)
-            factor = number_of(words, text)
+            powers_of(variable)  # refuses an unknown one
+            factor = number_of(option, text)
             crane = with_design_change(crane, axis, {variable: factor})
-            changed.append(f"{axis} {variable} ×{factor:g}")
-        if changed:
-            sets[", ".join(changed)] = crane
-        return sets
+            changes.append(f"{axis} {variable} ×{factor:g}")
+        return {", ".join(changes): crane} if changes else {}
 
 
-def control_of(words: str) -> Control | None:
-    """A controller of words such as ``zv-tip+feedback=0.2+clip``; None if there are none."""
+def control_of(text: str) -> Control | None:
+    """A controller of a text such as ``zv-tip+feedback=0.2+clip``; None if it is empty."""
     from swashplate.crane import control
 
     kinds: dict[str, tuple[Any, int]] = {
@@ -404,13 +417,15 @@ def control_of(words: str) -> Control | None:
     for shape in control.IMPULSES:
         kinds[f"{shape}-tip"] = (partial(control.TipShaper, shape), 0)
     stages: list[Control] = []
-    for word in filter(None, words.split("+")):
-        name, _, text = word.partition("=")
-        numbers = [number_of(f"The control '{word}'", part) for part in text.split("/") if text]
-        kind, most = kinds.get(name, (None, 0))
-        if kind is None or len(numbers) > most:
+    for stage in filter(None, text.split("+")):
+        name, _, values = stage.partition("=")
+        numbers = [
+            number_of(f"The control '{stage}'", value) for value in values.split("/") if values
+        ]
+        kind, most_numbers = kinds.get(name, (None, 0))
+        if kind is None or len(numbers) > most_numbers:
             raise InputError(
-                f"There is no control '{word}'; there are zv-tip (zvd, ei), "
+                f"There is no control '{stage}'; there are zv-tip (zvd, ei), "
                 "feedback=0.2/0.25, ship, clip=0.25, loop=0.7 and sensors=0.1/0.05/50."
             )
         stages.append(kind(*numbers))
@@ -434,8 +449,15 @@ def sea_sentences(seaway: Seaway | None) -> tuple[str, ...]:
     return () if seaway is None else seaway.sentences()
 
 
-def _sea_of(text: str) -> tuple[str | Spectrum, bool]:
-    """A sea's name or spectrum of words such as ``1.5,8,3.3,spread``, and whether it is spread."""
+class _Sea(NamedTuple):
+    sea: str | Spectrum
+    """Name of a packaged sea, or its spectrum."""
+    spread: bool
+    """Whether its directions are spread."""
+
+
+def _sea_of(text: str) -> _Sea:
+    """A sea of a text such as ``ss3,spread`` or ``1.5,8,3.3``."""
     from swashplate.crane import Spectrum
 
     first, *rest = (word.strip() for word in text.split(","))
@@ -448,7 +470,7 @@ def _sea_of(text: str) -> tuple[str | Spectrum, bool]:
             raise InputError(
                 f"--sea {text}: the name of a sea takes no numbers; write --sea {first} {instead}."
             )
-        return first, spread
+        return _Sea(first, spread)
     if not 1 <= len(numbers) <= 2:
         raise InputError(
             f"--sea {text}: write a name, --sea ss3, or significant height in m and peak period in "
@@ -457,9 +479,9 @@ def _sea_of(text: str) -> tuple[str | Spectrum, bool]:
     height = number_of(f"--sea {text}", first)
     period = number_of(f"--sea {text}", numbers[0])
     if len(numbers) == 1:
-        return Spectrum(height, period), spread
+        return _Sea(Spectrum(height, period), spread)
     peak_factor = number_of(f"--sea {text}", numbers[1])
-    return Spectrum(height, period, peak_factor), spread
+    return _Sea(Spectrum(height, period, peak_factor), spread)
 
 
 def _vector(option: str, text: str, example: str) -> tuple[float, ...]:
@@ -471,22 +493,22 @@ def _vector(option: str, text: str, example: str) -> tuple[float, ...]:
 
 
 def named_numbers(
-    what: str, words: list[str] | None, example: str, allowed: Sequence[str] = ()
+    option: str, assignments: list[str] | None, example: str, allowed: Sequence[str] = ()
 ) -> dict[str, Any]:
-    """Numbers by name of an option's pairs; refuses a name that is not allowed."""
-    pairs = pairs_of(what, words, example)
+    """Numbers by name from an option's assignments; refuses a name that is not allowed."""
+    pairs = pairs_of(option, assignments, example)
     unknown = [name for name, _ in pairs if allowed and name not in allowed]
     if unknown:
-        raise InputError(f"{what} has no {unknown[0]}; it has {', '.join(allowed)}.")
-    return {name: number_of(f"{what} {name}={text}", text) for name, text in pairs}
+        raise InputError(f"{option} has no {unknown[0]}; it has {', '.join(allowed)}.")
+    return {name: number_of(f"{option} {name}={text}", text) for name, text in pairs}
 
 
-def number_of(what: str, text: str) -> float:
-    """A number of an option's text; refuses what is not one."""
+def number_of(option: str, text: str) -> float:
+    """Parse a number; the error names the option if it is not a number."""
     try:
         return float(text)
     except ValueError:
-        raise InputError(f"{what}: '{text}' is not a number.") from None
+        raise InputError(f"{option}: '{text}' is not a number.") from None
 
 
 def crane_of(name: str) -> Crane:

@@ -101,7 +101,7 @@ def export(
     with spinner("Exporting"):
         from swashplate import export as exporting
 
-        exported = drive.chosen
+        exported = drive.loaded_drive
     longest_step = exporting.LONGEST_STEP if step is None else step
     names = None if platforms is None else [part.strip() for part in platforms.split(",")]
     with texts_of_warnings():
@@ -194,11 +194,11 @@ def live(
         if path is not None:
             campaign, axis_name = campaign_of(path, axis)
             sentences = write_live_page(
-                drive.chosen, out, campaign=campaign, axis=axis_name, name=name
+                drive.loaded_drive, out, campaign=campaign, axis=axis_name, name=name
             )
         else:
-            command = named_maneuver(maneuver or "", drive.chosen)
-            sentences = write_live_page(drive.chosen, out, command=command, name=name)
+            command = named_maneuver(maneuver or "", drive.loaded_drive)
+            sentences = write_live_page(drive.loaded_drive, out, command=command, name=name)
     drive.warn()
     for sentence in (*drive.changes, *sentences):
         note(sentence)

@@ -1,4 +1,4 @@
-"""``swashplate fit``, ``validate``, ``report`` and ``demo``: from tests to a judged drive."""
+"""``swashplate fit``, ``validate``, ``report`` and ``demo``: from tests to an assessed drive."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ FILES = {
     "estimates.csv": "Estimates",
     "fit.json": "Fit",
 }
-"""What `Identification.save` writes, of a drive or of a user-defined model."""
+"""Files that `Identification.save` writes, of a drive or of a user-defined model."""
 MEASURES = (
     "NRMSE is the RMSE over the standard deviation of what was measured, fit % is 100 (1 - "
     "NRMSE); 'of range' below: over the range of the signal, its largest minus its smallest value."
@@ -82,9 +82,9 @@ class StageClock:
         begin = perf_counter()
         from swashplate.equations.code_generation import generating_time
 
-        before = generating_time()
+        generated_before = generating_time()
         yield
-        kernels = generating_time() - before
+        kernels = generating_time() - generated_before
         self.parts["start and kernels"] += kernels
         self.parts[name] = self.parts.get(name, 0.0) + perf_counter() - begin - kernels
 
@@ -226,10 +226,10 @@ def fit(
             resume=resume,
         )
     if result.fit.interrupted and starts:
-        last = result.fit.stages[-1]
+        stage_fit = result.fit.stages[-1]
         note(
-            f"Interrupted in the stage '{last.stage.name}': {last.solution.message}. Only the "
-            "starts are written; the same command with --resume continues."
+            f"Interrupted in the stage '{stage_fit.stage.name}': {stage_fit.solution.message}. "
+            "Only the starts are written; the same command with --resume continues."
         )
         raise typer.Exit(INTERRUPTED)
     with spinner("Assessing"), clock.part("assessment"):
@@ -278,7 +278,7 @@ def _reported(result: Identification, out: Path, truth: ParameterSet | None = No
 def _say_verdict(verdict: Verdict) -> None:
     """Print the stated errors, what the verdict rests on, its answers, and the headline.
 
-    Ends with code 1 if what was judged is not usable.
+    Ends with code 1 if the assessed drive is not usable.
     """
     show(verdict.table())
     bullets(verdict.remarks)
@@ -349,7 +349,7 @@ def validate(
         predicted = predict(parameters, runs)
         if not predicted:
             raise InputError(f"{path}: all samples of these runs are ignored; nothing is left.")
-        judged = assess_fit((), predicted, required=require / 100.0)
+        verdict = assess_fit((), predicted, required=require / 100.0)
         measures = runs_tables(with_speeds(predicted))
     lines = []
     if out is not None:
@@ -360,7 +360,7 @@ def validate(
             page = out / "report.html"
             notes = {**versions(), "drive from": drive}
             write_validation_report(
-                parameters, campaign, page, predicted, judged=judged, notes=notes
+                parameters, campaign, page, predicted, verdict=verdict, notes=notes
             )
         lines = [f"Measures:  {out / 'measures.csv'}", f"Report:    {page}"]
     note(f"{parsing.title_of(campaign)}, {axis_name}: {parameters.name} from {drive}")
@@ -368,7 +368,7 @@ def validate(
     say(MEASURES)
     for line in lines:
         note(line)
-    _say_verdict(judged)
+    _say_verdict(verdict)
 
 
 @command(
@@ -516,8 +516,8 @@ def demo(
     note(f"Campaign:  {path}")
     estimates = [estimates_table(e, truth=truth.parameters) for e in result.fit.stages]
     show(*estimates)
-    inside, counted = truth_count(estimates)
-    say(f"The truth lies within the 95 % interval for {inside} of {counted} parameters.")
+    inside, total = truth_count(estimates)
+    say(f"The truth lies within the 95 % interval for {inside} of {total} parameters.")
     note("\nHeld out of the fit, and predicted")
     show(*runs_tables(result.predicted))
     say(verdict.headline)

@@ -64,11 +64,14 @@ def doctor() -> None:
     if sys.dont_write_bytecode and (names := _without_byte_code()):
         table.add("byte code", "-", WITHOUT_BYTE_CODE.format(names=", ".join(names)))
     extras = {f"extra {name}": entry for name, entry in EXTRAS.items()}
-    for what, (library, enables) in {**{e: (e, "") for e in LIBRARIES}, **extras}.items():
+    for entry_name, (library, enables) in {
+        **{e: (e, "") for e in LIBRARIES},
+        **extras,
+    }.items():
         try:
-            table.add(what, metadata.version(library), enables)
+            table.add(entry_name, metadata.version(library), enables)
         except metadata.PackageNotFoundError:
-            table.add(what, "-", enables)
+            table.add(entry_name, "-", enables)
     show(table)
     with spinner("Simulating the hoist"):
         from swashplate.drive import Drive

@@ -183,7 +183,7 @@ class DriveChoice:
     factors: ScaleOption = None
 
     @cached_property
-    def chosen(self) -> Drive:
+    def loaded_drive(self) -> Drive:
         """The drive."""
         from swashplate.cli.parsing import drive_of
 
@@ -196,7 +196,7 @@ class DriveChoice:
     def title(self) -> str:
         """Its name for a heading; one from a file of another name goes by that, too."""
         path = Path(self.drive)
-        name = self.chosen.name
+        name = self.loaded_drive.name
         return name if path.stem == name else f"{path.name or self.drive} ({name})"
 
     @property
@@ -204,17 +204,17 @@ class DriveChoice:
         """A line for each parameter that is not as its file has it."""
         from swashplate.cli.parsing import changes_between, parameters_of
 
-        return changes_between(parameters_of(self.drive), self.chosen.parameters)
+        return changes_between(parameters_of(self.drive), self.loaded_drive.parameters)
 
     def warn(self) -> None:
         """Say it if the drive's fit calls it not usable, as its title does, or left limits open."""
-        _, marked, why = self.chosen.parameters.title.partition("Not usable")
+        _, marked, why = self.loaded_drive.parameters.title.partition("Not usable")
         if marked:
             note(f"! The fit of this drive says: {marked}{why}.")
         self._warn_unreached()
 
     def _warn_unreached(self) -> None:
-        sentence = self.chosen.parameters.unreached_sentence()
+        sentence = self.loaded_drive.parameters.unreached_sentence()
         if sentence:
             note(f"! {sentence}")
 

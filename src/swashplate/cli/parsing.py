@@ -1,4 +1,4 @@
-"""From the words of a command line to drives, values and campaigns."""
+"""From the arguments of a command line to drives, values and campaigns."""
 
 from __future__ import annotations
 
@@ -18,16 +18,17 @@ if TYPE_CHECKING:
     from swashplate.campaign import Campaign, Experiment
     from swashplate.drive import Drive
     from swashplate.identification import FitSetup, ModelSetup
-    from swashplate.parameters import Change, ParameterSet
+    from swashplate.parameters import Change, Parameter, ParameterSet
 
 _NUMBER = r"[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|inf\b|nan\b)"
 _VALUE = re.compile(rf"\s*({_NUMBER})(?:/({_NUMBER}))?\s*((?:1/)?[^\W\d_].*|°.*)?")
 SETUP_FILE, NUMBERS = "setup.toml", "parameters.toml"
 """In a folder that a fit wrote: its fit setup, or the numbers of a user-defined model."""
-UNFELT, FEELING = "load_torque", ("motor_leakage", "motor_constant")
-"""A load, and what makes the speed depend on it."""
-SURPRISING = 1000.0
-"""Factor from which a value that is set is questioned."""
+LOAD = "load_torque"
+SENSITIVE_TO_LOAD = ("motor_leakage", "motor_constant")
+"""Refinements that make the speed depend on the load."""
+SUSPICIOUS_RATIO = 1000.0
+"""Ratio of new to old value from which a unit is questioned."""
 
 # --- files and what they are ----------------------------------------------------------------------
 
@@ -62,7 +63,7 @@ def file_kind(path: Path) -> str:
 
 
 def check_file_kind(path: Path, expected: str) -> None:
-    """Refuse a file that is plainly of another kind than expected; say where such a file goes."""
+    """Refuse a file of another kind than expected; name the right place for such a file."""
     kind = file_kind(path)
     instead = _INSTEAD.get((kind, expected))
     if path.is_file() and instead is not None:
@@ -77,7 +78,7 @@ def title_of(campaign: Campaign) -> str:
 
 
 def campaign_of(path: Path, axis: str | None = None) -> tuple[Campaign, str]:
-    """A campaign, and its axis of a name or its only one."""
+    """Read a campaign file; return the campaign and the given axis, or its only one."""
     from swashplate.campaign import Campaign
 
     if not path.exists():
@@ -134,7 +135,7 @@ def drive_file(word: str) -> Path | None:
 
 
 def parameters_of(word: str) -> ParameterSet:
-    """The packaged set of a name, the set in a TOML file, or the one that a fit's folder holds."""
+    """A packaged set by its name, or the set in a TOML file or in the folder of a fit."""
     from swashplate.parameters import load_preset, load_set
 
     file = drive_file(word)
@@ -142,13 +143,14 @@ def parameters_of(word: str) -> ParameterSet:
 
 
 def model_parameters_of(folder: str, file: Path, runs: Sequence[Experiment]) -> ModelSetup:
-    """A user-defined model with the numbers that a fit wrote into its folder."""
+    """Read a user-defined model from its file, and its numbers from the folder of its fit."""
     from swashplate.equations import is_real
     from swashplate.identification import ModelSetup
 
     setup = ModelSetup.from_file(file)
     numbers_file = Path(folder) / NUMBERS if Path(folder).is_dir() else Path(folder)
-    table = parse_toml(read_text(numbers_file), str(numbers_file)).get(setup.name)
+    tables = parse_toml(read_text(numbers_file), str(numbers_file))
+    table = tables.get(setup.name)
     nominal = setup.nominal(runs)
     if not isinstance(table, dict) or table.keys() != nominal.numbers.keys():
         raise InputError(
@@ -169,23 +171,23 @@ def model_parameters_of(folder: str, file: Path, runs: Sequence[Experiment]) -> 
 
 def assignments_of(
     option: str,
-    words: Iterable[str],
+    assignments: Iterable[str],
     example: str,
     definition_of: Callable[[str], Any],
     counts: Collection[int] = (1, 2),
     *,
     units: bool = False,
 ) -> dict[str, Any]:
-    """Parse words such as ``Z16=1.2e-4/1.5e-4`` or ``Z16=0.12mm`` by name, each given once.
+    """Parse assignments such as ``Z16=1.2e-4/1.5e-4`` or ``Z16=0.12mm``; a name occurs only once.
 
-    `definition_of` gives a name's definition or raises, `counts` are how many numbers it may have;
-    `units` may follow them, which are then turned into SI.
+    `definition_of` returns a name's definition or raises an error. `counts` are the allowed numbers
+    of values. With `units`, a unit may follow them, and they are converted to SI.
     """
     from swashplate.units import to_si
 
     values: dict[str, Any] = {}
-    for word in words:
-        name, _, value = (part.strip() for part in word.partition("="))
+    for assignment in assignments:
+        name, _, value = (part.strip() for part in assignment.partition("="))
         match = _VALUE.fullmatch(value)
         definition = None
         numbers = list[float]()
@@ -195,12 +197,12 @@ def assignments_of(
             unit = (match[3] or "").strip()
             numbers = [float(number) for number in match.group(1, 2) if number]
         if len(numbers) not in counts or (unit and not units):
-            raise InputError(f"{option} cannot read '{word}'; write it as {example}.")
+            raise InputError(f"{option} cannot read '{assignment}'; write it as {example}.")
         if name in values:
             raise InputError(f"{option} gives {name} twice; give it once.")
         if unit and definition is not None:
-            what = f"{name} ({definition.name})"
-            numbers = [to_si(number, unit, definition.unit, what) for number in numbers]
+            title = f"{name} ({definition.name})"
+            numbers = [to_si(number, unit, definition.unit, title) for number in numbers]
         values[name] = numbers[0] if len(numbers) == 1 else (numbers[0], numbers[1])
     return values
 
@@ -212,31 +214,36 @@ def drive_of(word: str, values: Sequence[str] = (), factors: Sequence[str] = ())
     drive = Drive(parameters_of(word))
     definitions = drive.parameters.definitions
 
-    def settable(name: str) -> Any:
+    def definition_to_set(name: str) -> Any:
         if _is_design_variable(name):
-            words = f"{name} is a design variable, which has no value: write --scale {name}=1.5."
-            raise InputError(words)
+            raise InputError(
+                f"{name} is a design variable, which has no value: write --scale {name}=1.5."
+            )
         return definitions.find(name)
 
     set_as = "Z16=1.2e-4, Z16=1.2e-4/1.5e-4 (plus/minus) or Z16_plus=0.12mm"
     scaled_as = "Z16=1.5, Z16=1.5/1.2 (plus/minus) or orifice=1.5"
-    scaled_variables = [
-        word for word in factors if _is_design_variable(word.partition("=")[0].strip())
-    ]
-    scaling = [word for word in factors if word not in scaled_variables]
+    scaled_variables = list[str]()
+    scaled_parameters = list[str]()
+    for assignment in factors:
+        name = assignment.partition("=")[0].strip()
+        scaled = scaled_variables if _is_design_variable(name) else scaled_parameters
+        scaled.append(assignment)
 
-    def scalable(name: str) -> Any:
+    def definition_to_scale(name: str) -> Any:
+        """Definition of a parameter; an error that lists the design variables, too, if unknown."""
         try:
             return definitions.find(name)
         except UnknownParameterError:
             from swashplate.analysis import powers_of
 
-            return powers_of(name)  # refuses it, and lists design variables as well
+            return powers_of(name)
 
-    changes = assignments_of("--set", values, set_as, settable, units=True)
+    changes = assignments_of("--set", values, set_as, definition_to_set, units=True)
     variable_factors = assignments_of("--scale", scaled_variables, scaled_as, str, (1,))
     drive = drive.replace(**changes)
-    drive = drive.scale(**assignments_of("--scale", scaling, scaled_as, scalable))
+    parameter_factors = assignments_of("--scale", scaled_parameters, scaled_as, definition_to_scale)
+    drive = drive.scale(**parameter_factors)
     if variable_factors:
         from swashplate.analysis import with_factors
 
@@ -254,33 +261,36 @@ def _is_design_variable(name: str) -> bool:
     return name in DESIGN_VARIABLES
 
 
-def physical_values(words: Sequence[str]) -> dict[str, Change]:
-    """Physical values in SI from words such as ``oil_volume=100cm^3``."""
+def physical_values(assignments: Sequence[str]) -> dict[str, Change]:
+    """Physical values in SI from assignments such as ``oil_volume=100cm^3``."""
     from swashplate.full_order import chosen_quantity
 
     example = "oil_volume=1e-4 or oil_volume=100cm^3"
-    return assignments_of("--physical", words, example, chosen_quantity, units=True)
+    return assignments_of("--physical", assignments, example, chosen_quantity, units=True)
 
 
-def factors_of(words: Sequence[str]) -> dict[str, float]:
-    """Factors by design variable or parameter from words such as ``orifice=1.5``."""
+def factors_of(assignments: Sequence[str]) -> dict[str, float]:
+    """Factors by design variable or parameter from assignments such as ``orifice=1.5``."""
     from swashplate.analysis import powers_of
 
-    return assignments_of("--scale", words, "orifice=1.5", powers_of, (1,))
+    return assignments_of("--scale", assignments, "orifice=1.5", powers_of, (1,))
 
 
-def factor_ranges_of(words: Sequence[str], usual: FactorRange) -> dict[str, FactorRange]:
-    """Ranges of factors by design variable from words such as ``pump`` or ``pump=0.8/1.5``."""
+def factor_ranges_of(variables: Sequence[str], default: FactorRange) -> dict[str, FactorRange]:
+    """Ranges of factors by design variable, from texts such as ``pump`` or ``pump=0.8/1.5``."""
     from swashplate.analysis import powers_of
 
-    completed = [word if "=" in word else f"{word}={usual[0]}/{usual[1]}" for word in words]
-    return assignments_of("--variable", completed, "pump or pump=0.8/1.5", powers_of, (2,))
+    lowest, highest = default
+    assignments = [
+        variable if "=" in variable else f"{variable}={lowest}/{highest}" for variable in variables
+    ]
+    return assignments_of("--variable", assignments, "pump or pump=0.8/1.5", powers_of, (2,))
 
 
 def pairs_of(
     option: str, texts: Sequence[str] | None, example: str, *, often: bool = False
 ) -> list[tuple[str, str]]:
-    """The text before and after each equals sign; the first is given once, or often."""
+    """Name and value of each assignment; a name may occur twice only with `often`."""
     pairs = list[tuple[str, str]]()
     for pair in texts or ():
         name, equals, value = pair.partition("=")
@@ -292,30 +302,40 @@ def pairs_of(
     return pairs
 
 
-def changes_between(before: ParameterSet, after: ParameterSet) -> list[str]:
-    """A line for each parameter of two sets that differs, with a question if it surprises."""
-    symbols = {parameter.symbol for parameter in before.values()}
-    added = [parameter for parameter in after.values() if parameter.symbol not in symbols]
-    lines = [
-        f"{parameter.symbol} ({parameter.name}): {'/'.join(f'{v:g}' for v in parameter.values)} "
-        f"{unit_text(parameter.unit)}".rstrip()
-        for parameter in added
-    ]
-    is_load_added = any(parameter.symbol == UNFELT for parameter in added)
-    if is_load_added and not set(FEELING) & set(after.refinements):
-        lines.append(f"! {UNFELT} changes nothing without {' or '.join(FEELING)}: set one as well.")
-    for old in before.values():
-        new = after[old.symbol]
+def changes_between(old_set: ParameterSet, new_set: ParameterSet) -> list[str]:
+    """A line for each parameter that differs between two sets, with a warning if it should."""
+    symbols = {parameter.symbol for parameter in old_set.values()}
+    added = [parameter for parameter in new_set.values() if parameter.symbol not in symbols]
+    lines = list[str]()
+    for parameter in added:
+        value = f"{_joined_values(parameter)} {unit_text(parameter.unit)}"
+        lines.append(f"{parameter.symbol} ({parameter.name}): {value}".rstrip())
+    is_load_added = any(parameter.symbol == LOAD for parameter in added)
+    if is_load_added and not set(SENSITIVE_TO_LOAD) & set(new_set.refinements):
+        lines.append(
+            f"! {LOAD} changes nothing without {' or '.join(SENSITIVE_TO_LOAD)}: set one as well."
+        )
+    for old in old_set.values():
+        new = new_set[old.symbol]
         if new.value == old.value:
             continue
-        words = ("/".join(f"{v:g}" for v in parameter.values) for parameter in (old, new))
         unit = unit_text(old.unit)
-        lines.append(f"{old.symbol} ({old.name}): {' -> '.join(words)} {unit}".rstrip())
+        change = f"{_joined_values(old)} -> {_joined_values(new)}"
+        lines.append(f"{old.symbol} ({old.name}): {change} {unit}".rstrip())
         ratios = [b / a for a, b in zip(old.values, new.values, strict=False) if a and isfinite(a)]
-        far = [r for r in ratios if isfinite(r) and not 1.0 / SURPRISING < abs(r) < SURPRISING]
-        if any(far):
+        suspicious = [ratio for ratio in ratios if _is_suspicious(ratio)]
+        if any(suspicious):
             in_unit = f" ({unit})" if unit else ""
             lines.append(
-                f"! {old.symbol} changes by a factor of {max(far):.3g}: check its unit{in_unit}."
+                f"! {old.symbol} changes by a factor of {max(suspicious):.3g}: check its "
+                f"unit{in_unit}."
             )
     return lines
+
+
+def _joined_values(parameter: Parameter) -> str:
+    return "/".join(f"{value:g}" for value in parameter.values)
+
+
+def _is_suspicious(ratio: float) -> bool:
+    return isfinite(ratio) and not 1.0 / SUSPICIOUS_RATIO < abs(ratio) < SUSPICIOUS_RATIO

@@ -61,7 +61,7 @@ def simulate(
     maneuvers.
     """
     with spinner("Simulating"):
-        marched = trials.at_rate(drive.chosen, sampling.rate)
+        marched = trials.at_rate(drive.loaded_drive, sampling.rate)
         name, run = trials.simulated_as(marched, maneuver, sampling)
         tables = run.tables()
         title = f"{drive.title}, {name}"

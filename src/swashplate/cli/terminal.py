@@ -1,4 +1,4 @@
-"""What reaches the terminal: tables and notes, and a sign of life while a person waits."""
+"""Output to the terminal: tables and notes, and a sign of life while a person waits."""
 
 from __future__ import annotations
 
@@ -24,12 +24,14 @@ from swashplate.tables import UNIT, Form, Table, check_place, ending
 SAVED: ContextVar[list[str]] = ContextVar("SAVED")
 """Lines on the files that a command wrote."""
 RESOURCES: ContextVar[ExitStack] = ContextVar("RESOURCES")
-"""What is released when a command ends, such as the lock of a folder."""
+"""Resources that are released when a command ends, such as the lock of a folder."""
 BETWEEN = 2
 """Characters between two columns."""
 NARROW = "\N{NO-BREAK SPACE}%"
-LEAST, LONGEST = 9, 30
-"""Characters of a head that is broken, and of a name beside too many numbers."""
+LEAST = 9
+"""Least width of the lines of a wrapped heading. [characters]"""
+LONGEST = 30
+"""Largest width of a name in a split table. [characters]"""
 CLOSED_PIPE = 141
 """Exit code if whoever reads the output has closed it, as a shell reports a SIGPIPE: 128 + 13."""
 
@@ -100,24 +102,26 @@ def _widths(rows: Sequence[Sequence[str]]) -> list[int]:
     return widths
 
 
-def _blocks(table: Table, line: int) -> Iterator[rich.table.Table]:
-    """A table for lines of a length, in one block or, of too many numbers, in several.
+def _blocks(table: Table, line_width: int) -> Iterator[rich.table.Table]:
+    """Lay a table out for a line width: as one block or, if it is too wide, as several.
 
-    Numbers are never cut. Heads are broken first; every block begins with the columns before the
-    first number.
+    Numbers are never cut. Long headings are wrapped before the table is split; every block begins
+    with the columns before the first column of numbers.
     """
     columns = table.columns
-    every = range(len(table.columns))
-    heads = ["" if columns[k] is UNIT else head for k, head in enumerate(table.heads())]
+    all_columns = range(len(table.columns))
+    headings = ["" if columns[k] is UNIT else name for k, name in enumerate(table.headings())]
     rows = [table.texts(row) for row in table.rows]
-    unbroken = _widths([heads, *rows])
-    broken = list[int]()
+    natural_widths = _widths([headings, *rows])
 
-    def length(columns: Sequence[int]) -> int:
-        return sum((broken or unbroken)[k] for k in columns) + BETWEEN * (len(columns) - 1)
+    def total_width(shown_columns: Sequence[int], widths: Sequence[int]) -> int:
+        gaps = BETWEEN * (len(shown_columns) - 1)
+        return sum(widths[k] for k in shown_columns) + gaps
 
-    def block(columns_shown: Sequence[int]) -> rich.table.Table:
-        shown = rich.table.Table(
+    def block(
+        shown_columns: Sequence[int], fixed_widths: Sequence[int] | None = None
+    ) -> rich.table.Table:
+        rich_table = rich.table.Table(
             title=table.title or None,
             title_justify="left",
             title_style="bold",
@@ -128,42 +132,55 @@ def _blocks(table: Table, line: int) -> Iterator[rich.table.Table]:
             pad_edge=False,
             collapse_padding=True,
         )
-        least = _widths([heads, *rows])
-        for k in columns_shown:
-            shown.add_column(
-                heads[k],
-                justify="right" if columns[k].spec else "left",
-                no_wrap=bool(columns[k].spec) or not (columns[k].wrap or broken),
-                width=broken[k] if broken else None,
-                min_width=least[k] if columns[k].spec else None,
+        minimum_widths = _widths([headings, *rows])
+        for k in shown_columns:
+            is_number = bool(columns[k].spec)
+            may_wrap = columns[k].wrap or fixed_widths is not None
+            rich_table.add_column(
+                headings[k],
+                justify="right" if is_number else "left",
+                no_wrap=is_number or not may_wrap,
+                width=None if fixed_widths is None else fixed_widths[k],
+                min_width=minimum_widths[k] if is_number else None,
                 # a name that is too long goes on in the next line
-                overflow="ellipsis" if columns[k].spec else "fold",
+                overflow="ellipsis" if is_number else "fold",
             )
         for row, cells in zip(table.rows, rows, strict=True):
             if row.section:
-                shown.add_section()
-            shown.add_row(*(cells[k] for k in columns_shown))
-        return shown
+                rich_table.add_section()
+            rich_table.add_row(*(cells[k] for k in shown_columns))
+        return rich_table
 
-    numbers = [k for k in every if columns[k].spec]
-    if length(every) <= line or not numbers or any(column.wrap for column in columns):
-        yield block(every)
+    number_columns = [k for k in all_columns if columns[k].spec]
+    fits = total_width(all_columns, natural_widths) <= line_width
+    if fits or not number_columns or any(column.wrap for column in columns):
+        yield block(all_columns)
         return
-    for k, cells in enumerate(_widths(rows or [heads])):
-        words = fill(heads[k].replace(" %", NARROW), max(cells, LEAST))
-        heads[k] = words.replace(NARROW, " %")
-    wide = enumerate(_widths([heads, *rows]))
-    broken = [column if k in numbers else min(column, LONGEST) for k, column in wide]
-    lead = list(every[: numbers[0]])
-    columns_of_block = lead
-    for k in every[numbers[0] :]:
-        unit = [k + 1] if k + 1 in every and columns[k + 1] is UNIT else []
-        full = columns[k] is not UNIT and length([*columns_of_block, k, *unit]) > line
-        if full and len(columns_of_block) > len(lead):
-            yield block(columns_of_block)
-            columns_of_block = lead
-        columns_of_block = [*columns_of_block, k]
-    yield block(columns_of_block)
+    for k, cell_width in enumerate(_widths(rows or [headings])):
+        headings[k] = _wrapped_heading(headings[k], cell_width)
+    fixed_widths = _widths([headings, *rows])
+    for k in all_columns:
+        if k not in number_columns:
+            fixed_widths[k] = min(fixed_widths[k], LONGEST)
+    leading_columns = list(all_columns[: number_columns[0]])
+    block_columns = leading_columns
+    for k in all_columns[number_columns[0] :]:
+        extended = [*block_columns, k]
+        if k + 1 in all_columns and columns[k + 1] is UNIT:
+            extended.append(k + 1)
+        # a unit stays in the block of its number
+        is_full = columns[k] is not UNIT and total_width(extended, fixed_widths) > line_width
+        if is_full and len(block_columns) > len(leading_columns):
+            yield block(block_columns, fixed_widths)
+            block_columns = leading_columns
+        block_columns = [*block_columns, k]
+    yield block(block_columns, fixed_widths)
+
+
+def _wrapped_heading(heading: str, cell_width: int) -> str:
+    """A heading broken into lines about as long as the column's cells; no line begins with %."""
+    wrapped = fill(heading.replace(" %", NARROW), max(cell_width, LEAST))
+    return wrapped.replace(NARROW, " %")
 
 
 def show(*tables: Table) -> None:
@@ -196,25 +213,25 @@ def say_error(error: Exception, lead: str = "Error") -> None:
     """Print what went wrong as one line on standard error."""
     sentence = " ".join(str(error).split()).rstrip(".")
     # the name of a file may hold what steers a terminal
-    shown = "".join(
+    printable = "".join(
         character if character.isprintable() else "\N{REPLACEMENT CHARACTER}"
         for character in sentence
     )
-    side.print(f"{lead}: {shown}.", soft_wrap=True)
+    side.print(f"{lead}: {printable}.", soft_wrap=True)
 
 
 class TerminalProgress:
-    """Progress of the package's functions, in the words of a spinner or a bar."""
+    """Progress of the package's functions, as the text of a spinner or a bar."""
 
     def __init__(self, update: Callable[[str], object]) -> None:
         self._update = update
 
     def show(self, line: str) -> None:
-        """Replace the words."""
+        """Replace the text."""
         self._update(line)
 
     def end(self, work: Work) -> None:
-        """Leave the last line where it is."""
+        """Leave the last line as it is."""
 
 
 @contextmanager
@@ -232,10 +249,10 @@ def spinner(text: str) -> Iterator[Status]:
 
 @contextmanager
 def long_work(text: str, steps: int = 0) -> Iterator[Callable[..., None]]:
-    """A bar with what is done now and the time left; nothing in a pipe.
+    """A bar with the present step and the time left; nothing in a pipe.
 
-    What it gives is called with words and, if it is known, the share that is done. With `steps`,
-    each call begins the next step, and the share is counted.
+    It yields a function to call with the name of the step and, if it is known, the share that is
+    done. With `steps`, each call begins the next step, and the share is counted.
     """
     from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeRemainingColumn
 
@@ -251,13 +268,13 @@ def long_work(text: str, steps: int = 0) -> Iterator[Callable[..., None]]:
         task = bar.add_task(text, total=None)
         steps_begun = 0
 
-        def show(what: str, share: float | None = None) -> None:
+        def show(step: str, share: float | None = None) -> None:
             nonlocal steps_begun
             if steps:
                 share = steps_begun / steps
                 steps_begun += 1
             total = None if share is None else 1.0
-            bar.update(task, description=what, total=total, completed=share or 0.0)
+            bar.update(task, description=step, total=total, completed=share or 0.0)
 
         with shown_by(TerminalProgress(lambda line: bar.update(task, description=line))):
             yield show
@@ -269,8 +286,8 @@ def check_free(*paths: Path, force: bool = False) -> None:
         return
     for path in paths:
         if path.is_file() or (path.is_dir() and any(path.iterdir())):
-            what = "is not empty" if path.is_dir() else "exists already"
-            raise FileError(f"{path} {what}; choose another path, or replace it with --force.")
+            reason = "is not empty" if path.is_dir() else "exists already"
+            raise FileError(f"{path} {reason}; choose another path, or replace it with --force.")
 
 
 def lock(folder: Path) -> None:
@@ -288,21 +305,21 @@ def check_writable(path: Path | None, form: Form, *, force: bool) -> None:
         check_free(path, force=force)
 
 
-def save(path: Path | None, what: str, write: Callable[[Path], object]) -> None:
-    """Write a file, if it was asked for; `say_saved` names it."""
+def save(path: Path | None, content: str, write: Callable[[Path], object]) -> None:
+    """Write a file, if it was requested; `say_saved` names it with its content."""
     if path is not None:
         with spinner(f"Writing {path}"):
             write(path)
-        SAVED.get().append(f"{what}: {path}")
+        SAVED.get().append(f"{content}: {path}")
 
 
-def draw_figure(path: Path | None, figure: Any, *shown: Any, **options: Any) -> None:
-    """Save a figure, or one of `swashplate.report.figures` by its name, if it was asked for."""
+def draw_figure(path: Path | None, figure: Any, *results: Any, **options: Any) -> None:
+    """Save a figure, or one of `swashplate.report.figures` by its name, if it was requested."""
     if path is not None:
         with spinner(f"Drawing {path}"):
             from swashplate.report import figures
 
-            drawing = getattr(figures, figure)(*shown, **options) if shown else figure
+            drawing = getattr(figures, figure)(*results, **options) if results else figure
             figures.save_figure(drawing, path)
         SAVED.get().append(f"Figure: {path}")
 

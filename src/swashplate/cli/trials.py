@@ -48,7 +48,7 @@ def named_maneuver(word: str, *drives: Drive) -> Maneuver:
 
 
 def at_rate(drive: Drive, rate: float) -> Drive:
-    """The drive for a rate: a recursion for another one becomes its equation, said in a note."""
+    """The drive for a rate; a filter's recursion for another rate is replaced, with a note."""
     from swashplate.cli.terminal import note
     from swashplate.equations.marching import least_substeps
 
@@ -65,7 +65,7 @@ def at_rate(drive: Drive, rate: float) -> Drive:
 
 
 def simulated_as(drive: Drive, command: str, options: Simulating) -> tuple[str, Simulation]:
-    """As `simulated_run`, from the start and with the inputs that the options name."""
+    """As `simulated_run`, with the start and the measured inputs of the options."""
     return simulated_run(
         drive,
         command,
@@ -85,13 +85,13 @@ def simulated_run(
     clip: bool = False,
     measured: Sequence[str] = (),
 ) -> tuple[str, Simulation]:
-    """Name of a command, a maneuver or a file, and the drive's simulation over it."""
+    """Simulate a drive over a maneuver or the command in a file; return its name and the run."""
     name_or_file = command.partition(":")[0]  # stairs:2/4/0 is not a path
     is_path = "/" in name_or_file or _ENDING.search(name_or_file) is not None
     if is_path or Path(command).is_file():
         name = Path(command).name
         log = command
-        where = f"{command}: "
+        error_prefix = f"{command}: "
         series = _command_series(command, options)
         values = series.values
         time = series.time
@@ -99,10 +99,10 @@ def simulated_run(
         maneuver = named_maneuver(command, drive)
         name = maneuver.name
         log = ""
-        where = ""
+        error_prefix = ""
         values = maneuver.sample(options.rate)
         time = None
-    inputs = _measured(measured, log, options.time_column)
+    inputs = _measured_inputs(measured, log, options.time_column)
     try:
         return name, drive.simulate(
             values,
@@ -114,7 +114,7 @@ def simulated_run(
             **inputs,
         )
     except InputError as error:
-        raise InputError(f"{where}{error}") from None
+        raise InputError(f"{error_prefix}{error}") from None
 
 
 def _command_series(command: str, options: CommandSampling) -> Series:
@@ -123,8 +123,10 @@ def _command_series(command: str, options: CommandSampling) -> Series:
 
     kind = file_kind(Path(command))
     if kind not in ("log", ""):
-        words = "not a command: name a maneuver such as step:9, or a log."
-        raise InputError(f"{command} is {KIND_NAMES[kind]}, {words}")
+        raise InputError(
+            f"{command} is {KIND_NAMES[kind]}, not a command: name a maneuver such as step:9, or a "
+            "log."
+        )
     log = open_log(command)
     columns = (("--time-column", options.time_column), ("--column", options.column))
     for option, column in columns:
@@ -141,23 +143,26 @@ def _command_series(command: str, options: CommandSampling) -> Series:
     return series
 
 
-def _measured(measured: Sequence[str], log: str, time_column: str) -> dict[str, Any]:
+def _measured_inputs(assignments: Sequence[str], log: str, time_column: str) -> dict[str, Any]:
     """Inputs other than the voltage by name: a column of a log, or a number."""
     from swashplate.drive import MEASURED
     from swashplate.logs import read_series
 
     inputs = dict[str, Any]()
-    for word in measured:
-        name, _, text = (part.strip() for part in word.partition("="))
+    for assignment in assignments:
+        name, _, text = (part.strip() for part in assignment.partition("="))
         if name not in MEASURED or not text or name in inputs:
-            names = ", ".join(MEASURED)
-            raise InputError(f"--measured {word}: write NAME=COLUMN, once for each of {names}.")
+            raise InputError(
+                f"--measured {assignment}: write NAME=COLUMN, once for each of "
+                f"{', '.join(MEASURED)}."
+            )
         try:
             inputs[name] = float(text)
         except ValueError:
             if not log:
-                must = "a maneuver has no columns, so give a number in SI"
-                raise InputError(f"--measured {word}: {must}.") from None
+                raise InputError(
+                    f"--measured {assignment}: a maneuver has no columns, so give a number in SI."
+                ) from None
             unit = MEASURED[name][0]
             inputs[name] = read_series(log, text, unit, time_column=time_column).values
     return inputs
@@ -169,13 +174,13 @@ def window_of(
     """The part of a record that --from and --to name; None for all of it. [s]"""
     if begin is None and end is None:
         return None
-    first = float(time[0]) if begin is None else begin
-    last = float(time[-1]) if end is None else end
-    return first, last
+    start = float(time[0]) if begin is None else begin
+    stop = float(time[-1]) if end is None else end
+    return start, stop
 
 
 def named_trial(drive: Drive, command: str, options: CommandSampling) -> tuple[str, Trial]:
-    """Name of a command, a maneuver or a log, and the trial that it makes."""
+    """Name of a command, which is a maneuver or a log, and its trial."""
     from swashplate.analysis import trial_of
 
     drive = at_rate(drive, options.rate)

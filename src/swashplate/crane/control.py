@@ -41,9 +41,9 @@ SEEN = (
     *("reference_x", "reference_y"),
     *("surge", "sway", "heave", "roll", "pitch", "yaw"),
 )
-"""What a user-defined controller may take as inputs: load less tip, horizontal, inertial [m]; rope
-[m]; slew and boom [rad]; the operator's tip in the ship's frame, shaped [m]; the ship's motion [m],
-[rad]."""
+"""Signals that a user-defined controller may take as inputs: load less tip, horizontal, inertial
+[m]; rope [m]; slew and boom [rad]; the operator's tip in the ship's frame, shaped [m]; the ship's
+motion [m], [rad]."""
 SENSED = (
     ("rope_angle_noise_deg", 0.0, 10.0),
     ("motion_noise_deg", 0.0, 10.0),
@@ -110,7 +110,7 @@ class Control:
         """Single stages."""
         return (self,)
 
-    def words(self) -> str:
+    def description(self) -> str:
         """Description with numbers: ``"delayed feedback of 0.2 at 0.25 periods"``."""
         return self.kind
 
@@ -130,9 +130,9 @@ class Chain(Control):
     def __repr__(self) -> str:
         return " | ".join(map(repr, self.parts))
 
-    def words(self) -> str:
+    def description(self) -> str:
         """All stages."""
-        return ", ".join(stage.words() for stage in self.parts)
+        return ", ".join(stage.description() for stage in self.parts)
 
     @property
     def stages(self) -> tuple[Control, ...]:
@@ -161,7 +161,7 @@ class TipShaper(Control):
     Examples
     --------
     >>> from swashplate.crane import control
-    >>> control.TipShaper("zvd").words()
+    >>> control.TipShaper("zvd").description()
     "shaper zvd of the tip's path"
     """
 
@@ -172,7 +172,7 @@ class TipShaper(Control):
         if self.shape not in IMPULSES:
             raise InputError(f"A shaper is 'zv', 'zvd' or 'ei', not '{self.shape}'.")
 
-    def words(self) -> str:
+    def description(self) -> str:
         """Its shape."""
         return f"{self.kind} {self.shape} of the tip's path"
 
@@ -186,7 +186,7 @@ class DelayedFeedback(Control):
     Examples
     --------
     >>> from swashplate.crane import control
-    >>> control.DelayedFeedback(gain=0.2, delay=0.25).words()
+    >>> control.DelayedFeedback(gain=0.2, delay=0.25).description()
     'delayed feedback of 0.2 at 0.25 periods'
     """
 
@@ -198,7 +198,7 @@ class DelayedFeedback(Control):
     kind = "delayed feedback"
     largest: ClassVar[Mapping[str, float]] = {"gain": 2.0, "delay": 1.0}
 
-    def words(self) -> str:
+    def description(self) -> str:
         """Gain and delay."""
         return f"{self.kind} of {self.gain:g} at {self.delay:g} periods"
 
@@ -210,8 +210,8 @@ class ShipCompensation(Control):
     Examples
     --------
     >>> from swashplate.crane import Crane, OperatorCommand, control, simulate
-    >>> crane, stick = Crane.preset("tg3637"), OperatorCommand.rest(5.0)
-    >>> run = simulate(crane, stick, control=control.ShipCompensation())
+    >>> crane, command = Crane.preset("tg3637"), OperatorCommand.rest(5.0)
+    >>> run = simulate(crane, command, control=control.ShipCompensation())
     >>> round(run.residual_deg, 3)
     0.0
     """
@@ -230,7 +230,7 @@ class Clip(Control):
     --------
     >>> from swashplate.crane import control
     >>> feedback = control.DelayedFeedback() | control.Clip(1.5)
-    >>> control.Clip(1.5).words()
+    >>> control.Clip(1.5).description()
     'a clip of 1.5 m'
     """
 
@@ -243,7 +243,7 @@ class Clip(Control):
     kind = "a clip"
     largest: ClassVar[Mapping[str, float]] = {"size": 100.0, "share": 10.0}
 
-    def words(self) -> str:
+    def description(self) -> str:
         """Its size, or the share of what slew and luff can follow."""
         if self.size == "auto":
             return f"{self.kind} at {self.share:g} of what slew and luff can follow"
@@ -262,7 +262,7 @@ class PositionLoop(Control):
     kind = "position loop"
     largest: ClassVar[Mapping[str, float]] = {"gain": 50.0}
 
-    def words(self) -> str:
+    def description(self) -> str:
         """Its gain."""
         return f"{self.kind} of {self.gain:g} /s"
 
@@ -297,7 +297,7 @@ class Sensors(Control):
     """Of the noise: the same for the same seed."""
     kind = "set of sensors"
 
-    def words(self) -> str:
+    def description(self) -> str:
         """Noise, delay and rate."""
         return (
             f"sensors with {self.rope_angle_noise_deg:g} deg of noise, {self.delay:g} s late, at "
@@ -331,7 +331,7 @@ class Sensors(Control):
 class Controller(Control):
     """User-defined controller: a model of the engine whose outputs offset the reference tip.
 
-    The position loop acts beside it, at 0.7 /s unless a `PositionLoop` says otherwise.
+    The position loop acts in addition to it, at 0.7 /s unless a `PositionLoop` says otherwise.
     """
 
     model: Model
@@ -340,7 +340,7 @@ class Controller(Control):
     """Named tuple of its parameters."""
     kind = "user-defined controller"
 
-    def words(self) -> str:
+    def description(self) -> str:
         """Its model's name."""
         return f"{self.kind} {self.model.name}"
 

@@ -42,7 +42,7 @@ class Deck(NamedTuple):
 
 
 class CraneFile(BaseModel):
-    """A crane's file; drives are packaged names, or files and folders of fits beside it."""
+    """A crane's file; drives are packaged names, or files and folders of fits next to it."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
@@ -77,9 +77,9 @@ class Crane:
     known_to_controller: Mapping[str, Drive] = field(default_factory=dict)
     """Drives that the controller counts on, by axis, if they are not those that move the crane."""
     sources: Mapping[str, DriveSource] = field(default_factory=dict)
-    """Where drives come from that are neither packaged nor made in Python, by axis."""
+    """Sources of drives that are neither packaged nor made in Python, by axis."""
     limits: Mapping[str, CraneQuantity] = field(default_factory=dict)
-    """What an operation may reach, by names of `swashplate.crane.LIMITED`."""
+    """Limits of an operation, by names of `swashplate.crane.LIMITED`."""
 
     def __post_init__(self) -> None:
         _ = self._si, self.limits_si
@@ -192,7 +192,7 @@ class Crane:
         ----------
         known_to_controller : bool
             Whether the controller knows the new drives, as after a redesign. If not, it counts on
-            the drives before, as if a drive has worn: inverse maps, the stick's full speed and the
+            the present drives, as if a drive has worn: inverse maps, the stick's full speed and the
             clip are theirs.
         **drives
             Each is a drive, ``luff=crane.luff.scale(Z16=1.5)``; the result of a fit; a packaged
@@ -228,9 +228,9 @@ class Crane:
         }
         if not known_to_controller:
             for axis, drive in replacements.items():
-                before = self.controller_drive(axis)
-                if before != drive:
-                    counted_on[axis] = before
+                counted_drive = self.controller_drive(axis)
+                if counted_drive != drive:
+                    counted_on[axis] = counted_drive
         sources = {
             axis: source for axis, source in self.sources.items() if axis not in replacements
         }
@@ -425,13 +425,27 @@ class Crane:
 
 
 def _table(title: str, quantities: Mapping[str, CraneQuantity], names: Mapping[str, str]) -> Table:
-    """Quantities with unit, status and source, by what they are called."""
-    heads = ("quantity", "value", "unit", "status")
-    table = Table(title, (*map(Column, heads), Column("source", wrap=True)))
-    for name, quantity in quantities.items():
-        value = ", ".join(f"{number:g}" for number in quantity.values)
-        assumed = quantity.status == "assumed"
-        table.add(names[name], value, quantity.unit, quantity.status, quantity.source, look=assumed)
+    """Quantities with unit, status and source; the rows of assumed ones are marked.
+
+    `names` are the names to show, by the keys of the quantities.
+    """
+    columns = (
+        Column("quantity"),
+        Column("value"),
+        Column("unit"),
+        Column("status"),
+        Column("source", wrap=True),
+    )
+    table = Table(title, columns)
+    for key, quantity in quantities.items():
+        table.add(
+            names[key],
+            ", ".join(f"{number:g}" for number in quantity.values),
+            quantity.unit,
+            quantity.status,
+            quantity.source,
+            look=quantity.status == "assumed",
+        )
     return table
 
 
@@ -470,7 +484,7 @@ def _geometry_of(content: CraneFile, origin: str) -> dict[str, CraneQuantity]:
 
 
 def _read(text: str, origin: str, folder: Path) -> Crane:
-    """A crane of a file's text, its drives beside it."""
+    """A crane of a file's text; paths of its drives count from a folder."""
     content = validated(parse_toml(text, origin), CraneFile, origin)
     quantities = _geometry_of(content, origin)
     quantities_in_si(quantities, origin)

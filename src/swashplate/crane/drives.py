@@ -1,4 +1,4 @@
-"""Drives of a crane: in what form they are given, where they come from, verdicts on their fits."""
+"""Drives of a crane: their forms, their sources, and the verdicts on their fits."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ if TYPE_CHECKING:
     from swashplate.identification import Verdict
 
 DRIVE_FILE, FIT_FILE = "drive.toml", "fit.json"
-"""What a fit writes into its folder: the drive, and the fit itself with its verdict."""
+"""Files in the folder of a fit: the drive, and the fit itself with its verdict."""
 UNUSABLE: Final = "Not usable"
-"""How the verdict begins on a fit that nothing should rest on; the title of such a drive has it."""
+"""Beginning of the verdict on a fit that is not usable; the title of such a drive has it."""
 
 
 class Fitted(Protocol):
@@ -54,7 +54,7 @@ class DriveSource(NamedTuple):
         """Whether the fit is usable; without a verdict it counts as usable."""
         return self.fit_usable is not False
 
-    def words(self) -> str:
+    def description(self) -> str:
         """Describe the drive's origin, the verdict on its fit and the range it holds for.
 
         It ends a sentence, and may go on with another one.
@@ -65,7 +65,7 @@ class DriveSource(NamedTuple):
 
     def sentence(self, axis: str) -> str:
         """The same of the drive of an axis."""
-        return f"The {axis}'s drive is {self.words()}"
+        return f"The {axis}'s drive is {self.description()}"
 
 
 def drives_of(
@@ -159,7 +159,7 @@ def _assessed_source(origin: str, fit: Path | None, verdict: Verdict) -> DriveSo
 
 
 def _source_of_file(path: Path, drive: Drive) -> DriveSource:
-    """The source of a drive's file, with the verdict of the fit beside it."""
+    """The source of a drive's file, with the verdict of the fit next to it."""
     stored = path.with_name(FIT_FILE)
     fit = None
     unknown_because = "there is no fit next to it"

@@ -14,20 +14,27 @@ from swashplate.errors import InputError
 Array = NDArray[np.float64]
 
 FEWEST = 5.0
-"""Swings of a log below which nothing is said of its damping."""
+"""Least number of swings in a log from which damping is identified."""
 WIDEST = 1.0
 """Angle beyond which a log is probably in degrees. [rad]"""
 EXPLAINED = 0.5
 """Least share of the log's variance that a decaying sine must explain."""
-NEAR = 0.1
+PERIOD_TOLERANCE = 0.1
 """Largest relative difference between the log's period and that of the rope: at 1 rad a pendulum
 swings 7 % slower, and a hook above the load makes the rope a few per cent longer or shorter."""
 STRONGEST = 0.9
-"""Size of the damping ratio within which is searched."""
+"""The damping ratio is searched between this value and its negative."""
 PADDED = 8
 """Points of the transform that finds the frequency, over those of the log."""
 UNKNOWNS = 5
 """Offset, amplitude, phase, frequency, damping ratio."""
+
+
+class _Log(NamedTuple):
+    elapsed: Array
+    """Time since its first sample. [s]"""
+    swing: Array
+    """Angle. [rad]"""
 
 
 class FreeSwing(NamedTuple):
@@ -41,7 +48,7 @@ class FreeSwing(NamedTuple):
 
 
 def swing_damping(time: ArrayLike, angle: ArrayLike, *, rope: float | None = None) -> FreeSwing:
-    """Damping ratio of a free swing in one plane, by a decaying sine through a log of its angle.
+    """Identify the damping ratio of a free swing in one plane from a log of its angle.
 
     Parameters
     ----------
@@ -55,16 +62,16 @@ def swing_damping(time: ArrayLike, angle: ArrayLike, *, rope: float | None = Non
     Raises
     ------
     InputError
-        For fewer than five swings, an angle that is never negative or beyond 1 rad, and a log that
-        is not a decaying sine for the most part, whose swing does not surely fall, or whose period
-        is not that of the rope.
+        For fewer than five swings, for an angle that exceeds 1 rad or never changes its sign, and
+        for a log that is not a free swing: a decaying sine explains less than half of it, its decay
+        is not certain, or its period is not that of the rope.
 
     Notes
     -----
-    The fit is by least squares; it starts at the largest line of the spectrum and the logarithmic
-    decrement. The interval takes the residuals as correlated: their effective number is that of the
-    samples over one plus twice the sum of their autocorrelation up to the first value that is not
-    positive.
+    A decaying sine is fitted by least squares, starting at the largest line of the spectrum and the
+    logarithmic decrement. The interval takes the residuals as correlated: their effective number is
+    the number of samples over a correlation time. That time is one plus twice the sum of the
+    residuals' autocorrelation, up to its first value that is not positive.
 
     Examples
     --------
@@ -78,15 +85,18 @@ def swing_damping(time: ArrayLike, angle: ArrayLike, *, rope: float | None = Non
     from scipy.optimize import least_squares
     from scipy.special import stdtrit
 
-    stamps, swing = _checked(time, angle)
-    start = _start(stamps, swing)
+    elapsed, swing = _checked(time, angle)
+    start = _start(elapsed, swing)
+    # offset, cosine, sine, frequency, damping ratio
+    lower = [-np.inf, -np.inf, -np.inf, 0.0, -STRONGEST]
+    upper = [np.inf, np.inf, np.inf, np.inf, STRONGEST]
     fit = least_squares(
         _residual,
         start,
         jac=_jacobian,
-        bounds=([-np.inf] * 3 + [0.0, -STRONGEST], [np.inf] * 4 + [STRONGEST]),
+        bounds=(lower, upper),
         x_scale="jac",
-        args=(stamps, swing),
+        args=(elapsed, swing),
     )
     frequency, ratio = fit.x[3:].tolist()
     residuals = fit.fun
@@ -101,21 +111,22 @@ def swing_damping(time: ArrayLike, angle: ArrayLike, *, rope: float | None = Non
         if not rope > 0.0:
             raise InputError(f"The rope is {rope:g} m long, but must be longer than 0 m.")
         expected = 2.0 * pi * sqrt(rope / GRAVITY)
-        if abs(period / expected - 1.0) > NEAR:
+        if abs(period / expected - 1.0) > PERIOD_TOLERANCE:
             raise InputError(
                 f"The log swings once in {period:.3g} s, but a load on {rope:g} m of rope once in "
                 f"{expected:.3g} s: check the column and the unit of the time."
             )
     correlation = _correlation_time(residuals)
-    freedom = residuals.size / correlation - UNKNOWNS
-    if freedom < 1.0:
+    degrees_of_freedom = residuals.size / correlation - UNKNOWNS
+    if degrees_of_freedom < 1.0:
         raise InputError(
             "The log contains changes that are too slow to separate from the swing's damping: "
             "remove any drift, or use a longer log."
         )
-    variance = float(residuals @ residuals) / freedom
+    variance = float(residuals @ residuals) / degrees_of_freedom
     covariance = np.linalg.inv(fit.jac.T @ fit.jac)
-    half = float(stdtrit(freedom, 0.975)) * sqrt(variance * covariance[4, 4])
+    standard_error = sqrt(variance * covariance[4, 4])
+    half = float(stdtrit(degrees_of_freedom, 0.975)) * standard_error
     if ratio - half <= 0.0:
         raise InputError(
             f"The log does not show that the swing decays: its damping ratio would be {ratio:.2g}, "
@@ -125,8 +136,8 @@ def swing_damping(time: ArrayLike, angle: ArrayLike, *, rope: float | None = Non
     return FreeSwing(ratio, ratio - half, ratio + half, period)
 
 
-def _checked(time: ArrayLike, angle: ArrayLike) -> tuple[Array, Array]:
-    """Stamps from 0 on [s] and the angle [rad]; refuses what cannot be a free swing."""
+def _checked(time: ArrayLike, angle: ArrayLike) -> _Log:
+    """The log, if it can be a free swing; else an `InputError`."""
     stamps, swing = (np.asarray(values, dtype=np.float64) for values in (time, angle))
     if stamps.ndim != 1 or stamps.shape != swing.shape or stamps.size <= UNKNOWNS:
         raise InputError(
@@ -146,7 +157,7 @@ def _checked(time: ArrayLike, angle: ArrayLike) -> tuple[Array, Array]:
             "The swing never changes its sign: use the signed angle in one plane, or subtract a "
             "constant."
         )
-    return stamps - stamps[0], swing
+    return _Log(stamps - stamps[0], swing)
 
 
 def _start(time: Array, swing: Array) -> Array:
@@ -173,11 +184,11 @@ def _start(time: Array, swing: Array) -> Array:
     amplitudes = []
     middles = []
     for k in range(int(swings)):
-        within = number == k
-        if within.sum() > basis.shape[1]:
-            coefficients = np.linalg.lstsq(basis[within], swing[within], rcond=None)[0]
+        in_swing = number == k
+        if in_swing.sum() > basis.shape[1]:
+            coefficients = np.linalg.lstsq(basis[in_swing], swing[in_swing], rcond=None)[0]
             amplitudes.append(np.hypot(*coefficients[1:]))
-            middles.append(time[within].mean())
+            middles.append(time[in_swing].mean())
     decay = 0.0
     if len(middles) > 1:
         decay = -float(np.polyfit(middles, np.log(np.maximum(amplitudes, 1e-12)), 1)[0])
@@ -188,25 +199,30 @@ def _start(time: Array, swing: Array) -> Array:
     return np.array([offset, cosine, sine, frequency, np.clip(decay / frequency, -0.5, 0.5)])
 
 
-def _parts(x: Array, time: Array) -> tuple[Array, Array, Array]:
-    """Decaying exponential, and it times cosine and sine of the damped swing, at times."""
+class _DecayingWaves(NamedTuple):
+    cosine: Array
+    sine: Array
+
+
+def _decaying_waves(x: Array, time: Array) -> _DecayingWaves:
+    """Decaying exponential times cosine and sine of the damped swing."""
     frequency, ratio = x[3:]
     damped = frequency * np.sqrt(1.0 - ratio * ratio)
-    fall = np.exp(-ratio * frequency * time)
-    return fall, fall * np.cos(damped * time), fall * np.sin(damped * time)
+    decay = np.exp(-ratio * frequency * time)
+    return _DecayingWaves(decay * np.cos(damped * time), decay * np.sin(damped * time))
 
 
 def _residual(x: Array, time: Array, swing: Array) -> Array:
     """A decaying sine less the log. [rad]"""
     offset, cosine, sine = x[:3]
-    _, c, s = _parts(x, time)
+    c, s = _decaying_waves(x, time)
     return np.asarray(offset + cosine * c + sine * s - swing)
 
 
 def _jacobian(x: Array, time: Array, swing: Array) -> Array:
     """Derivatives of the residual by the unknowns, (n, 5)."""
     _, cosine, sine, frequency, ratio = x
-    _, c, s = _parts(x, time)
+    c, s = _decaying_waves(x, time)
     root = np.sqrt(1.0 - ratio * ratio)
     value = cosine * c + sine * s
     turned = sine * c - cosine * s

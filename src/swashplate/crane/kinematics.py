@@ -96,7 +96,7 @@ def norm(a: Vector) -> float:
 
 
 @equation
-def moved(a: Vector, share: float, b: Vector) -> Vector:
+def add_scaled(a: Vector, share: float, b: Vector) -> Vector:
     """The vector a + share b."""
     return Vector(a.x + share * b.x, a.y + share * b.y, a.z + share * b.z)
 
@@ -143,7 +143,7 @@ def to_inertial(r: Rotation, p: Vector, shift: Vector) -> Vector:
     Vector
         Position in the inertial frame. [m]
     """
-    return moved(moved(moved(shift, p.x, r.forward), p.y, r.port), p.z, r.up)
+    return add_scaled(add_scaled(add_scaled(shift, p.x, r.forward), p.y, r.port), p.z, r.up)
 
 
 @equation
@@ -215,10 +215,10 @@ def shafts_for(x: float, y: float, now: Shafts, g: Geometry, home: Home) -> Shaf
     e_y = y - g.axis.y
     c = min(max((sqrt(e_x * e_x + e_y * e_y) - g.foot) / g.boom, 0.0), 1.0)
     rope = luff_rope(Boom(c, sqrt(1.0 - c * c)), g)
-    before = home.slew + now.slew
-    # the turn from where it stands, within ±180 degrees: no jump behind the stern
-    cross = -e_y * cos(before) - e_x * sin(before)
-    along = e_x * cos(before) - e_y * sin(before)
+    slew = home.slew + now.slew
+    # the turn from the present angle, within ±180 degrees: no jump when it passes the stern
+    cross = -e_y * cos(slew) - e_x * sin(slew)
+    along = e_x * cos(slew) - e_y * sin(slew)
     return Shafts(now.hoist, now.slew + atan2(cross, along), (home.luff_rope - rope) / g.luff)
 
 

@@ -1,4 +1,4 @@
-"""What an operation may reach: swing, off-lead, side-lead, hook load, hook speed, place, drives.
+"""Limited quantities of an operation, such as swing, off-lead, hook load and place.
 
 A crane's file gives limits in its table ``[limits]``, each with unit, status and source as its
 geometry; what it does not give is not assessed.

@@ -17,12 +17,12 @@ OUTPUTS = ("swing_out", "swing_across", "rope", "slew", "boom")
 
 
 def linearize(crane: Crane, boom_deg: float = 45.0, rope_m: float = 20.0) -> LinearModel:
-    """Linear crane about a load that hangs at rest; the slew changes nothing in the boom's axes.
+    """Linearise a crane about a load that hangs at rest; the angle of slew has no effect.
 
     Parameters
     ----------
     crane : Crane
-        Whose geometry counts.
+        Its geometry is used, not its drives.
     boom_deg : float
         Elevation of the boom. [deg]
     rope_m : float
@@ -31,10 +31,11 @@ def linearize(crane: Crane, boom_deg: float = 45.0, rope_m: float = 20.0) -> Lin
     Returns
     -------
     LinearModel
-        Inputs are the shafts' speeds, hoist, slew, luff [rad/s]. States are load less tip, outwards
-        along the boom and across it to starboard [m], and the load's speed that way [m/s]; rope
-        [m], slew and boom [rad] from where they are. Outputs are angles of the rope outwards and to
-        starboard [rad], rope [m], slew and boom [rad].
+        Inputs: speeds of the shafts, hoist, slew, luff [rad/s]. States: position of the load
+        relative to the tip, outwards along the boom and across it to starboard [m], each with the
+        load's speed in that direction [m/s]; changes of rope [m], slew and boom [rad]. Outputs:
+        angles of the rope outwards and to starboard [rad], changes of rope [m], slew and boom
+        [rad].
 
     Raises
     ------
@@ -43,8 +44,9 @@ def linearize(crane: Crane, boom_deg: float = 45.0, rope_m: float = 20.0) -> Lin
 
     Notes
     -----
-    Both axes of the swing are pendulums, apart from each other: d' = v - p', v' = -g/L d with p'
-    the speed of the tip, -∂ρ/∂θ of the luff and ρ of the slew.
+    Both axes of the swing are independent pendulums: d' = v - p', v' = -g/L d with the speed of the
+    tip p', which is -∂ρ/∂θ times the speed of the luff's shaft, and the radius ρ times that of the
+    slew.
 
     Examples
     --------
@@ -52,23 +54,24 @@ def linearize(crane: Crane, boom_deg: float = 45.0, rope_m: float = 20.0) -> Lin
     >>> linearize(Crane.preset("tg3637"), boom_deg=45.0, rope_m=20.0).A.shape
     (7, 7)
     """
-    crane.home(0.0, boom_deg, rope_m)
-    g = crane.geometry
+    crane.home(0.0, boom_deg, rope_m)  # refuses a pose beyond the crane's limits
+    geometry = crane.geometry
     boom = Boom(cos(radians(boom_deg)), sin(radians(boom_deg)))
     A = np.zeros((7, 7))
     B = np.zeros((7, 3))
     C = np.zeros((5, 7))
-    # the two pendulums
-    for i in (0, 2):
-        A[i, i + 1] = 1.0
-        A[i + 1, i] = -GRAVITY / rope_m
-        C[i // 2, i] = 1.0 / rope_m
-    B[0, 2] = reach_rate(boom, g)
-    B[2, 1] = -(g.foot + g.boom * boom.cos)
+    # the two pendulums, with their offset and speed as states
+    for swing, offset in ((0, 0), (1, 2)):
+        A[offset, offset + 1] = 1.0
+        A[offset + 1, offset] = -GRAVITY / rope_m
+        C[swing, offset] = 1.0 / rope_m
+    tip_radius = geometry.foot + geometry.boom * boom.cos
+    B[0, 2] = reach_rate(boom, geometry)
+    B[2, 1] = -tip_radius
     # rope, slew, boom
-    B[4] = (-g.hoist, 0.0, g.coupling * g.luff)
+    B[4] = (-geometry.hoist, 0.0, geometry.coupling * geometry.luff)
     B[5, 1] = 1.0
-    B[6, 2] = boom_rate(boom, g)
+    B[6, 2] = boom_rate(boom, geometry)
     C[2:, 4:] = np.eye(3)
     name = f"{crane.name}_{boom_deg:g}_{rope_m:g}"
     return LinearModel(

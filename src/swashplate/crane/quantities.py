@@ -14,7 +14,7 @@ from swashplate.units import to_si
 
 
 class CraneQuantity(BaseModel):
-    """A length, angle or number of a crane, with where it comes from."""
+    """A length, angle or number of a crane, with its source."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
@@ -52,7 +52,7 @@ GEOMETRY: Mapping[str, QuantityDefinition] = {
     "foot_offset": QuantityDefinition("m", 1, 0.0, 50.0),
     # forward, port and up from the ship's origin, which may stand at its stern: ships reach 400 m
     "slew_axis": QuantityDefinition("m", 3, -450.0, 450.0),
-    # a mast beside the boom's foot; A-frames of heavy-lift cranes are about 60 m high
+    # a mast next to the boom's foot; A-frames of heavy-lift cranes are about 60 m high
     "tower_sheave_distance": QuantityDefinition("m", 1, 0.1, 150.0),
     "tower_sheave_angle": QuantityDefinition("rad", 1, 0.0, 180.0),
     # a hand winch's drum has 30 mm, those of deep-water winches 1 to 3 m
@@ -134,9 +134,9 @@ def values_in_si(
     values = [to_si(number, quantity.unit, definition.unit, subject) for number in numbers]
     in_degrees = definition.unit == "rad"
     for number, value in zip(numbers, values, strict=True):
-        shown = degrees(value) if in_degrees else value
+        displayed = degrees(value) if in_degrees else value
         # an angle in degrees may come back a rounding beyond its end
-        if not definition.low - ROUNDING <= shown <= definition.high + ROUNDING:
+        if not definition.low - ROUNDING <= displayed <= definition.high + ROUNDING:
             unit = "deg" if in_degrees else definition.unit.replace("1", "")
             written = f"{number:g} {quantity.unit}".removesuffix(" 1")
             raise ParameterError(

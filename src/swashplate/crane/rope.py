@@ -1,6 +1,6 @@
 """The load: a point mass on a rope that can only pull, by Störmer and Verlet's step.
 
-The step needs nothing but positions of the boom's tip: no angles, which are singular where the rope
+The step needs nothing but positions of the boom's tip: no angles, which are singular if the rope
 lies level, and no accelerations of the tip, which drives with jumps do not have. The rope's pull is
 the multiplier that puts the load back on the sphere around the new tip; it follows from a quadratic
 in closed form, is zero if the rope is slack, and there is no drift.
@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swashplate.crane.kinematics import Vector, dot, moved, norm, rotation, to_ship, vector_of
+from swashplate.crane.kinematics import Vector, add_scaled, dot, norm, rotation, to_ship, vector_of
 from swashplate.equations import equation, kernel
 from swashplate.errors import InputError
 from swashplate.results import Result
@@ -162,11 +162,11 @@ class Hung(NamedTuple):
     """Load and hook after a step."""
 
     load: Vector
-    before: Vector
+    previous_load: Vector
     """The load one step earlier. [m]"""
     hook: Vector
-    """Where the rope ends: the hook, or the load without one. [m]"""
-    hook_before: Vector
+    """End of the rope: the hook, or the load if there is no hook. [m]"""
+    previous_hook: Vector
     """The same one step earlier. [m]"""
     pull: float
     """Tension of the rope for each kilogram of load and hook. [N/kg]"""
@@ -175,44 +175,60 @@ class Hung(NamedTuple):
 
 
 @equation
-def coasting(now: Vector, before: Vector, square: float, a: Vector) -> Vector:
+def coasting(now: Vector, previous: Vector, square: float, a: Vector) -> Vector:
     """Position of a body one step later under an acceleration, 2 x - x' + h² a. [m]"""
-    return moved(moved(now, 1.0, moved(now, -1.0, before)), square, a)
+    return add_scaled(add_scaled(now, 1.0, add_scaled(now, -1.0, previous)), square, a)
 
 
 @equation
-def slowed(next_: Vector, way: Vector, lead: Vector, d: Vector, share: float) -> Vector:
-    """A body's next place less a share of its way across the rope, relative to the tip. [m]
+def damped_position(
+    undamped: Vector, body_step: Vector, tip_step: Vector, rope: Vector, share: float
+) -> Vector:
+    """A body's next position less a share of its motion across the rope, relative to the tip. [m]
 
-    `way` and `lead` are what body and tip move within a step, d points along the rope. What a
-    hoist does along the rope is not slowed.
+    The steps are the motions of body and tip within a time step. Motion along the rope, such as
+    that of a hoist, is not damped.
     """
-    past = moved(way, -1.0, lead)
-    across = moved(past, -dot(past, d) / dot(d, d), d)
-    return moved(next_, -share, across)
+    relative = add_scaled(body_step, -1.0, tip_step)
+    across = add_scaled(relative, -dot(relative, rope) / dot(rope, rope), rope)
+    return add_scaled(undamped, -share, across)
 
 
 @equation
-def elastic_pull(stretch: float, before: float, length: float, s: Hanging, h: float) -> float:
-    """Pull of a stretched rope, EA ε + 2 ζ √(EA m/L) ε̇ L, never below 0. [N/kg]"""
-    rate = 2.0 * s.bounce_damping * sqrt(s.stiffness / length) * (stretch - before) / h
-    return max(s.stiffness * stretch / length + rate, 0.0) if stretch > 0.0 else 0.0
+def elastic_pull(stretch: float, previous: float, length: float, s: Hanging, h: float) -> float:
+    """Pull of a stretched rope, EA ε + 2 ζ √(EA m/L) ε̇ L, never below 0. [N/kg]
+
+    `previous` is the stretch one step earlier. [m]
+    """
+    damping = 2.0 * s.bounce_damping * sqrt(s.stiffness / length) * (stretch - previous) / h
+    return max(s.stiffness * stretch / length + damping, 0.0) if stretch > 0.0 else 0.0
+
+
+class Multipliers(NamedTuple):
+    """Lagrange multipliers of rope and slings over a step; 0 if slack. [1]"""
+
+    rope: float
+    """u: the rope's pull moves the hook by -u d, with d from the tip to the hook."""
+    sling: float
+    """w: the slings' pull moves the load by -w b, with b from the hook to the load."""
 
 
 @equation
 def both_taut(
     rope: Vector, sling: Vector, d: Vector, b: Vector, length: float, s: Hanging
-) -> tuple[float, float]:
+) -> Multipliers:
     """Multipliers u of the rope and w of the slings if both are taut, by Newton's method.
 
-    |rope - u d + q w b| = L and |sling + u d - (1 + q) w b| = l, with q the ratio of masses; rope
-    and sling are without pulls, d and b those at the step's beginning, along which they pull. [m]
+    The unknowns satisfy |rope - u d + q w b| = L and |sling + u d - (1 + q) w b| = l, with the
+    ratio of masses q. `rope` is the vector from the tip to the hook at the end of the step if
+    nothing pulled, `sling` that from the hook to the load; d and b are the same vectors at the
+    beginning of the step, along which rope and slings pull. [m]
     """
     u = 0.0
     w = 0.0
     for _ in range(4):
-        rope_line = moved(moved(rope, -u, d), s.ratio * w, b)
-        sling_line = moved(moved(sling, u, d), -(1.0 + s.ratio) * w, b)
+        rope_line = add_scaled(add_scaled(rope, -u, d), s.ratio * w, b)
+        sling_line = add_scaled(add_scaled(sling, u, d), -(1.0 + s.ratio) * w, b)
         f = dot(rope_line, rope_line) - length * length
         g = dot(sling_line, sling_line) - s.sling * s.sling
         f_u = -2.0 * dot(rope_line, d)
@@ -222,28 +238,32 @@ def both_taut(
         determinant = f_u * g_w - f_w * g_u
         u = u - (f * g_w - f_w * g) / determinant
         w = w - (f_u * g - f * g_u) / determinant
-    return u, w
+    return Multipliers(u, w)
 
 
 @equation
 def hook_pulls(
     rope: Vector, sling: Vector, d: Vector, b: Vector, length: float, s: Hanging
-) -> tuple[float, float]:
-    """Multipliers as of `both_taut`, 0 for what is slack; below 0 if none fit."""
-    u, w = both_taut(rope, sling, d, b, length, s)
-    if u >= 0.0 and w >= 0.0:
-        return u, w
-    u = multiplier_of(rope, d, length)
-    beyond = norm(moved(sling, u, d)) - s.sling
-    if u < 0.0 or beyond <= 0.0:
-        return u, 0.0
-    w = multiplier_of(sling, b, s.sling) / (1.0 + s.ratio)
-    return 0.0, w
+) -> Multipliers:
+    """Multipliers of a rope and slings that may be slack; arguments as of `both_taut`.
+
+    Tried in turn: both taut; only the rope taut, if the slings are not longer than they can be
+    then; only the slings taut. A multiplier below 0 means that none of these is possible.
+    """
+    taut = both_taut(rope, sling, d, b, length, s)
+    if taut.rope >= 0.0 and taut.sling >= 0.0:
+        return taut
+    rope_only = multiplier_of(rope, d, length)
+    overshoot = norm(add_scaled(sling, rope_only, d)) - s.sling
+    if rope_only < 0.0 or overshoot <= 0.0:
+        return Multipliers(rope_only, 0.0)
+    sling_only = multiplier_of(sling, b, s.sling) / (1.0 + s.ratio)
+    return Multipliers(0.0, sling_only)
 
 
 @equation
 def rope_step(
-    now: Hung, tip: Vector, following: Vector, length: float, s: Hanging, h: float, square: float
+    now: Hung, tip: Vector, next_tip: Vector, length: float, s: Hanging, h: float, square: float
 ) -> Hung:
     """Load and hook one step later, with the tip at n and n + 1 and the rope at n + 1. [m]
 
@@ -253,42 +273,43 @@ def rope_step(
     across the rope. `square` is h², half of it in the first step. [s²]
     """
     weight = Vector(0.0, 0.0, -GRAVITY)
-    load = coasting(now.load, now.before, square, weight)
+    load_step = add_scaled(now.load, -1.0, now.previous_load)
+    hook_step = add_scaled(now.hook, -1.0, now.previous_hook)
+    load = coasting(now.load, now.previous_load, square, weight)
     if s.drag > 0.0:
-        past = moved(moved(now.load, -1.0, now.before), -h, s.wind)
-        load = moved(load, -square * s.drag * norm(past) / (h * h), past)
+        step_in_air = add_scaled(load_step, -h, s.wind)
+        load = add_scaled(load, -square * s.drag * norm(step_in_air) / (h * h), step_in_air)
     hooked = s.sling > 0.0
     elastic = s.stiffness > 0.0
-    hook = coasting(now.hook, now.hook_before, square, weight) if hooked else load
-    d = moved(now.hook, -1.0, tip)
-    b = moved(now.load, -1.0, now.hook)
+    hook = coasting(now.hook, now.previous_hook, square, weight) if hooked else load
+    d = add_scaled(now.hook, -1.0, tip)
+    b = add_scaled(now.load, -1.0, now.hook)
     if s.swing_damping > 0.0:
         rate = 1.0 / h
         share = 2.0 * s.swing_damping * sqrt(GRAVITY / (length + s.sling)) * (square * rate)
-        lead = moved(following, -1.0, tip)
-        load = slowed(load, moved(now.load, -1.0, now.before), lead, d, share)
-        if hooked:
-            hook = slowed(hook, moved(now.hook, -1.0, now.hook_before), lead, d, share)
-        else:
-            hook = load
+        tip_step = add_scaled(next_tip, -1.0, tip)
+        load = damped_position(load, load_step, tip_step, d, share)
+        hook = damped_position(hook, hook_step, tip_step, d, share) if hooked else load
     if elastic:
-        hook = moved(hook, -square * now.pull * (1.0 + s.ratio) / norm(d), d)
-    rope = moved(hook, -1.0, following)
-    sling = moved(load, -1.0, hook)
+        hook = add_scaled(hook, -square * now.pull * (1.0 + s.ratio) / norm(d), d)
+    rope = add_scaled(hook, -1.0, next_tip)
+    sling = add_scaled(load, -1.0, hook)
     u = 0.0
     w = 0.0
     if hooked and elastic:
         w = multiplier_of(sling, b, s.sling) / (1.0 + s.ratio)
     elif hooked:
-        u, w = hook_pulls(rope, sling, d, b, length, s)
+        multipliers = hook_pulls(rope, sling, d, b, length, s)
+        u = multipliers.rope
+        w = multipliers.sling
     elif not elastic:
         u = multiplier_of(rope, d, length)
-    hook = moved(moved(hook, -u, d), s.ratio * w, b)
-    load = moved(load, -w, b) if hooked else hook
+    hook = add_scaled(add_scaled(hook, -u, d), s.ratio * w, b)
+    load = add_scaled(load, -w, b) if hooked else hook
     stretch = 0.0
     pull = u * norm(d) / (square * (1.0 + s.ratio))
     if elastic:
-        stretch = norm(moved(hook, -1.0, following)) - length
+        stretch = norm(add_scaled(hook, -1.0, next_tip)) - length
         pull = elastic_pull(stretch, now.stretch, length, s, h)
     if u < 0.0 or w < 0.0:
         pull = TOO_FAST
@@ -313,8 +334,8 @@ def hanging_load(tip: Vector, offset_x: float, offset_y: float, length: float, s
     stretch = pull * length / s.stiffness if s.stiffness > 0.0 else 0.0
     stretched = straight + stretch
     line = Vector(offset_x, offset_y, -sqrt(stretched * stretched - horizontal))
-    load = moved(tip, 1.0, line)
-    hook = moved(tip, (length + stretch) / stretched, line) if s.sling > 0.0 else load
+    load = add_scaled(tip, 1.0, line)
+    hook = add_scaled(tip, (length + stretch) / stretched, line) if s.sling > 0.0 else load
     return Hung(load, load, hook, hook, pull, stretch)
 
 
@@ -322,7 +343,7 @@ def hanging_load(tip: Vector, offset_x: float, offset_y: float, length: float, s
 def set_off(
     hung: Hung,
     tip: Vector,
-    lead: Vector,
+    tip_step: Vector,
     lowered: float,
     velocity_x: float,
     velocity_y: float,
@@ -330,18 +351,18 @@ def set_off(
 ) -> Hung:
     """A load at rest, with the positions one step earlier that give it its first velocity.
 
-    It moves with the tip, by `lead` within the step, and away from it along the rope by `lowered`
-    [m]. Its velocity relative to the tip has the given horizontal part [m/s]; the vertical one
-    keeps the rope taut.
+    Within the step it moves with the tip by `tip_step` [m] and away from it along the rope by
+    `lowered` [m]. Its velocity relative to the tip has the given horizontal part [m/s]; the
+    vertical part keeps the rope taut.
     """
-    line = moved(hung.load, -1.0, tip)
+    line = add_scaled(hung.load, -1.0, tip)
     rise = -(velocity_x * line.x + velocity_y * line.y) / line.z
     swing = Vector(velocity_x, velocity_y, rise)
-    led = moved(lead, lowered / norm(line), line)
-    hooked = norm(moved(hung.hook, -1.0, tip)) / norm(line)
-    before = moved(hung.load, -1.0, moved(led, h, swing))
-    hook_before = moved(hung.hook, -1.0, moved(led, h * hooked, swing))
-    return Hung(hung.load, before, hung.hook, hook_before, hung.pull, hung.stretch)
+    tip_and_hoist = add_scaled(tip_step, lowered / norm(line), line)
+    hook_share = norm(add_scaled(hung.hook, -1.0, tip)) / norm(line)
+    previous_load = add_scaled(hung.load, -1.0, add_scaled(tip_and_hoist, h, swing))
+    previous_hook = add_scaled(hung.hook, -1.0, add_scaled(tip_and_hoist, h * hook_share, swing))
+    return Hung(hung.load, previous_load, hung.hook, previous_hook, hung.pull, hung.stretch)
 
 
 # --- path of a load -------------------------------------------------------------------------------
@@ -351,13 +372,13 @@ def set_off(
 def _fill_motion(tip: Array, length: Array, start: Hung, s: Hanging, h: float, out: Array) -> int:
     """Fill load, hook and pull after the first sample; the sample that failed, or 0."""
     now = start
-    at = Vector(tip[0, 0], tip[0, 1], tip[0, 2])
+    tip_now = Vector(tip[0, 0], tip[0, 1], tip[0, 2])
     for n in range(tip.shape[0]):
         if n > 0:
-            following = Vector(tip[n, 0], tip[n, 1], tip[n, 2])
+            next_tip = Vector(tip[n, 0], tip[n, 1], tip[n, 2])
             square = 0.5 * h * h if n == 1 else h * h
-            now = rope_step(now, at, following, length[n], s, h, square)
-            at = following
+            now = rope_step(now, tip_now, next_tip, length[n], s, h, square)
+            tip_now = next_tip
             if now.pull < 0.0:
                 return n
         out[n, 0], out[n, 1], out[n, 2] = now.load.x, now.load.y, now.load.z
@@ -436,8 +457,10 @@ def load_motion(
         swing_damping=swing_damping,
     )
     now = hanging_load(vector_of(path[0]), 0.0, 0.0, float(rope[0]), s)
-    before, hook_before = (np.array(body) - v * h for body in (now.load, now.hook))
-    now = now._replace(before=vector_of(before), hook_before=vector_of(hook_before))
+    now = now._replace(
+        previous_load=vector_of(np.array(now.load) - v * h),
+        previous_hook=vector_of(np.array(now.hook) - v * h),
+    )
     if start is not None:
         load = np.asarray(start, dtype=np.float64)
         line = load - path[0]
@@ -451,9 +474,9 @@ def load_motion(
         stretch = distance - s.sling - float(rope[0])
         now = Hung(
             load=vector_of(load),
-            before=vector_of(load - v * h),
+            previous_load=vector_of(load - v * h),
             hook=vector_of(hook),
-            hook_before=vector_of(hook - v * h),
+            previous_hook=vector_of(hook - v * h),
             pull=float(elastic_pull(stretch, stretch, float(rope[0]), s, h)),
             stretch=stretch,
         )

@@ -20,7 +20,7 @@ from swashplate.equations import TAN_22_5, check_mapping
 from swashplate.equations.marching import Record
 from swashplate.errors import InputError
 from swashplate.executors import Executor
-from swashplate.parameters import SWITCHES, ParameterSet, broken_rules
+from swashplate.parameters import SWITCHES, ParameterSet, check_rules
 from swashplate.units import in_si
 
 Array = NDArray[np.float64]
@@ -53,7 +53,7 @@ def simulate_drives(
     driver, record = next(iter(records.items()))
     by_voltage = driver == "voltage"
     models = models_of(parameters.equations)
-    rules = [*broken_rules(numbers, definitions)]
+    rules = [*check_rules(numbers, definitions)]
     if by_voltage:
         rules += unstable_filters(numbers, record.step, parameters.rate is None)
     return march_sets(

@@ -35,7 +35,7 @@ from swashplate.models.drive import (
     settled_drive,
 )
 from swashplate.models.pump import searched_pressure, settled_pressure
-from swashplate.parameters import SIDES, Broken, ParameterSet, Rule, applied
+from swashplate.parameters import SIDES, CheckedRule, ParameterSet, Rule, apply_rule
 
 Array = NDArray[np.float64]
 
@@ -172,18 +172,23 @@ def filter_step_limit(zeta: ArrayLike, exact: bool) -> Array:
     return np.array(limits).reshape(damping.shape)
 
 
-def unstable_filters(numbers: Mapping[str, Array], step: float, exact: bool) -> Iterator[Broken]:
-    """For each rule the sets whose filter gives wrong values at this step; see `broken_rules`."""
-    words = (
+def unstable_filters(
+    numbers: Mapping[str, Array], step: float, exact: bool
+) -> Iterator[CheckedRule]:
+    """For each rule the sets whose filter gives wrong values at this step; see `check_rules`."""
+    finding = (
         "the current filter of the {side} channel (zeta = {zeta:g}, omega = {omega:g} rad/s) "
         f"{'swings too fast for' if exact else 'is unstable at'} a step of 1/{1.0 / step:g} s; "
         "simulate with "
     )
     rules: tuple[Rule, ...] = (
-        (lambda n: ~(n["steps"] < MOST_SUBSTEPS), f"{words}a zeta nearer to 1 or a lower omega."),
-        (
-            lambda n: ~(n["steps"] < 1.0),
-            f"{words}substeps={{least:.0f}} or more, a higher rate or a lower omega.",
+        Rule(
+            lambda values: ~(values["steps"] < MOST_SUBSTEPS),
+            f"{finding}a zeta nearer to 1 or a lower omega.",
+        ),
+        Rule(
+            lambda values: ~(values["steps"] < 1.0),
+            f"{finding}substeps={{least:.0f}} or more, a higher rate or a lower omega.",
         ),
     )
     for side in SIDES:
@@ -198,7 +203,7 @@ def unstable_filters(numbers: Mapping[str, Array], step: float, exact: bool) -> 
             "least": steps // 1.0 + 1.0,
         }
         for rule in rules:
-            yield applied(rule, values)
+            yield apply_rule(rule, values)
 
 
 @lru_cache(maxsize=256)

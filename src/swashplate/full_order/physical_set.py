@@ -24,8 +24,8 @@ from swashplate.models import machine as equations
 from swashplate.models.machine import Machine
 from swashplate.parameters import (
     AXES,
-    Broken,
     Change,
+    CheckedRule,
     Entries,
     HasParameters,
     Pair,
@@ -34,10 +34,10 @@ from swashplate.parameters import (
     ParameterSet,
     Rule,
     Value,
-    applied,
+    apply_rule,
+    check_range,
     meant_value,
     parameter_of,
-    range_rule,
     refuse,
     set_of,
 )
@@ -72,12 +72,12 @@ CHOICES: Mapping[str, Definition] = {
 }
 """What these are."""
 AGREES = 1e-9  # Relative difference up to which a given value agrees with the one that follows.
-ARM_TURNS: Rule = (
+ARM_TURNS = Rule(
     lambda n: ~(n["arm_sine"] < 1.0),
     "swash_arm/control_arm·tan swash_stop_{side} is {arm_sine:.4g}, but must be below 1: at its "
     "stop the swash plate would turn the feedback arm past 90°.",
 )
-LOAD_HELD: Rule = (
+LOAD_HELD = Rule(
     lambda n: ~(np.abs(n["rest"]) < n["ceiling"]),
     "the load holds a stroking pressure of {rest:.4g} Pa at rest, but it must stay below "
     "{ceiling:.4g} Pa, the smaller of supply_pressure and relief_pressure; check load_torque, "
@@ -114,7 +114,7 @@ class PhysicalSet(Entries):
         if missing:
             raise ParameterError(f"{self.name}: no value for {', '.join(missing)}.")
         self._keep({name: parameters[name] for name in QUANTITIES})
-        refuse(self.name, _broken_rules(self))
+        refuse(self.name, _check_rules(self))
 
     @classmethod
     def preset(cls, name: str) -> PhysicalSet:
@@ -261,21 +261,21 @@ def _rest(machine: Machine) -> tuple[float, float]:
     return pressure, float(modulus) / machine.oil_volume
 
 
-def _broken_rules(parameters: Mapping[str, Parameter]) -> Iterator[Broken]:
+def _check_rules(parameters: Mapping[str, Parameter]) -> Iterator[CheckedRule]:
     """Rules of single quantities, and those of a whole set."""
     n: dict[str, Any] = {}
     for parameter in parameters.values():
         for column, value in parameter.numbers.items():
             n[column] = np.array([value])
-            yield range_rule(parameter.definition, column, n[column])
+            yield check_range(parameter.definition, column, n[column])
     if not n.keys() >= set(Machine._fields):
         return  # not yet completed
     for side in ("plus", "minus"):
         arm_sine = n["swash_arm"] / n["control_arm"] * np.tan(n[f"swash_stop_{side}"])
-        yield applied(ARM_TURNS, {"side": side, "arm_sine": arm_sine})
+        yield apply_rule(ARM_TURNS, {"side": side, "arm_sine": arm_sine})
     rest = interpreted(equations.static_pressure)(Machine(**{k: float(v[0]) for k, v in n.items()}))
     ceiling = np.minimum(n["supply_pressure"], n["relief_pressure"])
-    yield applied(LOAD_HELD, {"rest": np.array([rest]), "ceiling": ceiling})
+    yield apply_rule(LOAD_HELD, {"rest": np.array([rest]), "ceiling": ceiling})
 
 
 # --- completed from lumps -------------------------------------------------------------------------
@@ -339,7 +339,7 @@ def from_lumped(
                 f"{owner}: {quantity} and {choice} are both given, but each follows from the "
                 "other; leave one out."
             )
-    refuse(owner, _broken_rules(entries))
+    refuse(owner, _check_rules(entries))
     quantities = {name: entry for name, entry in entries.items() if name in QUANTITIES}
     numbers = {
         column: value for entry in entries.values() for column, value in entry.numbers.items()

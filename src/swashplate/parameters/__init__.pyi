@@ -36,9 +36,9 @@ from .parameter_set import set_of as set_of
 from .plausible import check_plausible as check_plausible
 from .rules import FULL_VOLTAGE as FULL_VOLTAGE
 from .rules import SIDES as SIDES
-from .rules import Broken as Broken
+from .rules import CheckedRule as CheckedRule
 from .rules import Rule as Rule
-from .rules import applied as applied
-from .rules import broken_rules as broken_rules
-from .rules import range_rule as range_rule
+from .rules import apply_rule as apply_rule
+from .rules import check_range as check_range
+from .rules import check_rules as check_rules
 from .rules import refuse as refuse

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from functools import cached_property, lru_cache
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from swashplate.equations import Definition as Definition
 from swashplate.equations import declared_by
@@ -23,33 +23,42 @@ from swashplate.models.displacement_control import Pump
 Block = Literal["control_card", "pump_motor", "refinements"]
 
 INPUTS = ("pump_speed",)
-"""Fields of the models that no set has: what drives the machine, not what it is."""
+"""Fields of the models that are not parameters of a set, but inputs of a run."""
 
 
-def _collected() -> Iterator[tuple[Definition, dict[str, str]]]:
-    """All parameters in the order of Kruse's tables, the refinements last, with their paths."""
-    for part, kind in (("card", Card), ("pump", Pump)):
-        for definition in declared_by(kind):
+class _Declared(NamedTuple):
+    """A parameter as a field of a model declares it."""
+
+    definition: Definition
+    paths: dict[str, str]
+    """Path of its field in a drive's model, by column."""
+
+
+def _declared_parameters() -> Iterator[_Declared]:
+    """All parameters in the order of Kruse's tables, the refinements last."""
+    for part_name, part_type in (("card", Card), ("pump", Pump)):
+        for definition in declared_by(part_type):
             if definition.symbol in INPUTS:
                 continue
             paths = {
-                c: f"{part}.{path}"
-                for c, path in zip(definition.columns, definition.fields, strict=True)
+                column: f"{part_name}.{field}"
+                for column, field in zip(definition.columns, definition.fields, strict=True)
             }
             block: Block = "control_card"
-            if part == "pump":
+            if part_name == "pump":
                 block = "pump_motor" if definition.default is None else "refinements"
-            yield replace(definition, block=block), paths
+            yield _Declared(replace(definition, block=block), paths)
 
 
-_COLLECTED = tuple(_collected())
-_ALL = tuple(definition for definition, _ in _COLLECTED)
+_DECLARED = tuple(_declared_parameters())
+_ALL = tuple(declared.definition for declared in _DECLARED)
 
 CATALOGUE: dict[str, Definition] = {d.symbol: d for d in _ALL if d.block != "refinements"}
-"""Definitions of what every set has, by symbol, the card's first."""
+"""Definitions of the parameters that every set has, by symbol, the card's first."""
 
 REFINEMENTS: dict[str, Definition] = {d.symbol: d for d in _ALL if d.block == "refinements"}
-"""Definitions of what a set may leave out, by symbol, along the chain; each has one value."""
+"""Definitions of the parameters that a set may leave out, by symbol, from command to speed; each
+has one value."""
 
 COLUMNS: dict[str, str] = {
     column: symbol for symbol, definition in CATALOGUE.items() for column in definition.columns
@@ -63,11 +72,11 @@ SWITCHES: dict[str, str] = {
 belongs to, by symbol; each has one value."""
 
 OPTIONS: tuple[str, ...] = tuple(dict.fromkeys(SWITCHES.values()))
-"""Those options, along the chain."""
+"""Those options, from command to speed."""
 
 
 def options_of(numbers: Mapping[str, float]) -> frozenset[str]:
-    """Options whose parameters are not all zero; what is not among the numbers is off."""
+    """Options whose parameters are not all zero; a parameter without a number counts as zero."""
     return frozenset(switch for name, switch in SWITCHES.items() if numbers.get(name, 0.0) != 0.0)
 
 
@@ -79,7 +88,7 @@ class Definitions:
     """Parameters that a model has, by symbol, and what their public names stand for.
 
     A symbol such as ``Z16`` stands for all its columns, a column such as ``Z16_plus`` for one
-    number of the model. Here alone a name becomes a path in the model.
+    number of the model. Only here a name becomes a path in the model.
     """
 
     by_symbol: Mapping[str, Definition]
@@ -147,9 +156,9 @@ class Definitions:
 
 DEFINITIONS = Definitions(
     CATALOGUE | REFINEMENTS,
-    {column: path for _, paths in _COLLECTED for column, path in paths.items()},
+    {column: path for declared in _DECLARED for column, path in declared.paths.items()},
 )
-"""What a drive of the package's equations has."""
+"""Definitions of the parameters of a drive with the package's equations."""
 
 
 @lru_cache(maxsize=64)

@@ -94,7 +94,7 @@ class SetFile(FileTable):
     pump_motor: dict[str, ParameterEntry]
     model: ModelOptions = ModelOptions()
     refinements: dict[str, ParameterEntry] = Field({})
-    """What goes beyond Kruse's equations; all of it is off if it is not given."""
+    """Options beyond Kruse's equations; all are off by default."""
 
 
 # --- reading --------------------------------------------------------------------------------------
@@ -104,7 +104,7 @@ SETS = files("swashplate.parameters").joinpath("sets")
 
 
 NEUTRAL = "neutral"
-"""The packaged set that is no machine's, but where any may begin."""
+"""The packaged set that is not that of a machine, but an initial set for any."""
 
 
 def preset_names() -> tuple[str, ...]:
@@ -276,18 +276,18 @@ def _packaged_card(name: str, origin: str) -> CardFile:
 
 
 def parameter_of(definition: Definition, entry: ParameterEntry) -> Parameter:
-    """A parameter from its entry, in SI; what does not fit the definition is a `ParameterError`."""
-    what = f"{definition.symbol} ({definition.name})"
+    """A parameter from its entry, in SI; a `ParameterError` if it does not fit the definition."""
+    title = f"{definition.symbol} ({definition.name})"
     stated = entry.value if isinstance(entry.value, list) else [entry.value]
     try:
         numbers, bounds = (
-            tuple(to_si(value, entry.unit, definition.unit, what) for value in values)
+            tuple(to_si(value, entry.unit, definition.unit, title) for value in values)
             for values in (stated, entry.bounds or ())
         )
     except InputError as error:
         raise ParameterError(str(error)) from None
     if len(numbers) == 2 and not definition.directional:
-        raise ParameterError(f"{what} has one value, not a plus and a minus one.")
+        raise ParameterError(f"{title} has one value, not a plus and a minus one.")
     change = numbers if len(numbers) == 2 else numbers[0]
     value = meant_value(definition.symbol, definition, change)
     check_plausible(f"a bound of {definition.symbol}", definition, *bounds)

@@ -23,7 +23,7 @@ from swashplate.parameters.definitions import (
     options_of,
 )
 from swashplate.parameters.plausible import check_plausible
-from swashplate.parameters.rules import broken_rules, check_options, refuse
+from swashplate.parameters.rules import check_options, check_rules, refuse
 from swashplate.results import Result
 from swashplate.tables import UNIT, Column, Table, listed
 from swashplate.units import Quantity, in_si
@@ -82,7 +82,7 @@ class Parameter(Result):
         return self.definition.unit
 
     def table(self) -> Table:
-        """Its value with its unit, its status, and where it comes from."""
+        """Its value with its unit, its status, and its source."""
         columns = (
             Column("symbol"),
             Column("name", wrap=True),
@@ -108,12 +108,12 @@ class Parameter(Result):
         return dict(zip(self.definition.columns, self.values, strict=True))
 
     def in_direction(self, column: str) -> Parameter:
-        """One direction of a parameter with two by itself, ``Z16_plus`` of ``Z16``."""
+        """One direction of a parameter as a parameter with one value: ``Z16_plus`` of ``Z16``."""
         index = self.definition.columns.index(column)
-        side = ("positive", "negative")[index]
+        direction = ("positive", "negative")[index]
         definition = replace(
             self.definition,
-            name=f"{self.name}, {side}",
+            name=f"{self.name}, {direction}",
             symbol=column,
             fields=(self.definition.fields[index],),
         )
@@ -147,7 +147,7 @@ class Entries(Mapping[str, Parameter]):
         return len(self.parameters)
 
     def __reduce__(self) -> tuple[object, ...]:
-        # read-only views cannot be pickled, so a copy in another process is built anew
+        # read-only views cannot be pickled, so a copy in another process is built again
         instance: Any = self
         members = [getattr(self, field.name) for field in fields(instance) if field.init]
         return type(self), tuple(
@@ -216,7 +216,7 @@ class ParameterSet(Entries):
                         f"outside its bounds {low:g} to {high:g}."
                     )
         numbers = {name: np.array([number]) for name, number in self.numbers.items()}
-        refuse(self.name, broken_rules(numbers, definitions))
+        refuse(self.name, check_rules(numbers, definitions))
         check_options(self.name, self.options, self.numbers)
 
     @property
@@ -373,7 +373,7 @@ class ParameterSet(Entries):
             numbers = {symbol: parameters[symbol].values[0] for symbol in parameters}
             touched = {SWITCHES[name] for name in changes if name in SWITCHES}
             options = (self.options - touched) | (options_of(numbers) & touched)
-        # a number that someone gives is no longer one that tests left open
+        # a number that is set is not an end of what the tests reached any more
         columns = self.definitions.columns_of(changes)
         unreached = {k: v for k, v in self.unreached.items() if k not in columns}
         return replace(self, parameters=parameters, options=options, unreached=unreached)
@@ -400,15 +400,15 @@ class ParameterSet(Entries):
 def value_of(
     name: str, definition: Definition, change: Change, old: Parameter | None = None
 ) -> Value:
-    """A change in the form that a parameter's value has; of one side beside the old other one."""
+    """The new value of a parameter from a change; a change of one side keeps the other side."""
     if isinstance(change, tuple) and (not definition.directional or name != definition.symbol):
         raise ParameterError(f"{name} has one value, not a plus and a minus one.")
     if isinstance(change, tuple) and len(change) != 2:
         raise ParameterError(f"{name} takes one value or two (plus, minus), not {len(change)}.")
     stated = change if isinstance(change, tuple) else (change,)
-    what = f"{name} ({definition.name})"
+    title = f"{name} ({definition.name})"
     try:
-        numbers = [float(in_si(number, definition.unit, what)) for number in stated]
+        numbers = [float(in_si(number, definition.unit, title)) for number in stated]
     except InputError as error:
         raise ParameterError(str(error)) from None
     except (TypeError, ValueError):

@@ -1,13 +1,14 @@
-"""What values must satisfy, each alone and together: conditions with the sentence when broken.
+"""Validity rules of parameter sets, for single values and for values together.
 
-The rules work on arrays, one element a parameter set, so that a thousand sets are checked at once
-by the same lines as a single one.
+A rule is a condition with a sentence for a set that breaks it. The rules work on arrays with one
+element for each parameter set, so that a thousand sets are checked at once by the same lines as a
+single one.
 """
 
 from collections.abc import Callable, Iterator, Mapping
 from itertools import count
 from math import inf, isfinite
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba.np.unsafe.ndarray import to_fixed_tuple
@@ -32,23 +33,40 @@ from swashplate.parameters.definitions import (
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Values = dict[str, Any]
-"""Arrays by column, one element a set, and what follows from them; or words."""
-Rule = tuple[Callable[[Values], Mask], str]
-"""Which sets break it, and the sentence for one of them, by the names of the values."""
-Broken = tuple[Mask, Callable[[int], str]]
-"""Sets that break a rule, and the sentence for one of them."""
+"""Values by column and derived values by name, as arrays with an element for each set; or texts."""
+
+
+class Rule(NamedTuple):
+    """A rule for values of parameter sets."""
+
+    is_broken: Callable[[Values], Mask]
+    """Which sets break it."""
+    sentence: str
+    """For a set that breaks it; the names in braces are those of the values."""
+
+
+class CheckedRule(NamedTuple):
+    """A rule applied to parameter sets."""
+
+    is_broken: Mask
+    """Which sets break it."""
+    sentence: Callable[[int], str]
+    """The sentence for a set by its index."""
+
 
 FULL_VOLTAGE = 10.0  # Largest command, either way. [V]
-SIDES = ("plus", "minus")  # Endings of what has two directions.
+SIDES = ("plus", "minus")  # Endings of values for the two directions.
 VOLTAGES = np.linspace(0.0, FULL_VOLTAGE, 101)
 """Commands at which the static rules are checked. [V]"""
-FEW, _alone = 5000, count()
-"""Sets checked one by one for which Python takes as long as compiling does, and how many there
-were."""
-N_CHANNEL, N_PUMP = len(CardChannel._fields), len(Pump._fields)
+MOST_INTERPRETED = 5000
+"""Number of single sets whose check by Python takes as long as compiling the check does."""
+_single_checks = count()
+"""Counts the sets that are checked one by one."""
+N_CHANNEL = len(CardChannel._fields)
+N_PUMP = len(Pump._fields)
 
-OF_REFINEMENTS: tuple[Rule, ...] = (
-    (
+REFINEMENT_RULES: tuple[Rule, ...] = (
+    Rule(
         lambda n: (
             (n["spool_friction"] > 0.0)
             & np.isfinite(n["dither_time"])
@@ -57,40 +75,40 @@ OF_REFINEMENTS: tuple[Rule, ...] = (
         "dither_time is {dither_time:g} s, but spool_presliding is 0: dither acts on the small "
         "travel that friction permits; give that travel, of the order of 5e-5 m.",
     ),
-    (
+    Rule(
         lambda n: (n["line_stiffness"] > 0.0) & (n["load_inertia"] == 0.0),
         "line_stiffness is {line_stiffness:g} N m/rad, but load_inertia is 0: give the inertia "
         "that the line has to turn, in kg m^2 at the shaft.",
     ),
-    (
-        lambda n: n["depth"] >= 1.0,
-        "cam_ripple + cam_ripple_per_torque·|load_torque| is {depth:.4g}, but must be below 1: a "
-        "motor whose displacement vanishes somewhere would run away.",
+    Rule(
+        lambda n: n["ripple_depth"] >= 1.0,
+        "cam_ripple + cam_ripple_per_torque·|load_torque| is {ripple_depth:.4g}, but must be below "
+        "1: a motor whose displacement vanishes somewhere would run away.",
     ),
 )
-AT_REST: Rule = (
+RULE_AT_REST = Rule(
     lambda n: np.abs(n["rest"]) >= n["ceiling"],
     "the pressure at rest Z2/Z1 is {rest:g} Pa, but must stay below {ceiling:g} Pa, the smaller of "
     "Z9 and Z15.",
 )
-OF_A_SIDE: tuple[Rule, ...] = (
-    (
+SIDE_RULES: tuple[Rule, ...] = (
+    Rule(
         lambda n: n["I_t2"] >= n["I_t1"],
         "I_t2_{side} is {I_t2:g} A, but must be below I_t1_{side} = {I_t1:g} A: the decay begins "
         "at a lower current than the rate limit.",
     ),
-    (
+    Rule(
         lambda n: n["arm_sine"] >= 1.0,
         "Z3·tan Z13_{side} is {arm_sine:.4g}, but must be below 1: at its stop of {Z13:g} rad the "
         "swash plate would turn the feedback arm past 90°.",
     ),
-    (
+    Rule(
         lambda n: n["lowest"] < 0.0,
         f"the steady current of the {{side}} channel falls to {{lowest:.3g}} A within "
         f"{FULL_VOLTAGE:g} V, but a current is a magnitude; check G1_{{side}}, G2_{{side}} and "
         "G3_{side}.",
     ),
-    (
+    Rule(
         lambda n: ~(n["moment_sine"] < 1.0),
         f"Z5·F/√Z4 reaches {{moment_sine:.4g}} within {FULL_VOLTAGE:g} V ({{side}}), but must be "
         "below 1: the solenoid would overpower the feedback spring; check Z19 to Z22, Z4 and Z5.",
@@ -98,15 +116,15 @@ OF_A_SIDE: tuple[Rule, ...] = (
 )
 
 
-def refuse(owner: str, rules: Iterator[Broken]) -> None:
+def refuse(owner: str, rules: Iterator[CheckedRule]) -> None:
     """Raise the sentence of the first rule that the first set breaks, as a `ParameterError`."""
-    for mask, sentence in rules:
-        if mask[0]:
-            raise ParameterError(f"{owner}: {sentence(0)}")
+    for rule in rules:
+        if rule.is_broken[0]:
+            raise ParameterError(f"{owner}: {rule.sentence(0)}")
 
 
 def check_options(owner: str, options: frozenset[str], numbers: Mapping[str, float]) -> None:
-    """Check that what is on has a size.
+    """Check that each option that is on has a parameter other than 0.
 
     Raises
     ------
@@ -129,50 +147,61 @@ def check_options(owner: str, options: frozenset[str], numbers: Mapping[str, flo
             )
 
 
-def broken_rules(
+def check_rules(
     numbers: Mapping[str, Array], definitions: Definitions = DEFINITIONS
-) -> Iterator[Broken]:
-    """Every rule with the sets that break it, those about single values first.
+) -> Iterator[CheckedRule]:
+    """Apply every rule to many sets, those about single values first.
 
     Parameters
     ----------
     numbers : mapping of (m,) arrays
-        Every value by column, one element a set.
+        Every value by column, with an element for each set.
     definitions : Definitions
         Of the sets' parameters.
     """
-    for column, values in numbers.items():
-        yield range_rule(definitions.find(column), column, values)
-    n: Values = dict(numbers)
-    n["rest"], n["ceiling"] = n["Z2"] / n["Z1"], np.minimum(n["Z9"], n["Z15"])
-    size = n["rest"].size
-    # a refinement that is not given is what it is without
-    off = Pump._field_defaults.items()
-    n |= {name: np.full(size, value) for name, value in off if name not in numbers}
-    n["depth"] = n["cam_ripple"] + n["cam_ripple_per_torque"] * np.abs(n["load_torque"])
-    for rule in (*OF_REFINEMENTS, AT_REST):
-        yield applied(rule, n)
-    lowest, moment_sines = _static(n, size)
+    for column, column_values in numbers.items():
+        yield check_range(definitions.find(column), column, column_values)
+    values: Values = dict(numbers)
+    values["rest"] = values["Z2"] / values["Z1"]
+    values["ceiling"] = np.minimum(values["Z9"], values["Z15"])
+    set_count = values["rest"].size
+    for name, default in Pump._field_defaults.items():
+        if name not in numbers:  # a refinement that the sets leave out
+            values[name] = np.full(set_count, default)
+    ripple_by_torque = values["cam_ripple_per_torque"] * np.abs(values["load_torque"])
+    values["ripple_depth"] = values["cam_ripple"] + ripple_by_torque
+    for rule in (*REFINEMENT_RULES, RULE_AT_REST):
+        yield apply_rule(rule, values)
+    extremes = _steady_extremes(values, set_count)
     for k, side in enumerate(SIDES):
-        side_values = {name: n[f"{name}_{side}"] for name in ("I_t1", "I_t2", "Z13")}
-        side_values |= {"side": side, "lowest": lowest[:, k], "moment_sine": moment_sines[:, k]}
-        side_values["arm_sine"] = n["Z3"] * np.tan(side_values["Z13"])
-        for rule in OF_A_SIDE:
-            yield applied(rule, side_values)
+        side_values = {
+            "side": side,
+            "I_t1": values[f"I_t1_{side}"],
+            "I_t2": values[f"I_t2_{side}"],
+            "Z13": values[f"Z13_{side}"],
+            "arm_sine": values["Z3"] * np.tan(values[f"Z13_{side}"]),
+            "lowest": extremes.lowest_current[:, k],
+            "moment_sine": extremes.moment_sine[:, k],
+        }
+        for rule in SIDE_RULES:
+            yield apply_rule(rule, side_values)
 
 
-def applied(rule: Rule, n: Values) -> Broken:
-    """A rule with the sets that break it."""
-    breaks, words = rule
+def apply_rule(rule: Rule, values: Values) -> CheckedRule:
+    """Apply a rule to sets by their values."""
 
-    def sentence(i: int) -> str:
-        return words.format_map({k: v if isinstance(v, str) else float(v[i]) for k, v in n.items()})
+    def sentence(index: int) -> str:
+        values_of_set = {
+            name: value if isinstance(value, str) else float(value[index])
+            for name, value in values.items()
+        }
+        return rule.sentence.format_map(values_of_set)
 
-    return breaks(n), sentence
+    return CheckedRule(rule.is_broken(values), sentence)
 
 
-def range_rule(definition: Definition, column: str, values: Array) -> Broken:
-    """Mark values outside a definition's range, and say what is wrong with one of them."""
+def check_range(definition: Definition, column: str, values: Array) -> CheckedRule:
+    """Apply the range of a definition to one value of many sets."""
 
     def sentence(i: int) -> str:
         value = float(values[i])
@@ -181,23 +210,28 @@ def range_rule(definition: Definition, column: str, values: Array) -> Broken:
             hint = "; minus values are stored as magnitudes"
         return f"{definition.broken(column, value)}{hint}."
 
-    return np.logical_not(definition.holds(values)), sentence
+    return CheckedRule(np.logical_not(definition.holds(values)), sentence)
 
 
-# --- static rules ---------------------------------------------------------------------------------
+# --- rules of the steady state --------------------------------------------------------------------
 
 
-def _static(n: Values, size: int) -> tuple[Array, Array]:
-    """Lowest steady current [A] and largest |sin φ| of every set (rows) and side (columns).
+class _SteadyExtremes(NamedTuple):
+    """Extremes of every set (rows) and side (columns) in the steady state."""
 
-    sin φ is the solenoid's moment over the greatest moment of the feedback spring.
-    """
-    sides = [[n[f"{name}_{side}"] for name in CardChannel._fields] for side in SIDES]
+    lowest_current: Array
+    """[A]"""
+    moment_sine: Array
+    """Largest |sin φ|, the solenoid's moment over the greatest moment of the feedback spring."""
+
+
+def _steady_extremes(values: Values, set_count: int) -> _SteadyExtremes:
+    sides = [[values[f"{name}_{side}"] for name in CardChannel._fields] for side in SIDES]
     channels = np.moveaxis(np.array(sides), -1, 0)
-    pumps = np.column_stack([n[name] for name in Pump._fields])
-    lowest = np.empty((size, 2))
-    moment_sines = np.empty((size, 2))
-    if size == 1 and next(_alone) < FEW:
+    pumps = np.column_stack([values[name] for name in Pump._fields])
+    lowest = np.empty((set_count, 2))
+    moment_sines = np.empty((set_count, 2))
+    if set_count == 1 and next(_single_checks) < MOST_INTERPRETED:
         # commands that read a few sets and simulate nothing need not wait for machine code
         pump = Pump(*pumps[0].tolist())
         volts = VOLTAGES.tolist()
@@ -206,7 +240,7 @@ def _static(n: Values, size: int) -> tuple[Array, Array]:
             lowest[0, k], moment_sines[0, k] = interpreted(_extremes)(channel, pump, k, volts)
     else:
         static_extremes(channels, pumps, VOLTAGES, lowest, moment_sines)
-    return lowest, moment_sines
+    return _SteadyExtremes(lowest, moment_sines)
 
 
 @inlined

@@ -26,18 +26,18 @@ takes 90 to 330 kB; as SVG 60 to 130 kB, but as much more as its signals are lon
 class PlainFigure(Figure):
     """A figure made without pyplot, which shows itself all the same.
 
-    A notebook shows it where it is the last value of a cell. `show` shows it anywhere. Its words
+    A notebook shows it if it is the last value of a cell. `show` shows it anywhere. Its texts
     are drawn as they are: names come from files, and a dollar in one does not begin a formula.
     """
 
     def draw(self, renderer: Any) -> None:
-        """Draw it, all of its words as plain text."""
+        """Draw it, with all texts as plain text."""
         for text in self.findobj(Text):
             assert isinstance(text, Text)
             text.set_parse_math(False)
-            if not (words := text.get_text()).isprintable():
+            if not (content := text.get_text()).isprintable():
                 text.set_text(
-                    "".join(c if c.isprintable() or c == "\n" else "\ufffd" for c in words)
+                    "".join(c if c.isprintable() or c == "\n" else "\ufffd" for c in content)
                 )
         super().draw(renderer)
 

@@ -28,7 +28,7 @@ COLUMNS = 8192
 """Stretches of time of which a long line keeps the extremes; twice as many samples, 32 s at 512 Hz,
 are drawn as they are."""
 COARSE = 1000
-"""The same where many panels share a page: two or three a dot of a panel."""
+"""The same if many panels share a page: two or three a dot of a panel."""
 LONG = 131_072
 """A line of more samples is likely to fill its panel, and is drawn thinner."""
 
@@ -40,7 +40,7 @@ def fit_time(ax: Axes, *times: Array) -> None:
     ax.set_xlim(first, last if last > first else first + 1.0)
 
 
-def rows_within(time: Array, window: tuple[float, float] | None, what: str) -> slice:
+def rows_within(time: Array, window: tuple[float, float] | None, source: str) -> slice:
     """Rows of stamps [s] within a window, its ends included, two at least; all without one."""
     if window is None:
         return slice(0, time.size)
@@ -49,8 +49,8 @@ def rows_within(time: Array, window: tuple[float, float] | None, what: str) -> s
     if after - first < 2:
         raise InputError(
             f"The window from {window[0]:g} s to {window[1]:g} s holds {max(after - first, 0)} "
-            f"samples of {what}, which goes from {time[0]:g} s to {time[-1]:g} s; choose one with "
-            "at least two."
+            f"samples of {source}, which goes from {time[0]:g} s to {time[-1]:g} s; choose one "
+            "with at least two."
         )
     return slice(first, after)
 
@@ -122,7 +122,7 @@ def draw(
     label: str | None = None,
     columns: int = COLUMNS,
 ) -> None:
-    """Draw a signal over stamps [s]: no line across a gap, a dot where a sample is alone.
+    """Draw a signal over stamps [s]: no line across a gap, a dot for a sample between two gaps.
 
     A long signal is drawn by its extremes in so many columns (`thinned`). With
     `zero_order` each sample stays up to the next.
@@ -227,12 +227,12 @@ def shade(ax: Axes, spans: Array, look: Shade) -> None:
     )
 
 
-def shade_handle(look: Shade, words: str = "") -> Patch:
+def shade_handle(look: Shade, label: str = "") -> Patch:
     """Handle for a legend of shaded stretches."""
     from matplotlib.patches import Patch
 
     style: dict[str, Any] = {"facecolor": look.color, "edgecolor": look.edge or "#00000030"}
-    return Patch(hatch=look.hatch, linewidth=0.5, label=words or look.name, **style)
+    return Patch(hatch=look.hatch, linewidth=0.5, label=label or look.name, **style)
 
 
 def mark_gaps(ax: Axes, time: Array) -> None:

@@ -1,8 +1,8 @@
-"""How figures look: colours, sheets of panels, axes, legends. Matplotlib's global state is left."""
+"""Style of figures: colours, sheets of panels, axes, legends. Matplotlib's global state is left."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
@@ -35,12 +35,12 @@ SMALL, NORMAL, LARGE = 8.0, 9.0, 11.5
 THIN, LINE = 0.8, 1.3
 """Widths of lines. [pt]"""
 DPI = 150
-"""A picture's dots an inch: 8 pt letters stay readable where a page shows it at half its size."""
+"""A picture's dots an inch: 8 pt letters stay readable if a page shows it at half its size."""
 POINTS_PER_INCH = 72.0
 WIDTH = 8.6
 """Of a sheet. [inch]"""
 ROOM = WIDTH - 1.2
-"""Of a legend, beside a panel's ordinate. [inch]"""
+"""Space for a legend next to a panel's ordinate. [inch]"""
 GAP, HEAD, FOOT, ROW = 0.24, 0.38, 0.42, 0.18
 """Between panels, for the title, for the abscissa, for a row of a legend. [inch]"""
 
@@ -150,7 +150,7 @@ def dress_given(
 
 
 def legend_within(ax: Axes, handles: Sequence[Artist], location: Any = "best") -> None:
-    """Write a legend into a caller's panel, on white: lines may pass behind it."""
+    """Write a legend into a caller's panel, on white: lines may pass under it."""
     ax.legend(
         handles=handles,
         loc=location,
@@ -224,6 +224,11 @@ def handle(name: str, color: str, dashes: Dashes = "solid", width: float = 2.0) 
     return Line2D([], [], color=color, linestyle=dashes, linewidth=width, label=name)
 
 
+def stroke_handles(strokes: Mapping[str, Stroke]) -> list[Line2D]:
+    """Handles for a legend of lines by their names."""
+    return [handle(name, stroke.color, stroke.dashes) for name, stroke in strokes.items()]
+
+
 def put_legend(
     ax: Axes, handles: Sequence[Artist], *, beyond: bool = False, room: float = ROOM
 ) -> None:
@@ -265,9 +270,9 @@ def zero_line(ax: Axes, *, upright: bool = False) -> None:
         ax.axvline(0.0, color=FAINT, linewidth=0.8, zorder=1.2)
 
 
-def write_words(
+def put_text(
     ax: Axes,
-    words: str,
+    text: str,
     position: tuple[float, float],
     shift: tuple[float, float] = (4.0, 3.0),
     *,
@@ -279,7 +284,7 @@ def write_words(
 ) -> None:
     """Write small words at a position, shifted by some points."""
     ax.annotate(
-        words,
+        text,
         position,
         xycoords=coords,
         xytext=shift,
@@ -307,7 +312,7 @@ class MarginLabel(NamedTuple):
 
 
 def label_margin(ax: Axes, labels: Sequence[MarginLabel], inches: float) -> None:
-    """Write labels beside a panel of a height, each near its place but never over one another.
+    """Write labels next to a panel of a height, each near its place but never over one another.
 
     The panel's limits must be final.
     """
@@ -319,7 +324,7 @@ def label_margin(ax: Axes, labels: Sequence[MarginLabel], inches: float) -> None
     for position, index in zip(spread_out([heights[i] for i in order], gap), order, strict=True):
         label = labels[index]
         style: dict[str, Any] = {"va": "center", "annotation_clip": False}
-        write_words(ax, label.words, (1.0, position), (5.0, 0.0), color=label.color, **style)
+        put_text(ax, label.words, (1.0, position), (5.0, 0.0), color=label.color, **style)
 
 
 def spread_out(positions: Sequence[float], gap: float) -> list[float]:
@@ -345,7 +350,7 @@ _METADATA: dict[str, dict[str, None]] = {
     "svg": {"Date": None},
     "pdf": {"CreationDate": None},
 }
-"""What to leave out, because it would differ between two runs on the same figure."""
+"""Metadata to leave out, because they would differ between two runs on the same figure."""
 
 
 def save_figure(figure: Figure, path: str | Path) -> None:
@@ -375,9 +380,9 @@ def save_figure(figure: Figure, path: str | Path) -> None:
 
     kind = ending(path, FIGURE).removeprefix(".")
 
-    def write_words(beside: Path) -> None:
+    def write_file(temporary: Path) -> None:
         # without a salt of its own, an SVG's clip paths get random names
         with matplotlib.rc_context({"svg.hashsalt": "swashplate"}):
-            figure.savefig(beside, format=kind, metadata=_METADATA[kind])
+            figure.savefig(temporary, format=kind, metadata=_METADATA[kind])
 
-    write_whole(path, write_words)
+    write_whole(path, write_file)

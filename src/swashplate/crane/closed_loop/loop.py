@@ -31,8 +31,8 @@ from swashplate.crane.kinematics import (
     Rotation,
     Shafts,
     Vector,
+    add_scaled,
     boom_at,
-    moved,
     norm,
     reach_rate,
     rope_length,
@@ -62,9 +62,9 @@ IDEAL, VOLTS, INVERSE, DIRECT, MARCHED = range(5)
 """Actuation: instantaneous speeds; 10 V for full speed; the inverse map's voltage; voltages as
 given; drives that were simulated before."""
 FINE, TOO_FAST, BOOM_OUT, ROPE_OUT, NO_NUMBER = range(5)
-"""How a pass ended."""
+"""End of a pass."""
 ANGLE, SHAFT_SPEED, OPERATOR_ANGLE, OPERATOR_SPEED, REFERENCE_ANGLE, TORQUE = range(6)
-"""Shafts' angles and speeds; angles to which the stick alone would have brought them, and its
+"""Shafts' angles and speeds; angles to which only the stick would have brought them, and its
 speeds; reference angles of control; torques of the rope. [rad], [rad/s], [N m]"""
 BRAKE_WAITS, BRAKE_TAKES = 0.3, 0.2
 """Time at rest before the hoist's brake falls in, and time in which it stops the drum. [s]"""
@@ -138,10 +138,10 @@ class State(NamedTuple):
     """(6, 3) of hoist, slew and luff: rows `ANGLE` to `TORQUE`."""
     tip: Vector
     hung: Hung
-    still: float
+    rest_time: float
     """Time for which the hoist's command has been within the dead zone. [s]"""
     brake: float
-    """How far the brake has fallen in, 0 to 1."""
+    """Share by which the brake has fallen in, 0 to 1."""
 
 
 class Seen(NamedTuple):
@@ -239,7 +239,7 @@ def shaped(
 def operator_path(
     reference: Array, axes: Array, memory: Array, sample: int, half: float, h: float, fixed: Fixed
 ) -> tuple[float, float]:
-    """Position of the tip by the operator's speeds alone, shaped, in the ship's frame. [m]
+    """Position of the tip by only the operator's speeds, shaped, in the ship's frame. [m]
 
     `half` is half a period of the load. [samples]
     """
@@ -385,23 +385,23 @@ def limited(u: float, inverse: Inverse) -> float:
 
 @inlined
 def braked(
-    volts: float, still: float, brake: float, h: float, slow: Inverse
+    volts: float, rest_time: float, brake: float, h: float, inverse: Inverse
 ) -> tuple[float, float]:
     """Time for which the hoist's command has been in its dead zone, and how far the brake is in."""
-    gap = slow.gap
-    within_zone = slow.voltage[gap] < volts < slow.voltage[gap + 1]
-    still = still + h if within_zone else 0.0
-    falls = h / BRAKE_TAKES if still >= BRAKE_WAITS else -h / BRAKE_TAKES
-    return still, min(max(brake + falls, 0.0), 1.0)
+    gap = inverse.gap
+    is_in_dead_zone = inverse.voltage[gap] < volts < inverse.voltage[gap + 1]
+    rest_time = rest_time + h if is_in_dead_zone else 0.0
+    change = h / BRAKE_TAKES if rest_time >= BRAKE_WAITS else -h / BRAKE_TAKES
+    return rest_time, min(max(brake + change, 0.0), 1.0)
 
 
 @inlined
 def led_load(
     hung: Hung,
     tip: Vector,
-    following: Vector,
+    next_tip: Vector,
     rope: float,
-    rope_before: float,
+    previous_rope: float,
     sample: int,
     h: float,
     fixed: Fixed,
@@ -410,14 +410,14 @@ def led_load(
     s = fixed.hanging
     start = fixed.start
     if sample == 0:
-        return hanging_load(following, start.offset[0], start.offset[1], rope, s)
+        return hanging_load(next_tip, start.offset[0], start.offset[1], rope, s)
     square = h * h
     if sample == 1:
         square = 0.5 * square
-        lead = moved(following, -1.0, tip)
+        tip_step = add_scaled(next_tip, -1.0, tip)
         v = start.velocity
-        hung = set_off(hung, tip, lead, rope - rope_before, v[0], v[1], h)
-    return rope_step(hung, tip, following, rope, s, h, square)
+        hung = set_off(hung, tip, tip_step, rope - previous_rope, v[0], v[1], h)
+    return rope_step(hung, tip, next_tip, rope, s, h, square)
 
 
 @inlined
@@ -426,8 +426,8 @@ def rope_torques(
 ) -> Shafts:
     """Torques of the rope's tension on the three shafts. [N m]"""
     tension = fixed.mass * hung.pull
-    along = moved(hung.hook, -1.0, tip)
-    force = moved(Vector(0.0, 0.0, 0.0), tension / norm(along), along)
+    along = add_scaled(hung.hook, -1.0, tip)
+    force = add_scaled(Vector(0.0, 0.0, 0.0), tension / norm(along), along)
     return shaft_torques(to_ship(r, force), slew, boom, tension, fixed.geometry)
 
 
@@ -461,7 +461,7 @@ def store(
 
 @kernel
 def open_voltages(stick: Array, inverse: Inverse, actuation: int) -> Array:
-    """Voltages of a drive under the stick alone. [V]"""
+    """Voltages of a drive without control of the tip. [V]"""
     voltages = np.empty(stick.size)
     for m in range(stick.size):
         voltages[m] = voltage_for(limited(stick[m], inverse), inverse, actuation)
@@ -509,7 +509,7 @@ def loop_of(
         margins = arrays.margins
         marched = arrays.marched
         moving = ship.shape[1] > 1
-        sample, axes, tip, hung, still, brake = state
+        sample, axes, tip, hung, rest_time, brake = state
         shafts = shafts_of(axes, ANGLE)
         boom = boom_at(shafts.luff, g, home)
         rope = rope_length(shafts, g, home)
@@ -532,7 +532,7 @@ def loop_of(
                 reference[i] = limited(stick[m, i], inverses[i])
             if settings.path:
                 # 1. what control sees
-                swing = moved(hung.hook, -1.0, tip)
+                swing = add_scaled(hung.hook, -1.0, tip)
                 slew = home.slew + shafts.slew
                 seen = Seen(swing.x, swing.y, rope, slew, boom, tip.z - shift.z, shift, angles)
                 seen_r = r
@@ -591,12 +591,12 @@ def loop_of(
                 omega[0], omega[1], omega[2] = a.outputs[0], b.outputs[0], c.outputs[0]
                 limits[0], limits[1], limits[2] = a.outputs[1], b.outputs[1], c.outputs[1]
             if fixed.brake and actuation != IDEAL:
-                still, brake = braked(volts[0], still, brake, h, inverses[0])
+                rest_time, brake = braked(volts[0], rest_time, brake, h, inverses[0])
                 omega[0] = omega[0] * (1.0 - brake)
             # 4. kinematics and rope
             advance(axes, ANGLE, SHAFT_SPEED, omega, h, sample > 0)
             shafts = shafts_of(axes, ANGLE)
-            rope_before = rope
+            previous_rope = rope
             boom = boom_at(shafts.luff, g, home)
             rope = rope_length(shafts, g, home)
             following = to_inertial(r, tip_of(home.slew + shafts.slew, boom, g), shift)
@@ -606,7 +606,7 @@ def loop_of(
             if not (fixed.boom[0] <= boom.sin <= fixed.boom[1] and boom.cos > 0.0):
                 ended = BOOM_OUT
                 break
-            hung = led_load(hung, tip, following, rope, rope_before, sample, h, fixed)
+            hung = led_load(hung, tip, following, rope, previous_rope, sample, h, fixed)
             if hung.pull < 0.0:
                 ended = TOO_FAST
                 break
@@ -616,6 +616,6 @@ def loop_of(
                 torques = rope_torques(hung, tip, r, home.slew + shafts.slew, boom, fixed)
                 axes[TORQUE, 0], axes[TORQUE, 1], axes[TORQUE, 2] = torques
             sample += 1
-        return State(sample, axes, tip, hung, still, brake), ended
+        return State(sample, axes, tip, hung, rest_time, brake), ended
 
     return loop

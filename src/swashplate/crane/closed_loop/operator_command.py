@@ -1,4 +1,4 @@
-"""What the operator commands over time, as parts of each drive's full speed."""
+"""Commands of the operator over time, as fractions of each drive's full speed."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 LONGEST = 86_400.0
 """A day, longer than any run. [s]"""
 TARGETS = {"hoist": "rope_m", "slew": "slew_deg", "luff": "boom_deg"}
-"""What the target of an axis is called: rope below the tip, slew, elevation of the boom."""
+"""Name of the target of each axis: rope below the tip, slew, elevation of the boom."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,8 +90,8 @@ class OperatorCommand(Result):
         Examples
         --------
         >>> from swashplate.crane import OperatorCommand
-        >>> stick = OperatorCommand.trapezoid(slew=1.0, until={"slew_deg": 45.0})
-        >>> stick.length
+        >>> command = OperatorCommand.trapezoid(slew=1.0, until={"slew_deg": 45.0})
+        >>> command.length
         60.0
         """
         parts = {"hoist": hoist, "slew": slew, "luff": luff}
@@ -218,8 +218,8 @@ class OperatorCommand(Result):
         --------
         >>> from swashplate.crane import Crane, OperatorCommand
         >>> crane = Crane.preset("tg3637")
-        >>> stick = OperatorCommand.trapezoid(slew=1.0, until={"slew_deg": 45.0})
-        >>> commands, end = stick.sample(crane, crane.home(), 512.0)
+        >>> command = OperatorCommand.trapezoid(slew=1.0, until={"slew_deg": 45.0})
+        >>> commands, end = command.sample(crane, crane.home(), 512.0)
         >>> commands.shape
         (30721, 3)
         >>> round(end, 1)

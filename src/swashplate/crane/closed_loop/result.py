@@ -78,9 +78,9 @@ class CraneRun(Tabular):
     ship: Array
     """(n, 6) surge, sway, heave [m], roll, pitch, yaw [rad]; (n, 1) zeros for a ship at rest."""
     stored: Array = field(repr=False)
-    """What the loop stores of each sample, by `fixed.columns`, SI."""
+    """Stored signals of each sample, by `fixed.columns`, SI."""
     fixed: Fixed = field(repr=False)
-    """What stayed as it was: home, mass of load and hook, settings of the controller."""
+    """Constants of the run: home, mass of load and hook, settings of the controller."""
     stick_end: float
     """When the last command has returned to zero. [s]"""
 
@@ -420,8 +420,8 @@ def run_tables(runs: Mapping[str, CraneRun]) -> list[Table]:
 
 def limit_table(rows: Iterable[tuple[str, str, Iterable[float]]]) -> Table:
     """Share of time for which limits act: of a name and an axis, in the order of `PUMPS`."""
-    heads = [str(limit.name).lower().replace("_", " ") for limit in PUMPS]
-    numbers = [Column(head, ".1%", none="–") for head in heads]
+    headings = [str(limit.name).lower().replace("_", " ") for limit in PUMPS]
+    numbers = [Column(heading, ".1%", none="–") for heading in headings]
     columns = (Column("variant", wrap=True), Column("axis"), *numbers)
     note = "dead zone: the current is within that of the solenoids"
     table = Table("Share of time for which limits act", columns, note)

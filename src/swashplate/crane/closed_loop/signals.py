@@ -30,7 +30,7 @@ SPEED, SHAFT, TIP, LOAD, PULL = 0, 3, 6, 9, 12
 """First columns of what the loop stores of every run: four groups of three, and the pull."""
 ABSENT = -1
 BOOM_AND_ROPE = ("rope", "boom_cos", "boom_sin")
-"""What follows from the angles of the shafts."""
+"""Signals that follow from the angles of the shafts."""
 PARTS = {"hoist": 0, "slew": 1, "luff": 2, "x": 0, "y": 1, "z": 2}
 """Position of an axis in its group."""
 
@@ -43,7 +43,7 @@ class Columns(NamedTuple):
     limits: int
     """First of the limits of the three drives; ideal ones have none."""
     hook: int
-    """First of the hook with slings; without one it is where the load is."""
+    """First of the hook with slings; without one it is the position of the load."""
     torque: int
     """First of the torques, if the rope loads the drives."""
     width: int

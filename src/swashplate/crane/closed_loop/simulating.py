@@ -18,7 +18,7 @@ from swashplate.errors import InputError
 
 def simulate(
     crane: Crane,
-    stick: OperatorCommand,
+    command: OperatorCommand,
     *,
     sea: Seaway | ArrayLike | None = None,
     **options: Unpack[RunOptions],
@@ -29,7 +29,7 @@ def simulate(
     ----------
     crane : Crane
         The crane with its drives.
-    stick : OperatorCommand
+    command : OperatorCommand
         What the operator asks for; its length is that of the run.
     sea : Seaway or (n, 6) array_like, optional
         A seaway, or the ship's motion at 512 Hz: surge, sway, heave [m], roll, pitch, yaw [rad], as
@@ -55,13 +55,13 @@ def simulate(
     --------
     >>> from swashplate.crane import Crane, OperatorCommand, control, simulate
     >>> crane = Crane.preset("tg3637")
-    >>> stick = OperatorCommand.trapezoid(slew=1.0, until={"slew_deg": 45.0})
-    >>> round(simulate(crane, stick).residual_deg, 1)
+    >>> command = OperatorCommand.trapezoid(slew=1.0, until={"slew_deg": 45.0})
+    >>> round(simulate(crane, command).residual_deg, 1)
     7.4
-    >>> round(simulate(crane, stick, control=control.TipShaper("zv")).residual_deg, 1)
+    >>> round(simulate(crane, command, control=control.TipShaper("zv")).residual_deg, 1)
     1.0
     """
-    prepared = prepare(crane, stick, options)
+    prepared = prepare(crane, command, options)
     ship = ship_motion_of(sea, len(prepared.commands), RATE)
     return CraneRun(
         crane=crane,
@@ -83,19 +83,20 @@ class PreparedRun(NamedTuple):
     """When the last command has returned to zero. [s]"""
 
 
-def prepare(crane: Crane, stick: OperatorCommand, options: RunOptions) -> PreparedRun:
-    """A run before its first sample; it refuses what `simulate` refuses of crane and stick."""
+def prepare(crane: Crane, command: OperatorCommand, options: RunOptions) -> PreparedRun:
+    """A run before its first sample; it refuses what `simulate` refuses of crane and command."""
     stepper = CraneStepper(crane, **options)
     if stepper.fixed.actuation == DIRECT:
         raise InputError(
             "With direct actuation commands are voltages, but a stick gives fractions of full "
             "speed: use a CraneStepper, or actuation='volts'."
         )
-    if not isinstance(stick, OperatorCommand):
+    if not isinstance(command, OperatorCommand):
         raise InputError(
-            f"The stick is {stick!r}, but must be an OperatorCommand, as OperatorCommand.rest(60)."
+            f"The stick is {command!r}, but must be an OperatorCommand, as "
+            "OperatorCommand.rest(60)."
         )
-    commands, end = stick.sample(crane, stepper.fixed.home, RATE)
+    commands, end = command.sample(crane, stepper.fixed.home, RATE)
     if stepper.fixed.actuation == IDEAL and commands[0].any():
         raise InputError(
             "Ideal drives follow instantaneously, and the crane starts at rest: a recorded stick "

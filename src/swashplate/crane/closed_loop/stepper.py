@@ -38,7 +38,7 @@ Actuation = Literal["ideal", "volts", "inverse", "direct"]
 ACTUATIONS: tuple[str, ...] = get_args(Actuation)
 """In the order of `loop.IDEAL` and the others."""
 OUTPUTS = ("shaft_speed", "limits")
-"""What the loop takes of each drive."""
+"""Signals of each drive that the loop uses."""
 RIGID = Suspension()
 """A point on a rigid rope."""
 WIDEST, STRONGEST = 1e5, 100.0
@@ -60,8 +60,8 @@ class RunOptions(TypedDict, total=False):
     control : Control, default None
         Of `swashplate.crane.control`; by default the stick's commands as they are.
     actuation : {"inverse", "volts", "ideal", "direct"}, default "inverse"
-        What turns reference speeds into speeds: the real drives behind their inverse maps, or
-        behind 10 V for full speed (``"volts"``); or drives that follow instantaneously within their
+        What turns reference speeds into speeds: the real drives after their inverse maps, or
+        after 10 V for full speed (``"volts"``); or drives that follow instantaneously within their
         limits of speed (``"ideal"``). A stepper also takes voltages (``"direct"``).
     slew_deg : float, default 0, in studies 90
         From forward to starboard.
@@ -174,7 +174,7 @@ class CraneStepper:
         longest = 2.0 * pi * sqrt(fixed.ropes[1] / GRAVITY) * RATE + 4.0
         memory = np.zeros((4, 1 << int(longest).bit_length()))
         memory[loop.PATH : loop.PATH + 2] = [[tip.x], [tip.y]]
-        # the load has hung where it starts
+        # the load has hung at its initial position
         memory[loop.SWING : loop.SWING + 2] = [[hung.hook.x - tip.x], [hung.hook.y - tip.y]]
         sensing = settings.sensing
         on_their_way = int(sensing.delay * sensing.rate) + 2

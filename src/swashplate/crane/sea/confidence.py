@@ -76,7 +76,7 @@ def share_of(hits: int, of: int, unknown: int = 0) -> ConfidenceInterval:
     return ConfidenceInterval(hits / of, low, high)
 
 
-def counted_words(share: ConfidenceInterval, seaways: int) -> str:
+def share_in_seaways(share: ConfidenceInterval, seaways: int) -> str:
     """A share of seaways in words: ``"2 of 37 seaways (95 % interval 0.7 to 18.2 %)"``."""
     low, high = 100.0 * share.low, 100.0 * share.high
     of = f"{round(share.value * seaways)} of {count(seaways, 'seaway')}"

@@ -39,7 +39,7 @@ class Scatter(Result):
     share: Array
     """Of the year, adding up to 1."""
     note: str = ""
-    """Sentence on where it comes from; empty if that is the user's matter."""
+    """Sentence on its source; empty for a diagram of the user."""
 
     @classmethod
     def of(cls, height: ArrayLike, period: ArrayLike, share: ArrayLike, note: str = "") -> Scatter:
@@ -95,8 +95,8 @@ def _parsed(text: str, origin: str, note: str = "") -> Scatter:
         if line.strip() and not line.startswith("#")
     ]
     first = lines[0][1].split(",") if lines else []
-    heads = [head.split("[")[0].strip().lower() for head in first]
-    lacks = [name for name in NAMES if name not in heads]
+    names = [head.split("[")[0].strip().lower() for head in first]
+    lacks = [name for name in NAMES if name not in names]
     if lacks:
         raise InputError(
             f"{origin}: a scatter diagram has the columns hs, tp and share in its first line; "
@@ -105,13 +105,13 @@ def _parsed(text: str, origin: str, note: str = "") -> Scatter:
     columns: dict[str, list[float]] = {name: [] for name in NAMES}
     for number, line in lines[1:]:
         entries = line.split(",")
-        if len(entries) != len(heads):
+        if len(entries) != len(names):
             raise InputError(
                 f"{origin}: line {number} has {len(entries)} entries, but the first has "
-                f"{len(heads)}."
+                f"{len(names)}."
             )
         for name in NAMES:
-            entry = entries[heads.index(name)]
+            entry = entries[names.index(name)]
             try:
                 columns[name].append(float(entry))
             except ValueError:

@@ -43,7 +43,7 @@ STEEPEST, FARTHEST = 1.0, 1000.0
 """Roll, pitch or yaw beyond which a measured motion is probably in degrees [rad]; distance from its
 mean place that no ship comes to while a crane works [m]."""
 OVERSHOOT = 1.0
-"""How far a curve through samples may swing beyond them, over their range; it is a few percent if a
+"""Largest overshoot of a curve through samples, over their range; it is a few percent if a
 motion is sampled well."""
 RATES = (10.0, 1e5)
 """Samples a second that a measured motion is given at. [Hz]"""
@@ -157,7 +157,7 @@ class Components(NamedTuple):
     amplitude: Complex
     """A, of a surface Re A e^{i encounter t} at the ship's mean place. [m]"""
     heading: Array
-    """Where they run, from the bow to port; 0 following, 90° abeam. [rad]"""
+    """Direction in which they run, from the bow to port; 0 following, 90° abeam. [rad]"""
 
     def __repr__(self) -> str:
         return f"Components({self.frequency.size} waves)"
@@ -191,12 +191,12 @@ class Seaway(Result):
     sea: str | Spectrum = "ss3"
     """A name of `SEA_STATES`, or a spectrum."""
     heading_deg: float = 90.0
-    """Where the waves run, from the bow to port: 0 following, 90 abeam from starboard, 180 head
-    sea, 270 abeam from port."""
+    """Direction in which the waves run, from the bow to port: 0 following, 90 abeam from starboard,
+    180 head sea, 270 abeam from port."""
     seed: int = 0
     """Of the components."""
     ship: Hull | TransferFunctions = field(default=CRANE_SHIP, repr=False)
-    """What moves in the waves; by default a hull of a crane ship's size in closed form."""
+    """The ship; by default a hull of a crane ship's size in closed form."""
     speed: float = 0.0
     """Of the ship, forward. [m/s]"""
     spread: bool = False

@@ -301,7 +301,7 @@ def read_ship(path: str | Path, length: float | None = None) -> TransferFunction
     ------
     FileError
         If a line does not belong to such a file, a number is not plausible (`RANGES`), or a motion
-        is missing; the sentence says where. A ``.nc`` is read in a process of its own, which a
+        is missing; the sentence names the line. A ``.nc`` is read in a process of its own, which a
         damaged file cannot hang.
     InputError
         For another ending, a length that is missing or that no other file takes, and another
@@ -348,12 +348,12 @@ def _is_plausible(name: str, value: float) -> bool:
 
 
 def _numbers(
-    path: str | Path, line: int, words: Sequence[str | None], required: str
+    path: str | Path, line: int, texts: Sequence[str | None], required: str
 ) -> list[float]:
     """Plausible numbers of a line, by their names, which are joined by commas."""
     names = required.split(", ")
     numbers = list[float]()
-    for name, word in zip(names, [*words, *([None] * len(names))], strict=False):
+    for name, word in zip(names, [*texts, *([None] * len(names))], strict=False):
         try:
             # Python reads 1_000 as a number, no other program does
             number = inf if "_" in (word or "") else float(word or "")
@@ -383,8 +383,8 @@ def _veres_rows(path: str | Path) -> Iterator[Amplitude]:
 
     def following(required: str) -> list[float]:
         row = next(rows)
-        words = lines[row - 1].split() if row <= len(lines) else []
-        return _numbers(path, row, words, required)
+        row_cells = lines[row - 1].split() if row <= len(lines) else []
+        return _numbers(path, row, row_cells, required)
 
     speeds, headings, frequencies, _ = map(int, following("speeds, headings, frequencies, motions"))
     for _ in range(speeds):
@@ -405,10 +405,10 @@ def _wamit(path: str | Path) -> Amplitudes:
 def _wamit_rows(path: str | Path) -> Iterator[Amplitude]:
     required = "period, heading, motion, modulus, phase, real part, imaginary part"
     for row, line in enumerate(read_text(path).splitlines(), 1):
-        words = line.split()
-        if row == 1 and words and not words[0][-1].isdigit():
+        row_cells = line.split()
+        if row == 1 and row_cells and not row_cells[0][-1].isdigit():
             continue  # names of columns
-        period, heading, motion, _, _, real, imaginary = _numbers(path, row, words, required)
+        period, heading, motion, _, _, real, imaginary = _numbers(path, row, row_cells, required)
         yield 0.0, heading, 2.0 * pi / period, int(motion), complex(real, imaginary)
 
 
@@ -422,8 +422,8 @@ def _csv_rows(path: str | Path) -> Iterator[Amplitude]:
     table = csv.DictReader(read_text(path).splitlines())
     try:
         for cells in table:
-            words = [{"speed": "0", **cells}.get(name) for name in required.split(", ")]
-            speed, heading, omega, *values = _numbers(path, table.line_num, words, required)
+            row_cells = [{"speed": "0", **cells}.get(name) for name in required.split(", ")]
+            speed, heading, omega, *values = _numbers(path, table.line_num, row_cells, required)
             pairs = zip(values[::2], values[1::2], strict=True)
             for motion, (real, imaginary) in enumerate(pairs, 1):
                 yield speed, heading, omega, motion, complex(real, imaginary)

@@ -67,7 +67,7 @@ def assess(
     allowed_share_worse : float
         Share of seaways in which control may be worse than none.
     questions : sequence of {"harm", "sufficiency"}, optional
-        Questions that `Assessment.passed` answers; by default both, or harm alone if the crane has
+        Questions that `Assessment.passed` answers; by default both, or only harm if the crane has
         no limits.
     remedies : bool
         Whether to look for a larger orifice and for a clip that would do on the crane's own drives,
@@ -75,8 +75,8 @@ def assess(
     tipping_points : bool
         Whether to look for assumed or given numbers that would turn the answer.
     **study
-        Seaways, drives, stick, where each run begins: see `Study.of`. The verdict is on the last of
-        the drives.
+        Seaways, drives, command, where each run begins: see `Study.of`. The verdict is on the last
+        of the drives.
 
     Raises
     ------
@@ -145,12 +145,12 @@ def seaways_needed(seaways: int, allowed: float) -> str:
 
 
 def _with_remedies(assessment: Assessment) -> Assessment:
-    """The assessment with what would do, of larger orifices and of clips."""
+    """The assessment with the larger orifices and the clips that would be remedies."""
     case = assessment.study.cases[assessment.assessed_variant]
     control = case.options["control"]
     if not case.driven or control is None:
         return assessment
-    # factors are of the crane as it is built, whatever was assessed
+    # factors refer to the crane as it is built, whichever variant was assessed
     cranes = (assessment.study.crane,) if len(case.cranes) == 1 else case.cranes
     remedies: list[Remedy] = []
     failed: list[str] = []
@@ -160,14 +160,17 @@ def _with_remedies(assessment: Assessment) -> Assessment:
         # the last one, if it passes, has not failed
         for trial, result in zip(trials, results, strict=False):
             if result is None or not result.passes:
-                failed.append(trial.what)
-    named = [remedy.what for remedy in remedies]
-    others = [what for what in failed if what not in named]
+                failed.append(trial.change)
+    named = [remedy.change for remedy in remedies]
+    others = [change for change in failed if change not in named]
     return replace(assessment, remedies=tuple(remedies), tried=tuple(others))
 
 
 def _least(remedies: list[Remedy]) -> list[Remedy]:
-    """The least that does no harm, and the least that passes; else the least that may do."""
+    """The smallest remedy that does no harm and the smallest that passes.
+
+    Without any that does no harm, the smallest of the others.
+    """
     harmless = [remedy for remedy in remedies if remedy.harmless == "yes"]
     passing = [remedy for remedy in harmless if remedy.passes]
     if harmless:
@@ -178,10 +181,10 @@ def _least(remedies: list[Remedy]) -> list[Remedy]:
 class RemedyTrial(NamedTuple):
     """A change that is tried."""
 
-    what: str
-    """In words: ``"luff orifice ×1.5"``."""
+    change: str
+    """Its description: ``"luff orifice ×1.5"``."""
     size: float
-    """Factor on the orifice, or size of the clip. [m]"""
+    """Factor on the orifice [1], or size of the clip [m]."""
     case: Case
     """The variant with that change."""
 
@@ -205,16 +208,21 @@ def _larger_orifices(
 
 
 def _clips(case: Case, cranes: tuple[Crane, ...], control: Control) -> list[RemedyTrial]:
-    """Clips at shares of what the luff can follow at the load's period."""
+    """Trials of clips at shares of the amplitude that the luff can follow at the load's period.
+
+    The assessed control, without its clip and position loop, is followed by the clip and a stiff
+    position loop. Only clips smaller than that of the assessed control are tried.
+    """
     stages = [stage for stage in control.stages if not isinstance(stage, Clip | PositionLoop)]
-    present = [stage.share for stage in control.stages if isinstance(stage, Clip)]
-    period = 2.0 * pi * sqrt(case.pose["rope_m"] / GRAVITY)
-    reach = float(follow(cranes[0], [period], seas=(), **case.pose).amplitude[0, 2])
+    present_shares = [stage.share for stage in control.stages if isinstance(stage, Clip)]
+    pendulum_period = 2.0 * pi * sqrt(case.pose["rope_m"] / GRAVITY)
+    followable = follow(cranes[0], [pendulum_period], seas=(), **case.pose)
+    luff_amplitude = float(followable.amplitude[0, AXES.index("luff")])
     trials = []
     for share in SHARES:
-        if present and share >= present[0]:
-            continue  # what is assessed has that clip already
-        size = share * reach
+        if present_shares and share >= present_shares[0]:
+            continue
+        size = share * luff_amplitude
         clipped = Chain((*stages, Clip(share=share), LOOP))
         changed = case.changed(control=clipped)._replace(cranes=cranes)
         trials.append(RemedyTrial(f"a clip of {size:.2g} m", size, changed))
@@ -222,7 +230,10 @@ def _clips(case: Case, cranes: tuple[Crane, ...], control: Control) -> list[Reme
 
 
 def _results(assessment: Assessment, trials: Sequence[RemedyTrial]) -> list[Remedy | None]:
-    """Results of trials up to the first that passes; None for one that harms, or helps no more."""
+    """Results of trials up to the first that passes.
+
+    None for a trial that harms, and for one that does not pass after another did no harm.
+    """
     results: list[Remedy | None] = []
     harmless = False
     for trial in trials:
@@ -237,16 +248,19 @@ def _results(assessment: Assessment, trials: Sequence[RemedyTrial]) -> list[Reme
 def _result(
     assessment: Assessment, trial: RemedyTrial, *, only_if_sufficient: bool
 ) -> Remedy | None:
-    """A trial in all seaways; None as soon as it surely harms, or surely is not sufficient."""
-    none = assessment.of(NONE)
+    """Simulate a trial in all seaways; None as soon as it certainly harms.
+
+    With `only_if_sufficient`, None also as soon as it certainly is not sufficient.
+    """
+    uncontrolled = assessment.of(NONE)
     seaways = len(assessment.study.seeds)
-    sufficiency_asked = "sufficiency" in assessment.questions
-    limits = assessment.study.crane.limits_si if sufficiency_asked else {}
+    is_sufficiency_question = "sufficiency" in assessment.questions
+    limits = assessment.study.crane.limits_si if is_sufficiency_question else {}
     outcomes: list[RunOutcome] = []
     for first in range(0, seaways, BLOCK):
         block = range(first, min(first + BLOCK, seaways))
         outcomes += [outcome for (outcome,) in assessment.study.outcomes([trial.case], block)]
-        share_worse = share_worse_of(outcomes, none[: len(outcomes)])
+        share_worse = share_worse_of(outcomes, uncontrolled[: len(outcomes)])
         limited = assessed_limits(outcomes, limits)
         decisions = [quantity.within for quantity in limited]
         if share_worse.value * len(outcomes) > assessment.allowed_share_worse * seaways:
@@ -255,11 +269,11 @@ def _result(
             return None
     swing = rms_of(np.array([outcome.rms_swing for outcome in outcomes]))
     return Remedy(
-        what=trial.what,
+        change=trial.change,
         size=trial.size,
         harmless="yes" if share_worse.high <= assessment.allowed_share_worse else "not decided",
-        sufficient=all_of(decisions) if sufficiency_asked else None,
+        sufficient=all_of(decisions) if is_sufficiency_question else None,
         share_worse=share_worse,
         swing=swing,
-        beyond=tuple(quantity.words() for quantity in limited if quantity.within == "no"),
+        beyond=tuple(quantity.description() for quantity in limited if quantity.within == "no"),
     )

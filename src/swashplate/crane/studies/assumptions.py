@@ -1,8 +1,8 @@
-"""What the answer on a crane rests on: numbers that would turn it, if they had another value.
+"""Tipping points of the answer on a crane: numbers that would change it if they had another value.
 
 Roll period, damping of the load, height, period and peak of the sea, its heading, the luff's drum:
-each alone is set to both ends of what is plausible, and the answer is computed again from short
-runs. Swing without control comes from the frequency domain, with control from a few simulated
+one at a time is set to both ends of its plausible range, and the answer is computed again from
+short runs. Swing without control comes from the frequency domain, with control from a few simulated
 seaways.
 """
 
@@ -25,11 +25,12 @@ from swashplate.crane.studies.study import Case, Study
 from swashplate.errors import SwashplateError
 
 SEAWAYS = 6
-"""Seaways of a short answer."""
+"""Number of seaways of the short runs."""
 LENGTH = 300.0
-"""Time for which each of them counts: half an hour together. [s]"""
-TIGHT = 0.9
-"""Part of a limit, or of the swing without control, from which on a short answer is not sure."""
+"""Evaluated time of each short run: half an hour for all of them. [s]"""
+UNDECIDED_FROM = 0.9
+"""Ratio to a limit, or to the swing without control, from which short runs do not decide; they
+decide again above its inverse."""
 DAMPINGS = (0.002, 0.01)
 """Least and largest damping ratio of loads on ropes."""
 PERIOD, ROLL, HEIGHT, DRUM = 0.15, 0.2, 0.25, 0.2
@@ -42,35 +43,35 @@ PEAKS = (1.0, 3.3)
 
 
 class TippingPoint(NamedTuple):
-    """A number that would turn the answer."""
+    """A number that would change the answer."""
 
-    what: str
-    """In words: ``"the roll period"``."""
-    used: str
+    quantity: str
+    """Its name in a sentence: ``"the roll period"``."""
+    present_value: str
     """The value that the answer was computed with, with unit."""
-    other: str
-    """The value with which the answer is another one."""
+    other_value: str
+    """The value that changes the answer, with unit."""
     assumed: bool
-    """Whether it is assumed, not given."""
+    """Whether the present value is assumed, not given."""
     passes: bool
-    """Whether control passes then."""
+    """Whether control passes with the other value."""
 
-    def words(self) -> str:
-        """A sentence."""
-        status = ", which is assumed," if self.assumed else ""
-        then = "would pass" if self.passes else "would not pass"
+    def sentence(self) -> str:
+        """State that control would or would not pass with the other value."""
+        assumed = ", which is assumed," if self.assumed else ""
+        passes = "would pass" if self.passes else "would not pass"
         return (
-            f"With {self.what} of {self.other} in place of {self.used}{status} control {then}, by "
-            "a short run."
+            f"With {self.quantity} of {self.other_value} in place of {self.present_value}{assumed} "
+            f"control {passes}, by a short run."
         )
 
 
 class _ChangedNumber(NamedTuple):
     """A number with another value, and seaway and variant with that value."""
 
-    what: str
-    used: str
-    other: str
+    quantity: str
+    present_value: str
+    other_value: str
     assumed: bool
     seaway: Seaway
     case: Case
@@ -79,7 +80,7 @@ class _ChangedNumber(NamedTuple):
 def tipping_points_of(
     study: Study, variant: str, limits: Mapping[str, float]
 ) -> tuple[TippingPoint, ...]:
-    """Numbers that would turn the answer on a variant; none if short runs do not agree with it.
+    """Numbers that would change the answer on a variant; none if short runs do not decide it.
 
     Parameters
     ----------
@@ -87,12 +88,12 @@ def tipping_points_of(
     variant : str
         A name of the study's cases.
     limits : mapping of str to float
-        In SI, by name; without them only harm counts.
+        In SI, by name; without them only the swing is compared with that without control.
     """
     case = study.cases[variant]
-    if case.stick.samples is not None or case.stick.parts:
-        return ()  # what the operator does takes as long as it takes
-    case = case._replace(stick=OperatorCommand.rest(study.run_in + LENGTH))
+    if case.command.samples is not None or case.command.parts:
+        return ()  # an operator's command cannot be shortened
+    case = case._replace(command=OperatorCommand.rest(study.run_in + LENGTH))
     short = replace(study, seeds=study.seeds[:SEAWAYS], progress=None)
     base = _passes(short, study.seaway, case, limits)
     tipping_points = []
@@ -103,9 +104,9 @@ def tipping_points_of(
             continue
         if passes is not base and passes is not None and base is not None:
             point = TippingPoint(
-                what=changed.what,
-                used=changed.used,
-                other=changed.other,
+                quantity=changed.quantity,
+                present_value=changed.present_value,
+                other_value=changed.other_value,
                 assumed=changed.assumed,
                 passes=passes,
             )
@@ -125,13 +126,13 @@ def _other_ships(study: Study, case: Case) -> Iterator[_ChangedNumber]:
     if not isinstance(ship, Hull):
         return
     for factor in (1.0 - ROLL, 1.0 + ROLL):
-        other = replace(ship, roll_period=factor * ship.roll_period)
+        changed_ship = replace(ship, roll_period=factor * ship.roll_period)
         yield _ChangedNumber(
-            what="the ship's roll period",
-            used=f"{ship.roll_period:.3g} s",
-            other=f"{other.roll_period:.3g} s",
+            quantity="the ship's roll period",
+            present_value=f"{ship.roll_period:.3g} s",
+            other_value=f"{changed_ship.roll_period:.3g} s",
             assumed=True,
-            seaway=replace(study.seaway, ship=other),
+            seaway=replace(study.seaway, ship=changed_ship),
             case=case,
         )
 
@@ -139,9 +140,9 @@ def _other_ships(study: Study, case: Case) -> Iterator[_ChangedNumber]:
 def _other_dampings(study: Study, case: Case) -> Iterator[_ChangedNumber]:
     for ratio in DAMPINGS:
         yield _ChangedNumber(
-            what="a damping of the swing",
-            used=f"{100.0 * case.swing_damping:.3g} %",
-            other=f"{100.0 * ratio:.3g} %",
+            quantity="a damping of the swing",
+            present_value=f"{100.0 * case.swing_damping:.3g} %",
+            other_value=f"{100.0 * ratio:.3g} %",
             assumed="swing_damping" not in case.hangs and _assumed(study.crane, "swing_damping"),
             seaway=study.seaway,
             case=case.changed(swing_damping=ratio),
@@ -154,9 +155,9 @@ def _other_seas(study: Study, case: Case) -> Iterator[_ChangedNumber]:
     for factor in (1.0 - HEIGHT, 1.0 + HEIGHT):
         sea = replace(spectrum, height=factor * spectrum.height)
         yield _ChangedNumber(
-            what="waves",
-            used=f"{spectrum.height:.3g} m",
-            other=f"{sea.height:.3g} m",
+            quantity="waves",
+            present_value=f"{spectrum.height:.3g} m",
+            other_value=f"{sea.height:.3g} m",
             assumed=False,
             seaway=replace(seaway, sea=sea),
             case=case,
@@ -164,9 +165,9 @@ def _other_seas(study: Study, case: Case) -> Iterator[_ChangedNumber]:
     for factor in (1.0 - PERIOD, 1.0 + PERIOD):
         sea = replace(spectrum, period=factor * spectrum.period)
         yield _ChangedNumber(
-            what="a peak period",
-            used=f"{spectrum.period:.3g} s",
-            other=f"{sea.period:.3g} s",
+            quantity="a peak period",
+            present_value=f"{spectrum.period:.3g} s",
+            other_value=f"{sea.period:.3g} s",
             assumed=False,
             seaway=replace(seaway, sea=sea),
             case=case,
@@ -174,9 +175,9 @@ def _other_seas(study: Study, case: Case) -> Iterator[_ChangedNumber]:
     for peak in PEAKS:
         if peak != spectrum.peak_factor:
             yield _ChangedNumber(
-                what="a peak factor",
-                used=f"{spectrum.peak_factor:g}",
-                other=f"{peak:g}",
+                quantity="a peak factor",
+                present_value=f"{spectrum.peak_factor:g}",
+                other_value=f"{peak:g}",
                 assumed=True,
                 seaway=replace(seaway, sea=replace(spectrum, peak_factor=peak)),
                 case=case,
@@ -184,9 +185,9 @@ def _other_seas(study: Study, case: Case) -> Iterator[_ChangedNumber]:
     for turn in (-TURNED, TURNED):
         turned = replace(seaway, heading_deg=seaway.heading_deg + turn)
         yield _ChangedNumber(
-            what="a heading",
-            used=f"{seaway.heading_deg:g} deg",
-            other=f"{turned.heading_deg:g} deg",
+            quantity="a heading",
+            present_value=f"{seaway.heading_deg:g} deg",
+            other_value=f"{turned.heading_deg:g} deg",
             assumed=False,
             seaway=turned,
             case=case,
@@ -196,14 +197,14 @@ def _other_seas(study: Study, case: Case) -> Iterator[_ChangedNumber]:
 def _other_drums(study: Study, case: Case) -> Iterator[_ChangedNumber]:
     if not _assumed(study.crane, "luff_drum_radius"):
         return
-    used = study.crane.quantities["luff_drum_radius"].values[0]
+    present_radius = study.crane.quantities["luff_drum_radius"].values[0]
     for factor in (1.0 - DRUM, 1.0 + DRUM):
-        radius = factor * used
+        radius = factor * present_radius
         cranes = tuple(crane.with_geometry(luff_drum_radius=radius) for crane in case.cranes)
         yield _ChangedNumber(
-            what="a luff drum's radius",
-            used=f"{used:.3g} m",
-            other=f"{radius:.3g} m",
+            quantity="a luff drum's radius",
+            present_value=f"{present_radius:.3g} m",
+            other_value=f"{radius:.3g} m",
             assumed=True,
             seaway=study.seaway,
             case=case._replace(cranes=cranes),
@@ -215,25 +216,28 @@ def _assumed(crane: Crane, name: str) -> bool:
 
 
 def _passes(study: Study, seaway: Seaway, case: Case, limits: Mapping[str, float]) -> bool | None:
-    """Whether control passes in short runs; None if it is too close to say."""
+    """Whether control stays within limits in short runs, and swings less than without control.
+
+    None if the largest ratio is too close to 1 to decide from short runs.
+    """
     outcomes = [outcome for (outcome,) in replace(study, seaway=seaway).outcomes([case])]
     if any(outcome.departure_reason for outcome in outcomes):
         return False
-    ratios = [_over_none(seaway, case, outcomes)]
-    observed = sum(outcome.counted for outcome in outcomes)
+    ratios = [_swing_ratio(seaway, case, outcomes)]
+    evaluated_time = sum(outcome.evaluated_time for outcome in outcomes)
     for name, limit in limits.items():
         if name == "saturation":
             ratios.append(float(np.mean([outcome.saturation for outcome in outcomes])) / limit)
         elif all(name in outcome.peaks for outcome in outcomes):
             peaks = [outcome.peaks[name] for outcome in outcomes]
-            ratios.append(largest_of_peaks(peaks, observed).value / limit)
-    worst = max(ratios)
-    if TIGHT < worst < 1.0 / TIGHT:
+            ratios.append(largest_of_peaks(peaks, evaluated_time).value / limit)
+    largest_ratio = max(ratios)
+    if UNDECIDED_FROM < largest_ratio < 1.0 / UNDECIDED_FROM:
         return None
-    return worst <= 1.0
+    return largest_ratio <= 1.0
 
 
-def _over_none(seaway: Seaway, case: Case, outcomes: list[RunOutcome]) -> float:
+def _swing_ratio(seaway: Seaway, case: Case, outcomes: list[RunOutcome]) -> float:
     """Root mean square swing over that without control."""
     linear = linear_response(case.cranes[0], seaway, **case.pose, **case.hangs)
     controlled = np.sqrt(np.mean([outcome.rms_swing**2 for outcome in outcomes]))

@@ -20,10 +20,10 @@ from swashplate.crane.control import PositionLoop
 from swashplate.crane.limits import LIMITED
 from swashplate.crane.sea.confidence import (
     ConfidenceInterval,
-    counted_words,
     mean_of,
     more_seaways,
     rms_of,
+    share_in_seaways,
     share_of,
 )
 from swashplate.crane.sea.extremes import THREE_HOURS, largest_of_peaks
@@ -31,10 +31,11 @@ from swashplate.crane.sea.transfer_functions import CRANE_SHIP, Hull
 from swashplate.crane.studies.assumptions import TippingPoint
 from swashplate.crane.studies.run_outcome import RunOutcome
 from swashplate.crane.studies.spectral import LinearResponse
-from swashplate.crane.studies.study import NONE, Study, assumed_words
+from swashplate.crane.studies.study import NONE, Study, assumed_sentences
 from swashplate.drive import Limit
 from swashplate.results import Drawn, Tabular
 from swashplate.tables import Column, Table, count, listed
+from swashplate.units import DisplayUnit
 
 if TYPE_CHECKING:
     import polars
@@ -45,7 +46,7 @@ QUESTIONS: tuple[Question, ...] = ("harm", "sufficiency")
 Decision = Literal["yes", "no", "not decided"]
 
 LOOP = PositionLoop()
-"""What a clip is tried with: a stiffer loop brings back what the clip takes."""
+"""Position loop with which clips are tried: a stiff one compensates for the motion clipped."""
 NO_TIPPING_POINT = (
     "In short runs, no other value tried for damping, roll period, height, period, peak factor, "
     "heading or drum, each alone, clearly changes the answer."
@@ -70,40 +71,44 @@ class AssessedQuantity(NamedTuple):
         return "yes" if self.largest.high <= self.limit else "not decided"
 
     @property
-    def shown(self) -> tuple[str, float]:
-        """Unit in which it is shown, and the factor from SI to that."""
+    def shown_unit(self) -> DisplayUnit:
+        """Unit in which it is shown."""
         if self.name == "saturation":
-            return "%", 100.0
+            return DisplayUnit("%", 100.0)
         unit = LIMITED[self.name].unit
-        return ("deg", 180.0 / pi) if unit == "rad" else (unit.replace("1", ""), 1.0)
+        if unit == "rad":
+            return DisplayUnit("deg", 180.0 / pi)
+        return DisplayUnit(unit.replace("1", ""), 1.0)
 
-    def words(self) -> str:
-        """In a sentence: ``"off-lead 9.1 deg (8.7 to 9.5), limit 8 deg"``."""
-        unit, factor = self.shown
+    def description(self) -> str:
+        """Its value and limit: ``"off-lead 9.1 deg (8.7 to 9.5), limit 8 deg"``."""
+        label = LIMITED[self.name].label
         if not all(map(isfinite, self.largest)):
-            return f"{LIMITED[self.name].label} unknown: too few peaks"
+            return f"{label} unknown: too few peaks"
+        unit, factor = self.shown_unit
         value, low, high = (factor * number for number in self.largest)
-        what = f"{LIMITED[self.name].label} {value:.3g} {unit}".rstrip()
-        return f"{what} ({low:.3g} to {high:.3g}), limit {factor * self.limit:.3g} {unit}".rstrip()
+        largest = f"{label} {value:.3g} {unit}".rstrip()
+        limit = f"limit {factor * self.limit:.3g} {unit}".rstrip()
+        return f"{largest} ({low:.3g} to {high:.3g}), {limit}"
 
 
 class Remedy(NamedTuple):
     """A change that was tried on the crane's own drives."""
 
-    what: str
-    """In words: ``"luff orifice ×1.5"``."""
+    change: str
+    """Its description: ``"luff orifice ×1.5"``."""
     size: float
-    """Factor on the orifice, or size of the clip. [m]"""
+    """Factor on the orifice [1], or size of the clip [m]."""
     harmless: Decision
-    """Whether control is worse than none as seldom as allowed then."""
+    """Whether control with the change is worse than none at most as often as allowed."""
     sufficient: Decision | None
-    """Whether all stays within its limits then; None if that was not asked."""
+    """Whether all quantities stay within their limits; None if that is not a question."""
     share_worse: ConfidenceInterval
-    """Share of seaways in which control is then worse than none."""
+    """Share of seaways in which control with the change is worse than none."""
     swing: ConfidenceInterval
-    """Root mean square swing then. [rad]"""
+    """Root mean square swing with the change. [rad]"""
     beyond: tuple[str, ...]
-    """What is beyond its limit then, in words."""
+    """Descriptions of the quantities that exceed their limits."""
 
     @property
     def passes(self) -> bool:
@@ -129,7 +134,7 @@ class Assessment(Tabular, Drawn):
     """The crane without control in the frequency domain; None if its swing is not damped."""
     remedies: tuple[Remedy, ...] = ()
     tried: tuple[str, ...] = ()
-    """What else was tried, and does not pass all that was asked."""
+    """Other changes that were tried, and that do not meet all requirements."""
     tipping_points: tuple[TippingPoint, ...] | None = None
     """Assumed or given numbers that would turn the answer, if they were others; None if none were
     looked for."""
@@ -191,7 +196,7 @@ class Assessment(Tabular, Drawn):
 
     @property
     def harmless(self) -> Decision:
-        """Whether the assessed variant is worse than none as seldom as allowed."""
+        """Whether the assessed variant is worse than none at most as often as allowed."""
         share = self.share_worse(self.assessed_variant)
         if share.low > self.allowed_share_worse:
             return "no"
@@ -242,11 +247,11 @@ class Assessment(Tabular, Drawn):
     @property
     def headline(self) -> str:
         """The outcome, both answers, and whether they rest on a drive that is not usable."""
-        words = f"{self.outcome.capitalize()}: {self.verdict()}"
-        return " ".join(filter(None, [words, self.unusable_sentence()]))
+        outcome_and_verdict = f"{self.outcome.capitalize()}: {self.verdict()}"
+        return " ".join(filter(None, [outcome_and_verdict, self.unusable_sentence()]))
 
     def unusable_sentence(self) -> str:
-        """Name unusable fits behind the assessed variant; empty if there are none."""
+        """Name unusable fits of the assessed variant's drives; empty if there are none."""
         case = self.study.cases[self.assessed_variant]
         unusable = set[str]()
         for crane in case.cranes:
@@ -273,13 +278,12 @@ class Assessment(Tabular, Drawn):
                 f"{drives} changes nothing: {without:.2f} deg RMS without it, {controlled:.2f} "
                 f"with it, in {count(seaways, 'seaway')}."
             )
-        worse = f"swing worse than none in {counted_words(share, seaways)}"
+        worse = f"swing worse than none in {share_in_seaways(share, seaways)}"
+        rms = _rms_clause(without, controlled)
         if self.harmless == "yes":
-            return f"{drives} does no harm: it makes {worse}{_rms_words(without, controlled)}."
+            return f"{drives} does no harm: it makes {worse}{rms}."
         if self.harmless == "no":
-            return (
-                f"{drives} harms: it makes {worse}{_rms_words(without, controlled)}{self._cause()}."
-            )
+            return f"{drives} harms: it makes {worse}{rms}{self._cause()}."
         pairs = zip(self.of(self.assessed_variant), self.of(NONE), strict=True)
         undecided = sum(bool(run.departure_reason and none.departure_reason) for run, none in pairs)
         if undecided:
@@ -294,12 +298,14 @@ class Assessment(Tabular, Drawn):
         )
 
     def sufficiency_sentence(self) -> str:
-        """Say whether the assessed variant is within all limits; empty if the crane has none."""
+        """Say whether the assessed variant stays within all limits; empty without limits."""
         if self.sufficient is None:
             return ""
         limited = self.limited(self.assessed_variant)
-        beyond = [quantity.words() for quantity in limited if quantity.within == "no"]
-        undecided = [quantity.words() for quantity in limited if quantity.within == "not decided"]
+        beyond = [quantity.description() for quantity in limited if quantity.within == "no"]
+        undecided = [
+            quantity.description() for quantity in limited if quantity.within == "not decided"
+        ]
         if self.sufficient == "yes":
             return "It suffices: in 3 h all quantities stay within their limits."
         if self.sufficient == "no":
@@ -311,7 +317,7 @@ class Assessment(Tabular, Drawn):
         )
 
     def remedy_sentences(self) -> list[str]:
-        """Name sufficient remedies, or say that none of those tried is; empty if none was tried."""
+        """A sentence for each remedy, or that no tried one suffices; empty if none was tried."""
         if self.tried and not self.remedies:
             return [f"None of these is sufficient: {listed(self.tried)}."]
         sentences = [self._remedy_sentence(remedy) for remedy in self.remedies]
@@ -320,19 +326,19 @@ class Assessment(Tabular, Drawn):
         return sentences
 
     def _remedy_sentence(self, remedy: Remedy) -> str:
-        what = remedy.what.capitalize()
+        change = remedy.change.capitalize()
         if remedy.harmless == "not decided":
             seaways = len(self.study.seeds)
             more = more_seaways(remedy.share_worse.value, seaways, self.allowed_share_worse)
             if remedy.sufficient == "no":
                 beyond = "; ".join(remedy.beyond)
-                return f"{what} may do no harm, but would not suffice: in 3 h {beyond}."
-            return f"{what} may be sufficient: run more seaways ({more})."
+                return f"{change} may do no harm, but would not suffice: in 3 h {beyond}."
+            return f"{change} may be sufficient: run more seaways ({more})."
         if remedy.passes:
-            return f"{what} would do."
+            return f"{change} would do."
         if remedy.sufficient == "not decided":
-            return f"{what} would do no harm, and may suffice: run more seaways."
-        return f"{what} would do no harm, but not suffice: in 3 h {'; '.join(remedy.beyond)}."
+            return f"{change} would do no harm, and may suffice: run more seaways."
+        return f"{change} would do no harm, but not suffice: in 3 h {'; '.join(remedy.beyond)}."
 
     def _cause(self) -> str:
         """The limit that acts for the longest time."""
@@ -380,7 +386,7 @@ class Assessment(Tabular, Drawn):
     def _swing_table(self) -> Table:
         seaways = len(self.study.seeds)
         minutes = self.study.length / 60.0
-        interval = [Column(head, ".2f", "rad", none="–") for head in ("rms", "from", "to")]
+        interval = [Column(heading, ".2f", "rad", none="–") for heading in ("rms", "from", "to")]
         table = Table(
             f"Swing in {count(seaways, 'seaway')} of {minutes:g} min, 95 % intervals",
             (
@@ -414,36 +420,45 @@ class Assessment(Tabular, Drawn):
         seaways = len(self.study.seeds)
         for name in self.names[1:]:
             share_worse = self.share_worse(name)
-            look = share_worse.value > self.allowed_share_worse
             table.add(
                 name,
                 round(share_worse.value * seaways),
                 share_worse.value,
                 share_worse.low,
                 share_worse.high,
-                look=look,
+                look=share_worse.value > self.allowed_share_worse,
             )
         return table
 
     def _limit_table(self) -> Table:
-        """Tabulate the limited quantities of the assessed variant."""
-        heads = ("limit", "in 3 h", "from", "to")
-        numbers = [Column(head, ".3g", none="–") for head in heads]
-        last = (Column("within"), Column(NONE, ".3g", none="–"))
-        columns = (Column("quantity"), Column("unit"), *numbers, *last)
+        """Limited quantities of the assessed variant, with their values without control."""
+        columns = (
+            Column("quantity"),
+            Column("unit"),
+            Column("limit", ".3g", none="–"),
+            Column("in 3 h", ".3g", none="–"),
+            Column("from", ".3g", none="–"),
+            Column("to", ".3g", none="–"),
+            Column("within"),
+            Column(NONE, ".3g", none="–"),
+        )
         table = Table(
             f"Limits, '{self.assessed_variant}'", columns, "in 3 h: most probable largest value"
         )
-        none = {quantity.name: quantity.largest.value for quantity in self.limited(NONE)}
+        uncontrolled = {quantity.name: quantity.largest.value for quantity in self.limited(NONE)}
         for quantity in self.limited(self.assessed_variant):
-            unit, factor = quantity.shown
+            unit, factor = quantity.shown_unit
+            without_control = uncontrolled.get(quantity.name, nan)
+            numbers = (quantity.limit, *quantity.largest, without_control)
             # a side-lead without waves across the boom is 0, not a millionth of a degree
-            values = [round(factor * number, 3) for number in (quantity.limit, *quantity.largest)]
-            without = round(factor * none.get(quantity.name, nan), 3)
+            limit, largest, low, high, without = (round(factor * value, 3) for value in numbers)
             table.add(
                 LIMITED[quantity.name].label,
                 unit,
-                *values,
+                limit,
+                largest,
+                low,
+                high,
                 quantity.within,
                 without,
                 look=quantity.within != "yes",
@@ -451,21 +466,26 @@ class Assessment(Tabular, Drawn):
         return table
 
     def _difference_table(self) -> Table:
-        spec = [Column(head, "+.2f", "rad", none="–") for head in ("difference", "from", "to")]
-        heads = (Column("variant", wrap=True), Column("less", wrap=True), *spec)
-        table = Table("Differences of RMS swing within each seaway", heads)
-        for index, other in enumerate(self.names):
+        columns = (
+            Column("variant", wrap=True),
+            Column("less", wrap=True),
+            Column("difference", "+.2f", "rad", none="–"),
+            Column("from", "+.2f", "rad", none="–"),
+            Column("to", "+.2f", "rad", none="–"),
+        )
+        table = Table("Differences of RMS swing within each seaway", columns)
+        for index, subtracted in enumerate(self.names):
             for name in self.names[index + 1 :]:
-                table.add(name, other, *self.difference(name, other))
+                table.add(name, subtracted, *self.difference(name, subtracted))
         return table
 
     def _remedy_table(self) -> Table:
         share = [Column("worse than none", ".1%"), Column("from", ".1%"), Column("to", ".1%")]
-        interval = [Column(head, ".2f", "rad", none="–") for head in ("rms", "from", "to")]
+        interval = [Column(heading, ".2f", "rad", none="–") for heading in ("rms", "from", "to")]
         note = f"tried on the crane's own drives; a clip with a position loop of {LOOP.gain:g} /s"
         table = Table("Remedies", (Column("remedy"), *share, *interval), note)
         for remedy in self.remedies:
-            table.add(remedy.what, *remedy.share_worse, *remedy.swing)
+            table.add(remedy.change, *remedy.share_worse, *remedy.swing)
         return table
 
     def to_polars(self) -> polars.DataFrame:
@@ -489,7 +509,7 @@ class Assessment(Tabular, Drawn):
         return list(self.sentences()[1:])  # the first one is the headline
 
     def sentences(self) -> tuple[str, ...]:
-        """The verdict, what it rests on, and what would turn it."""
+        """The verdict, its basis, and what would change it."""
         study = self.study
         sentences = [self.verdict(), *self._basis()]
         for name in self.names:
@@ -499,7 +519,8 @@ class Assessment(Tabular, Drawn):
                     f"'{name}' is not a valid operation in {seaways} of {of}: {reason}."
                 )
         if self.tipping_points is not None:
-            sentences += [point.words() for point in self.tipping_points] or [NO_TIPPING_POINT]
+            tipping_points = [point.sentence() for point in self.tipping_points]
+            sentences += tipping_points or [NO_TIPPING_POINT]
         sentences += study.seaway.sentences()
         return (*sentences, *study.provenance())
 
@@ -526,7 +547,7 @@ class Assessment(Tabular, Drawn):
             and crane.quantities["swing_damping"].status == "assumed"
         )
         damping = f"The load's swing has a damping of {100.0 * none.swing_damping:g} %"
-        case = study.cases[self.assessed_variant].words()
+        case = study.cases[self.assessed_variant].sentence()
         sentences = [
             case,
             rule,
@@ -544,10 +565,10 @@ class Assessment(Tabular, Drawn):
                     f"The waves' peak is at {peak:.3g} Hz, but the {axis}'s drive was tested with "
                     f"sines of up to {source.fastest_sine:.3g} Hz: test it faster."
                 )
-        return [*sentences, *assumed_words(crane)]
+        return [*sentences, *assumed_sentences(crane)]
 
 
-def _rms_words(without: float, controlled: float) -> str:
+def _rms_clause(without: float, controlled: float) -> str:
     """Swing without control and with it [deg], as far as either is known."""
     without_it = "not an operation" if np.isnan(without) else f"{without:.2f} deg RMS"
     with_it = "not an operation" if np.isnan(controlled) else f"{controlled:.2f}"
@@ -555,15 +576,15 @@ def _rms_words(without: float, controlled: float) -> str:
 
 
 def share_worse_of(
-    controlled: Sequence[RunOutcome], none: Sequence[RunOutcome]
+    controlled: Sequence[RunOutcome], uncontrolled: Sequence[RunOutcome]
 ) -> ConfidenceInterval:
     """Share of seaways in which control swings more than none; see `Assessment.share_worse`."""
     worse = 0
     undecided = 0
-    for run, uncontrolled in zip(controlled, none, strict=True):
-        if run.departure_reason and uncontrolled.departure_reason:
+    for with_control, without in zip(controlled, uncontrolled, strict=True):
+        if with_control.departure_reason and without.departure_reason:
             undecided += 1
-        elif _is_worse(run, uncontrolled):
+        elif _is_worse(with_control, without):
             worse += 1
     return share_of(worse, len(controlled), undecided)
 
@@ -578,8 +599,8 @@ def _is_worse(run: RunOutcome, uncontrolled: RunOutcome) -> bool:
 def largest_of(outcomes: Sequence[RunOutcome], name: str) -> ConfidenceInterval:
     """Most probable largest value of a quantity in three hours, from its peaks in many runs."""
     runs = [outcome.peaks[name] for outcome in outcomes if name in outcome.peaks]
-    observed = sum(outcome.counted for outcome in outcomes)
-    return largest_of_peaks(runs, max(observed, 1.0))
+    evaluated_time = sum(outcome.evaluated_time for outcome in outcomes)
+    return largest_of_peaks(runs, max(evaluated_time, 1.0))
 
 
 def assessed_limits(

@@ -1,4 +1,4 @@
-"""What an axis can follow: the largest sine of the tip, known beforehand from its drive."""
+"""The largest sine of the tip that an axis can follow, computed from its drive."""
 
 from __future__ import annotations
 
@@ -52,11 +52,11 @@ class Followable(Drawn):
 
     def tables(self) -> list[Table]:
         """Amplitudes over the period, and what seas ask for."""
-        heads = [Column("period", ".1f", "s"), *(Column(axis, ".3f", "m") for axis in AXES)]
-        largest = Table("Largest sine an axis can follow", heads)
+        columns = [Column("period", ".1f", "s"), *(Column(axis, ".3f", "m") for axis in AXES)]
+        largest = Table("Largest sine an axis can follow", columns)
         for period, amplitudes in zip(self.periods.tolist(), self.amplitude.tolist(), strict=True):
             largest.add(period, *amplitudes)
-        demands = Table("Demand of the seas, significant amplitudes", [Column("sea"), *heads])
+        demands = Table("Demand of the seas, significant amplitudes", [Column("sea"), *columns])
         for name, demand in self.seas.items():
             demands.add(name, demand.period, *demand.amplitude)
         return [largest, demands]

@@ -26,7 +26,15 @@ from swashplate.crane.sea.scatter import Scatter
 from swashplate.crane.sea.seaway import Seaway, Spectrum
 from swashplate.crane.studies.run_outcome import RunOutcome
 from swashplate.crane.studies.spectral import DEMANDS, linear_response
-from swashplate.crane.studies.study import BUILT, IDEAL, NONE, Case, Drives, Study, assumed_words
+from swashplate.crane.studies.study import (
+    BUILT,
+    IDEAL,
+    NONE,
+    Case,
+    Drives,
+    Study,
+    assumed_sentences,
+)
 from swashplate.drive import Limit
 from swashplate.errors import InputError
 from swashplate.executors import Executor, Serial, Threads
@@ -52,9 +60,9 @@ SHORTEST = 300.0
 ACTS = 0.05
 """Share of time at a limit from which on a drive is what limits a cell."""
 WORKABLE = ""
-"""What limits a cell that can be worked: nothing."""
+"""In place of a limit, for a cell that can be worked."""
 LEFT = "leaves the model"
-"""What limits a cell in which a run is not an operation any more."""
+"""In place of a limit, for a cell in which a run is not a valid operation to its end."""
 DRIVES_LIMITS: Mapping[Limit, str] = {
     Limit.ORIFICE: "orifice",
     Limit.SWASH_STOP: "swash stop",
@@ -88,7 +96,7 @@ class Operability(Tabular):
     seaway: Seaway
     """Ship, peak factor, spreading."""
     case: str
-    """Where the crane stands and what controls it, in a sentence, and how cells are simulated."""
+    """Sentences on pose and control of the crane, and on the simulation of cells."""
     hoist_limit: tuple[float, float, float]
     """Least significant height at which the hoist is too slow for the hook, with period and
     heading; inf if none. [m], [s], [deg]"""
@@ -121,8 +129,8 @@ class Operability(Tabular):
             for limit in self.shares(name):
                 if limit != WORKABLE and limit not in limits:
                     limits.append(limit)
-        heads = [Column(label_of(limit), ".1%", wrap=True) for limit in limits]
-        columns = (Column("variant", wrap=True), Column("workable", ".1%"), *heads)
+        limit_columns = [Column(label_of(limit), ".1%", wrap=True) for limit in limits]
+        columns = (Column("variant", wrap=True), Column("workable", ".1%"), *limit_columns)
         table = Table("Share of the year, and what limits the rest first", columns)
         for name in self.names:
             shares = self.shares(name)
@@ -170,7 +178,7 @@ class Operability(Tabular):
             )
         if self.scatter.note:
             sentences.append(self.scatter.note)
-        return (*sentences, *assumed_words(self.crane))
+        return (*sentences, *assumed_sentences(self.crane))
 
 
 def label_of(limit: str) -> str:
@@ -208,7 +216,7 @@ def operability(
     executor : Executor, optional
         Threads by default; the numbers do not depend on it.
     **options
-        As of `Study.of`, without a stick.
+        As of `Study.of`, without a command.
 
     Raises
     ------
@@ -253,7 +261,7 @@ def operability(
     ordered = {name: dict(sorted(of_name.items())) for name, of_name in cells.items()}
     seaways = count(len(study.seeds), "seaway")
     simulated = f"A cell is simulated in {seaways} of {study.length / 60.0:g} min."
-    case = f"{study.cases[list(study.cases)[-1]].words()} {simulated}"
+    case = f"{study.cases[list(study.cases)[-1]].sentence()} {simulated}"
     return Operability(
         crane=crane,
         control=control,
@@ -372,9 +380,9 @@ def _by_simulation(
     outcomes = [outcome for (outcome,) in in_sea.outcomes([case])]
     if any(outcome.departure_reason for outcome in outcomes):
         return SeaCell(_drive_limit(outcomes) or LEFT, np.inf, True)
-    observed = sum(outcome.counted for outcome in outcomes)
+    evaluated_time = sum(outcome.evaluated_time for outcome in outcomes)
     ratios = {
-        name: largest_of_peaks([outcome.peaks[name] for outcome in outcomes], observed).value
+        name: largest_of_peaks([outcome.peaks[name] for outcome in outcomes], evaluated_time).value
         / limit
         for name, limit in limits.items()
         if all(name in outcome.peaks for outcome in outcomes)
@@ -389,11 +397,11 @@ def _drive_limit(outcomes: Sequence[RunOutcome]) -> str:
     """Drive and limit that act for the longest time, in words; empty if none acts for long."""
     shares = np.mean([np.nan_to_num(outcome.limits) for outcome in outcomes], axis=0)
     longest = ACTS
-    words = ""
+    cause = ""
     for row, axis in zip(shares, AXES, strict=True):
         for limit, name in DRIVES_LIMITS.items():
             share = float(row[PUMPS.index(limit)])
             if share > longest:
                 longest = share
-                words = f"{axis} {name}"
-    return words
+                cause = f"{axis} {name}"
+    return cause

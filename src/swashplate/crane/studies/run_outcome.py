@@ -1,4 +1,4 @@
-"""What counts of a run: swing, peaks of all that has a limit, limits of the drives, the end."""
+"""Outcome of a run: swing, peaks of limited quantities, limits of the drives, the end."""
 
 from __future__ import annotations
 
@@ -38,10 +38,10 @@ class RunOutcome(NamedTuple):
     """Largest share of time, over the drives, at the acceleration or the speed limit."""
     peaks: Mapping[str, Array]
     """Peaks of quantities by names of `limits.LIMITED`, until the run left the model."""
-    counted: float
-    """Time for which peaks count. [s]"""
+    evaluated_time: float
+    """Time in which peaks are evaluated. [s]"""
     departure_reason: str
-    """Why the run is not an operation any more from some time on; empty if it is one."""
+    """Why the run stops being a valid operation; empty if it is valid to its end."""
 
 
 LEAST = 10.0
@@ -52,7 +52,7 @@ STOPPED = RunOutcome(
     limits=np.full((3, len(PUMPS)), np.nan),
     saturation=np.nan,
     peaks={},
-    counted=0.0,
+    evaluated_time=0.0,
     departure_reason="stopped at a limit",
 )
 """Of a run that met a limit of the crane's travel, or left the domain of a drive's model."""
@@ -71,22 +71,22 @@ def outcome_of(run: CraneRun, start: float, target: tuple[float, float] | None) 
     """
     first = round(start * RATE)
     departure = run.departure
-    last = len(run.stored) if departure is None else round(departure.time * RATE)
+    end = len(run.stored) if departure is None else round(departure.time * RATE)
     reason = "" if departure is None else departure.reason
-    counted = max(last - first, 0) / RATE
-    if counted < LEAST:
+    evaluated_time = max(end - first, 0) / RATE
+    if evaluated_time < LEAST:
         return STOPPED._replace(departure_reason=reason)
-    counting = slice(first, last, EVERY)
-    load = run.load[counting]
-    tip = run.tip[counting]
-    hook = run.hook[counting]
+    evaluated = slice(first, end, EVERY)
+    load = run.load[evaluated]
+    tip = run.tip[evaluated]
+    hook = run.hook[evaluated]
     swing = swing_of(load, tip)
-    slew = run.fixed.home.slew + run["shaft_slew"][counting]
-    out, across = rope_leads(hook - tip, slew, run.ship[counting]).T
+    slew = run.fixed.home.slew + run["shaft_slew"][evaluated]
+    out, across = rope_leads(hook - tip, slew, run.ship[evaluated]).T
     speed = np.abs(np.diff(hook[:, 2])) * RATE / EVERY
     hoist = run.crane.geometry.hoist * min(np.abs(run.crane.inverse("hoist").limits))
     elastic = run.fixed.hanging.stiffness > 0.0
-    pull = run["pull"][slice(first, last, ELASTIC_EVERY if elastic else EVERY)]
+    pull = run["pull"][slice(first, end, ELASTIC_EVERY if elastic else EVERY)]
     peaks = {
         "swing": peaks_of(swing),
         "off_lead": peaks_of(np.abs(out)),
@@ -104,10 +104,10 @@ def outcome_of(run: CraneRun, start: float, target: tuple[float, float] | None) 
     return RunOutcome(
         rms_swing=float(np.sqrt(np.mean(swing**2))) if completed else np.nan,
         largest_swing=float(swing.max()) if completed else np.nan,
-        limits=_acting(run, slice(first, last)),
-        saturation=_saturated(run, slice(first, last)),
+        limits=_acting(run, slice(first, end)),
+        saturation=_saturated(run, slice(first, end)),
         peaks=peaks,
-        counted=counted,
+        evaluated_time=evaluated_time,
         departure_reason=reason,
     )
 

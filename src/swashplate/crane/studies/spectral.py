@@ -40,8 +40,8 @@ PER_RESONANCE = 4.0
 SPREAD_HEADINGS = 19
 """Headings of a sea whose directions spread."""
 DEMANDS = ("slew_speed", "slew_acceleration", "luff_speed", "luff_acceleration", "clip")
-"""What control asks of slew and luff, as shares of what their drives can do, and of its clip, if it
-has one, as a share of its size."""
+"""Demands of control on slew and luff, as shares of what their drives can do, and on its clip, if
+it has one, as a share of the clip's size."""
 
 
 class LinearValue(NamedTuple):
@@ -75,9 +75,9 @@ class LinearResponse(Result):
             names = [name for name in self.values if _unit(name) == unit]
             spec = ".2f" if unit == "rad" else ".3f"
             title = f"In the frequency domain, largest in {self.duration / 3600.0:g} h"
-            shown = "" if unit == "1" else unit
-            columns = [Column("quantity", wrap=True), Column("rms", spec, shown)]
-            columns += [Column("period", ".1f", "s"), Column("largest", spec, shown)]
+            shown_unit = "" if unit == "1" else unit
+            columns = [Column("quantity", wrap=True), Column("rms", spec, shown_unit)]
+            columns += [Column("period", ".1f", "s"), Column("largest", spec, shown_unit)]
             table = Table(title, columns)
             for name in names:
                 value = self.values[name]
@@ -138,8 +138,8 @@ def linear_response(
 
     Notes
     -----
-    With the tip's horizontal motion T by the ship alone, the load's place d from the tip obeys
-    d (ω₀² - ω² + 2 i ζ ω₀ ω - ω² k e^{-iωτ}) = ω² (1 - c) T, with gain k and delay τ of the
+    With the tip's horizontal motion T due only to the ship, the load's position d from the tip
+    obeys d (ω₀² - ω² + 2 i ζ ω₀ ω - ω² k e^{-iωτ}) = ω² (1 - c) T, with gain k and delay τ of the
     feedback, and c = 1 if the ship's motion is compensated. ω is the frequency as the ship meets
     the waves.
     """

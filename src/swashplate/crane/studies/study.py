@@ -45,7 +45,7 @@ ACTUATED: Mapping[str, Actuation] = {IDEAL: "ideal", BUILT: "inverse", "volts": 
 """Drives that follow instantaneously; the crane's own after their inverse maps; the same, 10 V for
 full speed."""
 NONE = "no control"
-"""The crane as it is built, under the operator's stick alone."""
+"""The crane as it is built, under the operator's command only."""
 LENGTH, RUN_IN = 600.0, 120.0
 """Time for which a run counts, and that of its run-in: seven decay times of a swing that control
 damps by 10 %. [s]"""
@@ -62,7 +62,7 @@ class Case(NamedTuple):
     cranes: tuple[Crane, ...]
     """One, or cranes of which each seaway takes the next."""
     options: RunOptions
-    stick: OperatorCommand
+    command: OperatorCommand
 
     @property
     def driven(self) -> bool:
@@ -98,9 +98,9 @@ class Case(NamedTuple):
         """Its run in a seaway by the seaway's number; the ship's motion, if it is known already."""
         crane = self.cranes[number % len(self.cranes)]
         if motion is None:
-            motion = seaway.motion(round(self.stick.length * RATE) + 1, RATE)
+            motion = seaway.motion(round(self.command.length * RATE) + 1, RATE)
         options = self.options | self._start(seaway)
-        return simulate(crane, self.stick, sea=motion, **options)
+        return simulate(crane, self.command, sea=motion, **options)
 
     def _start(self, seaway: Seaway) -> RunOptions:
         """The stationary swing without control at time 0, at most a part of the model's edge."""
@@ -118,7 +118,7 @@ class Case(NamedTuple):
             "load_velocity": (share * velocity_x, share * velocity_y),
         }
 
-    def words(self) -> str:
+    def sentence(self) -> str:
         """Describe pose, load and control of the crane in a sentence."""
         crane = self.cranes[0]
         pose = self.pose
@@ -136,11 +136,11 @@ class Case(NamedTuple):
         if clips:
             size = clip_size(clips[0], crane, pose)
             clip = f"; the clip is {size:.2g} m along the boom, sized for the crane's own drives"
-        return f"Control by {control.words()}: {stands}{clip}."
+        return f"Control by {control.description()}: {stands}{clip}."
 
     def target(self, seaway: Seaway) -> tuple[float, float] | None:
         """Target of the load, horizontal and inertial [m]; None if the operator moves it."""
-        if self.stick.samples is not None or self.stick.parts:
+        if self.command.samples is not None or self.command.parts:
             return None
         crane = self.cranes[0]
         home = crane.home(**self.pose)
@@ -176,7 +176,7 @@ class Study(Result):
         seeds: Sequence[int],
         sea: str | Spectrum | Seaway = "ss3",
         drives: Drives = (IDEAL, BUILT),
-        stick: OperatorCommand | None = None,
+        command: OperatorCommand | None = None,
         length: float = LENGTH,
         run_in: float = RUN_IN,
         executor: Executor | None = None,
@@ -198,7 +198,7 @@ class Study(Result):
             ``"identified"``, the crane's own; ``"volts"``, these without their inverse maps. By
             name also other cranes, or several of which each seaway takes the next, see
             `drawn_cranes`.
-        stick : OperatorCommand, optional
+        command : OperatorCommand, optional
             What the operator does; by default nothing, the crane keeps its load in place. Its
             length is then that of each run.
         length : float
@@ -229,7 +229,7 @@ class Study(Result):
             )
         set_here = ("control", "actuation", "load_offset", "load_velocity")
         run_options = [name for name in RunOptions.__annotations__ if name not in set_here]
-        keywords = ("seeds", "sea", "drives", "stick", "length", "run_in", *run_options)
+        keywords = ("seeds", "sea", "drives", "command", "length", "run_in", *run_options)
         check_names("A study has no", options, keywords, "it has")
         if not (length >= SHORTEST and run_in >= 0.0):
             raise InputError(
@@ -237,28 +237,28 @@ class Study(Result):
                 f"evaluated for at least {SHORTEST:g} s, eight swings, after a run-in of 0 s or "
                 "more."
             )
-        if stick is None:
-            stick = OperatorCommand.rest(run_in + length)
-        elif stick.length < run_in + SHORTEST:
+        if command is None:
+            command = OperatorCommand.rest(run_in + length)
+        elif command.length < run_in + SHORTEST:
             raise InputError(
-                f"The stick is {stick.length:g} s long, but a run is evaluated from {run_in:g} s "
+                f"The stick is {command.length:g} s long, but a run is evaluated from {run_in:g} s "
                 f"on for at least {SHORTEST:g} s: use a longer stick, or a shorter run_in."
             )
         pose: Any = {"slew_deg": 90.0, "boom_deg": 45.0, "rope_m": 27.0, **options}
-        none = Case((crane,), pose | {"control": None, "actuation": "inverse"}, stick)
+        none = Case((crane,), pose | {"control": None, "actuation": "inverse"}, command)
         cases = {NONE: none}
         for controller, stages in controllers.items():
             for name, drives_of_set in sets.items():
                 case = _driven(none.changed(control=stages), name, drives_of_set)
                 cases[f"{controller}, {name}" if controller else name] = case
         seaway = sea if isinstance(sea, Seaway) else Seaway(sea)
-        record = max(seaway.record, stick.length)
+        record = max(seaway.record, command.length)
         return cls(
             crane=crane,
             cases=cases,
             seaway=replace(seaway, record=record),
             seeds=tuple(seeds),
-            length=stick.length - run_in,
+            length=command.length - run_in,
             run_in=run_in,
             executor=executor or Threads(),
             progress=progress,
@@ -267,7 +267,7 @@ class Study(Result):
     def provenance(self) -> tuple[str, ...]:
         """Sentences on the drives of all its cranes, each once: `Crane.provenance`."""
         cranes = [self.crane, *(crane for case in self.cases.values() for crane in case.cranes)]
-        return tuple(dict.fromkeys(words for crane in cranes for words in crane.provenance()))
+        return tuple(dict.fromkeys(sentence for crane in cranes for sentence in crane.provenance()))
 
     def run(self, name: str, seed: int) -> CraneRun:
         """The whole run of a variant in one seaway; a `DomainError` if it is stopped."""
@@ -286,7 +286,7 @@ class Study(Result):
         An `InputError` or `ParameterError` if a case cannot begin as it is asked to.
         """
         for case in cases:  # refused here, once, and not by a worker
-            prepare(case.cranes[0], case.stick, case.options)
+            prepare(case.cranes[0], case.command, case.options)
         seaway_numbers = range(len(self.seeds)) if numbers is None else numbers
         outcomes: list[tuple[RunOutcome, ...]] = [()] * len(seaway_numbers)
         items = [(number, self.seeds[number]) for number in seaway_numbers]
@@ -299,7 +299,7 @@ class Study(Result):
         return outcomes
 
 
-def assumed_words(crane: Crane) -> list[str]:
+def assumed_sentences(crane: Crane) -> list[str]:
     """List assumptions about a crane and its limits, and whether its drives feel the load."""
     sentences = []
     if crane.assumed:
@@ -343,7 +343,7 @@ def _of_seaway(
     cases, unseeded, run_in = work
     number, seed = item
     seaway = replace(unseeded, seed=seed)
-    longest = max(case.stick.length for case in cases)
+    longest = max(case.command.length for case in cases)
     motion = seaway.motion(round(longest * RATE) + 1, RATE)
     outcomes = []
     for case in cases:

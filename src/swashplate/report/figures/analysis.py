@@ -64,10 +64,11 @@ from swashplate.report.style import (
     legend_within,
     new_figure,
     put_legend,
+    put_text,
     sheet,
     signed,
+    stroke_handles,
     write_title,
-    write_words,
     zero_line,
 )
 from swashplate.results import GivenAxes
@@ -77,19 +78,19 @@ from swashplate.units import display_unit
 # --- envelope -------------------------------------------------------------------------------------
 
 ROOM = 1.12
-"""How far the axes go beyond the speeds that are reached, and the accelerations there."""
+"""Size of the axes over the range of the speeds."""
 ENVELOPE_LOOKS = (
     (BLUE, f"+{FULL_VOLTAGE:g} V"),
     (VERMILION, f"−{FULL_VOLTAGE:g} V"),
     (FAINT, "let go"),
 )
-"""Colour and name of the two full commands and of the stick let go."""
+"""Colour and name of the two full commands and of the released joystick."""
 DASHES: dict[AcceleratedBy, Dashes] = {
     "orifice": "solid",
     "spool stop": "dashed",
     "valve": "dotted",
 }
-WORDS: dict[AcceleratedBy, str] = {
+LIMITATIONS: dict[AcceleratedBy, str] = {
     "orifice": "limited by the orifice",
     "spool stop": "limited by the spool's stop",
     "valve": "limited by the valve's opening",
@@ -120,7 +121,7 @@ def plot_envelope(
     envelope : Envelope
         What to show.
     ax : matplotlib axes, optional
-        Where to draw, with a legend of the colours alone; by default in a new figure.
+        Where to draw, with a legend of only the colours; by default in a new figure.
 
     Returns
     -------
@@ -137,19 +138,25 @@ def plot_envelope(
     drawn = set[str]()
     for curve in curves:
         drawn.update(curve.by)
-    dashes = [handle(WORDS[by], INK, d, LINE) for by, d in DASHES.items() if by in drawn]
-    words = f"{envelope.name}: acceleration that each speed allows" if title is None else title
-    speed = display_unit("rad/s")
-    acceleration = display_unit("rad/s^2")
-    up = acceleration.label("acceleration")
-    across = speed.label("speed")
+    dashes = [
+        handle(LIMITATIONS[by], INK, pattern, LINE) for by, pattern in DASHES.items() if by in drawn
+    ]
+    y_label = display_unit("rad/s^2").label("acceleration")
+    x_label = display_unit("rad/s").label("speed")
     if ax is None:
-        figure, (panel,) = sheet([3.8], words, [up], across, legend=[*colors, *dashes])
+        default_title = f"{envelope.name}: acceleration that each speed allows"
+        figure, (panel,) = sheet(
+            [3.8],
+            default_title if title is None else title,
+            [y_label],
+            x_label,
+            legend=[*colors, *dashes],
+        )
         _draw_envelope(panel, envelope)
         return figure
-    # the lines lie above, below and in the middle
+    # the curves leave only the left end of the middle free
     (panel,) = dress_given(
-        ax, title, [up], across, what="panel", legend=colors, legend_at="center left"
+        ax, title, [y_label], x_label, what="panel", legend=colors, legend_at="center left"
     )
     _draw_envelope(panel, envelope)
     return ax
@@ -162,23 +169,25 @@ def _draw_envelope(ax: Axes, envelope: Envelope) -> None:
     low, high = (speed.factor * limits.top_speed for limits in (envelope.minus, envelope.plus))
     span = (high - low) or 1.0
     ax.set_xlim(low - (ROOM - 1.0) * span, high + (ROOM - 1.0) * span)
-    most = []
+    largest = []
     curves = zip((*envelope.accelerating, envelope.released), ENVELOPE_LOOKS, strict=True)
-    for (curve, (color, _)), sign in zip(curves, (1.0, -1.0, 0.0), strict=True):
-        across = speed.factor * curve.speed
-        up = acceleration.factor * curve.acceleration
-        if sign:  # of the full commands only what speeds up their own way counts
-            up = sign * np.maximum(sign * up, 0.0)
-            ax.fill_between(across, up, color=color, alpha=0.08, linewidth=0.0)
-        most.append(float(np.abs(up).max()))
-        # part of the grey line lies under another, and is wider
-        width, above = (LINE, 2.0) if sign else (3.0, 1.7)
-        turns = [0, *(n for n in range(1, len(curve.by)) if curve.by[n] != curve.by[n - 1])]
-        for start, stop in zip(turns, [*turns[1:], len(curve.by)], strict=True):
-            part = slice(start, stop + 1)  # up to the first of the next
-            by = curve.by[start]
-            ax.plot(across[part], up[part], color=color, ls=DASHES[by], lw=width, zorder=above)
-    height = 1.3 * max(most[:2]) or 1.0
+    for (curve, (color, _)), direction in zip(curves, (1.0, -1.0, 0.0), strict=True):
+        x = speed.factor * curve.speed
+        y = acceleration.factor * curve.acceleration
+        if direction:  # of a full command only the acceleration in its direction is drawn
+            y = direction * np.maximum(direction * y, 0.0)
+            ax.fill_between(x, y, color=color, alpha=0.08, linewidth=0.0)
+        largest.append(float(np.abs(y).max()))
+        # the grey line of the released joystick is wider: others cover a part of it
+        width, order = (LINE, 2.0) if direction else (3.0, 1.7)
+        count = len(curve.by)
+        starts = [0]
+        starts += [index for index in range(1, count) if curve.by[index] != curve.by[index - 1]]
+        for start, stop in zip(starts, [*starts[1:], count], strict=True):
+            part = slice(start, stop + 1)  # with the first point of the next part
+            dashes = DASHES[curve.by[start]]
+            ax.plot(x[part], y[part], color=color, ls=dashes, lw=width, zorder=order)
+    height = 1.3 * max(largest[:2]) or 1.0
     ax.set_ylim(-height, height)
     for limits, color in ((envelope.plus, BLUE), (envelope.minus, VERMILION)):
         _mark_direction(ax, limits, color, height)
@@ -190,33 +199,34 @@ def _mark_direction(ax: Axes, limits: DirectionLimits, color: str, height: float
     acceleration_unit = display_unit("rad/s^2")
     speed = speed_unit.factor * limits.top_speed
     acceleration = acceleration_unit.factor * limits.acceleration
-    up = limits.acceleration > 0.0
-    stopped = limits.top_speed == limits.speed_limit
-    ax.axvline(speed, color=color, linewidth=1.0, linestyle="solid" if stopped else "dotted")
-    cause = f"at {'+' if up else '−'}{FULL_VOLTAGE:g} V"
-    if stopped:
-        cause = "swash stop"
-    write_words(
+    is_positive = limits.acceleration > 0.0
+    is_at_swash_stop = limits.top_speed == limits.speed_limit
+    sign = "+" if is_positive else "−"
+    cause = "swash stop" if is_at_swash_stop else f"at {sign}{FULL_VOLTAGE:g} V"
+    speed_text = signed(speed, 3 if abs(speed) < 10.0 else 1)
+    line = "solid" if is_at_swash_stop else "dotted"
+    ax.axvline(speed, color=color, linewidth=1.0, linestyle=line)
+    put_text(
         ax,
-        f"{cause}\n{signed(speed, 3 if abs(speed) < 10.0 else 1)} {speed_unit.name}",
-        (speed, -0.96 * height if up else 0.96 * height),
-        (-4.0 if up else 4.0, 0.0),
+        f"{cause}\n{speed_text} {speed_unit.name}",
+        (speed, -0.96 * height if is_positive else 0.96 * height),
+        (-4.0 if is_positive else 4.0, 0.0),
         coords="data",
         color=color,
-        ha="right" if up else "left",
-        va="bottom" if up else "top",
+        ha="right" if is_positive else "left",
+        va="bottom" if is_positive else "top",
     )
     ax.plot([0.0], [acceleration], "o", color=color, markersize=4.5)
-    number = signed(acceleration, 2 if abs(acceleration) < 10.0 else 1)
-    write_words(
+    acceleration_text = signed(acceleration, 2 if abs(acceleration) < 10.0 else 1)
+    put_text(
         ax,
-        f"{limits.accelerated_by}, at rest\n{number} {acceleration_unit.name}",
+        f"{limits.accelerated_by}, at rest\n{acceleration_text} {acceleration_unit.name}",
         (0.0, acceleration),
-        (5.0, 6.0) if up else (-5.0, -6.0),  # away from where the line falls
+        (5.0, 6.0) if is_positive else (-5.0, -6.0),  # on the side to which the curve does not fall
         coords="data",
         color=color,
-        ha="left" if up else "right",
-        va="bottom" if up else "top",
+        ha="left" if is_positive else "right",
+        va="bottom" if is_positive else "top",
     )
 
 
@@ -256,8 +266,8 @@ def plot_limit_timeline(
         legend.append(handle("without limits", GREY, "dashed"))
     heights = [1.1, 2.2, 0.27 * max(len(acting), 1)]
     labels = ("current (A)" if run.voltage is None else "voltage (V)", unit.label("speed"))
-    words = run.name if title is None else title
-    figure, axes = sheet(heights, words, labels, "time (s)", legend=legend)
+    sheet_title = run.name if title is None else title
+    figure, axes = sheet(heights, sheet_title, labels, "time (s)", legend=legend)
     command, speed, rows = axes
     draw(command, run.time, run.current if run.voltage is None else run.voltage, INK)
     if requested is not None:
@@ -284,7 +294,7 @@ def _bars(ax: Axes, run: Simulation, acting: list[Limit]) -> None:
             edgecolor=GREY,
             linewidth=0.4,
         )
-        write_words(
+        put_text(
             ax,
             share_cell(run.time_share(limit)).text,
             (1.0, row),
@@ -299,8 +309,8 @@ def _bars(ax: Axes, run: Simulation, acting: list[Limit]) -> None:
 
 # --- what-ifs and bands ---------------------------------------------------------------------------
 
-MOST_ALONE = 5
-"""Levers that are drawn by themselves, too; more would hide the answer."""
+MOST_SINGLE_CHANGES = 5
+"""Design variables whose single change is drawn, too; more would hide the answer."""
 NO_BANDS: Mapping[str, Bands] = MappingProxyType({})
 
 
@@ -312,58 +322,62 @@ def plot_whatif(
     Parameters
     ----------
     result : WhatIf
-        What `analysis.whatif.what_if` found. The reference speed is drawn dotted, the speed limits
+        A result of `analysis.whatif.what_if`. The reference speed is drawn dotted, the speed limits
         before and after as thin lines.
     bands : mapping of str to Bands, optional
-        By variant (``"as it is"``, ``"changed"``) the band that its speed lies in; a panel more
-        shows it enlarged, about its median.
+        Band of the speed by variant (``"as it is"``, ``"changed"``); an additional panel shows it
+        enlarged, about its median.
     """
-    alone = [name for name in result.variants if name not in (AS_IS, CHANGED)][:MOST_ALONE]
+    single_changes = [name for name in result.variants if name not in (AS_IS, CHANGED)]
     colors = (GREEN, PURPLE, ORANGE, SKY, FAINT)
-    looks = {AS_IS: Stroke(BLUE, "solid")}
-    looks |= {name: Stroke(color, "dashed") for name, color in zip(alone, colors, strict=False)}
-    looks[CHANGED] = Stroke(VERMILION, "solid")
-    legend = [handle(name, look.color, look.dashes) for name, look in looks.items()]
+    strokes = {AS_IS: Stroke(BLUE, "solid")}
+    for name, color in zip(single_changes[:MOST_SINGLE_CHANGES], colors, strict=False):
+        strokes[name] = Stroke(color, "dashed")
+    strokes[CHANGED] = Stroke(VERMILION, "solid")
+    legend = stroke_handles(strokes)
     legend.append(handle("reference", GREY, "dotted"))
-    moved = ", ".join(f"{name} x {factor:g}" for name, factor in result.factors.items())
-    words = f"{result.before.drive.name}: {moved}" if title is None else title
+    changes = ", ".join(f"{name} x {factor:g}" for name, factor in result.factors.items())
+    sheet_title = f"{result.before.drive.name}: {changes}" if title is None else title
     heights = [1.2, 2.8, 1.8, 1.3] if bands else [1.2, 2.8, 1.8]
     speed = display_unit("rad/s")
     acceleration = display_unit("rad/s^2")
     labels = ["voltage (V)", speed.label("shaft speed"), acceleration.label("acceleration")]
     labels.append(speed.label("about the median"))
-    figure, axes = sheet(heights, words, labels, "time (s)", legend=legend)
+    figure, axes = sheet(heights, sheet_title, labels, "time (s)", legend=legend)
     for ax in axes:
         zero_line(ax)
     time = result.before.run.time
     draw(axes[0], time, result.trial.voltage, INK, zorder=3.0)
-    _speed_limits(axes[1], result, looks)
+    _draw_speed_limits(axes[1], result, strokes)
     for name, band in bands.items():
-        shade_band(axes[1], band, looks[name].color)
-        shade_band(axes[3], band, looks[name].color, about=band.median)
+        shade_band(axes[1], band, strokes[name].color)
+        shade_band(axes[3], band, strokes[name].color, about=band.median)
     draw(axes[1], time, speed.factor * result.trial.reference, GREY, dashes="dotted", zorder=1.9)
-    middle = 0.5 * (time[1:] + time[:-1])
-    for name, look in looks.items():
+    midpoints = 0.5 * (time[1:] + time[:-1])
+    for name, stroke in strokes.items():
         shaft_speed = result.variants[name].run.shaft_speed
-        rising = acceleration.factor * np.diff(shaft_speed) * result.trial.rate
-        order = 3.0 if name in (AS_IS, CHANGED) else 2.0
-        draw(
-            axes[1], time, speed.factor * shaft_speed, look.color, dashes=look.dashes, zorder=order
-        )
-        draw(axes[2], middle, rising, look.color, dashes=look.dashes, zorder=order)
+        acceleration_of_run = acceleration.factor * np.diff(shaft_speed) * result.trial.rate
+        style: dict[str, Any] = {
+            "dashes": stroke.dashes,
+            "zorder": 3.0 if name in (AS_IS, CHANGED) else 2.0,
+        }
+        draw(axes[1], time, speed.factor * shaft_speed, stroke.color, **style)
+        draw(axes[2], midpoints, acceleration_of_run, stroke.color, **style)
     fit_time(axes[-1], time)
     return figure
 
 
-def _speed_limits(ax: Axes, result: WhatIf, looks: Mapping[str, Stroke]) -> None:
-    """Speed limits of the two drives, as far as the command's direction goes."""
+def _draw_speed_limits(ax: Axes, result: WhatIf, strokes: Mapping[str, Stroke]) -> None:
+    """Draw the speed limits of the two drives in the directions that the command has."""
     voltage = result.trial.voltage
     factor = display_unit("rad/s").factor
     for name in (AS_IS, CHANGED):
-        up, down = result.variants[name].speed_limits
-        for limit, used in ((up, (voltage > 0.0).any()), (down, (voltage < 0.0).any())):
-            if used:
-                ax.axhline(factor * limit, color=looks[name].color, linewidth=0.6, alpha=0.5)
+        positive, negative = result.variants[name].speed_limits
+        style: dict[str, Any] = {"color": strokes[name].color, "linewidth": 0.6, "alpha": 0.5}
+        if (voltage > 0.0).any():
+            ax.axhline(factor * positive, **style)
+        if (voltage < 0.0).any():
+            ax.axhline(factor * negative, **style)
 
 
 def shade_band(ax: Axes, band: Bands, color: ColorType, *, about: Array | float = 0.0) -> None:
@@ -380,7 +394,7 @@ def shade_band(ax: Axes, band: Bands, color: ColorType, *, about: Array | float 
 
 THICK = 0.72
 NO_SWING = 1e-9
-"""Swing, as a share of the base value, up to which nothing changes an outcome. [1]"""
+"""Swing up to which a design variable has no effect, as a share of the base value. [1]"""
 
 
 @overload
@@ -397,7 +411,9 @@ def plot_tornado(
     ax: Axes | Sequence[Axes] | None = None,
     title: str | None = None,
 ) -> Figure | Axes | Sequence[Axes]:
-    """Figure of what each design variable does alone, a panel an outcome, the strongest at the top.
+    """Figure of the effect of each design variable by itself, with a panel for each outcome.
+
+    In a panel the variable with the strongest effect is at the top.
 
     Parameters
     ----------
@@ -405,7 +421,7 @@ def plot_tornado(
         See `analysis.one_at_a_time`.
     ax : matplotlib axes or sequence of them, optional
         Where to draw, one for each outcome that is defined; by default in a new figure. The title,
-        if there is one, goes above the new figure alone.
+        if there is one, goes only above a new figure.
 
     Returns
     -------
@@ -416,41 +432,47 @@ def plot_tornado(
     InputError
         If no outcome is defined, or there is another number of axes.
     """
-    shown = [k for k in range(len(result.outcomes)) if np.isfinite(result.base[k])]
-    if not shown:
+    defined = [k for k in range(len(result.outcomes)) if np.isfinite(result.base[k])]
+    if not defined:
         raise InputError("None of the outcomes is defined for this command: nothing to draw.")
-    legend = []
-    for end, (words, color) in enumerate((("lower", BLUE), ("upper", VERMILION))):
-        factors = {pair[end] for pair in result.ranges.values()}
-        label = f"factor {factors.pop():g}" if len(factors) == 1 else f"{words} factor"
-        legend.append(Patch(color=color, label=label))
-    style: dict[str, Any] = {"frameon": False, "fontsize": SMALL}
+    lower_factors, upper_factors = zip(*result.ranges.values(), strict=True)
+    legend = [
+        Patch(color=BLUE, label=_factor_label("lower", lower_factors)),
+        Patch(color=VERMILION, label=_factor_label("upper", upper_factors)),
+    ]
     if ax is not None:
-        axes = given_axes(ax, len(shown), "outcomes")
-        _draw_swings(axes, result, shown)
+        axes = given_axes(ax, len(defined), "outcomes")
+        _draw_swings(axes, result, defined)
         legend_within(axes[0], legend)
         return ax
-    columns = min(len(shown), 2)
-    rows = -(-len(shown) // columns)
-    figure = new_figure(WIDTH, HEAD + ROW + rows * (0.22 * len(result.ranges) + 0.75) + 0.5 * FOOT)
+    columns = min(len(defined), 2)
+    rows = -(-len(defined) // columns)
+    panel_height = 0.22 * len(result.ranges) + 0.75
+    figure = new_figure(WIDTH, HEAD + ROW + rows * panel_height + 0.5 * FOOT)
     write_title(figure, "Each design variable alone" if title is None else title)
-    figure.legend(handles=legend, loc="outside lower left", ncols=3, **style)
+    figure.legend(handles=legend, loc="outside lower left", ncols=3, frameon=False, fontsize=SMALL)
     panels = list(figure.subplots(rows, columns, squeeze=False).flat)
-    for empty in panels[len(shown) :]:
+    for empty in panels[len(defined) :]:
         empty.axis("off")
-    _draw_swings(panels[: len(shown)], result, shown)
+    _draw_swings(panels[: len(defined)], result, defined)
     return figure
 
 
-def _draw_swings(panels: Sequence[Axes], result: OneAtATime, shown: Sequence[int]) -> None:
+def _factor_label(end: str, factors: Sequence[float]) -> str:
+    """Label of the bars of all lower or upper factors: the factor, if it is the same for all."""
+    return f"factor {factors[0]:g}" if len(set(factors)) == 1 else f"{end} factor"
+
+
+def _draw_swings(panels: Sequence[Axes], result: OneAtATime, defined: Sequence[int]) -> None:
+    """Draw the swings of the outcomes of these indices, one in each panel."""
     variables = list(result.ranges)
-    for ax, k in zip(panels, shown, strict=True):
+    for ax, k in zip(panels, defined, strict=True):
         outcome = result.outcomes[k]
         swings = np.nan_to_num(result.swings[:, k])
         order = np.argsort(swings, kind="stable")
-        unit = outcome.shown
+        unit = outcome.shown_unit
         base = unit.factor * result.base[k]
-        dress(ax, "", unit.label(outcome.words))
+        dress(ax, "", unit.label(outcome.label))
         for position, index in enumerate(order):
             for values, color in ((result.low, BLUE), (result.high, VERMILION)):
                 change = unit.factor * values[index, k] - base
@@ -459,16 +481,17 @@ def _draw_swings(panels: Sequence[Axes], result: OneAtATime, shown: Sequence[int
         if not (swings > NO_SWING * abs(result.base[k])).any():
             half = max(abs(base), 1.0) * 0.1
             ax.set_xlim(base - half, base + half)
-            words = "no design variable changes it"
-            ax.text(0.5, 0.5, words, transform=ax.transAxes, fontsize=SMALL)
+            remark = "no design variable changes it"
+            ax.text(0.5, 0.5, remark, transform=ax.transAxes, fontsize=SMALL)
         ax.axvline(base, color=INK, linewidth=0.8, zorder=3.0)
         names = [variables[index].replace("_", " ") for index in order]
         ax.set_yticks(range(len(names)), labels=names)
         ax.set_ylim(-0.6, len(names) - 0.4)
         ax.grid(False, axis="y")
         ax.tick_params(axis="y", length=0.0, labelsize=SMALL)
-        words = f"{outcome.words}, {base:z.{3 if outcome.unit == 's' else 2}f} {unit.name}"
-        ax.set_title(words, loc="left", fontsize=NORMAL, color=INK)
+        decimals = 3 if outcome.unit == "s" else 2
+        panel_title = f"{outcome.label}, {base:z.{decimals}f} {unit.name}"
+        ax.set_title(panel_title, loc="left", fontsize=NORMAL, color=INK)
 
 
 # --- inverse map ----------------------------------------------------------------------------------
@@ -549,8 +572,8 @@ def plot_compensation(
         error = figure.add_subplot(grid[2, :], sharex=speed)
         _draw_improvement(speed, error, improvement)
         figure.align_ylabels([full_range, speed, error])
-    words = f"{inverse.name}: voltage for a reference speed" if title is None else title
-    write_title(figure, words)
+    default_title = f"{inverse.name}: voltage for a reference speed"
+    write_title(figure, default_title if title is None else title)
     put_legend(full_range, legend, beyond=True)
     full_range.set_title(" ", fontsize=NORMAL, pad=8.0)
     return figure
@@ -580,13 +603,13 @@ def _draw_map(inverse: InverseMap, full_range: Axes, close_up: Axes | None = Non
     ):
         point = (unit.factor * end, height)
         full_range.plot([point[0]], [point[1]], "o", color=INK, markersize=4.5)
-        words = f"{point[0]:.4g} {unit.name}, {height:.3g} V".replace("-", "−")
-        write_words(full_range, words, point, (0.0, shift), coords="data", ha=side, va="center")
+        text = f"{point[0]:.4g} {unit.name}, {height:.3g} V".replace("-", "−")
+        put_text(full_range, text, point, (0.0, shift), coords="data", ha=side, va="center")
     if close_up is None:
         return
     below, above = (unit.factor * edge for edge in inverse.gap)
     close_up.axvspan(below, above, color="#ededed", linewidth=0.0, zorder=0.5)
-    write_words(
+    put_text(
         close_up,
         "cannot be held",
         (0.5 * (below + above), 0.0),
@@ -595,7 +618,7 @@ def _draw_map(inverse: InverseMap, full_range: Axes, close_up: Axes | None = Non
         color=GREY,
         ha="center",
     )
-    write_words(close_up, "close-up around standstill", (0.0, 1.0), (4.0, -10.0), color=GREY)
+    put_text(close_up, "close-up around standstill", (0.0, 1.0), (4.0, -10.0), color=GREY)
 
 
 def _draw_improvement(speed: Axes, error: Axes, improvement: Improvement) -> None:

@@ -47,10 +47,10 @@ from swashplate.report.style import (
     in_lines,
     label_below,
     new_figure,
+    put_text,
     right_axis,
     sheet,
     write_title,
-    write_words,
     zero_line,
 )
 from swashplate.units import DisplayUnit, display_unit
@@ -79,8 +79,8 @@ class PanelColumn(NamedTuple):
     """Channel of a column of panels, by name and unit; the input has no name."""
 
     key: tuple[str, str]
-    words: str
-    """What it shows, with the unit."""
+    label: str
+    """Label of its axis, with the unit."""
     unit: DisplayUnit
     low: float
     high: float
@@ -103,38 +103,38 @@ def _scale_rows(used: Mask) -> Mask:
     return used if used.any() else np.ones_like(used)
 
 
-def _counted(signal: InputSignal | Channel) -> Array:
-    """Samples that are not ignored; all of them of an input, or where none is left."""
+def _scale_values(signal: InputSignal | Channel) -> Array:
+    """Samples that set the scale of a panel; all of them of an input."""
     used = getattr(signal, "used", None)
     return signal.values if used is None else signal.values[_scale_rows(used)]
 
 
 def _column(key: tuple[str, str], signals: Sequence[InputSignal | Channel]) -> PanelColumn:
     """Column of the signals of one name and unit of all runs, with their common scale."""
-    # what is ignored may leave the panel: one spike would flatten all runs
-    shown = [_counted(signal) for signal in signals]
-    low = min(float(samples.min()) for samples in shown)
-    high = max(float(samples.max()) for samples in shown)
+    # ignored samples may leave the panel: one spike would flatten all runs
+    values_of_runs = [_scale_values(signal) for signal in signals]
+    low = min(float(values.min()) for values in values_of_runs)
+    high = max(float(values.max()) for values in values_of_runs)
     kind = signals[0].kind
     _, si = key
     unit = display_unit(si, max(abs(low), abs(high)))
     free = kind in ("position", "encoder_counts")
     if free:
-        high = 0.5 * max(float(np.ptp(samples)) for samples in shown)
+        high = 0.5 * max(float(np.ptp(values)) for values in values_of_runs)
         low = -high
-    words = {"encoder_counts": "encoder's angle", "other": signals[0].source.column}
-    label = unit.label(words.get(kind, kind.replace("_", " ")))
+    special_names = {"encoder_counts": "encoder's angle", "other": signals[0].source.column}
+    label = unit.label(special_names.get(kind, kind.replace("_", " ")))
     return PanelColumn(key, label, unit, unit.factor * low, unit.factor * high, free)
 
 
 def plot_campaign(experiments: Iterable[Experiment], *, title: str | None = None) -> list[Figure]:
-    """Figures of everything that was measured: a page for each axis and eight of its runs.
+    """Figures of all measured signals, with a page for each axis and eight of its runs.
 
-    A row is a run: over it its name, maneuver, role, rate and gaps; its input and channels side by
-    side. A column has one unit and one scale; positions, whose zero is free, have it about the
-    middle of each run. What is ignored is shaded and hatched, weights that differ stand along the
-    foot, samples at the end of their instrument's range are barred, gaps in the
-    stamps leave the line open and are pointed at.
+    A row is a run, with its input and channels side by side, and its name, maneuver, role, rate and
+    gaps above. A column has one unit and one scale; for positions, whose zero is free, the scale is
+    about the middle of each run. Ignored samples are shaded and hatched, weights that differ are
+    drawn along the foot, samples at the end of their instrument's range have a bar, gaps in the
+    time stamps leave the line open and have an arrow.
 
     Parameters
     ----------
@@ -175,10 +175,10 @@ def plot_campaign(experiments: Iterable[Experiment], *, title: str | None = None
         ]
         pages = [of_axis[first : first + RUNS] for first in range(0, len(of_axis), RUNS)]
         for number, page in enumerate(pages, start=1):
-            words = f"{title or 'Measured tests'}: {axis}"
+            page_title = f"{title or 'Measured tests'}: {axis}"
             if len(pages) > 1:
-                words += f", page {number} of {len(pages)}"
-            figures.append(_page_figure(page, columns, words))
+                page_title += f", page {number} of {len(pages)}"
+            figures.append(_page_figure(page, columns, page_title))
     return figures
 
 
@@ -187,18 +187,18 @@ def _page_figure(
 ) -> Figure:
     """Figure of a page: a row for each run, its signals side by side."""
     rows = len(experiments)
-    across = len(columns)
-    width = max(WIDTH, across * (NARROWEST + BETWEEN))
-    room = width / across - 1.3 * BETWEEN
+    column_count = len(columns)
+    width = max(WIDTH, column_count * (NARROWEST + BETWEEN))
+    column_width = width / column_count - 1.3 * BETWEEN
     figure = new_figure(width, HEAD + 2.0 * ROW + rows * (PANEL + ABOVE) + FOOT)
-    grid = figure.subplots(rows, across, sharex="row", squeeze=False)
+    grid = figure.subplots(rows, column_count, sharex="row", squeeze=False)
     for number, (row, experiment) in enumerate(zip(grid, experiments, strict=True)):
         signals = _signals(experiment)
-        first = min(float(signal.time[0]) for signal in signals.values())
-        last = max(float(signal.time[-1]) for signal in signals.values())
-        if 0.0 < first < _NEAR_ZERO * (last - first):
-            first = 0.0
-        row[0].set_xlim(first, last if last > first else first + 1.0)
+        begin = min(float(signal.time[0]) for signal in signals.values())
+        end = max(float(signal.time[-1]) for signal in signals.values())
+        if 0.0 < begin < _NEAR_ZERO * (end - begin):
+            begin = 0.0
+        row[0].set_xlim(begin, end if end > begin else begin + 1.0)
         for ax, column in zip(row, columns, strict=True):
             dress(ax)
             ax.xaxis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
@@ -207,15 +207,15 @@ def _page_figure(
                 _draw_signal(ax, column, signals[column.key], experiment)
             else:
                 ax.set_yticks([])
-                write_words(ax, "not measured", (0.5, 0.5), (0.0, 0.0), ha="center", va="center")
-            # room for the heading, and in the first row for the columns' names
-            words = " "
+                put_text(ax, "not measured", (0.5, 0.5), (0.0, 0.0), ha="center", va="center")
+            # space for the heading, and in the first row for the columns' names
+            column_title = " "
             pad = 6.0
             if number == 0:
-                name = shorten(column.key[0] or "input", room / 0.085)
-                words = f"{name}\n{shorten(column.words, room / 0.066)}"
+                name = shorten(column.key[0] or "input", column_width / 0.085)
+                column_title = f"{name}\n{shorten(column.label, column_width / 0.066)}"
                 pad = 20.0
-            ax.set_title(words, loc="left", fontsize=SMALL, color=INK, pad=pad)
+            ax.set_title(column_title, loc="left", fontsize=SMALL, color=INK, pad=pad)
         _heading(row[0], experiment)
     for ax in grid[-1]:
         label_below(ax, "time (s)")
@@ -231,9 +231,10 @@ def _put_page_legend(figure: Figure, grid: Any, experiments: Sequence[Experiment
         for _, _, reason in experiment.ignored:
             if reason and reason not in reasons:
                 reasons.append(reason)
-    why = "; ".join(reasons)
+    all_reasons = "; ".join(reasons)
+    ignored_label = f"ignored: {all_reasons}" if 0 < len(all_reasons) <= 60 else ""
     handles: dict[str, Patch | Line2D] = {
-        "ignored": shade_handle(IGNORED, f"ignored: {why}" if 0 < len(why) <= 60 else ""),
+        "ignored": shade_handle(IGNORED, ignored_label),
         "weight": Patch(facecolor=WEIGHTED, label="weight, relative to the largest"),
         "clipped": Patch(facecolor=ORANGE, label="at the end of the instrument's range"),
         GAP_MARK["label"]: Line2D([], [], **GAP_MARK),
@@ -242,26 +243,29 @@ def _put_page_legend(figure: Figure, grid: Any, experiments: Sequence[Experiment
     for ax in grid.flat:
         for artist in (*ax.collections, *ax.lines, *ax.patches):
             labels.add(artist.get_label())
-    if shown := [handle for key, handle in handles.items() if key in labels]:
+    present = [handle for key, handle in handles.items() if key in labels]
+    if present:
         style = {"frameon": False, "fontsize": SMALL, "ncols": 2}
-        figure.legend(handles=shown, loc="outside lower left", **style)
+        figure.legend(handles=present, loc="outside lower left", **style)
 
 
-def shorten(words: str, letters: float) -> str:
-    """Words cut to so many letters."""
-    return words if len(words) <= letters else f"{words[: int(letters) - 1]}…"
+def shorten(text: str, letters: float) -> str:
+    """Cut a text to a number of letters."""
+    return text if len(text) <= letters else f"{text[: int(letters) - 1]}…"
 
 
 def _draw_signal(
     ax: Axes, column: PanelColumn, signal: InputSignal | Channel, experiment: Experiment
 ) -> None:
-    """Draw a signal, with marks where it is ignored, weighted, clipped or missing."""
+    """Draw a signal, with marks for ignored, weighted, clipped and missing samples."""
     time = signal.time
     factor = column.unit.factor
     values = factor * signal.values
-    counted = factor * _counted(signal)
+    scale_values = factor * _scale_values(signal)
     zero_line(ax)
-    middle = 0.5 * float(counted.min() + counted.max()) if column.free else 0.0
+    middle = 0.0
+    if column.free:
+        middle = 0.5 * float(scale_values.min() + scale_values.max())
     margin = _ROOM * (column.high - column.low) or 1.0
     ax.set_ylim(middle + column.low - margin, middle + column.high + margin)
     # the input has no weights, and a channel nothing that is held between its samples
@@ -273,8 +277,8 @@ def _draw_signal(
         shade(ax, inside[inside[:, 0] < inside[:, 1]], IGNORED)
     else:
         shade(ax, stretches(time, weight == 0.0), IGNORED)
-        used = weight[weight > 0.0]
-        if used.size and used.max() > used.min():
+        positive = weight[weight > 0.0]
+        if positive.size and positive.max() > positive.min():
             turns = np.flatnonzero(np.diff(weight)) + 1
             rows = np.unique(np.r_[0, turns - 1, turns, weight.size - 1])
             foot: dict[str, Any] = {"transform": ax.get_xaxis_transform(), "label": "weight"}
@@ -282,7 +286,7 @@ def _draw_signal(
             ax.fill_between(time[rows], height, color=WEIGHTED, linewidth=0.0, zorder=1.0, **foot)
     if signal.limits is not None:
         ends = np.array(signal.limits)
-        # what a conversion of units rounds away is no distance from the end
+        # a value that differs from the end by the rounding of a conversion is at the end
         near = np.abs(signal.values - ends[:, None]) <= 1e-9 * (ends[1] - ends[0])
         beyond = np.stack((signal.values < ends[0], signal.values > ends[1]))
         for level, side in zip(factor * ends, near | beyond, strict=True):
@@ -297,32 +301,33 @@ def _draw_signal(
 
 
 def _heading(ax: Axes, experiment: Experiment) -> None:
-    """Name of a run in bold, and what else there is to say of it, above its first panel."""
-    words = [experiment.maneuver, _ROLES[experiment.role], *_stamps_in_words(experiment)]
+    """Write the name of a run in bold, its maneuver, role, rates and gaps above its first panel."""
+    properties = [experiment.maneuver, _ROLES[experiment.role], *_rates_and_gaps(experiment)]
     style: dict[str, Any] = {"fontsize": SMALL, "color": INK, "textcoords": "offset points"}
     # they may reach over the panels on their right
     style |= {"annotation_clip": False, "in_layout": False}
     run = ax.annotate(
         experiment.run, (0.0, 1.0), (0.0, 6.0), "axes fraction", weight="bold", **style
     )
-    ax.annotate("  ·  ".join(words), (1.0, 1.0), (7.0, 6.0), (run, "axes fraction"), **style)
+    line = "  ·  ".join(properties)
+    ax.annotate(line, (1.0, 1.0), (7.0, 6.0), (run, "axes fraction"), **style)
 
 
-def _stamps_in_words(experiment: Experiment) -> list[str]:
-    """The rates, from the lowest to the highest, and the gaps of the signal that has most."""
+def _rates_and_gaps(experiment: Experiment) -> list[str]:
+    """Lowest and highest rate of a run's signals, and the gaps of the signal that has most."""
     stamps = [signal.time for signal in _signals(experiment).values()]
     rates = [1.0 / float(np.median(np.diff(time))) for time in stamps]
     ends = [f"{r:.0f}" if r >= 100.0 else f"{r:.3g}" for r in (min(rates), max(rates))]
     # stamps that jitter do not have quite the same rate
     alike = max(rates) < 1.01 * min(rates)
-    words = [f"{ends[0]} Hz" if alike else f"{ends[0]} to {ends[1]} Hz"]
+    texts = [f"{ends[0]} Hz" if alike else f"{ends[0]} to {ends[1]} Hz"]
     gaps = max((np.diff(time)[gap_rows(time)] for time in stamps), key=np.size)
     if gaps.size:
         longest = f"{float(gaps.max()):.3g} s"
-        words.append(
+        texts.append(
             f"a gap of {longest}" if gaps.size == 1 else f"{gaps.size} gaps, longest {longest}"
         )
-    return words
+    return texts
 
 
 # --- a long log as a whole ------------------------------------------------------------------------
@@ -358,17 +363,20 @@ def plot_overview(overview: Overview, *, title: str | None = None) -> Figure:
         in_lines(unit.label(f"{signal.axis} {signal.name}" if several else signal.name), LABELLED)
         for signal, unit in zip(overview.signals, units, strict=True)
     ]
-    used = np.array([(w.begin, w.end) for w in overview.windows if w.used]).reshape(-1, 2)
-    left_out = np.array([(w.begin, w.end) for w in overview.windows if not w.used]).reshape(-1, 2)
-    shades = [(used, USED), (left_out, LEFT_OUT)]
-    legend = [shade_handle(look) for spans, look in shades if spans.size]
+    used = [(window.begin, window.end) for window in overview.windows if window.used]
+    left_out = [(window.begin, window.end) for window in overview.windows if not window.used]
+    shaded_windows = [
+        (np.array(used).reshape(-1, 2), USED),
+        (np.array(left_out).reshape(-1, 2), LEFT_OUT),
+    ]
+    legend = [shade_handle(window_shade) for spans, window_shade in shaded_windows if spans.size]
     heights = [1.3] * len(overview.signals)
-    words = f"{overview.run}, the whole log" if title is None else title
-    figure, axes = sheet(heights, words, labels, "time (s)", legend=legend)
+    sheet_title = f"{overview.run}, the whole log" if title is None else title
+    figure, axes = sheet(heights, sheet_title, labels, "time (s)", legend=legend)
     for ax, ranges, unit in zip(axes, overview.signals, units, strict=True):
         zero_line(ax)
-        for spans, look in shades:
-            shade(ax, spans, look)
+        for spans, window_shade in shaded_windows:
+            shade(ax, spans, window_shade)
         color = INK if ranges.name == "input" else BLUE
         _draw_ranges(ax, ranges, unit.factor, color)
         mark_gaps(ax, ranges.time)
@@ -384,7 +392,7 @@ def _largest(ranges: BlockRanges) -> float:
 
 
 def _draw_ranges(ax: Axes, ranges: BlockRanges, factor: float, color: str) -> None:
-    """Draw a signal between its extremes, open where it has none and over gaps of the stamps."""
+    """Draw a signal between its extremes, open over missing numbers and gaps of the stamps."""
     first = np.arange(0, ranges.time.size, -(-ranges.time.size // STRETCHES))
     time = ranges.time[first]
     low = np.fmin.reduceat(ranges.low, first)
@@ -419,16 +427,18 @@ def plot_channel(
     window: tuple[float, float] | None = None,
     title: str | None = None,
 ) -> Figure:
-    """Figure of one measured channel: its samples, and below what a glitch shows in best.
+    """Figure of the samples of one measured channel, with a lower panel that shows glitches best.
 
     Parameters
     ----------
     channel : Channel
-        Any. Below a position, a staircase of its samples, stands its speed: the difference of
-        neighbours, and Kruse's filters in their form for any rate, which set the scale.
+        A position is drawn as a staircase. The lower panel has its speed, by the difference of
+        neighbouring samples and by Kruse's filters in their form for any rate; the filtered speed
+        sets the scale.
     simulated : (n,) array, optional
-        What a drive predicts for each sample, SI. It is drawn over the samples; below any other
-        channel than a position stands measured less simulated, on the scale of what counts.
+        Prediction of a drive for each sample, SI. It is drawn over the samples. Of a channel other
+        than a position, the lower panel has measured less simulated; the samples that are not
+        ignored set its scale.
     window : (float, float), optional
         First and last instant to show [s]. Everything is computed from the whole record.
 
@@ -444,36 +454,22 @@ def plot_channel(
     legend = [handle("measured", INK if channel.is_position else BLUE, width=THIN)]
     if simulated is not None:
         legend.append(handle("simulated", VERMILION))
-    lower: list[tuple[Array, Array, str, float]] = []
+    lower = None
     if channel.is_position:
-        from swashplate.campaign import speed_of
-
-        speeds = [(speed_of(channel, "difference"), ROUGH), (speed_of(channel, "exact"), BLUE)]
-        for speed, color in speeds:
-            within = (speed.time >= time[0]) & (speed.time <= time[-1])
-            lower.append((speed.time[within], speed.speed[within], color, LINE))
-        late = 1e3 * speeds[1][0].delay
-        legend.append(handle("speed: difference of neighbours", ROUGH))
-        legend.append(handle(f"speed: 10 and 30 Hz filters, {late:.1f} ms late", BLUE))
-        below = "speed"
-        si = f"{channel.unit}/s"
+        lower = _speed_panel(channel, float(time[0]), float(time[-1]))
     elif simulated is not None:
-        lower.append((time, values - simulated[rows], INK, THIN))
-        below = "measured less simulated"
-        si = channel.unit
+        lower = _difference_panel(channel.unit, time, values - simulated[rows], used)
     unit = display_unit(channel.shown_unit, float(np.abs(values).max()))
+    heights = [3.2]
     labels = [unit.label(channel.kind.replace("_", " ").replace("encoder counts", "angle"))]
-    if lower:
-        scale = lower[-1][1] if channel.is_position else lower[-1][1][_scale_rows(used)]
-        small = display_unit(si, float(np.abs(scale).max()))
-        labels.append(small.label(below))
-    heights = [2.4, 2.2] if lower else [3.2]
-    words = channel.name if title is None else title
-    figure, axes = sheet(heights, words, labels, "time (s)", legend=legend)
+    if lower is not None:
+        heights = [2.4, 2.2]
+        labels.append(lower.unit.label(lower.label))
+        legend += lower.legend
+    sheet_title = channel.name if title is None else title
+    figure, axes = sheet(heights, sheet_title, labels, "time (s)", legend=legend)
     style: dict[str, Any] = {"zero_order": channel.is_position, "width": THIN, "zorder": 2.5}
-    counted = values[_scale_rows(used)]
-    room = 0.12 * float(np.ptp(counted)) or 1.0 / unit.factor
-    axes[0].set_ylim(unit.factor * (counted.min() - room), unit.factor * (counted.max() + room))
+    _set_scale(axes[0], values[_scale_rows(used)], unit)
     draw(axes[0], time, unit.factor * values, INK if channel.is_position else BLUE, **style)
     if simulated is not None:
         draw(axes[0], time, unit.factor * simulated[rows], VERMILION, zorder=3.0)
@@ -482,18 +478,85 @@ def plot_channel(
             axes[0], 1.0 / (unit.factor * channel.encoder.angle_per_count), "counts"
         )
         counts.yaxis.set_major_locator(MaxNLocator(6, steps=[1, 2, 5, 10], integer=True))
-    if lower:
-        room = 0.12 * float(np.ptp(scale)) or 1.0 / small.factor
-        axes[1].set_ylim(small.factor * (scale.min() - room), small.factor * (scale.max() + room))
+    if lower is not None:
+        _set_scale(axes[1], lower.scale_values, lower.unit)
         zero_line(axes[1])
-        for when, what, color, width in lower:
-            draw(axes[1], when, small.factor * what, color, width=width)
+        for curve in lower.curves:
+            draw(
+                axes[1],
+                curve.time,
+                lower.unit.factor * curve.values,
+                curve.color,
+                width=curve.width,
+            )
     _mark_samples(axes, time, used)
     return figure
 
 
+class _Curve(NamedTuple):
+    time: Array
+    values: Array
+    """SI."""
+    color: str
+    width: float
+    """[pt]"""
+
+
+class _LowerPanel(NamedTuple):
+    """Panel below the samples of a channel."""
+
+    label: str
+    unit: DisplayUnit
+    curves: list[_Curve]
+    scale_values: Array
+    """Values that set the scale, SI."""
+    legend: list[Line2D]
+
+
+def _speed_panel(channel: Channel, begin: float, end: float) -> _LowerPanel:
+    """Speed of a position from an instant to another, by differences and by filters."""
+    from swashplate.campaign import speed_of
+
+    difference = speed_of(channel, "difference")
+    filtered = speed_of(channel, "exact")
+    curves = []
+    for speed, color in ((difference, ROUGH), (filtered, BLUE)):
+        rows = (speed.time >= begin) & (speed.time <= end)
+        curves.append(_Curve(speed.time[rows], speed.speed[rows], color, LINE))
+    scale_values = curves[1].values
+    delay_ms = 1e3 * filtered.delay
+    return _LowerPanel(
+        label="speed",
+        unit=display_unit(f"{channel.unit}/s", float(np.abs(scale_values).max())),
+        curves=curves,
+        scale_values=scale_values,
+        legend=[
+            handle("speed: difference of neighbours", ROUGH),
+            handle(f"speed: 10 and 30 Hz filters, {delay_ms:.1f} ms late", BLUE),
+        ],
+    )
+
+
+def _difference_panel(unit: str, time: Array, difference: Array, used: Mask) -> _LowerPanel:
+    """Measured less simulated values of a channel."""
+    scale_values = difference[_scale_rows(used)]
+    return _LowerPanel(
+        label="measured less simulated",
+        unit=display_unit(unit, float(np.abs(scale_values).max())),
+        curves=[_Curve(time, difference, INK, THIN)],
+        scale_values=scale_values,
+        legend=[],
+    )
+
+
+def _set_scale(ax: Axes, values: Array, unit: DisplayUnit) -> None:
+    """Let a panel show values, SI, with a margin above and below."""
+    margin = 0.12 * float(np.ptp(values)) or 1.0 / unit.factor
+    ax.set_ylim(unit.factor * (values.min() - margin), unit.factor * (values.max() + margin))
+
+
 def _mark_samples(axes: Sequence[Axes], time: Array, used: Mask) -> None:
-    """Mark what is ignored of a record and its gaps in panels over it, from end to end."""
+    """Mark ignored samples and gaps of a record in panels, and let these show all of it."""
     for ax in axes:
         shade(ax, stretches(time, ~used), IGNORED)
         mark_gaps(ax, time)
@@ -512,15 +575,15 @@ def plot_prediction(
     window: tuple[float, float] | None = None,
     title: str | None = None,
 ) -> Figure:
-    """Figure of one channel of a run, measured and simulated, and of the residual it is judged by.
+    """Figure of one channel of a run, measured and simulated, with the assessed residual.
 
     Parameters
     ----------
     quality : RunQuality
-        The channel. Below a position stands the speed, by which it is judged: measured and
-        simulated positions go through the same filters. The lowest panel is the residual, simulated
-        less measured, of that speed; of a position from which no speed can be computed, and of any
-        other channel, its own.
+        The channel. A position is assessed by its speed, which has a panel of its own: measured
+        and simulated positions go through the same filters. The lowest panel is the residual,
+        simulated less measured: of that speed, or of the channel itself if it is not a position or
+        no speed can be computed from it.
     window : (float, float), optional
         First and last instant to show [s]. Everything is computed from the whole record.
 
@@ -534,25 +597,28 @@ def plot_prediction(
     rows = rows_within(channel.time, window, str(channel.source))
     time = channel.time[rows]
     used = channel.used[rows]
-    counted = _scale_rows(used)
+    scale_rows = _scale_rows(used)
     panels = [_overlay(signal, rows) for signal in signals]
-    judged = signals[-1]
-    residual = judged.residual[rows]
-    panels.append(Overlay("residual", judged.experiment[judged.channel].unit, [(residual, INK)]))
-    largest = [max(float(np.abs(v[counted]).max()) for v, _ in panel.curves) for panel in panels]
-    pairs = zip(panels, largest, strict=True)
-    units = [display_unit(panel.unit, size or 1.0) for panel, size in pairs]
-    labels = [unit.label(panel.words) for panel, unit in zip(panels, units, strict=True)]
+    assessed = signals[-1]
+    residual_unit = assessed.experiment[assessed.channel].unit
+    panels.append(Overlay("residual", residual_unit, [(assessed.residual[rows], INK)]))
+    units = []
+    labels = []
+    for panel in panels:
+        largest = max(float(np.abs(values[scale_rows]).max()) for values, _ in panel.curves)
+        unit = display_unit(panel.unit, largest or 1.0)
+        units.append(unit)
+        labels.append(unit.label(panel.label))
     legend = [handle("measured", BLUE, width=WIDE), handle("simulated", VERMILION, width=NARROW)]
-    words = f"{quality.experiment.name}, {channel.name}" if title is None else title
+    sheet_title = f"{quality.experiment.name}, {channel.name}" if title is None else title
     heights = [2.2] * len(signals) + [1.5]
-    figure, axes = sheet(heights, words, labels, "time (s)", legend=legend)
+    figure, axes = sheet(heights, sheet_title, labels, "time (s)", legend=legend)
     for ax, panel, unit in zip(axes, panels, units, strict=True):
-        shown = [unit.factor * values[counted] for values, _ in panel.curves]
-        low = min(float(curve.min()) for curve in shown)
-        high = max(float(curve.max()) for curve in shown)
-        room = 0.1 * (high - low) or 1.0
-        ax.set_ylim(low - room, high + room)
+        scale_curves = [unit.factor * values[scale_rows] for values, _ in panel.curves]
+        low = min(float(curve.min()) for curve in scale_curves)
+        high = max(float(curve.max()) for curve in scale_curves)
+        margin = 0.1 * (high - low) or 1.0
+        ax.set_ylim(low - margin, high + margin)
         zero_line(ax)
         for values, color in panel.curves:
             width = WIDE if color == BLUE else NARROW
@@ -564,7 +630,7 @@ def plot_prediction(
 class Overlay(NamedTuple):
     """Curves of one panel, SI, each with its colour."""
 
-    words: str
+    label: str
     unit: str
     curves: list[tuple[Array, str]]
 
@@ -572,6 +638,8 @@ class Overlay(NamedTuple):
 def _overlay(quality: RunQuality, rows: slice) -> Overlay:
     """Measured curve of a channel, and the simulated one on top of it."""
     channel = quality.experiment[quality.channel]
-    words = channel.kind.replace("_", " ").replace("encoder counts", "angle")
+    label = channel.kind.replace("_", " ").replace("encoder counts", "angle")
+    if channel.kind == "other":
+        label = channel.name
     curves = [(channel.values[rows], BLUE), (quality.simulated[rows], VERMILION)]
-    return Overlay(channel.name if channel.kind == "other" else words, channel.shown_unit, curves)
+    return Overlay(label, channel.shown_unit, curves)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from textwrap import wrap
-from typing import Any, NamedTuple, overload
+from typing import Any, Literal, NamedTuple, overload
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -48,7 +48,7 @@ HEADINGS = {
 """Names of headings of the waves. [deg]"""
 
 
-def seaway_words(sea: Seaway, height: bool = True) -> str:
+def seaway_label(sea: Seaway, height: bool = True) -> str:
     """A seaway in a few words, with the height of its waves or without.
 
     ``"ss3 0.88 m, 7.5 s, abeam from starboard, roll 13 s"``
@@ -60,12 +60,12 @@ def seaway_words(sea: Seaway, height: bool = True) -> str:
     elif isinstance(sea.sea, str):
         first = f"{sea.sea} {first}"
     heading = HEADINGS.get(sea.heading_deg % 360.0, f"waves at {sea.heading_deg:g}°")
-    words = [first, heading]
+    texts = [first, heading]
     if spectrum.peak_factor != 1.0:
-        words.insert(1, f"γ {spectrum.peak_factor:g}")
+        texts.insert(1, f"γ {spectrum.peak_factor:g}")
     if isinstance(sea.ship, Hull):
-        words.append(f"roll {sea.ship.roll_period:g} s")
-    return ", ".join(words)
+        texts.append(f"roll {sea.ship.roll_period:g} s")
+    return ", ".join(texts)
 
 
 def remarks(texts: Sequence[str]) -> str:
@@ -73,29 +73,27 @@ def remarks(texts: Sequence[str]) -> str:
     return "\n".join(wrap("; ".join(filter(None, texts)), LETTERS))
 
 
-def remark(ax: Axes, words: str, rows: int = 0) -> None:
+def remark(ax: Axes, text: str, rows: int = 0) -> None:
     """Write grey words above a panel, over so many rows of a legend."""
-    style.write_words(
-        ax, words, (0.0, 1.0), (0.0, 3.0 + 13.0 * rows), color=style.GREY, va="bottom"
-    )
+    style.put_text(ax, text, (0.0, 1.0), (0.0, 3.0 + 13.0 * rows), color=style.GREY, va="bottom")
 
 
 def _panels(
     heights: list[float],
     labels: Sequence[str],
-    below: str,
+    x_label: str,
     title: str,
-    looks: Mapping[str, style.Stroke],
+    strokes: Mapping[str, style.Stroke],
     texts: Sequence[str],
 ) -> tuple[Figure, list[Axes]]:
     """Make panels with a legend of lines, if there are several, and remarks above them."""
     legend = []
-    if len(looks) > 1:
-        legend = [style.handle(name, look.color, look.dashes) for name, look in looks.items()]
-    words = remarks(texts)
-    lines = 1 + words.count("\n")
-    figure, axes = style.sheet(heights, title, labels, below, legend=legend, lines=lines)
-    remark(axes[0], words, style.legend_rows(legend) if legend else 0)
+    if len(strokes) > 1:
+        legend = style.stroke_handles(strokes)
+    joined_remarks = remarks(texts)
+    lines = 1 + joined_remarks.count("\n")
+    figure, axes = style.sheet(heights, title, labels, x_label, legend=legend, lines=lines)
+    remark(axes[0], joined_remarks, style.legend_rows(legend) if legend else 0)
     return figure, axes
 
 
@@ -128,7 +126,7 @@ def plot_crane(
     """
     named = named_runs(runs, MOST_RUNS, "A figure")
     first = next(iter(named.values()))
-    looks = style.strokes(named)
+    strokes = style.strokes(named)
     driven = {name: run for name, run in named.items() if run.actuation != "ideal"}
     panels = _signal_panels(named, sea or {})
     heights = [panel.height for panel in panels]
@@ -143,13 +141,13 @@ def plot_crane(
         labels,
         "time (s)",
         title or first.crane.title,
-        looks,
+        strokes,
         texts=(stick_remark, assumed(first.crane)),
     )
     for ax, panel in zip(axes, panels, strict=False):
-        _draw_signal(ax, panel, looks)
+        _draw_signal(ax, panel, strokes)
     if driven:
-        _draw_limits(axes[-1], driven, looks)
+        _draw_limits(axes[-1], driven, strokes)
     for ax in axes:
         fit_time(ax, first.time)
         if stick_moves:
@@ -186,16 +184,18 @@ def _moves(panel: SignalPanel) -> bool:
     return any(np.ptp(getattr(run, panel.signal)) > MOVED for run in panel.runs.values())
 
 
-def _draw_signal(ax: Axes, panel: SignalPanel, looks: Mapping[str, style.Stroke]) -> None:
+def _draw_signal(ax: Axes, panel: SignalPanel, strokes: Mapping[str, style.Stroke]) -> None:
     """Draw the signal of a panel, a line for each run."""
     for name, run in panel.runs.items():
-        look = looks[name]
-        draw(ax, run.time, getattr(run, panel.signal), look.color, dashes=look.dashes)
+        stroke = strokes[name]
+        draw(ax, run.time, getattr(run, panel.signal), stroke.color, dashes=stroke.dashes)
     if panel.signal == "swing_deg":
         ax.set_ylim(bottom=0.0)
 
 
-def _draw_limits(ax: Axes, runs: Mapping[str, CraneRun], looks: Mapping[str, style.Stroke]) -> None:
+def _draw_limits(
+    ax: Axes, runs: Mapping[str, CraneRun], strokes: Mapping[str, style.Stroke]
+) -> None:
     """Draw bars while limits of slew and luff act, a row for each run and axis."""
     rows = [(name, axis) for name in runs for axis in ("slew", "luff")]
     ax.set_ylim(len(rows) - 0.4, -0.6)
@@ -208,7 +208,7 @@ def _draw_limits(ax: Axes, runs: Mapping[str, CraneRun], looks: Mapping[str, sty
     ax.grid(False, axis="y")
     ax.set_yticks(range(len(rows)), [axis for _, axis in rows], fontsize=style.SMALL)
     for (name, _), text in zip(rows, ax.get_yticklabels(), strict=True):
-        text.set_color(looks[name].color if len(runs) > 1 else style.INK)
+        text.set_color(strokes[name].color if len(runs) > 1 else style.INK)
     style.put_legend(ax, [shade_handle(SHADES[limit]) for limit in ACTING])
 
 
@@ -226,8 +226,10 @@ LOOKS = {
 """Title of a sweep over a quantity, and its abscissa."""
 RADII = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0)
 """Circles of a polar figure. [deg]"""
-ACROSS, AROUND = 5.0, 0.46
-"""Size of a polar figure, and room for the words around it. [inch]"""
+DIAMETER = 5.0
+"""Diameter of a polar figure. [inch]"""
+AROUND = 0.46
+"""Space for the names of bearings around it. [inch]"""
 CENTRE = 0.05
 """Swing at the centre of a polar figure, whose radius is logarithmic. [deg]"""
 
@@ -239,27 +241,27 @@ def plot_sweep(result: Sweep, *, title: str | None = None) -> Figure:
     bearings are on one side of the ship. If one of the runs at a point left the model, the line has
     a gap there, and a cross marks it.
     """
-    looks = style.strokes(result.names)
-    usual, below = LOOKS[result.over]
+    strokes = style.strokes(result.names)
+    default_title, x_label = LOOKS[result.over]
     means = "over {} with its 95 % interval"
     if result.over == "bearing":
         means = "RMS over {}"
     some_left = bool(np.isnan(result.rms()).any())
     texts = (
-        seaway_words(result.seaway, result.over != "height"),
+        seaway_label(result.seaway, result.over != "height"),
         means.format(count(len(result.values), "seaway")),
         "" if result.over == "bearing" else "thin line: no control, by its spectrum",
         "×: a run left the model" if some_left else "",
         assumed(result.crane),
     )
     if result.over == "bearing":
-        return _polar(result, title or usual, looks, texts)
+        return _polar(result, title or default_title, strokes, texts)
     labels = ("swing, RMS (deg)",)
-    figure, (ax,) = _panels([3.0], labels, below, title or usual, looks, texts)
+    figure, (ax,) = _panels([3.0], labels, x_label, title or default_title, strokes, texts)
     swings = np.degrees(result.values)
     points = result.points
     highest = LEAST
-    for variant, (color, dashes) in enumerate(looks.values()):
+    for variant, (color, dashes) in enumerate(strokes.values()):
         of_variant = swings[:, :, variant].T
         estimates = np.array([rms_of(seaways) for seaways in of_variant])
         left_model = np.isnan(of_variant).any(axis=1)
@@ -269,10 +271,8 @@ def plot_sweep(result: Sweep, *, title: str | None = None) -> Figure:
         ax.plot(points, middle, color=color, linestyle=dashes, linewidth=1.4, marker="o", ms=3.0)
         # crosses of several variants at a point stand below one another
         height = np.full(int(left_model.sum()), 0.97 - 0.05 * variant)
-        across = ax.get_xaxis_transform()
-        ax.plot(
-            points[left_model], height, "x", color=color, ms=5.0, transform=across, clip_on=False
-        )
+        x = ax.get_xaxis_transform()
+        ax.plot(points[left_model], height, "x", color=color, ms=5.0, transform=x, clip_on=False)
         highest = max(highest, float(np.nanmax(np.append(middle, LEAST))))
     ax.plot(points, np.degrees(result.spectrum), color=style.GREY, linewidth=0.8, zorder=1.5)
     if result.over == "height":
@@ -283,46 +283,50 @@ def plot_sweep(result: Sweep, *, title: str | None = None) -> Figure:
         low = max(LEAST, 0.5 * float(finite.min(initial=highest)))
         _logarithmic(ax, low, 2.0 * highest)
         ax.axvline(1.0, color=style.FAINT, linewidth=0.8, zorder=1.0)
-        style.write_words(ax, "as built", (1.0, low), (4.0, 4.0), coords="data", color=style.GREY)
+        style.put_text(ax, "as built", (1.0, low), (4.0, 4.0), coords="data", color=style.GREY)
     return figure
 
 
-def _side_of(bearings: Array) -> tuple[str, float]:
-    """Side of the ship that bearings [rad] lie on, empty if they are on both; its first bearing."""
-    if bearings.size and (bearings >= 0.0).all() and (bearings <= np.pi).all():
-        return "starboard", 0.0
-    if bearings.size and (bearings >= np.pi).all() and (bearings <= 2.0 * np.pi).all():
-        return "port", np.pi
-    return "", 0.0
+Side = Literal["starboard", "port"]
+SIDES: dict[Side, float] = {"starboard": 0.0, "port": np.pi}
+"""Sides of the ship, with the first bearing of each. [rad]"""
+
+
+def _side_of(bearings: Array) -> Side | None:
+    """Side of the ship that all bearings [rad] lie on; None if they are on both."""
+    for side, first in SIDES.items():
+        if bearings.size and (bearings >= first).all() and (bearings <= first + np.pi).all():
+            return side
+    return None
 
 
 def _polar(
-    result: Sweep, title: str, looks: dict[str, style.Stroke], texts: Sequence[str]
+    result: Sweep, title: str, strokes: dict[str, style.Stroke], texts: Sequence[str]
 ) -> Figure:
     """Swing over the bearing around the ship, or over the half of it that the bearings are on."""
-    legend = [style.handle(name, look.color, look.dashes) for name, look in looks.items()]
+    legend = style.stroke_handles(strokes)
     rows = style.legend_rows(legend)
-    words = remarks(texts)
-    above = style.HEAD + style.ROW * (rows + 1 + words.count("\n"))
-    side, first = _side_of(result.points)
-    tall = 0.5 * ACROSS if side else ACROSS
-    height = above + tall + 2.0 * AROUND
+    joined_remarks = remarks(texts)
+    header_height = style.HEAD + style.ROW * (rows + 1 + joined_remarks.count("\n"))
+    side = _side_of(result.points)
+    plot_height = DIAMETER if side is None else 0.5 * DIAMETER
+    height = header_height + plot_height + 2.0 * AROUND
     figure = style.new_figure(style.WIDTH, height, layout="none")
     style.write_title(figure, title)
     # the axes are a square, of which half a circle takes the middle
-    left = 0.5 * (style.WIDTH - ACROSS)
-    bottom = AROUND + 0.5 * (tall - ACROSS)
-    square = left / style.WIDTH, bottom / height, ACROSS / style.WIDTH, ACROSS / height
+    left = 0.5 * (style.WIDTH - DIAMETER)
+    bottom = AROUND + 0.5 * (plot_height - DIAMETER)
+    square = (left / style.WIDTH, bottom / height, DIAMETER / style.WIDTH, DIAMETER / height)
     ax: Any = figure.add_axes(square, projection="polar")
-    if side:
-        _dress_half_circle(ax, first)
-    else:
+    if side is None:
         _dress_circle(ax)
-    _draw_polar(ax, result, looks)
-    head = figure.add_axes((0.012, 1.0 - (above + 0.02) / height, 0.9, 0.001))
-    head.set_axis_off()
-    style.put_legend(head, legend)
-    remark(head, words, rows)
+    else:
+        _dress_half_circle(ax, SIDES[side])
+    _draw_polar(ax, result, strokes)
+    header = figure.add_axes((0.012, 1.0 - (header_height + 0.02) / height, 0.9, 0.001))
+    header.set_axis_off()
+    style.put_legend(header, legend)
+    remark(header, joined_remarks, rows)
     return figure
 
 
@@ -340,10 +344,10 @@ def _dress_circle(ax: Any) -> None:
         text.set_horizontalalignment("center" if angle % 180 == 0 else alignment)
 
 
-def _dress_half_circle(ax: Any, first: float) -> None:
-    """Show half a circle from a bearing [rad] on, which lies flat, and name its bearings."""
-    first_deg = np.degrees(first)
-    ax.set_theta_offset(first + np.pi)
+def _dress_half_circle(ax: Any, first_bearing: float) -> None:
+    """Show half a circle from a bearing [rad] on, with its diameter level and named bearings."""
+    first_deg = np.degrees(first_bearing)
+    ax.set_theta_offset(first_bearing + np.pi)
     ax.set_thetamin(first_deg)
     ax.set_thetamax(first_deg + 180.0)
     ax.spines["start"].set_color(style.FAINT)
@@ -362,27 +366,27 @@ def _dress_bearings(ax: Any, angles: range) -> None:
     ax.spines["polar"].set_color(style.FAINT)
 
 
-def _draw_polar(ax: Any, result: Sweep, looks: Mapping[str, style.Stroke]) -> None:
+def _draw_polar(ax: Any, result: Sweep, strokes: Mapping[str, style.Stroke]) -> None:
     """Draw the swing of each variant over the bearing, on a logarithmic radius."""
     mean = np.degrees(result.rms())
     largest = float(np.nanmax(np.append(mean, RADII[1])))
     # closed if the bearings go all the way around, not if they are part of a circle
-    again = result.points[:1] + 2.0 * np.pi
-    gap = again - result.points[-1]
-    again = again[gap <= 1.5 * np.diff(result.points).max(initial=0.0)]
-    around = np.append(result.points, again)
-    edge = float(np.log10(1.3 * largest / CENTRE))
-    for swing, (color, dashes) in zip(mean.T, looks.values(), strict=True):
-        radius = np.log10(np.maximum(np.append(swing, swing[: again.size]), CENTRE) / CENTRE)
-        ax.plot(around, radius, color=color, linestyle=dashes, linewidth=1.4, marker="o", ms=2.5)
+    closing_bearing = result.points[:1] + 2.0 * np.pi
+    gap = closing_bearing - result.points[-1]
+    closing_bearing = closing_bearing[gap <= 1.5 * np.diff(result.points).max(initial=0.0)]
+    bearings = np.append(result.points, closing_bearing)
+    outer_radius = float(np.log10(1.3 * largest / CENTRE))
+    for swing, (color, dashes) in zip(mean.T, strokes.values(), strict=True):
+        closed_swing = np.append(swing, swing[: closing_bearing.size])
+        radius = np.log10(np.maximum(closed_swing, CENTRE) / CENTRE)
+        ax.plot(bearings, radius, color=color, linestyle=dashes, linewidth=1.4, marker="o", ms=2.5)
         left_model = result.points[np.isnan(swing)]
-        rim = np.full(left_model.size, edge)
+        rim = np.full(left_model.size, outer_radius)
         ax.plot(left_model, rim, "x", color=color, ms=6.0, clip_on=False)
     circles = [radius for radius in RADII if radius <= 1.3 * largest]
-    ax.set_ylim(0.0, edge)
+    ax.set_ylim(0.0, outer_radius)
     ax.set_yticks(np.log10(np.array(circles) / CENTRE), [f"{radius:g}°" for radius in circles])
-    side, _ = _side_of(result.points)
-    if not side:
+    if _side_of(result.points) is None:
         ax.set_rlabel_position(52.5)  # lines cross it straight on
 
 
@@ -408,27 +412,30 @@ def plot_follow(result: Followable, *, ax: GivenAxes, title: str | None = None) 
 def plot_follow(
     result: Followable, *, ax: Axes | Sequence[Axes] | None = None, title: str | None = None
 ) -> Figure | Axes | Sequence[Axes]:
-    """Figure of the amplitude that each axis can follow over the period, and what seas ask of it.
+    """Figure of the amplitude that each axis can follow over the period, and of the seas' demands.
 
-    What a sea asks is a diamond in the axis's colour, filled if it is more than the axis can, or a
-    triangle at the lower end of the ordinate if it is less than that.
+    The demand of a sea is a diamond in the axis's colour, filled if the axis cannot follow it. If
+    it is below the ordinate, it is a triangle at the lower end.
 
     By default a new figure; with `ax` it is drawn there, without the remark above, and `ax`
     returned.
     """
-    looks = style.strokes(AXIS_LINES)
-    words = title or "What the axes can follow"
+    strokes = style.strokes(AXIS_LINES)
     label = "amplitude (m)"
-    below = "period (s)"
+    x_label = "period (s)"
     if ax is None:
-        boom = f"boom at {result.boom_deg:.0f}°"
         figure, (panel,) = _panels(
-            [3.6], [label], below, words, looks, texts=(boom, DEMANDED, assumed(result.crane))
+            heights=[3.6],
+            labels=[label],
+            x_label=x_label,
+            title=title or "What the axes can follow",
+            strokes=strokes,
+            texts=(f"boom at {result.boom_deg:.0f}°", DEMANDED, assumed(result.crane)),
         )
     else:
-        legend = [style.handle(name, look.color, look.dashes) for name, look in looks.items()]
-        (panel,) = style.dress_given(ax, title, [label], below, what="panel", legend=legend)
-    lines = list(zip(looks.values(), result.amplitude.T, strict=True))
+        legend = style.stroke_handles(strokes)
+        (panel,) = style.dress_given(ax, title, [label], x_label, what="panel", legend=legend)
+    lines = list(zip(strokes.values(), result.amplitude.T, strict=True))
     for (color, dashes), amplitudes in lines:
         panel.plot(result.periods, amplitudes, color=color, linestyle=dashes, linewidth=1.4)
     first = float(result.periods[0])
@@ -463,13 +470,13 @@ def _name_seas(ax: Axes, tops: Mapping[str, tuple[float, float]]) -> None:
     first, last = ax.get_xlim()
     names: list[tuple[float, float, float]] = []
     for name, (period, top) in sorted(tops.items(), key=lambda entry: entry[1]):
-        across = (period - first) / (last - first)
-        up = (np.log(top) - low) / (high - low)
+        x = (period - first) / (last - first)
+        y = (np.log(top) - low) / (high - low)
         width = 0.012 * len(name)
         while any(
-            abs(across - named_across) < 0.5 * (width + named_width) and abs(up - named_up) < 0.06
+            abs(x - named_across) < 0.5 * (width + named_width) and abs(y - named_up) < 0.06
             for named_across, named_up, named_width in names
         ):
-            up += 0.01
-        names.append((across, up, width))
-        style.write_words(ax, name, (across, up), (0.0, 6.0), ha="center", bbox=box)
+            y += 0.01
+        names.append((x, y, width))
+        style.put_text(ax, name, (x, y), (0.0, 6.0), ha="center", bbox=box)

@@ -20,7 +20,7 @@ from swashplate.crane import LIMITED, AssessedQuantity, Assessment, Hull, Operab
 from swashplate.crane.sea import rms_of
 from swashplate.crane.studies import NONE, WORKABLE, label_of
 from swashplate.report import style
-from swashplate.report.figures.crane import assumed, remark, remarks, seaway_words
+from swashplate.report.figures.crane import assumed, remark, remarks, seaway_label
 from swashplate.results import GivenAxes
 from swashplate.tables import count
 
@@ -30,12 +30,16 @@ Array = NDArray[np.float64]
 
 SWING = "swing, RMS of a seaway (deg)"
 NAME, ROOM = 30, style.WIDTH - 2.4
-"""Letters of a line of a variant's name; room for a legend beside such names. [inch]"""
-BREAK, LEFT, END = 1.06, 1.11, 1.16
-"""Where the axis breaks, runs that left the model stand, and the panel ends: in parts of the
-largest swing."""
-UNBROKEN_END = 1.03
-"""Where the panel ends if none left it."""
+"""Letters of a line of a variant's name; room for a legend next to such names. [inch]"""
+# positions on the axis, in parts of the largest swing
+END = 1.03
+"""End of the axis if no run left the model."""
+BREAK = 1.06
+"""Break of the axis if runs left the model."""
+DEPARTURES = 1.11
+"""Tick of the runs that left the model."""
+END_WITH_DEPARTURES = 1.16
+"""End of the axis if runs left the model."""
 WIDEST = 2.0
 """Part of the largest swing up to which an interval is shown whole."""
 LEAST_SHARE, MOST_SHARE = 0.1, 20.0
@@ -58,13 +62,13 @@ def plot_assessment(
 def plot_assessment(
     result: Assessment, *, ax: Axes | Sequence[Axes] | None = None, title: str | None = None
 ) -> Figure | Axes | Sequence[Axes]:
-    """Figure of an assessment: swing of each variant in each seaway, and what has a limit.
+    """Figure of an assessment: swing of each variant in each seaway, and the limited quantities.
 
     The first panel has a point for each seaway and a diamond as wide as the 95 % interval of their
     root mean square; runs that left the model are counted beyond a break of the axis. The second
     one has the most probable largest values in three hours as shares of their limits.
 
-    By default a new figure; with `ax`, of one panel, the swing alone is drawn there, without the
+    By default a new figure; with `ax`, of one panel, only the swing is drawn there, without the
     remark above, and `ax` returned.
     """
     if ax is not None:
@@ -84,15 +88,15 @@ def plot_assessment(
     grid = figure.subplots(len(heights), 1, squeeze=False, gridspec_kw={"height_ratios": heights})
     panels = list(grid[:, 0])
     seaways = f"{count(len(study.seeds), 'seaway')} of {study.length / 60.0:g} min"
-    style.write_title(figure, title or f"{seaways}, {seaway_words(study.seaway)}")
-    above = [
+    style.write_title(figure, title or f"{seaways}, {seaway_label(study.seaway)}")
+    remarks_above = [
         assumed(study.crane),
         f"'{result.assessed_variant}' and its limits; bars: 95 % intervals",
     ]
-    for panel, legend, words in zip(panels, legends, above, strict=False):
+    for panel, legend, remark_above in zip(panels, legends, remarks_above, strict=False):
         style.dress(panel)
         style.put_legend(panel, legend, room=ROOM)
-        remark(panel, words, style.legend_rows(legend, ROOM))
+        remark(panel, remark_above, style.legend_rows(legend, ROOM))
     style.label_below(panels[0], SWING)
     _draw_swings(panels[0], result)
     if limited:
@@ -141,8 +145,9 @@ def _draw_swings(ax: Axes, result: Assessment) -> None:
         _diamond(ax, row - 0.16, swing)
         departures = sum(result.departures(name).values())
         if departures:
-            ax.plot(LEFT * edge, row, "x", color=style.INK, ms=6.0)
-            style.write_words(ax, f"{departures}", (LEFT * edge, row), (7.0, -3.0), coords="data")
+            point = (DEPARTURES * edge, row)
+            ax.plot(*point, "x", color=style.INK, ms=6.0)
+            style.put_text(ax, f"{departures}", point, (7.0, -3.0), coords="data")
         label = style.in_lines(name, NAME)
         if name != NONE:
             worse = round(result.share_worse(name).value * swing.size)
@@ -152,7 +157,8 @@ def _draw_swings(ax: Axes, result: Assessment) -> None:
         by_spectrum = np.degrees(result.linear.values["swing"].rms)
         row = names.index(NONE)
         ax.vlines(by_spectrum, row - 0.4, row + 0.4, color=style.INK, linewidth=1.0, zorder=4.0)
-    _swing_axis(ax, edge, broken=any(result.departures(name) for name in names))
+    with_departures = any(result.departures(name) for name in names)
+    _swing_axis(ax, edge, with_departures=with_departures)
     ax.grid(False, axis="y")
     ax.set_yticks(range(len(names)), labels, fontsize=style.SMALL)
     ax.set_ylim(-0.5, len(names) - 0.5)
@@ -169,17 +175,22 @@ def _largest_swing(result: Assessment, swings: Sequence[Array]) -> float:
     return edge or 1.0
 
 
-def _swing_axis(ax: Axes, edge: float, *, broken: bool) -> None:
-    """An abscissa up to a swing [deg], and beyond a break the place of what left the model."""
-    ticks = list(MaxNLocator(8, steps=[1, 2, 5, 10]).tick_values(0.0, edge))
-    ticks = [tick for tick in ticks if 0.0 <= tick <= edge]
-    words = [f"{tick:g}" for tick in ticks]
-    if broken:
-        ax.axvline(BREAK * edge, color=style.FAINT, linewidth=1.0, linestyle=(0, (2, 2)))
-        ticks.append(LEFT * edge)
-        words.append("left the\nmodel")
-    ax.set_xticks(ticks, words)
-    ax.set_xlim(0.0, (END if broken else UNBROKEN_END) * edge)
+def _swing_axis(ax: Axes, largest_swing: float, *, with_departures: bool) -> None:
+    """Set an abscissa up to a swing [deg]; after a break the tick of runs that left the model."""
+    locator = MaxNLocator(8, steps=[1, 2, 5, 10])
+    ticks = [
+        tick for tick in locator.tick_values(0.0, largest_swing) if 0.0 <= tick <= largest_swing
+    ]
+    labels = [f"{tick:g}" for tick in ticks]
+    end = END * largest_swing
+    if with_departures:
+        break_at = BREAK * largest_swing
+        ax.axvline(break_at, color=style.FAINT, linewidth=1.0, linestyle=(0, (2, 2)))
+        ticks.append(DEPARTURES * largest_swing)
+        labels.append("left the\nmodel")
+        end = END_WITH_DEPARTURES * largest_swing
+    ax.set_xticks(ticks, labels)
+    ax.set_xlim(0.0, end)
 
 
 def _diamond(ax: Axes, row: float, swing: Array) -> None:
@@ -210,15 +221,18 @@ def _limit_legend(result: Assessment, limited: Sequence[AssessedQuantity]) -> li
 
 
 def _draw_limits(ax: Axes, result: Assessment, limited: Sequence[AssessedQuantity]) -> None:
-    """Draw a row for each quantity that has a limit: its largest value as a share of that."""
+    """Draw a row for each quantity with a limit: its largest value as a share of the limit.
+
+    In colour the assessed variant, with the interval of its value; in grey the others.
+    """
     others = {name: result.limited(name) for name in result.names[:-1]}
     shares = [_share(quantity.largest.high, quantity.limit) for quantity in limited]
     for quantities in others.values():
         shares += [_share(quantity.largest.value, quantity.limit) for quantity in quantities]
-    top = max([2.0, *(1.25 * share for share in shares if isfinite(share))])
-    end = min(top, MOST_SHARE)
+    finite_shares = [share for share in shares if isfinite(share)]
+    axis_end = min(max(2.0, 1.25 * max(finite_shares, default=0.0)), MOST_SHARE)
     names = [quantity.name for quantity in reversed(limited)]
-    ax.axvspan(1.0, end, color=style.VERMILION, alpha=0.07, linewidth=0.0, zorder=0.5)
+    ax.axvspan(1.0, axis_end, color=style.VERMILION, alpha=0.07, linewidth=0.0, zorder=0.5)
     ax.axvline(1.0, color=style.VERMILION, linewidth=1.0, zorder=1.5)
     for variant, quantities in others.items():
         marker = "s" if variant == NONE else "o"
@@ -226,24 +240,27 @@ def _draw_limits(ax: Axes, result: Assessment, limited: Sequence[AssessedQuantit
             if quantity.name in names:
                 row = names.index(quantity.name) + 0.18
                 share = _share(quantity.largest.value, quantity.limit)
-                _point(ax, share, row, end, marker, style.FAINT, face="white", ms=4.5)
+                _draw_share(ax, share, row, axis_end, marker, style.FAINT, face="white", ms=4.5)
     labels = []
     for row, quantity in enumerate(reversed(limited)):
         color = FACES[quantity.within] if quantity.within != "not decided" else style.INK
         low = _share(quantity.largest.low, quantity.limit)
         high = _share(quantity.largest.high, quantity.limit)
         if isfinite(low) and isfinite(high):
-            low, high = (min(max(share, LEAST_SHARE), end) for share in (low, high))
+            low = min(max(low, LEAST_SHARE), axis_end)
+            high = min(max(high, LEAST_SHARE), axis_end)
             ax.hlines(row, low, high, color=color, linewidth=2.0, zorder=2.5)
         share = _share(quantity.largest.value, quantity.limit)
-        _point(ax, share, row, end, "o", color, face=FACES[quantity.within], ms=6.5)
-        unit, factor = quantity.shown
-        # what has no more than three decimals is 0: a side-lead without waves across the boom
-        number = f"{round(factor * quantity.largest.value, 3):.3g}" if isfinite(share) else "–"
-        shown = f"{number} of {factor * quantity.limit:.3g} {unit}".rstrip()
-        labels.append(f"{LIMITED[quantity.name].label}\n{shown}")
+        _draw_share(ax, share, row, axis_end, "o", color, face=FACES[quantity.within], ms=6.5)
+        unit, factor = quantity.shown_unit
+        number = "–"
+        if isfinite(share):
+            # a side-lead without waves across the boom is 0, not a millionth of a degree
+            number = f"{round(factor * quantity.largest.value, 3):.3g}"
+        value_and_limit = f"{number} of {factor * quantity.limit:.3g} {unit}".rstrip()
+        labels.append(f"{LIMITED[quantity.name].label}\n{value_and_limit}")
     ax.set_xscale("log")
-    ax.set_xlim(LEAST_SHARE, end)
+    ax.set_xlim(LEAST_SHARE, axis_end)
     ax.xaxis.set_major_locator(FixedLocator([0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0]))
     ax.xaxis.set_minor_locator(NullLocator())
     ax.xaxis.set_major_formatter(FuncFormatter(lambda share, _: f"{share:g}"))
@@ -254,25 +271,25 @@ def _draw_limits(ax: Axes, result: Assessment, limited: Sequence[AssessedQuantit
 
 
 def _share(largest: float, limit: float) -> float:
-    """A largest value over its limit, which is 0 if no drive may be at a limit of its own."""
+    """A largest value over its limit, which may be 0 for the saturation of drives."""
     if limit > 0.0:
         return largest / limit
     return MOST_SHARE if largest > 0.0 else 0.0
 
 
-def _point(
-    ax: Axes, share: float, row: float, end: float, marker: str, color: str, **how: Any
+def _draw_share(
+    ax: Axes, share: float, row: float, axis_end: float, marker: str, color: str, **style: Any
 ) -> None:
-    """A share of a limit; a triangle at the end of the axis for one beyond it, nothing for NaN."""
+    """Draw a share of a limit: a triangle at the axis's end if it is beyond, nothing for NaN."""
     if not isfinite(share):
         return
     if share < LEAST_SHARE:
         marker = "<"
-    elif share > end:
+    elif share > axis_end:
         marker = ">"
-    face = how.pop("face")
-    shown = min(max(share, LEAST_SHARE), end)
-    ax.plot(shown, row, marker, color=color, mfc=face, zorder=3.0, clip_on=False, **how)
+    face = style.pop("face")
+    within_axis = min(max(share, LEAST_SHARE), axis_end)
+    ax.plot(within_axis, row, marker, color=color, mfc=face, zorder=3.0, clip_on=False, **style)
 
 
 # --- operability ----------------------------------------------------------------------------------
@@ -288,7 +305,7 @@ LIMIT_COLORS = (
 )
 """Colours of limits, the most frequent first; the first five can be distinguished if pale."""
 PALEST = 0.3
-"""Strength of the colour of a cell that one heading alone spoils."""
+"""Strength of the colour of a cell that only one heading spoils."""
 ABREAST = 3
 """Panels side by side."""
 
@@ -300,12 +317,12 @@ def plot_operability(result: Operability, *, title: str | None = None) -> Figure
     headings cannot be worked; it is white if all can.
     """
     weights = _weights(result)
-    used = [limit for limit in weights if limit != WORKABLE]
-    colors = dict(zip(used, LIMIT_COLORS, strict=False))
+    limits = [limit for limit in weights if limit != WORKABLE]
+    colors = dict(zip(limits, LIMIT_COLORS, strict=False))
     legend: list[Any] = [
         Patch(facecolor=color, label=label_of(limit)) for limit, color in colors.items()
     ]
-    if len(used) > len(colors):
+    if len(limits) > len(colors):
         legend.append(Patch(facecolor=style.FAINT, label="others"))
     legend.append(Patch(facecolor="white", edgecolor=style.FAINT, label="can be worked"))
     names = result.names
@@ -321,8 +338,8 @@ def plot_operability(result: Operability, *, title: str | None = None) -> Figure
         style.dress(panel)
         _draw_cells(panel, result, name, colors)
         worked = f"{100.0 * result.workable(name):.0f} % of the year"
-        words = f"{style.in_lines(name, NAME)}: {worked}"
-        panel.set_title(words, loc="left", fontsize=style.NORMAL, color=style.INK)
+        panel_title = f"{style.in_lines(name, NAME)}: {worked}"
+        panel.set_title(panel_title, loc="left", fontsize=style.NORMAL, color=style.INK)
     for panel in panels[len(names) :]:
         panel.set_axis_off()
     for panel in panels[max(len(names) - columns, 0) : len(names)]:  # the lowest of each column

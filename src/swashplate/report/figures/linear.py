@@ -22,9 +22,10 @@ from swashplate.report.style import (
     Stroke,
     dress_given,
     handle,
+    put_text,
     sheet,
+    stroke_handles,
     strokes,
-    write_words,
 )
 from swashplate.results import GivenAxes
 from swashplate.units import DisplayUnit, display_unit
@@ -72,7 +73,7 @@ def plot_bode(
 ) -> Figure | Axes | Sequence[Axes]:
     """Figure of gain, phase and distortion over the frequency, a line for each amplitude.
 
-    Lines end where nothing moves any more, which is said at the foot of the gain.
+    Lines end at the frequency from which nothing moves, which the foot of the gain's panel states.
 
     Parameters
     ----------
@@ -107,35 +108,36 @@ def plot_bode(
     if linear is not None:
         _check_ends(linear, response)
     unit = response.units.get(response.input, "")
-    looks = strokes(f"{amplitude:g} {unit}" for amplitude in response.amplitudes)
-    legend = [handle(name, look.color, look.dashes) for name, look in looks.items()]
+    stroke_by_name = strokes(f"{amplitude:g} {unit}" for amplitude in response.amplitudes)
+    legend = stroke_handles(stroke_by_name)
     if linear is not None:
-        legend.append(handle(f"small motions{_operating_words(linear)}", GREY, "dashed"))
+        legend.append(handle(f"small motions{_operating_point_label(linear)}", GREY, "dashed"))
     output = WORDS.get(response.output, response.output.replace("_", " "))
-    words = f"{response.name}: {response.input} to {output}, sines about {response.bias:g} {unit}"
+    default_title = (
+        f"{response.name}: {response.input} to {output}, sines about {response.bias:g} {unit}"
+    )
     output_unit = _output_unit(response)
     by = f"({output_unit.name})" if "/" in output_unit.name else output_unit.name or "1"
     gain_label = f"gain ({by}/{unit})" if unit else f"gain ({by})"
     labels = [gain_label, "phase (deg)", "distortion (%)"]
     if ax is None:
-        words = words if title is None else title
-        figure, axes = sheet([2.3, 2.3, 1.3], words, labels, "frequency (Hz)", legend=legend)
+        sheet_title = default_title if title is None else title
+        heights = [2.3, 2.3, 1.3]
+        figure, axes = sheet(heights, sheet_title, labels, "frequency (Hz)", legend=legend)
     else:
         count = min(max(np.size(np.asarray(ax, dtype=object)), 2), 3)
         axes = dress_given(ax, title, labels[:count], "frequency (Hz)", legend=legend)
-    _draw_response(axes, response, list(looks.values()))
+    _draw_response(axes, response, list(stroke_by_name.values()))
     if linear is not None:
         _draw_linear(axes, linear, response)
     _scale_axes(axes, response)
     # the lines are at the top there
-    write_words(
-        axes[0], "\n".join(response.still()), (0.0, 0.0), (4.0, 4.0), color=GREY, va="bottom"
-    )
+    put_text(axes[0], "\n".join(response.still()), (0.0, 0.0), (4.0, 4.0), color=GREY, va="bottom")
     if mark is not None and response.frequencies[0] <= mark <= response.frequencies[-1]:
         for panel in axes:
             panel.axvline(mark, color=FAINT, linewidth=1.0, zorder=1.3)
         position: dict[str, Any] = {"coords": ("data", "axes fraction"), "va": "bottom"}
-        write_words(axes[0], f"{mark:g} Hz", (mark, 0.0), (3.0, 3.0), color=GREY, **position)
+        put_text(axes[0], f"{mark:g} Hz", (mark, 0.0), (3.0, 3.0), color=GREY, **position)
     return figure if ax is None else ax
 
 
@@ -149,7 +151,7 @@ def _check_ends(linear: LinearModel, response: FrequencyResponse) -> None:
         )
 
 
-def _operating_words(linear: LinearModel) -> str:
+def _operating_point_label(linear: LinearModel) -> str:
     """Operating point of a drive's linear model, such as ``" about 2 V"``; else empty."""
     if not isinstance(linear, LinearDrive):
         return ""
@@ -166,15 +168,15 @@ def _output_unit(response: FrequencyResponse) -> DisplayUnit:
 
 
 def _draw_response(
-    axes: Sequence[Axes], response: FrequencyResponse, looks: Sequence[Stroke]
+    axes: Sequence[Axes], response: FrequencyResponse, stroke_by_name: Sequence[Stroke]
 ) -> None:
     """Draw gain, phase and distortion, in so many axes as there are, a line for each amplitude."""
     gain = _output_unit(response).factor * response.gain
     swept = (gain, np.degrees(response.phase), 100.0 * response.distortion)
     marker = "o" if response.frequencies.size == 1 else None
     for panel, rows in zip(axes, swept, strict=False):
-        for row, moves, look in zip(rows, response.moves, looks, strict=True):
-            style: dict[str, Any] = {"color": look.color, "ls": look.dashes, "lw": LINE}
+        for row, moves, stroke in zip(rows, response.moves, stroke_by_name, strict=True):
+            style: dict[str, Any] = {"color": stroke.color, "ls": stroke.dashes, "lw": LINE}
             shown_row = np.where(moves, row, np.nan)
             panel.plot(response.frequencies, shown_row, marker=marker, ms=4.0, **style)
 
@@ -214,8 +216,8 @@ def _scale_axes(axes: list[Axes], response: FrequencyResponse) -> None:
 def _set_plain_numbers(ax: Axes, which: str, span: float) -> None:
     """Write plain numbers along a logarithmic axis, as many as fit."""
     axis = ax.xaxis if which == "x" else ax.yaxis
-    room = DECADE**3 if which == "x" else DECADE**2
-    subs = (1.0, 2.0, 5.0) if span < room else (1.0,)
+    margin = DECADE**3 if which == "x" else DECADE**2
+    subs = (1.0, 2.0, 5.0) if span < margin else (1.0,)
     axis.set_major_locator(LogLocator(subs=subs, numticks=15))
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axis.set_minor_locator(NullLocator())

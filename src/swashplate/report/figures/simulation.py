@@ -42,16 +42,16 @@ from swashplate.report.style import (
     VERMILION,
     MarginLabel,
     dress_given,
-    handle,
     in_lines,
     label_below,
     label_margin,
     legend_rows,
     legend_within,
+    put_text,
     sheet,
     signed,
+    stroke_handles,
     strokes,
-    write_words,
     zero_line,
 )
 from swashplate.results import GivenAxes
@@ -83,13 +83,13 @@ class Mark(NamedTuple):
     """A level that the signal should be compared with."""
 
     level: float
-    words: str
+    label: str
 
 
 class Panel(NamedTuple):
     """Content of one panel: signals in SI, drawn in the units that people read."""
 
-    words: str
+    label: str
     si: str
     traces: tuple[Curve, ...]
     limits: tuple[tuple[Shade, Array], ...] = ()
@@ -210,7 +210,7 @@ def plot_signals(
 
     A user-defined model says what they are: their `Definition` has words and unit of the ordinate
     and the range, whose ends are drawn if the signal comes near to them. Stretches in which a limit
-    of the model acts are shaded in each panel; where several act, the last that the model names is
+    of the model acts are shaded in each panel; if several act, the last that the model names is
     seen. In given axes neither range nor limits are drawn.
 
     Parameters
@@ -242,13 +242,15 @@ def plot_signals(
     if ax is not None:
         _draw_given(run, signals, ax, label, rows, title)
         return ax
-    looks = _looks(run)
-    limits = tuple((look, stretches(run.time, run.active(name))) for name, look in looks.items())
+    shades = _limit_shades(run)
+    limits = tuple(
+        (limit_shade, stretches(run.time, run.active(name))) for name, limit_shade in shades.items()
+    )
     panels = {name: _panel(run, name, label, rows)._replace(limits=limits) for name in signals}
     columns = _columns(run, panels)
     longest = max(map(len, columns.values()))
     height = PANEL if len(panels) > 1 else ALONE
-    legend = _legend(list(panels.values()), tuple(looks.values()))
+    legend = _legend(list(panels.values()), tuple(shades.values()))
     figure, axes = sheet(
         [height] * longest,
         run.title if title is None else title,
@@ -262,7 +264,7 @@ def plot_signals(
             _draw_panel(panel_axes, panel._replace(height=height), run.time, rows)
         above = 4.0 + POINTS_PER_INCH * ROW * (legend_rows(legend) if legend else 0)
         if heading:
-            write_words(column_axes[0], heading, (0.0, 1.0), (0.0, above), color=GREY)
+            put_text(column_axes[0], heading, (0.0, 1.0), (0.0, above), color=GREY)
         last = column_axes[len(column) - 1]
         last.tick_params(labelbottom=True)
         label_below(last, "time (s)")
@@ -320,20 +322,20 @@ def _panel(run: Run, signal: str, label: str, rows: slice) -> Panel:
         if isfinite(end)
     )
     color = INK if signal in run.records else BLUE
-    words = in_lines(definition.name, LETTERS)
+    panel_label = in_lines(definition.name, LETTERS)
     trace = Curve(values, color, label)
-    return Panel(words, definition.unit, (trace,), marks=marks, from_zero=False)
+    return Panel(panel_label, definition.unit, (trace,), marks=marks, from_zero=False)
 
 
 def _definition(run: Run, signal: str) -> Definition:
     """Definition of a signal: of a user-defined model its own, of a drive from `SIGNAL_UNITS`."""
-    words = signal.replace("_", " ")
+    name = signal.replace("_", " ")
     if isinstance(run, Simulation | FullOrderSimulation):
-        return Definition(words, SIGNAL_UNITS.get(signal, ""))
-    return run.instance.model.definitions.get(signal, Definition(words, ""))
+        return Definition(name, SIGNAL_UNITS.get(signal, ""))
+    return run.instance.model.definitions.get(signal, Definition(name, ""))
 
 
-def _looks(run: Run) -> dict[str, Shade]:
+def _limit_shades(run: Run) -> dict[str, Shade]:
     """Looks of the limits of a user-defined model by name; a drive's stand in its chain."""
     if isinstance(run, Simulation | FullOrderSimulation):
         return {}
@@ -368,7 +370,7 @@ def plot_full_order(comparison: OrderComparison, *, title: str | None = None) ->
     else:
         error = Panel("difference", "rad/s", (Curve(comparison.error, INK),))
     speeds = (
-        # where the two are the same, the wide line shows on both sides of the narrow one
+        # if the two are the same, the wide line shows on both sides of the narrow one
         Curve(full.shaft_speed, BLUE, "five states", WIDE),
         Curve(comparison.reduced_speed, VERMILION, "one state", NARROW),
     )
@@ -416,12 +418,12 @@ def _chain(panels: Sequence[Panel], time: Array, title: str, rows: slice = slice
     return figure
 
 
-def _legend(panels: Sequence[Panel], looks: Sequence[Shade]) -> list[Patch]:
-    """Handles of the looks of limits that act in one of the panels, in the order given."""
+def _legend(panels: Sequence[Panel], shades: Sequence[Shade]) -> list[Patch]:
+    """Handles of the shades of limits that act in one of the panels, in the order given."""
     acting = set[Shade]()
     for panel in panels:
         acting.update(look for look, spans in panel.limits if spans.size)
-    return [shade_handle(look) for look in looks if look in acting]
+    return [shade_handle(shade) for shade in shades if shade in acting]
 
 
 def _draw_panel(ax: Axes, panel: Panel, time: Array, rows: slice) -> None:
@@ -434,25 +436,25 @@ def _draw_panel(ax: Axes, panel: Panel, time: Array, rows: slice) -> None:
     largest = max(float(np.abs(trace.values[rows]).max()) for trace in panel.traces)
     unit = display_unit(panel.si, max(largest, panel.least) or inf)
     name, factor = unit
-    label = f"{panel.words}\n({name})" if name else panel.words
+    label = f"{panel.label}\n({name})" if name else panel.label
     ax.set_ylabel(label, fontsize=NORMAL, color=INK)
     zero_line(ax)
-    shown = [factor * trace.values[rows] for trace in panel.traces]
-    low = min(float(curve.min()) for curve in shown)
-    high = max(float(curve.max()) for curve in shown)
+    curves = [factor * trace.values[rows] for trace in panel.traces]
+    low = min(float(curve.min()) for curve in curves)
+    high = max(float(curve.max()) for curve in curves)
     labels = []
     for mark in panel.marks:
         level = factor * mark.level
         if (high if level > 0.0 else -low) >= NEAR * abs(level):
             ax.axhline(level, color=GREY, linewidth=THIN, dashes=(5.0, 3.0), zorder=1.5)
-            labels.append(MarginLabel(level, mark.words, GREY))
+            labels.append(MarginLabel(level, mark.label, GREY))
     ends = [low, high, *(label.height for label in labels)]
     if panel.from_zero or not 0.0 < high - low < FAR * max(abs(low), abs(high)):
         ends.append(0.0)
     span = max(ends) - min(ends)
     spare = max(0.09 * span, 0.5 * (factor * panel.least - span)) or 1.0
     ax.set_ylim(min(ends) - spare, max(ends) + spare)
-    for trace, values in zip(panel.traces, shown, strict=True):
+    for trace, values in zip(panel.traces, curves, strict=True):
         draw(ax, time[rows], values, trace.color, width=trace.width)
         if trace.name:
             labels.append(MarginLabel(float(values[-1]), trace.name, trace.color))
@@ -493,12 +495,12 @@ def plot_maneuver(
     Figure, or `ax` as it was given
     """
     starts = np.array([start for start, _ in maneuver.pieces])
-    before = starts[starts > 0.0] - JUST_BEFORE * maneuver.length
+    before_steps = starts[starts > 0.0] - JUST_BEFORE * maneuver.length
     even = np.linspace(0.0, maneuver.length, COLUMNS)
-    time = np.union1d(even, np.concatenate([starts, before]))
+    time = np.union1d(even, np.concatenate([starts, before_steps]))
     if ax is None:
-        words = maneuver.name if title is None else title
-        figure, (panel,) = sheet([2.4], words, ["voltage (V)"], "time (s)")
+        title_text = maneuver.name if title is None else title
+        figure, (panel,) = sheet([2.4], title_text, ["voltage (V)"], "time (s)")
     else:
         (panel,) = dress_given(ax, title, ["voltage (V)"], "time (s)", what="panel")
     zero_line(panel)
@@ -526,15 +528,15 @@ def plot_comparison(simulations: Mapping[str, Simulation], *, title: str | None 
     """
     if not simulations:
         raise InputError("A comparison needs at least one simulation.")
-    looks = strokes(simulations)
+    stroke_by_name = strokes(simulations)
     speed = display_unit("rad/s")
-    words = "Shaft speed under the same command" if title is None else title
-    legend = [handle(name, look.color, look.dashes) for name, look in looks.items()]
+    title_text = "Shaft speed under the same command" if title is None else title
+    legend = stroke_handles(stroke_by_name)
     heights = [1.2, 2.6, 1.6] if len(simulations) > 1 else [1.2, 2.6]
     volts = all(simulation.voltage is not None for simulation in simulations.values())
     labels = ["voltage (V)" if volts else "current (A)", speed.label("shaft speed")]
     labels.append(speed.label("difference"))
-    figure, axes = sheet(heights, words, labels, "time (s)", legend=legend)
+    figure, axes = sheet(heights, title_text, labels, "time (s)", legend=legend)
     for ax in axes:
         zero_line(ax)
     (reference, first), *_ = simulations.items()
@@ -543,7 +545,7 @@ def plot_comparison(simulations: Mapping[str, Simulation], *, title: str | None 
         for simulation in simulations.values()
     ]
     for (name, run), command in zip(simulations.items(), commands, strict=True):
-        color, dashes = looks[name]
+        color, dashes = stroke_by_name[name]
         time = run.time
         if run is first:
             draw(axes[0], time, command, INK, zorder=3.0)
@@ -557,6 +559,6 @@ def plot_comparison(simulations: Mapping[str, Simulation], *, title: str | None 
             draw(axes[2], at, speed.factor * difference, color, dashes=dashes)
     if len(simulations) > 1:
         label = f"speed minus that of {reference}"
-        write_words(axes[2], label, (0.0, 1.0), color=looks[reference].color)
+        put_text(axes[2], label, (0.0, 1.0), color=stroke_by_name[reference].color)
     fit_time(axes[-1], *(simulation.time for simulation in simulations.values()))
     return figure

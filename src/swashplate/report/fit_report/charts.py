@@ -17,19 +17,22 @@ STRETCHES = 120
 """Of the lags, of which a chart shows the lowest and the highest value."""
 
 
-def _svg(width: float, height: float, words: str, elements: Iterable[Markup], look: str) -> Markup:
-    """A chart; `words` say what it shows to those who cannot see it."""
-    head = Markup('<svg class="{0}" width="{1:g}" viewBox="0 0 {1:g} {2:g}" role="img" ')
-    label = Markup('aria-label="{}">').format(words)
-    return Markup("").join([head.format(look, width, height), label, *elements, Markup("</svg>")])
+def _svg(
+    width: float, height: float, description: str, elements: Iterable[Markup], css_class: str
+) -> Markup:
+    """A chart, with a description for those who cannot see it."""
+    opening = Markup('<svg class="{0}" width="{1:g}" viewBox="0 0 {1:g} {2:g}" role="img" ')
+    label = Markup('aria-label="{}">').format(description)
+    start = opening.format(css_class, width, height)
+    return Markup("").join([start, label, *elements, Markup("</svg>")])
 
 
-def _text(x: float, y: float, words: str, anchor: str = "start", turn: float = 0.0) -> Markup:
-    """Words at a place, turned about it by an angle [deg]."""
+def _text(x: float, y: float, text: str, anchor: str = "start", turn: float = 0.0) -> Markup:
+    """A text at a point, turned about it by an angle [deg]."""
     template = Markup(
         '<text text-anchor="{}" transform="translate({:.1f} {:.1f}) rotate({:g})">{}</text>'
     )
-    return template.format(anchor, x, y, turn, words.replace("-", "−"))
+    return template.format(anchor, x, y, turn, text.replace("-", "−"))
 
 
 def _line(x1: float, y1: float, x2: float, y2: float, look: str = "axis") -> Markup:
@@ -43,7 +46,7 @@ def _polyline(x: Array, y: Array) -> Markup:
 
 
 def profile_chart(profile: Profile, unknown: Unknown) -> Markup:
-    """The least cost over one unknown, above that of the optimum, and where the interval ends."""
+    """The least cost over one unknown, above that of the optimum, with the ends of the interval."""
     values = np.array([unknown.to_value(point.number) for point in profile.points])
     rises = np.array([point.cost - profile.cost for point in profile.points])
     if not values.size:
@@ -56,7 +59,7 @@ def profile_chart(profile: Profile, unknown: Unknown) -> Markup:
     up = bottom - 6.0 - scale * (rises - low)
     level = bottom - 6.0 - scale * (profile.rise - low)
     point = Markup('<circle class="full" cx="{:.1f}" cy="{:.1f}" r="3"><title>{}</title></circle>')
-    words = f"{profile.name} ({unknown.unit})" if unknown.unit else profile.name
+    label = f"{profile.name} ({unknown.unit})" if unknown.unit else profile.name
     elements = [
         _line(left, top, left, bottom),
         _line(left, bottom, right, bottom),
@@ -70,38 +73,38 @@ def profile_chart(profile: Profile, unknown: Unknown) -> Markup:
         _text(left - 6.0, top + 8.0, f"{high:.4g}", "end"),
         _text(left, bottom + 14.0, f"{first:.5g}"),
         _text(right, bottom + 14.0, f"{last:.5g}", "end"),
-        _text(0.5 * (left + right), bottom + 30.0, words, "middle"),
+        _text(0.5 * (left + right), bottom + 30.0, label, "middle"),
         _text(12.0, 0.5 * (top + bottom), "rise of the cost", "middle", -90.0),
     ]
-    return _svg(330.0, 220.0, f"rise of the cost over {words}", elements, "chart")
+    return _svg(330.0, 220.0, f"rise of the cost over {label}", elements, "chart")
 
 
-def lags_chart(lags: Array, values: Array, band: float, words: str) -> Markup:
+def lags_chart(lags: Array, values: Array, band: float, description: str) -> Markup:
     """A correlation over the lag [s], with the band of what has none, by half its width."""
-    wide = 230.0
-    tall = 64.0
-    edge = 4.0
+    width = 230.0
+    plot_height = 64.0
+    margin = 4.0
     low, high = min(-band, float(values.min()), -0.1), max(band, float(values.max()), 0.1)
 
     def height(value: float | Array) -> Array:
-        return np.asarray(edge + (tall - 2.0 * edge) * (high - value) / (high - low))
+        return np.asarray(margin + (plot_height - 2.0 * margin) * (high - value) / (high - low))
 
     rows = thinned(lags, values, np.empty(0, dtype=np.intp), STRETCHES)
     reach = float(lags[-1] - lags[0]) or 1.0
-    across = edge + (wide - 2.0 * edge) * (lags - lags[0]) / reach
+    x = margin + (width - 2.0 * margin) * (lags - lags[0]) / reach
     zero, top, bottom = (float(height(level)) for level in (0.0, band, -band))
     belt = Markup('<rect class="band" x="{:g}" y="{:.1f}" width="{:g}" height="{:.1f}"/>')
     elements = [
-        belt.format(edge, top, wide - 2.0 * edge, bottom - top),
-        _line(edge, zero, wide - edge, zero),
+        belt.format(margin, top, width - 2.0 * margin, bottom - top),
+        _line(margin, zero, width - margin, zero),
     ]
     if lags[0] < 0.0:
-        middle = float(np.interp(0.0, lags, across))
-        elements.append(_line(middle, edge, middle, tall - edge))
+        middle = float(np.interp(0.0, lags, x))
+        elements.append(_line(middle, margin, middle, plot_height - margin))
     elements += [
-        _polyline(across[rows], height(values[rows])),
-        _text(edge, tall + 12.0, f"{lags[0]:.2g} s"),
-        _text(0.5 * wide, tall + 12.0, f"band ±{band:.2g}", "middle"),
-        _text(wide - edge, tall + 12.0, f"{lags[-1]:.2g} s", "end"),
+        _polyline(x[rows], height(values[rows])),
+        _text(margin, plot_height + 12.0, f"{lags[0]:.2g} s"),
+        _text(0.5 * width, plot_height + 12.0, f"band ±{band:.2g}", "middle"),
+        _text(width - margin, plot_height + 12.0, f"{lags[-1]:.2g} s", "end"),
     ]
-    return _svg(wide, tall + 16.0, words, elements, "small")
+    return _svg(width, plot_height + 16.0, description, elements, "small")

@@ -1,4 +1,4 @@
-"""What a report says: the sections of a fit's page and of a validation's, from the results."""
+"""Content of a report: the sections of a fit's page and of a validation's, from the results."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ from swashplate.report.fit_report.html_page import (
     titled,
 )
 from swashplate.report.fit_report.live import can_run, live_page, run_of
-from swashplate.report.fit_report.runs import ShownRun, run_data, run_words, shown_runs
+from swashplate.report.fit_report.runs import ShownRun, measures_line, run_data, shown_runs
 from swashplate.report.fit_report.summary import light, run_error, run_lights, summary_section
 from swashplate.tables import NONE, Cell, Column, Table, count, ended, joined, listed, write_text
 from swashplate.units import chosen_unit, show_rod, shown_in, unit_text
@@ -79,7 +79,7 @@ def write_fit_report(
     path : path
         The file, which replaces an older one.
     truth : ParameterSet, optional
-        What virtual tests were simulated with; it stands beside the estimates.
+        Parameters of which virtual tests were simulated, to show next to the estimates.
 
     Raises
     ------
@@ -124,7 +124,7 @@ def write_validation_report(
     path: str | Path,
     predicted: Sequence[RunQuality],
     *,
-    judged: Verdict | None = None,
+    verdict: Verdict | None = None,
     notes: Mapping[str, str] | None = None,
 ) -> None:
     """Write the report of a validation: one HTML file, whole or not at all, without network.
@@ -139,7 +139,7 @@ def write_validation_report(
         The file, which replaces an older one.
     predicted : sequence of RunQuality
         At least one, as `validation.predict` gives them.
-    judged : Verdict, optional
+    verdict : Verdict, optional
         The verdict; made here by default.
     notes : mapping of str to str, optional
         What belongs to the report besides.
@@ -155,7 +155,7 @@ def write_validation_report(
         f"{count(len(runs), 'run')} predicted from the command alone · "
         f"{count(samples, 'sample')} that count"
     )
-    assessed = judged if judged is not None else assess_fit((), predicted)
+    assessed = verdict if verdict is not None else assess_fit((), predicted)
     setup = _setup_section(campaign, drive, "", notes or {}, ())
     write_text(_page("Validation", facts, campaign, drive, runs, assessed, setup), path)
 
@@ -172,7 +172,7 @@ def _page(
     campaign: Campaign,
     fitted: Fit | Parameters,
     runs: Sequence[ShownRun],
-    judged: Verdict,
+    verdict: Verdict,
     setup: Section,
     other_sections: Sequence[Section] = (),
 ) -> str:
@@ -191,20 +191,20 @@ def _page(
     sentences = list[str]()
     for run, qualities in examined.items():
         for signal in qualities:
-            for words in signal.findings:
-                sentences.append(ended(f"{run.name}, {signal.signal}: {words}"))
+            for finding in signal.findings:
+                sentences.append(ended(f"{run.name}, {signal.signal}: {finding}"))
                 findings.setdefault(run.name, []).append(len(sentences))
     quality = joined(
         [quality_table(run_qualities, of_run) for run_qualities, of_run in examined.items()]
     )
     known_drive = Drive(drive) if isinstance(drive, ParameterSet) else None
     sections = [
-        summary_section(judged, campaign, known_drive, stages, runs, len(sentences)),
-        _agreement_section(runs, findings, judged),
+        summary_section(verdict, campaign, known_drive, stages, runs, len(sentences)),
+        _agreement_section(runs, findings, verdict),
         _curves_section(runs, campaign.virtual),
         *other_sections,
         _residual_section(runs),
-        _verdict_section(judged, len(sentences)),
+        _verdict_section(verdict, len(sentences)),
         _data_section(sentences, quality, campaign.overviews),
         setup,
     ]
@@ -231,14 +231,22 @@ def _qualities(runs: Sequence[ShownRun], role: str = "") -> list[RunQuality]:
 
 
 def _agreement_section(
-    runs: Sequence[ShownRun], findings: dict[str, list[int]], judged: Verdict
+    runs: Sequence[ShownRun], findings: dict[str, list[int]], verdict: Verdict
 ) -> Section:
-    error = Column("error / range", "s", none=NONE)
-    columns = (Column(""), Column("run"), Column("role"), Column("maneuver"), Column("judged by"))
-    overview = Table("", (*columns, error, Column("why"), Column("findings")))
-    lights = run_lights(runs, findings, judged)
+    columns = (
+        Column(""),
+        Column("run"),
+        Column("role"),
+        Column("maneuver"),
+        Column("judged by"),
+        Column("error / range", "s", none=NONE),
+        Column("why"),
+        Column("findings"),
+    )
+    overview = Table("", columns)
+    lights = run_lights(runs, findings, verdict)
     for number, (run, (look, why)) in enumerate(zip(runs, lights, strict=True)):
-        part = run_error(run, runs)
+        error_share = run_error(run, runs)
         to_curves = Markup('<a href="#run-{}">{}</a>').format(number, run.name)
         links = Markup(" ").join(
             Markup('<a href="#finding-{0}">{0}</a>').format(finding_number)
@@ -250,7 +258,7 @@ def _agreement_section(
             run.role,
             run.experiment.maneuver,
             run.judged.channel,
-            None if part == inf else Cell(part, percent(part)),
+            None if error_share == inf else Cell(error_share, percent(error_share)),
             why,
             links,
             look=look != "good",
@@ -259,7 +267,7 @@ def _agreement_section(
         *runs_tables(_qualities(runs, "fit")),
         *runs_tables(_qualities(runs, "validate")),
     ]
-    words = (
+    explanation = (
         "RMSE is the root of the mean squared difference of the samples that count; NRMSE is RMSE "
         "over the standard deviation of what was measured; fit % is 100 (1 − NRMSE). Error / "
         "range is RMSE over the largest minus the smallest value measured in all runs of that "
@@ -268,21 +276,21 @@ def _agreement_section(
     measures = PageBlock("table", joined(agreement), "agreement")
     blocks = [
         PageBlock("table", overview, "overview"),
-        PageBlock("details", [text(words), measures], "Measures of every channel"),
+        PageBlock("details", [text(explanation), measures], "Measures of every channel"),
     ]
     return Section("agreement", "Runs", blocks)
 
 
 def _curves_section(runs: Sequence[ShownRun], virtual: bool) -> Section:
     measured = "virtual test" if virtual else "measured"
-    words = (
+    explanation = (
         "Drag to zoom in time, Ctrl and wheel to zoom about the pointer, double-click for all of "
         f"it. Residuals are simulated minus {measured}. Grey stretches are ignored."
     )
-    blocks = [text(words, "screen")]
+    blocks = [text(explanation, "screen")]
     for number, run in enumerate(runs):
         measures = [
-            (channel.quality.channel, run_words(channel.quality)) for channel in run.channels
+            (channel.quality.channel, measures_line(channel.quality)) for channel in run.channels
         ]
         content = {"number": number, "run": run, "measures": measures, "measured": measured}
         blocks.append(PageBlock("run", content))
@@ -290,31 +298,42 @@ def _curves_section(runs: Sequence[ShownRun], virtual: bool) -> Section:
 
 
 def _live_section(fit: Fit, campaign: Campaign, runs: Sequence[ShownRun]) -> Section:
-    """The drive itself beside the run that it misses most, of those held out if there are any."""
-    blocks: list[PageBlock] = []
-    drive = fit.parameters
-    nominal = fit.nominal
-    if isinstance(drive, ParameterSet) and isinstance(nominal, ParameterSet):
-        # the statuses are those of the nominal set: what was fitted is what has moved
-        nominal_parameters = nominal.parameters
-        parameters = {}
-        for symbol, parameter in drive.parameters.items():
-            nominal_parameter = nominal_parameters.get(symbol)
-            same = nominal_parameter is not None and nominal_parameter.values == parameter.values
-            parameters[symbol] = replace(parameter, status="fixed" if same else "fitted")
-        drive = replace(drive, parameters=parameters)
-        held_out = [run for run in runs if run.role == "validate"]
-        worst = max(held_out or runs, key=lambda run: run_error(run, runs)).experiment
-        if can_run(drive, worst):
-            shown = run_of(at_instants(drive, worst))
-            page = live_page(drive, [shown], campaign.title, campaign.virtual, "drive.toml")
-            words = f"Sliders for every parameter, next to {worst.name}"
-            blocks = [PageBlock("live", page, words)]
-    return Section("live", "Try other values", blocks)
+    """The fitted drive with sliders for its parameters, next to the run with the largest error.
+
+    The run is one of those held out if there are any. The section is empty for a user-defined model
+    and for a drive that cannot run in the page.
+    """
+    section = Section("live", "Try other values", [])
+    if not (isinstance(fit.parameters, ParameterSet) and isinstance(fit.nominal, ParameterSet)):
+        return section
+    drive = _with_fit_statuses(fit.parameters, fit.nominal)
+    held_out = [run for run in runs if run.role == "validate"]
+    worst_run = max(held_out or runs, key=lambda run: run_error(run, runs)).experiment
+    if not can_run(drive, worst_run):
+        return section
+    page = live_page(
+        drive,
+        [run_of(at_instants(drive, worst_run))],
+        campaign.title,
+        campaign.virtual,
+        "drive.toml",
+    )
+    caption = f"Sliders for every parameter, next to {worst_run.name}"
+    return replace(section, blocks=[PageBlock("live", page, caption)])
+
+
+def _with_fit_statuses(fitted: ParameterSet, nominal: ParameterSet) -> ParameterSet:
+    """The fitted set with the status "fitted" for parameters that differ from the nominal ones."""
+    parameters = {}
+    for symbol, parameter in fitted.parameters.items():
+        initial = nominal.parameters.get(symbol)
+        is_fixed = initial is not None and initial.values == parameter.values
+        parameters[symbol] = replace(parameter, status="fixed" if is_fixed else "fitted")
+    return replace(fitted, parameters=parameters)
 
 
 def _residual_section(runs: Sequence[ShownRun]) -> Section:
-    words = (
+    explanation = (
         "Correlation of the residuals with the input, positive lags where the residual comes "
         "after it, and the 95 % band of residuals, coloured as these are, that are unrelated to "
         "it."
@@ -328,7 +347,8 @@ def _residual_section(runs: Sequence[ShownRun]) -> Section:
             drawn = charts.lags_chart(test.lags, test.correlation, test.band, correlation)
             run = quality.experiment
             table.add(run.name, run.role, quality.channel, drawn, test.verdict)
-    return Section("residuals", "Residuals", [text(words), PageBlock("table", table, "residuals")])
+    blocks = [text(explanation), PageBlock("table", table, "residuals")]
+    return Section("residuals", "Residuals", blocks)
 
 
 def _data_section(
@@ -340,11 +360,11 @@ def _data_section(
         Markup('<span id="finding-{}">{}</span>').format(number, sentence)
         for number, sentence in enumerate(findings, start=1)
     ]
-    shown = PageBlock(
+    details = PageBlock(
         "details", [PageBlock("table", quality, "data")], count(len(quality.rows), "signal")
     )
     used = listed_block([overview.sentence for overview in overviews])
-    return Section("data", "Data quality", [*used, text(heading), *listed_block(numbered), shown])
+    return Section("data", "Data quality", [*used, text(heading), *listed_block(numbered), details])
 
 
 def _setup_section(
@@ -362,63 +382,63 @@ def _setup_section(
         table.add("drive", f"{drive.name}, card {drive.card}" if drive.card else drive.name)
     if title:
         table.add("fit setup", title)
-    for key, words in notes.items():
+    for key, note in notes.items():
         if key != "campaign":
-            table.add(key, words)
+            table.add(key, note)
     blocks = [PageBlock("table", table, "notes")]
     for stage in stages:
         blocks.append(PageBlock("heading", f"Stage {stage.stage.name}", "h3"))
-        blocks += listed_block(_stage_words(stage))
+        blocks += listed_block(_stage_sentences(stage))
     return Section("setup", "Fit setup", blocks)
 
 
-def _stage_words(fit: StageFit) -> list[str]:
+def _stage_sentences(fit: StageFit) -> list[str]:
     """Describe the task of a stage."""
     stage = fit.stage
     problem = fit.problem
-    words = [f"Simulates {_PARTS[stage.part]}."]
+    sentences = [f"Simulates {_PARTS[stage.part]}."]
     if stage.part == "pump":
-        words.append(f"The current is the {stage.current} one.")
-    words.append(f"Fits {listed(list(problem.channels))}.")
-    words.append(scales_words(fit))
+        sentences.append(f"The current is the {stage.current} one.")
+    sentences.append(f"Fits {listed(list(problem.channels))}.")
+    sentences.append(scales_words(fit))
     for kind, windows in stage.weights.items():
-        words += [
-            f"Weight on {kind.replace('_', ' ')}: {_weight_words(window)}." for window in windows
+        sentences += [
+            f"Weight on {kind.replace('_', ' ')}: {_weight_text(window)}." for window in windows
         ]
     of_runs = sum(unknown.run is not None for unknown in problem.unknowns)
     if of_runs:
-        words.append(
+        sentences.append(
             f"In addition, there are {of_runs} parameters of single runs, with wide bounds."
         )
-    return words
+    return sentences
 
 
-def _weight_words(weight: WeightWindow) -> str:
-    when = "all of the run"
+def _weight_text(weight: WeightWindow) -> str:
+    period = "all of the run"
     if weight.start is not None or weight.stop is not None:
         first = "the start" if weight.start is None else f"{weight.start:g} s"
-        last = "the end" if weight.stop is None else f"{weight.stop:g} s"
-        when = f"{first} to {last}"
-    where = f" in '{weight.maneuver}'" if weight.maneuver else ""
+        stop = "the end" if weight.stop is None else f"{weight.stop:g} s"
+        period = f"{first} to {stop}"
+    place = f" in '{weight.maneuver}'" if weight.maneuver else ""
     why = f" ({weight.why})" if weight.why else ""
-    return f"{weight.factor:g} on {when}{where}{why}"
+    return f"{weight.factor:g} on {period}{place}{why}"
 
 
 # --- verdict --------------------------------------------------------------------------------------
 
 
-def _verdict_section(judged: Verdict, findings: int) -> Section:
+def _verdict_section(verdict: Verdict, findings: int) -> Section:
     """The three answers, what they rest on, and the stated errors."""
-    words = f"{count(findings, 'finding')} on the campaign's data: see the section on them."
-    answers = [(name, "look", [text]) for name, text in judged.answers().items()]
+    remark = f"{count(findings, 'finding')} on the campaign's data: see the section on them."
+    answers = [(name, "look", [text]) for name, text in verdict.answers().items()]
     answers_and_remarks = [
         *answers,
-        ("Range of validity", "plain", [judged.validity] if judged.validity else []),
-        ("Remarks", "look", judged.remarks),
-        ("Assumed, as these logs cannot show it", "plain", judged.assumed),
-        ("Logs", "look", [words] if findings else []),
+        ("Range of validity", "plain", [verdict.validity] if verdict.validity else []),
+        ("Remarks", "look", verdict.remarks),
+        ("Assumed, as these logs cannot show it", "plain", verdict.assumed),
+        ("Logs", "look", [remark] if findings else []),
     ]
-    errors = titled(judged.table(), "errors") if judged.predictions else []
+    errors = titled(verdict.table(), "errors") if verdict.predictions else []
     return Section(
         "verdict",
         "Verdict in detail",
@@ -431,17 +451,17 @@ def _verdict_section(judged: Verdict, findings: int) -> Section:
 
 def _parameter_section(fit: Fit, stages: Sequence[StageFit], truth: ParameterSet | None) -> Section:
     estimates = [estimates_table(stage, truth=truth) for stage in stages]
-    words = (
+    explanation = (
         "Change is from the nominal value. Intervals are for residuals that are correlated over "
         "time. A parameter at a bound has no symmetric interval. Parameter files have SI units."
     )
-    blocks = [text(words)]
+    blocks = [text(explanation)]
     if truth is not None:
-        inside, counted = truth_count(estimates)
+        inside, total = truth_count(estimates)
         blocks.append(
             text(
                 "Truth is the simulated value. Fixed parameters with other values shift the "
-                f"estimates. {inside} of {counted} intervals contain it."
+                f"estimates. {inside} of {total} intervals contain it."
             )
         )
     for table, stage in zip(estimates, stages, strict=True):
@@ -490,10 +510,15 @@ def _identifiability_section(stages: Sequence[StageFit]) -> Section:
     return Section("identifiability", "Uncertainty", blocks)
 
 
-def _effects(identifiability: Identifiability, shown: Sequence[bool]) -> list[PageBlock]:
+def _effects(identifiability: Identifiability, shown_mask: Sequence[bool]) -> list[PageBlock]:
     """Tabulate the change of all weighted residuals for 1 % of each parameter, largest first."""
     table = Table("", (Column("parameter"), Column("change of the residuals for 1 %", ".3g")))
-    pairs = zip(identifiability.sensitivity, identifiability.variables.names, shown, strict=True)
+    pairs = zip(
+        identifiability.sensitivity,
+        identifiability.variables.names,
+        shown_mask,
+        strict=True,
+    )
     for effect, name in sorted(
         ((float(e), name) for e, name, is_shown in pairs if is_shown), reverse=True
     ):
@@ -518,8 +543,8 @@ def _correlations(stage: StageFit, general: Sequence[bool]) -> list[PageBlock]:
         table.add(first, second, correlation)
     if not table.rows:
         return []
-    shown = PageBlock("table", table, "correlations")
-    return [PageBlock("details", [shown], "Strongest correlations of the estimates")]
+    block = PageBlock("table", table, "correlations")
+    return [PageBlock("details", [block], "Strongest correlations of the estimates")]
 
 
 def _starts_section(several: Mapping[str, Sequence[Solution]]) -> Section:
@@ -534,8 +559,8 @@ def _starts_section(several: Mapping[str, Sequence[Solution]]) -> Section:
         for solution in sorted(solutions, key=lambda solution: solution.cost):
             if solution.cost < 1e300:
                 table.add(str(solution.number), solution.cost / best, solution.message)
-        words = f"Where each of {len(solutions)} starts ended, the best first{failures}."
-        blocks += [text(words), PageBlock("table", table, "starts")]
+        explanation = f"Where each of {len(solutions)} starts ended, the best first{failures}."
+        blocks += [text(explanation), PageBlock("table", table, "starts")]
     return Section("starts", "Starts", blocks)
 
 
@@ -543,16 +568,16 @@ def _profile_section(fit: Fit, profiles: Sequence[Profile]) -> Section:
     tiles = []
     for profile in profiles:
         unknown = fit.stage(profile.stage).problem.unknowns.items[profile.index]
-        remarks = [text(words, "remark") for words in profile.sentences()]
+        remarks = [text(sentence, "remark") for sentence in profile.sentences()]
         drawn = PageBlock(
             "figure", charts.profile_chart(profile, unknown), f"{profile.name} ({profile.stage})"
         )
         tiles.append(PageBlock("tile", [drawn, *remarks]))
-    words = (
+    explanation = (
         "The lowest cost with one parameter fixed, above that of the optimum; the dashed line ends "
         "the interval."
     )
-    blocks = [text(words), PageBlock("tiles", tiles)] if tiles else []
+    blocks = [text(explanation), PageBlock("tiles", tiles)] if tiles else []
     return Section("profiles", "Profile likelihoods", blocks)
 
 
@@ -560,13 +585,13 @@ def _folds_section(folds: CrossValidation | None, stages: Sequence[StageFit]) ->
     if folds is None:
         return Section("folds", "Cross-validation", [])
     held_out, fold_tables = folds_tables(folds, stages)
-    words = (
+    explanation = (
         f"The runs were assigned to {folds.planned} folds, with kinds of test and directions "
         f"spread over them (seed {folds.seed}). Each fold was predicted from the command alone by "
         "a fit to the others that began at the nominal values."
     )
     blocks = [
-        text(words),
+        text(explanation),
         *(text(sentence, "remark") for sentence in folds.sentences()),
         PageBlock("table", held_out, "held-out"),
         PageBlock("table", fold_tables, "folds"),

@@ -30,7 +30,7 @@ _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 @dataclass(frozen=True)
 class PageBlock:
-    """A piece of a section: its kind, of those that `page.html` knows, and what it shows."""
+    """A piece of a section: its kind, of those that `page.html` has, and its content."""
 
     kind: str
     content: Any
@@ -47,9 +47,9 @@ class Section:
     blocks: Sequence[PageBlock]
 
 
-def text(words: str, look: str = "") -> PageBlock:
-    """A paragraph, in a look of `page.css`."""
-    return PageBlock("text", words, look)
+def text(paragraph: str, css_class: str = "") -> PageBlock:
+    """A paragraph, with a class of `page.css`."""
+    return PageBlock("text", paragraph, css_class)
 
 
 def listed_block(sentences: Sequence[str]) -> list[PageBlock]:
@@ -57,10 +57,11 @@ def listed_block(sentences: Sequence[str]) -> list[PageBlock]:
     return [PageBlock("list", sentences)] if sentences else []
 
 
-def titled(table: Table, look: str = "") -> list[PageBlock]:
+def titled(table: Table, css_class: str = "") -> list[PageBlock]:
     """A table under its title, its caption a remark."""
     remark = [text(table.caption, "remark")] if table.caption else []
-    return [PageBlock("heading", table.title, "h3"), PageBlock("table", table, look), *remark]
+    heading = PageBlock("heading", table.title, "h3")
+    return [heading, PageBlock("table", table, css_class), *remark]
 
 
 def page(
@@ -124,7 +125,7 @@ def rendered(
         policy=content_policy(allowed, compiles=live),
         date=f"{date.today():%d %B %Y}",
     )
-    # control characters of a name, and what turns the direction of writing, are no part of HTML
+    # control characters of a name, and what turns the direction of writing, are not part of HTML
     return re.sub(
         "[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069\ud800-\udfff\ufffe\uffff]",
         "\ufffd",
@@ -168,20 +169,23 @@ def content_policy(scripts: Sequence[str], *, compiles: bool = False) -> str:
     )
 
 
-def html_table(table: Table, look: str = "") -> Markup:
-    """A table's columns for a page. A symbol stands below its meaning, a role is a badge."""
-    shown = table.of("p")
-    pieces = [f'<table class="{escape(look)}"><thead><tr>']
-    for column, head in zip(shown.columns, shown.heads(), strict=True):
+def html_table(table: Table, css_class: str = "") -> Markup:
+    """HTML of a table for a page. A symbol stands below its meaning, a role is a badge."""
+    page_table = table.of("p")
+    pieces = [f'<table class="{escape(css_class)}"><thead><tr>']
+    for column, heading in zip(page_table.columns, page_table.headings(), strict=True):
         if column.name != "meaning":
-            pieces.append(f'<th class="{"n" if column.spec else ""}">{escape(head)}</th>')
+            pieces.append(f'<th class="{"n" if column.spec else ""}">{escape(heading)}</th>')
     pieces.append("</tr></thead><tbody>")
-    pieces += [_html_row(shown, row) for row in shown.rows]
+    pieces += [_html_row(page_table, row) for row in page_table.rows]
     return Markup("".join([*pieces, "</tbody></table>"]))
 
 
 def _html_row(table: Table, row: Row) -> str:
-    # every piece is escaped where it is put in: Markup's own formatting takes ten times as long
+    """HTML of a row; the text of its column "meaning" is put before the symbol in the first cell.
+
+    Every piece is escaped when it is inserted: Markup's own formatting takes ten times as long.
+    """
     row_classes = []
     if row.look:
         row_classes.append("look")
@@ -190,60 +194,68 @@ def _html_row(table: Table, row: Row) -> str:
     classes = " ".join(row_classes)
     pieces = [f'<tr class="{classes}">' if classes else "<tr>"]
     cells = list(zip(table.columns, row.cells, table.texts(row), strict=True))
-    meaning = next((words for column, _, words in cells if column.name == "meaning"), "")
-    for position, (column, value, words) in enumerate(cells):
+    meanings = [cell_text for column, _, cell_text in cells if column.name == "meaning"]
+    meaning = meanings[0] if meanings else ""
+    for position, (column, value, cell_text) in enumerate(cells):
         if column.name == "meaning":
             continue
-        shown = value if isinstance(value, Markup) else escape(typeset(words, column))
         if column.name == "role":
-            shown = Markup('<span class="badge {0}">{0}</span>').format(words)
-        if position == 0:
-            symbol = f'{escape(meaning)} <span class="symbol">{shown}</span>' if meaning else shown
-            look = ' class="n"' if column.spec else ""
-            pieces.append(f'<th scope="row"{look}>{symbol}</th>')
+            content = Markup('<span class="badge {0}">{0}</span>').format(cell_text)
+        elif isinstance(value, Markup):
+            content = value
         else:
-            look = _cell_class(column, words)
-            pieces.append(f'<td class="{look}">{shown}</td>' if look else f"<td>{shown}</td>")
+            content = escape(typeset(cell_text, column))
+        if position == 0:
+            if meaning:
+                content = Markup(f'{escape(meaning)} <span class="symbol">{content}</span>')
+            number_class = ' class="n"' if column.spec else ""
+            pieces.append(f'<th scope="row"{number_class}>{content}</th>')
+            continue
+        cell_class = _cell_class(column, cell_text)
+        start = f'<td class="{cell_class}">' if cell_class else "<td>"
+        pieces.append(f"{start}{content}</td>")
     return "".join([*pieces, "</tr>\n"])
 
 
-def _cell_class(column: Column, words: str) -> str:
+def _cell_class(column: Column, cell_text: str) -> str:
     """CSS classes of a cell: of units, of numbers, and of an interval that misses the truth."""
     if column is UNIT:
         return "unit"
     classes = ["n"] if column.spec else []
-    if column.name == "holds" and words == "no":
+    if column.name == "holds" and cell_text == "no":
         classes.append("miss")
     return " ".join(classes)
 
 
-def typeset(words: str, column: Column) -> str:
-    """Numbers of a column as print shows them: a true minus, and powers of ten raised."""
+def typeset(cell_text: str, column: Column) -> str:
+    """Typeset numbers of a column: with a true minus, and powers of ten raised."""
     if not column.spec:
-        return words
+        return cell_text
 
     def power(match: re.Match[str]) -> str:
         return f" ·10{str(int(match[1])).translate(_RAISED)}"
 
-    raised = re.sub(r"(?<=\d)e([+-]\d+)\b", power, words)
+    raised = re.sub(r"(?<=\d)e([+-]\d+)\b", power, cell_text)
     return re.sub(r"(?<![\w.])-(?=\d)", "−", raised)
 
 
 def script_json(content: Any) -> Markup:
     """JSON that can stand in a script element: no text in it can end the element."""
-    words = json.dumps(content, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
-    return Markup(words.replace("&", "\\u0026").replace("<", "\\u003c").replace(">", "\\u003e"))
+    document = json.dumps(content, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
+    for character in "&<>":
+        document = document.replace(character, f"\\u{ord(character):04x}")
+    return Markup(document)
 
 
 # --- on paper -------------------------------------------------------------------------------------
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "msedge")
 PATIENCE = 180.0
-"""After which a browser that has not printed is stopped. [s]"""
+"""Time after which a browser that has not printed is stopped. [s]"""
 
 
 def find_browser() -> str:
-    """Path of a Chromium, which prints pages; a `FileError` where there is none."""
+    """Path of a Chromium, which prints pages; a `FileError` if there is none."""
     browser_path = next(
         (path for browser in BROWSERS if (path := which(browser)) is not None), None
     )
@@ -270,15 +282,21 @@ def print_report(page: str | Path, path: str | Path) -> None:
     browser = find_browser()
     address = Path(page).absolute().as_uri()
 
-    def write(beside: Path) -> None:
+    def write(temporary: Path) -> None:
         with TemporaryDirectory() as profile:
-            words = [browser, "--headless", "--disable-gpu", "--no-pdf-header-footer"]
+            arguments = [
+                browser,
+                "--headless",
+                "--disable-gpu",
+                "--no-pdf-header-footer",
+                f"--user-data-dir={profile}",
+                f"--print-to-pdf={temporary.absolute()}",
+            ]
             if hasattr(os, "geteuid") and os.geteuid() == 0:
-                words.append("--no-sandbox")  # Chromium has none for the superuser
-            words += [f"--user-data-dir={profile}", f"--print-to-pdf={beside.absolute()}", address]
+                arguments.append("--no-sandbox")  # Chromium has none for the superuser
             with suppress(TimeoutExpired):
-                run(words, capture_output=True, timeout=PATIENCE, check=False)
-        if not beside.stat().st_size:
+                run([*arguments, address], capture_output=True, timeout=PATIENCE, check=False)
+        if not temporary.stat().st_size:
             raise OSError(0, f"{browser} printed nothing")
 
     write_whole(path, write)

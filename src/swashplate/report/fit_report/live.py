@@ -1,4 +1,4 @@
-"""Live page of a drive: one HTML file in which it runs, with sliders beside what was measured."""
+"""Live page of a drive: one HTML file in which it runs, with sliders and measured signals."""
 
 from __future__ import annotations
 
@@ -44,9 +44,9 @@ SPAN = 4.0
 SHOWN = ("orifice", "pump", "supply_pressure", "rate_limits", "dead_zone", "spool_offset")
 """Design variables that have a slider of their own; each parameter has one too."""
 BEFORE_CURRENT = Limit.DEAD_ZONE | Limit.CURRENT_RATE
-"""Limits that are shaded behind a current; the others are behind what the pump does."""
+"""Limits that are shaded in a panel of a current; the others are shaded in those of the pump."""
 UNMEASURED = ("current", "shaft_speed")
-"""Signals that are shown of a command alone."""
+"""Signals that are shown of a command without measured signals."""
 
 
 def write_live_page(
@@ -71,7 +71,7 @@ def write_live_page(
     path : path
         The file, which replaces an older one.
     campaign : Campaign, optional
-        Its runs with a voltage as their input are shown beside what the drive makes of them.
+        Its runs with a voltage as their input are shown with the drive's simulated response.
     axis : str, optional
         The axis, if the campaign has several.
     command : Maneuver, optional
@@ -131,7 +131,7 @@ def write_live_page(
 def live_page(
     parameters: ParameterSet, runs: Sequence[dict[str, Any]], title: str, virtual: bool, name: str
 ) -> str:
-    """HTML of a live page beside runs of `run_of`; see `write_live_page`."""
+    """HTML of a live page with runs of `run_of`; see `write_live_page`."""
     if parameters.equations:
         raise InputError(
             f"{parameters.name} has a user-defined equation, which the WebAssembly of the package "
@@ -141,7 +141,7 @@ def live_page(
     limits = [(1 << k, Limit[name.upper()]) for k, (_, name) in enumerate(exported.limits)]
     numbers = values_of(Drive(parameters), runs[0]["step"])
     values = _parameters(parameters)
-    before = "as fitted" if any(value["main"] for value in values) else "as it is"
+    present_label = "as fitted" if any(value["main"] for value in values) else "as it is"
     content = {
         "wasm": b64encode(packaged(WASM)).decode("ascii"),
         "values": b64encode(numbers.astype("<f8").tobytes()).decode("ascii"),
@@ -149,7 +149,7 @@ def live_page(
         "design_variables": _design_variables(values),
         "outputs": [{"name": output, "number": k} for k, output in enumerate(exported.names)],
         "limits": [[bit, _word(limit)] for bit, limit in limits],
-        "before": before,
+        "before": present_label,
         "filter": {"low": LOW_PASS, "high": DIFFERENTIATOR},
         "unmeasured": [_signal_panel(signal) for signal in UNMEASURED],
         "runs": runs,
@@ -167,15 +167,15 @@ def live_page(
         drive=parameters.title or parameters.name,
         virtual=virtual,
         measured=any(run["channels"] for run in runs),
-        fitted=before == "as fitted",
-        before=before,
+        fitted=present_label == "as fitted",
+        before=present_label,
         limits=[(SHADES[limit].name, SHADES[limit].color) for limit in SHADES],
         file=name,
     )
 
 
 def can_run(parameters: ParameterSet, experiment: Experiment) -> bool:
-    """Whether a page can run a drive as it is beside a run: see `write_live_page`."""
+    """Whether a page can run a drive over the input of a run; see `write_live_page`."""
     driven = experiment.input.kind == "voltage" and not parameters.equations
     return driven and not at_rate_of([experiment], parameters)[1]
 
@@ -239,9 +239,9 @@ def _design_variables(values: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
             keys = {value["symbol"], value["column"]}  # the same without directions
             moves += [(value["number"], powers[key]) for key in keys if key in powers]
         if moves:
-            words = name.replace("_", " ").capitalize()
+            label = name.replace("_", " ").capitalize()
             ends = (1.0 / SPAN, SPAN)
-            variables.append({"name": name, "words": words, "moves": moves, "range": ends})
+            variables.append({"name": name, "words": label, "moves": moves, "range": ends})
     return variables
 
 
@@ -299,32 +299,32 @@ def _measured_channel(channel: Channel) -> dict[str, Any]:
     if signal == "current_sum":
         signal = "current_positive"
         also = "current_negative"
-    shown = _signal_panel(signal, name, unit, float(np.abs(values).max(initial=0.0)))
+    panel = _signal_panel(signal, name, unit, float(np.abs(values).max(initial=0.0)))
     interval = float(np.median(np.diff(channel.time)))
     return {
-        **shown,
+        **panel,
         "also": also,
         "speed": channel.is_position,
         "time": packed_samples(channel.time, interval / 2**20),
-        "measured": packed_samples(shown["factor"] * values),
+        "measured": packed_samples(panel["factor"] * values),
         "breaks": [int(row) for row in gap_rows(channel.time)],
         "ignored": ignored_windows(channel),
     }
 
 
 def _signal_panel(signal: str, name: str = "", unit: str = "", size: float = 0.0) -> dict[str, Any]:
-    """A signal's panel: label, unit of people, limits that are shaded behind it."""
+    """A signal's panel: label, displayed unit, limits that are shaded in it."""
     unit = unit or {"current": "A", "shaft_speed": "rad/s"}[signal]
-    shown = display_unit(unit, size)
+    displayed = display_unit(unit, size)
     electric = "current" in signal
-    words = name or signal.replace("_", " ")
+    label = name or signal.replace("_", " ")
     return {
         "signal": signal,
-        "name": words,
-        "unit": shown.name,
-        "factor": shown.factor,
-        "label": in_lines(shown.label(words), 24),
-        "residual": in_lines(shown.label("residual"), 14),
+        "name": label,
+        "unit": displayed.name,
+        "factor": displayed.factor,
+        "label": in_lines(displayed.label(label), 24),
+        "residual": in_lines(displayed.label("residual"), 14),
         "shaded": [_word(limit) for limit in Limit if bool(limit & BEFORE_CURRENT) == electric],
     }
 

@@ -84,8 +84,8 @@ class ShownRun:
         first = self.input_unit.label("input" if kind == "other" else kind)
         panel_labels: list[Any] = [in_lines(first, LETTERS["input"])]
         for channel, name in zip(self.channels, names, strict=True):
-            words = f"{name}, {channel.stage}" if names.count(name) > 1 and several else name
-            signal = in_lines(channel.unit.label(words), LETTERS["overlay"])
+            label = f"{name}, {channel.stage}" if names.count(name) > 1 and several else name
+            signal = in_lines(channel.unit.label(label), LETTERS["overlay"])
             panel_labels.append(
                 (signal, in_lines(channel.small.label("residual"), LETTERS["residual"]))
             )
@@ -136,26 +136,26 @@ def _largest_size(values: Array) -> float:
 
 def off_scale(channel: Channel, values: Array) -> Mask:
     """(m,) ignored samples so far from those that count that they would press these flat."""
-    used = channel.used
-    if not used.any():
+    used_samples = channel.used
+    if not used_samples.any():
         return np.zeros(values.size, dtype=np.bool_)
-    low, high = float(values[used].min()), float(values[used].max())
-    room = 0.5 * (high - low)
-    far: Mask = ~used & ((values < low - room) | (values > high + room))
+    low, high = float(values[used_samples].min()), float(values[used_samples].max())
+    margin = 0.5 * (high - low)
+    far: Mask = ~used_samples & ((values < low - margin) | (values > high + margin))
     return far
 
 
-def run_words(quality: RunQuality) -> str:
-    """Words that must stand beside every fit %: RMSE, initial state, ignored samples."""
+def measures_line(quality: RunQuality) -> str:
+    """Text that must accompany every fit %: RMSE, initial state, ignored samples."""
     measures = quality.measures
     run = quality.experiment
     channel = run[quality.channel]
-    words = [f"RMSE {quantity(measures.rmse, channel.shown_unit)}"]
+    texts = [f"RMSE {quantity(measures.rmse, channel.shown_unit)}"]
     if measures.fit_percent is not None and measures.nrmse is not None:
-        words.insert(0, f"fit {measures.fit_percent:.2f} %")
-        words.append(f"NRMSE {measures.nrmse:.3g}")
-    words.append(f"initial state {start_words(run)}")
-    return " · ".join([*words, f"ignored: {ignored_words(run, channel)}"])
+        texts.insert(0, f"fit {measures.fit_percent:.2f} %")
+        texts.append(f"NRMSE {measures.nrmse:.3g}")
+    texts.append(f"initial state {start_words(run)}")
+    return " · ".join([*texts, f"ignored: {ignored_words(run, channel)}"])
 
 
 def write_samples(runs: Sequence[ShownRun], path: str | Path) -> None:
@@ -210,13 +210,13 @@ def run_data(run: ShownRun) -> dict[str, Any]:
     }
 
 
-def _channel_data(shown: ShownChannel) -> dict[str, Any]:
-    channel = shown.channel
-    factor = shown.unit.factor
-    small = shown.small.factor
-    residual = small * shown.quality.residual
+def _channel_data(displayed: ShownChannel) -> dict[str, Any]:
+    channel = displayed.channel
+    factor = displayed.unit.factor
+    small = displayed.small.factor
+    residual = small * displayed.quality.residual
     rms = float(np.sqrt(np.mean(np.square(residual[channel.used])))) if channel.used.any() else 0.0
-    signals = [(factor * shown.quality.simulated, None), (residual, rms / FINE or None)]
+    signals = [(factor * displayed.quality.simulated, None), (residual, rms / FINE or None)]
     return {
         **_packed_signals(channel.time, signals, off_scale(channel, factor * channel.values)),
         "ratio": factor / small,

@@ -11,7 +11,7 @@ from markupsafe import Markup
 from numpy.typing import NDArray
 
 from swashplate.analysis import (
-    ASSUMED,
+    ERROR_OF_ASSUMED,
     assumed_parameters,
     changes_left_open,
     dead_zone,
@@ -78,7 +78,7 @@ def machine_numbers_of(drive: Drive, largest: Commands = FULL) -> Array:
         command[0] = 0.0
         run = drive.simulate(command, RATE, start="steady")
         final = float(drive.steady_speed(volts))
-        numbers[DEAD_ZONE, side] = dead_zone(drive, direction)[0]
+        numbers[DEAD_ZONE, side] = dead_zone(drive, direction).inside
         numbers[TOP_SPEED, side] = float(drive.steady_speed(direction * FULL_VOLTAGE))
         numbers[CREEP, side] = rest
         if final == rest:
@@ -111,7 +111,7 @@ def tested_commands(stages: Sequence[StageFit]) -> Commands:
     size = max((float(np.abs(values).max()) for values in commands), default=0.0)
     plus = max((float(values.max()) for values in commands), default=0.0)
     minus = max((float(-values.min()) for values in commands), default=0.0)
-    # noise about 0 V is no command
+    # noise about 0 V is not a command
     noise = NO_COMMAND * size
     return (
         min(plus, FULL_VOLTAGE) if plus > noise else 0.0,
@@ -135,7 +135,8 @@ class _Range(NamedTuple):
 def numbers_table(drive: Drive, stages: Sequence[StageFit]) -> tuple[Table, list[str]]:
     """The numbers that matter, each with its 95 % interval, and what these leave out.
 
-    A number that a limit decides which no test reached has one end alone, "at least" or "at most".
+    A number that depends on a limit which no test reached has only one end, "at least" or "at
+    most".
     Without stages of a fit there are no intervals.
     """
     largest = largest_commands(stages)
@@ -161,16 +162,17 @@ def numbers_table(drive: Drive, stages: Sequence[StageFit]) -> tuple[Table, list
         ("Lag, from there to 63 %", "s"),
         ("Creep at 0 V", "rad/s"),
     )
-    for row, (words, unit) in enumerate(rows):
+    for row, (label, unit) in enumerate(rows):
         factor = display_unit(unit, float(np.nanmax(np.abs(values[row]), initial=0.0))).factor
         positive = _cell(factor, values, range_, (row, 0))
         negative = _cell(factor, values, range_, (row, 1))
         if row == CREEP:  # the same both ways
             negative = Cell(None, "")
-        table.add(words, positive, negative, unit=unit, spec=".3f")
+        table.add(label, positive, negative, unit=unit, spec=".3f")
     if stages and assumed_parameters(stages):
         sentences.append(
-            f"Assumed parameters are taken as known to {percent(ASSUMED)} (standard deviation)."
+            f"Assumed parameters are taken as known to {percent(ERROR_OF_ASSUMED)} (standard "
+            "deviation)."
         )
     if largest != FULL:
         sentences.append(
@@ -197,11 +199,11 @@ def _range_of(drive: Drive, stages: Sequence[StageFit], values: Array, largest: 
     half = QUANTILE * errors
     nearest, farthest = _at_limits(drive, unseen), without_limits(drive, unseen)
     near, far = machine_numbers_of(nearest, largest), machine_numbers_of(farthest, largest)
-    moved = np.maximum(np.abs(near - values), np.abs(far - values))
+    largest_change = np.maximum(np.abs(near - values), np.abs(far - values))
     left_open = np.abs(far - near) > OPEN * np.abs(near)
     doubt = np.full((6, 2), "", dtype=object)
     for name, variances in variances_from_bounds(stages, numbers, unseen).items():
-        # what has one end alone has no interval to lose
+        # a number with only one end has no interval to lose
         doubt[~left_open & (variances > LEANS * errors**2)] = f"{name} {AT_BOUND}"
     doubt[changes_left_open(stages, numbers, unseen) > FOLLOWS * np.abs(values)] = "not determined"
     for side, volts in enumerate(tested_commands(stages)):
@@ -217,7 +219,7 @@ def _range_of(drive: Drive, stages: Sequence[StageFit], values: Array, largest: 
         )
         cautious = QUANTILE * at_ends * np.sign(near)
         near = np.where(np.abs(far) > np.abs(near), near - cautious, near + cautious)
-    half = np.where(left_open, np.nan, half + moved)
+    half = np.where(left_open, np.nan, half + largest_change)
     near, far = np.where(left_open, near, values), np.where(left_open, far, values)
     return _Range(half, doubt, near, far)
 
@@ -233,7 +235,7 @@ MEANINGS = {
     "(fixed)": "Fixed: depends on parameters that were not fitted.",
     "Z16_": "Z16 fixed: the fit did not estimate an orifice, which can be mistaken for a lag.",
 }
-"""What words beside a number mean."""
+"""Meaning of the words that are shown next to a number."""
 
 
 def _meanings(table: Table) -> list[str]:
@@ -241,7 +243,7 @@ def _meanings(table: Table) -> list[str]:
     cells = list[str]()
     for row in table.rows:
         cells += [cell.text for cell in row.cells if isinstance(cell, Cell)]
-    return [words for word, words in MEANINGS.items() if any(word in cell for cell in cells)]
+    return [meaning for word, meaning in MEANINGS.items() if any(word in cell for cell in cells)]
 
 
 def mistaken_for_a_lag(
@@ -267,21 +269,21 @@ def _cell(factor: float, values: Array, range_: _Range, index: tuple[int, int]) 
         return Cell(None, NONE)
     if range_.doubt[index]:
         has_half = 0.0 < half < np.inf
-        shown = f"{value:.{_decimals(value, half)}f}" if has_half else f"{value:.4g}"
-        return Cell(value, f"{_unsigned_zero(shown)} ({range_.doubt[index]})")
+        number = f"{value:.{_decimals(value, half)}f}" if has_half else f"{value:.4g}"
+        return Cell(value, f"{_unsigned_zero(number)} ({range_.doubt[index]})")
     if near != far:
         at_least = abs(far) > abs(near)
         end = "least" if at_least else "most"
         return Cell(near, f"at {end} {_three_digits(near, towards_zero=at_least)}, not seen")
     if half <= 1e-9 * abs(value):
-        # it follows from what the fit left at its nominal value alone
+        # it depends only on parameters that the fit left at their nominal values
         return Cell(value, f"{value:.4g} (fixed)")
     if not np.isfinite(half):
         return Cell(value, f"{value:.4g}")
     decimals = _decimals(value, half)
     upwards = ceil(half * 10.0**decimals - 1e-9) / 10.0**decimals
-    shown = _unsigned_zero(f"{value:.{decimals}f}")
-    return Cell(value, f"{shown} ± {upwards:.{decimals}f}")
+    number = _unsigned_zero(f"{value:.{decimals}f}")
+    return Cell(value, f"{number} ± {upwards:.{decimals}f}")
 
 
 def _decimals(value: float, half: float) -> int:
@@ -290,9 +292,9 @@ def _decimals(value: float, half: float) -> int:
     return max(min(decimals, 3 - floor(log10(max(abs(value), half)))), 0)
 
 
-def _unsigned_zero(shown: str) -> str:
+def _unsigned_zero(number: str) -> str:
     """A number as it is printed, a zero without a sign."""
-    return shown if float(shown) else shown.removeprefix("-")
+    return number if float(number) else number.removeprefix("-")
 
 
 def _three_digits(value: float, towards_zero: bool) -> str:
@@ -308,11 +310,11 @@ def _three_digits(value: float, towards_zero: bool) -> str:
 # --- lights ---------------------------------------------------------------------------------------
 
 
-def light(look: Light, words: str) -> Markup:
-    """A traffic light with its meaning, which does not rest on colour alone."""
+def light(look: Light, meaning: str) -> Markup:
+    """A traffic light with its meaning, which does not rest only on its colour."""
     sign = {"good": "✓", "look": "!", "bad": "✗"}[look]
     template = Markup('<span class="light {}" title="{}" role="img" aria-label="{}">{}</span>')
-    return template.format(look, words, words, sign)
+    return template.format(look, meaning, meaning, sign)
 
 
 def run_error(run: ShownRun, runs: Sequence[ShownRun]) -> float:
@@ -369,12 +371,12 @@ def summary_section(
     """The first screen: `drive` is None for a user-defined model, which has no such numbers."""
     look: Light = "good" if judged.usable else "bad"
     headline = judged.headline.replace(" %", "\N{NO-BREAK SPACE}%")
-    shown = [
+    blocks = [
         PageBlock(
             "verdict", (light(look, "Usable" if judged.usable else "Not usable"), headline), look
         )
     ]
-    shown.append(PageBlock("pair", list(_curve_blocks(runs, campaign.virtual))))
+    blocks.append(PageBlock("pair", list(_curve_blocks(runs, campaign.virtual))))
     numbers = []
     limits = []
     if drive is not None:
@@ -392,8 +394,10 @@ def summary_section(
         limits += listed_block(_limit_sentences(drive, stages))
     limits.append(PageBlock("heading", "What to do next", "h3"))
     limits += listed_block(_next_steps(judged, campaign, stages, runs, findings))
-    shown.append(PageBlock("pair", [PageBlock("tile", tile) for tile in (numbers, limits) if tile]))
-    return Section("summary", "Summary", shown)
+    blocks.append(
+        PageBlock("pair", [PageBlock("tile", tile) for tile in (numbers, limits) if tile])
+    )
+    return Section("summary", "Summary", blocks)
 
 
 def _curve_blocks(runs: Sequence[ShownRun], virtual: bool) -> Iterable[PageBlock]:
@@ -418,7 +422,8 @@ def _curve_blocks(runs: Sequence[ShownRun], virtual: bool) -> Iterable[PageBlock
 def _limit_sentences(drive: Drive, stages: Sequence[StageFit]) -> list[str]:
     """Say which limits act during a step each way, and which to change first.
 
-    The steps go to the largest commands that were tested; what no test reached is no limit here.
+    The steps go to the largest commands that were tested; a value that no test reached does not
+    count as a limit.
     """
     length = int(2.0 * RATE)
     plus, minus = largest_commands(stages)
@@ -432,8 +437,8 @@ def _limit_sentences(drive: Drive, stages: Sequence[StageFit]) -> list[str]:
     shares = [
         f"{limit.limit} {percent(limit.time_share)}" for limit in acting[:3] if limit.time_share
     ]
-    head = f"Share of the time of steps from rest to {plus:.3g} and -{minus:.3g} V and back"
-    return [f"{head}: {', '.join(shares) or 'nothing acts'}.", *limit_times.sentences()[:1]]
+    heading = f"Share of the time of steps from rest to {plus:.3g} and -{minus:.3g} V and back"
+    return [f"{heading}: {', '.join(shares) or 'nothing acts'}.", *limit_times.sentences()[:1]]
 
 
 def _next_steps(
@@ -464,8 +469,8 @@ def _next_steps(
     if stages and not any(run.role == "validate" for run in runs):
         steps.append('Hold a run out of the fit (role = "validate"): nothing was predicted yet.')
     if judged.usable:
-        what = f"Use the {subject}"
-        steps.append(f"{what}. {judged.validity}" if judged.validity else f"{what}.")
+        advice = f"Use the {subject}"
+        steps.append(f"{advice}. {judged.validity}" if judged.validity else f"{advice}.")
         if stages and subject == "drive":
             steps.append(Markup("Try it: <code>swashplate simulate drive.toml step:9</code>."))
     return steps

@@ -30,7 +30,7 @@ COLUMNS = (
     "limits_slew",
     "limits_luff",
 )
-"""What the page keeps of each picture, beside the ship's six motions."""
+"""Numbers of each picture that the page keeps, in addition to the ship's six motions."""
 
 
 def write_scene(runs: CraneRun | Mapping[str, CraneRun], path: str | Path) -> None:

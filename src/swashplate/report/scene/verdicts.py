@@ -38,12 +38,12 @@ SUFFICES: dict[Decision, str] = {
     "not decided": "may not suffice",
     "no": "does not suffice",
 }
-IN_WORDS = (
+ABOUT_SWING = (
     "No control: the crane as it is, moved only by the operator's stick. Every variant goes "
     "through the same seaways, so differences are within each seaway. Swing is the angle between "
     "rope and plumb line, RMS its root mean square over a seaway."
 )
-LIMITS_IN_WORDS = (
+ABOUT_LIMITS = (
     "Orifice: the in-line orifice limits the flow to the stroking piston, so the shaft cannot "
     "accelerate faster. Swash stop: the pump is at full stroke, so the motor cannot turn faster. "
     "A controller that demands more acts late, and late action increases the swing."
@@ -58,13 +58,14 @@ PERIODS = np.linspace(4.0, 16.0, 25)
 
 
 def write_assessment(assessment: Assessment, path: str | Path) -> None:
-    """Write an assessment's page: one HTML file, whole or not at all, that needs no network.
+    """Write a report of an assessment as one HTML file, which needs no network.
 
-    It replaces an older file; a `FileError` if it cannot be written.
+    It replaces an older file, and is written whole or not at all; a `FileError` if it cannot be
+    written.
     """
-    # a scene alone needs no figures
+    # imported here: the pages of scenes do without Matplotlib
     from swashplate.report.figures import plot_assessment
-    from swashplate.report.figures.crane import seaway_words
+    from swashplate.report.figures.crane import seaway_label
     from swashplate.report.fit_report.summary import light
 
     study = assessment.study
@@ -79,22 +80,26 @@ def write_assessment(assessment: Assessment, path: str | Path) -> None:
         *_answers(assessment),
         *_fit_verdicts(crane),
         *(block for table in limited for block in titled(table, "limits")),
-        _drawn(plot_assessment(assessment), "Swing of each variant in each seaway, and its limits"),
+        _figure_block(
+            plot_assessment(assessment), "Swing of each variant in each seaway, and its limits"
+        ),
         *_remedies(assessment, remedies),
     ]
     provenance = study.provenance()
-    hangs = [words for words in assessment.sentences()[1:] if words not in provenance]
+    assumptions = [
+        sentence for sentence in assessment.sentences()[1:] if sentence not in provenance
+    ]
     swing_tables = [block for table in (swings, worse, differences) for block in titled(table)]
     sections = [
         Section("summary", "Summary", summary),
-        Section("hangs", "Sensitivity of the answer to assumptions", listed_block(hangs)),
-        Section("swing", "Swing", [text(IN_WORDS), *swing_tables]),
+        Section("hangs", "Sensitivity of the answer to assumptions", listed_block(assumptions)),
+        Section("swing", "Swing", [text(ABOUT_SWING), *swing_tables]),
         Section("limits", "Limits of the drives", _drives_limits(assessment, acting)),
         Section("example", "One of the seaways", _example(assessment)),
         Section("basis", "What it rests on", _basis(assessment)),
     ]
     facts = [
-        seaway_words(study.seaway),
+        seaway_label(study.seaway),
         f"{count(len(study.seeds), 'seaway')} of {study.length / 60.0:g} min",
         f"{count(len(assessment.names) - 1, 'variant')} besides no control",
     ]
@@ -103,22 +108,22 @@ def write_assessment(assessment: Assessment, path: str | Path) -> None:
 
 
 def _headline(assessment: Assessment) -> str:
-    """The outcome and the answers to what was asked, in one short sentence."""
+    """The outcome and the answers to the questions, in one short sentence."""
     answers = [HARM[assessment.harmless]] if "harm" in assessment.questions else []
     joint = "and"
     if "sufficiency" in assessment.questions and assessment.sufficient is not None:
         if answers and (assessment.harmless == "yes") != (assessment.sufficient == "yes"):
             joint = "but"
         answers.append(SUFFICES[assessment.sufficient])
-    words = "changes nothing" if assessment.idle else f" {joint} ".join(answers)
+    predicate = "changes nothing" if assessment.idle else f" {joint} ".join(answers)
     sentence = (
-        f"{assessment.outcome.capitalize()}: control ('{assessment.assessed_variant}') {words}."
+        f"{assessment.outcome.capitalize()}: control ('{assessment.assessed_variant}') {predicate}."
     )
     return f"{sentence} {assessment.unusable_sentence()}".rstrip()
 
 
 def _answers(assessment: Assessment) -> list[PageBlock]:
-    """Both answers with a light of their own, asked or not."""
+    """Both answers, each with its light, whether it was requested or not."""
     harmless: Decision = "no" if assessment.idle else assessment.harmless
     terms = [("Harm", LIGHTS[harmless], [assessment.harm_sentence()])]
     if assessment.sufficient is not None:
@@ -132,7 +137,7 @@ def _answers(assessment: Assessment) -> list[PageBlock]:
 
 def _remedies(assessment: Assessment, tables: Sequence[Table]) -> list[PageBlock]:
     """List sufficient remedies, and those that were tried in vain."""
-    blocks = [text(words) for words in assessment.remedy_sentences()]
+    blocks = [text(sentence) for sentence in assessment.remedy_sentences()]
     blocks += [block for table in tables for block in titled(table)]
     if assessment.tried and assessment.remedies:  # else the sentence says so
         blocks.append(text(f"Tried as well, and not better: {listed(assessment.tried)}.", "remark"))
@@ -141,29 +146,32 @@ def _remedies(assessment: Assessment, tables: Sequence[Table]) -> list[PageBlock
 
 def _fit_verdicts(crane: Crane) -> list[PageBlock]:
     """The verdict on the fit of each drive that comes from one, and what its tests left open."""
-    looks: dict[bool | None, Light] = {True: "good", False: "bad"}
+    lights: dict[bool | None, Light] = {True: "good", False: "bad"}
     terms: list[tuple[str, Light, list[str]]] = []
     for axis in AXES:
         source = crane.sources.get(axis)
         unreached = crane.unreached_sentence(axis)
-        look: Light = "look" if source is None else looks.get(source.fit_usable, "look")
-        words = [source.words()] if source is not None else []
+        axis_light: Light = "look"
+        sentences = []
+        if source is not None:
+            axis_light = lights.get(source.fit_usable, "look")
+            sentences.append(source.description())
         if unreached:
-            words.append(unreached)
-        if words:
-            terms.append((f"{axis.capitalize()}'s drive", look, words))
+            sentences.append(unreached)
+        if sentences:
+            terms.append((f"{axis.capitalize()}'s drive", axis_light, sentences))
     return [PageBlock("terms", terms, "verdict")] if terms else []
 
 
 def _drives_limits(assessment: Assessment, acting: Table) -> list[PageBlock]:
-    """Speeds that the axes can follow, and how long limits act; empty for ideal drives alone."""
+    """Amplitudes that the axes can follow, and how long limits act; empty for ideal drives."""
     if not acting.rows:
         return []
     study = assessment.study
     pose = study.cases[NONE].pose
     seas = [study.seaway.sea]
     followable = follow(study.crane, PERIODS, seas=seas, seaway=study.seaway, **pose)
-    return [text(LIMITS_IN_WORDS), _drawn(followable.plot(), FOLLOWED), *titled(acting)]
+    return [text(ABOUT_LIMITS), _figure_block(followable.plot(), FOLLOWED), *titled(acting)]
 
 
 def _example(assessment: Assessment) -> list[PageBlock]:
@@ -180,7 +188,7 @@ def _example(assessment: Assessment) -> list[PageBlock]:
         f"Seaway {seed}, in which '{assessed}' swings as in half of all seaways; evaluated from "
         f"{assessment.study.run_in:g} s on"
     )
-    return [_drawn(plot_crane(runs, title=f"Swing in seaway {seed}"), caption)]
+    return [_figure_block(plot_crane(runs, title=f"Swing in seaway {seed}"), caption)]
 
 
 def _basis(assessment: Assessment) -> list[PageBlock]:
@@ -197,8 +205,8 @@ def _basis(assessment: Assessment) -> list[PageBlock]:
         control = case.options["control"]
         if name != NONE:
             drives = count(len(case.cranes), "crane") if case.driven else "ideal drives"
-            words = control.words() if control is not None else "no control"
-            basis.append(f"{name}: {words}, {drives}.")
+            description = control.description() if control is not None else "no control"
+            basis.append(f"{name}: {description}, {drives}.")
     for axis in AXES:
         title = getattr(crane, axis).parameters.title.partition(f". {UNUSABLE}")[0]
         basis.append(f"{axis}: {title.rstrip('.')}.")
@@ -218,7 +226,7 @@ def _ship_sentence(seaway: Seaway) -> str:
 
 
 def _assumptions(crane: Crane) -> list[PageBlock]:
-    """Limits and geometry with their sources, what is assumed marked."""
+    """Limits and geometry with their sources; assumed ones are marked."""
     blocks = []
     if crane.limits:
         blocks += titled(crane.limit_table())
@@ -235,16 +243,17 @@ CELLS = (
 
 
 def write_operability(operability: Operability, path: str | Path) -> None:
-    """Write the page of an operability: one HTML file, whole or not at all, without a network.
+    """Write a report of an operability study as one HTML file, which needs no network.
 
-    It replaces an older file; a `FileError` if it cannot be written.
+    It replaces an older file, and is written whole or not at all; a `FileError` if it cannot be
+    written.
     """
     crane = operability.crane
     seaway = operability.seaway
     (table,) = operability.tables()
     summary = [
-        text(_lead(operability), "lead"),
-        _drawn(operability.plot(), CELLS),
+        text(_summary_sentence(operability), "lead"),
+        _figure_block(operability.plot(), CELLS),
         *titled(table),
         *listed_block(operability.sentences()),
     ]
@@ -261,31 +270,34 @@ def write_operability(operability: Operability, path: str | Path) -> None:
     write_text(page(sections, what="Operability", title=title, facts=" · ".join(facts)), path)
 
 
-def _lead(operability: Operability) -> str:
-    """The share of the year of the last variant and without control, and what limits most of it."""
+def _summary_sentence(operability: Operability) -> str:
+    """Share of the year that the last variant and the crane without control can work.
+
+    A second sentence names the limit that most often prevents work.
+    """
     name = operability.names[-1]
-    worked, none = (100.0 * operability.workable(variant) for variant in (name, NONE))
+    with_control = 100.0 * operability.workable(name)
+    without = 100.0 * operability.workable(NONE)
     sentence = (
-        f"'{name}' can work {worked:.0f} % of the year, the crane without control {none:.0f} %."
+        f"'{name}' can work {with_control:.0f} % of the year, the crane without control "
+        f"{without:.0f} %."
     )
     shares = operability.shares(name)
-    rest = [limit for limit in shares if limit != WORKABLE]
-    if not rest:
+    limits = [limit for limit in shares if limit != WORKABLE]
+    if not limits:
         return sentence
-    share = 100.0 * shares[rest[0]]
-    limit = label_of(rest[0])
+    share = 100.0 * shares[limits[0]]
+    limit = label_of(limits[0])
     return f"{sentence} Most often the rest is limited by {limit} first: {share:.0f} % of the year."
 
 
-def _drawn(figure: Figure, caption: str) -> PageBlock:
-    """A figure as SVG within the page, whole on a narrow screen as well."""
+def _figure_block(figure: Figure, caption: str) -> PageBlock:
+    """A figure as SVG within the page, with a class that lets it shrink on a narrow screen."""
     from matplotlib import rc_context
 
-    written = StringIO()
+    file = StringIO()
     with rc_context({"svg.hashsalt": "swashplate"}):
-        figure.savefig(written, format="svg", metadata={"Date": None})
-    drawn = written.getvalue()
-    drawn = drawn[drawn.index("<svg") :]
-    return PageBlock(
-        "figure", Markup(drawn.replace("<svg", '<svg class="chart sheet"', 1)), caption
-    )
+        figure.savefig(file, format="svg", metadata={"Date": None})
+    document = file.getvalue()
+    svg = document[document.index("<svg") :]
+    return PageBlock("figure", Markup(svg.replace("<svg", '<svg class="chart sheet"', 1)), caption)
