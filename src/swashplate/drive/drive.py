@@ -850,14 +850,15 @@ class Drive(Result, Mapping[str, Parameter]):
         return self._steady(voltage)[0]
 
     def _steady(self, voltage: float | Sequence[float] | Array) -> tuple[float | Array, ...]:
+        """Steady current [A] and speed [rad/s] at a voltage [V], each in the voltage's shape."""
         voltage = in_si(voltage, "V", "The voltage")
         try:
-            volts = np.atleast_1d(np.array(voltage, dtype=np.float64))
+            voltages = np.atleast_1d(np.array(voltage, dtype=np.float64))
         except (TypeError, ValueError):
-            volts = np.array([np.nan])
-        if not (np.abs(volts) <= FULL_VOLTAGE).all():
+            voltages = np.array([np.nan])  # refused below
+        if not (np.abs(voltages) <= FULL_VOLTAGE).all():
             raise InputError("A steady state needs finite commands within ±10 V.")
-        current, speed = steady_states(self.parameters, volts.reshape(-1))
+        current, speed = steady_states(self.parameters, voltages.reshape(-1))
         if np.ndim(voltage) == 0:
             return float(current[0]), float(speed[0])
-        return current.reshape(volts.shape), speed.reshape(volts.shape)
+        return current.reshape(voltages.shape), speed.reshape(voltages.shape)

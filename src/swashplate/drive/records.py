@@ -44,7 +44,7 @@ INPUTS: Mapping[str, Definition] = {
 }
 """What each measured input is. The range is that of a sample, beyond any machine: what lies outside
 is in another unit or no measurement. What is plausible is the largest size in a record."""
-RANGES: Mapping[str, tuple[float, float]] = {
+INPUT_RANGES: Mapping[str, tuple[float, float]] = {
     name: (definition.lower, definition.upper) for name, definition in INPUTS.items()
 }
 """Least and largest sample of each, as a stepper and exported code take it."""
@@ -95,7 +95,7 @@ def drive_records(
 def _check_measured(name: str, values: Array) -> None:
     """Refuse a record with a sample that no machine has, or whose size can hardly be meant."""
     definition = INPUTS[name]
-    least, most = RANGES[name]
+    least, most = INPUT_RANGES[name]
     low, high = float(values.min()), float(values.max())
     try:
         check_plausible(name, definition, max(low, high, key=abs))

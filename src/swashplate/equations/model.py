@@ -343,24 +343,24 @@ class Model:
 
 def _wrong(model: Model) -> Iterator[str]:
     """What keeps a single model from being marched, in sentences."""
-    says = f"Model {model.name}: "
+    prefix = f"Model {model.name}: "
     if not str(model.name).isidentifier():
         yield f"The name of a model is one word, such as 'valve', not {model.name!r}."
     for type_ in (model.parameters, model.state, model.inputs, model.options, model.given):
         if type_ is not None and not is_named_tuple(type_):
             yield (
-                f"{says}{type_!r} must be a named tuple, as in "
+                f"{prefix}{type_!r} must be a named tuple, as in "
                 "'class State(NamedTuple): position: float'."
             )
     for type_ in (model.parameters, model.state, model.given):
         for field_, kind in _no_floats(type_) if type_ is not None else ():
             must = "but must be a float or a named tuple of floats"
-            yield f"{says}{field_} is of type {kind}, {must}."
+            yield f"{prefix}{field_} is of type {kind}, {must}."
     for word in ("step", "sample", "rest", "settled", "limits", "domain"):
         member = getattr(model, word)
         is_left_out = member is None and word != "step"
         if not isinstance(plain(member), FunctionType) and not is_left_out:
-            yield f"{says}{word} must be an equation, not {member!r}."
+            yield f"{prefix}{word} must be an equation, not {member!r}."
     input_names = [*model.input_types]
     parameters = floats_of(model.parameters)
     for asking in model.equations:
@@ -368,28 +368,30 @@ def _wrong(model: Model) -> Iterator[str]:
             if name not in (*ARGUMENTS, *input_names):
                 choice = ", ".join((*ARGUMENTS, *input_names))
                 name_of = plain(asking).__name__
-                yield f"{says}{name_of} needs '{name}', which is not one of {choice}."
+                yield f"{prefix}{name_of} needs '{name}', which is not one of {choice}."
     for name, tap in model.taps.items():
         if name not in input_names:
-            yield f"{says}there is a tap on '{name}', but no input."
+            yield f"{prefix}there is a tap on '{name}', but no input."
         if tap.hold not in get_args(Hold):
             choice = ", ".join(get_args(Hold))
-            yield f"{says}'{name}' has the hold '{tap.hold}'; there are {choice}."
+            yield f"{prefix}'{name}' has the hold '{tap.hold}'; there are {choice}."
         if tap.delay and tap.delay not in parameters:
             choice = ", ".join(parameters)
-            yield f"{says}the delay of '{name}' is '{tap.delay}', but the parameters are {choice}."
+            yield (
+                f"{prefix}the delay of '{name}' is '{tap.delay}', but the parameters are {choice}."
+            )
     states = floats_of(model.state)
     for name in [path for paths in model.free_start.values() for path in paths]:
         if name not in states:
-            yield f"{says}free_start names '{name}', but the state has {', '.join(states)}."
+            yield f"{prefix}free_start names '{name}', but the state has {', '.join(states)}."
     inputs = {model.tap(name).signal for name in input_names}
     if "time" in inputs:
-        yield f"{says}an input cannot be called 'time', the name of the time stamps: rename it."
+        yield f"{prefix}an input cannot be called 'time', the name of the time stamps: rename it."
     for name, where in _own_names(model):
         if name in inputs:
-            yield f"{says}'{name}' is both an input and in {where}: rename one of them."
+            yield f"{prefix}'{name}' is both an input and in {where}: rename one of them."
         if name == "time":
-            yield f"{says}'time' is in {where}, but means the time stamps: rename it."
+            yield f"{prefix}'time' is in {where}, but means the time stamps: rename it."
 
 
 def _own_names(model: Model) -> Iterator[tuple[str, str]]:

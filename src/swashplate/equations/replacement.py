@@ -20,8 +20,8 @@ from typing import Any, NamedTuple, get_type_hints
 from swashplate.equations.declaration import (
     Replacements,
     equation_of_text,
+    functions_run,
     is_function,
-    reached,
 )
 from swashplate.equations.language import is_named_tuple, plain
 from swashplate.equations.model import Equation, Model, arguments_of, join
@@ -120,7 +120,7 @@ def _link_equations(model: Model) -> dict[str, Equation]:
 
 def _calls(equations: Iterable[Equation], replacements: Replacements, equation: Equation) -> bool:
     """Whether any of some equations is or calls another one."""
-    return plain(equation) in reached(equations, replacements)
+    return plain(equation) in functions_run(equations, replacements)
 
 
 def replaced(

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.drive import (
-    RANGES,
+    INPUT_RANGES,
     Drive,
     Sample,
     check_filter_stability,
@@ -62,7 +62,7 @@ def _exported(equations: tuple[Any, ...]) -> Exported:
         parameters=columns,
         outputs=(*Sample._fields[1:], "motor_torque", "motor_pressure_drop"),
         bounds={"voltage": FULL_VOLTAGE},
-        ranges=RANGES,
+        ranges=INPUT_RANGES,
         stable={0: stable_step},
         follows={(1, "steep"): steep_stops},
         internal=frozenset({"own"}),

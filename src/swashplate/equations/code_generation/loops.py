@@ -187,13 +187,15 @@ class Inner(NamedTuple):
         """Name of the equation."""
         return self.source.name
 
-    def function(self, *, flat: bool = False) -> Function:
-        """The equation as a function of scalars, which returns a tuple if it is to be `flat`."""
+    def function(self, *, always_tuple: bool = False) -> Function:
+        """The equation as a function of scalars, which returns a tuple if it is `always_tuple`."""
         nodes = [node for _, node in leaves(self.result)]
         formals = [*self.leading, *self.formals]
         name = f"{self.name}_{UNNAMED}"
-        says = f"{self.name} of scalars."
-        text, names = function_text(name, says, formals, nodes, self.labels, flat=flat)
+        docstring = f"{self.name} of scalars."
+        text, names = function_text(
+            name, docstring, formals, nodes, self.labels, always_tuple=always_tuple
+        )
         return Function(*named_by_text(name, text), dict(names))
 
 
@@ -255,7 +257,7 @@ def _inner(outer: Runner, callee: Callee, leading: Sequence[Value], rest: Sequen
 def called_apart(trace: Runner, callee: Callee, values: Sequence[Value]) -> Value:
     """An equation as a call of a generated function, without derivatives."""
     inner = _inner(trace, callee, [], values)
-    function = inner.function(flat=True)
+    function = inner.function(always_tuple=True)
     count = sum(1 for _ in leaves(inner.result))
     called = Call(function, count, loop=Loop(function.name, "once", inner))
     call = make("call", *inner.actuals, value=called)
@@ -442,9 +444,9 @@ def _tangent_loop(
         f"return {', '.join(returned)},",
     ]
     moved = [formals[index] for index in moving]
-    says = f"{inner.name}, repeated, with its derivatives by {listed(moved)}."
+    docstring = f"{inner.name}, repeated, with its derivatives by {listed(moved)}."
     name = f"{loop}_{UNNAMED}"
-    text = function_source(f"{name}({', '.join(formals)})", says, lines, "")
+    text = function_source(f"{name}({', '.join(formals)})", docstring, lines, "")
     return Derived(
         *named_by_text(name, text),
         {step.name: step},

@@ -342,6 +342,7 @@ class Lowering:
         self._begin(end)
 
     def _while(self, test: ast.expr, body: list[ast.stmt], scope: Scope) -> None:
+        """Write a ``while`` loop: a block that tests, one that does the body and one after it."""
         head, inside, end = self._label("while"), self._label("do"), self._label("end")
         self._jump(head)
         self._begin(head)
@@ -351,6 +352,7 @@ class Lowering:
         self._begin(end)
 
     def _loop(self, body: list[ast.stmt], onwards: str, end: str, scope: Scope) -> None:
+        """Write a loop's body, from which ``continue`` jumps `onwards` and ``break`` to `end`."""
         self._loops.append((onwards, end))
         if self._body(body, scope):
             self._jump(onwards)

@@ -127,10 +127,11 @@ _OF_COMMENTS = re.compile(r"\*(?=/)|/(?=\*)|\?(?=\?)")
 
 
 def comment_line(text: str) -> str:
-    """A text as one line within a comment, which nothing in it can begin or end.
+    """A text as one line of a comment, changed so that no part of it can begin or end a comment.
 
-    C removes a backslash at the end of a line, and C99 replaces trigraphs such as ``??/``, before
-    it looks for comments: two harmless lines could be joined to the end of one.
+    Before C looks for comments, it joins lines that end in a backslash, and C99 replaces trigraphs
+    such as ``??/``, which is a backslash. Two harmless lines could thus become the end of a
+    comment.
     """
     line = "".join(c if c.isprintable() else " " for c in text)
     line = line.replace("\\", "|")
@@ -138,27 +139,30 @@ def comment_line(text: str) -> str:
 
 
 def comment(text: str, pad: str = "", width: int = WIDTH) -> list[str]:
-    """A text of one line as a comment, on as many as it takes."""
+    """A text of one line as a comment of C, wrapped to a width."""
     line = f"{pad}/* {comment_line(text)} */"
     lines = list[str]()
-    while len(line) > width and " " in line[len(pad) + 20 : width - 3]:
-        at = line.rindex(" ", len(pad) + 20, width - 3)
-        lines.append(line[:at])
-        line = f"{pad} * {line[at + 1 :]}"
+    # a break leaves at least some words on a line, and room for the end of the comment
+    earliest = len(pad) + 20
+    latest = width - 3
+    while len(line) > width and " " in line[earliest:latest]:
+        break_at = line.rindex(" ", earliest, latest)
+        lines.append(line[:break_at])
+        line = f"{pad} * {line[break_at + 1 :]}"
     return [*lines, line]
 
 
 def indented(lines: Iterable[str]) -> list[str]:
-    """Lines of C moved in, long ones on several."""
+    """Lines of C indented by four spaces, long ones wrapped."""
     parts: list[str] = []
     for line in lines:
         parts += wrapped(f"    {line}") if line else [""]
     return parts
 
 
-def function(says: str, head: str, body: Iterable[str]) -> str:
+def function(description: str, head: str, body: Iterable[str]) -> str:
     """Text of a function of C."""
-    heading = comment(says) if says else []
+    heading = comment(description) if description else []
     return "\n".join([*heading, *wrapped(head), "{", *indented(body), "}"])
 
 
@@ -332,7 +336,7 @@ class C(Language):
                 headed += run
                 continue
             pad = run[0][: len(run[0]) - len(run[0].lstrip())]
-            says = first_line(source)
+            summary = first_line(source)
             new = source not in introduced
             introduced.add(source)
             short_run = len(run) < FEW and run[0].endswith(";") and not new
@@ -342,7 +346,7 @@ class C(Language):
                 continue
             if headed and not headed[-1].endswith("{") and headed[-1]:
                 headed.append("")
-            text = f"{source.name}: {says}" if new and says else source.name
+            text = f"{source.name}: {summary}" if new and summary else source.name
             headed += [*comment(text, pad, WIDTH - 4), *run]
         return headed
 

@@ -524,7 +524,7 @@ class _Tracer:
         if kind is plain(root) or kind is plain(repeated):
             return self.loop(node, kind.__name__)
         if kind is plain(interpolate):
-            return self.table(self.arguments(node, ("x", "knots", "values"), ()), node)
+            return self.interpolation(self.arguments(node, ("x", "knots", "values"), ()), node)
         if not _is_equation(called):
             text = ast.unparse(node.func)
             self.refuse(node, f"a call of {text}", f"make {text} an @equation")
@@ -575,8 +575,8 @@ class _Tracer:
             self.refuse(node, what, f"let it take {', '.join(own_arguments)} and the rest")
         return make_of(self.trace, inner, values[0], values[1], values[2:])
 
-    def table(self, arguments: Mapping[str, Value], node: ast.Call) -> Value:
-        """Value of `interpolate`."""
+    def interpolation(self, arguments: Mapping[str, Value], node: ast.Call) -> Value:
+        """Value of a call of `interpolate`, whose arguments are checked."""
         x, knots, values = arguments.values()
         if not (
             isinstance(x, Node)
@@ -590,11 +590,14 @@ class _Tracer:
                 "type them tuple[float, float, ...] with every element, or give derive their "
                 "lengths",
             )
-        numbers = [[node for _, node in leaves(table)] for table in (knots, values)]
-        return self.interpolated(x, *numbers)
+        return self.interpolated(
+            x,
+            knots=[leaf for _, leaf in leaves(knots)],
+            values=[leaf for _, leaf in leaves(values)],
+        )
 
     def interpolated(self, x: Node, knots: Sequence[Node], values: Sequence[Node]) -> Node:
-        """`interpolate`, written out."""
+        """Nodes of `interpolate`: the segment of x is chosen, then a straight line evaluated."""
         make, label = self.trace.make, self.trace.label
         ends = [knots[0], knots[1], values[0], values[1]]
         for segment in range(1, len(knots) - 1):

@@ -425,8 +425,8 @@ def march_source(
             "lower = worst < worst_margin[0] or worst != worst",
             "worst_margin[0] = worst if lower else worst_margin[0]",
         ]
-    says = f"March {model.name} over its inputs."
-    return sample_code.module(function_source(f"march({KERNEL_ARGUMENTS})", says, lines, ""))
+    docstring = f"March {model.name} over its inputs."
+    return sample_code.module(function_source(f"march({KERNEL_ARGUMENTS})", docstring, lines, ""))
 
 
 def step_source(
@@ -475,10 +475,17 @@ def step_source(
             compared = sample_code.printed(part, [lowest])
             ends += [*compared.lines, f"worst = {compared.texts[0]}"]
         ends += [*states.step, *states.save]
-    head, says = "prepare(params, given, h, constants)", f"Constants of {model.name}."
-    prepared = function_source(head, says, [*prepare, "return"])
-    says, lines = f"One sample of {model.name}.", [*lines, *ends, "return worst"]
-    stepped = function_source("step(context)", says, lines, "@inlined")
+    prepared = function_source(
+        "prepare(params, given, h, constants)",
+        f"Constants of {model.name}.",
+        [*prepare, "return"],
+    )
+    stepped = function_source(
+        "step(context)",
+        f"One sample of {model.name}.",
+        [*lines, *ends, "return worst"],
+        "@inlined",
+    )
     return sample_code.module(prepared, stepped), count
 
 

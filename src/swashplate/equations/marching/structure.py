@@ -458,11 +458,12 @@ def recurrence(pattern: tuple[tuple[float | None, ...], ...]) -> PlannedKernel:
     lines += [f"width = (size - {len(changing)}) // {3 * size}"]
     lines += [f"for c in range(0, width, {len(together)}):"]
     lines += indented([*ahead, "for m in range(count):", *indented(inner), *after])
-    name, says = f"recurrence_{size}", f"Derivatives of {size} states that wait for each other."
+    name = f"recurrence_{size}"
+    docstring = f"Derivatives of {size} states that wait for each other."
     head = KERNEL_ARGUMENTS
     for argument, instead in (("first", "size"), ("delay_samples", "lanes"), ("params", "tangent")):
         head = head.replace(argument, instead)
-    return PlannedKernel(name, name, function_source(f"{name}({head})", says, lines, ""))
+    return PlannedKernel(name, name, function_source(f"{name}({head})", docstring, lines, ""))
 
 
 def _sum(terms: Sequence[str]) -> str:

@@ -284,14 +284,14 @@ class _Interface:
             test = " || ".join(f"m->{member} != 0.0" for member in members)
             line = f"m->{member}_options.{c_name(option)} = {test};"
             cases.setdefault(line, []).extend(str(index_of[member]) for member in members)
-        says = "Terms of the equations that are on where their parameters are not 0."
+        description = "Terms of the equations that are on where their parameters are not 0."
         head = f"static void switched({self.exported.type} *m, int parameter)"
         if not cases:
-            return function(says, head, ["(void)m;", "(void)parameter;"]) + "\n"
+            return function(description, head, ["(void)m;", "(void)parameter;"]) + "\n"
         lines = ["switch (parameter) {"]
         for line, numbers in cases.items():
             lines += [*(f"case {number}:" for number in numbers), f"    {line}", "    break;"]
-        return function(says, head, [*lines, "default:", "    break;", "}"]) + "\n"
+        return function(description, head, [*lines, "default:", "    break;", "}"]) + "\n"
 
     def places(self) -> str:
         """Whether taps and the newest sample lie within their lines."""
@@ -329,10 +329,12 @@ def _body(lines: Sequence[str]) -> str:
     return "".join(f"{line}\n" for line in indented(lines))
 
 
-def _enum(says: str, prefix: str, names: Sequence[str], count: str, *, bits: bool = False) -> str:
+def _enum(
+    description: str, prefix: str, names: Sequence[str], count: str, *, bits: bool = False
+) -> str:
     if not names and not count:
         return ""
-    lines = [f"/* {says}. */", "enum {"]
+    lines = [f"/* {description}. */", "enum {"]
     for index, name in enumerate(names):
         constant = 1 << index if bits else index
         comma = "," if count or index + 1 < len(names) else ""

@@ -302,9 +302,9 @@ class PartInC:
         result_type = "void" if margin is None else "bool"
         head = f"static {result_type} {self.names['sample']}({', '.join(formals)})"
         part = self.part_model.name
-        says = f"A sample of the {part}: what is known at it, and the state at the next."
+        description = f"A sample of the {part}: what is known at it, and the state at the next."
         lines = [*(f"(void){name};" for name in unused), *lines]
-        return function(says, head, lines if "m->" in text else ["(void)m;", *lines])
+        return function(description, head, lines if "m->" in text else ["(void)m;", *lines])
 
     def start(self, settled: bool) -> str:
         """The state at the first sample."""
@@ -345,8 +345,8 @@ class PartInC:
         pointer = f"struct {tag} *k = &m->{self.member}_constants;"
         lines = self.body(self.part.trace, {"k": results}, available, {}, pointers={"k": pointer})
         part = self.part_model.name
-        says = f"What follows from the parameters of the {part}, its options and the step."
-        return function(says, head, lines)
+        description = f"What follows from the parameters of the {part}, its options and the step."
+        return function(description, head, lines)
 
     def decided(self, name: str, equation: Equation) -> str:
         """A function that returns what an equation of parameters, options and step says."""
@@ -358,9 +358,9 @@ class PartInC:
         }
         lines = self.body(trace, {}, available, {}, decision)
         result_type = "bool" if decision.kind == "bool" else "double"
-        says = (equation.__doc__ or "").strip().partition("\n")[0]
+        description = (equation.__doc__ or "").strip().partition("\n")[0]
         return function(
-            says, f"static {result_type} {name}(const {self.layout.exported.type} *m)", lines
+            description, f"static {result_type} {name}(const {self.layout.exported.type} *m)", lines
         )
 
     # -- numbers -----------------------------------------------------------------------------------

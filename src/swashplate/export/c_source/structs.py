@@ -36,8 +36,8 @@ class Structs:
                 note = comment_line(notes[name])
                 fields.append(f"{declared} /* {note} */" if note else declared)
             doc = inspect.getdoc(cls) or ""
-            says = "" if doc.startswith(f"{cls.__name__}(") else doc.splitlines()[0]
-            self.texts[cls] = tag, struct(says, tag, fields)
+            description = "" if doc.startswith(f"{cls.__name__}(") else doc.splitlines()[0]
+            self.texts[cls] = tag, struct(description, tag, fields)
         return self.texts[cls][0]
 
     def fresh(self, stem: str) -> str:
@@ -50,9 +50,9 @@ class Structs:
         return "double" if hint in (float, int) else "bool"
 
 
-def struct(says: str, tag: str, fields: Iterable[str]) -> str:
+def struct(description: str, tag: str, fields: Iterable[str]) -> str:
     """Text of a struct; one without fields has a byte, as C99 wants it."""
-    head = comment(says) if says else []
+    head = comment(description) if description else []
     lines = [f"    {declaration}" for declaration in fields] or ["    char nothing;"]
     return "\n".join([*head, f"struct {tag} {{", *lines, "};"])
 

@@ -12,8 +12,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from swashplate.campaign import CURRENTS as CURRENTS
 from swashplate.campaign import (
-    APART,
+    LARGEST_CERTAIN_INTERVAL,
     RISE,
     SIGNALS,
     Channel,
@@ -23,7 +24,6 @@ from swashplate.campaign import (
     InputSignal,
     signed_by_command,
 )
-from swashplate.campaign import CURRENTS as CURRENTS
 from swashplate.drive import (
     PRESSURE_PATH,
     START,
@@ -136,7 +136,7 @@ def _jumps_at_once(signal: InputSignal, *, even: bool) -> bool:
     if signal.interpolation == "linear" or (signal.is_held and not even):
         return False
     jumps = signal.jumps
-    return bool(jumps.size) and float(np.diff(signal.time)[jumps].max()) <= APART
+    return bool(jumps.size) and float(np.diff(signal.time)[jumps].max()) <= LARGEST_CERTAIN_INTERVAL
 
 
 def voltage_record(experiment: Experiment) -> Record:
