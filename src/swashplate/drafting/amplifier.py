@@ -305,8 +305,7 @@ def _try_dynamics(
     The error is infinite if the card refuses a command.
     """
     neutral = Drive.preset("neutral").at_every_rate().parameters
-    numbers = {"Z19": WEAK_SOLENOIDS, **static, **dynamics.numbers}
-    drive = Drive(neutral.with_numbers(numbers))
+    drive = Drive(neutral.with_numbers({"Z19": WEAK_SOLENOIDS, **static, **dynamics.numbers}))
     squares = np.zeros(DELAYS.size)
     size = 0
     try:

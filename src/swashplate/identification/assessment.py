@@ -33,7 +33,7 @@ from swashplate.identification.estimation.unknowns import Unknown, Unknowns
 from swashplate.identification.fitting import (
     Estimated,
     Fit,
-    Solved,
+    SolvedStage,
     fingerprint,
     staged,
 )
@@ -518,7 +518,7 @@ def _loaded(
     nominal = _nominal_of(path, file, model, runs)
     entries = iter(file.stages)
 
-    def solved(stage: Stage, problem: Problem) -> Solved:
+    def solved(stage: Stage, problem: Problem) -> SolvedStage:
         return _stored_stage(path, next(entries), stage, problem)
 
     fitted = file.setup.model_copy(update={"stages": file.setup.stages[: len(file.stages)]})
@@ -584,21 +584,21 @@ def _nominal_of(
     return nominal
 
 
-def _stored_stage(path: Path, entry: StoredStage, stage: Stage, problem: Problem) -> Solved:
+def _stored_stage(path: Path, stored: StoredStage, stage: Stage, problem: Problem) -> SolvedStage:
     """A stage as it was stored; refused unless it has the unknowns of the problem."""
-    sizes = {entry.solution.vector.size, len(entry.unknowns)}
-    if entry.intervals is not None:
-        sizes.add(len(entry.intervals))
-    same = entry.name == stage.name and _identities(entry.unknowns) == _identities(problem.unknowns)
-    if not same or len(sizes) > 1:
+    lengths = {stored.solution.vector.size, len(stored.unknowns)}
+    if stored.intervals is not None:
+        lengths.add(len(stored.intervals))
+    has_same_unknowns = _identities(stored.unknowns) == _identities(problem.unknowns)
+    if stored.name != stage.name or not has_same_unknowns or len(lengths) > 1:
         raise FileError(
-            f"{path}: stage {entry.name} has other parameters than its fit setup: fit again."
+            f"{path}: stage {stored.name} has other parameters than its fit setup: fit again."
         )
-    return Solved(
-        problem=replace(problem, unknowns=Unknowns(entry.unknowns)),
-        solution=entry.solution,
-        starts=entry.starts,
-        intervals=entry.intervals,
+    return SolvedStage(
+        problem=replace(problem, unknowns=Unknowns(stored.unknowns)),
+        solution=stored.solution,
+        starts=stored.starts,
+        intervals=stored.intervals,
     )
 
 

@@ -89,7 +89,7 @@ OF_FORCES = ("Z19", "Z21")
 """Coefficients of the solenoids that are drawn if a fit setup frees forces: those of odd powers."""
 
 
-class Solved(NamedTuple):
+class SolvedStage(NamedTuple):
     """Solution of a stage, and its starts."""
 
     problem: Problem
@@ -317,7 +317,7 @@ def fit(
     nominal, setup = stated.nominal, stated.setup
     doubts += stated.doubts
 
-    def solved(stage: Stage, problem: Problem) -> Solved:
+    def solved(stage: Stage, problem: Problem) -> SolvedStage:
         def seen(now: Progress) -> None:
             work.at(f"evaluation {now.evaluations}, cost {now.cost:.5g}")
             if watch is not None:
@@ -379,7 +379,7 @@ def staged(
     setup: FitSetup,
     nominal: Parameters,
     runs: Sequence[Experiment],
-    solved: Callable[[Stage, Problem], Solved],
+    solved: Callable[[Stage, Problem], SolvedStage],
     *,
     threads: int | None = None,
 ) -> tuple[StageFit, ...]:
@@ -448,8 +448,8 @@ def _solved(
     solver: partial[Solution],
     search: Search | None,
     doubts: Sequence[str],
-) -> Solved:
-    """See `Solved`."""
+) -> SolvedStage:
+    """See `SolvedStage`."""
     limits = {key: solver.keywords[key] for key in ("tolerance", "max_evaluations")}
     if search is not None and search.starts:
         solutions = _from_starts(stage, problem, search, limits)
@@ -479,7 +479,7 @@ def _solved(
         # what the residuals are worth is known only now
         problem = weighed(problem, solution.vector)
         solution = solver(problem, solution.vector)
-    return Solved(problem, solution, solutions)
+    return SolvedStage(problem, solution, solutions)
 
 
 def _from_starts(

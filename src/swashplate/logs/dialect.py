@@ -540,18 +540,20 @@ _KNOWN_UNITS = frozenset(
     - – − 1 none n/a dimensionless
     """.split()  # noqa: SIM905 - a list of so many strings is unreadable
 )
-_SHORT = 4
-"""Letters that a word may have that is taken for a unit because of its neighbours."""
+_LONGEST_UNKNOWN_UNIT = 4
+"""Most letters of an unknown word that counts as a unit because known units are next to it."""
 _PARTS = re.compile(r"[\s*/·.()^²³0-9-]+")
 _BRACKETS = re.compile(r"\[.*\]|\(.*\)")
 
 
 def _units_of(cells: Sequence[str]) -> _Units | None:
-    """Units in a row of units, None for an empty cell; or None if the row is not one."""
+    """Units in a row of a table, None for an empty cell; None if it is not a row of units."""
     filled = [cell for cell in cells if cell]
-    # a short word of another language may stand among units, such as Imp for pulses
-    others = [cell for cell in filled if not _is_unit(cell)]
-    if 2 * len(others) >= len(filled) or any(len(cell) > _SHORT for cell in others):
+    # a short word of another language may be among units, such as Imp for pulses
+    unknown_words = [cell for cell in filled if not _is_unit(cell)]
+    if 2 * len(unknown_words) >= len(filled):
+        return None
+    if any(len(word) > _LONGEST_UNKNOWN_UNIT for word in unknown_words):
         return None
     units: _Units = []
     for cell in cells:

@@ -37,12 +37,12 @@ from swashplate.tables import count
 
 Array = NDArray[np.float64]
 
-WINDOW = 0.2
-"""Time over which the speed behind a position is taken. [s]"""
+SPEED_WINDOW = 0.2
+"""Time over which a mean speed is taken from a position. [s]"""
 MOVING = 0.1
-"""Of the largest motion in any run, from which a run's own can be judged."""
+"""Motion of a run that is enough to judge it, as a part of the largest in any run. [1]"""
 FAR_OFF = 3.0
-"""By which a channel should not differ from the nominal drive."""
+"""Factor by which a channel should not differ from the nominal drive. [1]"""
 FROZEN, DEAD = 1.0, 0.2
 """Time for which no position stands still while its drive runs [s]; and the part of a channel's
 largest simulated range that a run must have for a still sensor to be broken."""
@@ -89,24 +89,29 @@ def check_runs(experiments: Sequence[Experiment], nominal: ParameterSet) -> list
     if not _refused(findings):
         for name, runs in simulated_readings(experiments, nominal).items():
             named = {finding.run for finding in findings if finding.channel is None}
-            still = list(_still(name, [readings for readings in runs if readings.run not in named]))
-            named |= {finding.run for finding in still}
-            findings += still
-            others = [readings for readings in runs if readings.run not in named]
-            findings += contradictions(name, others)
+            unnamed = [readings for readings in runs if readings.run not in named]
+            stuck_sensors = list(_stuck_sensors(name, unnamed))
+            named |= {finding.run for finding in stuck_sensors}
+            findings += stuck_sensors
+            unnamed = [readings for readings in runs if readings.run not in named]
+            findings += contradictions(name, unnamed)
     return sorted(findings, key=lambda finding: finding.severity != "refuse")
 
 
 def unfitted_currents(experiments: Sequence[Experiment], setup: FitSetup) -> list[Finding]:
-    """Currents of an amplifier that are measured, and fitted by no stage."""
-    fitted = {kind for stage in setup.stages for kind in stage.channels or kinds_of(stage.part)}
+    """Warnings of currents of an amplifier that are measured, but that no stage uses."""
     if any(stage.current == "measured" for stage in setup.stages):
         return []
+    fitted_kinds = set[str]()
+    for stage in setup.stages:
+        fitted_kinds.update(stage.channels or kinds_of(stage.part))
+    unfitted_kinds = set(CURRENTS) - fitted_kinds
     unfitted = dict.fromkeys(
         name
         for run in experiments
+        if run.input.kind == "voltage"
         for name, channel in run.channels.items()
-        if run.input.kind == "voltage" and channel.kind in CURRENTS and channel.kind not in fitted
+        if channel.kind in unfitted_kinds
     )
     return [
         warning(
@@ -342,7 +347,7 @@ class SimulatedReadings(NamedTuple):
 def simulated_readings(
     experiments: Sequence[Experiment], parameters: ParameterSet
 ) -> dict[str, list[SimulatedReadings]]:
-    """What each channel did in each run, by the channel's name; runs that hardly move left out."""
+    """Measured and simulated readings by channel, of the runs in which the drive moves enough."""
     by_channel = dict[str, list[SimulatedReadings]]()
     for experiment in experiments:
         simulation = simulated_run(experiment, parameters)
@@ -356,16 +361,20 @@ def simulated_readings(
 
 
 def _readings_of(run: str, channel: Channel, simulation: Simulation) -> SimulatedReadings:
-    """A channel of a run beside its simulation."""
-    time, measured = channel.time[channel.used], channel.values[channel.used]
+    """Used readings of a channel in a run, and the simulated ones; of a position mean speeds."""
+    time = channel.time[channel.used]
+    measured = channel.values[channel.used]
     signal = SIGNALS[channel.kind]
-    parts = ("current_positive", "current_negative") if signal == "current_sum" else (signal,)
+    if signal == "current_sum":
+        summands: tuple[str, ...] = ("current_positive", "current_negative")
+    else:
+        summands = (signal,)
     simulated = np.sum(
-        [np.interp(time, simulation.time, simulation[part]) for part in parts], axis=0
+        [np.interp(time, simulation.time, simulation[name]) for name in summands], axis=0
     )
     if channel.is_position:
-        # mean speeds in short windows: where a position drifts to says little
-        windows = max(int((time[-1] - time[0]) / WINDOW), 4)
+        # a position drifts with small errors of speed: speeds are what can be compared
+        windows = max(int((time[-1] - time[0]) / SPEED_WINDOW), 4)
         grid = np.linspace(time[0], time[-1], windows + 1)
         measured = np.diff(np.interp(grid, time, measured)) / np.diff(grid)
         simulated = np.diff(np.interp(grid, time, simulated)) / np.diff(grid)
@@ -382,7 +391,7 @@ def _moving(runs: Sequence[SimulatedReadings]) -> list[SimulatedReadings]:
     ]
 
 
-def _still(name: str, runs: Sequence[SimulatedReadings]) -> Iterator[Finding]:
+def _stuck_sensors(name: str, runs: Sequence[SimulatedReadings]) -> Iterator[Finding]:
     """Sensors that show nothing while the drive moves, and positions that freeze for a while."""
     ranges = [float(np.ptp(readings.simulated)) for readings in runs]
     fastest = max((float(np.abs(readings.simulated).max()) for readings in runs), default=0.0)

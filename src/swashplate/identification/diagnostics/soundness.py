@@ -96,35 +96,40 @@ def outlying_runs(stages: Sequence[StageFit], predicted: Sequence[RunQuality]) -
         if stage is not None:
             channels = list(stage.problem.channels)
         for channel in dict.fromkeys(channels):
-            for finding in _of_channel(stage, channel, predicted):
+            for finding in _outliers_by_channel(stage, channel, predicted):
                 if finding.run not in named:
                     named.add(str(finding.run))
                     yield finding
 
 
-def _of_channel(
+def _outliers_by_channel(
     stage: StageFit | None, channel: str, predicted: Sequence[RunQuality]
 ) -> list[Finding]:
-    """The runs that one channel shows to be unsound.
+    """The runs that one channel shows to be outliers, found one by one.
 
-    Empty if these would be half of all: runs that disagree altogether show what the model lacks.
+    None if these would be half of all: runs that all disagree show what the model lacks.
     """
     findings = list[Finding]()
-    names = list[str]()
+    excluded = list[str]()
     while True:
-        before = _ErrorRatios.of(_records(stage, channel, predicted, names), names)
-        suspect = None if before is None else before.farthest
+        ratios = _ErrorRatios.of(_records(stage, channel, predicted, excluded), excluded)
+        suspect = None if ratios is None else ratios.farthest
         if suspect is None:
             break
-        records = _records(stage, channel, predicted, [*names, suspect])
-        after = _ErrorRatios.of(records, [*names, suspect])
-        if after is None or after.excess(suspect) <= after.limit or after.is_shared(suspect):
+        # the suspect must stand out from a fit that it does not influence
+        excluded.append(suspect)
+        records = _records(stage, channel, predicted, excluded)
+        ratios = _ErrorRatios.of(records, excluded)
+        if ratios is None:
             break
-        names.append(suspect)
+        log_excess = ratios.excess(suspect)
+        if log_excess <= ratios.limit or ratios.is_shared(suspect):
+            break
         record = next(record for record in records if record.run == suspect)
-        times = float(np.exp(0.5 * after.excess(suspect)))
-        findings.append(refusal(suspect, channel, _sentence(record, channel, records, times)))
-        if 2 * len(findings) >= len(after.ratios):
+        error_ratio = float(np.exp(0.5 * log_excess))
+        sentence = _sentence(record, channel, records, error_ratio)
+        findings.append(refusal(suspect, channel, sentence))
+        if 2 * len(findings) >= len(ratios.ratios):
             return []
     return findings
 
@@ -161,7 +166,7 @@ def _records(
 
 @dataclass(frozen=True)
 class _ErrorRatios:
-    """Logarithms of the runs' errors, beside those of the runs that count as sound."""
+    """Logarithms of the runs' squared errors, to compare with those of the sound runs."""
 
     suspects: tuple[str, ...]
     """Runs that may be unsound."""
@@ -195,7 +200,7 @@ class _ErrorRatios:
         return np.array([self.ratios[name] for name in self.sound])
 
     def excess(self, run: str) -> float:
-        """How far a run is above the median of the sound ones."""
+        """Logarithm of a run's squared error over the median of the sound ones."""
         if run not in self.ratios:
             return 0.0
         return self.ratios[run] - float(np.median(self._sound_ratios))
@@ -229,19 +234,19 @@ class _ErrorRatios:
 
 
 def _sentence(
-    record: ChannelErrors, channel: str, records: Iterable[ChannelErrors], times: float
+    record: ChannelErrors, channel: str, records: Iterable[ChannelErrors], error_ratio: float
 ) -> str:
     """What is wrong with a run, if that can be found out, and the line to write."""
     fault = (
-        f"{record.run}: '{channel}' is {times:.2g} times as far from the simulation as in the "
-        "other runs"
+        f"{record.run}: '{channel}' is {error_ratio:.2g} times as far from the simulation as in "
+        "the other runs"
     )
     measured, simulated = _motion(record)
     mean_square = float(np.mean((simulated - measured) ** 2))
     ignored = 'leave it out with role = "ignore"'
-    span = _still(record)
-    if span is not None:
-        first, last = span
+    standstill = _standstill(record)
+    if standstill is not None:
+        first, last = standstill
         return (
             f"{fault}: it does not move from {first:.4g} to {last:.4g} s. Check the sensor; ignore "
             f"this window, or {ignored}."
@@ -303,7 +308,7 @@ def _delayed(record: ChannelErrors, measured: Array, simulated: Array) -> tuple[
     return float(shifts[best] * record.step), float(mean_squares[best])
 
 
-def _still(record: ChannelErrors) -> tuple[float, float] | None:
+def _standstill(record: ChannelErrors) -> tuple[float, float] | None:
     """First and last instant at which a position stands still though the model moves. [s]"""
     if not record.is_position:
         return None

@@ -129,7 +129,12 @@ def plot_bode(
     _scale_axes(axes, response)
     # the lines are at the top there
     write_words(
-        axes[0], "\n".join(response.still()), (0.0, 0.0), (4.0, 4.0), color=GREY, va="bottom"
+        axes[0],
+        "\n".join(response.sentences_on_no_motion()),
+        (0.0, 0.0),
+        (4.0, 4.0),
+        color=GREY,
+        va="bottom",
     )
     if mark is not None and response.frequencies[0] <= mark <= response.frequencies[-1]:
         for panel in axes:
@@ -173,7 +178,7 @@ def _draw_response(
     swept = (gain, np.degrees(response.phase), 100.0 * response.distortion)
     marker = "o" if response.frequencies.size == 1 else None
     for panel, rows in zip(axes, swept, strict=False):
-        for row, moves, look in zip(rows, response.moves, looks, strict=True):
+        for row, moves, look in zip(rows, response.has_motion, looks, strict=True):
             style: dict[str, Any] = {"color": look.color, "ls": look.dashes, "lw": LINE}
             shown_row = np.where(moves, row, np.nan)
             panel.plot(response.frequencies, shown_row, marker=marker, ms=4.0, **style)
