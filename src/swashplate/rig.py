@@ -59,7 +59,7 @@ HELD_BACK = {
 COLUMNS: Mapping[str, str] = {"rectified_current": "current", "encoder_counts": "counts"}
 """Columns that are not called as the kind of their channel."""
 DRIVE_FILE = "drive.toml"
-"""Parameters of the drive that was simulated, beside truth.toml; or, beside campaign.toml, those of
+"""Parameters of the drive that was simulated, next to truth.toml; or, next to campaign.toml, those of
 the one that a fit starts from."""
 
 
@@ -155,7 +155,7 @@ SEVERITIES: Mapping[Severity, Instruments] = MappingProxyType({
 clean: the model's own numbers at k/512 s, in which a fit finds the parameters to any digit.
 realistic: noise of mean zero and nothing systematic, so that a fit of the right model is unbiased
 and its confidence intervals can be compared with the truth; jitter as of a clock in hardware never
-lets a sample beside a step pass the card's dead zone. harsh: zero and gain errors, jitter that
+lets a sample next to a step pass the card's dead zone. harsh: zero and gain errors, jitter that
 moves steps by a part of a sample, gaps and a counter that rolls over.
 """
 
@@ -225,7 +225,7 @@ def run(
     maneuvers : mapping or sequence of Maneuver, optional
         By default Kruse's tests of the axis.
     seed : int
-        Not negative. The same seed gives the same logs, each of them whatever runs beside it.
+        Not negative. The same seed gives the same logs, each of them whatever other runs there are.
     severity : {"clean", "realistic", "harsh"}
         How bad the instruments are, see `SEVERITIES`.
     instruments : Instruments, optional
@@ -568,7 +568,7 @@ def _play(position: Array, width: float) -> Array:
 
 
 def write(tests: VirtualTests, folder: str | Path, *, overwrite: bool = False) -> Path:
-    """Files that a campaign leaves, and the truth beside them.
+    """Files that a campaign leaves, and the truth next to them.
 
     Parameters
     ----------

@@ -76,9 +76,9 @@ class Accuracy(NamedTuple):
     zero: float = 0.0
     """In the signal's unit."""
     time: float | None = 0.0
-    """Of its stamps beside those of the other signals [s]; None: half the time between samples."""
+    """Of its stamps against those of the other signals [s]; None: half the time between samples."""
     rounded: bool = True
-    """Whether the steps of its converter are an error beside the zero; not if a zero is stated."""
+    """Whether the steps of its converter are a further error; not if a zero is stated."""
 
 
 ASSUMED: Mapping[str, Accuracy] = MappingProxyType(
@@ -307,7 +307,7 @@ class Channel(Result):
     def resolution(self) -> float | None:
         """Step of an encoder's readings, None of other channels. [unit]
 
-        A count; more where it moves by multiples of more alone, as behind a decoder that counts
+        A count; more if it moves only by multiples of more, as downstream of a decoder that counts
         every fourth edge.
         """
         if self.encoder is None:

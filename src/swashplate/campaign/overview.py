@@ -56,7 +56,7 @@ class BlockRanges(Result):
     """(n,) as recorded: a counter that wraps does so here; NaN in a block without a number.
     [unit]"""
     missing: int
-    """Samples that are no finite number."""
+    """Samples that are not a finite number."""
     period: float
     """Usual interval of its stamps. [s]"""
     longest: float
@@ -79,7 +79,7 @@ class Overview(Result):
     windows: tuple[LogWindow, ...]
     """Those with motion, in the order of time."""
     read_from: Path | None = None
-    """The table that stands for the log, if one was written beside it."""
+    """The table that stands for the log, if one was written next to it."""
 
     @property
     def begin(self) -> float:

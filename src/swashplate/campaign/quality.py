@@ -274,7 +274,7 @@ def has_sign(currents: Sequence[Array], share: float = 0.25) -> bool:
 def unsigned_currents(experiments: Iterable[Experiment]) -> dict[tuple[str, str], str]:
     """Currents that are said to have a sign and have none, with a sentence on each.
 
-    By axis and channel. Give runs beside each other: of one alone a current that never turns
+    By axis and channel. Give runs together: of one only, a current that never turns
     negative may be right.
     """
     currents, lowest = dict[tuple[str, str], list[Array]](), dict[tuple[str, str], float]()

@@ -403,7 +403,7 @@ class RunEntry(FileTable):
 
 
 class CampaignFile(FileTable):
-    """A campaign: the tests of a machine, beside their logs."""
+    """A campaign: the tests of a machine, next to their logs."""
 
     title: str = Field("", description="For the report.")
     virtual: Flag = Field(False, description="Whether the tests are simulated.")

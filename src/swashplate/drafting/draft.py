@@ -113,11 +113,11 @@ class _Guess(NamedTuple):
     rolls_over_at: float = 0.0
     """Reading after which an encoder's counter or an angle wraps; 0 if it does not."""
     unit_comment: str = "from its name"
-    """Reason for its unit, beside the entry, if it does not stand in the header."""
+    """Reason for its unit, next to the entry, if it is not in the header."""
     has_plc_name: bool = False
     """Whether its name is that of a PLC's word."""
     full_scale: int = 0
-    """Reading of a PLC's word at full scale; 0 if the numbers are no such words."""
+    """Reading of a PLC's word at full scale; 0 if the numbers are not such words."""
 
 
 class _Axis(NamedTuple):
@@ -418,7 +418,7 @@ def _full_scale(blocks: Sequence[Array], *, has_plc_name: bool) -> int:
 
 
 def _turn(values: Sequence[Array], unit: str) -> float:
-    """A whole turn in a unit if positions jump by it, 0 if not or if the unit is no angle's."""
+    """A whole turn in a unit if positions jump by it, 0 if not or if the unit is not an angle's."""
     try:
         turn = to_si(2.0 * pi, "rad", unit, "")
     except InputError:
@@ -772,7 +772,7 @@ def _trial_reading(
 def _sampling_words(
     experiments: Sequence[Experiment], overview: Overview | None, duration: float
 ) -> str:
-    """Duration [s] and rate of a run, and its parts, for the comment beside its file."""
+    """Duration [s] and rate of a run, and its parts, for the comment next to its file."""
     of_axis = [experiment for experiment in experiments if experiment.axis == experiments[0].axis]
     rate = 1.0 / float(np.median(np.diff(of_axis[0].input.time)))
     words = f", {duration:.4g} s at {rate:.4g} Hz"

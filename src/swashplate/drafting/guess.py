@@ -162,7 +162,7 @@ def guess_drive(tests: Campaign | Sequence[Experiment]) -> Guess:
     Raises
     ------
     InputError
-        If no run has such a channel, the input is no voltage, the speed of a run or of all moves
+        If no run has such a channel, the input is not a voltage, the speed of a run or of all moves
         opposite to the command, a channel has gross spikes, or too little moves.
     """
     experiments = tests.select(role="fit") if isinstance(tests, Campaign) else tuple(tests)

@@ -362,7 +362,7 @@ class Drive(Result, Mapping[str, Parameter]):
         substeps : int, optional
             Steps of the march a sample; by default so many that h ≤ 1/512 s.
         load_torque, pump_speed, supply_pressure : (n,) array_like or float, optional
-            What was measured beside the command, at its stamps: torque of the load at the shaft,
+            Measured in addition to the command, at its stamps: torque of the load at the shaft,
             positive against positive speed [N m]; speed of the prime mover over that which Z10
             belongs to [1]; supply pressure less static pressure, in place of Z9 [Pa]. By default
             the parameters count.
@@ -666,7 +666,7 @@ class Drive(Result, Mapping[str, Parameter]):
         Refinements count: friction as presliding, with the state ``"spool_deflection"``; damping
         and the line with their states; the cam ring's ripple with its mean over a turn, zero.
         Within the solenoids' hysteresis a current moves nothing: only the force, or what is
-        measured beside the command, has a model there.
+        measured in addition to the command, has a model there.
 
         Parameters
         ----------

@@ -130,7 +130,7 @@ class LinearDrive(LinearModel, Result):
         delay_samples = round(fine.delay * rate * substeps)
         line = tuple(f"{self.input}_{k}" for k in range(1, delay_samples + 1))
         last = tuple(f"{name}_last" for name in self.inputs)
-        # what is measured beside the command goes straight from sample to sample
+        # a measured input goes straight from sample to sample
         zero_order = [interpolation == "previous", *(False for _ in self.inputs[1:])]
         A, B, C, D = with_delay_line((fine.A, fine.B, fine.C, fine.D), delay_samples)
         A, B, C, D = lifted(A, B, C, D, substeps, zero_order)

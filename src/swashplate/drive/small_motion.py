@@ -30,7 +30,7 @@ Input = Literal[
 ]
 
 INPUTS: tuple[Input, ...] = get_args(Input)
-COMMANDS = INPUTS[:3]  # Of which one moves at a time; the others can move beside it.
+COMMANDS = INPUTS[:3]  # Of which one moves at a time; the others can move together with it.
 OUTPUTS = (
     "shaft_speed",
     "swash_angle",

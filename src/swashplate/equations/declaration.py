@@ -115,7 +115,7 @@ def remember_text(name: str, text: str) -> str:
 
 
 def equation_of_text(text: str, name: str, names: dict[str, Any]) -> Any:
-    """An equation that is known by the text of one function alone, and by what that refers to."""
+    """An equation that is known by the text of one function only, and by what that refers to."""
     file = remember_text(name, text)
     space = {**vars(math), **names}
     exec(compile(text, file, "exec"), space)

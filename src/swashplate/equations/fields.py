@@ -90,7 +90,7 @@ class Definition:
         return (self.symbol,)
 
     def holds(self, values: Any) -> Any:
-        """Whether a value, or each of an array, lies in the range; what is no number does not."""
+        """Whether a value, or each of an array, lies in the range; NaN does not."""
         strict = self.above is not None or not isfinite(self.lower)
         allowed: Any = values > self.lower if strict else values >= self.lower
         if isfinite(self.upper) or not self.can_be_off:
@@ -218,7 +218,7 @@ def is_real(value: object) -> TypeGuard[float]:
 
 
 def check_mapping(what: str, mapping: object) -> None:
-    """Refuse what is no mapping of names to values."""
+    """Refuse what is not a mapping of names to values."""
     if not isinstance(mapping, Mapping):
         raise InputError(f"{what} is {mapping!r}, but must be a mapping of names to values.")
 
@@ -239,7 +239,7 @@ def numbers_of(value: Any) -> list[float]:
 
 
 def made(kind: Any, numbers: Mapping[str, float], prefix: str = "") -> Any:
-    """A nested named tuple from numbers by path, behind a prefix; others keep their defaults."""
+    """A nested named tuple from numbers by path after a prefix; others keep their defaults."""
     hints = get_type_hints(kind)
     values = []
     for name in kind._fields:

@@ -60,7 +60,7 @@ class Window(NamedTuple):
     s: tuple[float, ...]
     """Samples, newest first."""
     f: float
-    """How far the instant looked at lies behind the newest, in samples, 0 to 1."""
+    """Age of the instant that is read, relative to the newest sample, in samples, 0 to 1."""
 
 
 @equation
@@ -143,7 +143,7 @@ class Link(NamedTuple):
 
     @property
     def after(self) -> int:
-        """The part behind which it is known."""
+        """The part after which it is known."""
         return max(source.part for source in self.sources)
 
 
@@ -191,7 +191,7 @@ class Model:
     """Numbers that a run may start from as its own unknowns, each with the paths of the states
     that it sets; a path of the state that is not listed stands for itself."""
     parts: tuple[Model, ...] = ()
-    """Models in series, this one alone if it is not joined."""
+    """Models in series; only this one if it is not joined."""
     links: Mapping[str, Link] = field(default_factory=dict)
     """Signals that are equations over the parts' signals, by name."""
     replacements: Replacements = field(default_factory=dict)
@@ -408,7 +408,7 @@ def _packaged(model: Model) -> bool:
 
 
 def _no_floats(type_: type[Any]) -> Iterator[tuple[str, str]]:
-    """Fields that are no numbers, with their types' names."""
+    """Fields that are not numbers, with their types' names."""
     for name, hint in get_type_hints(type_).items():
         if is_named_tuple(hint):
             yield from _no_floats(hint)
@@ -598,7 +598,7 @@ class Tableau(NamedTuple):
     """Explicit Runge-Kutta method (Hairer, Nørsett and Wanner 1993, II.1)."""
 
     stages: tuple[tuple[float, ...], ...]
-    """Of each slope behind the first, the weights of those before it."""
+    """Of each slope after the first, the weights of those before it."""
     weights: tuple[float, ...]
     """Of the slopes, in the step."""
 

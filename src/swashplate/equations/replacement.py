@@ -88,7 +88,7 @@ def found_at(places: Mapping[str, str]) -> Replacement:
 
 
 def check_members(members: Mapping[str, Any], names: Mapping[str, str]) -> None:
-    """Refuse a replacement whose members are no equations, or bring no named tuple along.
+    """Refuse a replacement whose members are not equations, or have no named tuple.
 
     Parameters
     ----------
@@ -135,7 +135,7 @@ def replaced(
     old : equation
         One that the model uses.
     new : equation
-        Its replacement: the same arguments, and behind them, by name, any further parameters.
+        Its replacement: the same arguments, and after them, by name, any further parameters.
     parameters : class of named tuples, optional
         Parameters that the model gets in addition, each a float with its `Definition` and a
         default.

@@ -38,7 +38,7 @@ LONGEST_STEP = 1.0 / SOURCE_RATE
 LONGEST_IDENTIFIER = 63
 """Characters of a name that every C99 compiler looks at."""
 FURTHER = ("main.c", "CMakeLists.txt", "README.md")
-"""Files of a folder beside the model's own."""
+"""Files of a folder in addition to the model's own."""
 
 
 def exported_drive(drive: Drive | None = None) -> Exported:
@@ -185,7 +185,7 @@ def content_of(
 
 
 def _nearest(what: object) -> str:
-    """How a drive is got of something else, to stand behind what must be given."""
+    """How to get a drive from something else, as a clause after what must be given."""
     if isinstance(what, ParameterSet):
         return ": Drive(parameters)"
     if isinstance(what, str | Path):

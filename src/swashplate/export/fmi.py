@@ -45,7 +45,7 @@ Array = NDArray[np.float64]
 
 MAGIC, RESOURCE_VERSION, TOKEN_LENGTH = b"SWPDRIVE", 1, 64
 DISPLAYED = {"rad": ("deg",), "rad/s": ("deg/s", "rpm"), "Pa": ("bar",), "m": ("mm",), "s": ("ms",)}
-"""Units that people read, offered beside SI ones."""
+"""Units that people read, offered in addition to SI ones."""
 WHOLE = "fmu.c"
 """The source that an importer compiles."""
 COPYRIGHT = "Libraries and sources: the swashplate developers; numbers: their owner"
@@ -211,7 +211,7 @@ def _token(fmi: Version, sources: Sources, numbers: Array, table: Sequence[Varia
 
 
 def _zipped(members: Mapping[str, bytes]) -> bytes:
-    """A zip whose bytes depend on its content alone, the description first."""
+    """A zip whose bytes depend only on its content, the description first."""
     target = BytesIO()
     with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as archive:
         for name in sorted(members, key=lambda member: (member != "modelDescription.xml", member)):
@@ -367,7 +367,7 @@ def _add_units(root: ET.Element, table: Sequence[Variable]) -> None:
 
 @dataclass(frozen=True)
 class FmuComparison(Result):
-    """An FMU's outputs beside those of the drive, sample by sample."""
+    """An FMU's outputs and those of the drive, sample by sample."""
 
     name: str
     """Name of the drive."""

@@ -1,7 +1,7 @@
 """Compiled libraries: for which machines, made from which sources, and how.
 
 The package carries one library for each platform, made once from the generated C and the same for
-every drive: its numbers travel beside it (`swashplate.export.fmu`). A user-defined model, or a
+every drive: its numbers travel next to it (`swashplate.export.fmu`). A user-defined model, or a
 drive with a user-defined equation, has other C, which is compiled when it is exported.
 """
 

@@ -177,11 +177,11 @@ def variables(
     if exported.bounds:
         bounds = ", ".join(f"{name} beyond ±{bound:g}" for name, bound in exported.bounds.items())
         settings.append(("clip", references.CLIP, f"clip a {bounds} instead of failing", True))
-    behind = 1 + len(parameters) + len(exported.named("given"))
+    first_option = 1 + len(parameters) + len(exported.named("given"))
     for index, option in enumerate(exported.settable):
         option_words = words.get(option[1], Words(f"option {option[1]}"))
         if option[1] != exported.free_step:
-            on = values[behind + exported.options.index(option)] != 0.0
+            on = values[first_option + exported.options.index(option)] != 0.0
             settings.append(
                 (
                     option_words.name or option[1],

@@ -1,6 +1,6 @@
 """A drive with all five states, its natural modes, and whether one state is enough for it.
 
-A physical set stands behind the card and solenoids of a drive.
+A physical set is downstream of the card and solenoids of a drive.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.int8]
 
 RESOLUTION = 1.0  # Largest product of a sub-step and the fastest natural frequency.
-STABLE = 2.0  # The same where the march is no longer stable.
+STABLE = 2.0  # The same if the march is not stable any longer.
 LEAST_SUBSTEPS = 8  # Sub-steps a sample that kinks of the flow, at the orifices' limits, are worth.
 MOST_SUBSTEPS = 20_000  # Sub-steps a sample, beyond which the machine is too stiff for the march.
 
@@ -206,7 +206,7 @@ class FullOrderDrive:
     drive: Drive
     """Card and solenoids, and the form of the valve's root."""
     physical: PhysicalSet
-    """Everything behind the solenoids."""
+    """Everything downstream of the solenoids."""
 
     def __post_init__(self) -> None:
         if self.drive.parameters.refinements:
@@ -542,7 +542,7 @@ class Modes(Result):
     spool: complex
     """Spool on the feedback spring, the upper of a pair. [rad/s]"""
     swash: complex
-    """Swash plate on its return spring and the oil trapped behind the closed valve. [rad/s]"""
+    """Swash plate on its return spring and the oil trapped by the closed valve. [rad/s]"""
     swash_at_held_pressure: complex
     """Swash plate on its return spring alone, Kruse's reckoning. [rad/s]"""
 

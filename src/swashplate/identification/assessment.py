@@ -65,7 +65,7 @@ if TYPE_CHECKING:
     import polars
 
 SETUP_FILE, ESTIMATES, STORED = "setup.toml", "estimates.csv", "fit.json"
-"""In a fit's folder, beside the drive or the model's numbers: the fit setup, the table of
+"""In a fit's folder, next to the drive or the model's numbers: the fit setup, the table of
 estimates, and what the fit keeps of itself."""
 
 
@@ -191,7 +191,7 @@ class Identification(Estimated):
         path : path
             The file, which replaces an older one.
         truth : Drive or ParameterSet, optional
-            What virtual tests were simulated with; it stands beside the estimates.
+            What virtual tests were simulated with; it is shown next to the estimates.
 
         Returns
         -------

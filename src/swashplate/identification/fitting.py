@@ -74,7 +74,7 @@ ROUGH = 1e-4
 lacks an effect, so that no start can help, six starts take 235 evaluations instead of 929."""
 LEAST_EXPLAINED = 0.4
 """Share of the variance of what was measured that a search must explain after `solving.LEG`
-evaluations, or it is given up. Channels clipped at half of their range, late by 0.2 s, behind a lag
+evaluations, or it is given up. Channels clipped at half of their range, late by 0.2 s, after a lag
 of 0.5 s, doubled, or under noise of 30 % of it left 0.57 or more in 36 campaigns; outputs of other
 runs, and runs tiled with jumps, 0 to 0.32."""
 TRIAL = 12
@@ -487,10 +487,10 @@ def _from_starts(
 ) -> tuple[Solution, ...]:
     """Solutions from the nominal values and from the starts of a search."""
     # starts run side by side, so each of them runs on one thread
-    alone = replace(problem, threads=1)
+    single_threaded = replace(problem, threads=1)
     return solve_from(
-        alone,
-        [problem.start, *sobol_starts(alone, search.starts, search.seed)],
+        single_threaded,
+        [problem.start, *sobol_starts(single_threaded, search.starts, search.seed)],
         executor=search.executor,
         store=None if search.store is None else search.store / stage.name,
         origin=_origin(stage, problem, limits),

@@ -52,7 +52,7 @@ class Covariance(Result):
 
     @property
     def correlation(self) -> Array:
-        """(K, K) with 1 on the diagonal; 0 beside it for what has no variance."""
+        """(K, K) with 1 on the diagonal; 0 elsewhere for what has no variance."""
         errors = np.sqrt(np.maximum(np.diag(self.matrix), 0.0))
         errors[errors == 0.0] = 1.0
         correlation: Array = np.clip(self.matrix / np.outer(errors, errors), -1.0, 1.0)

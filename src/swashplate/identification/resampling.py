@@ -87,7 +87,7 @@ class CrossValidation(Result):
 
 
 def folds_tables(result: CrossValidation, stages: Sequence[StageFit] = ()) -> list[Table]:
-    """Errors held out, beside those of the fit to all runs if its stages are given; the folds."""
+    """Errors held out, next to those of the fit to all runs if its stages are given; the folds."""
     fitted_columns = "tpf" if stages else ""
     of_all_runs = pooled(with_speeds(quality for stage in stages for quality in stage.runs))
     held_out = Table(

@@ -321,8 +321,8 @@ def with_speeds(qualities: Iterable[RunQuality]) -> tuple[RunQuality, ...]:
     """The qualities, each of a position followed by that of its speed.
 
     Measured and simulated positions go through the same filters (`speed_of`, ``"exact"``), so that
-    both carry the same phase. What the position's noise is behind them is stated as the speed's,
-    beside measures that contain it. A position whose stamps no filter takes has no speed, nor has
+    both carry the same phase. What the position's noise is after them is stated as the speed's,
+    next to measures that contain it. A position whose stamps no filter takes has no speed, nor has
     one in whose noise the speed drowns.
     """
     pairs = list[tuple[RunQuality, RunQuality | None]]()
@@ -364,7 +364,7 @@ def with_speeds(qualities: Iterable[RunQuality]) -> tuple[RunQuality, ...]:
 
 
 def _noise_of_speed(quality: RunQuality, speed: Array) -> float:
-    """Standard deviation that the noise of a position has behind the filters of `speed_of`.
+    """Standard deviation that the noise of a position has after the filters of `speed_of`.
 
     Of an encoder that of rounding what is simulated, whose speed is given, to whole counts. Of
     another position that of its white noise.

@@ -90,7 +90,7 @@ def _form_of(reader: str, path: Path) -> str:
         return "MDF 4"
     if reader != "MATLAB":
         return reader
-    # HDF5 begins at 0 or, behind MATLAB's own header, at a power of two
+    # HDF5 begins at 0 or, after MATLAB's own header, at a power of two
     if any(head[offset:].startswith(b"\x89HDF\r\n\x1a\n") for offset in (0, 512, 1024, 2048)):
         return "MATLAB 7.3"
     if size > _LARGEST:
@@ -359,7 +359,7 @@ class _Refusal(logging.Handler):
 
 @contextmanager
 def _tdms(path: Path) -> Iterator[Iterable[_Item]]:
-    """npTDMS on a file; an index beside it, which may belong to another, is not used."""
+    """npTDMS on a file; an index next to it, which may belong to another, is not used."""
     nptdms = _library(path, "npTDMS", "tdms")
     nptdms.log.log_manager.console_handler.setLevel(logging.CRITICAL)
     logger, refusal = logging.getLogger("nptdms"), _Refusal()

@@ -237,7 +237,7 @@ class TextLayout(NamedTuple):
         return len(cells) == self.width and bool(numbers) and all(numbers)
 
     def is_blank(self, line: str) -> bool:
-        """Whether a line is no row; one of nothing but tabs is a row of empty cells."""
+        """Whether a line is not a row; one of nothing but tabs is a row of empty cells."""
         if line.strip():
             return False
         return self.delimiter != "\t" or len(self.cells(line)) != self.width

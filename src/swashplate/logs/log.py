@@ -205,7 +205,7 @@ _LISTED = 30
 
 
 def split_unit(name: str) -> tuple[str, str | None]:
-    """A header's name and the unit in brackets behind it: ``time [ms]``, ``time (ms)``."""
+    """A header's name and the unit in brackets after it: ``time [ms]``, ``time (ms)``."""
     match = _BRACKETED.fullmatch(name)
     if match is None or not match[1]:
         return name, None

@@ -58,13 +58,13 @@ def open_in_subprocess(reader: str, path: Path) -> Log:
 
 
 class _ReaderProcess:
-    """The other process. It is asked in a line of JSON and answers in one, arrays behind it."""
+    """The other process. It is asked in a line of JSON and answers in one, arrays after it."""
 
     lock = threading.Lock()
     running: _ReaderProcess | None = None
 
     def __init__(self) -> None:
-        # what it says of an error, and what libraries leave behind of a damaged file
+        # what it says of an error, and what libraries leave of a damaged file
         self._scratch = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
         self._error_file = Path(self._scratch.name) / "errors"
         threads = min(4, os.cpu_count() or 1)  # each takes a share of the memory that it may have
@@ -161,7 +161,7 @@ def _ended(process: subprocess.Popen[bytes], scratch: tempfile.TemporaryDirector
 # --- the other process ----------------------------------------------------------------------------
 
 _SPARE = 3 << 30
-"""Memory that reading takes at least, most of it addresses alone. [byte]"""
+"""Memory that reading takes at least, most of it mere addresses. [byte]"""
 _INFLATION = 1032
 """No more bytes than this come out of one byte of zlib's; Parquet's codecs are no better."""
 _USED = Path("/proc/self/statm")

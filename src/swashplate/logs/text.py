@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 PIECE = 1 << 20
 """Bytes that are read at a time."""
 LONGEST_LINE = 1 << 24
-"""A line of more characters is no row of a table."""
+"""A line of more characters is not a row of a table."""
 _HEAD = 2000  # lines in which the header and the first row of data must be
 _SAMPLE = 60  # lines that decide on delimiter and decimal sign, from the start and all over
 _SAMPLED = 1 << 20  # letters of them: fewer lines where there are thousands of columns
@@ -123,7 +123,7 @@ class _Table:
             count += len(lines)
 
     def _at_once(self, piece: str, begin: int) -> tuple[Sequence[int], polars.DataFrame] | None:
-        """Numbers of a piece's lines, and their cells; None if some may be no plain rows."""
+        """Numbers of a piece's lines, and their cells; None if some may not be plain rows."""
         import polars as pl
 
         text = piece.split("\n", max(self.first - begin, 0))[-1]
@@ -240,7 +240,7 @@ class _Clock:
     """A column of dates of one form, read piece after piece.
 
     Stamps count from 1970 in universal time if a zone is written; a clock without a date begins
-    anew at midnight.
+    again at midnight.
     """
 
     def __init__(self, form: str) -> None:

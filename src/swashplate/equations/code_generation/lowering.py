@@ -134,9 +134,9 @@ class Scope:
     number: int
     space: Mapping[str, Any]
     end: str
-    """Label behind the function."""
+    """Label after the function."""
     local: dict[str, Any] = field(default_factory=dict)
-    """Names of what is no operand: functions, tuples, fields."""
+    """Names of what is not an operand: functions, tuples, fields."""
     result: Any = None
     """What it returns: an operand, or a tuple of them; None if nothing."""
 
@@ -145,7 +145,7 @@ class Scope:
         return f"{name}.{self.number}"
 
     def find(self, name: str) -> Any:
-        """What a name stands for that is no variable."""
+        """Meaning of a name that is not a variable."""
         if name in self.local:
             return self.local[name]
         return self.space[name] if name in self.space else getattr(builtins, name)
@@ -427,14 +427,14 @@ class Lowering:
     def alike(
         self, first: Operand, second: Operand, least: str = "bool"
     ) -> tuple[Operand, Operand]:
-        """Two numbers as the wider one of their kinds, or one that is no less wide."""
+        """Two numbers as the wider one of their kinds, or one that is at least as wide."""
         kind = KINDS[max(map(KINDS.index, (first.kind, second.kind, least)))]
         return self.cast(first, kind), self.cast(second, kind)
 
     def compared(self, op: str, first: Operand, second: Operand) -> Operand:
         """A comparison."""
         first, second = self.alike(first, second)
-        if first.kind == "float":  # true of what is no number only if it is `!=`
+        if first.kind == "float":  # NaN is only `!=`
             instruction = f"fcmp {'u' if op == '!=' else 'o'}{TESTS[op]}"
         else:
             instruction = f"icmp {'' if op in ('==', '!=') else 's'}{TESTS[op]}"

@@ -534,5 +534,5 @@ def mentions(text: str, name: str) -> bool:
 
 
 def without_comments(text: str) -> str:
-    """A text of C without what it says beside the code."""
+    """A text of C without its comments."""
     return re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)

@@ -48,7 +48,7 @@ Fields = TypeVar("Fields", bound=tuple[Any, ...])
 Kernel = Any
 """What is called: machine code (`Code`), or a plain function if nothing is compiled."""
 PlannedCode = Callable[[], Kernel]
-"""Compiles a kernel when it is first needed (`generating`): residuals alone need no derivatives."""
+"""Compiles a kernel when it is first needed (`generating`): residuals need no derivatives."""
 
 
 def routine(function: Callable[..., None]) -> Kernel:

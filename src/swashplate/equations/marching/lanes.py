@@ -66,7 +66,7 @@ DIGEST = 8
 
 
 def is_vector(statement: Statement) -> bool:
-    """Whether a processor can do a statement for many lanes at once: it is no branch."""
+    """Whether a processor can do a statement for many lanes at once: it is not a branch."""
     return len(statement.names) <= 1 and all_vector(statement.nodes)
 
 

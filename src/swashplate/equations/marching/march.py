@@ -408,7 +408,7 @@ def march_source(
     last = parts[-1]
     passed = [last.source(source) for source in sample_code.sources if source.part != last.part]
     if passed and any(sample_code.carried[part.part] for part in parts[:-1]):
-        # the last part is a sample behind the others, so that neither waits for the other
+        # the last part is a sample later than the others, so that neither waits for the other
         late = re.compile(rf"\b({'|'.join(passed)})\b")
         lines += [*(f"{name} = 0.0" for name in passed), "for m in range(first, last + 1):"]
         lines += indented([f"late_{name} = {name}" for name in passed])
@@ -419,7 +419,7 @@ def march_source(
         lines += ["for n in range(first, last):", *indented(chain(*samples))]
     lines += saved
     if margins:
-        # a sum is no number once a margin was none
+        # a sum is NaN once a margin was NaN
         lines += [
             "worst = worst if total == total or worst <= 0.0 else total",
             "lower = worst < worst_margin[0] or worst != worst",

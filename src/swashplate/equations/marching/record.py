@@ -26,7 +26,7 @@ class Sampling(TypedDict, total=False):
 
 
 SOURCE_RATE = 512.0
-"""Rate of Kruse's logs; a drive's step is no longer than one of its samples. [Hz]"""
+"""Rate of Kruse's logs; a drive's step is at most one of its samples. [Hz]"""
 LONGEST = 100_000_000
 """Steps that a record may take: 54 hours at 512 Hz. More is a mistake, in a unit perhaps."""
 SLOWEST, FASTEST = 10.0, 100_000.0
@@ -151,7 +151,7 @@ def least_substeps(rate: float, requested: int | None = None) -> int:
 
 
 def check_rate(value: float, what: str = "rate", unit: str = "Hz") -> None:
-    """Refuse a rate, or a step, that is no finite number above 0."""
+    """Refuse a rate, or a step, that is not a finite number above 0."""
     if not is_real(value) or not 0.0 < value < np.inf:
         raise InputError(f"The {what} is {value!r} {unit}, but must be a number above 0.")
 

@@ -532,7 +532,7 @@ def arrays_of(
 
 
 def check_domain(instance: Instance, states: Array, worst: float, cause: str) -> None:
-    """Refuse what was computed outside the model's equations, or is no finite state."""
+    """Refuse what was computed outside the model's equations, or is not a finite state."""
     if not worst > 0.0:
         raise DomainError(f"{instance.name}: {outside(instance.model, worst, cause)}")
     if np.isfinite(states).all():

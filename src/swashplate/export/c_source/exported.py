@@ -38,7 +38,7 @@ class Exported:
     longest: float = inf
     """Longest step. [s]"""
     free_step: str = ""
-    """Option without which the equations are for one step alone; none if empty."""
+    """Option without which the equations are for one step only; none if empty."""
 
     @property
     def file(self) -> str:

@@ -388,7 +388,7 @@ class PartInC:
 
 
 def formulas(trace: Trace) -> set[Parsed]:
-    """Equations of numbers alone that a part uses more than once: they become functions of C."""
+    """Equations of numbers only that a part uses more than once: they become functions of C."""
     repeated = set()
     for source, calls in trace.calls.items():
         arguments, results = max(calls, key=lambda call: len(ordered(call[1], call[0])))

@@ -351,7 +351,7 @@ def lost(experiment: Experiment, name: str, output: Array, *, resisting: bool) -
 
 
 def behind_lag(time: Array, values: Array, lag: float = SMALL_LAG) -> Array:
-    """(m,) values behind a first-order lag [s], at rest before."""
+    """(m,) values after a first-order lag [s], at rest before."""
     decay = np.exp(-np.diff(time) / lag)
     bands = np.vstack([np.ones(time.size), np.append(-decay, 0.0)])
     lagged = solve_banded((1, 0), bands, np.append(values[:1], (1.0 - decay) * values[1:]))

@@ -73,7 +73,7 @@ refusal, warning = partial(Finding, "refuse"), partial(Finding, "warn")
 
 
 def check_runs(experiments: Sequence[Experiment], nominal: ParameterSet) -> list[Finding]:
-    """What stands in the way of a fit: runs beside each other and beside the nominal drive.
+    """What stands in the way of a fit: runs against each other and against the nominal drive.
 
     What must be refused comes first. Later checks need what earlier ones found sound, so that not
     everything that is wrong is always listed at once. Runs or a drive that cannot be simulated are
@@ -188,7 +188,7 @@ def _unchanging(run: Experiment, names: Sequence[str]) -> Iterator[Finding]:
 def contradicting_runs(
     experiments: Sequence[Experiment], parameters: ParameterSet
 ) -> list[Finding]:
-    """Runs whose sign or scale contradicts the others, beside a drive that was fitted to all."""
+    """Runs whose sign or scale contradicts the others, judged by a drive that was fitted to all."""
     return [
         finding
         for name, runs in simulated_readings(experiments, parameters).items()
@@ -314,7 +314,7 @@ def _within_dead_zone(run: Experiment, nominal: ParameterSet) -> str:
     return f"stays between {least:.3g} and {most:.3g} {unit}, within {zone}"
 
 
-# --- what channels do beside the nominal drive ----------------------------------------------------
+# --- channels against the nominal drive -----------------------------------------------------------
 
 
 class SimulatedReadings(NamedTuple):
@@ -429,7 +429,7 @@ def _frozen(name: str, readings: SimulatedReadings, least: float) -> Iterator[Fi
 
 
 def contradictions(name: str, runs: Sequence[SimulatedReadings]) -> Iterator[Finding]:
-    """Runs whose sign or scale beside the drive cannot be right, or a channel's as a whole."""
+    """Runs whose sign or scale against the drive cannot be right, or a channel's as a whole."""
     against = [turned(readings.simulated, readings.measured) for readings in runs]
     if len(runs) > 1 and all(against):
         yield refusal(
@@ -576,7 +576,7 @@ def check_rank(where: str, problem: Problem) -> list[Finding]:
 
 
 def beside_the_drives(campaign: Campaign) -> list[str]:
-    """Sentences on runs that stand out beside a simulation of their axis's drive."""
+    """Sentences on runs that stand out against a simulation of their axis's drive."""
     sentences = list[str]()
     for name, axis in campaign.axes.items():
         if axis.drive is None:

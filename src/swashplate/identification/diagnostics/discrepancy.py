@@ -106,7 +106,7 @@ class _RunPart(NamedTuple):
 
 
 def _shifts(fit: LinearisedFit, groups: Mapping[str, str]) -> dict[str, _Shift]:
-    """Of each group of runs; products alone are kept of them."""
+    """Of each group of runs; only products are kept of them."""
     parts = defaultdict[str, list[_RunPart]](list)
     for run, jacobian in fit.jacobians():
         if run.name in groups:
@@ -299,7 +299,7 @@ def classes_of(
 
 
 class WindowCell(NamedTuple):
-    """Windows of one class in one run, one beside another, over the range of the signal."""
+    """Windows of one class in one run, next to each other, over the range of the signal."""
 
     run: str
     maneuver: str
@@ -508,7 +508,7 @@ def variance_function(cells: Sequence[WindowCell]) -> Array:
     for _ in range(12):
         spread = np.maximum(terms @ coefficients, 1e-3 * coefficients.sum()) + noise + 1e-14
         coefficients = nnls(terms / spread[:, None], squares / spread)[0]
-    # what the noise's own scatter leaves open is no less than two standard errors of its mean
+    # what the noise's own scatter leaves open is at least two standard errors of its mean
     coefficients[0] += 2.0 * float(np.sqrt(2.0 * np.mean(noise**2) / noise.size))
     return np.asarray(coefficients)
 

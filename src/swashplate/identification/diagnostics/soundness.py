@@ -1,4 +1,4 @@
-"""Whether the data are sound: runs beside the model that was fitted to all of them."""
+"""Whether the data are sound: runs against the model that was fitted to all of them."""
 
 from __future__ import annotations
 

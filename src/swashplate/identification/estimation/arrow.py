@@ -48,7 +48,7 @@ class RunRows(NamedTuple):
 
     run: str
     own: Numbers
-    """(q,) numbers of the unknowns that belong to this run alone."""
+    """(q,) numbers of the unknowns that belong only to this run."""
     rows: Array
     """(n, q + M) derivatives by them, then by the shared unknowns."""
 
@@ -163,7 +163,7 @@ class Whitening:
     """Matrix W with W Wᵀ the inverse of JᵀJ on what is determined: columns of J W are orthonormal.
 
     Its columns are directions: first those of the machine, in which each run's own unknowns follow,
-    then those of each run, in which its own unknowns move alone.
+    then those of each run, in which only its own unknowns change.
     """
 
     factor: ArrowFactor

@@ -191,7 +191,7 @@ def simulated_current(
     record = voltage_record(experiment)
     observation = Observation("current", record.points, np.zeros(record.values.size))
     observed = ObservedRecord(record, (observation,), "voltage", experiment.begins)
-    # refinements begin behind the card
+    # refinements begin downstream of the card
     ready = DriveModel(parameters.plain, "card").ready(
         start, experiment, SimulationRequest(observed)
     )
@@ -234,7 +234,7 @@ def limits_unreached(
 ) -> dict[str, float]:
     """Columns of the limits that no run shows, and how far the runs went. [SI]
 
-    Of Z13 to Z16, whether the model has such a limit or not: behind what was reached anything may
+    Of Z13 to Z16, whether the model has such a limit or not: beyond what was reached anything may
     lie. A run shows a limit if it would go beyond by `SHOWN` without it: what is merely touched a
     slightly smaller gain does as well. Errors are those of `simulated_run`.
     """

@@ -32,7 +32,7 @@ INSTANT_STEP = 1e-5
 
 
 class MachineModel(Protocol):
-    """A model of the machine; with `simulate` alone it is differentiated by central differences.
+    """A model of the machine; with only `simulate` it is differentiated by central differences.
 
     One that knows its derivatives has ``linearise(values, experiment, names)`` as well, which gives
     for each channel a `Linearised`.

@@ -214,7 +214,7 @@ class Problem(Result):
         return Evaluation(np.concatenate([*values, residuals]), np.vstack([*jacobians, rows]))
 
     def cost(self, vector: Array) -> float:
-        """Half the sum of squares alone, which is quicker."""
+        """Only half the sum of squares, which is quicker."""
         priors, _ = self.unknowns.prior_rows(vector)
         return 0.5 * (sum(self._each(partial(self._squares, vector))) + float(priors @ priors))
 

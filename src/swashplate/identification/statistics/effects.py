@@ -1,4 +1,4 @@
-"""What estimates follow beside the noise: earlier stages, fixed numbers, instruments, runs.
+"""What estimates depend on in addition to the noise: earlier stages, fixed numbers, instruments, runs.
 
 Estimates absorb such an effect, so that residuals do not show it. How far they move is linear in
 it: a standard uncertainty of each effect, times this slope, goes into the intervals (JCGM 100:2008,
@@ -36,7 +36,7 @@ SMALL = 0.02
 """Part of a standard uncertainty of the command's zero by which it is moved for the derivative: a
 whole one may lie beyond a switch of the card, where the derivative is another one."""
 IN_RUN = " in "
-"""What stands between an effect and the run that it belongs to alone."""
+"""What stands between an effect and the only run that it belongs to."""
 HYSTERESIS = ("solenoid_hysteresis", "spool_friction")
 """Parameters by which a drive has a hysteresis of its own."""
 FEWEST_RUNS = 5
@@ -149,7 +149,7 @@ def changes_of(experiment: Experiment, resolution: float) -> Iterator[Change]:
     -----
     Limits of an instrument's error are taken for ends of a rectangular distribution, whose standard
     deviation is 1/√3 of them (JCGM 100:2008, 4.3.7). The zero of a command is another one in each
-    run, because the converter rounds each level of it anew. What a command does between two samples
+    run, because the converter rounds each level of it again. What a command does between two samples
     is known to half of the time between them: the instant of a jump, or when a staircase that looks
     like a ramp passes a threshold.
     """
@@ -187,7 +187,7 @@ def changes_of(experiment: Experiment, resolution: float) -> Iterator[Change]:
 
 
 def after_play(values: Array, width: float) -> Array:
-    """A signal behind a play of a full width, in the middle of which it begins."""
+    """A signal downstream of a play of a full width, in the middle of which it begins."""
     output, half = np.empty_like(values), 0.5 * width
     follower = values[0]
     for n, value in enumerate(values.tolist()):
@@ -220,7 +220,7 @@ def responses(stage: StageFit, number: int, resolution: float) -> Iterator[tuple
 
 
 def _acts(stage: StageFit, experiment: Experiment, changed: Experiment) -> bool:
-    """Whether a change acts on what is simulated, and not on what was measured alone."""
+    """Whether a change acts on what is simulated, and not only on what was measured."""
     model = stage.problem.model
     if changed.input is not experiment.input or not isinstance(model, DriveModel):
         return True  # a user-defined model may take any channel as an input
@@ -249,7 +249,7 @@ class SimulatedRun:
     def behind_hysteresis(self, experiment: Experiment) -> dict[str, Array]:
         """By how much these change if the current that drives the pump has a hysteresis.
 
-        Of a drive alone; empty if the stage has no pump, the hysteresis is 0, or the drive has one
+        Of a drive only; empty if the stage has no pump, the hysteresis is 0, or the drive has one
         of its own.
         """
         model, width = self.stage.problem.model, self.stage.stage.current_hysteresis
@@ -287,7 +287,7 @@ class RunToRun(Result):
 
 @dataclass(frozen=True, eq=False)
 class Effects(Result):
-    """What a stage's estimates follow beside the noise."""
+    """What a stage's estimates depend on in addition to the noise."""
 
     systematic: Mapping[str, Array]
     """(K,) changes of the solver's vector for a standard uncertainty of each effect, by name."""
@@ -378,7 +378,7 @@ def _run_to_run(fit: LinearisedFit, motions: Sequence[_Motion]) -> RunToRun | No
 
     Notes
     -----
-    A machine differs from run to run: its oil is warmer, a pressure is set anew. What of that is a
+    A machine differs from run to run: its oil is warmer, a pressure is set again. What of that is a
     scale of the motion, by b_i in run i, shows in the products q_i = z_iᵀ r. At the optimum
     q = A b + noise with A = ZᵀZ - ZᵀJ (JᵀJ)⁻¹ JᵀZ. The variance of b is that of the method of
     moments (Henderson 1953): the sum of the q², each in units of |z_i|, less what the noise adds

@@ -317,7 +317,7 @@ def prior_information(
 def _without_tests(
     parameters: ParameterSet, stage: Stage, sensors: Sequence[Sensor]
 ) -> PriorInformation:
-    """What priors alone tell, and those of some sensors that the stage's part of a drive moves."""
+    """What only priors tell, and those of some sensors that the stage's part of a drive moves."""
     part = stage.part
     useful = [
         sensor
@@ -522,7 +522,7 @@ def advise(
 def sequential_plan(
     present: Array, candidates: Sequence[CandidateTest], variables: Unknowns, count: int
 ) -> tuple[Advice, ...]:
-    """A plan of tests: the best one, then the best beside it, and so on, each at most once.
+    """A plan of tests: the best one, then the best in addition to it, and so on, each at most once.
 
     As many as `count`, fewer if none of the others tells anything new; otherwise as `advise`.
     """

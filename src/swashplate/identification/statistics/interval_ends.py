@@ -187,7 +187,7 @@ SWITCHING = ("V_dz", "J_", "lim", "I_t", "Z13", "Z14", "Z15", "Z16", "Z17")
 STRAIGHT = 0.02
 """Half width, in the solver's vector, up to which the drive is linear in all others."""
 SHALLOW = 0.25
-"""Part of the linearised rise of the cost below which an interval's end is looked for anew."""
+"""Part of the linearised rise of the cost below which an interval's end is looked for again."""
 MOST_POINTS = 8
 """Most points of the profile on such a side."""
 LEAST_STEP = 1e-3
