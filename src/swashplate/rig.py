@@ -59,8 +59,8 @@ HELD_BACK = {
 COLUMNS: Mapping[str, str] = {"rectified_current": "current", "encoder_counts": "counts"}
 """Columns that are not called as the kind of their channel."""
 DRIVE_FILE = "drive.toml"
-"""Parameters of the drive that was simulated, next to truth.toml; or, next to campaign.toml, those of
-the one that a fit starts from."""
+"""Next to truth.toml the parameters of the drive that was simulated; next to campaign.toml those of
+the drive that a fit starts from."""
 
 
 @dataclass(frozen=True)

@@ -130,8 +130,8 @@ class Campaign(Result):
         heads = (*map(Head, ("run", "axis", "role", "maneuver")), Head("s", ".4g"))
         table = Table(self.title, (*heads, Head("channels", wrap=True)))
         for experiment in self:
-            words = experiment.name, experiment.axis, experiment.role, experiment.maneuver
-            table.add(*words, experiment.duration, ", ".join(experiment.channels))
+            cells = experiment.name, experiment.axis, experiment.role, experiment.maneuver
+            table.add(*cells, experiment.duration, ", ".join(experiment.channels))
         return table
 
     def plot(self, *, title: str | None = None) -> list[Figure]:

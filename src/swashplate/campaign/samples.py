@@ -221,8 +221,8 @@ def interpolate_counts(time: ArrayLike, counts: ArrayLike) -> Array:
     Notes
     -----
     Kruse (2001), section 7.2. A line knows a change before it happens, so it is not a causal
-    filter; and the row of a change carries its new count in both directions, so that a reversal, whose two
-    changes pass the same edge, moves the position by one count.
+    filter. The row of a change carries its new count in both directions, so that a reversal, whose
+    two changes pass the same edge, moves the position by one count.
     """
     stamps, edges = np.asarray(time, np.float64), np.asarray(counts, np.float64)
     knots = np.concatenate([[0], np.flatnonzero(edges[1:] != edges[:-1]) + 1])

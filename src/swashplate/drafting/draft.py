@@ -775,12 +775,12 @@ def _sampling_words(
     """Duration [s] and rate of a run, and its parts, for the comment next to its file."""
     of_axis = [experiment for experiment in experiments if experiment.axis == experiments[0].axis]
     rate = 1.0 / float(np.median(np.diff(of_axis[0].input.time)))
-    words = f", {duration:.4g} s at {rate:.4g} Hz"
+    comment = f", {duration:.4g} s at {rate:.4g} Hz"
     if overview is not None:
-        words += f", {len(of_axis)} of {len(overview.windows)} windows with motion used"
+        comment += f", {len(of_axis)} of {len(overview.windows)} windows with motion used"
     elif len(of_axis) > 1:
-        words += f" in {len(of_axis)} parts"
-    return words
+        comment += f" in {len(of_axis)} parts"
+    return comment
 
 
 class _Deflection(NamedTuple):

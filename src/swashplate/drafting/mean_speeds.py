@@ -302,10 +302,10 @@ def _observed(drive: InputSignal, grid: Array, is_held: bool) -> ObservedRecord:
     area = np.concatenate([[0.0], np.cumsum(means_between * np.diff(stamps))])
 
     def area_at(instants: Array) -> Array:
-        before = np.clip(np.searchsorted(stamps, instants, "right") - 1, 0, stamps.size - 1)
-        first = values[before]
+        index = np.clip(np.searchsorted(stamps, instants, "right") - 1, 0, stamps.size - 1)
+        first = values[index]
         last = first if is_held else np.interp(instants, stamps, values)
-        return np.asarray(area[before] + 0.5 * (instants - stamps[before]) * (first + last))
+        return np.asarray(area[index] + 0.5 * (instants - stamps[index]) * (first + last))
 
     means = np.diff(area_at(np.append(grid, grid[-1] + STEP))) / STEP
     record = Record(means, float(grid[0]), 1.0 / STEP, 1)

@@ -174,16 +174,19 @@ def filter_step_limit(zeta: ArrayLike, exact: bool) -> Array:
 
 def unstable_filters(numbers: Mapping[str, Array], step: float, exact: bool) -> Iterator[Broken]:
     """For each rule the sets whose filter gives wrong values at this step; see `broken_rules`."""
-    words = (
+    beginning = (
         "the current filter of the {side} channel (zeta = {zeta:g}, omega = {omega:g} rad/s) "
         f"{'swings too fast for' if exact else 'is unstable at'} a step of 1/{1.0 / step:g} s; "
         "simulate with "
     )
     rules: tuple[Rule, ...] = (
-        (lambda n: ~(n["steps"] < MOST_SUBSTEPS), f"{words}a zeta nearer to 1 or a lower omega."),
+        (
+            lambda n: ~(n["steps"] < MOST_SUBSTEPS),
+            f"{beginning}a zeta nearer to 1 or a lower omega.",
+        ),
         (
             lambda n: ~(n["steps"] < 1.0),
-            f"{words}substeps={{least:.0f}} or more, a higher rate or a lower omega.",
+            f"{beginning}substeps={{least:.0f}} or more, a higher rate or a lower omega.",
         ),
     )
     for side in SIDES:

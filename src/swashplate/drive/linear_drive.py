@@ -191,8 +191,8 @@ def model_tables(
     if loop_gain is None:
         return [operating, moving, poles]
     margins = model.margins(loop_gain)
-    shown = display_unit(f"{unit}/(rad/s)")
-    loop = _key_values(f"Proportional loop, {shown.factor * loop_gain:g} {shown.name}")
+    display = display_unit(f"{unit}/(rad/s)")
+    loop = _key_values(f"Proportional loop, {display.factor * loop_gain:g} {display.name}")
     loop.add("crossover", margins.crossover or Cell(None, "none"), unit="Hz", spec=".4g")
     loop.add(
         "phase margin", _none_if_infinite(np.degrees(margins.phase_margin)), unit="deg", spec=".1f"

@@ -184,8 +184,8 @@ def _names(side: str, step: float, options: Any) -> dict[str, str]:
     }
     if not side:
         return names
-    before = "current_rate" if step == 0.0 or options.exact is not None else "current_before"
-    return {f"card.{side}.before": before, f"card.{side}.now": "current", **names}
+    name_before = "current_rate" if step == 0.0 or options.exact is not None else "current_before"
+    return {f"card.{side}.before": name_before, f"card.{side}.now": "current", **names}
 
 
 # --- several steps a sample -----------------------------------------------------------------------

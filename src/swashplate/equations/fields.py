@@ -109,8 +109,8 @@ class Definition:
         if self.lower != -inf:
             low = f"{'at least' if self.above is None else 'above'} {self.lower:g}"
         high = "" if self.upper == inf else f"below {self.upper:g}"
-        words = " and ".join(part for part in (low, high) if part) or "any finite number"
-        return words + (", or inf for none" if self.can_be_off else "")
+        text = " and ".join(part for part in (low, high) if part) or "any finite number"
+        return text + (", or inf for none" if self.can_be_off else "")
 
     @property
     def plausible_range(self) -> str:

@@ -324,7 +324,7 @@ def _check(source: Parsed) -> None:
 
 
 def _check_call(source: Parsed, node: ast.Call) -> None:
-    """Refuse a call of what certainly is not an equation; a name may still be given to one later."""
+    """Refuse a call of what is certainly not an equation; a name may be given to one later."""
     function = node.func
     base = function.value if isinstance(function, ast.Attribute) else function
     if not isinstance(base, ast.Name) or base.id in source.local:

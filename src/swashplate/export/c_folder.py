@@ -256,7 +256,7 @@ def c(
     )
     exported, values, name = content.exported, content.values, content.identifier
     texts = interface(exported)
-    words = {
+    placeholders = {
         "file": exported.file,
         "name": name,
         "type": exported.type,
@@ -269,7 +269,7 @@ def c(
     title = what.parameters.title if isinstance(what, Drive) else ""
     texts[f"{name}_values.h"] = _initialiser(exported, values, name, title)
     for file in FURTHER:
-        texts[file] = filled(source_text(f"folder/{file}"), words)
+        texts[file] = filled(source_text(f"folder/{file}"), placeholders)
     to = Path(folder)
     try:
         to.mkdir(parents=True, exist_ok=True)

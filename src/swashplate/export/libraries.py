@@ -166,8 +166,8 @@ def one_unit(sources: Sources, fmi: str, identifier: str) -> str:
     Whatever is not of the standard's is static, and the standard's functions begin with the model's
     identifier unless the importer says otherwise, so that several can be linked into one program.
     """
-    words = {"n": fmi[0], "identifier": identifier, "model": sources.model}
-    return filled(source_text("fmu.c"), words)
+    placeholders = {"n": fmi[0], "identifier": identifier, "model": sources.model}
+    return filled(source_text("fmu.c"), placeholders)
 
 
 # --- the package's libraries ----------------------------------------------------------------------
@@ -313,8 +313,8 @@ def compiled_c(folder: Path, header: str) -> Path:
             )
         compiler = [sys.executable, "-m", "ziglang", "cc"]
     shared = ["-shared"] if ending == ".dll" else ["-shared", "-fPIC"]
-    words = ["-std=c99", "-O2", "-ffp-contract=off", *shared, "-o", f"{stem}{ending}"]
-    _run([*compiler, *words, f"{stem}.c", "-lm"], folder)
+    options = ["-std=c99", "-O2", "-ffp-contract=off", *shared, "-o", f"{stem}{ending}"]
+    _run([*compiler, *options, f"{stem}.c", "-lm"], folder)
     return folder / f"{stem}{ending}"
 
 

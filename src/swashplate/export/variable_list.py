@@ -90,12 +90,12 @@ class Variable:
 
 def words_of(exported: Exported) -> dict[str, Words]:
     """Meaning and unit of the signals of a user-defined model, as far as its types declare them."""
-    words = {}
+    descriptions = {}
     for part in exported.model.parts:
         for kind in (part.state, part.signals):
             for definition, path in _declared(kind) if kind is not None else ():
-                words[path] = Words(definition.name, definition.unit or "1")
-    return words
+                descriptions[path] = Words(definition.name, definition.unit or "1")
+    return descriptions
 
 
 def _declared(kind: type) -> Iterator[tuple[Definition, str]]:

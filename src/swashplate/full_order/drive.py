@@ -140,7 +140,7 @@ class FullOrderSimulation(Run, Tabular):
 
     def table(self) -> Table:
         """Lowest, highest and last value of each signal."""
-        numbers = (Column(words, "z.4g") for words in ("lowest", "highest", "at the end"))
+        numbers = (Column(heading, "z.4g") for heading in ("lowest", "highest", "at the end"))
         table = Table("", (Column("Signal"), *numbers, UNIT))
         for name in SIGNALS:
             values = self[name]
@@ -561,13 +561,13 @@ class Modes(Result):
         heads = (Column("Mode"), Column("Hz", ".4g"), Column("damping", ".3f"), Column(""))
         table = Table("Modes at rest", heads)
         slow = f"τ = {-1.0 / self.slow.real:.4g} s, " if self.slow.real < 0.0 else ""
-        for name, mode, words in (
+        for name, mode, heading in (
             ("spool", self.spool, "on its feedback spring"),
             ("swash plate", self.swash, "on its spring and the trapped oil"),
             ("swash plate, held pressure", self.swash_at_held_pressure, "on its spring alone"),
             ("slow pole", self.slow, f"{slow}which one state keeps"),
         ):
-            table.add(name, self.frequency_hz(mode), self.damping_ratio(mode), words)
+            table.add(name, self.frequency_hz(mode), self.damping_ratio(mode), heading)
         return table
 
 

@@ -153,8 +153,8 @@ class Identification(Estimated):
 
     def tables(self) -> list[Table]:
         """Stated errors, then estimates, profiles, errors of runs, cross-validation."""
-        shown = [table for part in parts_of(self) for table in part.tables]
-        return [self.verdict.table(), *shown]
+        part_tables = [table for part in parts_of(self) for table in part.tables]
+        return [self.verdict.table(), *part_tables]
 
     def summary(self) -> str:
         """Text: the verdict, then what the command ``fit`` prints."""
@@ -167,8 +167,8 @@ class Identification(Estimated):
         for part in parts:
             if part.opened:
                 estimates += "".join(table._repr_html_() for table in part.tables)
-            shown = () if part.opened else part.tables
-            details += folded(part.title, shown, [*part.remarks, *part.sentences])
+            visible_tables = () if part.opened else part.tables
+            details += folded(part.title, visible_tables, [*part.remarks, *part.sentences])
         for line in tables.single_runs_line(self.fit.stages):
             estimates += f"<p>{escape(line)}</p>"
         return f"{self.verdict.html(estimates)}{details}"
@@ -343,8 +343,8 @@ class Identification(Estimated):
                 source = f"{self.campaign.path.name}, {today}; 95 %: {'; '.join(ends[symbol])}"
                 parameters[symbol] = replace(parameter, status="fitted", source=source)
             elif parameter.status != "inactive":
-                before = nominal.parameters.get(symbol, parameter).source
-                source = f"{nominal.name}: {before}" if before else nominal.name
+                earlier_source = nominal.parameters.get(symbol, parameter).source
+                source = f"{nominal.name}: {earlier_source}" if earlier_source else nominal.name
                 parameters[symbol] = replace(parameter, status="fixed", source=source)
         fitted = len(self.fit.stages[0].problem.experiments)
         title = f"{self.campaign.title}: fitted to {fitted} runs, {today}"
@@ -404,22 +404,22 @@ def motion_of(runs: Iterable[Experiment]) -> Motion:
 
 def _interval_words(stages: Sequence[StageFit], fitted: ParameterSet) -> dict[str, list[str]]:
     """Intervals of the fitted parameters in words, by symbol."""
-    words: dict[str, list[str]] = {}
+    texts_by_symbol: dict[str, list[str]] = {}
     for stage in stages:
         unknowns = stage.problem.unknowns
         for estimate, unknown in zip(estimates_of(stage), unknowns, strict=True):
             if unknown.kind == "force":
                 forces = ("Z19", "Z20", "Z21", "Z22")
-                words |= {symbol: ["from the fitted forces"] for symbol in forces}
+                texts_by_symbol |= {symbol: ["from the fitted forces"] for symbol in forces}
             elif unknown.run is None:
                 ends = " to ".join(filter(None, estimate.ends()))
                 for target in (target for target in unknown.targets if target in fitted.numbers):
                     side = target.rpartition("_")[2]
                     side = f"{side} " if side in ("plus", "minus") else ""
-                    words.setdefault(fitted.definitions.find(target).symbol, []).append(
+                    texts_by_symbol.setdefault(fitted.definitions.find(target).symbol, []).append(
                         f"{side}{ends}"
                     )
-    return words
+    return texts_by_symbol
 
 
 def _seen_from(folder: Path, path: Path) -> str:

@@ -471,8 +471,8 @@ def _solved(
             if share < LEAST_EXPLAINED:
                 raise InputError(_no_fit(stage, problem, planned, share, doubts))
         if len(solutions) < planned:
-            words = f"interrupted after {len(solutions)} of {planned} starts: the best of them"
-            solution = replace(best, converged=False, interrupted=True, message=words)
+            message = f"interrupted after {len(solutions)} of {planned} starts: the best of them"
+            solution = replace(best, converged=False, interrupted=True, message=message)
         elif search is not None or best.number or solution.given_up:
             solution = solver(problem, best.vector)
     if any(unknown.prior is not None for unknown in problem.unknowns) and not solution.interrupted:
@@ -530,7 +530,7 @@ def _from_other_starts(
         )
     except KeyboardInterrupt:  # before the first of them ended
         others = ()
-    numbered = [replace(other, number=other.number + 1) for other in others]
+    numbered = [replace(result, number=result.number + 1) for result in others]
     solutions = (solution, *numbered)
     if _explained(problem, solutions[-1]):
         return solutions, len(solutions)

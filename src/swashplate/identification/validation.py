@@ -115,7 +115,7 @@ def residual_test(
         raise InputError(f"{time.size} samples show no correlation; at least {FEWEST} are needed.")
     grid = grid_of(time)
     most = max(int(LONGEST * grid.size), 1)
-    shown = min(most, max(int(longest / grid.step), 1))
+    lags_kept = min(most, max(int(longest / grid.step), 1))
     residual, command = residual - residual.mean(), command - command.mean()
     of_residual, counts = _autocorrelation(residual, grid, most)
     of_command, _ = _autocorrelation(command, grid, most)
@@ -125,13 +125,18 @@ def residual_test(
     products_of_both = float(of_residual[lags_within] @ of_command[lags_within])
     inflation = max(1.0, 1.0 + 2.0 * products_of_both)
     band = min(DEVIATIONS * float(np.sqrt(inflation / time.size)), 1.0)
-    lags, correlation = np.arange(-shown, shown + 1.0) * grid.step, np.zeros(2 * shown + 1)
+    lags, correlation = (
+        np.arange(-lags_kept, lags_kept + 1.0) * grid.step,
+        np.zeros(2 * lags_kept + 1),
+    )
     scale = float(np.linalg.norm(residual) * np.linalg.norm(command))
     if scale > 0.0:
-        size = next_fast_len(grid.size + shown, real=True)
+        size = next_fast_len(grid.size + lags_kept, real=True)
         spectra = rfft(grid.spread(command), size).conj() * rfft(grid.spread(residual), size)
         products = irfft(spectra, size)
-        correlation = np.concatenate([products[size - shown :], products[: shown + 1]]) / scale
+        correlation = (
+            np.concatenate([products[size - lags_kept :], products[: lags_kept + 1]]) / scale
+        )
     return ResidualTest(lags, correlation, band, length * grid.step)
 
 

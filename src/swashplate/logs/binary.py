@@ -65,8 +65,8 @@ def look(
             arrays.append(numbers)
     lengths = [signal.rows for signal in readable]
     columns = [(signal.name, signal.unit) for signal in readable]
-    shown = {"format": form, "columns": columns, "left_out": left_out, "lengths": lengths}
-    return shown, arrays
+    contents = {"format": form, "columns": columns, "left_out": left_out, "lengths": lengths}
+    return contents, arrays
 
 
 _LARGEST = 256 << 20
@@ -333,13 +333,13 @@ def _wave_rows(array: Any) -> dict[str, Array]:
         [str(word).lower() for word in labels[name].asstr()[...]]
         for name in ("complex", "radiating_dof")
     )
-    moved = [number for number, freedom in enumerate(freedoms) if freedom in _MOTIONS]
-    motions = np.array([_MOTIONS.index(freedoms[number]) + 1.0 for number in moved])
+    motion_numbers = [number for number, freedom in enumerate(freedoms) if freedom in _MOTIONS]
+    motions = np.array([_MOTIONS.index(freedoms[number]) + 1.0 for number in motion_numbers])
     directions, frequencies = (np.asarray(labels[name][...], np.float64) for name in _AXES[:2])
     grids = np.meshgrid(directions, frequencies, motions, indexing="ij")
     columns = dict(zip(("wave_direction", "omega", "motion"), grids, strict=True))
     for part in ("re", "im"):
-        columns[part] = np.asarray(table[components.index(part)][..., moved], np.float64)
+        columns[part] = np.asarray(table[components.index(part)][..., motion_numbers], np.float64)
     return {name: values.ravel() for name, values in columns.items()}
 
 

@@ -254,11 +254,11 @@ def check_stamps(log: Log, column: str, stamps: Array) -> None:
     late = np.flatnonzero(np.diff(stamps) <= 0.0)
     if not late.size:
         return
-    before, after = map(float, stamps[late[0] : late[0] + 2])
+    earlier, later = map(float, stamps[late[0] : late[0] + 2])
     row = log.first + int(late[0])
-    what = f"goes back from {before!r} to {after!r} in data row {row + 2}"
-    if before == after:
-        what = f"has {before!r} twice, in data rows {row + 1} and {row + 2}"
+    what = f"goes back from {earlier!r} to {later!r} in data row {row + 2}"
+    if earlier == later:
+        what = f"has {earlier!r} twice, in data rows {row + 1} and {row + 2}"
     others = f", the first of {late.size} such rows" if late.size > 1 else ""
     raise FileError(f"{log.path}: column '{column}' {what}{others}; time stamps must increase.")
 

@@ -52,9 +52,11 @@ def open_in_subprocess(reader: str, path: Path) -> Log:
     def load(positions: Sequence[int], first: int = 0, last: int | None = None) -> list[Array]:
         return ask([*positions], first, last)[1]
 
-    shown = ask()[0]
-    columns = tuple(LogColumn(*column) for column in shown["columns"])
-    return Log(path, shown["format"], columns, load, shown["left_out"], tuple(shown["lengths"]))
+    contents = ask()[0]
+    columns = tuple(LogColumn(*column) for column in contents["columns"])
+    return Log(
+        path, contents["format"], columns, load, contents["left_out"], tuple(contents["lengths"])
+    )
 
 
 class _ReaderProcess:

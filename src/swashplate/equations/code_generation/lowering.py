@@ -490,14 +490,14 @@ class Lowering:
         key = self._label("chosen$")
         then_label, else_label, end = self._label("then"), self._label("else"), self._label("end")
         self._fork(self._test(test, scope), then_label, else_label)
-        chosen: Any = None
+        result: Any = None
         for label, node in ((then_label, then), (else_label, other)):
             self._begin(label)
-            chosen = self._value(node, scope)
-            self._keep(key, chosen)
+            result = self._value(node, scope)
+            self._keep(key, result)
             self._jump(end)
         self._begin(end)
-        return self._kept(key, chosen)
+        return self._kept(key, result)
 
     def _keep(self, key: str, value: Any) -> None:
         """Store a number, or each of a tuple."""

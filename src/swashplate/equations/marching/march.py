@@ -194,14 +194,14 @@ class SampleCode:
         return block
 
     def ahead(
-        self, part: PartCode, ends: Sequence[Node], still: Collection[str] = ()
+        self, part: PartCode, ends: Sequence[Node], constant_names: Collection[str] = ()
     ) -> tuple[list[str], dict[Node, str]]:
         """Lines ahead of a loop that computes some nodes, and the names that they give.
 
         They take the parameters and givens that are read, and compute what follows from these and
         the step alone.
         """
-        block = self.printed(part, part.ahead(ends, still), named=True)
+        block = self.printed(part, part.ahead(ends, constant_names), named=True)
         lines = [*self.given(part, names_in(ends)), *block.lines]
         return lines, block.names
 

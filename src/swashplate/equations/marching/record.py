@@ -137,9 +137,9 @@ def record_of(
 def least_substeps(rate: float, requested: int | None = None) -> int:
     """Steps a sample that keep a drive's h at or below 1/512 s, or those that are requested."""
     if not is_real(rate) or not SLOWEST <= rate <= FASTEST:
-        shown = f"{rate:g}" if is_real(rate) else repr(rate)
+        text = f"{rate:g}" if is_real(rate) else repr(rate)
         raise InputError(
-            f"The rate is {shown} Hz, but must be between {SLOWEST:g} and {FASTEST:g} Hz."
+            f"The rate is {text} Hz, but must be between {SLOWEST:g} and {FASTEST:g} Hz."
         )
     least = max(ceil(SOURCE_RATE / rate - 1e-9), 1)
     if is_real(requested) and requested < least:

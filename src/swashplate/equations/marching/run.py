@@ -149,7 +149,7 @@ class Instance:
             slope=np.array([delay.slope for delay in delays], dtype=np.float64),
         )
 
-    def number_at(self, stored: SignalId, before: Mapping[str, float], h: float) -> float:
+    def number_at(self, stored: SignalId, signals_before: Mapping[str, float], h: float) -> float:
         """Number that is known ahead of a sample, of constant records; 0 for a tap's fraction."""
         numbers = self.parts[stored.part]
         kind = stored.kind
@@ -160,7 +160,7 @@ class Instance:
         if kind in ("tap", "input"):
             part = self.model.parts[stored.part]
             name, _, _ = stored.path.partition(".")
-            return before.get(part.tap(name).signal, 0.0)
+            return signals_before.get(part.tap(name).signal, 0.0)
         return h if kind == "h" else 0.0
 
     def check_inputs(self, signals: Collection[str]) -> None:
@@ -199,7 +199,9 @@ class Instance:
     ) -> InitialStates:
         check_start(start)
         self.check_inputs(first)
-        before = {name: value if start == "steady" else 0.0 for name, value in first.items()}
+        signals_before = {
+            name: value if start == "steady" else 0.0 for name, value in first.items()
+        }
         states: list[Any] = []
         arguments_of_parts: list[Mapping[str, Any]] = []
         for index, (part, numbers) in enumerate(zip(self.model.parts, self.parts, strict=True)):
@@ -218,7 +220,7 @@ class Instance:
                     )
                     continue
                 if tap.signal in first:
-                    value = (before if name in part.taps else first)[tap.signal]
+                    value = (signals_before if name in part.taps else first)[tap.signal]
                 else:
                     value = float(value_at(numbers.p, part.defaults[name]))
                 arguments[name] = Window((value,) * tap.width, 0.0) if tap.width else value
@@ -237,7 +239,7 @@ class Instance:
                     none = dict.fromkeys(floats_of(part.signals or tuple), math.nan)
                     arguments["signals"] = made(part.signals or tuple, none)
             arguments_of_parts.append(arguments)
-        return InitialStates(tuple(states), before, tuple(arguments_of_parts))
+        return InitialStates(tuple(states), signals_before, tuple(arguments_of_parts))
 
     def _state(self, part: Model, arguments: Mapping[str, Any], start: Start) -> Any:
         equation = part.rest if start == "rest" else part.settled

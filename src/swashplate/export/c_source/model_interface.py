@@ -46,7 +46,7 @@ class _Interface:
 
     def filled(self, text: str, **further: str) -> str:
         exported, signals = self.exported, "".join(f", double {name}" for name in self.arguments)
-        words = {
+        placeholders = {
             "type": exported.type,
             "p": exported.prefix,
             "P": self.P,
@@ -65,7 +65,7 @@ class _Interface:
             "count": len(self.numbers) + len(self.writer.constant_names()) + 1,
             "longest": literal(exported.longest),
         }
-        return filled(text, {**words, **further})
+        return filled(text, {**placeholders, **further})
 
     # -- header ------------------------------------------------------------------------------------
 

@@ -144,15 +144,15 @@ class PartInC:
 
     def _constants(self, ends: Sequence[Node]) -> dict[Node, str]:
         """What follows from parameters and step, if it has a name or takes a library's function."""
-        still = {node.value for node in self.options.values()}
+        option_names = {node.value for node in self.options.values()}
         taken = set[str]()
         constants = dict[Node, str]()
-        pending = self.part.ahead(ends, still)[::-1]
+        pending = self.part.ahead(ends, option_names)[::-1]
         while pending:
             node = graph.plain_value(pending.pop())
             if node in constants or node.op in (*LEAVES, "call"):
                 continue
-            if not names_in([node]) - still:
+            if not names_in([node]) - option_names:
                 continue
             named = node in self._labels and node.kind == "float"
             if not named and not any(
@@ -247,13 +247,15 @@ class PartInC:
         model = layout.exported.model
         c_texts: dict[Node, str] = {}
         named: dict[Node, tuple[str, str]] = {}
-        before = {
+        before_record = {
             signal: f"m->before_record[{row}]" for row, signal in enumerate(layout.exported.lines)
         }
         for tap, window in zip(self.part.taps, self.windows, strict=True):
             for age, name in enumerate(self.part.tap_samples(tap)):
                 signal = tap.tap.signal
-                c_texts[graph.name(name)] = before[signal] if start else f"{window}->s[{age}]"
+                c_texts[graph.name(name)] = (
+                    before_record[signal] if start else f"{window}->s[{age}]"
+                )
             c_texts[graph.name(self.part.delay_fraction(tap))] = "0.0" if start else f"{window}->f"
         for name in self.part_model.input_types:
             node = self.part.inputs[name]
@@ -268,7 +270,7 @@ class PartInC:
                 continue
             text = layout.value_of(signal)
             if name in self.part_model.taps:
-                text = before[signal] if start else self._looked(node, c_texts)
+                text = before_record[signal] if start else self._looked(node, c_texts)
             if default is not None:
                 is_set = f"m->inputs.measured[{layout.P}_INPUT_{c_name(signal)}].given"
                 text = f"{is_set} ? {text} : p->{path_of(default)}"

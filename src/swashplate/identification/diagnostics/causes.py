@@ -127,10 +127,10 @@ def causes_of(stages: Sequence[StageFit]) -> tuple[Cause, ...] | None:
         quick = isinstance(stage.problem.model, EquationModel)
         if stage.solution.loss != "linear" or not quick:
             continue
-        before = squares_of(stage.problem, stage.solution.vector)
-        if before.noise_share >= EXPLAINED:
+        original_squares = squares_of(stage.problem, stage.solution.vector)
+        if original_squares.noise_share >= EXPLAINED:
             continue
-        causes = _causes_of_stage(stage, before)
+        causes = _causes_of_stage(stage, original_squares)
         if causes:
             # what an earlier stage lacks, the later ones inherit
             break
@@ -162,20 +162,20 @@ def squares_of(problem: Problem, vector: Array) -> Squares:
         for name, residual in problem.residuals(vector, number).items():
             used = run[name].used
             time = run[name].time[used]
-            counted = residual[used]
+            used_residual = residual[used]
             if time.size < 2:
                 continue
             block = max(round(BLOCK / float(np.median(np.diff(time)))), 2)
-            starts = np.arange(0, counted.size, block)
-            counts = np.diff(np.append(starts, counted.size))
-            slow += float(np.sum(np.add.reduceat(counted, starts) ** 2 / counts))
-            total += float(counted @ counted)
-            samples += counted.size
+            starts = np.arange(0, used_residual.size, block)
+            counts = np.diff(np.append(starts, used_residual.size))
+            slow += float(np.sum(np.add.reduceat(used_residual, starts) ** 2 / counts))
+            total += float(used_residual @ used_residual)
+            samples += used_residual.size
             blocks += starts.size
     return Squares(slow, max(total - slow, 0.0), samples / max(blocks, 1.0))
 
 
-def _causes_of_stage(stage: StageFit, before: Squares) -> tuple[Cause, ...]:
+def _causes_of_stage(stage: StageFit, original_squares: Squares) -> tuple[Cause, ...]:
     """Causes of one stage's residuals, the largest share first."""
     plausible = [
         score
@@ -185,7 +185,7 @@ def _causes_of_stage(stage: StageFit, before: Squares) -> tuple[Cause, ...]:
     plausible.sort(key=lambda score: -score.share)
     causes = list[Cause]()
     for score in plausible[:TRIED]:
-        cause = _refitted(stage, score, before)
+        cause = _refitted(stage, score, original_squares)
         if cause is not None:
             causes.append(cause)
     causes.sort(key=lambda cause: -cause.share)
@@ -545,10 +545,10 @@ def _driving(stage: StageFit, experiment: Experiment) -> Array:
 # --- a refit with it ------------------------------------------------------------------------------
 
 
-def _refitted(stage: StageFit, score: _Score, before: Squares) -> Cause | None:
+def _refitted(stage: StageFit, score: _Score, original_squares: Squares) -> Cause | None:
     """A candidate after a refit; None if it does not remove half of the squares."""
     candidate = score.candidate
-    best = _solved(stage, candidate, score.size, before)
+    best = _solved(stage, candidate, score.size, original_squares)
     if best is None:
         return None
     size, share = best
@@ -556,17 +556,17 @@ def _refitted(stage: StageFit, score: _Score, before: Squares) -> Cause | None:
         # along the size the squares are a parabola: its slope at 0 is known
         curvature = share - 2.0 * score.share
         if curvature < 0.0 and abs(score.share / curvature + 1.0) > 0.1:
-            other = -score.share / curvature * score.size
-            better = _solved(stage, candidate, other, before)
-            if better is not None and better[1] > share:
-                size, share = better
+            other_size = -score.share / curvature * score.size
+            other_fit = _solved(stage, candidate, other_size, original_squares)
+            if other_fit is not None and other_fit[1] > share:
+                size, share = other_fit
     if share < EXPLAINED or not candidate.least < size < candidate.most:
         return None
     return Cause(candidate.name, size, share, candidate.states(size), candidate.advice)
 
 
 def _solved(
-    stage: StageFit, candidate: CandidateCause, size: float, before: Squares
+    stage: StageFit, candidate: CandidateCause, size: float, original_squares: Squares
 ) -> tuple[float, float] | None:
     """Size of a candidate and the share of the squares that a refit removes; None if it fails."""
     problem, vector = stage.problem, stage.solution.vector
@@ -579,7 +579,7 @@ def _solved(
                 start[k] = estimated[name]
         most = min(max(WORK // problem.samples, FEWEST_EVALUATIONS), MOST_EVALUATIONS)
         solution: Solution = solve(freed, start, tolerance=TOLERANCE, max_evaluations=most)
-        share = 1.0 - squares_of(freed, solution.vector).slow / before.slow
+        share = 1.0 - squares_of(freed, solution.vector).slow / original_squares.slow
     except (DomainError, InputError, ParameterError):
         return None
     if candidate.free:

@@ -507,19 +507,19 @@ def clipped_channels(experiments: Sequence[Experiment]) -> Iterator[Finding]:
             if not spans.size or low == high:
                 continue
             rests = any(run[name].values[0] == end for run in runs)
-            moved, apart = float(np.ptp(spans, axis=1).max()), float(np.ptp(spans))
+            largest_range, total_range = float(np.ptp(spans, axis=1).max()), float(np.ptp(spans))
             # a rounded reading stands still by itself for as long as a step of it lasts
             coarse = float(np.diff(np.unique(np.round(values / (high - low), 9))).min())
             step = max(coarse, 3e-4) * (high - low)
-            if apart > moved and not rests and _is_noisy(values, step):
-                moved = apart
-            if moved > (0.1 + 2.0 * coarse) * reach:
+            if total_range > largest_range and not rests and _is_noisy(values, step):
+                largest_range = total_range
+            if largest_range > (0.1 + 2.0 * coarse) * reach:
                 yield refusal(
                     None,
                     name,
                     f"'{name}' reads exactly {end:.6g} {runs[0][name].unit} at inputs that differ "
-                    f"by {moved:.3g} {runs[0].input.unit}: it is clipped there. Set limits = "
-                    f"[{low:.6g}, {high:.6g}] in its channel, and such samples are ignored.",
+                    f"by {largest_range:.3g} {runs[0].input.unit}: it is clipped there. Set limits "
+                    f"= [{low:.6g}, {high:.6g}] in its channel, and such samples are ignored.",
                 )
 
 
@@ -531,9 +531,9 @@ def _inputs_at(end: float, experiment: Experiment, name: str) -> list[tuple[floa
     """
     channel, spans = experiment[name], list[tuple[float, float]]()
     edges = np.flatnonzero(np.diff(channel.values == end, prepend=False, append=False))
-    for first, after in edges.reshape(-1, 2):
-        if channel.time[after - 1] - channel.time[first] >= DWELLS:
-            inputs = experiment.input.at(channel.time[first : after - (after - first) // 4])
+    for first, stop in edges.reshape(-1, 2):
+        if channel.time[stop - 1] - channel.time[first] >= DWELLS:
+            inputs = experiment.input.at(channel.time[first : stop - (stop - first) // 4])
             spans.append((float(inputs.min()), float(inputs.max())))
     return spans
 
@@ -545,10 +545,10 @@ def _is_noisy(values: Array, step: float) -> bool:
     one step makes, a tenth are such.
     """
     inner = (values > values.min()) & (values < values.max())
-    first, after = np.diff(values)[:-1], np.diff(values)[1:]
+    first, second = np.diff(values)[:-1], np.diff(values)[1:]
     within = inner[:-2] & inner[1:-1] & inner[2:]
-    least = np.minimum(np.abs(first), np.abs(after))
-    turns = within & (first * after < 0.0) & (least > 1.5 * step)
+    least = np.minimum(np.abs(first), np.abs(second))
+    turns = within & (first * second < 0.0) & (least > 1.5 * step)
     return bool(turns.sum() > TO_AND_FRO * max(within.sum(), 1))
 
 

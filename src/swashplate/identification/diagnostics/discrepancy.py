@@ -134,8 +134,8 @@ def _shifted(fit: LinearisedFit, run: LinearisedRun, jacobian: Array, shift: _Sh
     """(n,) differences of a run, simulated less measured, after a shift. [unit]"""
     directions, whitening = fit.inverse.of_run(run.name)
     _, of_run, of_shift = np.intersect1d(directions, shift.directions, return_indices=True)
-    moved = run.residual + jacobian @ (whitening[:, of_run] @ shift.size[of_shift])
-    return np.asarray(moved if run.weight is None else moved / run.weight)
+    shifted = run.residual + jacobian @ (whitening[:, of_run] @ shift.size[of_shift])
+    return np.asarray(shifted if run.weight is None else shifted / run.weight)
 
 
 # --- errors over windows --------------------------------------------------------------------------
@@ -539,6 +539,6 @@ def log_ratio(cells: Sequence[WindowCell], coefficients: Array) -> float:
 
 def spread_of(ratios: Array) -> tuple[float, float]:
     """Standard deviation of logarithms of some maneuvers, and its degrees of freedom."""
-    own = ratios.size - 1.0
+    freedom = ratios.size - 1.0
     squares = float(np.sum((ratios - ratios.mean()) ** 2)) + WORTH * USUAL_SPREAD**2
-    return float(np.sqrt(squares / (own + WORTH))), own + WORTH
+    return float(np.sqrt(squares / (freedom + WORTH))), freedom + WORTH

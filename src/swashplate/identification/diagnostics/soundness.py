@@ -264,11 +264,11 @@ def _sentence(
             f"{fault}: it moves {gain:.3g} times as far. Check its unit, scale and "
             f"counts_per_turn, or {ignored}."
         )
-    for other in records:
-        if _follows(record, measured, other, EXPLAINED * mean_square):
+    for other_record in records:
+        if _follows(record, measured, other_record, EXPLAINED * mean_square):
             return (
-                f"{fault}, but follows the command of {other.run}: are their logs swapped? Give "
-                f"each run its own file, or {ignored}."
+                f"{fault}, but follows the command of {other_record.run}: are their logs swapped? "
+                f"Give each run its own file, or {ignored}."
             )
     return f"{fault}. Is it a log of this axis and this command? If not, {ignored}."
 
@@ -313,15 +313,15 @@ def _standstill(record: ChannelErrors) -> tuple[float, float] | None:
     if not record.is_position:
         return None
     moves = np.abs(record.signal) > MOVES * float(np.abs(record.signal).max())
-    still = (np.diff(record.measured, prepend=np.nan) == 0.0) & moves
+    is_still = (np.diff(record.measured, prepend=np.nan) == 0.0) & moves
     # a coarse encoder has many samples a count
     steps = np.abs(np.diff(record.measured))
     count = float(steps[steps > 0.0].min(initial=np.inf))
-    moved = np.abs(np.diff(np.cumsum(record.signal) * record.step, prepend=0.0))
-    edges = np.flatnonzero(np.diff(still, prepend=False, append=False)).reshape(-1, 2)
-    for first, after in edges.tolist():
-        long = (after - first) * record.step > STANDS_STILL
-        if long and float(moved[first:after].sum()) > STEPS * count:
+    simulated_way = np.abs(np.diff(np.cumsum(record.signal) * record.step, prepend=0.0))
+    edges = np.flatnonzero(np.diff(is_still, prepend=False, append=False)).reshape(-1, 2)
+    for first, stop in edges.tolist():
+        long = (stop - first) * record.step > STANDS_STILL
+        if long and float(simulated_way[first:stop].sum()) > STEPS * count:
             start, step = record.start, record.step
-            return start + (first - 1) * step, start + (after - 1) * step
+            return start + (first - 1) * step, start + (stop - 1) * step
     return None

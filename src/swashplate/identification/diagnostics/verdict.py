@@ -155,7 +155,9 @@ class Verdict(Result):
         )
         for prediction in decisive:
             tested = {stated.motion for stated in prediction.classes}
-            unknown = [words for motion, words in MOTIONS.items() if motion not in tested]
+            unknown = [
+                description for motion, description in MOTIONS.items() if motion not in tested
+            ]
             if unknown:
                 sentences += (
                     f" {prediction.signal}: unknown in {listed(unknown)}, as no run has it."
@@ -369,11 +371,11 @@ def _unfinished(stages: Sequence[StageFit], planned: Sequence[str]) -> Iterator[
 # --- words ----------------------------------------------------------------------------------------
 
 
-def _state(found: ClassError, required: float) -> str:
+def _state(stated: ClassError, required: float) -> str:
     """Whether the stated error of a class is within what is required."""
-    if isnan(found.error):
+    if isnan(stated.error):
         return "-"
-    return "met" if found.error <= required else "NOT MET"
+    return "met" if stated.error <= required else "NOT MET"
 
 
 def _starts(stages: Sequence[StageFit]) -> Iterator[str]:
@@ -432,8 +434,8 @@ def maneuvers_tested(tested: Mapping[str, Experiment]) -> str:
         kinds[several.get(word, word)] = None
     low = min(float(experiment.input.values.min()) for experiment in runs)
     high = max(float(experiment.input.values.max()) for experiment in runs)
-    words = [f"sines of up to {fastest:.3g} Hz" if k == "sines" and fastest else k for k in kinds]
-    return f"{listed(words)} from {low:.3g} to {high:.3g} {runs[0].input.unit}"
+    phrases = [f"sines of up to {fastest:.3g} Hz" if k == "sines" and fastest else k for k in kinds]
+    return f"{listed(phrases)} from {low:.3g} to {high:.3g} {runs[0].input.unit}"
 
 
 def _fastest_sine(tested: Mapping[str, Experiment]) -> float:

@@ -144,8 +144,8 @@ def _check_outputs(outputs: object, experiment: Experiment, names: int | None = 
         method, of_channel = "simulate", "an array of floats"
 
     def refused(must: str, returned: object) -> InputError:
-        words = _type_words(returned)
-        return InputError(f"{experiment.name}: {method} must return {must}, not {words}.")
+        type_name = _type_words(returned)
+        return InputError(f"{experiment.name}: {method} must return {must}, not {type_name}.")
 
     if not isinstance(outputs, Mapping):
         first = next(iter(experiment.channels), "speed")
@@ -218,9 +218,14 @@ class EquationModel(ABC):
 
     def columns(self, names: Sequence[str]) -> tuple[list[str], Array]:
         """Columns that some names move, and (columns, names) their derivatives by these."""
-        moved = [self.moves(name) for name in names]
-        columns = list(dict.fromkeys(column for derivatives in moved for column in derivatives))
-        rows = [[derivatives.get(column, 0.0) for derivatives in moved] for column in columns]
+        derivatives_of_names = [self.moves(name) for name in names]
+        columns = list(
+            dict.fromkeys(column for derivatives in derivatives_of_names for column in derivatives)
+        )
+        rows = [
+            [derivatives.get(column, 0.0) for derivatives in derivatives_of_names]
+            for column in columns
+        ]
         return columns, np.array(rows).reshape(len(columns), len(names))
 
     def observed(

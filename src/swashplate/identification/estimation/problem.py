@@ -368,8 +368,8 @@ def noise_scales(experiments: Sequence[Experiment], channels: Sequence[str]) -> 
     for name in channels:
         having: list[Channel] = [run[name] for run in experiments if name in run.channels]
         if not having:
-            known = ", ".join(dict.fromkeys(c for run in experiments for c in run.channels))
-            raise InputError(f"No experiment has a channel '{name}'; there are {known}.")
+            channel_names = ", ".join(dict.fromkeys(c for run in experiments for c in run.channels))
+            raise InputError(f"No experiment has a channel '{name}'; there are {channel_names}.")
         stated = [channel.noise for channel in having if channel.noise is not None]
         if stated:
             scales[name] = float(np.sqrt(np.mean(np.square(stated))))

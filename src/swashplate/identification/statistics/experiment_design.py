@@ -350,9 +350,9 @@ def _of_residuals(
         if run.channel != name:
             continue
         # with free zeros and other unknowns of single runs fitted
-        own = jacobian[:, : fit.variables.of_run(run.name).size]
-        shift = np.linalg.lstsq(own, -run.residual, rcond=None)[0]
-        runs.append(run._replace(residual=run.residual + own @ shift))
+        run_jacobian = jacobian[:, : fit.variables.of_run(run.name).size]
+        shift = np.linalg.lstsq(run_jacobian, -run.residual, rcond=None)[0]
+        runs.append(run._replace(residual=run.residual + run_jacobian @ shift))
         derivatives.append(jacobian)
     square = np.concatenate([run.residual for run in runs]) ** 2
     noise = stated.noise * float(np.sqrt(np.mean(square)))
@@ -492,14 +492,14 @@ def advise(
     names = tuple(variables.names[k] for k in np.flatnonzero(free))
     known_now = whitening(dense_factor(present), free, TOLERANCE)
     now = known_now.matrix
-    before = np.where(known_now.determined, np.linalg.norm(now, axis=1), inf)
+    errors_now = np.where(known_now.determined, np.linalg.norm(now, axis=1), inf)
     ranked = []
     for candidate in candidates:
         both = dense_factor(np.vstack([present, candidate.derivatives]))
         known_then = whitening(both, free, TOLERANCE)
         then = known_then.matrix
-        after = np.where(known_then.determined, np.linalg.norm(then, axis=1), inf)
-        after = np.minimum(after, before)
+        errors_then = np.where(known_then.determined, np.linalg.norm(then, axis=1), inf)
+        errors_then = np.minimum(errors_then, errors_now)
         # errors then along the directions known now, in which they are 1 and independent now
         along = (present @ now).T @ (present @ then)
         shrinking = -np.linalg.slogdet(along @ along.T)[1]
@@ -509,8 +509,8 @@ def advise(
                 candidate=candidate.name,
                 duration=candidate.duration,
                 names=names,
-                before=before[free],
-                after=after[free],
+                before=errors_now[free],
+                after=errors_then[free],
                 ranks=then.shape[1] - now.shape[1],
                 d_gain=d_gain,
             )
@@ -558,7 +558,7 @@ def default_maneuvers() -> tuple[Maneuver, ...]:
 def advice_table(title: str, judged: Sequence[Advice]) -> Table:
     """Tests in the order given, what each would tell, and in a file all errors with it."""
     new = any(advice.newly_determined for advice in judged)
-    made = Table(
+    table = Table(
         title,
         (
             Column("test", wrap=not new),
@@ -573,13 +573,13 @@ def advice_table(title: str, judged: Sequence[Advice]) -> Table:
         first, more = advice.newly_determined[:NAMED], len(advice.newly_determined) - NAMED
         # the unknown whose error shrinks most, of those that are then known
         pairs = zip(advice.names, advice.before.tolist(), advice.after.tolist(), strict=True)
-        known = [pair for pair in pairs if pair[2] <= KNOWN]
+        determined = [pair for pair in pairs if pair[2] <= KNOWN]
         gained = ""
-        if known:
-            name, now, then = min(known, key=lambda pair: pair[2] / pair[1])
-            before = f"{_error(now)} " if now <= KNOWN else ""
-            gained = f"{name} {before}to {_error(then)}"
-        made.add(
+        if determined:
+            name, now, then = min(determined, key=lambda pair: pair[2] / pair[1])
+            error_before = f"{_error(now)} " if now <= KNOWN else ""
+            gained = f"{name} {error_before}to {_error(then)}"
+        table.add(
             advice.candidate,
             advice.duration,
             ", ".join(first) + (f" + {more}" if more > 0 else ""),
@@ -587,7 +587,7 @@ def advice_table(title: str, judged: Sequence[Advice]) -> Table:
             f"{advice.d_gain:.2f}x" if advice.d_gain > 1.0 + WORTH else "",
             *(error if error < inf else None for error in advice.after.tolist()),
         )
-    return made
+    return table
 
 
 def best_tests_table(judged: Sequence[Advice]) -> Table:

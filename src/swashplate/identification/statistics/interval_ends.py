@@ -297,15 +297,15 @@ def _unneeded(problem: Problem, vector: Array, index: int, cost: float, rise: fl
         left = 0.5 * float(np.sum((residuals - jacobian @ step) ** 2))
         if left - cost > HOPELESS * rise:
             return False
-        before = 0.5 * float(residuals @ residuals)
+        limited_cost = 0.5 * float(residuals @ residuals)
         for tried in range(LOOK, TRIES + 1, LOOK):
             now, start = minimise(index, float(start[index]), start)
             over = now - cost - rise
             if over < 0.0:
                 return True
-            if (before - now) * (TRIES - tried) / LOOK < over:
+            if (limited_cost - now) * (TRIES - tried) / LOOK < over:
                 return False
-            before = now
+            limited_cost = now
     except DomainError:
         pass
     return False

@@ -164,8 +164,8 @@ def profiles_of(
     )
     by_name: dict[str, Profile] = {}
     profiles = (executor or Serial()).run(_profiled, shared, numbers)
-    words = f"Profiling {stage.stage.name}"
-    for position, profile in counted(profiles, len(numbers), "parameters", words):
+    task = f"Profiling {stage.stage.name}"
+    for position, profile in counted(profiles, len(numbers), "parameters", task):
         number = numbers[position]
         name = variables.names[number]
         unknown = problem.unknowns.items[number]
