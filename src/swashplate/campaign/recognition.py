@@ -84,7 +84,7 @@ class _Candidate(NamedTuple):
     began: float
     """When the command leaves rest. [s]"""
     jumps: Mask | None = None
-    """Samples within jumps, where nothing is known."""
+    """Samples within jumps, of which nothing is known."""
     frequency: float | None = None
 
 

@@ -182,7 +182,7 @@ def unwrap_position(position: Array, size: float) -> Array:
 
 
 def _shortest(steps: Array, modulus: float) -> Array:
-    """Steps of a counter by the shorter way round, down where both are as long. [count]"""
+    """Steps of a counter by the shorter way round, down if both are as long. [count]"""
     return np.asarray(steps - modulus * np.floor(steps / modulus + 0.5))
 
 

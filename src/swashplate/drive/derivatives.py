@@ -50,8 +50,8 @@ def bound_drive(
     """The drive's model with its numbers, for some columns.
 
     These are symbols (``"Z16"`` stands for both directions), columns (``"Z16_plus"``) and states
-    at the first sample, ``"start.pump.pressure"`` [Pa]. Keys of ``run_values.start`` are paths without
-    ``start.``; it has a value for each of these states.
+    at the first sample, ``"start.pump.pressure"`` [Pa]. Keys of ``run_values.start`` are paths
+    without ``start.``; it has a value for each of these states.
     """
     for observation in observed.observations:
         check_output(observation.signal)

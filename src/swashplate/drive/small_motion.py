@@ -138,7 +138,7 @@ def small_motion_model(
     names = _names(side, step, front.options)
     if options.friction is not None and step > 0.0:
         # the next sample knows the spool's place x and its deflection d as d e^(-h/T) - x w/x_s
-        # alone, the deflection that would be left if it came back to where it was balanced
+        # alone, the deflection that would be left if it came back to its balance
         spool = states.index("pump.spool")
         deflection = states.index("pump.deflection")
         width_of = interpreted(friction_width, pump.replacements)

@@ -238,14 +238,14 @@ def numbers_of(value: Any) -> list[float]:
     return numbers
 
 
-def made(kind: Any, numbers: Mapping[str, float], prefix: str = "") -> Any:
+def tuple_from(kind: Any, numbers: Mapping[str, float], prefix: str = "") -> Any:
     """A nested named tuple from numbers by path after a prefix; others keep their defaults."""
     hints = get_type_hints(kind)
     values = []
     for name in kind._fields:
         path = f"{prefix}{name}"
         if is_named_tuple(hints[name]):
-            values.append(made(hints[name], numbers, f"{path}."))
+            values.append(tuple_from(hints[name], numbers, f"{path}."))
         else:
             number = numbers.get(path)
             values.append(kind._field_defaults[name] if number is None else float(number))

@@ -229,8 +229,8 @@ def type_of(function: FunctionType, argument: str) -> Any:
     if not isinstance(hint, str):
         return hint
     try:
-        alone = SimpleNamespace(__annotations__={argument: hint})
-        return typing.get_type_hints(alone, function.__globals__, include_extras=True)[argument]
+        annotated = SimpleNamespace(__annotations__={argument: hint})
+        return typing.get_type_hints(annotated, function.__globals__, include_extras=True)[argument]
     except NameError:
         return None
 

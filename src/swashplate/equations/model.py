@@ -526,12 +526,12 @@ def join(
 
 def _too_late(model: Model) -> Iterator[str]:
     """What a part of a joined model would take from outside, although it is known after it."""
-    before = [set[int]() for _ in model.parts]
+    upstream = [set[int]() for _ in model.parts]
     inputs = [(index, name) for index, part in enumerate(model.parts) for name in part.input_types]
     for index, name in inputs:
         link = model.link_of(index, name)
         for source in link.sources if link else ():
-            before[index] |= {source.part, *before[source.part]}
+            upstream[index] |= {source.part, *upstream[source.part]}
     for index, name in inputs:
         signal = model.parts[index].tap(name).signal
         part = model.parts[index].name
@@ -547,7 +547,7 @@ def _too_late(model: Model) -> Iterator[str]:
             continue
         giver = model.parts[after].name
         instead = f"put {giver} before {part}"
-        if index in {after, *before[after]}:
+        if index in {after, *upstream[after]}:
             instead = "a loop must be one model, or be closed sample by sample with steppers"
         yield (
             f"Model {model.name}: {part} needs '{signal}', which is known only after {giver}: "

@@ -27,7 +27,14 @@ from swashplate.equations.code_generation import c_name, comment_line, filled, l
 from swashplate.equations.marching import SOURCE_RATE, check_rate
 from swashplate.errors import FileError, InputError, InputTypeError
 from swashplate.export.c_source import Exported, interface, numbers, writer_of
-from swashplate.export.variable_list import DRIVE, DRIVE_WORDS, OWN, References, Words, words_of
+from swashplate.export.variable_list import (
+    DRIVE,
+    DRIVE_DESCRIPTIONS,
+    OWN,
+    Description,
+    References,
+    descriptions_of,
+)
 from swashplate.models.amplifier import stable_step
 from swashplate.models.displacement_control import steep_stops
 from swashplate.parameters import FULL_VOLTAGE, ParameterSet
@@ -115,7 +122,7 @@ class Content:
     packaged: bool
     """Whether the package's libraries have its equations."""
     references: References
-    words: Mapping[str, Words]
+    descriptions: Mapping[str, Description]
     """Meaning and unit of signals and options."""
 
     def __repr__(self) -> str:
@@ -169,7 +176,12 @@ def content_of(
             )
         check_filter_stability(what.parameters, step)
         exported, instance = exported_drive(what), drive_instance(what.parameters, by_voltage=True)
-        name, title, references, words = what.name, what.parameters.title, DRIVE, DRIVE_WORDS
+        name, title, references, descriptions = (
+            what.name,
+            what.parameters.title,
+            DRIVE,
+            DRIVE_DESCRIPTIONS,
+        )
     else:
         if not isinstance(what, Model):
             raise InputTypeError(
@@ -178,10 +190,10 @@ def content_of(
             )
         instance = instance_of(what, parameters, options=options, given=given)
         exported, name, title = Exported(what, prefix), what.name, f"Model {what.name}"
-        references, words = OWN, words_of(exported)
+        references, descriptions = OWN, descriptions_of(exported)
     values = numbers(exported, instance, step)
     packaged = isinstance(what, Drive) and not what.parameters.equations
-    return Content(exported, instance, values, name, title, packaged, references, words)
+    return Content(exported, instance, values, name, title, packaged, references, descriptions)
 
 
 def _nearest(what: object) -> str:

@@ -187,7 +187,7 @@ def table_of(content: Content) -> tuple[Variable, ...]:
     """Every variable of what is exported."""
     direct = feedthrough(content.exported, content.instance, content.step)
     values = content.values.tolist()
-    return variables(content.exported, values, direct, content.words, content.references)
+    return variables(content.exported, values, direct, content.descriptions, content.references)
 
 
 def resource(numbers: Array, layout: int, token: str) -> bytes:

@@ -144,15 +144,15 @@ def sources(content: Content | None = None) -> Sources:
     """C texts of libraries and WebAssembly; by default those of the packaged drive."""
     if content is None or content.packaged:
         return _packaged_sources()
-    return _made(content.exported, content.references)
+    return _sources(content.exported, content.references)
 
 
 @cache
 def _packaged_sources() -> Sources:
-    return _made(exported_drive(), DRIVE)
+    return _sources(exported_drive(), DRIVE)
 
 
-def _made(exported: Exported, references: References) -> Sources:
+def _sources(exported: Exported, references: References) -> Sources:
     texts = interface(exported)
     layout = int(digest(texts)[:16], 16)
     header = c_header(exported, layout, references)

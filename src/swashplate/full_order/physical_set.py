@@ -158,7 +158,7 @@ class PhysicalSet(Entries):
     def to_lumped(self, Z6: float | None = None) -> dict[str, Change]:
         """Lumped parameters that the set stands for; Kruse eqs. 6.56-6.70 and table 6.1.
 
-        Z1 to Z16 and Z18 by symbol, pairs (plus, minus) where the directions differ; the solenoids'
+        Z1 to Z16 and Z18 by symbol, pairs (plus, minus) if the directions differ; the solenoids'
         Z17 and Z19 to Z22 are not the pump's geometry. `Z6` is where to move to along the gauge
         Z6↔Z8: away from the stops only Z7/(1+Z6) and Z8/(1+Z6) count; by default the physical
         A_s²B/(k_r V).

@@ -66,7 +66,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 OTHERS = 6
-"""Starts besides the nominal one where that ends far from what was measured: of 419 sound campaigns
+"""Starts in addition to the nominal one if that ends far from what was measured: of 419 sound campaigns
 of slew eleven did, and in ten of them one of these starts reached the best. That some agree says
 nothing: in one campaign the nominal start and the first three ended in the same wrong optimum."""
 ROUGH = 1e-4
@@ -78,7 +78,7 @@ evaluations, or it is given up. Channels clipped at half of their range, late by
 of 0.5 s, doubled, or under noise of 30 % of it left 0.57 or more in 36 campaigns; outputs of other
 runs, and runs tiled with jumps, 0 to 0.32."""
 TRIAL = 12
-"""Evaluations of each other start where the first search was given up."""
+"""Evaluations of each other start if the first search was given up."""
 WINDOW = 1.0
 """Time over which the mean speed of a position is taken. [s]"""
 UNEXPLAINED = 5.0

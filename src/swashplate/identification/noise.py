@@ -39,7 +39,7 @@ class Covariance(Result):
 
     @property
     def standard_errors(self) -> Array:
-        """(K,) of the solver's numbers; inf where undetermined, 0 for one at its bound."""
+        """(K,) of the solver's numbers; inf if undetermined, 0 for one at its bound."""
         has_error = self.determined | ~self.variables.free
         return np.where(has_error, np.sqrt(np.maximum(np.diag(self.matrix), 0.0)), np.inf)
 
@@ -340,7 +340,7 @@ class _Sandwich:
     """
 
     def __init__(self, fit: LinearisedFit) -> None:
-        self.fit, self.spare = fit, fit.spare_samples  # refused where there are none
+        self.fit, self.spare = fit, fit.spare_samples  # refused if there are none
         prior = fit.prior @ fit.whitening
         self.middle: Array = (prior.T * fit.prior_noise) @ prior
         self.total: Array = np.sum((fit.whitening @ self.middle) * fit.whitening, axis=1)

@@ -48,7 +48,7 @@ DEVIATIONS = 1.96
 FOLLOWS = 0.5
 """Correlation of residuals with the input that counts as model error: a quarter of their square."""
 BANDS = 1.35
-"""And how many of its 95 % bands it must reach: where a band is wide, about six independent looks
+"""And how many of its 95 % bands it must reach: if a band is wide, about six independent looks
 fit into the lags, and the largest of them stays below that."""
 SURE = 0.9
 """A correlation from which no band is asked: in short runs of one slow movement it reaches 1."""
@@ -59,7 +59,7 @@ class ResidualTest(Result):
     """Correlation of the residuals of one channel of one run, with the input above all."""
 
     lags: Array
-    """(2 m - 1,) positive where the residual comes after the input. [s]"""
+    """(2 m - 1,) positive if the residual comes after the input. [s]"""
     correlation: Array
     """(2 m - 1,) of the residuals with the input."""
     band: float
@@ -160,7 +160,7 @@ class Measures(NamedTuple):
 
     @property
     def nrmse(self) -> float | None:
-        """RMSE over the measured standard deviation; None where nothing moved."""
+        """RMSE over the measured standard deviation; None if nothing moved."""
         return self.rmse / self.spread if self.spread > 0.0 else None
 
     @property
@@ -211,7 +211,7 @@ class RunQuality(Result):
     """(m,) at the channel's stamps, its free zero included. [unit of the channel]"""
     measures: Measures
     test: ResidualTest | None
-    """None where there are too few samples."""
+    """None if there are too few samples."""
     noise: float = 0.0
     """Standard deviation of a position's noise in a speed made from it.
     [unit of the channel]"""

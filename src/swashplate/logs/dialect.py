@@ -51,7 +51,7 @@ class TextOptions:
     header_row: int | None = None
     encoding: str | None = None
 
-    # pydantic, where this is a part of a larger schema: a misspelt key is refused
+    # pydantic, if this is a part of a larger schema: a misspelt key is refused
     __pydantic_config__: ClassVar[Any] = {"extra": "forbid"}
 
     def __post_init__(self) -> None:
@@ -174,7 +174,7 @@ def date_form(cell: str) -> str | None:
     return None
 
 
-def shown(cell: str) -> str:
+def short_cell(cell: str) -> str:
     """A cell for a sentence: short and printable."""
     text = printable(cell.strip())
     return text if len(text) <= 40 else f"{text[:37]}..."
@@ -219,7 +219,7 @@ class TextLayout(NamedTuple):
         return [cell.strip() for cell in cells]
 
     def names(self, line: str) -> list[str]:
-        """Cells of a header; where spaces delimit, the one before a unit does not."""
+        """Cells of a header; if spaces delimit, the one before a unit does not."""
         if self.delimiter == " ":
             line = re.sub(r"[ \t]+([\[(])", "\0\\1", line)
         return [cell.replace("\0", " ") for cell in self.cells(line)]
@@ -265,7 +265,7 @@ def find_layout(lines: Sequence[str], options: TextOptions, path: Path) -> TextL
         row = next((line for line in lines if "," in line), lines[0])
         readings = " or as ".join(map(str, equal))
         raise FileError(
-            f"{path} can be read in more than one way, '{shown(row)}' as {readings}; "
+            f"{path} can be read in more than one way, '{short_cell(row)}' as {readings}; "
             "give 'delimiter' or 'decimal' as an option."
         )
     layout = equal[0]  # with a point: if both signs are alike, there are whole numbers only

@@ -215,7 +215,7 @@ def split_unit(name: str) -> tuple[str, str | None]:
 def unit_of(column: LogColumn, requested: str, si: str) -> str:
     """Unit of a column that `Log.find` returned: its own, the ending of its name, or else `si`.
 
-    A name like ``time_ms`` means milliseconds where that is a unit of the same quantity, or where
+    A name like ``time_ms`` means milliseconds if that is a unit of the same quantity, or if
     it was asked for as ``time``, and is just a name otherwise.
     """
     if column.unit is not None:

@@ -175,7 +175,7 @@ def serve() -> None:
     os.dup2(2, 1)  # what libraries print must not get between the answers
     warnings.simplefilter("ignore")
     for line in sys.stdin.buffer:
-        reader, name, shown, *requested = json.loads(line)
+        reader, name, name_in_messages, *requested = json.loads(line)
         answer, arrays = dict[str, Any](), list[Array]()
         try:
             _limit_memory(Path(name))
@@ -190,7 +190,7 @@ def serve() -> None:
                     f"{name} cannot be read as {reader}, it is damaged or of another kind: "
                     f"{first_sentence(error)}."
                 )
-            answer = {"error": what.replace(name, shown), "kind": type(error).__name__}
+            answer = {"error": what.replace(name, name_in_messages), "kind": type(error).__name__}
         answer["sizes"] = [array.size for array in arrays]
         answers.write(json.dumps(answer).encode() + b"\n")
         for array in arrays:

@@ -27,7 +27,7 @@ from swashplate.logs.dialect import (
     find_layout,
     is_number_text,
     read_heading,
-    shown,
+    short_cell,
 )
 from swashplate.logs.log import Array, Log, LogColumn, printable
 
@@ -40,7 +40,7 @@ LONGEST_LINE = 1 << 24
 """A line of more characters is not a row of a table."""
 _HEAD = 2000  # lines in which the header and the first row of data must be
 _SAMPLE = 60  # lines that decide on delimiter and decimal sign, from the start and all over
-_SAMPLED = 1 << 20  # letters of them: fewer lines where there are thousands of columns
+_SAMPLED = 1 << 20  # letters of them: fewer lines if there are thousands of columns
 
 
 def open_text(path: Path, options: TextOptions | None = None) -> Log:
@@ -202,7 +202,7 @@ class _Table:
             kind = f"number with a decimal {'comma' if other_mark == '.' else 'point'}"
         raise FileError(
             f"{self.path}: column '{self.columns[position].name}' holds "
-            f"'{shown(text[row])}', which is not a {kind}, in data row {count + row + 1} "
+            f"'{short_cell(text[row])}', which is not a {kind}, in data row {count + row + 1} "
             f"(line {lines[row]})."
         )
 

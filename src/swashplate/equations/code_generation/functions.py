@@ -136,11 +136,11 @@ class Function:
         return space[self.name]
 
 
-def fresh_name(stem: str, taken: set[str]) -> str:
+def fresh_name(stem: str, used_names: set[str]) -> str:
     """A name that is not yet taken, and is from now on."""
     name, times = stem, 1
-    while name in taken:
+    while name in used_names:
         times += 1
         name = f"{stem}_{times}"
-    taken.add(name)
+    used_names.add(name)
     return name

@@ -173,7 +173,7 @@ class Inner(NamedTuple):
     source: Parsed
     labels: dict[Node, str]
     origins: dict[Node, Parsed]
-    taken: set[str]
+    used_names: set[str]
     leading: dict[str, str]
     """Kinds of the scalars of its first arguments, which the loop gives."""
     formals: dict[str, str]
@@ -212,7 +212,7 @@ def _inner(outer: Runner, callee: Callee, leading: Sequence[Value], rest: Sequen
     """An equation whose `leading` arguments the loop gives, the others as where it is called."""
     source = callee.source
     trace = outer.inner(source)
-    taken = {*FUNCTIONS, *RESERVED}
+    used_names = {*FUNCTIONS, *RESERVED}
     names = [argument.arg for argument in source.arguments]
     values, stands_for = dict[str, Value](), dict[Node, Node]()
 
@@ -231,7 +231,7 @@ def _inner(outer: Runner, callee: Callee, leading: Sequence[Value], rest: Sequen
         if value.op == "number" and not always:
             return value
         kind = "float" if always and value.kind == "int" else value.kind
-        node = graph.name(fresh_name(stem, taken), kind)
+        node = graph.name(fresh_name(stem, used_names), kind)
         stands_for[node] = value
         return node
 
@@ -246,7 +246,7 @@ def _inner(outer: Runner, callee: Callee, leading: Sequence[Value], rest: Sequen
         source=source,
         labels=trace.labels,
         origins=trace.origins,
-        taken=taken,
+        used_names=used_names,
         leading={node.value: node.kind for node in first},
         formals={node.value: node.kind for node in read},
         actuals=[stands_for[node] for node in read],
@@ -276,7 +276,7 @@ def solved(trace: Runner, callee: Callee, low: Value, high: Value, rest: Sequenc
             None, "a residual or a bracket that is a tuple", "let each be one float"
         )
     function = inner.function()
-    ends = [fresh_name(end_name, inner.taken) for end_name in ("low", "high")]
+    ends = [fresh_name(end_name, inner.used_names) for end_name in ("low", "high")]
     arguments = ", ".join([*ends, *inner.formals])
     name = f"root_of_{function.name}"
     return_line = f"return (root({function.name}, {arguments}),)"
@@ -334,7 +334,7 @@ def repetition(
         instead = "let it take and return the same named tuple of floats, or a float"
         trace.under_way[-1].source.refuse(None, what, instead)
     *state_names, number = inner.leading
-    count_name = fresh_name("count", inner.taken)
+    count_name = fresh_name("count", inner.used_names)
     formals = [count_name, *state_names, *inner.formals]
     states = ", ".join(state_names)
     step_arguments = ", ".join([*state_names, f"float({number})", *inner.formals])
@@ -376,7 +376,7 @@ def _tangent_loop(
     inputs = [formals[index] for index in moving if index > 0]
     *state_names, number = inner.leading
     width = len(inputs)
-    taken = {*inner.taken}
+    used_names = {*inner.used_names}
     differentiated_by = [*state_names, *(name for name in inputs if name not in state_names)]
     step = derived_function(
         f"{inner.name}_{UNNAMED}",
@@ -387,11 +387,11 @@ def _tangent_loop(
         inner.labels,
         chained=True,
     )
-    slopes, column = fresh_name("slopes", taken), fresh_name("c", taken)
-    next_names = [fresh_name(f"new_{name}", taken) for name in state_names]
-    slopes_before = [fresh_name(f"by_{name}", taken) for name in state_names]
+    slopes, column = fresh_name("slopes", used_names), fresh_name("c", used_names)
+    next_names = [fresh_name(f"new_{name}", used_names) for name in state_names]
+    slopes_before = [fresh_name(f"by_{name}", used_names) for name in state_names]
     partials = [
-        fresh_name(f"d_{next_names[output]}_{differentiated_by[source]}", taken)
+        fresh_name(f"d_{next_names[output]}_{differentiated_by[source]}", used_names)
         for output, source in step.entries
     ]
     slope_of = {

@@ -306,12 +306,12 @@ class Lowering:
                 raise not_lowered(target)
 
     def _if(
-        self, test: ast.expr, then: list[ast.stmt], other: list[ast.stmt], scope: Scope
+        self, test: ast.expr, then: list[ast.stmt], otherwise: list[ast.stmt], scope: Scope
     ) -> bool:
         then_label, else_label, end = self._label("then"), self._label("else"), self._label("end")
         self._fork(self._test(test, scope), then_label, else_label)
         reached = False
-        for label, statements in ((then_label, then), (else_label, other)):
+        for label, statements in ((then_label, then), (else_label, otherwise)):
             self._begin(label)
             if self._body(statements, scope):
                 self._jump(end)
@@ -391,7 +391,7 @@ class Lowering:
             case ast.BoolOp(op, tests):
                 return self._joined(tests, scope, every=isinstance(op, ast.And))
             case ast.IfExp(test, then, other):
-                return self._chosen(test, then, other, scope)
+                return self._conditional(test, then, other, scope)
             case ast.Subscript(array, index):
                 return self.load(self._value(array, scope), self._value(index, scope))
             case ast.Attribute(value, name):
@@ -485,19 +485,21 @@ class Lowering:
         self._begin(end)
         return self._load(key)
 
-    def _chosen(self, test: ast.expr, then: ast.expr, other: ast.expr, scope: Scope) -> Any:
+    def _conditional(
+        self, test: ast.expr, then: ast.expr, otherwise: ast.expr, scope: Scope
+    ) -> Any:
         """One of two numbers, or tuples of them, of which only that one is computed."""
         key = self._label("chosen$")
         then_label, else_label, end = self._label("then"), self._label("else"), self._label("end")
         self._fork(self._test(test, scope), then_label, else_label)
         result: Any = None
-        for label, node in ((then_label, then), (else_label, other)):
+        for label, node in ((then_label, then), (else_label, otherwise)):
             self._begin(label)
             result = self._value(node, scope)
             self._keep(key, result)
             self._jump(end)
         self._begin(end)
-        return self._kept(key, result)
+        return self._stored_value(key, result)
 
     def _keep(self, key: str, value: Any) -> None:
         """Store a number, or each of a tuple."""
@@ -507,7 +509,7 @@ class Lowering:
         for index, element in enumerate(value):
             self._store(f"{key}.{index}", element)
 
-    def _kept(self, key: str, like: Any) -> Any:
+    def _stored_value(self, key: str, like: Any) -> Any:
         """What was stored: a number, or a tuple as long as another."""
         if isinstance(like, Operand):
             return self._load(key)
@@ -540,7 +542,9 @@ class Lowering:
         if self._body(function.tree.body, scope):
             self._jump(scope.end)
         self._begin(scope.end)
-        return None if scope.result is None else self._kept(scope.key("result$"), scope.result)
+        return (
+            None if scope.result is None else self._stored_value(scope.key("result$"), scope.result)
+        )
 
     def called(self, name: str, *arguments: Operand) -> Operand:
         """A function of floats, of LLVM or of C."""

@@ -74,7 +74,7 @@ class Language(ABC):
         """
 
     @abstractmethod
-    def branch(self, test: str, then: list[str], other: list[str], pad: str) -> list[str]:
+    def branch(self, test: str, then: list[str], otherwise: list[str], pad: str) -> list[str]:
         """Lines of an `if` and its `else`."""
 
     def declared(self, names: Mapping[str, Node], pad: str, *, always: bool) -> list[str]:
@@ -164,13 +164,13 @@ class Python(Language):
         )
         return assigned(unpacked, f"{call.value.function.name}({', '.join(arguments)})", pad)
 
-    def branch(self, test: str, then: list[str], other: list[str], pad: str) -> list[str]:
+    def branch(self, test: str, then: list[str], otherwise: list[str], pad: str) -> list[str]:
         """Lines of an `if` and its `else`."""
         if not then:
-            return [*bracketed("if not (", test, "):", pad), *other]
+            return [*bracketed("if not (", test, "):", pad), *otherwise]
         fits = len(pad) + len(test) < WIDTH - 4
         head = [f"{pad}if {test}:"] if fits else bracketed("if (", test, "):", pad)
-        return [*head, *then, *([f"{pad}else:", *other] if other else [])]
+        return [*head, *then, *([f"{pad}else:", *otherwise] if otherwise else [])]
 
 
 PYTHON, BRANCHING = Python(), Python(branches=True)
@@ -225,14 +225,14 @@ class CodeBlock:
         self,
         results: Sequence[Node],
         labels: Mapping[Node, str],
-        taken: set[str],
+        used_names: set[str],
         *,
         available: Mapping[Node, str] | None = None,
         flat: Flat | None = None,
         language: Language = PYTHON,
         named: bool = False,
     ) -> None:
-        self._labels, self._taken, self._available = labels, taken, dict(available or {})
+        self._labels, self._used_names, self._available = labels, used_names, dict(available or {})
         self._language = language
         self.functions: dict[str, Function] = {}
         self._schedule = Schedule(results, self._available, flat)
@@ -241,7 +241,7 @@ class CodeBlock:
         self._named: dict[tuple[Node, Region], str] = {}
         self._outlive: dict[Conditional | None, dict[str, Node]] = {}
         """Names of each branch that are read after it, while its test is known to hold."""
-        self._uses = self._counted(results)
+        self._uses = self._uses_of(results)
         outermost = self._schedule.whole
         self.statements = [*self._steps(outermost, "")]
         self.results = [self._result(node, named=named) for node in results]
@@ -262,7 +262,7 @@ class CodeBlock:
 
     # -- names -------------------------------------------------------------------------------------
 
-    def _counted(self, results: Sequence[Node]) -> dict[tuple[Node, Region], list[Region]]:
+    def _uses_of(self, results: Sequence[Node]) -> dict[tuple[Node, Region], list[Region]]:
         """From where each value is read, by where it is computed."""
         uses: dict[tuple[Node, Region], list[Region]] = {}
 
@@ -329,7 +329,7 @@ class CodeBlock:
     def _fresh(self, node: Node) -> str:
         stem = self._labels.get(node) or STEMS.get(node.op, "part")
         stem = re.sub(r"\W+", "_", stem)
-        return fresh_name(f"value_{stem}" if stem[0].isdigit() else stem, self._taken)
+        return fresh_name(f"value_{stem}" if stem[0].isdigit() else stem, self._used_names)
 
     # -- lines -------------------------------------------------------------------------------------
 

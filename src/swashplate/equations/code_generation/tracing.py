@@ -470,8 +470,8 @@ class _Tracer:
             return self.trace.make("**", left, value=ast.literal_eval(node.right))
         right = self.scalar(node.right)
         if left.kind == right.kind == "int" and left.op == right.op == "number" and op != "/":
-            counted = {"+": int.__add__, "-": int.__sub__, "*": int.__mul__}[op]
-            return graph.number(counted(left.value, right.value))
+            integer_operation = {"+": int.__add__, "-": int.__sub__, "*": int.__mul__}[op]
+            return graph.number(integer_operation(left.value, right.value))
         if op == "*" and left.kind == right.kind == "float":  # a factor that is known to be one
             for factor, other in ((left, right), (right, left)):
                 if graph.is_number(factor, 1.0):
@@ -604,7 +604,7 @@ class _Tracer:
             beyond = make(">=", x, knots[segment])
             next_ends = knots[segment], knots[segment + 1], values[segment], values[segment + 1]
             ends = [
-                choose(beyond, after, before) for before, after in zip(ends, next_ends, strict=True)
+                choose(beyond, next_end, end) for end, next_end in zip(ends, next_ends, strict=True)
             ]
             for node, name in zip(ends, ("left", "right", "low", "high"), strict=True):
                 label(self.trace.noted(node), name)

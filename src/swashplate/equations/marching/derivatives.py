@@ -155,9 +155,10 @@ def jacobian(
 ) -> Jacobian:
     """The same residuals with their exact derivatives by columns.
 
-    Columns are paths of parameters, and ``start.`` with the path of a state; `can_depend` says whether
-    the record may depend on each at all: the others give zeros. `out` is (k + 1, m) memory to write
-    to, the `rows` of an earlier call for example: new memory takes longer to get than the march.
+    Columns are paths of parameters, and ``start.`` with the path of a state; `can_depend` says
+    whether the record may depend on each at all: the others give zeros. `out` is (k + 1, m) memory
+    to write to, the `rows` of an earlier call for example: new memory takes longer to get than the
+    march.
     """
     dependent = np.flatnonzero(np.ones(len(columns)) if can_depend is None else can_depend)
     names = (*columns, *observed.own_columns)

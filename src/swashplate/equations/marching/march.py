@@ -89,9 +89,9 @@ class SampleCode:
     ) -> None:
         self.model = model
         self.signals = tuple(signals)
-        taken = {*RESERVED, *self.signals, *(f"{signal}_before" for signal in self.signals)}
+        used_names = {*RESERVED, *self.signals, *(f"{signal}_before" for signal in self.signals)}
         self.parts = [
-            PartCode(model, index, signals, options_of_part, taken)
+            PartCode(model, index, signals, options_of_part, used_names)
             for index, options_of_part in enumerate(options)
         ]
         self.ends: list[list[Node]] = [[] for _ in self.parts]
@@ -184,7 +184,7 @@ class SampleCode:
         block = CodeBlock(
             results,
             labels,
-            part.taken,
+            part.used_names,
             available=available,
             named=named,
             flat=flat,

@@ -82,18 +82,18 @@ class PartCode:
         part: int,
         signals: Sequence[str],
         options: Any,
-        taken: set[str] | None = None,
+        used_names: set[str] | None = None,
         trace: Trace | None = None,
     ) -> None:
         self.model, self.part, self.part_model = model, part, model.parts[part]
         self.records, self.options = tuple(signals), options
         self.trace = Trace(replacements=self.part_model.replacements) if trace is None else trace
-        self.taken: set[str] = set() if taken is None else taken
+        self.used_names: set[str] = set() if used_names is None else used_names
         self.prefix = f"{self.part_model.name}_" if len(model.parts) > 1 else ""
-        self.taken.add("h")
+        self.used_names.add("h")
         self.taps = [tap for tap in taps_of(model, self.records) if tap.part == part]
         for tap in self.taps:
-            self.taken |= {
+            self.used_names |= {
                 *self.tap_samples(tap),
                 self.delay_fraction(tap),
                 self.delay_samples(tap),
@@ -127,7 +127,7 @@ class PartCode:
 
     def fresh(self, stem: str) -> str:
         """A name that is not yet taken."""
-        return fresh_name(stem.replace(".", "_"), self.taken)
+        return fresh_name(stem.replace(".", "_"), self.used_names)
 
     def _fresh(self, letter: str) -> Callable[[str], str]:
         """What gives the numbers of a named tuple their names."""

@@ -193,7 +193,7 @@ def dot(a: Array, b: Array, room: Array) -> float:
 def absorb(sink: int, room: int) -> None:
     """Rotate the rows of a sink into the triangular factor of all rows before it.
 
-    They are used up, and are to be zeros where there are fewer than ROWS.
+    They are used up, and are to be zeros if there are fewer than ROWS.
     """
     columns = fields_of(sink, Sink).columns
     rows = fields_of(sink, Sink).rows
@@ -240,13 +240,13 @@ def combine(struct: int, flat: Array, t: int, shift: int, count: int, row: Array
         scale = program.scale[s]
         factor = row_from(flat, program.first_factor[s] + shift)
         if program.second_factor[s] >= 0:
-            other = row_from(flat, program.second_factor[s] + shift)
+            second = row_from(flat, program.second_factor[s] + shift)
             if s == first:
                 for m in range(count):
-                    row[m] = scale * (factor[m] * other[m])
+                    row[m] = scale * (factor[m] * second[m])
             else:
                 for m in range(count):
-                    row[m] += scale * (factor[m] * other[m])
+                    row[m] += scale * (factor[m] * second[m])
         elif s == first:
             for m in range(count):
                 row[m] = scale * factor[m]

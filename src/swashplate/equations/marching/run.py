@@ -21,8 +21,8 @@ from swashplate.equations.fields import (
     check_mapping,
     floats_of,
     is_real,
-    made,
     numbers_of,
+    tuple_from,
     value_at,
 )
 from swashplate.equations.keeping import cached_on_disk, key_of
@@ -237,7 +237,7 @@ class Instance:
                 except NO_NUMBER:
                     # outside the domain; the march, which asks for its margin, says what is wrong
                     none = dict.fromkeys(floats_of(part.signals or tuple), math.nan)
-                    arguments["signals"] = made(part.signals or tuple, none)
+                    arguments["signals"] = tuple_from(part.signals or tuple, none)
             arguments_of_parts.append(arguments)
         return InitialStates(tuple(states), signals_before, tuple(arguments_of_parts))
 
@@ -258,7 +258,7 @@ class Instance:
             )
         defaults = part.state._field_defaults
         empty = [path for path in floats_of(part.state) if path.split(".")[0] not in defaults]
-        return made(part.state, dict.fromkeys(empty, 0.0))
+        return tuple_from(part.state, dict.fromkeys(empty, 0.0))
 
     def _called(
         self, part: Model, equation: Callable[..., Any], arguments: Mapping[str, Any]

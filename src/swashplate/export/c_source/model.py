@@ -111,10 +111,10 @@ class Writer:
             }
             signal = trace.call(link.equation, sources)
             assert isinstance(signal, Node)
-            taken = {*self.loops.taken, "m"}
+            used_names = {*self.loops.used_names, "m"}
             labels = {node: c_name(label) for node, label in trace.labels.items()}
-            language = C(self.loops, trace.origins, taken)
-            block = CodeBlock([signal], labels, taken, language=language)
+            language = C(self.loops, trace.origins, used_names)
+            block = CodeBlock([signal], labels, used_names, language=language)
             function_name = self.loops.fresh(name)
             lines = [*language.headed(block.lines), f"return {block.texts[0]};"]
             description = first_line(trace.callee(link.equation).source)

@@ -161,7 +161,7 @@ class _Interface:
                 TEXTS["interface"],
                 settle=self.filled(TEXTS["settled"]) if exported.settles else "",
                 constants=self.constants(),
-                move=self.moved(),
+                move=self.advance_line(),
                 outputs=self.outputs(),
                 limits=self.limits(),
                 places=self.places(),
@@ -215,7 +215,7 @@ class _Interface:
             lines.append(f"m->line[{row}][m->newest] = {self.writer.layout.value_of(signal)};")
         return _body(lines or ["(void)m;"])
 
-    def moved(self) -> str:
+    def advance_line(self) -> str:
         if not self.exported.lines:
             return ""
         return f"    m->newest = m->newest > 0 ? m->newest - 1 : {self.P}_LINE - 1;\n"

@@ -76,9 +76,9 @@ class PartInC:
             self._symbols = kind(*flags)
         self._trace(self.trace())
         self._trace(self.trace(outlined=formulas(self.part.trace)))
-        taken = {*OWN}
+        used_names = {*OWN}
         self.windows = [
-            fresh_name(c_name(tap.input if tap.tap.width else f"{tap.input}_window"), taken)
+            fresh_name(c_name(tap.input if tap.tap.width else f"{tap.input}_window"), used_names)
             for tap in self.part.taps
         ]
         self.names = {
@@ -145,7 +145,7 @@ class PartInC:
     def _constants(self, ends: Sequence[Node]) -> dict[Node, str]:
         """What follows from parameters and step, if it has a name or takes a library's function."""
         option_names = {node.value for node in self.options.values()}
-        taken = set[str]()
+        used_names = set[str]()
         constants = dict[Node, str]()
         pending = self.part.ahead(ends, option_names)[::-1]
         while pending:
@@ -161,7 +161,7 @@ class PartInC:
                 continue
             if named or node.op in LIBRARY or node.op == "result":
                 stem = self._labels.get(node) or STEMS.get(node.op, node.op)
-                constants[node] = fresh_name(c_name(stem), taken)
+                constants[node] = fresh_name(c_name(stem), used_names)
             else:
                 pending += node.args[::-1]
         return constants
@@ -210,13 +210,15 @@ class PartInC:
         `inputs` are values that get their names ahead, each with its name and its text. The `last`
         of all is returned. `pointers` are further declarations, or others, by name.
         """
-        taken = {*self.layout.loops.taken, *OWN, *self.windows}
-        names = {node: fresh_name(name, taken) for node, (name, _) in inputs.items()}
+        used_names = {*self.layout.loops.used_names, *OWN, *self.windows}
+        names = {node: fresh_name(name, used_names) for node, (name, _) in inputs.items()}
         nodes = [node for results_of_word in results.values() for _, node in results_of_word]
         nodes += [last] if last is not None else []
-        language = C(self.layout.loops, trace.origins, taken)
+        language = C(self.layout.loops, trace.origins, used_names)
         labels = self.labels(trace, nodes)
-        block = CodeBlock(nodes, labels, taken, available={**available, **names}, language=language)
+        block = CodeBlock(
+            nodes, labels, used_names, available={**available, **names}, language=language
+        )
         lines, texts = language.headed(block.lines), iter(block.texts)
         for word, results_of_word in results.items():
             lines += [""] if results_of_word and lines else []
@@ -372,7 +374,16 @@ class PartInC:
 
         They read ``params``, ``given``, ``options`` and ``h``, and fill ``constants``.
         """
-        taken = {*FUNCTIONS, *RESERVED, "params", "given", "options", "h", "constants", "prepare"}
+        used_names = {
+            *FUNCTIONS,
+            *RESERVED,
+            "params",
+            "given",
+            "options",
+            "h",
+            "constants",
+            "prepare",
+        }
         available = {}
         for array, numbers in (("params", self.part.p), ("given", self.part.given)):
             paths = self.layout.exported.model.places(
@@ -382,7 +393,7 @@ class PartInC:
                 available[node] = f"{array}[{paths.index((self.number, path))}]"
         for name, node in self.options.items():
             available[node] = f"options[{self.layout.exported.options.index((self.number, name))}]"
-        block = CodeBlock([*self.constants], self._labels, taken, available=available)
+        block = CodeBlock([*self.constants], self._labels, used_names, available=available)
         lines = [*block.lines]
         for index, text in enumerate(block.texts):
             lines += assigned(f"constants[{first + index}]", text)

@@ -20,8 +20,8 @@ class Structs:
         Tag and text of each, by the class of named tuples that it stands for.
     """
 
-    def __init__(self, prefix: str, taken: Iterable[str]) -> None:
-        self.prefix, self._taken = prefix, {*taken}
+    def __init__(self, prefix: str, used_names: Iterable[str]) -> None:
+        self.prefix, self._used_names = prefix, {*used_names}
         self.texts: dict[Any, tuple[str, str]] = {}
 
     def of(self, cls: Any) -> str:
@@ -42,7 +42,7 @@ class Structs:
 
     def fresh(self, stem: str) -> str:
         """A tag that nothing else has."""
-        return fresh_name(c_name(f"{self.prefix}_{stem}"), self._taken)
+        return fresh_name(c_name(f"{self.prefix}_{stem}"), self._used_names)
 
     def _type(self, hint: Any) -> str:
         if is_named_tuple(hint):

@@ -318,7 +318,7 @@ def _within_dead_zone(run: Experiment, nominal: ParameterSet) -> str:
 
 
 class SimulatedReadings(NamedTuple):
-    """What a channel did in a run, measured and simulated, where it counts."""
+    """What a channel did in a run, measured and simulated, at the samples that count."""
 
     run: str
     channel: Channel
@@ -331,7 +331,7 @@ class SimulatedReadings(NamedTuple):
 
     @property
     def gain(self) -> float:
-        """Measured over simulated, in the least-squares sense; negative where turned round."""
+        """Measured over simulated, in the least-squares sense; negative if turned round."""
         return float(self.measured @ self.simulated / (self.simulated @ self.simulated))
 
     @property
@@ -484,7 +484,7 @@ def _far_off_gains(name: str, runs: Sequence[SimulatedReadings]) -> Iterator[Fin
 def clipped_channels(experiments: Sequence[Experiment]) -> Iterator[Finding]:
     """Channels that stand at an end of their instrument, with the limits to state.
 
-    A channel is clipped where it reads its very largest or smallest value for 0.1 s and longer
+    A channel is clipped if it reads its very largest or smallest value for 0.1 s and longer
     while the input moves by more than a tenth of its range: no noisy signal does that. Nor does one
     stand there so long at inputs that far apart, a machine at its stop included; but one without
     noise does, and one that reads it at a run's first sample is at rest. Positions are passed over,

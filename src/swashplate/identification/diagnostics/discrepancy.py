@@ -268,7 +268,7 @@ def window_weights(record: ChannelErrors, window: float) -> Array:
 
 
 def windowed(values: Array, weights: Array) -> Array:
-    """(n,) weighted sums about each of (n,) samples, NaN where a part of the window is missing."""
+    """(n,) weighted sums about each of (n,) samples, NaN if a part of the window is missing."""
     half = weights.size // 2
     sums = np.full(values.size, np.nan)
     if values.size > weights.size:

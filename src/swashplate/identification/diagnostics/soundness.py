@@ -273,11 +273,13 @@ def _sentence(
     return f"{fault}. Is it a log of this axis and this command? If not, {ignored}."
 
 
-def _follows(record: ChannelErrors, measured: Array, other: ChannelErrors, least: float) -> bool:
+def _follows(
+    record: ChannelErrors, measured: Array, other_record: ChannelErrors, least: float
+) -> bool:
     """Whether a run moves as another run of another maneuver is simulated."""
-    if other.maneuver == record.maneuver or abs(other.step - record.step) > 1e-9:
+    if other_record.maneuver == record.maneuver or abs(other_record.step - record.step) > 1e-9:
         return False
-    _, simulated = _motion(other)
+    _, simulated = _motion(other_record)
     size = min(simulated.size, measured.size)
     if size < 0.5 * max(simulated.size, measured.size):
         return False

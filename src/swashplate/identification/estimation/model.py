@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.campaign import Edge, Experiment
-from swashplate.equations import BoundModel, instance_of, made, parameter_paths, state_paths
+from swashplate.equations import BoundModel, instance_of, parameter_paths, state_paths, tuple_from
 from swashplate.equations import Model as Equations
 from swashplate.equations.marching import (
     Observation,
@@ -314,7 +314,7 @@ class UserModel(Result, EquationModel):
 
     model: Equations
     rate: float | None = None
-    """Samples a second; by default the input's. Needed where its stamps are not even. [Hz]"""
+    """Samples a second; by default the input's. Needed if its stamps are not even. [Hz]"""
     options: Any = None
     given: Any = None
     """The model's givens, or a mapping of them by the experiments' names."""
@@ -399,7 +399,9 @@ class UserModel(Result, EquationModel):
                     f"{model.name} has no state '{path}' to begin at; it has {', '.join(states)}."
                 )
         try:
-            p = made(model.parameters, {name: values[name] for name in values if name in paths})
+            p = tuple_from(
+                model.parameters, {name: values[name] for name in values if name in paths}
+            )
         except KeyError as error:
             raise InputError(
                 f"{model.name} has no value of {error.args[0]}: let it be free, or fix it."

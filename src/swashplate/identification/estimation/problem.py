@@ -284,7 +284,7 @@ class Problem(Result):
         return Evaluation(np.concatenate(values), np.vstack(by))
 
     def _factored(self, vector: Array, number: int) -> RunRows:
-        """[J r] of one experiment where the march cannot make its triangular factor."""
+        """[J r] of one experiment if the march cannot make its triangular factor."""
         residuals, jacobian = self._full(vector, number)
         factor = triangular_factor(np.column_stack([jacobian, residuals]))
         return self._block(number, factor)
@@ -344,7 +344,7 @@ class Problem(Result):
 
 
 def _factors(weight: Array, scale: float) -> Array:
-    """(m,) factors on residuals; where all are alike, an array that takes no memory."""
+    """(m,) factors on residuals; if all are equal, an array that takes no memory."""
     if weight.size and weight.min() == weight.max():
         return np.broadcast_to(np.sqrt(weight[0]) / scale, weight.shape)
     return np.sqrt(weight) / scale
@@ -414,7 +414,7 @@ class LinearisedRun(NamedTuple):
     residual: Array
     """(n,) weighted: w times (simulated less measured)."""
     weight: Array | None = None
-    """(n,) the factors w; None where all are alike. Samples of factor 0 are dropped."""
+    """(n,) the factors w; None if all are equal. Samples of factor 0 are dropped."""
 
     @property
     def unweighted(self) -> Array:

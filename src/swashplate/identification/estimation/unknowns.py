@@ -270,7 +270,7 @@ class Unknowns(Result):
 
     @cached_property
     def at_bound(self) -> NDArray[np.int8]:
-        """(K,) -1 where the point is at the lower bound, 1 at the upper, 0 between."""
+        """(K,) -1 if the point is at the lower bound, 1 at the upper, 0 between."""
         low, high = self.bounds
         near = AT_BOUND * (high - low)
         return np.where(self.vector <= low + near, -1, self.vector >= high - near).astype(np.int8)
@@ -305,7 +305,7 @@ class Unknowns(Result):
         return np.where(self.logarithmic, powers, vector * self.scales)
 
     def to_vector(self, values: Array) -> Array:
-        """(..., K) vectors of values, positive where logarithmic."""
+        """(..., K) vectors of values, positive if logarithmic."""
         logarithms = np.log(np.where(self.logarithmic, values, 1.0))
         return np.where(self.logarithmic, logarithms, values / self.scales)
 

@@ -225,7 +225,7 @@ class Sensor(NamedTuple):
 
 
 def default_sensors(drive: Drive) -> tuple[Sensor, ...]:
-    """Those of Kruse's tests: an ammeter around both leads and, where known, its encoder.
+    """Those of Kruse's tests: an ammeter around both leads and, if known, its encoder.
 
     Of the others noise is assumed, 0.5 % of what full command makes them read.
     """
@@ -244,7 +244,7 @@ def default_sensors(drive: Drive) -> tuple[Sensor, ...]:
 
 @dataclass(frozen=True, eq=False)
 class PriorInformation(Result):
-    """A drive, what is to be found of it, and what is known so far: where candidates are tried."""
+    """A drive, what is to be found of it, and what is known so far; candidates are tried with it."""
 
     parameters: ParameterSet
     stage: Stage

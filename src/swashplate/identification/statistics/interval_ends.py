@@ -285,7 +285,7 @@ def checked_ends(
 def _unneeded(problem: Problem, vector: Array, index: int, cost: float, rise: float) -> bool:
     """Whether a fit with a limit out of the way is as good.
 
-    It is given up where a first linear step leaves far too much. Then it is followed for a few
+    It is given up if a first linear step leaves far too much. Then it is followed for a few
     evaluations at a time, until the cost falls so slowly that the tries left would not do.
     """
     start, minimise = vector.copy(), minimiser(problem, tolerance=1e-6, max_evaluations=LOOK)

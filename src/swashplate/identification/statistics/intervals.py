@@ -82,13 +82,13 @@ class Estimate(Result):
     """What is known of its error, or what computes it."""
 
     @cached_property
-    def _known(self) -> Interval:
+    def _interval(self) -> Interval:
         return self.source if isinstance(self.source, Interval) else self.source()
 
     @property
     def status(self) -> Status:
         """How it came about, or what its interval lacks."""
-        return self._known.status
+        return self._interval.status
 
     @property
     def standard_error(self) -> float | None:
@@ -96,7 +96,7 @@ class Estimate(Result):
 
         That of a logarithmic unknown is the value times the logarithm's.
         """
-        return self._known.standard_error
+        return self._interval.standard_error
 
     @property
     def lower(self) -> float | None:
@@ -104,12 +104,12 @@ class Estimate(Result):
 
         The interval of a logarithmic unknown is asymmetric about the value.
         """
-        return self._known.lower
+        return self._interval.lower
 
     @property
     def upper(self) -> float | None:
         """Upper end of the 95 % interval, in `unit`; None if there is no end."""
-        return self._known.upper
+        return self._interval.upper
 
     @property
     def interval(self) -> tuple[float | None, float | None]:
@@ -120,7 +120,7 @@ class Estimate(Result):
         if not isinstance(other, Estimate):
             return NotImplemented
         same = (self.name, self.value, self.unit) == (other.name, other.value, other.unit)
-        return same and self._known == other._known
+        return same and self._interval == other._interval
 
     def __hash__(self) -> int:
         return hash((self.name, self.value, self.unit))
