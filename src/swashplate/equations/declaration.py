@@ -151,7 +151,7 @@ _uncompiled: dict[tuple[Any, ...], Any] = {}
 
 
 def interpreted(function: Any, replacements: Replacements = NO_REPLACEMENTS) -> Any:
-    """A function and all that it calls as plain Python, for a single call, if compiling would take longer."""
+    """A function and all that it calls as plain Python, if compiling would take longer."""
     function, replacements = standing(function, replacements)
     python_function = plain(function)
     if not isinstance(python_function, FunctionType):

@@ -175,13 +175,11 @@ def content_of(
                 stacklevel=3,
             )
         check_filter_stability(what.parameters, step)
-        exported, instance = exported_drive(what), drive_instance(what.parameters, by_voltage=True)
-        name, title, references, descriptions = (
-            what.name,
-            what.parameters.title,
-            DRIVE,
-            DRIVE_DESCRIPTIONS,
-        )
+        exported = exported_drive(what)
+        instance = drive_instance(what.parameters, by_voltage=True)
+        title = what.parameters.title
+        references = DRIVE
+        descriptions = DRIVE_DESCRIPTIONS
     else:
         if not isinstance(what, Model):
             raise InputTypeError(
@@ -189,11 +187,22 @@ def content_of(
                 f"{_nearest(what)}."
             )
         instance = instance_of(what, parameters, options=options, given=given)
-        exported, name, title = Exported(what, prefix), what.name, f"Model {what.name}"
-        references, descriptions = OWN, descriptions_of(exported)
+        exported = Exported(what, prefix)
+        title = f"Model {what.name}"
+        references = OWN
+        descriptions = descriptions_of(exported)
     values = numbers(exported, instance, step)
     packaged = isinstance(what, Drive) and not what.parameters.equations
-    return Content(exported, instance, values, name, title, packaged, references, descriptions)
+    return Content(
+        exported=exported,
+        instance=instance,
+        values=values,
+        name=what.name,
+        title=title,
+        packaged=packaged,
+        references=references,
+        descriptions=descriptions,
+    )
 
 
 def _nearest(what: object) -> str:

@@ -66,9 +66,10 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 OTHERS = 6
-"""Starts in addition to the nominal one if that ends far from what was measured: of 419 sound campaigns
-of slew eleven did, and in ten of them one of these starts reached the best. That some agree says
-nothing: in one campaign the nominal start and the first three ended in the same wrong optimum."""
+"""Starts in addition to the nominal one if that ends far from what was measured: of 419 sound
+campaigns of slew eleven did, and in ten of them one of these starts reached the best. That some
+agree says nothing: in one campaign the nominal start and the first three ended in the same wrong
+optimum."""
 ROUGH = 1e-4
 """Tolerance of these starts, of which the best goes on: optima differ by factors. Where the model
 lacks an effect, so that no start can help, six starts take 235 evaluations instead of 929."""

@@ -21,7 +21,7 @@ from swashplate.results import Result
 Array = NDArray[np.float64]
 
 
-LEVEL = 0.95
+CONFIDENCE_LEVEL = 0.95
 """Probability of the intervals."""
 
 
@@ -48,7 +48,7 @@ class Covariance(Result):
         """(K,) half widths of the intervals in standard errors, Student's."""
         from scipy.special import stdtrit  # of scipy.stats, without its second to load
 
-        return np.asarray(stdtrit(self.degrees_of_freedom, 0.5 + 0.5 * LEVEL))
+        return np.asarray(stdtrit(self.degrees_of_freedom, 0.5 + 0.5 * CONFIDENCE_LEVEL))
 
     @property
     def correlation(self) -> Array:

@@ -42,7 +42,7 @@ class Fold(Result):
     held: tuple[str, ...]
     """Names of the runs that were held out."""
     lost: tuple[str, ...] = ()
-    """Unknowns on which no run left in the fold depends: their values after its fit are arbitrary."""
+    """Unknowns on which no run left in the fold depends: its fit leaves their values arbitrary."""
     measures: Mapping[str, Measures] = field(default_factory=dict)
     """Measures of each channel over the runs that were held out."""
     converged: bool = False

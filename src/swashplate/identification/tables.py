@@ -14,7 +14,7 @@ from swashplate.identification.estimation.drive_model import DriveModel, true_va
 from swashplate.identification.estimation.model_setup import ModelSetup
 from swashplate.identification.estimation.stages import Parameters
 from swashplate.identification.estimation.unknowns import Kind, Unknown
-from swashplate.identification.noise import LEVEL
+from swashplate.identification.noise import CONFIDENCE_LEVEL
 from swashplate.identification.stage_fit import Interval, StageFit, Status
 from swashplate.identification.statistics.determination import (
     GAUGES,
@@ -63,7 +63,7 @@ def estimates_table(
     unknowns = stage.problem.unknowns
     # in terminal, page and file, or nowhere
     truth_shown_in = "" if truth is None else "tpf"
-    ends = f"{100.0 * LEVEL:g} %"
+    ends = f"{100.0 * CONFIDENCE_LEVEL:g} %"
     table = Table(
         f"Stage {stage.stage.name}",
         (
@@ -132,7 +132,7 @@ def _half_width(value: float, low: float | None, high: float | None) -> str:
 def profiles_table(profiles: Sequence[Profile], stages: Sequence[StageFit]) -> Table:
     """Ends of the intervals of profile likelihoods; none if the cost does not rise enough."""
     stage_of = {stage.stage.name: stage for stage in stages}
-    ends = f"{100.0 * LEVEL:g} %"
+    ends = f"{100.0 * CONFIDENCE_LEVEL:g} %"
     table = Table(
         "Profile likelihoods, of the noise alone",
         (

@@ -86,11 +86,14 @@ class InitialStates(NamedTuple):
 
 
 class TapDelays(NamedTuple):
-    """Where all taps read, an element each; see `TapDelay`."""
+    """Where the taps read, as one array for each field of `TapDelay`, an element for each tap."""
 
     samples: NDArray[np.int64]
+    """Whole samples of the delay."""
     fraction: Array
+    """Rest of the delay, in samples."""
     slope: Array
+    """Derivative of the fraction by the delay. [1/s]"""
 
 
 @dataclass(frozen=True)
@@ -137,12 +140,15 @@ class Instance:
 
     def _tap_delays(self, signals: tuple[str, ...], h: float) -> TapDelays:
         delays = []
-        for tap in taps_of(self.model, signals):
-            name = tap.tap.delay
-            delay = float(value_at(self.parts[tap.part].p, name)) if name else 0.0
+        for tapped in taps_of(self.model, signals):
+            name = tapped.tap.delay
+            delay = 0.0
+            if name:
+                parameters = self.parts[tapped.part].p
+                delay = float(value_at(parameters, name))
             if not 0.0 <= delay < math.inf:
                 raise InputError(f"{self.name}: {name} is {delay:g} s, but a delay is at least 0.")
-            delays.append(tap_delay(tap.tap, delay, h))
+            delays.append(tap_delay(tapped.tap, delay, h))
         return TapDelays(
             samples=np.array([delay.samples for delay in delays], dtype=np.int64),
             fraction=np.array([delay.fraction for delay in delays], dtype=np.float64),

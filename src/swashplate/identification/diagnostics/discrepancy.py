@@ -44,7 +44,7 @@ COMMANDED = 0.01
 OWN = 0.01
 """Of 1 less leverage: directions that one maneuver alone determines stay fitted, as one step says
 little of where they would be without it."""
-LEVEL = 0.9
+BOUND_LEVEL = 0.9
 """Probability with which the error of a new maneuver lies below the stated one."""
 USUAL_SPREAD, WORTH = 1.3, 20.0
 """Standard deviation of the logarithm of a maneuver's squared error over the variance function, and
@@ -521,7 +521,7 @@ def bound_of_variance(cells: Sequence[WindowCell]) -> Array:
         maneuvers[cell.maneuver].append(cell)
     ratios = np.array([log_ratio(of_maneuver, coefficients) for of_maneuver in maneuvers.values()])
     deviation, freedom = spread_of(ratios)
-    bound = float(stdtrit(freedom, LEVEL)) * deviation * np.sqrt(1.0 + 1.0 / ratios.size)
+    bound = float(stdtrit(freedom, BOUND_LEVEL)) * deviation * np.sqrt(1.0 + 1.0 / ratios.size)
     return coefficients * float(np.exp(ratios.mean() + bound))
 
 

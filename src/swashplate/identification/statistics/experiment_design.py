@@ -244,7 +244,7 @@ def default_sensors(drive: Drive) -> tuple[Sensor, ...]:
 
 @dataclass(frozen=True, eq=False)
 class PriorInformation(Result):
-    """A drive, what is to be found of it, and what is known so far; candidates are tried with it."""
+    """A drive, what is to be found of it, and what is known before the next test."""
 
     parameters: ParameterSet
     stage: Stage
