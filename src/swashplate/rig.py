@@ -59,8 +59,8 @@ HELD_BACK = {
 COLUMNS: Mapping[str, str] = {"rectified_current": "current", "encoder_counts": "counts"}
 """Columns that are not called as the kind of their channel."""
 DRIVE_FILE = "drive.toml"
-"""Parameters of the drive that was simulated, beside truth.toml; or, beside campaign.toml, those of
-the one that a fit starts from."""
+"""Next to truth.toml the parameters of the drive that was simulated; next to campaign.toml those of
+the drive that a fit starts from."""
 
 
 @dataclass(frozen=True)
@@ -155,7 +155,7 @@ SEVERITIES: Mapping[Severity, Instruments] = MappingProxyType({
 clean: the model's own numbers at k/512 s, in which a fit finds the parameters to any digit.
 realistic: noise of mean zero and nothing systematic, so that a fit of the right model is unbiased
 and its confidence intervals can be compared with the truth; jitter as of a clock in hardware never
-lets a sample beside a step pass the card's dead zone. harsh: zero and gain errors, jitter that
+lets a sample next to a step pass the card's dead zone. harsh: zero and gain errors, jitter that
 moves steps by a part of a sample, gaps and a counter that rolls over.
 """
 
@@ -225,7 +225,7 @@ def run(
     maneuvers : mapping or sequence of Maneuver, optional
         By default Kruse's tests of the axis.
     seed : int
-        Not negative. The same seed gives the same logs, each of them whatever runs beside it.
+        Not negative. The same seed gives the same logs, each of them whatever other runs there are.
     severity : {"clean", "realistic", "harsh"}
         How bad the instruments are, see `SEVERITIES`.
     instruments : Instruments, optional
@@ -233,7 +233,7 @@ def run(
     truth : Drive, optional
         What is simulated instead of `drive`, with refinements for example.
     perturb : float
-        Multiply every value of what is simulated by a factor drawn by chance, whose logarithm is
+        Multiply every value of what is simulated by a random factor, whose logarithm is
         at most this, 0.5 at most, and has half of it as standard deviation. Zeros, infinite limits
         and parameters without effect stay. [1]
     axis : {"hoist", "slew", "luff"}, optional
@@ -308,7 +308,7 @@ def run(
         largest = float(np.abs(command).max())
         if largest > FULL_SCALE:
             raise InputError(f"The command reaches {largest:g} V, but the card takes ±10 V.")
-        simulation = simulated.simulate(_converted(command, instruments_used.command_bits))
+        simulation = simulated.simulate(_quantised(command, instruments_used.command_bits))
         runs[name] = VirtualRun(
             name=name,
             stem=stem,
@@ -352,7 +352,7 @@ def _check_tests(
 
 
 def _perturbed(drive: Drive, spread: float, seed: int) -> Drive:
-    """A drive whose every value is multiplied by chance, within a spread of the logarithm."""
+    """A drive with each value times a random factor, within a spread of the logarithm."""
     if not 0.0 < spread <= 0.5:
         raise InputError(f"perturb must be above 0 and at most 0.5, not {spread:g}.")
     numbers = drive.parameters.numbers
@@ -397,34 +397,34 @@ def _stream(seed: int, *names: str) -> Generator:
 def _logged(
     truth: Simulation,
     kinds: tuple[ChannelKind, ...],
-    tools: Instruments,
+    instruments: Instruments,
     counts_per_turn: float,
     seed: int,
     name: str,
 ) -> dict[str, Array]:
-    """Columns of a run's log; each instrument has its own stream of chance."""
+    """Columns of a run's log; each instrument has its own random generator."""
     size = truth.time.size
-    sampled_at = _sampling_instants(truth.time, tools, _stream(seed, name, "time"))
-    readings = _Readings(truth, sampled_at, tools, counts_per_turn)
+    sampled_at = _sampling_instants(truth.time, instruments, _stream(seed, name, "time"))
+    readings = _Readings(truth, sampled_at, instruments, counts_per_turn)
     columns = {"voltage": readings.voltage(_stream(seed, name, "voltage"))}
     for kind in kinds:
         columns[COLUMNS.get(kind, kind)] = readings.channel(kind, _stream(seed, name, kind))
-    if tools.empty_cells:
+    if instruments.empty_cells:
         for column, values in columns.items():
-            chance = _stream(seed, name, "empty", column)
-            gaps = _lost_samples(size, tools.empty_cells, tools.longest_gap, chance)
+            generator = _stream(seed, name, "empty", column)
+            gaps = _lost_samples(size, instruments.empty_cells, instruments.longest_gap, generator)
             columns[column] = np.where(gaps, np.nan, values)
-    chance = _stream(seed, name, "rows")
-    is_logged = ~_lost_samples(size, tools.lost_rows, tools.longest_loss, chance)
+    generator = _stream(seed, name, "rows")
+    is_logged = ~_lost_samples(size, instruments.lost_rows, instruments.longest_loss, generator)
     if not is_logged.any():
         raise InputError(f"{name}: lost_rows leaves no row; use a smaller share.")
-    columns = {"time": _rounded_to_steps(sampled_at, tools.stamp_resolution), **columns}
+    columns = {"time": _rounded_to_steps(sampled_at, instruments.stamp_resolution), **columns}
     return {column: values[is_logged] for column, values in columns.items()}
 
 
-def _sampling_instants(time: Array, tools: Instruments, chance: Generator) -> Array:
+def _sampling_instants(time: Array, instruments: Instruments, generator: Generator) -> Array:
     """Jittered instants (n,) of the samples, in order whatever the jitter. [s]"""
-    jitter = tools.jitter * chance.standard_normal(time.size)
+    jitter = instruments.jitter * generator.standard_normal(time.size)
     step = time[1] - time[0] if time.size > 1 else 0.0
     bound = 0.4 * step
     jittered = time + np.clip(jitter, -bound, bound)
@@ -438,42 +438,44 @@ class _Readings:
     truth: Simulation
     sampled_at: Array
     """[s]"""
-    tools: Instruments
+    instruments: Instruments
     counts_per_turn: float
 
-    def voltage(self, chance: Generator) -> Array:
+    def voltage(self, generator: Generator) -> Array:
         """The command, with zero error, noise and the steps of its converter. [V]"""
-        noise = chance.standard_normal(self.sampled_at.size)
+        noise = generator.standard_normal(self.sampled_at.size)
         values = self._sampled("voltage")
-        values = values + self.tools.voltage_offset + self.tools.voltage_noise * noise
-        return _converted(values, self.tools.voltage_bits)
+        values = values + self.instruments.voltage_offset + self.instruments.voltage_noise * noise
+        return _quantised(values, self.instruments.voltage_bits)
 
-    def channel(self, kind: ChannelKind, chance: Generator) -> Array:
+    def channel(self, kind: ChannelKind, generator: Generator) -> Array:
         """Reading of the instrument of a kind of channel, in the unit of its log."""
         if kind == "rectified_current":
             currents = self._sampled("current_positive"), self._sampled("current_negative")
-            return _ammeter(self.sampled_at, currents, self.tools, chance)
+            return _ammeter(self.sampled_at, currents, self.instruments, generator)
         values = self._sampled(SIGNALS[kind])
         if kind == "encoder_counts":
-            return _counter(values * (self.counts_per_turn / (2.0 * pi)), self.tools, chance)
-        noise = chance.standard_normal(self.sampled_at.size)
-        return np.asarray(values + self.tools.transducer_noise * np.abs(values).max() * noise)
+            return _counter(
+                values * (self.counts_per_turn / (2.0 * pi)), self.instruments, generator
+            )
+        noise = generator.standard_normal(self.sampled_at.size)
+        return np.asarray(values + self.instruments.transducer_noise * np.abs(values).max() * noise)
 
     def _sampled(self, signal: str) -> Array:
         """A signal at the sampling instants, on straight lines between the simulation's own."""
         values: Array = getattr(self.truth, signal)
-        if signal == "shaft_position" and self.tools.backlash:
-            values = _play(values, self.tools.backlash)
-        if not self.tools.jitter:
+        if signal == "shaft_position" and self.instruments.backlash:
+            values = _play(values, self.instruments.backlash)
+        if not self.instruments.jitter:
             return values
         return np.interp(self.sampled_at, self.truth.time, values)
 
 
-def _lost_samples(size: int, share: float, longest: int, chance: Generator) -> NDArray[np.bool_]:
+def _lost_samples(size: int, share: float, longest: int, generator: Generator) -> NDArray[np.bool_]:
     """Which samples are lost: runs of 1 to `longest`, together about a share of all."""
     mask = np.zeros(size, dtype=np.bool_)
-    begins = np.flatnonzero(chance.random(size) < share / (0.5 * (1 + longest)))
-    lengths = chance.integers(1, longest, size=begins.size, endpoint=True)
+    begins = np.flatnonzero(generator.random(size) < share / (0.5 * (1 + longest)))
+    lengths = generator.integers(1, longest, size=begins.size, endpoint=True)
     for begin, length in zip(begins.tolist(), lengths.tolist(), strict=True):
         mask[begin : begin + length] = True
     return mask
@@ -490,72 +492,83 @@ def _rounded_to_steps(values: Array, step: float) -> Array:
     return np.asarray(np.rint(values / step) * step + 0.0)
 
 
-def _converted(voltage: Array, bits: int) -> Array:
-    """Codes of b bits over ±10 V: whole multiples of 20/2ᵇ V, up to one below 10 V. [V]"""
+def _quantised(voltage: Array, bits: int) -> Array:
+    """Voltage as a converter of b bits over ±10 V gives it, unchanged if `bits` is 0. [V]
+
+    Whole multiples of 20/2ᵇ V, from -10 V to one multiple below 10 V.
+    """
     if not bits:
         return voltage
-    half = 2.0 ** (bits - 1)
-    codes = np.clip(np.rint(voltage / FULL_SCALE * half), -half, half - 1.0)
+    full_scale_code = 2.0 ** (bits - 1)
+    codes = np.rint(voltage / FULL_SCALE * full_scale_code)
+    codes = np.clip(codes, -full_scale_code, full_scale_code - 1.0)
     # 0.0 turns -0.0 into 0.0, which reads better in a log
-    return np.asarray(codes * (FULL_SCALE / half) + 0.0)
+    return np.asarray(codes * (FULL_SCALE / full_scale_code) + 0.0)
 
 
 def _ammeter(
-    instants: Array, currents: tuple[Array, Array], tools: Instruments, chance: Generator
+    instants: Array, currents: tuple[Array, Array], instruments: Instruments, generator: Generator
 ) -> Array:
-    """The ammeter around both leads, from their currents (m,), magnitudes, at instants (m,). [A]
+    """Readings (m,) of the ammeter around both leads, at instants (m,) [s]. [A]
 
-    The reading is (1 + gain error) (|I₊ + ripple| + |I₋ + ripple|) + zero error + noise. Pulses of
-    the length D T, D = I / I_full, raise the current of an inductive coil along a straight line and
-    let it fall along another: a triangle of mean zero whose height goes with D (1 − D). It has all
-    multiples of the frequency; at 512 Hz the fifth of 100 Hz shows at 12 Hz.
+    `currents` are the magnitudes (m,) of the mean currents I₊ and I₋ of both coils. The reading is
+    (1 + gain error) (|I₊ + ripple| + |I₋ + ripple|) + zero error + noise.
+
+    The ripple is that of dither. In each period T, a pulse of the length D T, D = I / I_full, lets
+    the current of an inductive coil rise along a straight line; then it falls along another. The
+    ripple is a triangle of mean zero whose height is proportional to D (1 − D). Its spectrum has
+    all multiples of the dither's frequency; sampled at 512 Hz, the fifth of 100 Hz shows at 12 Hz.
     """
-    passed = np.mod(tools.dither_frequency * instants + float(chance.random()), 1.0)
+    phase = np.mod(instruments.dither_frequency * instants + float(generator.random()), 1.0)
     reading = np.zeros(instants.size)
-    for mean in currents:
-        duty = np.clip(mean / FULL_CURRENT, 0.0, 1.0)
-        rising = 2.0 * passed / np.maximum(duty, 1e-9) - 1.0
-        falling = 1.0 - 2.0 * (passed - duty) / np.maximum(1.0 - duty, 1e-9)
-        height = 4.0 * tools.dither * duty * (1.0 - duty)
-        reading += np.abs(mean + height * np.where(passed < duty, rising, falling))
-    noise = tools.current_noise * chance.standard_normal(instants.size)
-    reading = (1.0 + tools.current_gain_error) * reading + tools.current_zero + noise
-    return _rounded_to_steps(reading, tools.current_resolution)
+    for mean_current in currents:
+        # duty and phase are in periods; both lines run from -1 to 1 or back
+        duty = np.clip(mean_current / FULL_CURRENT, 0.0, 1.0)
+        rising = 2.0 * phase / np.maximum(duty, 1e-9) - 1.0
+        falling = 1.0 - 2.0 * (phase - duty) / np.maximum(1.0 - duty, 1e-9)
+        height = 4.0 * instruments.dither * duty * (1.0 - duty)
+        ripple = height * np.where(phase < duty, rising, falling)
+        reading += np.abs(mean_current + ripple)
+    noise = instruments.current_noise * generator.standard_normal(instants.size)
+    reading = (1.0 + instruments.current_gain_error) * reading + instruments.current_zero + noise
+    return _rounded_to_steps(reading, instruments.current_resolution)
 
 
-def _counter(counts: Array, tools: Instruments, chance: Generator) -> Array:
+def _counter(counts: Array, instruments: Instruments, generator: Generator) -> Array:
     """The encoder's counter, 0 at the first sample, from positions (n,). [count]
 
-    It shows how many edges were passed. Where between two edges the shaft stands at first is
-    chance, so that on average the steps are no error. A counter of b bits counts from −2ᵇ⁻¹ to
+    It shows how many edges were passed. The shaft's first position between two edges is
+    random, so that on average the steps are not an error. A counter of b bits counts from −2ᵇ⁻¹ to
     2ᵇ⁻¹ − 1 and wraps.
     """
-    first = float(chance.random())
-    if tools.encoder_step:
-        step = float(tools.encoder_step)
+    first = float(generator.random())
+    if instruments.encoder_step:
+        step = float(instruments.encoder_step)
         counts = step * (np.floor(counts / step + first) - np.floor(counts[:1] / step + first))
-    if tools.counter_bits:
-        half = 2.0 ** (tools.counter_bits - 1)
+    if instruments.counter_bits:
+        half = 2.0 ** (instruments.counter_bits - 1)
         counts = np.mod(counts + half, 2.0 * half) - half
     return np.asarray(counts)
 
 
 def _play(position: Array, width: float) -> Array:
-    """Position (n,) behind a gear with backlash of a width: the play operator. [rad]
+    """Position (n,) downstream of a gear with backlash of a width: the play operator. [rad]
 
     yₙ = max(xₙ − b/2, min(xₙ + b/2, yₙ₋₁)), in the middle of the gap at first.
     """
-    behind, driven = float(position[0]), np.empty_like(position)
+    last_output = float(position[0])
+    output = np.empty_like(position)
     for n, x in enumerate(position):
-        behind = driven[n] = max(x - 0.5 * width, min(x + 0.5 * width, behind))
-    return driven
+        last_output = max(x - 0.5 * width, min(x + 0.5 * width, last_output))
+        output[n] = last_output
+    return output
 
 
 # --- files ----------------------------------------------------------------------------------------
 
 
 def write(tests: VirtualTests, folder: str | Path, *, overwrite: bool = False) -> Path:
-    """Files that a campaign leaves, and the truth beside them.
+    """Files that a campaign leaves, and the truth next to them.
 
     Parameters
     ----------
@@ -632,9 +645,12 @@ def _contents(tests: VirtualTests) -> tuple[str, str]:
     """TOML of the campaign file, and of the truth: instruments, seed and versions."""
     from tomlkit import dumps
 
-    tools, drop = tests.instruments, {"missing": "drop"} if tests.instruments.empty_cells else {}
+    instruments, drop = (
+        tests.instruments,
+        {"missing": "drop"} if tests.instruments.empty_cells else {},
+    )
     entries: dict[str, Any] = {"kind": "voltage", "column": "voltage", "unit": "V", **drop}
-    entries["accuracy"] = _accuracy("voltage", tools)
+    entries["accuracy"] = _accuracy("voltage", instruments)
     axis: dict[str, Any] = {"drive": tests.preset or DRIVE_FILE}
     axis |= {"time": {"column": "time", "unit": "s"}, "start": "rest", "input": entries}
     channels = axis["channels"] = dict[str, dict[str, object]]()
@@ -643,30 +659,33 @@ def _contents(tests: VirtualTests) -> tuple[str, str]:
         entry = channels[column] = {"kind": kind, "column": column, **drop}
         if kind != "encoder_counts":
             entry["unit"] = KINDS[kind].units[0]
-            entry["accuracy"] = _accuracy(kind, tools)
+            entry["accuracy"] = _accuracy(kind, instruments)
             continue
         entry["counts_per_turn"] = tests.counts_per_turn
-        if tools.counter_bits:
-            entry["rolls_over_at"] = 2**tools.counter_bits
+        if instruments.counter_bits:
+            entry["rolls_over_at"] = 2**instruments.counter_bits
     runs = [{"file": f"{run.stem}.csv", "role": run.role} for run in tests.runs.values()]
     content = {"title": f"Virtual tests, {tests.axis}", "virtual": True}
     truth = {"virtual": True, "axis": tests.axis, "drive": DRIVE_FILE}
     truth |= {key: getattr(tests, key) for key in ("severity", "seed", "counts_per_turn")}
-    truth |= {"runs": list(tests.runs), "instruments": asdict(tools)}
+    truth |= {"runs": list(tests.runs), "instruments": asdict(instruments)}
     versions = {package: version(package) for package in ("numpy", "numba")}
     truth["versions"] = {"swashplate": __version__, "python": python_version(), **versions}
     return dumps(content | {"axes": {tests.axis: axis}, "runs": runs}), dumps(truth)
 
 
-def _accuracy(kind: ChannelKind | Literal["voltage"], tools: Instruments) -> InlineTable:
+def _accuracy(kind: ChannelKind | Literal["voltage"], instruments: Instruments) -> InlineTable:
     """Accuracy of an instrument for the campaign file, which the rig knows."""
     from tomlkit import inline_table
 
     limits = {"gain": 0.0, "zero": 0.0, "time": 0.0}
     if kind == "voltage":
-        limits["zero"] = abs(tools.voltage_offset)
+        limits["zero"] = abs(instruments.voltage_offset)
     elif kind == "rectified_current":
-        limits["gain"], limits["zero"] = abs(tools.current_gain_error), abs(tools.current_zero)
+        limits["gain"], limits["zero"] = (
+            abs(instruments.current_gain_error),
+            abs(instruments.current_zero),
+        )
     table = inline_table()
     table.update(limits)
     return table

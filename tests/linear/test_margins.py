@@ -167,7 +167,7 @@ def test_a_dead_zone() -> None:
     part = np.minimum(1.0 / amplitudes, 1.0)
     expected = 1.0 - 2.0 / np.pi * (np.arcsin(part) + part * np.sqrt(1.0 - part**2))
     np.testing.assert_allclose(swept.gain[:, 0], expected, atol=1e-4)
-    assert swept.moves[:, 0].tolist() == [False, True, True, True]
+    assert swept.has_motion[:, 0].tolist() == [False, True, True, True]
     assert np.isnan(swept.phase[0, 0])
     # half a millivolt's worth of the lag, and two steps of the card
     np.testing.assert_allclose(swept.phase[1:, 0], np.angle(lagging(0.01)), atol=1e-3)
@@ -203,7 +203,7 @@ def test_the_table_and_its_parts(hoist: Drive, tmp_path) -> None:
     swept = hoist.frequency_response([0.1, 0.3, 8.0], [0.25, 4.0])
     table = swept.to_polars()
     assert table.height == 6
-    assert table["phase"].null_count() == int((~swept.moves).sum()) > 0
+    assert table["phase"].null_count() == int((~swept.has_motion).sum()) > 0
     assert table["amplitude"].to_list() == [0.25] * 3 + [4.0] * 3
     assert table["gain"].to_list()[4] == swept.gain[1, 1]
     swept.write(tmp_path / "bode.csv")

@@ -325,12 +325,14 @@ def test_lines_of_a_sweep_are_the_response(made: dict[str, Figure], hoist: Drive
     assert labels(figure) == ["gain ((deg/s)/V)", "phase (deg)", "distortion (%)"]
     swept = hoist.frequency_response(np.geomspace(0.05, 5.0, 12), [1.0, 9.0])
     for row in range(2):
-        there = swept.moves[row]
+        there = swept.has_motion[row]
         expected = DEGREE * swept.gain[row]
         np.testing.assert_allclose(lines(figure, 0)[row][there], expected[there])
     assert legend(figure) == ["1 V", "9 V", "small motions about 4 V"]
-    assert not swept.moves.all()
-    assert "\n".join(swept.still()) in [text.get_text() for text in figure.axes[0].texts]
+    assert not swept.has_motion.all()
+    assert "\n".join(swept.sentences_on_no_motion()) in [
+        text.get_text() for text in figure.axes[0].texts
+    ]
     by_current = hoist.linearize(current=0.5)
     with pytest.raises(InputError, match="voltage to shaft_speed"):
         figures.plot_bode(swept, linear=by_current)

@@ -9,12 +9,12 @@ import pytest
 import sympy as sp
 
 from swashplate import Drive, PhysicalSet
-from swashplate.equations import interpreted, made
+from swashplate.equations import interpreted, tuple_from
 from swashplate.models import displacement_control, machine, pump, refinements
 from swashplate.models.displacement_control import Pump
 from swashplate.models.machine import Machine
 
-PUMP = made(Pump, Drive.preset("hoist").parameters.numbers)
+PUMP = tuple_from(Pump, Drive.preset("hoist").parameters.numbers)
 MACHINE = Machine(**PhysicalSet.preset("hoist").numbers)
 PUMPING = MACHINE.pumping_area * MACHINE.pumping_arm
 OPEN = dict.fromkeys(("spool_stroke", "orifice_opening_plus", "orifice_opening_minus"), inf)

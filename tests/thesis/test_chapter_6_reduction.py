@@ -9,7 +9,7 @@ import pint
 import pytest
 
 from swashplate import Drive, maneuvers
-from swashplate.equations import derive, interpreted, made
+from swashplate.equations import derive, interpreted, tuple_from
 from swashplate.full_order import QUANTITIES, FullOrderDrive, PhysicalSet
 from swashplate.models import displacement_control as control
 from swashplate.models import machine
@@ -101,7 +101,7 @@ def test_erratum_15_eq_6_65_the_valve_feeds_the_leak_at_rest() -> None:
 def test_erratum_01_eq_6_61_on_the_signed_current() -> None:
     """Printed, the force of every current below Z17 is none, that of the other solenoid too."""
     plus, minus = (12.0, 0.3, 0.2, 0.0), (10.0, 3.7, 1.7, -54.0)
-    p = made(Pump, Drive.preset("hoist").parameters.numbers)._replace(
+    p = tuple_from(Pump, Drive.preset("hoist").parameters.numbers)._replace(
         Z17=0.27,
         **{f"Z{n}_plus": each for n, each in enumerate(plus, 19)},
         **{f"Z{n}_minus": each for n, each in enumerate(minus, 19)},
@@ -160,7 +160,7 @@ def test_eq_6_72_to_6_74_and_erratum_23_slopes_at_rest(hoist: Drive) -> None:
 
     6.74 has α_sw in place of the opening, on which alone the rate depends.
     """
-    p = made(Pump, hoist.replace(Z18=0.0).parameters.numbers)
+    p = tuple_from(Pump, hoist.replace(Z18=0.0).parameters.numbers)
     spool = derive(control.spool_balance, by=("force", "arm_sine")).python(0.0, 0.0, p)[1:]
     assert spool == pytest.approx((p.Z5**2 / sqrt(p.Z4), -p.Z5))
     (sine,) = derive(control.arm_sine, by=("pressure",)).python(0.0, p)[1:]

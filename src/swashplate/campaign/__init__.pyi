@@ -1,7 +1,7 @@
 from .campaign import Campaign as Campaign
 from .campaign import json_schema as json_schema
-from .experiment import APART as APART
 from .experiment import ASSUMED as ASSUMED
+from .experiment import LARGEST_CERTAIN_INTERVAL as LARGEST_CERTAIN_INTERVAL
 from .experiment import RISE as RISE
 from .experiment import Accuracy as Accuracy
 from .experiment import Channel as Channel

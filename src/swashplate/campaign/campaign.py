@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from swashplate.drive import Drive
     from swashplate.results import Figure
 
-_OPEN = re.compile("=.*FIXME")
+_FIXME_ENTRY = re.compile("=.*FIXME")
 """A line of a draft that a person has to fill in."""
 LISTED = 12
 """Runs that a sentence names."""
@@ -120,7 +120,7 @@ class Campaign(Result):
             title,
             file.virtual,
             file.axes,
-            in_time(experiments),
+            in_recorded_order(experiments),
             tuple(ignored),
             tuple(overviews),
         )
@@ -130,8 +130,8 @@ class Campaign(Result):
         heads = (*map(Head, ("run", "axis", "role", "maneuver")), Head("s", ".4g"))
         table = Table(self.title, (*heads, Head("channels", wrap=True)))
         for experiment in self:
-            words = experiment.name, experiment.axis, experiment.role, experiment.maneuver
-            table.add(*words, experiment.duration, ", ".join(experiment.channels))
+            cells = experiment.name, experiment.axis, experiment.role, experiment.maneuver
+            table.add(*cells, experiment.duration, ", ".join(experiment.channels))
         return table
 
     def plot(self, *, title: str | None = None) -> list[Figure]:
@@ -232,7 +232,7 @@ class Campaign(Result):
             raise ParameterError(f"{self.path}, [axes.{axis}]: {error}") from None
 
 
-def in_time(experiments: Sequence[Experiment]) -> tuple[Experiment, ...]:
+def in_recorded_order(experiments: Sequence[Experiment]) -> tuple[Experiment, ...]:
     """Experiments in the order in which they were recorded; unchanged if a time is unknown."""
     times = [experiment.recorded for experiment in experiments]
     recorded = [time for time in times if time is not None]
@@ -250,25 +250,31 @@ def json_schema() -> str:
 
 
 def read_campaign_file(path: str | Path) -> schema.CampaignFile:
-    """Contents of a campaign file, without its logs.
+    """Contents of a campaign file, checked; its logs are not read.
 
     Raises
     ------
     FileError
         If it cannot be read or is not TOML.
     ParameterError
-        If an entry is wrong; the sentence names it.
+        If an entry is wrong. The message names the entry, and the lines marked FIXME if there are
+        any.
     """
-    origin, text = str(path), read_text(path)
+    origin = str(path)
+    text = read_text(path)
     try:
         return validated(parse_toml(text, origin), schema.CampaignFile, origin)
     except ParameterError as error:
-        # of a draft the entry that is wrong or missing is most often one that was left open
+        # a draft marks the entries that its author still has to fill in: most often they are the
+        # cause
         lines = enumerate(text.splitlines(), 1)
-        marked = [str(number) for number, line in lines if _OPEN.search(line)]
-        if not marked:
+        fixme_lines = [str(number) for number, line in lines if _FIXME_ENTRY.search(line)]
+        if not fixme_lines:
             raise
-        which = f"lines {', '.join(marked)} are" if len(marked) > 1 else f"line {marked[0]} is"
+        if len(fixme_lines) == 1:
+            subject = f"line {fixme_lines[0]} is"
+        else:
+            subject = f"lines {', '.join(fixme_lines)} are"
         raise ParameterError(
-            f"{str(error).rstrip('.')}; {which} marked FIXME: fill in what is missing."
+            f"{str(error).rstrip('.')}; {subject} marked FIXME: fill in what is missing."
         ) from None

@@ -33,10 +33,14 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-SUDDEN, BESIDE, APART, RISE = 0.1, 0.1, 0.003, 3.0 / 512.0
-"""Part of a command's range by which it jumps between two samples, and part of the jump that it
-moves by at most beside it; the samples' least distance [s], below which the jump is taken as it is
-logged; and the time that a jump takes, three steps of the march. [s]"""
+SUDDEN = 0.1
+"""Change between two samples from which a command jumps, as a part of its range. [1]"""
+LARGEST_NEIGHBOUR = 0.1
+"""Largest change just before and just after a jump, as a part of the jump. [1]"""
+LARGEST_CERTAIN_INTERVAL = 0.003
+"""Largest interval of stamps within which a jump is taken as it is logged. [s]"""
+RISE = 3.0 / 512.0
+"""Time that a jump takes in a simulation, three steps of the march. [s]"""
 ROUNDED = 1e-6
 """Share of the largest input below which two levels are one. [1]"""
 VARIED = 8
@@ -72,9 +76,9 @@ class Accuracy(NamedTuple):
     zero: float = 0.0
     """In the signal's unit."""
     time: float | None = 0.0
-    """Of its stamps beside those of the other signals [s]; None: half the time between samples."""
+    """Of its stamps against those of the other signals [s]; None: half the time between samples."""
     rounded: bool = True
-    """Whether the steps of its converter are an error beside the zero; not if a zero is stated."""
+    """Whether the steps of its converter are a further error; not if a zero is stated."""
 
 
 ASSUMED: Mapping[str, Accuracy] = MappingProxyType(
@@ -162,54 +166,63 @@ class InputSignal(Result):
 
     @cached_property
     def jumps(self) -> NDArray[np.intp]:
-        """(j,) places of the last samples before sudden changes, beside which it hardly moves."""
+        """(j,) indices of the last samples before sudden changes; it hardly moves next to these."""
         changes = np.abs(np.diff(self.values))
-        beside = np.pad(changes, 1)
-        alone = np.maximum(beside[:-2], beside[2:]) < BESIDE * changes
-        return np.flatnonzero((changes > SUDDEN * np.ptp(self.values)) & alone)
+        padded = np.pad(changes, 1)
+        larger_neighbours = np.maximum(padded[:-2], padded[2:])
+        isolated = larger_neighbours < LARGEST_NEIGHBOUR * changes
+        return np.flatnonzero((changes > SUDDEN * np.ptp(self.values)) & isolated)
 
     def with_jumps(self) -> InputSignal:
-        """The signal with instantaneous jumps, in the middle of the samples beside them.
+        """The signal with instantaneous jumps, midway between the samples before and after them.
 
         A straight line from sample to sample would pass a dead zone at its beginning, and the
-        current's jump there come up to half a sample too early.
+        current's jump there would come up to half a sample too early.
         """
         rows = self.jumps
         middle = 0.5 * (self.time[rows] + self.time[rows + 1])
-        beside = np.stack([np.nextafter(middle, -np.inf), middle], axis=1)
+        instants = np.stack([np.nextafter(middle, -np.inf), middle], axis=1)
         levels = np.stack([self.values[rows], self.values[rows + 1]], axis=1)
-        between = np.repeat(rows + 1, 2)
-        time = np.insert(self.time, between, beside.ravel())
-        return replace(self, time=time, values=np.insert(self.values, between, levels.ravel()))
+        insert_at = np.repeat(rows + 1, 2)
+        time = np.insert(self.time, insert_at, instants.ravel())
+        values = np.insert(self.values, insert_at, levels.ravel())
+        return replace(self, time=time, values=values)
 
     @cached_property
     def edges(self) -> tuple[Edge, ...]:
-        """Its jumps at instants that are not known: of a command that is held there are none."""
+        """Jumps whose instants are uncertain, because the stamps around them are far apart.
+
+        A command that is held has none: it jumps at a stamp.
+        """
         if self.is_held:
             return ()
-        apart = np.diff(self.time)
+        intervals = np.diff(self.time)
         return tuple(
-            Edge(int(k), float(self.time[k] + 0.5 * apart[k]), float(apart[k]))
+            Edge(
+                row=int(k),
+                middle=float(self.time[k] + 0.5 * intervals[k]),
+                interval=float(intervals[k]),
+            )
             for k in self.jumps
-            if apart[k] > APART
+            if intervals[k] > LARGEST_CERTAIN_INTERVAL
         )
 
     def with_edges(self, late: Mapping[int, float]) -> InputSignal:
-        """The signal with edges, by their places, so much later than their middle [s].
+        """The signal with some edges shifted: by their rows, how much later than their middle [s].
 
-        Rounded off over `RISE`, so that a simulation is a smooth function of the instant.
+        Each is rounded off over `RISE`, so that a simulation is a smooth function of the instant.
         """
-        moved = [(edge, edge.middle + late[edge.row]) for edge in self.edges if edge.row in late]
-        steps = [instant + RISE * np.linspace(-0.5, 0.5, 9) for _, instant in moved]
-        time = np.unique(np.concatenate([self.time, *steps]))
+        shifted = [(edge, edge.middle + late[edge.row]) for edge in self.edges if edge.row in late]
+        rise_instants = [instant + RISE * np.linspace(-0.5, 0.5, 9) for _, instant in shifted]
+        time = np.unique(np.concatenate([self.time, *rise_instants]))
         values = self.at(time)
-        for edge, instant in moved:
+        for edge, instant in shifted:
             near = np.abs(time - edge.middle) <= 0.5 * edge.interval + RISE
             earlier, later = self.time[edge.row : edge.row + 2]
-            before = self.at(np.minimum(time[near], earlier))
-            done = np.clip((time[near] - instant) / RISE + 0.5, 0.0, 1.0)
-            jump = self.at(np.maximum(time[near], later)) - before
-            values[near] = before + jump * done**2 * (3.0 - 2.0 * done)
+            start_level = self.at(np.minimum(time[near], earlier))
+            share = np.clip((time[near] - instant) / RISE + 0.5, 0.0, 1.0)
+            jump = self.at(np.maximum(time[near], later)) - start_level
+            values[near] = start_level + jump * share**2 * (3.0 - 2.0 * share)
         return replace(self, time=time, values=values)
 
     def at(self, time: Array) -> Array:
@@ -241,10 +254,10 @@ def resolution_of_inputs(inputs: Sequence[InputSignal]) -> float:
     of levels between them.
     """
     levels = np.unique(np.concatenate([signal.values for signal in inputs]))
-    # rounding of a decimal number, or of a scale, sets equal levels apart
-    apart = np.diff(levels)
-    apart = apart[apart > ROUNDED * float(np.abs(levels).max(initial=0.0))]
-    return float(apart.min()) if apart.size + 1 >= LEVELS else 0.0
+    # rounding of a decimal number, or of a scale, makes equal levels differ
+    distances = np.diff(levels)
+    distances = distances[distances > ROUNDED * float(np.abs(levels).max(initial=0.0))]
+    return float(distances.min()) if distances.size + 1 >= LEVELS else 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -294,7 +307,7 @@ class Channel(Result):
     def resolution(self) -> float | None:
         """Step of an encoder's readings, None of other channels. [unit]
 
-        A count; more where it moves by multiples of more alone, as behind a decoder that counts
+        A count; more if it moves only by multiples of more, as downstream of a decoder that counts
         every fourth edge.
         """
         if self.encoder is None:

@@ -56,7 +56,7 @@ class BlockRanges(Result):
     """(n,) as recorded: a counter that wraps does so here; NaN in a block without a number.
     [unit]"""
     missing: int
-    """Samples that are no finite number."""
+    """Samples that are not a finite number."""
     period: float
     """Usual interval of its stamps. [s]"""
     longest: float
@@ -79,7 +79,7 @@ class Overview(Result):
     windows: tuple[LogWindow, ...]
     """Those with motion, in the order of time."""
     read_from: Path | None = None
-    """The table that stands for the log, if one was written beside it."""
+    """The table that stands for the log, if one was written next to it."""
 
     @property
     def begin(self) -> float:
@@ -98,16 +98,16 @@ class Overview(Result):
         rows = sum(window.last - window.first for window in used)
         moving = sum(window.last - window.first for window in self.windows)
         total = len(self.windows)
-        words = f"{self.run}: the log has {self.rows:,} rows, {moving:,} of them in "
-        words += "one window with motion" if total == 1 else f"{total} windows with motion"
+        text = f"{self.run}: the log has {self.rows:,} rows, {moving:,} of them in "
+        text += "one window with motion" if total == 1 else f"{total} windows with motion"
         if len(used) == total:
-            words += ", which is used" if total == 1 else ", which are all used"
+            text += ", which is used" if total == 1 else ", which are all used"
         else:
-            words += f"; {len(used)} of them, {rows:,} rows, spread over the log, "
-            words += "is used" if len(used) == 1 else "are used"
+            text += f"; {len(used)} of them, {rows:,} rows, spread over the log, "
+            text += "is used" if len(used) == 1 else "are used"
         if self.read_from is not None:
-            words += f"; its rows are read from {self.read_from.name}, written next to it"
-        return f"{words}."
+            text += f"; its rows are read from {self.read_from.name}, written next to it"
+        return f"{text}."
 
     def table(self) -> Table:
         """What each signal does in the whole log: range, longest interval, missing samples."""
@@ -125,18 +125,20 @@ class Overview(Result):
         )
         for signal in self.signals:
             finite = np.isfinite(signal.low)
-            words = "no number"
+            range_text = "no number"
             if finite.any():
                 low, high = float(signal.low[finite].min()), float(signal.high[finite].max())
-                shown = display_unit(signal.shown_unit, max(abs(low), abs(high)))
-                words = f"{shown.factor * low:z.4g} to {shown.factor * high:z.4g} {shown.name}"
+                display = display_unit(signal.shown_unit, max(abs(low), abs(high)))
+                range_text = (
+                    f"{display.factor * low:z.4g} to {display.factor * high:z.4g} {display.name}"
+                )
             table.add(
                 signal.axis,
                 signal.name,
                 signal.kind.replace("_", " "),
                 1.0 / signal.period,
                 f"{1e3 * signal.longest:.3g}" if signal.longest > 1.5 * signal.period else "-",
-                words.rstrip(),
+                range_text.rstrip(),
                 signal.missing,
             )
         return table

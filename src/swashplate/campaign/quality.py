@@ -234,17 +234,19 @@ def moves_at_first(experiment: Experiment) -> tuple[str, ...]:
     sample does. At a command of 0 a reading is an instrument's zero error.
     """
     moving_channels, drive = list[str](), experiment.input
-    still = abs(drive.values[0]) <= 0.02 * np.abs(drive.values).max() and drive.kind != "other"
+    begins_at_rest = (
+        abs(drive.values[0]) <= 0.02 * np.abs(drive.values).max() and drive.kind != "other"
+    )
     moving = experiment.of_kind("shaft_speed", "position", "encoder_counts")
-    for channel in moving if experiment.start == "rest" and not still else ():
+    for channel in moving if experiment.start == "rest" and not begins_at_rest else ():
         time, motion = channel.time[channel.used], channel.values[channel.used]
         if time.size < 4 * NEIGHBOURS or np.ptp(motion) == 0.0:
             continue
         if channel.is_position:
-            coarse, apart = float(np.diff(np.unique(motion)).min()), np.median(np.diff(time))
+            coarse, interval = float(np.diff(np.unique(motion)).min()), np.median(np.diff(time))
             fastest = float(np.quantile(np.abs(np.diff(motion)), 0.998))
             stride = max(ceil(10.0 * coarse / fastest), 1) if fastest else time.size
-            if stride * apart > SLOW:
+            if stride * interval > SLOW:
                 continue
             motion = np.diff(motion[::stride]) / np.diff(time[::stride])
         speeds = motion[:6] * np.sign(motion[0])
@@ -274,7 +276,7 @@ def has_sign(currents: Sequence[Array], share: float = 0.25) -> bool:
 def unsigned_currents(experiments: Iterable[Experiment]) -> dict[tuple[str, str], str]:
     """Currents that are said to have a sign and have none, with a sentence on each.
 
-    By axis and channel. Give runs beside each other: of one alone a current that never turns
+    By axis and channel. Give runs together: of one only, a current that never turns
     negative may be right.
     """
     currents, lowest = dict[tuple[str, str], list[Array]](), dict[tuple[str, str], float]()
@@ -415,8 +417,8 @@ def lost_counts(channel: Channel) -> list[LostCounts]:
     usual = float(np.median(np.abs(np.diff(counts)))) if rows else 0.0
 
     def jump_at(row: int) -> float:
-        before = counts[row - 1] - counts[row - 2] if row > 1 else 0.0
-        return float(counts[row] - counts[row - 1] - before)
+        last_step = counts[row - 1] - counts[row - 2] if row > 1 else 0.0
+        return float(counts[row] - counts[row - 1] - last_step)
 
     jumps, skip = list[LostCounts](), False
     for number, row in enumerate(rows):
@@ -539,16 +541,16 @@ def _one_sided(axis: str, runs: Sequence[Experiment]) -> Iterator[str]:
     commands = [run.input.values for run in runs if run.input.kind == "voltage"]
     if not commands or min(c.min() for c in commands) < 0.0 < max(c.max() for c in commands):
         return
-    moved, driven = list[Array](), list[Array]()
+    speeds, driven = list[Array](), list[Array]()
     for run in runs:
         for _, time, speed in _mean_speeds(run):
-            moved.append(speed)
+            speeds.append(speed)
             driven.append(run.input.at(time))
-    motion, command = (np.concatenate([np.zeros(0), *parts]) for parts in (moved, driven))
+    motion, command = (np.concatenate([np.zeros(0), *parts]) for parts in (speeds, driven))
     most = float(np.abs(motion).max(initial=0.0))
-    still = np.abs(motion) < 0.02 * most
-    if still.any() and min(motion.max(), -motion.min()) > most / 3.0:
-        rest = float(np.median(command[still]))
+    at_rest = np.abs(motion) < 0.02 * most
+    if at_rest.any() and min(motion.max(), -motion.min()) > most / 3.0:
+        rest = float(np.median(command[at_rest]))
         yield (
             f"axis '{axis}': it moves both ways although its command never changes sign; a stick "
             f"that rests at {rest:.3g} V needs offset = {-rest:.3g} in [axes.{axis}.input]"
@@ -581,10 +583,10 @@ def _of_other_scale(runs: Sequence[Experiment]) -> Iterator[str]:
         return
     for run in runs:
         for channel, time, speed in _mean_speeds(run):
-            before = np.linspace(-HELD, 0.0, 9)[:, None] + time
-            command = run.input.at(before.ravel()).reshape(before.shape)
+            instants = np.linspace(-HELD, 0.0, 9)[:, None] + time
+            command = run.input.at(instants.ravel()).reshape(instants.shape)
             size = np.abs(command).min(axis=0)
-            one_way = np.abs(np.sign(command).sum(axis=0)) == before.shape[0]
+            one_way = np.abs(np.sign(command).sum(axis=0)) == instants.shape[0]
             steady = one_way & (size > LARGE * largest) & (time > run.input.time[0] + HELD)
             if steady.sum() > 1:
                 gain = float(np.median(np.abs(speed[steady] / command[-1, steady])))
@@ -676,8 +678,8 @@ def quality_table(experiment: Experiment, qualities: Sequence[Quality]) -> Table
     )
     for quality in qualities:
         stamps, largest = quality.stamps, max(abs(quality.low), abs(quality.high))
-        shown = display_unit(shown_unit(quality.kind, quality.unit), largest)
-        low, high = shown.factor * quality.low, shown.factor * quality.high
+        display = display_unit(shown_unit(quality.kind, quality.unit), largest)
+        low, high = display.factor * quality.low, display.factor * quality.high
         table.add(
             experiment.name,
             quality.signal,
@@ -686,7 +688,7 @@ def quality_table(experiment: Experiment, qualities: Sequence[Quality]) -> Table
             stamps.rate,
             f"{round(1e3 * stamps.jitter, 4):.3g}",
             f"{round(1e3 * stamps.longest, 4):.3g}" if stamps.gaps.size else "-",
-            f"{low:z.4g} to {high:z.4g} {shown.name}".rstrip(),
+            f"{low:z.4g} to {high:z.4g} {display.name}".rstrip(),
             "" if isnan(quality.clipped) else f"{100.0 * quality.clipped:.2g}",
             quality.lost_counts,
             f"{100.0 * quality.ignored:.3g} %",

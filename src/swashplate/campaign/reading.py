@@ -654,9 +654,9 @@ def _windows(
     changes = np.flatnonzero(np.diff(np.concatenate([[False], moving, [False]])))
     first = np.maximum(changes[::2] * GRAIN - round(BEFORE / period), 0)
     last = np.minimum(changes[1::2] * GRAIN + round(AFTER / period), rows)
-    apart = np.flatnonzero(first[1:] > last[:-1])
-    begins = first[[0, *(apart + 1)]].tolist()
-    ends_of_motion = last[[*apart, last.size - 1]].tolist()
+    gaps = np.flatnonzero(first[1:] > last[:-1])
+    begins = first[[0, *(gaps + 1)]].tolist()
+    ends_of_motion = last[[*gaps, last.size - 1]].tolist()
     grain_rows = np.arange(time.size) * GRAIN
     windows = list[LogWindow]()
     for begin, end in zip(begins, ends_of_motion, strict=True):

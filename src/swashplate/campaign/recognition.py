@@ -28,7 +28,7 @@ SURE = 6.0
 SMALLEST_VOLTS = 0.1
 """Smallest voltage that counts as a command: 1 % of full scale. [V]"""
 LARGEST_ZERO = 0.5
-"""Reading at rest beyond which it is no zero error of an instrument. [V]"""
+"""Reading at rest beyond which it is not a zero error of an instrument. [V]"""
 SHORTEST = 16
 """Samples below which nothing can be distinguished."""
 FEWEST_HELD = 5
@@ -84,7 +84,7 @@ class _Candidate(NamedTuple):
     began: float
     """When the command leaves rest. [s]"""
     jumps: Mask | None = None
-    """Samples within jumps, where nothing is known."""
+    """Samples within jumps, of which nothing is known."""
     frequency: float | None = None
 
 
@@ -99,7 +99,7 @@ def recognise(time: ArrayLike, voltage: ArrayLike, *, unit: str = "V") -> Recogn
         The command, with the noise and steps of its instrument. [unit]
     unit : str
         Its unit, for the name. All levels are relative to what the record begins with, which in V
-        must be within 0.5 V of zero. Changes of less than 0.1 V are no command, in other units any.
+        must be within 0.5 V of zero. In V, changes of less than 0.1 V are not a command.
 
     Returns
     -------
@@ -110,7 +110,7 @@ def recognise(time: ArrayLike, voltage: ArrayLike, *, unit: str = "V") -> Recogn
     Raises
     ------
     InputError
-        If the columns differ in length, hold what is no number, or the time does not increase.
+        If the columns differ in length, hold what is not a number, or the time does not increase.
 
     Notes
     -----
@@ -186,7 +186,7 @@ def _noise(time: Array, values: Array) -> float:
     deviation = (values[at] - line) / np.sqrt(1.0 + share**2 + (1.0 - share) ** 2)
     changes = np.abs(values[at] - values[at - 1])
     smallest = float(np.min(changes, where=changes > 0.0, initial=np.inf))
-    # of a command without noise the smallest change is no converter's step, but a part of it
+    # of a command without noise the smallest change is not a converter's step, but a part of it
     quantum = min(0.3 * smallest, 0.002 * float(np.ptp(values)))
     return max(float(np.median(np.abs(deviation))) / 0.6745, quantum)
 
@@ -235,7 +235,7 @@ def _stairs(record: _Record) -> _Candidate | None:
     least = max(2.0 * record.tolerance, 0.05 * record.peak)
     jumps = np.flatnonzero(np.abs(np.diff(values)) > least)
     groups = np.split(jumps, np.flatnonzero(np.diff(jumps) > FEWEST_HELD) + 1)
-    # with so many jumps it is no stairs
+    # with so many jumps it is not stairs
     if not jumps.size or len(groups) > 200 or any(np.ptp(group) >= record.jump for group in groups):
         return None
     model = np.zeros(size)
@@ -244,12 +244,12 @@ def _stairs(record: _Record) -> _Candidate | None:
     firsts = [0, *(int(group[-1]) + 1 for group in groups)]
     lasts = [*(int(group[0]) + 1 for group in groups), size]
     for first, last in zip(firsts, lasts, strict=True):
-        # without the samples beside its jumps, which may be taken while they last
-        beside = min(2, (last - first) // 4)
+        # without the samples next to its jumps, which may be taken while they last
+        next_to_jump = min(2, (last - first) // 4)
         if first > 0:
-            first += beside
+            first += next_to_jump
         if last < size:
-            last -= beside
+            last -= next_to_jump
         level_samples = values[first:last]
         usual = np.median(level_samples[: max(FEWEST_HELD, level_samples.size // 10)])
         level_samples = level_samples[np.abs(level_samples - usual) <= record.tolerance]
@@ -270,13 +270,13 @@ def _stairs(record: _Record) -> _Candidate | None:
     if not heights:
         return None
     leaves = record.leaves(np.where(within_jumps, values, model), 0)
-    # a level that is left is the last one, which is no rest
+    # a level that is left is the last one, which is not a rest
     if leaves < size and (leaves < firsts[-1] + FEWEST_HELD or resting):
         return None
     name = f"stairs {'/'.join(f'{height:g}' for height in heights)} {record.unit}"
     if len(heights) == 1 or (len(heights) == 2 and resting and not heights[1]):
         name = f"step {heights[0]:+g} {record.unit}"
-    end = firsts[-1] + beside if resting else size
+    end = firsts[-1] + next_to_jump if resting else size
     return _Candidate(name, model, min(leaves, end), began, within_jumps)
 
 

@@ -104,14 +104,14 @@ def signal(name: str, values: ArrayLike, rows: int) -> Array:
     return numbers
 
 
-# --- an encoder's counts, and angles that begin anew ----------------------------------------------
+# --- an encoder's counts, and angles that wrap ----------------------------------------------------
 
 SUSTAINED = 5
 """A speed lasts if the median of this many neighbouring intervals has it."""
 MARGIN = 1.5
 """A jump is this much faster than anything that lasts."""
-BEYOND = 1.05
-"""Readings of an angle reach over no more than this many turns: noise takes them beyond one."""
+LARGEST_SPAN = 1.05
+"""Largest span of the readings of an angle that wraps [turn]: noise takes them beyond one."""
 
 
 def unwrap_counts(counts: ArrayLike, modulus: int) -> Array:
@@ -132,7 +132,7 @@ def unwrap_counts(counts: ArrayLike, modulus: int) -> Array:
     Raises
     ------
     InputError
-        If a reading is no whole number or outside the counter, or a step is exactly half the
+        If a reading is not a whole number or is outside the counter, or a step is exactly half the
         modulus, so that neither way round is the shorter.
     """
     readings, size = row("counts", counts), whole("modulus", modulus)
@@ -168,7 +168,7 @@ def unwrap_position(position: Array, size: float) -> Array:
     InputError
         If the readings reach further than `size` and noise do.
     """
-    if (reach := float(np.ptp(position))) > BEYOND * size:
+    if (reach := float(np.ptp(position))) > LARGEST_SPAN * size:
         raise InputError(
             f"the readings span {reach / size:.4g} times rolls_over_at, but a position that wraps "
             "stays within it; correct rolls_over_at, or leave it out."
@@ -182,7 +182,7 @@ def unwrap_position(position: Array, size: float) -> Array:
 
 
 def _shortest(steps: Array, modulus: float) -> Array:
-    """Steps of a counter by the shorter way round, down where both are as long. [count]"""
+    """Steps of a counter by the shorter way round, down if both are as long. [count]"""
     return np.asarray(steps - modulus * np.floor(steps / modulus + 0.5))
 
 
@@ -220,9 +220,9 @@ def interpolate_counts(time: ArrayLike, counts: ArrayLike) -> Array:
 
     Notes
     -----
-    Kruse (2001), section 7.2. A line knows a change before it happens, so it is no causal filter;
-    and the row of a change carries its new count in both directions, so that a reversal, whose two
-    changes pass the same edge, moves the position by one count.
+    Kruse (2001), section 7.2. A line knows a change before it happens, so it is not a causal
+    filter. The row of a change carries its new count in both directions, so that a reversal, whose
+    two changes pass the same edge, moves the position by one count.
     """
     stamps, edges = np.asarray(time, np.float64), np.asarray(counts, np.float64)
     knots = np.concatenate([[0], np.flatnonzero(edges[1:] != edges[:-1]) + 1])
@@ -247,47 +247,59 @@ def find_lost_counts(time: Array, counts: Array) -> Rows:
 def rolls_over_at(values: Array, counts_per_turn: float | None = None) -> int:
     """Counts after which a counter wraps, 0 if the numbers are not such a counter's.
 
-    The numbers are whole and many, and some steps go over more than half of their range, which
-    become as small as the others when they are taken the other way round. Numbers that only go up
-    by the same step each time count the samples. The counts of a turn are a likely size.
+    The numbers of a counter are whole and many. Some of their steps go over more than half of the
+    range, and become as small as the others when they are taken the other way round. Numbers that
+    go up by the same step each time count the samples. The counts of a turn are a likely size.
     """
     if values.size < 2 or not np.isfinite(values).all() or np.any(values != np.floor(values)):
         return 0
-    low, high, turn = float(values.min()), float(values.max()), float(counts_per_turn or 0.0)
+    low = float(values.min())
+    high = float(values.max())
+    turn = float(counts_per_turn or 0.0)
     span = high + 1.0 if low >= 0.0 else 2.0 * max(-low, high + 1.0)
     sizes = {1 << ceil(log2(span)), 100 * ceil(span / 100.0)}
-    if turn.is_integer() and span <= turn <= BEYOND * span:
+    if turn.is_integer() and span <= turn <= LARGEST_SPAN * span:
         sizes = {int(turn)}
-    return int(_begins_anew(values, span, sizes))
+    return int(_wrap_size(values, span, sizes))
 
 
 def turns_over(position: Array, turn: float) -> bool:
     """Whether a position (n,) of one unit jumps by about a `turn`, where its angle wraps."""
     values = position[np.isfinite(position)]
     reach = float(np.ptp(values)) if values.size else 0.0
-    within = 0.5 * turn < reach < BEYOND * turn
-    return within and bool(_begins_anew(values, reach, {turn}))
+    within = 0.5 * turn < reach < LARGEST_SPAN * turn
+    return within and bool(_wrap_size(values, reach, {turn}))
 
 
-def _begins_anew(values: Array, span: float, sizes: Collection[float]) -> float:
-    """Which of some sizes steps over half of the span are short with, the other way round; or 0."""
+def _wrap_size(values: Array, span: float, sizes: Collection[float]) -> float:
+    """Size, of some, after which the values wrap; 0 if they do not wrap.
+
+    A step over more than half of the span is a roll-over if, less the size, it is as short as the
+    other steps.
+    """
     steps = np.diff(values)
-    over = np.abs(steps) > 0.5 * span
+    is_long = np.abs(steps) > 0.5 * span
     # fewer numbers may be those of a switch
-    if np.unique(values).size < 32 or not over.any() or over.all():
+    if np.unique(values).size < 32 or not is_long.any() or is_long.all():
         return 0
-    usual = steps[~over]
-    # larger ones lead across gaps
-    ordinary = float(np.quantile(np.abs(usual), 0.998))
-    # the steps beside a roll-over are as large as the one across it, taken the other way round
-    beside = np.interp(np.flatnonzero(over), np.flatnonzero(~over), usual)
-    across = {size: steps[over] - size * np.round(steps[over] / size) for size in sorted(sizes)}
-    best = min(across, key=lambda size: float(np.median(np.abs(across[size] - beside))))
-    # across a gap any step may be; the counter's size is known to what the largest reading leaves
-    room = 2.0 * ordinary + max(best - span, 0.0)
-    small = np.mean(np.abs(across[best]) <= room) >= 0.5
-    level = np.ptp(np.concatenate([usual, across[best]])) == 0.0
-    return best if small and not level and ordinary < 0.25 * best else 0
+    short_steps = steps[~is_long]
+    # the few larger ones lead across gaps
+    largest_short = float(np.quantile(np.abs(short_steps), 0.998))
+    # the step across a roll-over, less the size, is as large as those just before and after it
+    expected = np.interp(np.flatnonzero(is_long), np.flatnonzero(~is_long), short_steps)
+    unwrapped = {
+        size: steps[is_long] - size * np.round(steps[is_long] / size) for size in sorted(sizes)
+    }
+    best = min(unwrapped, key=lambda size: float(np.median(np.abs(unwrapped[size] - expected))))
+    # half of the steps must fit, as one across a gap may have any length; the size itself is
+    # uncertain by what lies between the span of the readings and it
+    tolerance = 2.0 * largest_short + max(best - span, 0.0)
+    fits = np.mean(np.abs(unwrapped[best]) <= tolerance) >= 0.5
+    # samples that are numbered: the same step each time
+    counts_samples = np.ptp(np.concatenate([short_steps, unwrapped[best]])) == 0.0
+    if not fits or counts_samples or largest_short >= 0.25 * best:
+        return 0
+    return best
 
 
 # --- the ammeter ----------------------------------------------------------------------------------

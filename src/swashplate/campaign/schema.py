@@ -59,7 +59,7 @@ KINDS: Mapping[str, Kind] = {
     "voltage": Kind(("V",), "", "the card's command, positive for positive speed",
         r"volts?|voltage|u|\w*spannung|spanning|spenning|spænding|spänning|voltaje", ("V", "mV")),
     "current": Kind(("A",), "", "signed current that drives the pump without a card"),
-    # by its name an input: channels are of this kind where somebody says so
+    # by its name an input: channels are of this kind only if somebody says so
     "other": Kind((), "", "any other quantity, in the unit of the log",
         "cmd|command|duty|setpoint|valve|stick|joystick|joy|stellgröße|stellgroesse|sollwert|hebel|"
         "consigne|consigna|manette|palanca|spak|pådrag"),
@@ -403,7 +403,7 @@ class RunEntry(FileTable):
 
 
 class CampaignFile(FileTable):
-    """A campaign: the tests of a machine, beside their logs."""
+    """A campaign: the tests of a machine, next to their logs."""
 
     title: str = Field("", description="For the report.")
     virtual: Flag = Field(False, description="Whether the tests are simulated.")

@@ -71,7 +71,7 @@ def speed_of(channel: Channel, method: Method = "exact") -> DerivedSpeed:
         half = 0.5 * float(np.median(np.diff(time)))
         return DerivedSpeed(time[1:], np.diff(values) / np.diff(time), half)
     if encoder is not None and channel.counts is not None:
-        # on a grid where the stamps are even, so that their rounding stays out of the speed
+        # on a grid if the stamps are even, so that their rounding stays out of the speed
         even, _ = stamps_of(time)
         values = interpolate_counts(even, channel.counts) * encoder.angle_per_count
     return DerivedSpeed(time, speed_from_angle(time, values), 1.0 / LOW_PASS + 1.0 / DIFFERENTIATOR)

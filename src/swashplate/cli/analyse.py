@@ -581,7 +581,7 @@ def bode(
     drive.note(f"{drive.title}, sines about {bias:g} V: {span}")
     note(f"At {frequency:g} Hz:")
     show(table)
-    for output in response.still():
+    for output in response.sentences_on_no_motion():
         say(f"{output}.")
 
 

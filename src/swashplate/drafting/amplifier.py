@@ -26,7 +26,8 @@ from swashplate.results import short
 from swashplate.tables import UNIT, Cell, Column, Table
 
 Array = NDArray[np.float64]
-Pair = tuple[float, float]
+PlusMinus = tuple[float, float]
+"""A parameter's numbers for commands above and below 0."""
 
 SETTLED = 0.3
 """Time over which a command must have been slow, so that the current has settled. [s]"""
@@ -52,6 +53,8 @@ DYNAMIC = ("zeta", "omega", "C", "lim1", "lim2", "I_t1", "I_t2", "a")
 """Parameters of the current's dynamics."""
 SCALED = ("C", "lim1", "lim2", "I_t1", "I_t2")
 """Those of them that are proportional to the size of the current."""
+WEAK_SOLENOIDS = 1e-3
+"""Z19 of the simulations: at no current do solenoids this weak overpower the feedback spring."""
 SCALED_AT = 10.0
 """Command beyond the dead zone at which sizes of currents are compared: a card's full range. [V]"""
 
@@ -62,19 +65,19 @@ class AmplifierGuess(NamedTuple):
     def __repr__(self) -> str:
         return short(self)
 
-    dead_zone: Pair
+    dead_zone: PlusMinus
     """[V]"""
-    jump: Pair
+    jump: PlusMinus
     """Current right beyond the dead zone. [A]"""
-    gain: Pair
+    gain: PlusMinus
     """[A/V]"""
-    dynamics: Mapping[str, Pair]
+    dynamics: Mapping[str, PlusMinus]
     """Parameters of the current's dynamics, by symbol. [SI]"""
     card: str
     """The packaged card that they are of, empty for a plain filter."""
     delay: float
     """[s]"""
-    command: Pair
+    command: PlusMinus
     """Largest command with a current; 0 for a way that was not tried, whose numbers are the
     other's. [V]"""
     fit_percent: float
@@ -87,7 +90,7 @@ class AmplifierGuess(NamedTuple):
 
 
 class _Currents(NamedTuple):
-    """A current beside its command in one run."""
+    """A current and its command in one run."""
 
     experiment: Experiment
     channel: Channel
@@ -129,11 +132,11 @@ def guess_amplifier(experiments: Sequence[Experiment]) -> AmplifierGuess | None:
     """
     measured = list(_currents(experiments))
     seen_plus, seen_minus = _static_line(measured, 0), _static_line(measured, 1)
-    # numbers of a way that tells none are the other's
+    # a way without a current has the other's numbers
     plus, minus = seen_plus or seen_minus, seen_minus or seen_plus
     if plus is None or minus is None:
         return None
-    static: dict[str, Pair] = {
+    static: dict[str, PlusMinus] = {
         "V_dz": (plus.dead_zone, minus.dead_zone),
         "J": (plus.jump, minus.jump),
         "G1": (plus.gain, minus.gain),
@@ -172,7 +175,7 @@ class _Line(NamedTuple):
 
 
 def _static_line(measured: Sequence[_Currents], side: int) -> _Line | None:
-    """Line of a way at the delay of the least error; None if its currents tell none."""
+    """Line of a way at the delay of the least error; None if no line fits its currents."""
     best: _Line | None = None
     for delay in SETTLED_DELAYS:
         line = _line(*_settled(measured, side, delay))
@@ -194,11 +197,11 @@ def _settled(measured: Sequence[_Currents], side: int, delay: float) -> tuple[Ar
             continue
         drive = currents.experiment.input
         grid = np.linspace(-SETTLED - delay, 0.0, 9)[:, None] + currents.time
-        before = drive.at(grid.ravel()).reshape(grid.shape)
+        recent_commands = drive.at(grid.ravel()).reshape(grid.shape)
         command = sign * drive.at(currents.time - delay)
         one_way = command > 0.0
         readings = np.stack([command, currents.current])
-        slow.append(readings[:, one_way & (np.ptp(before, axis=0) <= SLOW * largest)])
+        slow.append(readings[:, one_way & (np.ptp(recent_commands, axis=0) <= SLOW * largest)])
         every.append(readings[:, one_way])
     volts, amperes = np.concatenate([np.zeros((2, 0)), *slow], axis=1)
     if volts.size < FEWEST or np.ptp(volts) < 0.1 * largest:
@@ -241,12 +244,12 @@ class _Dynamics(NamedTuple):
 
     card: str
     """The packaged card that they are of, empty for a plain filter."""
-    numbers: dict[str, Pair]
+    numbers: dict[str, PlusMinus]
     """Parameters by symbol. [SI]"""
 
 
 class _Trial(NamedTuple):
-    """Error of dynamics beside the measured currents, at the delay of the least error."""
+    """Error of simulated against measured currents, at the delay of the least error."""
 
     dynamics: _Dynamics
     delay: float
@@ -255,10 +258,10 @@ class _Trial(NamedTuple):
     """RMS. [A]"""
 
 
-def _dynamics(static: Mapping[str, Pair]) -> Iterator[_Dynamics]:
+def _dynamics(static: Mapping[str, PlusMinus]) -> Iterator[_Dynamics]:
     """Dynamics to try: of plain filters, and of each packaged card, for currents of this size."""
     plain = Drive.preset("neutral").at_every_rate().parameters
-    unlimited = {symbol: _pair(plain, symbol) for symbol in DYNAMIC}
+    unlimited = {symbol: _plus_minus(plain, symbol) for symbol in DYNAMIC}
     for omega in NATURAL_FREQUENCIES:
         yield _Dynamics("", {**unlimited, "zeta": (1.0, 1.0), "omega": (omega, omega)})
     cards = {plain.card}
@@ -269,16 +272,18 @@ def _dynamics(static: Mapping[str, Pair]) -> Iterator[_Dynamics]:
             yield _Dynamics(packaged.card, _scaled_dynamics(packaged, static))
 
 
-def _scaled_dynamics(packaged: ParameterSet, static: Mapping[str, Pair]) -> dict[str, Pair]:
+def _scaled_dynamics(
+    packaged: ParameterSet, static: Mapping[str, PlusMinus]
+) -> dict[str, PlusMinus]:
     """Dynamics of a packaged card for currents of the size that settled ones have."""
     factors = list[float]()
     for side in range(2):
         measured = static["J"][side] + SCALED_AT * static["G1"][side]
-        of_card = _pair(packaged, "J")[side] + SCALED_AT * _pair(packaged, "G1")[side]
+        of_card = _plus_minus(packaged, "J")[side] + SCALED_AT * _plus_minus(packaged, "G1")[side]
         factors.append(measured / of_card)
-    numbers = dict[str, Pair]()
+    numbers = dict[str, PlusMinus]()
     for symbol in DYNAMIC:
-        plus, minus = _pair(packaged, symbol)
+        plus, minus = _plus_minus(packaged, symbol)
         if symbol in SCALED:
             plus *= factors[0]
             minus *= factors[1]
@@ -286,19 +291,21 @@ def _scaled_dynamics(packaged: ParameterSet, static: Mapping[str, Pair]) -> dict
     return numbers
 
 
-def _pair(parameters: ParameterSet, symbol: str) -> Pair:
+def _plus_minus(parameters: ParameterSet, symbol: str) -> PlusMinus:
     """Numbers of plus and minus."""
     plus, minus = parameters[symbol].values
     return plus, minus
 
 
 def _try_dynamics(
-    measured: Sequence[_Currents], static: Mapping[str, Pair], dynamics: _Dynamics
+    measured: Sequence[_Currents], static: Mapping[str, PlusMinus], dynamics: _Dynamics
 ) -> _Trial:
-    """Delay and error of the least squares; an infinite error if the card refuses a command."""
-    # whatever the current, the solenoids do not overpower the feedback spring
+    """Simulate the currents with some dynamics; the delay and error of the least squares.
+
+    The error is infinite if the card refuses a command.
+    """
     neutral = Drive.preset("neutral").at_every_rate().parameters
-    drive = Drive(neutral.with_numbers({"Z19": 1e-3, **static, **dynamics.numbers}))
+    drive = Drive(neutral.with_numbers({"Z19": WEAK_SOLENOIDS, **static, **dynamics.numbers}))
     squares = np.zeros(DELAYS.size)
     size = 0
     try:

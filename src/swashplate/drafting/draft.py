@@ -113,11 +113,11 @@ class _Guess(NamedTuple):
     rolls_over_at: float = 0.0
     """Reading after which an encoder's counter or an angle wraps; 0 if it does not."""
     unit_comment: str = "from its name"
-    """Reason for its unit, beside the entry, if it does not stand in the header."""
+    """Reason for its unit, next to the entry, if it is not in the header."""
     has_plc_name: bool = False
     """Whether its name is that of a PLC's word."""
     full_scale: int = 0
-    """Reading of a PLC's word at full scale; 0 if the numbers are no such words."""
+    """Reading of a PLC's word at full scale; 0 if the numbers are not such words."""
 
 
 class _Axis(NamedTuple):
@@ -275,7 +275,11 @@ def _by_header(column: LogColumn, kind: str | None) -> _Guess:
     if kind is not None:
         by_name = by_name._replace(kind=kind)
         by_last_word = by_last_word._replace(kind=kind)
-    if column.unit is None and by_name.kind not in HALVES and _measures(by_last_word.kind, ending):
+    if (
+        column.unit is None
+        and by_name.kind not in HALVES
+        and _is_unit_of(ending, by_last_word.kind)
+    ):
         return by_last_word._replace(unit=ending, in_header=False)
     return by_name._replace(
         unit=unit if by_name.kind == "shaft_speed" else column.unit,
@@ -285,15 +289,15 @@ def _by_header(column: LogColumn, kind: str | None) -> _Guess:
 
 
 def _check_unit(kind: str, unit: str, what: str) -> None:
-    """Refuse a unit that does not measure what a column is: time or a kind of signal."""
+    """Refuse a unit in which a kind of signal, or time, is not measured."""
     if kind == "time":
         to_si(1.0, unit, "s", what)
     else:
         conversion(kind, unit, what)
 
 
-def _measures(kind: str, unit: str) -> bool:
-    """Whether a unit is one of time or of a kind that has units; counts are none."""
+def _is_unit_of(unit: str, kind: str) -> bool:
+    """Whether a kind of signal, or time, is measured in a unit; encoder counts have no unit."""
     has_units = kind == "time" or (kind in KINDS and bool(KINDS[kind].units))
     if not has_units or kind == "encoder_counts":
         return False
@@ -414,7 +418,7 @@ def _full_scale(blocks: Sequence[Array], *, has_plc_name: bool) -> int:
 
 
 def _turn(values: Sequence[Array], unit: str) -> float:
-    """A whole turn in a unit if positions jump by it, 0 if not or if the unit is no angle's."""
+    """A whole turn in a unit if positions jump by it, 0 if not or if the unit is not an angle's."""
     try:
         turn = to_si(2.0 * pi, "rad", unit, "")
     except InputError:
@@ -584,7 +588,7 @@ def _unit_lines(signal: _Guess) -> list[str]:
     """The entry of a signal's unit, none if the header has it."""
     units = KINDS[signal.kind].units
     usual = units[0] if units else "1"
-    if signal.unit is not None and units and not _measures(signal.kind, signal.unit):
+    if signal.unit is not None and units and not _is_unit_of(signal.unit, signal.kind):
         reason = f"'{signal.unit}', as the header has it, is not a unit of a {signal.kind}"
         return [f"unit = {toml_string(usual)}    # {FIXME}: {reason}"]
     if signal.in_header:
@@ -667,7 +671,7 @@ def _run_lines(
             run.entries.insert(0, f"name = {toml_string(f'{path.parent.name}/{path.name}')}")
         runs.append(run)
     held_back = _held_back([run for run in runs if run.role == '"fit"'])
-    runs, lines = _in_time(runs)
+    runs, lines = _sorted_by_recording(runs)
     for run in runs:
         role = '"validate"' if run is held_back else run.role
         lines += ["[[runs]]", f"file = {run.file}", f"role = {role}", *run.entries, ""]
@@ -768,15 +772,15 @@ def _trial_reading(
 def _sampling_words(
     experiments: Sequence[Experiment], overview: Overview | None, duration: float
 ) -> str:
-    """Duration [s] and rate of a run, and its parts, for the comment beside its file."""
+    """Duration [s] and rate of a run, and its parts, for the comment next to its file."""
     of_axis = [experiment for experiment in experiments if experiment.axis == experiments[0].axis]
     rate = 1.0 / float(np.median(np.diff(of_axis[0].input.time)))
-    words = f", {duration:.4g} s at {rate:.4g} Hz"
+    comment = f", {duration:.4g} s at {rate:.4g} Hz"
     if overview is not None:
-        words += f", {len(of_axis)} of {len(overview.windows)} windows with motion used"
+        comment += f", {len(of_axis)} of {len(overview.windows)} windows with motion used"
     elif len(of_axis) > 1:
-        words += f" in {len(of_axis)} parts"
-    return words
+        comment += f" in {len(of_axis)} parts"
+    return comment
 
 
 class _Deflection(NamedTuple):
@@ -802,31 +806,37 @@ def _deflection(experiment: Experiment) -> _Deflection:
     return _Deflection(direction, larger)
 
 
-def _in_time(runs: Sequence[_DraftedRun]) -> tuple[list[_DraftedRun], list[str]]:
-    """Runs in the order in which they were recorded, and a comment if no clock tells it.
+def _sorted_by_recording(
+    runs: Sequence[_DraftedRun],
+) -> tuple[list[_DraftedRun], list[str]]:
+    """Runs in the order in which they were recorded, and lines of comment if it is not known.
 
-    A log is written to its end. If files were written so far apart that none of their runs overlap,
-    these are the times of a logger; those of copies lie closer together.
+    It is known if all runs state when they were recorded, or from the times at which their files
+    were written. File times are trusted only if runs that ended then do not overlap: copying sets
+    them all close together.
     """
-    read = [run for run in runs if run.duration is not None]
-    if len(read) < 2 or all(run.recorded is not None for run in read):
+    with_duration = [run for run in runs if run.duration is not None]
+    if len(with_duration) < 2 or all(run.recorded is not None for run in with_duration):
         return sorted(runs, key=lambda run: run.recorded or inf), []
-    by_writing = sorted(read, key=lambda run: run.written)
-    apart = all(
-        later.written - (1.0 - OVERLAP) * (later.duration or 0.0) >= earlier.written
-        for earlier, later in pairwise(by_writing)
-    )
-    if not apart:
-        return [*runs], [UNORDERED, ""]
-    dated = [_dated(run) if run.duration is not None else run for run in runs]
+    by_writing = sorted(with_duration, key=lambda run: run.written)
+    if not all(_follows(later, earlier) for earlier, later in pairwise(by_writing)):
+        blank_line = ""
+        return [*runs], [UNORDERED, blank_line]
+    dated = [_with_guessed_date(run) if run.duration is not None else run for run in runs]
     return sorted(dated, key=lambda run: run.written), []
 
 
-def _dated(run: _DraftedRun) -> _DraftedRun:
+def _follows(later: _DraftedRun, earlier: _DraftedRun) -> bool:
+    """Whether a run began after the file of an earlier one was written, a little overlap aside."""
+    duration = later.duration or 0.0
+    return later.written - (1.0 - OVERLAP) * duration >= earlier.written
+
+
+def _with_guessed_date(run: _DraftedRun) -> _DraftedRun:
     """A run with the entry of when it was recorded, from the time of its file."""
     began = datetime.fromtimestamp(run.written - (run.duration or 0.0), UTC)
-    words = began.isoformat(timespec="seconds").replace("+00:00", "Z")
-    line = f"recorded = {words}    # guessed: time of writing of its file, minus its duration"
+    date = began.isoformat(timespec="seconds").replace("+00:00", "Z")
+    line = f"recorded = {date}    # guessed: time of writing of its file, minus its duration"
     return run._replace(entries=[line, *run.entries])
 
 

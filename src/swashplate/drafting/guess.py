@@ -112,14 +112,14 @@ def _creep(runs: Sequence[MovingRun], numbers: Array, speed: float) -> float | N
 
     largest = max(float(np.abs(run.command).max()) for run in runs)
     # a creep takes from the dead zone of one way what it gives to the other
-    still = max(0.5 * float(numbers[DEAD_ZONE].min()), STILL * largest)
+    largest_rest = max(0.5 * float(numbers[DEAD_ZONE].min()), STILL * largest)
     stopping = speed / numbers[ACCELERATION].min()
     settling = numbers[DELAY] + LAGS_TO_REST * numbers[LAG] + stopping
     speeds = list[Array]()
     rounding = 0.0
     for run in runs:
         simulated = simulated_course(run, numbers)
-        for begin, end in _rests(run, still, settling):
+        for begin, end in _rests(run, largest_rest, settling):
             ends: Array = begin + REST * np.arange(int((end - begin) / REST) + 1.0)
             measured = np.interp(ends, run.sampled, run.travelled)
             speeds.append(np.diff(measured - simulated.at(ends)) / REST)
@@ -134,9 +134,9 @@ def _creep(runs: Sequence[MovingRun], numbers: Array, speed: float) -> float | N
     return mean if abs(mean) > doubt else 0.0
 
 
-def _rests(run: MovingRun, still: float, settling: float) -> Iterable[tuple[float, float]]:
+def _rests(run: MovingRun, largest_rest: float, settling: float) -> Iterable[tuple[float, float]]:
     """Begin and end of each stretch that has settled to rest, measured without a gap. [s]"""
-    resting = np.abs(run.command) <= still
+    resting = np.abs(run.command) <= largest_rest
     # a command that is held stays up to the next stamp
     until = np.append(run.stamps[1:], run.stamps[-1]) if run.is_held else run.stamps
     changes = np.flatnonzero(np.diff(np.concatenate([[0], resting.astype(np.int8), [0]])))
@@ -162,7 +162,7 @@ def guess_drive(tests: Campaign | Sequence[Experiment]) -> Guess:
     Raises
     ------
     InputError
-        If no run has such a channel, the input is no voltage, the speed of a run or of all moves
+        If no run has such a channel, the input is not a voltage, the speed of a run or of all moves
         opposite to the command, a channel has gross spikes, or too little moves.
     """
     experiments = tests.select(role="fit") if isinstance(tests, Campaign) else tuple(tests)

@@ -105,7 +105,7 @@ class Windows(NamedTuple):
     """[s]"""
     ends: Array
     """[s]"""
-    averaged: float = 0.0
+    averaging_time: float = 0.0
     """Time after each end over which a noisy position is averaged, 0 for instants. [s]"""
 
     @property
@@ -115,25 +115,34 @@ class Windows(NamedTuple):
 
     def mean_speeds(self, course: Course) -> Array:
         """Mean speeds (..., m) of a course."""
-        averaged = course.integral() if self.averaged else course
-        return self._differences(averaged.at)
+        if self.averaging_time:
+            return self._mean_rates(course.integral().at)
+        return self._mean_rates(course.at)
 
     def mean_accelerations(self, course: Course) -> Array:
-        """Rates of change (..., m) of mean speeds if a course is moved forward in time."""
-        return self._differences(course.at if self.averaged else course.rate_at)
+        """Rates of change (..., m) of mean speeds if a course is shifted forward in time."""
+        if self.averaging_time:
+            return self._mean_rates(course.at)
+        return self._mean_rates(course.rate_at)
 
-    def _differences(self, at: Callable[[Array], Array]) -> Array:
-        """Differences over each window (..., m), of means over `averaged` if at is an integral."""
+    def _mean_rates(self, quantity_at: Callable[[Array], Array]) -> Array:
+        """Mean rates of change (..., m) of a quantity over the windows.
 
-        def mean_from(instants: Array) -> Array:
-            if not self.averaged:
-                return at(instants)
-            return (at(instants + self.averaged) - at(instants)) / self.averaged
+        With an `averaging_time` the function gives the quantity's integral, from which its mean
+        after each end of a window is taken.
+        """
 
-        first, last = mean_from(self.begins), mean_from(self.ends)
+        def value_from(instants: Array) -> Array:
+            if not self.averaging_time:
+                return quantity_at(instants)
+            rise = quantity_at(instants + self.averaging_time) - quantity_at(instants)
+            return rise / self.averaging_time
+
+        first = value_from(self.begins)
+        last = value_from(self.ends)
         return np.asarray((last - first) / (self.ends - self.begins))
 
-    def at(self, mask: Mask) -> Windows:
+    def selected(self, mask: Mask) -> Windows:
         """Those windows that a mask (m,) keeps."""
         return self._replace(begins=self.begins[mask], ends=self.ends[mask])
 
@@ -147,7 +156,7 @@ class MovingRun(NamedTuple):
     edge: float
     """Command over which a jump is complete. [V]"""
     stamps: Array
-    """Those of the command, of a straight line the grid's as well. [s]"""
+    """Those of the command; if it is a straight line between them, those of the grid, too. [s]"""
     command: Array
     """[V]"""
     is_held: bool
@@ -160,7 +169,7 @@ class MovingRun(NamedTuple):
     sampled: Array
     """Instants (j,) of the measured samples. [s]"""
     travelled: Array
-    """Measured way (j,) since the first of them, of a speed its integral."""
+    """Measured way (j,) since the first of them; of a measured speed its integral."""
     resolution: float
     """Resolution of the way, 0 if it is fine."""
 
@@ -175,8 +184,8 @@ def _model(run: MovingRun, numbers: Array) -> tuple[Instance, RunValues]:
 def _delayed(run: MovingRun, positions: Array, start: Array | float, delay: float) -> Course:
     """Positions (..., n) on the march's grid, later by the delay [s], with the motion before it.
 
-    The output is delayed and not the command, so that the march meets its steps alike whatever the
-    delay: else errors had a minimum at every whole step.
+    The output is delayed, not the command, so that the march treats the command's steps the same
+    way whatever the delay: otherwise errors would have a minimum at every whole step.
     """
     values = np.empty((*positions.shape[:-1], positions.shape[-1] + 1))
     values[..., 0] = -BEFORE * start
@@ -221,7 +230,7 @@ def moving_run(experiment: Experiment, channel: Channel) -> MovingRun:
     time, values = channel.time[used], channel.values[used]
     travelled = _travelled(channel, time, values)
     course, windows = _course_and_windows(channel, time, values, travelled)
-    windows = windows.at(_inside(windows, drive, time))
+    windows = windows.selected(_inside(windows, drive, time))
     speeds = windows.mean_speeds(course)
     grid = drive.time[0] + STEP * np.arange(np.ceil((drive.time[-1] - drive.time[0]) / STEP) + 1.0)
     is_held = drive.interpolation == "previous"
@@ -270,7 +279,7 @@ def _course_and_windows(
         width = max(width, _quiet_width(time, values, interval))
     begins = np.arange(time[0], time[-1] - 2.0 * width, width)
     # all samples of a noisy position count, which a difference of two of them would lose
-    return Course(time, travelled), Windows(begins, begins + width, averaged=width)
+    return Course(time, travelled), Windows(begins, begins + width, averaging_time=width)
 
 
 def _inside(windows: Windows, drive: InputSignal, time: Array) -> Mask:
@@ -278,7 +287,7 @@ def _inside(windows: Windows, drive: InputSignal, time: Array) -> Mask:
 
     Windows across ignored samples or a gap tell of no speed.
     """
-    begins, ends = windows.begins, windows.ends + windows.averaged
+    begins, ends = windows.begins, windows.ends + windows.averaging_time
     inside = (begins >= drive.time[0]) & (ends <= drive.time[-1])
     intervals = np.diff(time)
     for gap in np.flatnonzero(intervals > GAP * float(np.median(intervals))):
@@ -293,10 +302,10 @@ def _observed(drive: InputSignal, grid: Array, is_held: bool) -> ObservedRecord:
     area = np.concatenate([[0.0], np.cumsum(means_between * np.diff(stamps))])
 
     def area_at(instants: Array) -> Array:
-        before = np.clip(np.searchsorted(stamps, instants, "right") - 1, 0, stamps.size - 1)
-        first = values[before]
+        index = np.clip(np.searchsorted(stamps, instants, "right") - 1, 0, stamps.size - 1)
+        first = values[index]
         last = first if is_held else np.interp(instants, stamps, values)
-        return np.asarray(area[before] + 0.5 * (instants - stamps[before]) * (first + last))
+        return np.asarray(area[index] + 0.5 * (instants - stamps[index]) * (first + last))
 
     means = np.diff(area_at(np.append(grid, grid[-1] + STEP))) / STEP
     record = Record(means, float(grid[0]), 1.0 / STEP, 1)

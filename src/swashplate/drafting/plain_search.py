@@ -224,7 +224,7 @@ class _Search:
 
 def goes_with_command(run: MovingRun) -> bool:
     """Whether a motion goes with its command at any of the delays from which the search begins."""
-    middle = 0.5 * (run.windows.begins + run.windows.ends + run.windows.averaged)
+    middle = 0.5 * (run.windows.begins + run.windows.ends + run.windows.averaging_time)
     commands = (np.interp(middle - delay, run.stamps, run.command) for delay in DELAYS)
     weighted = run.windows.weights**2 * run.speeds
     return any(float(command @ weighted) >= 0.0 for command in commands)

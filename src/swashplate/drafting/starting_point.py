@@ -301,7 +301,7 @@ def _lag_line(guess: Guess, widest: float) -> str:
     return "# the lag is too short to be seen: Z8 stays fixed"
 
 
-def _limit_line(column: str, reach: tuple[float, float], words: str) -> str:
+def _limit_line(column: str, reach: tuple[float, float], comment: str) -> str:
     """Line that frees a limit, between two multiples of its guess."""
     low, high = reach
-    return f"{column} = {{ relative = [{low}, {high}], log = true }}    # {words}"
+    return f"{column} = {{ relative = [{low}, {high}], log = true }}    # {comment}"

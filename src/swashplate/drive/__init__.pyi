@@ -19,7 +19,7 @@ from .linear_drive import LinearDrive as LinearDrive
 from .linear_drive import model_tables as model_tables
 from .march import Sample as Sample
 from .march import simulate_drive as simulate_drive
-from .records import RANGES as RANGES
+from .records import INPUT_RANGES as INPUT_RANGES
 from .records import RunKeywords as RunKeywords
 from .records import check_voltage as check_voltage
 from .records import drive_records as drive_records

@@ -45,13 +45,13 @@ def bound_drive(
     parameters: ParameterSet,
     observed: ObservedRecord,
     columns: Sequence[str] = (),
-    own: RunValues = NO_RUN_VALUES,
+    run_values: RunValues = NO_RUN_VALUES,
 ) -> BoundModel:
     """The drive's model with its numbers, for some columns.
 
     These are symbols (``"Z16"`` stands for both directions), columns (``"Z16_plus"``) and states
-    at the first sample, ``"start.pump.pressure"`` [Pa]. Keys of ``own.start`` are paths without
-    ``start.``; it has a value for each of these states.
+    at the first sample, ``"start.pump.pressure"`` [Pa]. Keys of ``run_values.start`` are paths
+    without ``start.``; it has a value for each of these states.
     """
     for observation in observed.observations:
         check_output(observation.signal)
@@ -63,7 +63,7 @@ def bound_drive(
         step=observed.record.step,
         extremes=observed.extremes if by_voltage else (0.0, 0.0),
         pump_is_observed=any(o.signal not in CURRENTS for o in observed.observations),
-        own=own,
+        run_values=run_values,
     )
 
 
@@ -75,7 +75,7 @@ def _bound(
     step: float,
     extremes: tuple[float, float],
     pump_is_observed: bool = True,
-    own: RunValues = NO_RUN_VALUES,
+    run_values: RunValues = NO_RUN_VALUES,
 ) -> BoundModel:
     """The model with numbers for some columns, under a command between two extremes."""
     if by_voltage:
@@ -85,12 +85,12 @@ def _bound(
     switches = frozenset(SWITCHES[name] for name in names if name in SWITCHES)
     switched = _switched_on(parameters, switches - {"leaky", "loaded"})
     instance = drive_instance(switched, by_voltage=by_voltage)
-    start = dict(own.start)
+    start = dict(run_values.start)
     if PRESSURE_PATH in start:
         start |= start_states(instance, start[PRESSURE_PATH])
-    # whether anything observed can depend on a column: on a driven channel, on the pump
+    # what is observed does not depend on a channel without a command beyond its dead zone
     low, high = extremes
-    moved = {
+    can_move = {
         "card.plus": high > parameters.numbers["V_dz_plus"],
         "card.minus": -low > parameters.numbers["V_dz_minus"],
         "pump": pump_is_observed,
@@ -98,13 +98,14 @@ def _bound(
         "start.card.minus": True,
         "start.pump": pump_is_observed,
     }
-    moved["card"] = moved["card.plus"] or moved["card.minus"]
+    can_move["card"] = can_move["card.plus"] or can_move["card.minus"]
     paths = _paths(parameters.definitions, names)
+    prefixes = [path.rpartition(".")[0] for path in paths]
     return BoundModel(
         instance,
-        own._replace(start=start),
+        run_values._replace(start=start),
         paths,
-        [moved[path.rpartition(".")[0]] for path in paths],
+        [can_move[prefix] for prefix in prefixes],
     )
 
 

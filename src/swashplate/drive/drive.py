@@ -362,7 +362,7 @@ class Drive(Result, Mapping[str, Parameter]):
         substeps : int, optional
             Steps of the march a sample; by default so many that h ≤ 1/512 s.
         load_torque, pump_speed, supply_pressure : (n,) array_like or float, optional
-            What was measured beside the command, at its stamps: torque of the load at the shaft,
+            Measured in addition to the command, at its stamps: torque of the load at the shaft,
             positive against positive speed [N m]; speed of the prime mover over that which Z10
             belongs to [1]; supply pressure less static pressure, in place of Z9 [Pa]. By default
             the parameters count.
@@ -666,7 +666,7 @@ class Drive(Result, Mapping[str, Parameter]):
         Refinements count: friction as presliding, with the state ``"spool_deflection"``; damping
         and the line with their states; the cam ring's ripple with its mean over a turn, zero.
         Within the solenoids' hysteresis a current moves nothing: only the force, or what is
-        measured beside the command, has a model there.
+        measured in addition to the command, has a model there.
 
         Parameters
         ----------
@@ -850,14 +850,15 @@ class Drive(Result, Mapping[str, Parameter]):
         return self._steady(voltage)[0]
 
     def _steady(self, voltage: float | Sequence[float] | Array) -> tuple[float | Array, ...]:
+        """Steady current [A] and speed [rad/s] at a voltage [V], each in the voltage's shape."""
         voltage = in_si(voltage, "V", "The voltage")
         try:
-            volts = np.atleast_1d(np.array(voltage, dtype=np.float64))
+            voltages = np.atleast_1d(np.array(voltage, dtype=np.float64))
         except (TypeError, ValueError):
-            volts = np.array([np.nan])
-        if not (np.abs(volts) <= FULL_VOLTAGE).all():
+            voltages = np.array([np.nan])  # refused below
+        if not (np.abs(voltages) <= FULL_VOLTAGE).all():
             raise InputError("A steady state needs finite commands within ±10 V.")
-        current, speed = steady_states(self.parameters, volts.reshape(-1))
+        current, speed = steady_states(self.parameters, voltages.reshape(-1))
         if np.ndim(voltage) == 0:
             return float(current[0]), float(speed[0])
-        return current.reshape(volts.shape), speed.reshape(volts.shape)
+        return current.reshape(voltages.shape), speed.reshape(voltages.shape)

@@ -43,8 +43,8 @@ def sweep_drive(
         raise InputError(
             f"The rate is {rate:g} Hz, but must be between {SOURCE_RATE:g} and {FASTEST:g} Hz."
         )
-    f = checked_frequencies(frequencies, rate)
-    a = checked_amplitudes(amplitudes)
+    swept_frequencies = checked_frequencies(frequencies, rate)
+    sine_amplitudes = checked_amplitudes(amplitudes)
     if input not in ("voltage", "current"):
         raise InputError(f"The input is '{input}'; it is 'voltage' or 'current'.")
     if output not in SWEPT_OUTPUTS or output == input:
@@ -54,31 +54,31 @@ def sweep_drive(
         )
     by_voltage = input == "voltage"
     if by_voltage:
-        largest = float(a.max())
+        largest = float(sine_amplitudes.max())
         if is_real(bias) and abs(bias) + largest > FULL_VOLTAGE:
             raise InputError(
                 f"Bias and amplitude reach {abs(bias) + largest:g} V, but the card takes ±10 V."
             )
-        for frequency in f.tolist():
+        for frequency in swept_frequencies.tolist():
             step = 1.0 / (frequency * steps_of(frequency, rate))
             check_filter_stability(parameters, step)
     instance = without_ripple(drive_instance(parameters, by_voltage=by_voltage))
     return sweep(
         instance,
-        f,
-        a,
+        swept_frequencies,
+        sine_amplitudes,
         rate,
         input=input,
         output=output,
         bias=bias,
         tolerance=tolerance,
-        size=_size(instance.parts[1].p, output),
+        size=_signal_size(instance.parts[1].p, output),
         units={name: UNITS[name] for name in (input, output)},
     )
 
 
-def _size(pump: Pump, output: str) -> float:
-    """Natural size of a signal, beside which rounding is told from motion, in its SI unit."""
+def _signal_size(pump: Pump, output: str) -> float:
+    """Natural size of a signal, in its SI unit: changes far smaller than it are rounding."""
     sizes = {
         "shaft_speed": pump.Z10,
         "stroker_pressure": 1.0 / pump.Z1,
@@ -111,11 +111,11 @@ def response_table(response: FrequencyResponse, frequency: float) -> Table:
         Column("mean speed", "z.2f", "rad/s"),
     )
     table = Table("", columns)
-    # the phase within a turn of itself, as of this frequency alone
+    # within ±180°: a phase at one frequency is not followed from lower ones
     phases = np.angle(response.ratio[:, index])
     for k, amplitude in enumerate(map(float, response.amplitudes)):
         gain = phase = lag = distortion = None
-        if response.moves[k, index]:
+        if response.has_motion[k, index]:
             gain = float(response.gain[k, index])
             phase = float(np.degrees(phases[k]))
             lag = -1e3 * float(phases[k]) / (2.0 * np.pi * frequency)

@@ -130,7 +130,7 @@ class LinearDrive(LinearModel, Result):
         delay_samples = round(fine.delay * rate * substeps)
         line = tuple(f"{self.input}_{k}" for k in range(1, delay_samples + 1))
         last = tuple(f"{name}_last" for name in self.inputs)
-        # what is measured beside the command goes straight from sample to sample
+        # a measured input goes straight from sample to sample
         zero_order = [interpolation == "previous", *(False for _ in self.inputs[1:])]
         A, B, C, D = with_delay_line((fine.A, fine.B, fine.C, fine.D), delay_samples)
         A, B, C, D = lifted(A, B, C, D, substeps, zero_order)
@@ -191,8 +191,8 @@ def model_tables(
     if loop_gain is None:
         return [operating, moving, poles]
     margins = model.margins(loop_gain)
-    shown = display_unit(f"{unit}/(rad/s)")
-    loop = _key_values(f"Proportional loop, {shown.factor * loop_gain:g} {shown.name}")
+    display = display_unit(f"{unit}/(rad/s)")
+    loop = _key_values(f"Proportional loop, {display.factor * loop_gain:g} {display.name}")
     loop.add("crossover", margins.crossover or Cell(None, "none"), unit="Hz", spec=".4g")
     loop.add(
         "phase margin", _none_if_infinite(np.degrees(margins.phase_margin)), unit="deg", spec=".1f"

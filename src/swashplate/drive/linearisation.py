@@ -1,4 +1,4 @@
-"""A drive linearised: what is asked for, checked, and its linear model."""
+"""Linear model of a drive from checked inputs and outputs."""
 
 from __future__ import annotations
 
@@ -30,26 +30,10 @@ def linearize_drive(
     """Linear model of small motions about a steady state; see `Drive.linearize`."""
     if input is None:
         input = "voltage" if current is None else "current"
-    inputs: tuple[str, ...] = (input,) if isinstance(input, str) else tuple(input)
-    for name in inputs:
-        if name not in INPUTS:
-            raise InputError(f"The input is '{name}', but must be one of {', '.join(INPUTS)}.")
-    if not inputs or len(set(inputs)) != len(inputs) or set(inputs[1:]) & set(COMMANDS):
-        raise InputError(
-            "A linear model needs one input or several different ones, of which only the first "
-            f"may be a command: {', '.join(COMMANDS)}."
-        )
-    names = (outputs,) if isinstance(outputs, str) else tuple(outputs)
-    before = {inputs[0], "current"} if inputs[0] == "solenoid_force" else {inputs[0]}
-    possible = [name for name in OUTPUTS if name not in before]
-    for name in names:
-        if name not in possible:
-            raise InputError(
-                f"'{name}' is not an output of a model from {inputs[0].replace('_', ' ')}; it has "
-                f"{', '.join(possible)}."
-            )
-    if not names or len(set(names)) != len(names):
-        raise InputError("A linear model needs one output or several different ones.")
+    inputs = _checked_inputs((input,) if isinstance(input, str) else tuple(input))
+    output_names = _checked_outputs(
+        (outputs,) if isinstance(outputs, str) else tuple(outputs), inputs[0]
+    )
     if coulomb not in ("ignored", "tangent"):
         raise InputError(f"coulomb is '{coulomb}'; it is 'ignored' or 'tangent'.")
     if coulomb == "tangent" and parameters.coulomb_sign == "literal":
@@ -58,7 +42,7 @@ def linearize_drive(
             "coulomb='ignored'."
         )
     point = operating_point(parameters, inputs[0], voltage, current)
-    model = small_motion_model(parameters, point, inputs, names, coulomb)
+    model = small_motion_model(parameters, point, inputs, output_names, coulomb)
     return LinearDrive(
         name=parameters.name,
         A=model.A,
@@ -67,10 +51,38 @@ def linearize_drive(
         D=model.D,
         states=model.states,
         inputs=inputs,
-        outputs=names,
+        outputs=output_names,
         delay=parameters.numbers["tau"] if inputs[0] == "voltage" else 0.0,
-        units={name: UNITS[name] for name in (*inputs, *names)},
+        units={name: UNITS[name] for name in (*inputs, *output_names)},
         operating_point=point,
         coulomb=coulomb,
         parameters=parameters,
     )
+
+
+def _checked_inputs(names: tuple[str, ...]) -> tuple[str, ...]:
+    """Inputs of a linear model, refused unless they are known and only the first is a command."""
+    for name in names:
+        if name not in INPUTS:
+            raise InputError(f"The input is '{name}', but must be one of {', '.join(INPUTS)}.")
+    if not names or len(set(names)) != len(names) or set(names[1:]) & set(COMMANDS):
+        raise InputError(
+            "A linear model needs one input or several different ones, of which only the first "
+            f"may be a command: {', '.join(COMMANDS)}."
+        )
+    return names
+
+
+def _checked_outputs(names: tuple[str, ...], command: str) -> tuple[str, ...]:
+    """Outputs of a linear model, refused unless they are downstream of the first input."""
+    upstream = {command, "current"} if command == "solenoid_force" else {command}
+    possible = [name for name in OUTPUTS if name not in upstream]
+    for name in names:
+        if name not in possible:
+            raise InputError(
+                f"'{name}' is not an output of a model from {command.replace('_', ' ')}; it has "
+                f"{', '.join(possible)}."
+            )
+    if not names or len(set(names)) != len(names):
+        raise InputError("A linear model needs one output or several different ones.")
+    return names

@@ -1,4 +1,4 @@
-"""A drive marched: over records, and one sample at a time."""
+"""Simulate a drive over records, and one sample at a time."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from swashplate.drive.instance import check_filter_stability, drive_instance
-from swashplate.drive.records import RANGES
+from swashplate.drive.records import INPUT_RANGES
 from swashplate.drive.simulation import Simulation
 from swashplate.equations import Instance, Stepper, interpreted
 from swashplate.equations.marching import Interpolation, Record, Start, least_substeps
@@ -26,7 +26,8 @@ def simulate_drive(
 ) -> Simulation:
     """March card and pump over a voltage, or the pump alone over a current; see `Drive.simulate`.
 
-    With `start_pressure` the pump begins there [Pa] and only the card's state is that of `start`.
+    With `start_pressure` [Pa] the pump begins at that pressure; `start` then sets only the card's
+    state.
     """
     driver, record = next(iter(records.items()))
     if driver == "voltage":
@@ -38,7 +39,7 @@ def simulate_drive(
 
 
 def start_states(instance: Instance, pressure: float) -> dict[str, float]:
-    """Numbers of the pump's state that a pressure at the start sets, by path. [Pa]"""
+    """Initial values of the pump's states that a pressure at the start determines, by path. [Pa]"""
     if not np.isfinite(pressure):
         raise InputError(f"The pressure at the start must be a finite number, not {pressure}.")
     limits_of = interpreted(pressure_limits, instance.model.parts[1].replacements)
@@ -75,17 +76,29 @@ def drive_stepper(
     start: Start,
     measured: Sequence[str],
 ) -> Stepper[Sample]:
-    """The drive one sample at a time; see `Drive.stepper`."""
+    """The drive one sample at a time; see `Drive.stepper`.
+
+    `measured` are the inputs other than the voltage.
+    """
     substeps = least_substeps(rate)
     check_filter_stability(parameters, 1.0 / (rate * substeps))
+
+    def sample_of(values: Sequence[float]) -> Sample:
+        """Inputs come first in the stepper's values; of these a sample shows only the voltage."""
+        outputs = values[1 + len(measured) :]
+        return Sample(values[0], *outputs)
+
+    interpolation_of: dict[str, Interpolation] = {"voltage": interpolation}
+    for name in measured:
+        interpolation_of[name] = "linear"
     return Stepper(
         drive_instance(parameters, by_voltage=True),
         ("voltage", *measured),
         Sample._fields[1:],
         rate,
-        lambda values: Sample(values[0], *values[1 + len(measured) :]),
+        sample_of,
         start,
-        interpolation={"voltage": interpolation, **dict.fromkeys(measured, "linear")},
+        interpolation=interpolation_of,
         substeps=substeps,
-        ranges={"voltage": (-FULL_VOLTAGE, FULL_VOLTAGE), **RANGES},
+        ranges={"voltage": (-FULL_VOLTAGE, FULL_VOLTAGE), **INPUT_RANGES},
     )

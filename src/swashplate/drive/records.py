@@ -1,4 +1,4 @@
-"""What drives a drive, on the march's grid: its command and what was measured beside it."""
+"""What drives a drive, on the march's grid: its command and measured inputs."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 
 class RunKeywords(TypedDict, total=False):
-    """Inputs, and signals measured beside the command; see `Drive.simulate`."""
+    """Inputs, and signals measured in addition to the command; see `Drive.simulate`."""
 
     clip: bool
     time: ArrayLike | None
@@ -44,7 +44,7 @@ INPUTS: Mapping[str, Definition] = {
 }
 """What each measured input is. The range is that of a sample, beyond any machine: what lies outside
 is in another unit or no measurement. What is plausible is the largest size in a record."""
-RANGES: Mapping[str, tuple[float, float]] = {
+INPUT_RANGES: Mapping[str, tuple[float, float]] = {
     name: (definition.lower, definition.upper) for name, definition in INPUTS.items()
 }
 """Least and largest sample of each, as a stepper and exported code take it."""
@@ -61,7 +61,7 @@ def drive_records(
     substeps: int | None = None,
     **measured: ArrayLike | None,
 ) -> dict[str, Record]:
-    """A drive's command and what was measured beside it on the march's grid, checked.
+    """A drive's command and its measured inputs on the march's grid, checked.
 
     What was measured is a straight line between samples, whatever the command is. Pint quantities
     are turned into SI.
@@ -75,19 +75,19 @@ def drive_records(
             f"The {driver} is a single number, {command:g}: give an array with a number for each "
             f"sample{instead if driver == 'voltage' else ''}."
         )
-    beside = {
+    measured_inputs = {
         name: in_si(values, UNITS[name], f"The {name}")
         for name, values in measured.items()
         if values is not None
     }
     between: dict[str, Interpolation | None] = {driver: interpolation}
-    between |= dict.fromkeys(beside, "linear")
+    between |= dict.fromkeys(measured_inputs, "linear")
     steps = least_substeps(rate, substeps)
-    inputs = {driver: sampled(command, rate), **beside}
+    inputs = {driver: sampled(command, rate), **measured_inputs}
     records = on_grid(inputs, rate, time=time, interpolation=between, substeps=steps)
     if driver == "voltage":
         records["voltage"] = check_voltage(records["voltage"], clip)
-    for name in beside:
+    for name in measured_inputs:
         _check_measured(name, records[name].values)
     return records
 
@@ -95,7 +95,7 @@ def drive_records(
 def _check_measured(name: str, values: Array) -> None:
     """Refuse a record with a sample that no machine has, or whose size can hardly be meant."""
     definition = INPUTS[name]
-    least, most = RANGES[name]
+    least, most = INPUT_RANGES[name]
     low, high = float(values.min()), float(values.max())
     try:
         check_plausible(name, definition, max(low, high, key=abs))

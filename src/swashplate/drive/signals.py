@@ -25,7 +25,7 @@ MEASURED = {
     "pump_speed": ("1", "speed of the prime mover, relative to that of Z10"),
     "supply_pressure": ("Pa", "supply pressure less static pressure; until it is set, Z9 counts"),
 }
-"""The same of what may be measured beside the command."""
+"""Those of inputs that may be measured in addition to the command."""
 UNITS = {name: unit for name, (unit, _) in {**CHAIN, **MOTOR, **MEASURED}.items()}
 SIGNALS = tuple(CHAIN)
 OUTPUTS = ("current_sum", *SIGNALS[1:], *MOTOR)

@@ -169,8 +169,8 @@ class Simulation(Run):
             return super().active(str(limit), fine=True)
         if isinstance(limit, str):
             if limit.lower() not in self.limit_names:
-                known = ", ".join(self.limit_names)
-                raise InputError(f"There is no limit '{limit}'; there are {known}.")
+                names = ", ".join(self.limit_names)
+                raise InputError(f"There is no limit '{limit}'; there are {names}.")
             limit = Limit[limit.upper()]
         return np.asarray((self.limits & int(limit)) != 0)
 
@@ -206,8 +206,8 @@ class Simulation(Run):
             did.add(f"peak current, {way}", float(current), unit="A", spec="z.4f", section=section)
         limits = Table("", (Column("Limit"), Column("share of time", ".1%")))
         for limit in Limit:
-            words = str(limit.name).lower().replace("_", " ")
-            limits.add(words, share_cell(self.time_share(limit)))
+            name = str(limit.name).lower().replace("_", " ")
+            limits.add(name, share_cell(self.time_share(limit)))
         return did, limits
 
     def to_polars(self, units: Literal["SI", "display"] = "SI") -> polars.DataFrame:

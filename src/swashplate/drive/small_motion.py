@@ -30,7 +30,7 @@ Input = Literal[
 ]
 
 INPUTS: tuple[Input, ...] = get_args(Input)
-COMMANDS = INPUTS[:3]  # Of which one moves at a time; the others can move beside it.
+COMMANDS = INPUTS[:3]  # Of which one moves at a time; the others can move together with it.
 OUTPUTS = (
     "shaft_speed",
     "swash_angle",
@@ -138,7 +138,7 @@ def small_motion_model(
     names = _names(side, step, front.options)
     if options.friction is not None and step > 0.0:
         # the next sample knows the spool's place x and its deflection d as d e^(-h/T) - x w/x_s
-        # alone, the deflection that would be left if it came back to where it was balanced
+        # alone, the deflection that would be left if it came back to its balance
         spool = states.index("pump.spool")
         deflection = states.index("pump.deflection")
         width_of = interpreted(friction_width, pump.replacements)
@@ -184,8 +184,8 @@ def _names(side: str, step: float, options: Any) -> dict[str, str]:
     }
     if not side:
         return names
-    before = "current_rate" if step == 0.0 or options.exact is not None else "current_before"
-    return {f"card.{side}.before": before, f"card.{side}.now": "current", **names}
+    name_before = "current_rate" if step == 0.0 or options.exact is not None else "current_before"
+    return {f"card.{side}.before": name_before, f"card.{side}.now": "current", **names}
 
 
 # --- several steps a sample -----------------------------------------------------------------------

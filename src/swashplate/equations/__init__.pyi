@@ -25,7 +25,7 @@ from .fields import declared_by as declared_by
 from .fields import definition_of as definition_of
 from .fields import floats_of as floats_of
 from .fields import is_real as is_real
-from .fields import made as made
+from .fields import tuple_from as tuple_from
 from .fields import value_at as value_at
 from .language import Parsed as Parsed
 from .language import is_named_tuple as is_named_tuple

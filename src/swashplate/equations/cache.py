@@ -50,7 +50,7 @@ GENERATED = "swashplate_generated"
 DAY = 86400.0
 """[s]"""
 UNUSED = 30.0 * DAY
-"""Time after which a generated module that nobody used is removed, and machine code is made anew.
+"""Time after which a generated module that nobody used is removed, and machine code is made again.
 [s]"""
 DOCSTRING = re.compile(r'^ *""".*?"""\n', re.MULTILINE | re.DOTALL)
 
@@ -244,7 +244,7 @@ def generated(name: str, text: str, names: Mapping[str, Any]) -> dict[str, Any]:
     Its file's name begins with `name` and carries a hash of the text without its docstrings, and of
     all that the `names` it refers to reach; many processes may write it at once. `kernel`s in it
     are cached on disk as those of any file. If no folder can be written, the module is kept in
-    memory alone, and its kernels are compiled in every session.
+    memory only, and its kernels are compiled in every session.
     """
     words = set(re.findall(r"\w+", text))
     used = {word: meaning for word, meaning in names.items() if word in words}
@@ -307,9 +307,9 @@ def _tidy(folder: Path) -> None:
         if mark.exists() and time() - mark.stat().st_mtime < DAY:
             return
         mark.touch()
-        # Numba keeps machine code beside the modules, or in folders beside theirs
-        beside = folder.parent.glob(f"{escape(folder.name)}_*")
-        for swept in [folder, folder / "__pycache__", *beside]:
+        # Numba keeps machine code next to the modules, or in folders next to theirs
+        sibling_folders = folder.parent.glob(f"{escape(folder.name)}_*")
+        for swept in [folder, folder / "__pycache__", *sibling_folders]:
             for path in [*swept.glob("*.*")]:
                 if time() - path.stat().st_mtime > UNUSED:
                     path.unlink()

@@ -115,7 +115,7 @@ def remember_text(name: str, text: str) -> str:
 
 
 def equation_of_text(text: str, name: str, names: dict[str, Any]) -> Any:
-    """An equation that is known by the text of one function alone, and by what that refers to."""
+    """An equation that is known by the text of one function only, and by what that refers to."""
     file = remember_text(name, text)
     space = {**vars(math), **names}
     exec(compile(text, file, "exec"), space)
@@ -151,7 +151,7 @@ _uncompiled: dict[tuple[Any, ...], Any] = {}
 
 
 def interpreted(function: Any, replacements: Replacements = NO_REPLACEMENTS) -> Any:
-    """A function and all that it calls as plain Python, for one call where compiling costs more."""
+    """A function and all that it calls as plain Python, if compiling would take longer."""
     function, replacements = standing(function, replacements)
     python_function = plain(function)
     if not isinstance(python_function, FunctionType):
@@ -194,7 +194,7 @@ def _interpreted(member: Any, names: Iterable[str], replacements: Replacements) 
     return SimpleNamespace(**{**vars(member), **equations}) if equations else member
 
 
-# --- what a function reaches ----------------------------------------------------------------------
+# --- what a function refers to --------------------------------------------------------------------
 
 
 def _names(code: CodeType) -> Iterator[str]:
@@ -218,9 +218,12 @@ def is_function(thing: Any) -> bool:
     return plain(thing) is not thing or thing in compiled_functions
 
 
-def _reached(reaching: Any) -> Iterator[tuple[str, Any]]:
-    """What a function's own code, or the types of its arguments or fields, name outside."""
-    python_function = plain(reaching)
+def _referenced(function: Any) -> Iterator[tuple[str, Any]]:
+    """Functions, classes of named tuples and constants that a function refers to, by name.
+
+    Those that its code names, and those that the types of its arguments or fields name.
+    """
+    python_function = plain(function)
     names: list[str] = []
     if not is_named_tuple(python_function):
         names = list(dict.fromkeys(_names(python_function.__code__)))
@@ -255,22 +258,22 @@ def _types_named(python_function: Any) -> Iterator[tuple[str, Any]]:
 def closure(function: Any) -> dict[str, Any]:
     """All equations, classes of named tuples and constants that a function reaches, by name.
 
-    The function is the first entry. Of two things of one name, the second has its module's name
-    before its own.
+    The function is the first entry. If two things have the same name, the second has its module's
+    name in front.
     """
     members: dict[str, Any] = {plain(function).__name__: function}
     visited = {plain(function)}
     pending = [function]
     while pending:
-        reaching = pending.pop()
-        for name, member in _reached(reaching):
+        referring = pending.pop()
+        for name, member in _referenced(referring):
             is_constant = not (is_function(member) or is_named_tuple(member))
             if not is_constant and plain(member) in visited:
                 continue
             if name in members:
                 if is_constant and repr(members[name]) == repr(member):
                     continue
-                module = getattr(member, "__module__", None) or plain(reaching).__module__
+                module = getattr(member, "__module__", None) or plain(referring).__module__
                 name = f"{module}.{name}"
             members[name] = member
             if not is_constant:
@@ -279,9 +282,9 @@ def closure(function: Any) -> dict[str, Any]:
     return members
 
 
-def reached(functions: Iterable[Any], replacements: Replacements) -> set[FunctionType]:
-    """Plain functions of all equations that are run if some are called, those among them."""
-    functions_run: set[FunctionType] = set()
+def functions_run(functions: Iterable[Any], replacements: Replacements) -> set[FunctionType]:
+    """Plain functions of all equations that are run if some are called, these included."""
+    plain_functions: set[FunctionType] = set()
     visited = set()
     pending = [(function, replacements) for function in functions]
     while pending:
@@ -289,9 +292,10 @@ def reached(functions: Iterable[Any], replacements: Replacements) -> set[Functio
         state = (plain(function), *((old, chain) for old, chain in within.items() if chain))
         if state not in visited:
             visited.add(state)
-            functions_run.add(plain(function))
-            pending += [(called, within) for _, called in _reached(function) if is_function(called)]
-    return functions_run
+            plain_functions.add(plain(function))
+            called = [member for _, member in _referenced(function) if is_function(member)]
+            pending += [(member, within) for member in called]
+    return plain_functions
 
 
 def closure_hash(function: Any) -> str:

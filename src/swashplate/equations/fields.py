@@ -90,7 +90,7 @@ class Definition:
         return (self.symbol,)
 
     def holds(self, values: Any) -> Any:
-        """Whether a value, or each of an array, lies in the range; what is no number does not."""
+        """Whether a value, or each of an array, lies in the range; NaN does not."""
         strict = self.above is not None or not isfinite(self.lower)
         allowed: Any = values > self.lower if strict else values >= self.lower
         if isfinite(self.upper) or not self.can_be_off:
@@ -109,8 +109,8 @@ class Definition:
         if self.lower != -inf:
             low = f"{'at least' if self.above is None else 'above'} {self.lower:g}"
         high = "" if self.upper == inf else f"below {self.upper:g}"
-        words = " and ".join(part for part in (low, high) if part) or "any finite number"
-        return words + (", or inf for none" if self.can_be_off else "")
+        text = " and ".join(part for part in (low, high) if part) or "any finite number"
+        return text + (", or inf for none" if self.can_be_off else "")
 
     @property
     def plausible_range(self) -> str:
@@ -218,7 +218,7 @@ def is_real(value: object) -> TypeGuard[float]:
 
 
 def check_mapping(what: str, mapping: object) -> None:
-    """Refuse what is no mapping of names to values."""
+    """Refuse what is not a mapping of names to values."""
     if not isinstance(mapping, Mapping):
         raise InputError(f"{what} is {mapping!r}, but must be a mapping of names to values.")
 
@@ -238,14 +238,14 @@ def numbers_of(value: Any) -> list[float]:
     return numbers
 
 
-def made(kind: Any, numbers: Mapping[str, float], prefix: str = "") -> Any:
-    """A nested named tuple from numbers by path, behind a prefix; others keep their defaults."""
+def tuple_from(kind: Any, numbers: Mapping[str, float], prefix: str = "") -> Any:
+    """A nested named tuple from numbers by path after a prefix; others keep their defaults."""
     hints = get_type_hints(kind)
     values = []
     for name in kind._fields:
         path = f"{prefix}{name}"
         if is_named_tuple(hints[name]):
-            values.append(made(hints[name], numbers, f"{path}."))
+            values.append(tuple_from(hints[name], numbers, f"{path}."))
         else:
             number = numbers.get(path)
             values.append(kind._field_defaults[name] if number is None else float(number))

@@ -48,7 +48,7 @@ def cached_on_disk(name: str, key: tuple[Any, ...], make: Callable[[], T]) -> T:
     Returns
     -------
     object
-        What `make` returned, in this process or another. A damaged file is made anew.
+        What `make` returned, in this process or another. A damaged file is made again.
     """
     digest = blake2b(f"{engine_hash()} {key!r}".encode(), digest_size=10).hexdigest()
     folder = generated_folder()
@@ -86,7 +86,7 @@ def _read(path: Path | None) -> tuple[Any, ...] | None:
 @cache
 def engine_hash() -> str:
     """Hash of the source that makes texts of equations."""
-    # an installation may have byte code alone
+    # an installation may have byte code only
     digest = blake2b(__version__.encode(), digest_size=10)
     folder = Path(__file__).parent
     for path in sorted(folder.rglob("*.py")):

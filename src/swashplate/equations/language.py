@@ -229,8 +229,8 @@ def type_of(function: FunctionType, argument: str) -> Any:
     if not isinstance(hint, str):
         return hint
     try:
-        alone = SimpleNamespace(__annotations__={argument: hint})
-        return typing.get_type_hints(alone, function.__globals__, include_extras=True)[argument]
+        annotated = SimpleNamespace(__annotations__={argument: hint})
+        return typing.get_type_hints(annotated, function.__globals__, include_extras=True)[argument]
     except NameError:
         return None
 
@@ -274,7 +274,7 @@ def unchecked(function: Any) -> Parsed:
             f"The source of {f.__name__} cannot be read from {file}: write the equation in a "
             "file or in a notebook's cell, not at a bare prompt."
         )
-    full = os.path.abspath(file)  # noqa: PTH100 - the name of a notebook's cell is no path
+    full = os.path.abspath(file)  # noqa: PTH100 - the name of a notebook's cell is not a path
     starts = [os.path.abspath(folder) + os.sep for folder in sys.path if folder]  # noqa: PTH100
     longest = max((folder for folder in starts if full.startswith(folder)), key=len, default="")
     return Parsed(f, node, full[len(longest) :].replace(os.sep, "/") if longest else file)
@@ -324,7 +324,7 @@ def _check(source: Parsed) -> None:
 
 
 def _check_call(source: Parsed, node: ast.Call) -> None:
-    """Refuse a call of what certainly is no equation; a name may still be given to one later."""
+    """Refuse a call of what is certainly not an equation; a name may be given to one later."""
     function = node.func
     base = function.value if isinstance(function, ast.Attribute) else function
     if not isinstance(base, ast.Name) or base.id in source.local:

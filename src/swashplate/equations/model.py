@@ -60,7 +60,7 @@ class Window(NamedTuple):
     s: tuple[float, ...]
     """Samples, newest first."""
     f: float
-    """How far the instant looked at lies behind the newest, in samples, 0 to 1."""
+    """Age of the instant that is read, relative to the newest sample, in samples, 0 to 1."""
 
 
 @equation
@@ -143,7 +143,7 @@ class Link(NamedTuple):
 
     @property
     def after(self) -> int:
-        """The part behind which it is known."""
+        """The part after which it is known."""
         return max(source.part for source in self.sources)
 
 
@@ -191,7 +191,7 @@ class Model:
     """Numbers that a run may start from as its own unknowns, each with the paths of the states
     that it sets; a path of the state that is not listed stands for itself."""
     parts: tuple[Model, ...] = ()
-    """Models in series, this one alone if it is not joined."""
+    """Models in series; only this one if it is not joined."""
     links: Mapping[str, Link] = field(default_factory=dict)
     """Signals that are equations over the parts' signals, by name."""
     replacements: Replacements = field(default_factory=dict)
@@ -343,24 +343,24 @@ class Model:
 
 def _wrong(model: Model) -> Iterator[str]:
     """What keeps a single model from being marched, in sentences."""
-    says = f"Model {model.name}: "
+    prefix = f"Model {model.name}: "
     if not str(model.name).isidentifier():
         yield f"The name of a model is one word, such as 'valve', not {model.name!r}."
     for type_ in (model.parameters, model.state, model.inputs, model.options, model.given):
         if type_ is not None and not is_named_tuple(type_):
             yield (
-                f"{says}{type_!r} must be a named tuple, as in "
+                f"{prefix}{type_!r} must be a named tuple, as in "
                 "'class State(NamedTuple): position: float'."
             )
     for type_ in (model.parameters, model.state, model.given):
         for field_, kind in _no_floats(type_) if type_ is not None else ():
             must = "but must be a float or a named tuple of floats"
-            yield f"{says}{field_} is of type {kind}, {must}."
+            yield f"{prefix}{field_} is of type {kind}, {must}."
     for word in ("step", "sample", "rest", "settled", "limits", "domain"):
         member = getattr(model, word)
         is_left_out = member is None and word != "step"
         if not isinstance(plain(member), FunctionType) and not is_left_out:
-            yield f"{says}{word} must be an equation, not {member!r}."
+            yield f"{prefix}{word} must be an equation, not {member!r}."
     input_names = [*model.input_types]
     parameters = floats_of(model.parameters)
     for asking in model.equations:
@@ -368,28 +368,30 @@ def _wrong(model: Model) -> Iterator[str]:
             if name not in (*ARGUMENTS, *input_names):
                 choice = ", ".join((*ARGUMENTS, *input_names))
                 name_of = plain(asking).__name__
-                yield f"{says}{name_of} needs '{name}', which is not one of {choice}."
+                yield f"{prefix}{name_of} needs '{name}', which is not one of {choice}."
     for name, tap in model.taps.items():
         if name not in input_names:
-            yield f"{says}there is a tap on '{name}', but no input."
+            yield f"{prefix}there is a tap on '{name}', but no input."
         if tap.hold not in get_args(Hold):
             choice = ", ".join(get_args(Hold))
-            yield f"{says}'{name}' has the hold '{tap.hold}'; there are {choice}."
+            yield f"{prefix}'{name}' has the hold '{tap.hold}'; there are {choice}."
         if tap.delay and tap.delay not in parameters:
             choice = ", ".join(parameters)
-            yield f"{says}the delay of '{name}' is '{tap.delay}', but the parameters are {choice}."
+            yield (
+                f"{prefix}the delay of '{name}' is '{tap.delay}', but the parameters are {choice}."
+            )
     states = floats_of(model.state)
     for name in [path for paths in model.free_start.values() for path in paths]:
         if name not in states:
-            yield f"{says}free_start names '{name}', but the state has {', '.join(states)}."
+            yield f"{prefix}free_start names '{name}', but the state has {', '.join(states)}."
     inputs = {model.tap(name).signal for name in input_names}
     if "time" in inputs:
-        yield f"{says}an input cannot be called 'time', the name of the time stamps: rename it."
+        yield f"{prefix}an input cannot be called 'time', the name of the time stamps: rename it."
     for name, where in _own_names(model):
         if name in inputs:
-            yield f"{says}'{name}' is both an input and in {where}: rename one of them."
+            yield f"{prefix}'{name}' is both an input and in {where}: rename one of them."
         if name == "time":
-            yield f"{says}'time' is in {where}, but means the time stamps: rename it."
+            yield f"{prefix}'time' is in {where}, but means the time stamps: rename it."
 
 
 def _own_names(model: Model) -> Iterator[tuple[str, str]]:
@@ -406,7 +408,7 @@ def _packaged(model: Model) -> bool:
 
 
 def _no_floats(type_: type[Any]) -> Iterator[tuple[str, str]]:
-    """Fields that are no numbers, with their types' names."""
+    """Fields that are not numbers, with their types' names."""
     for name, hint in get_type_hints(type_).items():
         if is_named_tuple(hint):
             yield from _no_floats(hint)
@@ -524,12 +526,12 @@ def join(
 
 def _too_late(model: Model) -> Iterator[str]:
     """What a part of a joined model would take from outside, although it is known after it."""
-    before = [set[int]() for _ in model.parts]
+    upstream = [set[int]() for _ in model.parts]
     inputs = [(index, name) for index, part in enumerate(model.parts) for name in part.input_types]
     for index, name in inputs:
         link = model.link_of(index, name)
         for source in link.sources if link else ():
-            before[index] |= {source.part, *before[source.part]}
+            upstream[index] |= {source.part, *upstream[source.part]}
     for index, name in inputs:
         signal = model.parts[index].tap(name).signal
         part = model.parts[index].name
@@ -545,7 +547,7 @@ def _too_late(model: Model) -> Iterator[str]:
             continue
         giver = model.parts[after].name
         instead = f"put {giver} before {part}"
-        if index in {after, *before[after]}:
+        if index in {after, *upstream[after]}:
             instead = "a loop must be one model, or be closed sample by sample with steppers"
         yield (
             f"Model {model.name}: {part} needs '{signal}', which is known only after {giver}: "
@@ -596,7 +598,7 @@ class Tableau(NamedTuple):
     """Explicit Runge-Kutta method (Hairer, Nørsett and Wanner 1993, II.1)."""
 
     stages: tuple[tuple[float, ...], ...]
-    """Of each slope behind the first, the weights of those before it."""
+    """Of each slope after the first, the weights of those before it."""
     weights: tuple[float, ...]
     """Of the slopes, in the step."""
 

@@ -20,8 +20,8 @@ from typing import Any, NamedTuple, get_type_hints
 from swashplate.equations.declaration import (
     Replacements,
     equation_of_text,
+    functions_run,
     is_function,
-    reached,
 )
 from swashplate.equations.language import is_named_tuple, plain
 from swashplate.equations.model import Equation, Model, arguments_of, join
@@ -88,7 +88,7 @@ def found_at(places: Mapping[str, str]) -> Replacement:
 
 
 def check_members(members: Mapping[str, Any], names: Mapping[str, str]) -> None:
-    """Refuse a replacement whose members are no equations, or bring no named tuple along.
+    """Refuse a replacement whose members are not equations, or have no named tuple.
 
     Parameters
     ----------
@@ -120,7 +120,7 @@ def _link_equations(model: Model) -> dict[str, Equation]:
 
 def _calls(equations: Iterable[Equation], replacements: Replacements, equation: Equation) -> bool:
     """Whether any of some equations is or calls another one."""
-    return plain(equation) in reached(equations, replacements)
+    return plain(equation) in functions_run(equations, replacements)
 
 
 def replaced(
@@ -135,7 +135,7 @@ def replaced(
     old : equation
         One that the model uses.
     new : equation
-        Its replacement: the same arguments, and behind them, by name, any further parameters.
+        Its replacement: the same arguments, and after them, by name, any further parameters.
     parameters : class of named tuples, optional
         Parameters that the model gets in addition, each a float with its `Definition` and a
         default.

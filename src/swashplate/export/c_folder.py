@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.drive import (
-    RANGES,
+    INPUT_RANGES,
     Drive,
     Sample,
     check_filter_stability,
@@ -27,7 +27,14 @@ from swashplate.equations.code_generation import c_name, comment_line, filled, l
 from swashplate.equations.marching import SOURCE_RATE, check_rate
 from swashplate.errors import FileError, InputError, InputTypeError
 from swashplate.export.c_source import Exported, interface, numbers, writer_of
-from swashplate.export.variable_list import DRIVE, DRIVE_WORDS, OWN, References, Words, words_of
+from swashplate.export.variable_list import (
+    DRIVE,
+    DRIVE_DESCRIPTIONS,
+    OWN,
+    Description,
+    References,
+    descriptions_of,
+)
 from swashplate.models.amplifier import stable_step
 from swashplate.models.displacement_control import steep_stops
 from swashplate.parameters import FULL_VOLTAGE, ParameterSet
@@ -38,7 +45,7 @@ LONGEST_STEP = 1.0 / SOURCE_RATE
 LONGEST_IDENTIFIER = 63
 """Characters of a name that every C99 compiler looks at."""
 FURTHER = ("main.c", "CMakeLists.txt", "README.md")
-"""Files of a folder beside the model's own."""
+"""Files of a folder in addition to the model's own."""
 
 
 def exported_drive(drive: Drive | None = None) -> Exported:
@@ -62,7 +69,7 @@ def _exported(equations: tuple[Any, ...]) -> Exported:
         parameters=columns,
         outputs=(*Sample._fields[1:], "motor_torque", "motor_pressure_drop"),
         bounds={"voltage": FULL_VOLTAGE},
-        ranges=RANGES,
+        ranges=INPUT_RANGES,
         stable={0: stable_step},
         follows={(1, "steep"): steep_stops},
         internal=frozenset({"own"}),
@@ -115,7 +122,7 @@ class Content:
     packaged: bool
     """Whether the package's libraries have its equations."""
     references: References
-    words: Mapping[str, Words]
+    descriptions: Mapping[str, Description]
     """Meaning and unit of signals and options."""
 
     def __repr__(self) -> str:
@@ -168,8 +175,11 @@ def content_of(
                 stacklevel=3,
             )
         check_filter_stability(what.parameters, step)
-        exported, instance = exported_drive(what), drive_instance(what.parameters, by_voltage=True)
-        name, title, references, words = what.name, what.parameters.title, DRIVE, DRIVE_WORDS
+        exported = exported_drive(what)
+        instance = drive_instance(what.parameters, by_voltage=True)
+        title = what.parameters.title
+        references = DRIVE
+        descriptions = DRIVE_DESCRIPTIONS
     else:
         if not isinstance(what, Model):
             raise InputTypeError(
@@ -177,15 +187,26 @@ def content_of(
                 f"{_nearest(what)}."
             )
         instance = instance_of(what, parameters, options=options, given=given)
-        exported, name, title = Exported(what, prefix), what.name, f"Model {what.name}"
-        references, words = OWN, words_of(exported)
+        exported = Exported(what, prefix)
+        title = f"Model {what.name}"
+        references = OWN
+        descriptions = descriptions_of(exported)
     values = numbers(exported, instance, step)
     packaged = isinstance(what, Drive) and not what.parameters.equations
-    return Content(exported, instance, values, name, title, packaged, references, words)
+    return Content(
+        exported=exported,
+        instance=instance,
+        values=values,
+        name=what.name,
+        title=title,
+        packaged=packaged,
+        references=references,
+        descriptions=descriptions,
+    )
 
 
 def _nearest(what: object) -> str:
-    """How a drive is got of something else, to stand behind what must be given."""
+    """How to get a drive from something else, as a clause after what must be given."""
     if isinstance(what, ParameterSet):
         return ": Drive(parameters)"
     if isinstance(what, str | Path):
@@ -256,7 +277,7 @@ def c(
     )
     exported, values, name = content.exported, content.values, content.identifier
     texts = interface(exported)
-    words = {
+    placeholders = {
         "file": exported.file,
         "name": name,
         "type": exported.type,
@@ -269,7 +290,7 @@ def c(
     title = what.parameters.title if isinstance(what, Drive) else ""
     texts[f"{name}_values.h"] = _initialiser(exported, values, name, title)
     for file in FURTHER:
-        texts[file] = filled(source_text(f"folder/{file}"), words)
+        texts[file] = filled(source_text(f"folder/{file}"), placeholders)
     to = Path(folder)
     try:
         to.mkdir(parents=True, exist_ok=True)

@@ -45,7 +45,7 @@ Array = NDArray[np.float64]
 
 MAGIC, RESOURCE_VERSION, TOKEN_LENGTH = b"SWPDRIVE", 1, 64
 DISPLAYED = {"rad": ("deg",), "rad/s": ("deg/s", "rpm"), "Pa": ("bar",), "m": ("mm",), "s": ("ms",)}
-"""Units that people read, offered beside SI ones."""
+"""Units that people read, offered in addition to SI ones."""
 WHOLE = "fmu.c"
 """The source that an importer compiles."""
 COPYRIGHT = "Libraries and sources: the swashplate developers; numbers: their owner"
@@ -144,10 +144,10 @@ def exportable(what: Drive | Model, step: float, **numbers: Any) -> Content:
     for signal, (delay, steps) in newest(content.exported, content.instance, step).items():
         shorter = f"choose a step of {delay / steps:.3g} s or less" if delay > 0.0 else ""
         advice = shorter or "a master that sets inputs before it reads outputs gets them exactly"
-        words = "tau" if isinstance(what, Drive) else f"the delay of {signal}"
+        delay_name = "tau" if isinstance(what, Drive) else f"the delay of {signal}"
         warnings.warn(
-            f"{what.name}: {words} is {delay:g} s, below {steps:g} steps of {step:g} s, so that "
-            f"outputs depend on the {signal} at the same instant and may be one sample late; "
+            f"{what.name}: {delay_name} is {delay:g} s, below {steps:g} steps of {step:g} s, so "
+            f"that outputs depend on the {signal} at the same instant and may be one sample late; "
             f"{advice}.",
             stacklevel=3,
         )
@@ -187,7 +187,7 @@ def table_of(content: Content) -> tuple[Variable, ...]:
     """Every variable of what is exported."""
     direct = feedthrough(content.exported, content.instance, content.step)
     values = content.values.tolist()
-    return variables(content.exported, values, direct, content.words, content.references)
+    return variables(content.exported, values, direct, content.descriptions, content.references)
 
 
 def resource(numbers: Array, layout: int, token: str) -> bytes:
@@ -211,7 +211,7 @@ def _token(fmi: Version, sources: Sources, numbers: Array, table: Sequence[Varia
 
 
 def _zipped(members: Mapping[str, bytes]) -> bytes:
-    """A zip whose bytes depend on its content alone, the description first."""
+    """A zip whose bytes depend only on its content, the description first."""
     target = BytesIO()
     with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED, compresslevel=9) as archive:
         for name in sorted(members, key=lambda member: (member != "modelDescription.xml", member)):
@@ -273,10 +273,10 @@ def description(content: Content, table: Sequence[Variable], fmi: Version, token
 
 
 def _head(content: Content, table: Sequence[Variable], fmi: Version, token: str) -> dict[str, str]:
-    words = f"{content.title}. Own steps of {content.step:g} s."
+    description = f"{content.title}. Own steps of {content.step:g} s."
     read = sorted({name for variable in table for name in variable.feedthrough})
     if read:
-        words += (
+        description += (
             f" Some outputs depend on {', '.join(read)} at the same instant: a master that reads "
             "them before it has set that input sees them one step late."
         )
@@ -285,7 +285,7 @@ def _head(content: Content, table: Sequence[Variable], fmi: Version, token: str)
         "fmiVersion": fmi,
         "modelName": content.name,
         named: token,
-        "description": words,
+        "description": description,
         "copyright": COPYRIGHT,
         "license": LICENSE,
         "generationTool": f"swashplate {__version__}",
@@ -357,9 +357,9 @@ def _add_units(root: ET.Element, table: Sequence[Variable]) -> None:
             ET.SubElement(
                 element, "BaseUnit", {name: str(exponent) for name, exponent in exponents.items()}
             )
-        for shown in DISPLAYED.get(unit, ()):
-            factor = 1.0 / to_si(1.0, shown, unit, "a display unit")
-            ET.SubElement(element, "DisplayUnit", {"name": shown, "factor": repr(factor)})
+        for display_unit in DISPLAYED.get(unit, ()):
+            factor = 1.0 / to_si(1.0, display_unit, unit, "a display unit")
+            ET.SubElement(element, "DisplayUnit", {"name": display_unit, "factor": repr(factor)})
 
 
 # --- comparison -----------------------------------------------------------------------------------
@@ -367,7 +367,7 @@ def _add_units(root: ET.Element, table: Sequence[Variable]) -> None:
 
 @dataclass(frozen=True)
 class FmuComparison(Result):
-    """An FMU's outputs beside those of the drive, sample by sample."""
+    """An FMU's outputs and those of the drive, sample by sample."""
 
     name: str
     """Name of the drive."""

@@ -1,7 +1,7 @@
 """Compiled libraries: for which machines, made from which sources, and how.
 
 The package carries one library for each platform, made once from the generated C and the same for
-every drive: its numbers travel beside it (`swashplate.export.fmu`). A user-defined model, or a
+every drive: its numbers travel next to it (`swashplate.export.fmu`). A user-defined model, or a
 drive with a user-defined equation, has other C, which is compiled when it is exported.
 """
 
@@ -144,15 +144,15 @@ def sources(content: Content | None = None) -> Sources:
     """C texts of libraries and WebAssembly; by default those of the packaged drive."""
     if content is None or content.packaged:
         return _packaged_sources()
-    return _made(content.exported, content.references)
+    return _sources(content.exported, content.references)
 
 
 @cache
 def _packaged_sources() -> Sources:
-    return _made(exported_drive(), DRIVE)
+    return _sources(exported_drive(), DRIVE)
 
 
-def _made(exported: Exported, references: References) -> Sources:
+def _sources(exported: Exported, references: References) -> Sources:
     texts = interface(exported)
     layout = int(digest(texts)[:16], 16)
     header = c_header(exported, layout, references)
@@ -166,8 +166,8 @@ def one_unit(sources: Sources, fmi: str, identifier: str) -> str:
     Whatever is not of the standard's is static, and the standard's functions begin with the model's
     identifier unless the importer says otherwise, so that several can be linked into one program.
     """
-    words = {"n": fmi[0], "identifier": identifier, "model": sources.model}
-    return filled(source_text("fmu.c"), words)
+    placeholders = {"n": fmi[0], "identifier": identifier, "model": sources.model}
+    return filled(source_text("fmu.c"), placeholders)
 
 
 # --- the package's libraries ----------------------------------------------------------------------
@@ -313,8 +313,8 @@ def compiled_c(folder: Path, header: str) -> Path:
             )
         compiler = [sys.executable, "-m", "ziglang", "cc"]
     shared = ["-shared"] if ending == ".dll" else ["-shared", "-fPIC"]
-    words = ["-std=c99", "-O2", "-ffp-contract=off", *shared, "-o", f"{stem}{ending}"]
-    _run([*compiler, *words, f"{stem}.c", "-lm"], folder)
+    options = ["-std=c99", "-O2", "-ffp-contract=off", *shared, "-o", f"{stem}{ending}"]
+    _run([*compiler, *options, f"{stem}.c", "-lm"], folder)
     return folder / f"{stem}{ending}"
 
 

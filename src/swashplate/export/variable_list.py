@@ -21,7 +21,7 @@ Causality = Literal["input", "output", "parameter", "independent"]
 Variability = Literal["continuous", "tunable", "fixed"]
 
 NONE = 1e30
-"""What stands for infinity, "no limit", where a number must be finite: the numbers that follow from
+"""What stands for infinity, "no limit", if a number must be finite: the numbers that follow from
 it are the same to the last bit."""
 
 
@@ -44,20 +44,23 @@ OWN = References(0, 10_000, 20_000, 30_000, 30_001, 30_002, 40_000, 50_000)
 """Those of a user-defined model, which may have any number of each."""
 
 
-class Words(NamedTuple):
+class Description(NamedTuple):
     """What a signal or an option is."""
 
     meaning: str
     unit: str = "1"
     name: str = ""
-    """Its name outside the model, where it has another there."""
+    """Its name outside the model, if it has another there."""
 
 
-DRIVE_WORDS: dict[str, Words] = {
-    **{name: Words(said, unit) for name, (unit, said) in {**CHAIN, **MOTOR, **MEASURED}.items()},
-    "literal": Words("literal sign of the card's Coulomb term", name="literal_coulomb_sign"),
-    "split": Words("the card's limits take over within a step", name="split_card_switch"),
-    "symmetric": Words(
+DRIVE_DESCRIPTIONS: dict[str, Description] = {
+    **{
+        name: Description(said, unit)
+        for name, (unit, said) in {**CHAIN, **MOTOR, **MEASURED}.items()
+    },
+    "literal": Description("literal sign of the card's Coulomb term", name="literal_coulomb_sign"),
+    "split": Description("the card's limits take over within a step", name="split_card_switch"),
+    "symmetric": Description(
         "root of the supply pressure less the signed pressure", name="symmetric_root"
     ),
 }
@@ -88,14 +91,14 @@ class Variable:
     """Of an output: inputs that it depends on at the same instant."""
 
 
-def words_of(exported: Exported) -> dict[str, Words]:
+def descriptions_of(exported: Exported) -> dict[str, Description]:
     """Meaning and unit of the signals of a user-defined model, as far as its types declare them."""
-    words = {}
+    descriptions = {}
     for part in exported.model.parts:
         for kind in (part.state, part.signals):
             for definition, path in _declared(kind) if kind is not None else ():
-                words[path] = Words(definition.name, definition.unit or "1")
-    return words
+                descriptions[path] = Description(definition.name, definition.unit or "1")
+    return descriptions
 
 
 def _declared(kind: type) -> Iterator[tuple[Definition, str]]:
@@ -108,7 +111,7 @@ def variables(
     exported: Exported,
     values: Sequence[float],
     feedthrough: Mapping[str, frozenset[str]],
-    words: Mapping[str, Words],
+    descriptions: Mapping[str, Description],
     references: References,
 ) -> tuple[Variable, ...]:
     """Every variable of a model: inputs, outputs, parameters, settings.
@@ -124,9 +127,15 @@ def variables(
     def signal(
         name: str, number: int, kind: Literal["input", "output"], **attributes: Any
     ) -> Variable:
-        option_words = words.get(name, Words(f"{kind} {name}"))
+        option_description = descriptions.get(name, Description(f"{kind} {name}"))
         return Variable(
-            name, number, kind, "continuous", option_words.meaning, option_words.unit, **attributes
+            name,
+            number,
+            kind,
+            "continuous",
+            option_description.meaning,
+            option_description.unit,
+            **attributes,
         )
 
     listed = [
@@ -177,16 +186,16 @@ def variables(
     if exported.bounds:
         bounds = ", ".join(f"{name} beyond ±{bound:g}" for name, bound in exported.bounds.items())
         settings.append(("clip", references.CLIP, f"clip a {bounds} instead of failing", True))
-    behind = 1 + len(parameters) + len(exported.named("given"))
+    first_option = 1 + len(parameters) + len(exported.named("given"))
     for index, option in enumerate(exported.settable):
-        option_words = words.get(option[1], Words(f"option {option[1]}"))
+        option_description = descriptions.get(option[1], Description(f"option {option[1]}"))
         if option[1] != exported.free_step:
-            on = values[behind + exported.options.index(option)] != 0.0
+            on = values[first_option + exported.options.index(option)] != 0.0
             settings.append(
                 (
-                    option_words.name or option[1],
+                    option_description.name or option[1],
                     references.OPTION + index,
-                    option_words.meaning,
+                    option_description.meaning,
                     on,
                 )
             )

@@ -1,6 +1,6 @@
 """A drive with all five states, its natural modes, and whether one state is enough for it.
 
-A physical set stands behind the card and solenoids of a drive.
+A physical set is downstream of the card and solenoids of a drive.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.int8]
 
 RESOLUTION = 1.0  # Largest product of a sub-step and the fastest natural frequency.
-STABLE = 2.0  # The same where the march is no longer stable.
+STABLE = 2.0  # The same if the march is not stable any longer.
 LEAST_SUBSTEPS = 8  # Sub-steps a sample that kinks of the flow, at the orifices' limits, are worth.
 MOST_SUBSTEPS = 20_000  # Sub-steps a sample, beyond which the machine is too stiff for the march.
 
@@ -140,7 +140,7 @@ class FullOrderSimulation(Run, Tabular):
 
     def table(self) -> Table:
         """Lowest, highest and last value of each signal."""
-        numbers = (Column(words, "z.4g") for words in ("lowest", "highest", "at the end"))
+        numbers = (Column(heading, "z.4g") for heading in ("lowest", "highest", "at the end"))
         table = Table("", (Column("Signal"), *numbers, UNIT))
         for name in SIGNALS:
             values = self[name]
@@ -206,7 +206,7 @@ class FullOrderDrive:
     drive: Drive
     """Card and solenoids, and the form of the valve's root."""
     physical: PhysicalSet
-    """Everything behind the solenoids."""
+    """Everything downstream of the solenoids."""
 
     def __post_init__(self) -> None:
         if self.drive.parameters.refinements:
@@ -542,7 +542,7 @@ class Modes(Result):
     spool: complex
     """Spool on the feedback spring, the upper of a pair. [rad/s]"""
     swash: complex
-    """Swash plate on its return spring and the oil trapped behind the closed valve. [rad/s]"""
+    """Swash plate on its return spring and the oil trapped by the closed valve. [rad/s]"""
     swash_at_held_pressure: complex
     """Swash plate on its return spring alone, Kruse's reckoning. [rad/s]"""
 
@@ -561,13 +561,13 @@ class Modes(Result):
         heads = (Column("Mode"), Column("Hz", ".4g"), Column("damping", ".3f"), Column(""))
         table = Table("Modes at rest", heads)
         slow = f"τ = {-1.0 / self.slow.real:.4g} s, " if self.slow.real < 0.0 else ""
-        for name, mode, words in (
+        for name, mode, heading in (
             ("spool", self.spool, "on its feedback spring"),
             ("swash plate", self.swash, "on its spring and the trapped oil"),
             ("swash plate, held pressure", self.swash_at_held_pressure, "on its spring alone"),
             ("slow pole", self.slow, f"{slow}which one state keeps"),
         ):
-            table.add(name, self.frequency_hz(mode), self.damping_ratio(mode), words)
+            table.add(name, self.frequency_hz(mode), self.damping_ratio(mode), heading)
         return table
 
 

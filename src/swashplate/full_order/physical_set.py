@@ -49,13 +49,13 @@ QUANTITIES: Mapping[str, Definition] = {
     definition.symbol: definition for definition in declared_by(Machine)
 }
 """Quantities by name, from the spool to the load."""
-IN_PLACE_OF: Mapping[str, str] = {
+ALTERNATIVE_CHOICE: Mapping[str, str] = {
     "feedback_arm_inertia": "spool_frequency",
     "spool_damping": "spool_damping_ratio",
     "swash_inertia": "swash_frequency",
     "piston_damping": "swash_damping_ratio",
 }
-"""Quantities, and what may be chosen in their place when a set is completed."""
+"""The quantity that may be chosen instead of an inertia or damping when a set is completed."""
 CHOICES: Mapping[str, Definition] = {
     f"{part}_{what}": Definition(
         f"{meaning} of the {words}",
@@ -158,7 +158,7 @@ class PhysicalSet(Entries):
     def to_lumped(self, Z6: float | None = None) -> dict[str, Change]:
         """Lumped parameters that the set stands for; Kruse eqs. 6.56-6.70 and table 6.1.
 
-        Z1 to Z16 and Z18 by symbol, pairs (plus, minus) where the directions differ; the solenoids'
+        Z1 to Z16 and Z18 by symbol, pairs (plus, minus) if the directions differ; the solenoids'
         Z17 and Z19 to Z22 are not the pump's geometry. `Z6` is where to move to along the gauge
         Z6↔Z8: away from the stops only Z7/(1+Z6) and Z8/(1+Z6) count; by default the physical
         A_s²B/(k_r V).
@@ -295,7 +295,7 @@ def chosen_over(
             quantity = chosen_quantity(name)
             change = Parameter(quantity, meant_value(name, quantity, change))
         entries[name] = change
-        if (instead := IN_PLACE_OF.get(name)) is not None and instead not in chosen:
+        if (instead := ALTERNATIVE_CHOICE.get(name)) is not None and instead not in chosen:
             entries.pop(instead, None)
     return entries
 
@@ -310,7 +310,7 @@ def from_lumped(
     Parameters
     ----------
     lumped : ParameterSet or Drive
-        The lumped parameters that the set shall have, Z6 apart.
+        The lumped parameters that the set shall have, except Z6.
     like : str, optional
         Packaged set whose assumed values count if nothing is chosen; by default see
         `nearest_set`.
@@ -333,7 +333,7 @@ def from_lumped(
     owner = parameters.name
     _, assumed = _assumed(nearest_set(parameters.name) if like is None else like)
     entries = chosen_over(assumed, chosen)
-    for quantity, choice in IN_PLACE_OF.items():
+    for quantity, choice in ALTERNATIVE_CHOICE.items():
         if quantity in entries and choice in entries:
             raise ParameterError(
                 f"{owner}: {quantity} and {choice} are both given, but each follows from the "
@@ -359,7 +359,7 @@ def from_lumped(
 
 
 class SwingingPart(NamedTuple):
-    """A part that turns against a spring, with a mass on an arm: what its quantities are called."""
+    """A part that turns against a spring, with a mass on an arm; the names of its quantities."""
 
     inertia: str
     damping: str
@@ -374,43 +374,47 @@ class SwingingPart(NamedTuple):
 
 
 def _completed(
-    owner: str, Z: Mapping[str, float], n: Mapping[str, float]
+    owner: str, Z: Mapping[str, float], chosen: Mapping[str, float]
 ) -> dict[str, tuple[Value, str]]:
-    """Quantities that follow from the lumps and what is chosen, and from which."""
+    """Physical quantities that follow from lumped parameters Z and chosen values.
+
+    By symbol: the value, and a text that names the parameters and values that it follows from.
+    """
     if Z["Z2"] != 0.0:
         raise ParameterError(
             f"{owner}: Z2 is {Z['Z2']:g}, but a physical set has Z2 = 0, because the pressure is "
             "counted from the one that holds the load (eq. 6.56)."
         )
-    # of what is known; nothing else may be asked of it
-    machine = Machine(*(n.get(name, 0.0) for name in Machine._fields))
-    arm = n["swash_arm"]
-    area = n["piston_area"]
+    # a machine of the chosen values only: fields that are not chosen are 0 and must not be read
+    machine = Machine(*(chosen.get(name, 0.0) for name in Machine._fields))
+    swash_arm = chosen["swash_arm"]
+    area = chosen["piston_area"]
     oil = "oil_volume and bulk_modulus"
     supply = Z["Z9"] + _rest(machine)[0]
     _, stiffness = _rest(machine._replace(supply_pressure=supply))
-    spring_rate = area / (Z["Z1"] * arm)
+    spring_rate = area / (Z["Z1"] * swash_arm)
     spring_moment = Z["Z4"] ** 0.5
-    gauge = (1.0 + area**2 * stiffness / spring_rate) / (1.0 + Z["Z6"]) / stiffness
+    # lumped flows over (1 + Z6) are rates of pressure; this makes flows of them
+    flow_scale = (1.0 + area**2 * stiffness / spring_rate) / (1.0 + Z["Z6"]) / stiffness
     completed: dict[str, tuple[Value, str]] = {
         "spool_arm": (Z["Z5"], "Z5"),
         "feedback_spring_rate": (
-            spring_moment / n["feedback_spring_arm"] ** 2,
+            spring_moment / chosen["feedback_spring_arm"] ** 2,
             "√Z4 and feedback_spring_arm",
         ),
-        "control_arm": (arm / Z["Z3"], "Z3 and swash_arm"),
+        "control_arm": (swash_arm / Z["Z3"], "Z3 and swash_arm"),
         "plussing": (Z["Z18"], "Z18"),
         "spool_stroke": (Z["Z14"], "Z14"),
         "orifice_opening": (Pair(Z["Z16_plus"], Z["Z16_minus"]), "Z16"),
-        "valve_flow_gain": (Z["Z8"] * gauge, f"Z8/(1+Z6), {oil}"),
-        "piston_leakage": (Z["Z7"] * gauge, f"Z7/(1+Z6), {oil}"),
+        "valve_flow_gain": (Z["Z8"] * flow_scale, f"Z8/(1+Z6), {oil}"),
+        "piston_leakage": (Z["Z7"] * flow_scale, f"Z7/(1+Z6), {oil}"),
         "supply_pressure": (supply, "Z9 and load_torque"),
         "relief_pressure": (Z["Z15"], "Z15"),
         "return_spring_rate": (spring_rate, "Z1, piston_area and swash_arm"),
         "swash_stop": (Pair(Z["Z13_plus"], Z["Z13_minus"]), "Z13"),
-        "pump_flow_gain": (Z["Z10"] / n["motor_constant"], "Z10 and motor_constant"),
+        "pump_flow_gain": (Z["Z10"] / chosen["motor_constant"], "Z10 and motor_constant"),
         "motor_leakage": (
-            _motor_leakage(owner, Z, n),
+            _motor_leakage(owner, Z, chosen),
             "Z11 and Z12, load_torque and load_inertia",
         ),
     }
@@ -428,16 +432,16 @@ def _completed(
         damping="piston_damping",
         mass="piston_mass",
         arm_name="swash_arm",
-        arm=arm,
-        stiffness=spring_rate * arm**2,
+        arm=swash_arm,
+        stiffness=spring_rate * swash_arm**2,
         origin="Z1, swash_frequency, piston_area, swash_arm and piston_mass",
     )
     for part in (spool, swash):
-        inertia_of_mass = n[part.mass] * part.arm**2
-        inertia = n.get(part.inertia)
+        inertia_of_mass = chosen[part.mass] * part.arm**2
+        inertia = chosen.get(part.inertia)
         if inertia is None:
-            frequency = IN_PLACE_OF[part.inertia]
-            total = part.stiffness / n[frequency] ** 2
+            frequency = ALTERNATIVE_CHOICE[part.inertia]
+            total = part.stiffness / chosen[frequency] ** 2
             if inertia_of_mass > total:
                 raise ParameterError(
                     f"{owner}: {part.mass} on {part.arm_name} alone has {inertia_of_mass:.4g} "
@@ -446,10 +450,10 @@ def _completed(
                 )
             inertia = total - inertia_of_mass
             completed[part.inertia] = inertia, part.origin
-        if part.damping not in n:
-            ratio = IN_PLACE_OF[part.damping]
+        if part.damping not in chosen:
+            ratio = ALTERNATIVE_CHOICE[part.damping]
             critical = sqrt(part.stiffness * (inertia + inertia_of_mass))
-            completed[part.damping] = 2.0 * n[ratio] * critical / part.arm**2, ratio
+            completed[part.damping] = 2.0 * chosen[ratio] * critical / part.arm**2, ratio
     return completed
 
 

@@ -33,7 +33,7 @@ from swashplate.identification.estimation.unknowns import Unknown, Unknowns
 from swashplate.identification.fitting import (
     Estimated,
     Fit,
-    Solved,
+    SolvedStage,
     fingerprint,
     staged,
 )
@@ -65,7 +65,7 @@ if TYPE_CHECKING:
     import polars
 
 SETUP_FILE, ESTIMATES, STORED = "setup.toml", "estimates.csv", "fit.json"
-"""In a fit's folder, beside the drive or the model's numbers: the fit setup, the table of
+"""In a fit's folder, next to the drive or the model's numbers: the fit setup, the table of
 estimates, and what the fit keeps of itself."""
 
 
@@ -153,8 +153,8 @@ class Identification(Estimated):
 
     def tables(self) -> list[Table]:
         """Stated errors, then estimates, profiles, errors of runs, cross-validation."""
-        shown = [table for part in parts_of(self) for table in part.tables]
-        return [self.verdict.table(), *shown]
+        part_tables = [table for part in parts_of(self) for table in part.tables]
+        return [self.verdict.table(), *part_tables]
 
     def summary(self) -> str:
         """Text: the verdict, then what the command ``fit`` prints."""
@@ -167,8 +167,8 @@ class Identification(Estimated):
         for part in parts:
             if part.opened:
                 estimates += "".join(table._repr_html_() for table in part.tables)
-            shown = () if part.opened else part.tables
-            details += folded(part.title, shown, [*part.remarks, *part.sentences])
+            visible_tables = () if part.opened else part.tables
+            details += folded(part.title, visible_tables, [*part.remarks, *part.sentences])
         for line in tables.single_runs_line(self.fit.stages):
             estimates += f"<p>{escape(line)}</p>"
         return f"{self.verdict.html(estimates)}{details}"
@@ -191,7 +191,7 @@ class Identification(Estimated):
         path : path
             The file, which replaces an older one.
         truth : Drive or ParameterSet, optional
-            What virtual tests were simulated with; it stands beside the estimates.
+            What virtual tests were simulated with; it is shown next to the estimates.
 
         Returns
         -------
@@ -343,8 +343,8 @@ class Identification(Estimated):
                 source = f"{self.campaign.path.name}, {today}; 95 %: {'; '.join(ends[symbol])}"
                 parameters[symbol] = replace(parameter, status="fitted", source=source)
             elif parameter.status != "inactive":
-                before = nominal.parameters.get(symbol, parameter).source
-                source = f"{nominal.name}: {before}" if before else nominal.name
+                earlier_source = nominal.parameters.get(symbol, parameter).source
+                source = f"{nominal.name}: {earlier_source}" if earlier_source else nominal.name
                 parameters[symbol] = replace(parameter, status="fixed", source=source)
         fitted = len(self.fit.stages[0].problem.experiments)
         title = f"{self.campaign.title}: fitted to {fitted} runs, {today}"
@@ -404,22 +404,22 @@ def motion_of(runs: Iterable[Experiment]) -> Motion:
 
 def _interval_words(stages: Sequence[StageFit], fitted: ParameterSet) -> dict[str, list[str]]:
     """Intervals of the fitted parameters in words, by symbol."""
-    words: dict[str, list[str]] = {}
+    texts_by_symbol: dict[str, list[str]] = {}
     for stage in stages:
         unknowns = stage.problem.unknowns
         for estimate, unknown in zip(estimates_of(stage), unknowns, strict=True):
             if unknown.kind == "force":
                 forces = ("Z19", "Z20", "Z21", "Z22")
-                words |= {symbol: ["from the fitted forces"] for symbol in forces}
+                texts_by_symbol |= {symbol: ["from the fitted forces"] for symbol in forces}
             elif unknown.run is None:
                 ends = " to ".join(filter(None, estimate.ends()))
                 for target in (target for target in unknown.targets if target in fitted.numbers):
                     side = target.rpartition("_")[2]
                     side = f"{side} " if side in ("plus", "minus") else ""
-                    words.setdefault(fitted.definitions.find(target).symbol, []).append(
+                    texts_by_symbol.setdefault(fitted.definitions.find(target).symbol, []).append(
                         f"{side}{ends}"
                     )
-    return words
+    return texts_by_symbol
 
 
 def _seen_from(folder: Path, path: Path) -> str:
@@ -518,7 +518,7 @@ def _loaded(
     nominal = _nominal_of(path, file, model, runs)
     entries = iter(file.stages)
 
-    def solved(stage: Stage, problem: Problem) -> Solved:
+    def solved(stage: Stage, problem: Problem) -> SolvedStage:
         return _stored_stage(path, next(entries), stage, problem)
 
     fitted = file.setup.model_copy(update={"stages": file.setup.stages[: len(file.stages)]})
@@ -584,21 +584,21 @@ def _nominal_of(
     return nominal
 
 
-def _stored_stage(path: Path, entry: StoredStage, stage: Stage, problem: Problem) -> Solved:
+def _stored_stage(path: Path, stored: StoredStage, stage: Stage, problem: Problem) -> SolvedStage:
     """A stage as it was stored; refused unless it has the unknowns of the problem."""
-    sizes = {entry.solution.vector.size, len(entry.unknowns)}
-    if entry.intervals is not None:
-        sizes.add(len(entry.intervals))
-    same = entry.name == stage.name and _identities(entry.unknowns) == _identities(problem.unknowns)
-    if not same or len(sizes) > 1:
+    lengths = {stored.solution.vector.size, len(stored.unknowns)}
+    if stored.intervals is not None:
+        lengths.add(len(stored.intervals))
+    has_same_unknowns = _identities(stored.unknowns) == _identities(problem.unknowns)
+    if stored.name != stage.name or not has_same_unknowns or len(lengths) > 1:
         raise FileError(
-            f"{path}: stage {entry.name} has other parameters than its fit setup: fit again."
+            f"{path}: stage {stored.name} has other parameters than its fit setup: fit again."
         )
-    return Solved(
-        problem=replace(problem, unknowns=Unknowns(entry.unknowns)),
-        solution=entry.solution,
-        starts=entry.starts,
-        intervals=entry.intervals,
+    return SolvedStage(
+        problem=replace(problem, unknowns=Unknowns(stored.unknowns)),
+        solution=stored.solution,
+        starts=stored.starts,
+        intervals=stored.intervals,
     )
 
 

@@ -66,19 +66,20 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 OTHERS = 6
-"""Starts besides the nominal one where that ends far from what was measured: of 419 sound campaigns
-of slew eleven did, and in ten of them one of these starts reached the best. That some agree says
-nothing: in one campaign the nominal start and the first three ended in the same wrong optimum."""
+"""Starts in addition to the nominal one if that ends far from what was measured: of 419 sound
+campaigns of slew eleven did, and in ten of them one of these starts reached the best. That some
+agree says nothing: in one campaign the nominal start and the first three ended in the same wrong
+optimum."""
 ROUGH = 1e-4
 """Tolerance of these starts, of which the best goes on: optima differ by factors. Where the model
 lacks an effect, so that no start can help, six starts take 235 evaluations instead of 929."""
 LEAST_EXPLAINED = 0.4
 """Share of the variance of what was measured that a search must explain after `solving.LEG`
-evaluations, or it is given up. Channels clipped at half of their range, late by 0.2 s, behind a lag
+evaluations, or it is given up. Channels clipped at half of their range, late by 0.2 s, after a lag
 of 0.5 s, doubled, or under noise of 30 % of it left 0.57 or more in 36 campaigns; outputs of other
 runs, and runs tiled with jumps, 0 to 0.32."""
 TRIAL = 12
-"""Evaluations of each other start where the first search was given up."""
+"""Evaluations of each other start if the first search was given up."""
 WINDOW = 1.0
 """Time over which the mean speed of a position is taken. [s]"""
 UNEXPLAINED = 5.0
@@ -89,7 +90,7 @@ OF_FORCES = ("Z19", "Z21")
 """Coefficients of the solenoids that are drawn if a fit setup frees forces: those of odd powers."""
 
 
-class Solved(NamedTuple):
+class SolvedStage(NamedTuple):
     """Solution of a stage, and its starts."""
 
     problem: Problem
@@ -317,7 +318,7 @@ def fit(
     nominal, setup = stated.nominal, stated.setup
     doubts += stated.doubts
 
-    def solved(stage: Stage, problem: Problem) -> Solved:
+    def solved(stage: Stage, problem: Problem) -> SolvedStage:
         def seen(now: Progress) -> None:
             work.at(f"evaluation {now.evaluations}, cost {now.cost:.5g}")
             if watch is not None:
@@ -379,7 +380,7 @@ def staged(
     setup: FitSetup,
     nominal: Parameters,
     runs: Sequence[Experiment],
-    solved: Callable[[Stage, Problem], Solved],
+    solved: Callable[[Stage, Problem], SolvedStage],
     *,
     threads: int | None = None,
 ) -> tuple[StageFit, ...]:
@@ -448,8 +449,8 @@ def _solved(
     solver: partial[Solution],
     search: Search | None,
     doubts: Sequence[str],
-) -> Solved:
-    """See `Solved`."""
+) -> SolvedStage:
+    """See `SolvedStage`."""
     limits = {key: solver.keywords[key] for key in ("tolerance", "max_evaluations")}
     if search is not None and search.starts:
         solutions = _from_starts(stage, problem, search, limits)
@@ -471,15 +472,15 @@ def _solved(
             if share < LEAST_EXPLAINED:
                 raise InputError(_no_fit(stage, problem, planned, share, doubts))
         if len(solutions) < planned:
-            words = f"interrupted after {len(solutions)} of {planned} starts: the best of them"
-            solution = replace(best, converged=False, interrupted=True, message=words)
+            message = f"interrupted after {len(solutions)} of {planned} starts: the best of them"
+            solution = replace(best, converged=False, interrupted=True, message=message)
         elif search is not None or best.number or solution.given_up:
             solution = solver(problem, best.vector)
     if any(unknown.prior is not None for unknown in problem.unknowns) and not solution.interrupted:
         # what the residuals are worth is known only now
         problem = weighed(problem, solution.vector)
         solution = solver(problem, solution.vector)
-    return Solved(problem, solution, solutions)
+    return SolvedStage(problem, solution, solutions)
 
 
 def _from_starts(
@@ -487,10 +488,10 @@ def _from_starts(
 ) -> tuple[Solution, ...]:
     """Solutions from the nominal values and from the starts of a search."""
     # starts run side by side, so each of them runs on one thread
-    alone = replace(problem, threads=1)
+    single_threaded = replace(problem, threads=1)
     return solve_from(
-        alone,
-        [problem.start, *sobol_starts(alone, search.starts, search.seed)],
+        single_threaded,
+        [problem.start, *sobol_starts(single_threaded, search.starts, search.seed)],
         executor=search.executor,
         store=None if search.store is None else search.store / stage.name,
         origin=_origin(stage, problem, limits),
@@ -530,7 +531,7 @@ def _from_other_starts(
         )
     except KeyboardInterrupt:  # before the first of them ended
         others = ()
-    numbered = [replace(other, number=other.number + 1) for other in others]
+    numbered = [replace(result, number=result.number + 1) for result in others]
     solutions = (solution, *numbered)
     if _explained(problem, solutions[-1]):
         return solutions, len(solutions)

@@ -21,7 +21,7 @@ from swashplate.results import Result
 Array = NDArray[np.float64]
 
 
-LEVEL = 0.95
+CONFIDENCE_LEVEL = 0.95
 """Probability of the intervals."""
 
 
@@ -39,7 +39,7 @@ class Covariance(Result):
 
     @property
     def standard_errors(self) -> Array:
-        """(K,) of the solver's numbers; inf where undetermined, 0 for one at its bound."""
+        """(K,) of the solver's numbers; inf if undetermined, 0 for one at its bound."""
         has_error = self.determined | ~self.variables.free
         return np.where(has_error, np.sqrt(np.maximum(np.diag(self.matrix), 0.0)), np.inf)
 
@@ -48,11 +48,11 @@ class Covariance(Result):
         """(K,) half widths of the intervals in standard errors, Student's."""
         from scipy.special import stdtrit  # of scipy.stats, without its second to load
 
-        return np.asarray(stdtrit(self.degrees_of_freedom, 0.5 + 0.5 * LEVEL))
+        return np.asarray(stdtrit(self.degrees_of_freedom, 0.5 + 0.5 * CONFIDENCE_LEVEL))
 
     @property
     def correlation(self) -> Array:
-        """(K, K) with 1 on the diagonal; 0 beside it for what has no variance."""
+        """(K, K) with 1 on the diagonal; 0 elsewhere for what has no variance."""
         errors = np.sqrt(np.maximum(np.diag(self.matrix), 0.0))
         errors[errors == 0.0] = 1.0
         correlation: Array = np.clip(self.matrix / np.outer(errors, errors), -1.0, 1.0)
@@ -114,9 +114,9 @@ def grid_of(time: Array) -> Grid:
     """
     if time.size < 2:
         return Grid(np.zeros(time.size, np.intp), time.size, 1.0)
-    apart = np.diff(time)
-    step = float(np.median(apart))
-    steps = np.maximum(np.rint(apart / step), 1.0)
+    distances = np.diff(time)
+    step = float(np.median(distances))
+    steps = np.maximum(np.rint(distances / step), 1.0)
     gaps = int(np.count_nonzero(steps > 1.0))
     steps = np.minimum(steps, max(15 * time.size // max(gaps, 1), 2))
     places = np.concatenate([[0], np.cumsum(steps)]).astype(np.intp)
@@ -153,8 +153,8 @@ def correlation_length(autocovariance: Array, counts: Array) -> int:
     if not autocovariance[0] > 0.0:
         return 0
     rho = autocovariance / autocovariance[0]
-    before = np.concatenate([[0.0], np.cumsum(rho[1:-1] ** 2)])[: rho.size - 1]
-    band = 2.0 * np.sqrt((1.0 + 2.0 * before) / np.maximum(counts[1:], 1.0))
+    cumulated_squares = np.concatenate([[0.0], np.cumsum(rho[1:-1] ** 2)])[: rho.size - 1]
+    band = 2.0 * np.sqrt((1.0 + 2.0 * cumulated_squares) / np.maximum(counts[1:], 1.0))
     outside = np.abs(rho[1:]) > band  # of lag k at k - 1
     lengths = np.concatenate([[0], np.flatnonzero(outside) + 1])
     ends = np.minimum(lengths + np.maximum(20, lengths // 4), outside.size)
@@ -279,12 +279,12 @@ class _Spectrum:
         # a few directions at a time, as all of a long run together would not stay in the cache
         for first in range(0, shape[0], TOGETHER):
             few = slice(first, first + TOGETHER)
-            moved = self.whitening[:, few].T @ jacobian.T
+            projected = self.whitening[:, few].T @ jacobian.T
             along = self.derivatives[few]
-            along[:] = scale * rfft(grid.spread(weight * moved))
+            along[:] = scale * rfft(grid.spread(weight * projected))
             by_estimate = along / weight[0] ** 2
             if not alike:
-                by_estimate = scale * rfft(grid.spread(moved / weight))
+                by_estimate = scale * rfft(grid.spread(projected / weight))
             leverage += np.sum((along.conj() * by_estimate).real, axis=0)
         self.left: Array = 1.0 - np.clip(leverage, 0.0, 1.0)
         """(F,) part of the noise that the fit leaves."""
@@ -340,7 +340,7 @@ class _Sandwich:
     """
 
     def __init__(self, fit: LinearisedFit) -> None:
-        self.fit, self.spare = fit, fit.spare_samples  # refused where there are none
+        self.fit, self.spare = fit, fit.spare_samples  # refused if there are none
         prior = fit.prior @ fit.whitening
         self.middle: Array = (prior.T * fit.prior_noise) @ prior
         self.total: Array = np.sum((fit.whitening @ self.middle) * fit.whitening, axis=1)
@@ -363,15 +363,15 @@ class _Sandwich:
         variances = np.diag(matrix)
         by_freedom = 1.0 / np.maximum(freedom[shared], 1.0)
         for run, (_, _, follow) in inverse.runs.items():
-            own = inverse.factor.runs[run].own
-            others = np.maximum(variances[own] - self.total[own], 0.0)
+            run_columns = inverse.factor.runs[run].own
+            others = np.maximum(variances[run_columns] - self.total[run_columns], 0.0)
             # by each of the machine's unknowns, as if they were independent of each other
             shares = (follow @ by_direction) ** 2 * variances[shared]
             shares /= np.maximum(shares.sum(axis=1, keepdims=True), 1e-300)
-            squares = self.squares[own] + each * others**2 * (shares**2 @ by_freedom)
-            total = self.total[own] + others
+            squares = self.squares[run_columns] + each * others**2 * (shares**2 @ by_freedom)
+            total = self.total[run_columns] + others
             positive = squares > 0.0
-            freedom[own[positive]] = each * total[positive] ** 2 / squares[positive]
+            freedom[run_columns[positive]] = each * total[positive] ** 2 / squares[positive]
         return covariance_of(self.fit, matrix, np.maximum(freedom, 1.0))
 
 
@@ -428,10 +428,10 @@ def _covariances(fit: LinearisedFit) -> tuple[Covariance, Covariance]:
         weights = spectrum.variances(derivatives) * (spectrum.level * spectrum.twice)
         first = np.flatnonzero(np.diff(bins, prepend=-1))
         weights, bins = np.add.reduceat(weights, first, axis=1), bins[first]
-        own = fit.variables.of_run(run.name)
-        shared[run.channel][:, bins] += weights[own.size :]
-        smoothed.total[own] += weights[: own.size] @ noise.means[bins]
-        smoothed.squares[own] += weights[: own.size] ** 2 @ noise.squares[bins]
+        run_columns = fit.variables.of_run(run.name)
+        shared[run.channel][:, bins] += weights[run_columns.size :]
+        smoothed.total[run_columns] += weights[: run_columns.size] @ noise.means[bins]
+        smoothed.squares[run_columns] += weights[: run_columns.size] ** 2 @ noise.squares[bins]
 
         products = derivatives.conj() * (spectrum.twice * spectrum.residual)
         width = min(BAND, 0.5 / spectrum.step / FEWEST_BANDS)

@@ -42,7 +42,7 @@ class Fold(Result):
     held: tuple[str, ...]
     """Names of the runs that were held out."""
     lost: tuple[str, ...] = ()
-    """Unknowns on which no run left in the fold depends: where its fit leaves them is chance."""
+    """Unknowns on which no run left in the fold depends: its fit leaves their values arbitrary."""
     measures: Mapping[str, Measures] = field(default_factory=dict)
     """Measures of each channel over the runs that were held out."""
     converged: bool = False
@@ -87,7 +87,7 @@ class CrossValidation(Result):
 
 
 def folds_tables(result: CrossValidation, stages: Sequence[StageFit] = ()) -> list[Table]:
-    """Errors held out, beside those of the fit to all runs if its stages are given; the folds."""
+    """Errors held out, next to those of the fit to all runs if its stages are given; the folds."""
     fitted_columns = "tpf" if stages else ""
     of_all_runs = pooled(with_speeds(quality for stage in stages for quality in stage.runs))
     held_out = Table(

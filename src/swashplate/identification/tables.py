@@ -14,7 +14,7 @@ from swashplate.identification.estimation.drive_model import DriveModel, true_va
 from swashplate.identification.estimation.model_setup import ModelSetup
 from swashplate.identification.estimation.stages import Parameters
 from swashplate.identification.estimation.unknowns import Kind, Unknown
-from swashplate.identification.noise import LEVEL
+from swashplate.identification.noise import CONFIDENCE_LEVEL
 from swashplate.identification.stage_fit import Interval, StageFit, Status
 from swashplate.identification.statistics.determination import (
     GAUGES,
@@ -63,7 +63,7 @@ def estimates_table(
     unknowns = stage.problem.unknowns
     # in terminal, page and file, or nowhere
     truth_shown_in = "" if truth is None else "tpf"
-    ends = f"{100.0 * LEVEL:g} %"
+    ends = f"{100.0 * CONFIDENCE_LEVEL:g} %"
     table = Table(
         f"Stage {stage.stage.name}",
         (
@@ -95,9 +95,9 @@ def estimates_table(
         if truth is not None:
             assert isinstance(stage.problem.model, DriveModel)
             true = true_value(unknown, stage.problem.model, truth)
-        shown: Sequence[str] = (f"{factor * value:.5g}", *estimate.ends(factor))
+        texts: Sequence[str] = (f"{factor * value:.5g}", *estimate.ends(factor))
         if low is not None and high is not None:
-            shown = spread(factor * value, factor * low, factor * high)
+            texts = spread(factor * value, factor * low, factor * high)
         if true is not None and (low, high) != (None, None):
             inside = (-inf if low is None else low) <= true <= (inf if high is None else high)
             holds = "yes" if inside else "no"
@@ -107,12 +107,12 @@ def estimates_table(
             meaning_of(unknown, stage),
             *(() if truth is None else (Cell(unknown.unit, chosen_unit(unknown.unit).name),)),
             unknown.start,
-            Cell(value, shown[0]),
+            Cell(value, texts[0]),
             "" if own else percent(value - unknown.start, unknown.start, sign=True),
             true,
             holds,
-            Cell(low, shown[1]),
-            Cell(high, shown[2]),
+            Cell(low, texts[1]),
+            Cell(high, texts[2]),
             _half_width(value, low, high),
             estimate.standard_error,
             estimate.status,
@@ -130,9 +130,9 @@ def _half_width(value: float, low: float | None, high: float | None) -> str:
 
 
 def profiles_table(profiles: Sequence[Profile], stages: Sequence[StageFit]) -> Table:
-    """Ends of the intervals that profiles give; none if the cost does not rise enough."""
-    by_name = {stage.stage.name: stage for stage in stages}
-    ends = f"{100.0 * LEVEL:g} %"
+    """Ends of the intervals of profile likelihoods; none if the cost does not rise enough."""
+    stage_of = {stage.stage.name: stage for stage in stages}
+    ends = f"{100.0 * CONFIDENCE_LEVEL:g} %"
     table = Table(
         "Profile likelihoods, of the noise alone",
         (
@@ -146,10 +146,11 @@ def profiles_table(profiles: Sequence[Profile], stages: Sequence[StageFit]) -> T
         si=True,
     )
     for profile in profiles:
-        stage = by_name[profile.stage]
+        stage = stage_of[profile.stage]
         unknown = stage.problem.unknowns.items[profile.index]
-        lower, upper = profile.lower, profile.upper
-        if profile.better is not None:
+        lower = profile.lower
+        upper = profile.upper
+        if profile.better is not None:  # of a point that is not the optimum there is no interval
             lower = upper = None
         table.add(
             profile.stage,
@@ -173,10 +174,10 @@ def estimates_by_name(stages: Sequence[StageFit]) -> dict[str, Estimate]:
             by_name[estimate.name] = estimate
             if unknown.run is None:
                 by_name.update(dict.fromkeys(unknown.targets, estimate))
-    parameters, moved = stages[-1].parameters, _moved(stages)
+    parameters, estimated = stages[-1].parameters, _estimated_columns(stages)
     for name, value in parameters.numbers.items():
         unit = "" if isinstance(parameters, ModelSetup) else parameters[name].unit
-        status: Status = "from the forces" if name in moved else "fixed"
+        status: Status = "from the forces" if name in estimated else "fixed"
         by_name.setdefault(name, Estimate(name, value, unit, source=Interval(status)))
     return by_name
 
@@ -228,22 +229,22 @@ def meaning_of_parameter(name: str) -> str:
     return definition.name + (direction if definition.directional else "")
 
 
-def _moved(stages: Sequence[StageFit]) -> set[str]:
-    """Columns of the drive's parameters that some stage moved."""
+def _estimated_columns(stages: Sequence[StageFit]) -> set[str]:
+    """Columns of the drive's parameters that some stage estimates, its forces included."""
     problems = [stage.problem for stage in stages]
-    moved = {
+    estimated = {
         target for problem in problems for unknown in problem.unknowns for target in unknown.targets
     }
     forces = [problem.model.forces for problem in problems if isinstance(problem.model, DriveModel)]
-    return moved.union(*(force.columns for force in forces if force is not None))
+    return estimated.union(*(force.columns for force in forces if force is not None))
 
 
-def _is_moved(symbol: str, moved: Collection[str]) -> bool:
-    return any(column in moved for column in (symbol, f"{symbol}_plus", f"{symbol}_minus"))
+def _is_estimated(symbol: str, estimated: Collection[str]) -> bool:
+    return any(column in estimated for column in (symbol, f"{symbol}_plus", f"{symbol}_minus"))
 
 
 def fixed_table(stages: Sequence[StageFit], truth: ParameterSet | None = None) -> Table:
-    """The parameters that no stage moved; `truth` as it is, in no other scales."""
+    """The parameters that no stage estimates; `truth` as it is, in no other scales."""
     table = Table(
         "Fixed at their nominal values",
         (
@@ -257,15 +258,15 @@ def fixed_table(stages: Sequence[StageFit], truth: ParameterSet | None = None) -
         ),
         si=True,
     )
-    moved = _moved(stages)
+    estimated = _estimated_columns(stages)
     parameters = stages[-1].parameters
     if isinstance(parameters, ModelSetup):
         for name, value in parameters.numbers.items():
-            if name not in moved:
+            if name not in estimated:
                 table.add(name, "", value, None, "given with the model", "")
         return table
     for column, symbol in COLUMNS.items():
-        if column in moved:
+        if column in estimated:
             continue
         parameter, value = parameters[symbol], parameters.numbers[column]
         reason = ""
@@ -274,8 +275,12 @@ def fixed_table(stages: Sequence[StageFit], truth: ParameterSet | None = None) -
         if parameter.status == "inactive":
             reason = "inactive: no test reaches it"
         for gauge in GAUGES[::-1]:
-            fixed = next((name for name in gauge.fix if not _is_moved(name, moved)), None)
-            others = [name for name in gauge.moves if name != symbol and _is_moved(name, moved)]
+            fixed = next((name for name in gauge.fix if not _is_estimated(name, estimated)), None)
+            others = [
+                name
+                for name in gauge.derivatives
+                if name != symbol and _is_estimated(name, estimated)
+            ]
             if fixed == symbol and others:
                 reason = f"fixes the {gauge.name}: {gauge.determined}"
         table.add(
@@ -292,9 +297,9 @@ def fixed_table(stages: Sequence[StageFit], truth: ParameterSet | None = None) -
 
 def fixed_line(stages: Sequence[StageFit], nominal: Parameters) -> str:
     """The symbols that kept their nominal values, in a sentence."""
-    moved = _moved(stages)
+    estimated = _estimated_columns(stages)
     plain_names = (n.removesuffix("_plus").removesuffix("_minus") for n in nominal.numbers)
-    fixed = [name for name in dict.fromkeys(plain_names) if not _is_moved(name, moved)]
+    fixed = [name for name in dict.fromkeys(plain_names) if not _is_estimated(name, estimated)]
     return f"Fixed at their nominal values: {', '.join(fixed) or 'none'}."
 
 

@@ -48,7 +48,7 @@ DEVIATIONS = 1.96
 FOLLOWS = 0.5
 """Correlation of residuals with the input that counts as model error: a quarter of their square."""
 BANDS = 1.35
-"""And how many of its 95 % bands it must reach: where a band is wide, about six independent looks
+"""And how many of its 95 % bands it must reach: if a band is wide, about six independent looks
 fit into the lags, and the largest of them stays below that."""
 SURE = 0.9
 """A correlation from which no band is asked: in short runs of one slow movement it reaches 1."""
@@ -59,7 +59,7 @@ class ResidualTest(Result):
     """Correlation of the residuals of one channel of one run, with the input above all."""
 
     lags: Array
-    """(2 m - 1,) positive where the residual comes after the input. [s]"""
+    """(2 m - 1,) positive if the residual comes after the input. [s]"""
     correlation: Array
     """(2 m - 1,) of the residuals with the input."""
     band: float
@@ -115,7 +115,7 @@ def residual_test(
         raise InputError(f"{time.size} samples show no correlation; at least {FEWEST} are needed.")
     grid = grid_of(time)
     most = max(int(LONGEST * grid.size), 1)
-    shown = min(most, max(int(longest / grid.step), 1))
+    lags_kept = min(most, max(int(longest / grid.step), 1))
     residual, command = residual - residual.mean(), command - command.mean()
     of_residual, counts = _autocorrelation(residual, grid, most)
     of_command, _ = _autocorrelation(command, grid, most)
@@ -125,13 +125,18 @@ def residual_test(
     products_of_both = float(of_residual[lags_within] @ of_command[lags_within])
     inflation = max(1.0, 1.0 + 2.0 * products_of_both)
     band = min(DEVIATIONS * float(np.sqrt(inflation / time.size)), 1.0)
-    lags, correlation = np.arange(-shown, shown + 1.0) * grid.step, np.zeros(2 * shown + 1)
+    lags, correlation = (
+        np.arange(-lags_kept, lags_kept + 1.0) * grid.step,
+        np.zeros(2 * lags_kept + 1),
+    )
     scale = float(np.linalg.norm(residual) * np.linalg.norm(command))
     if scale > 0.0:
-        size = next_fast_len(grid.size + shown, real=True)
+        size = next_fast_len(grid.size + lags_kept, real=True)
         spectra = rfft(grid.spread(command), size).conj() * rfft(grid.spread(residual), size)
         products = irfft(spectra, size)
-        correlation = np.concatenate([products[size - shown :], products[: shown + 1]]) / scale
+        correlation = (
+            np.concatenate([products[size - lags_kept :], products[: lags_kept + 1]]) / scale
+        )
     return ResidualTest(lags, correlation, band, length * grid.step)
 
 
@@ -155,7 +160,7 @@ class Measures(NamedTuple):
 
     @property
     def nrmse(self) -> float | None:
-        """RMSE over the measured standard deviation; None where nothing moved."""
+        """RMSE over the measured standard deviation; None if nothing moved."""
         return self.rmse / self.spread if self.spread > 0.0 else None
 
     @property
@@ -208,7 +213,7 @@ class RunQuality(Result):
     """(m,) at the channel's stamps, its free zero included. [unit of the channel]"""
     measures: Measures
     test: ResidualTest | None
-    """None where there are too few samples."""
+    """None if there are too few samples."""
     noise: float = 0.0
     """Standard deviation of a position's noise in a speed made from it.
     [unit of the channel]"""
@@ -324,7 +329,7 @@ def with_speeds(qualities: Iterable[RunQuality]) -> tuple[RunQuality, ...]:
 
     Measured and simulated positions go through the same filters (`speed_of`, ``"exact"``), so that
     both carry the same phase. What the position's noise is after them is stated as the speed's,
-    beside measures that contain it. A position whose stamps no filter takes has no speed, nor has
+    next to measures that contain it. A position whose stamps no filter takes has no speed, nor has
     one in whose noise the speed drowns.
 
     Parameters
@@ -376,7 +381,7 @@ def with_speeds(qualities: Iterable[RunQuality]) -> tuple[RunQuality, ...]:
 
 
 def _noise_of_speed(quality: RunQuality, speed: Array) -> float:
-    """Standard deviation that the noise of a position has behind the filters of `speed_of`.
+    """Standard deviation that the noise of a position has after the filters of `speed_of`.
 
     Of an encoder that of rounding what is simulated, whose speed is given, to whole counts. Of
     another position that of its white noise.

@@ -120,15 +120,15 @@ class FrequencyResponse(Tabular):
         return np.abs(self.ratio)
 
     @property
-    def moves(self) -> NDArray[np.bool_]:
-        """True if there is an answer at all, (a, f): a small sine may stay in a dead zone."""
+    def has_motion(self) -> NDArray[np.bool_]:
+        """(a, f) whether the output moves at all: a small sine may stay in a dead zone."""
         return np.asarray(self.ratio != 0.0)
 
     @property
     def phase(self) -> Array:
         """Phase of the output, negative if it lags, followed from low to high frequencies. [rad]
 
-        The lowest frequency's is within ±π. NaN marks what `moves` denies: nothing has no phase.
+        The lowest frequency's is within ±π. It is NaN if the output does not move.
         """
         phase = np.full(self.ratio.shape, np.nan)
         for row, ratio in zip(phase, self.ratio, strict=True):
@@ -154,7 +154,7 @@ class FrequencyResponse(Tabular):
         for k, amplitude in enumerate(self.amplitudes.tolist()):
             for index in rows.tolist():
                 gain = phase = distortion = None
-                if self.moves[k, index]:
+                if self.has_motion[k, index]:
                     gain = float(self.gain[k, index])
                     phase = float(self.phase[k, index])
                     distortion = float(self.distortion[k, index])
@@ -170,18 +170,22 @@ class FrequencyResponse(Tabular):
             table.caption = f"{rows.size} of {size} frequencies shown"
         return table
 
-    def still(self) -> list[str]:
-        """Name, for each amplitude, the frequencies at which there is no answer; see `moves`."""
+    def sentences_on_no_motion(self) -> list[str]:
+        """A sentence for each amplitude under which the output does not move at some frequencies.
+
+        See `has_motion`.
+        """
         unit = self.units.get(self.input, "")
         sentences = list[str]()
-        for amplitude, moves in zip(self.amplitudes, self.moves, strict=True):
-            still = np.flatnonzero(~moves)
-            if still.size == 0:
+        for amplitude, has_motion in zip(self.amplitudes, self.has_motion, strict=True):
+            without_motion = np.flatnonzero(~has_motion)
+            if without_motion.size == 0:
                 continue
-            low, high = self.frequencies[still[[0, -1]]]
+            low, high = self.frequencies[without_motion[[0, -1]]]
             where = f"at {low:.3g} Hz" if low == high else f"from {low:.3g} to {high:.3g} Hz"
-            if high > low and still[-1] - still[0] >= still.size:
-                where = f"at {still.size} frequencies {where}"
+            are_adjacent = without_motion[-1] - without_motion[0] < without_motion.size
+            if high > low and not are_adjacent:
+                where = f"at {without_motion.size} frequencies {where}"
             size = f"{amplitude:g} {unit}".rstrip()
             sentences.append(f"No motion under {size} {where}")
         return sentences
@@ -209,16 +213,17 @@ def steps_of(frequency: float, rate: float) -> int:
 
 
 def checked_frequencies(frequencies: ArrayLike, rate: float) -> Array:
-    """Frequencies as an array, refused unless they rise and suit the rate of the steps. [Hz]"""
+    """Frequencies as an array [Hz], refused unless they rise and suit a rate of steps [Hz]."""
     check_rate(rate)
-    f = _checked(frequencies, "frequencies")
-    lowest, highest = max(SLOWEST_CYCLE, rate / MOST_STEPS), rate / FEWEST_STEPS
-    if (np.diff(f) <= 0.0).any() or f[0] < lowest or f[-1] > highest:
+    values = _checked(frequencies, "frequencies")
+    lowest = max(SLOWEST_CYCLE, rate / MOST_STEPS)
+    highest = rate / FEWEST_STEPS
+    if (np.diff(values) <= 0.0).any() or values[0] < lowest or values[-1] > highest:
         raise InputError(
             f"The frequencies must rise from {lowest:g} Hz or above to at most {highest:g} Hz, an "
             "eighth of the rate."
         )
-    return f
+    return values
 
 
 def checked_amplitudes(amplitudes: ArrayLike) -> Array:

@@ -256,7 +256,7 @@ def _step_slopes(
     """Derivatives of a step of length h [s] at the states that a march would start with.
 
     Rows are the model's states after the step, then the outputs; columns the states before it, then
-    the samples of the inputs, in the order that is returned beside them.
+    the samples of the inputs, in the order that is returned with them.
     """
     model = instance.model
     signals = tuple(initial.before)

@@ -23,10 +23,10 @@ ComplexArray = NDArray[np.complex128]
 Matrices = tuple[Array, Array, Array, Array]
 Response = Callable[[Array], ComplexArray]
 
-INTEGRATES = 3e-8
-"""Distance from s = 0, or z = 1, by the size of the poles, at which a pole counts as there.
+INTEGRATOR_DISTANCE = 3e-8
+"""Largest distance of an integrator's pole from s = 0, or z = 1, over the size of the poles. [1]
 
-Two that integrate one after the other are found some 1e-8 apart."""
+Numerically, the poles of two integrators in series lie some 1e-8 apart."""
 
 LINEAR_MODEL = Form("a linear model", (".toml", ".json"))
 
@@ -98,18 +98,23 @@ class LinearModel:
         return bool((np.abs(self.poles) < 1.0).all())
 
     @cached_property
-    def _slowest(self) -> float:
-        """Frequency far below every motion that dies out if some state integrates, else 0. [Hz]"""
-        standstill = 0.0 if self.rate is None else 1.0  # the pole of a state that integrates
-        rates = np.abs(self.poles - standstill)
-        dying = rates[rates > INTEGRATES * self._scale]
-        if dying.size == rates.size:
+    def _steady_frequency(self) -> float:
+        """Frequency at which to find steady gains if some state integrates. [Hz]
+
+        A million times below the slowest decaying pole; 0 if no state integrates.
+        """
+        integrator_pole = 0.0 if self.rate is None else 1.0
+        distances = np.abs(self.poles - integrator_pole)
+        decaying = distances[distances > INTEGRATOR_DISTANCE * self._pole_size]
+        if decaying.size == distances.size:
             return 0.0
-        return float(1e-6 * dying.min(initial=self._scale) * (self.rate or 1.0) / (2.0 * pi))
+        slowest = decaying.min(initial=self._pole_size)
+        steps_per_second = self.rate or 1.0  # of a continuous model poles are rates already
+        return float(1e-6 * slowest * steps_per_second / (2.0 * pi))
 
     @property
-    def _scale(self) -> float:
-        """Size of the poles: 1 in the z-plane, in the s-plane the fastest."""
+    def _pole_size(self) -> float:
+        """Size to compare poles with: 1 in the z-plane, that of the fastest in the s-plane."""
         if self.rate is not None:
             return 1.0
         return float(np.abs(self.poles).max(initial=0.0)) or 1.0
@@ -164,8 +169,8 @@ class LinearModel:
                 f"The model of {self.name} has no input '{input}'; it has {', '.join(self.inputs)}."
             )
         column = 0 if input is None else self.inputs.index(input)
-        steady = (f == 0.0) & (self._slowest > 0.0)
-        s = 2j * np.pi * np.where(steady, self._slowest, f)
+        steady = (f == 0.0) & (self._steady_frequency > 0.0)
+        s = 2j * np.pi * np.where(steady, self._steady_frequency, f)
         point = s if h is None else np.exp(s * h)
         n = self.A.shape[0]
         system = point[:, np.newaxis, np.newaxis] * np.eye(n) - self.A
@@ -175,9 +180,10 @@ class LinearModel:
         if column == 0:
             response = response * np.exp(-s * self.delay)
         if steady.any():
-            # halving with the frequency, an output integrates once; a quarter of it, twice
+            # if twice the frequency halves the gain, the output integrates once; if it leaves a
+            # quarter, twice
             near = response[:, steady]
-            twice = self.response([2.0 * self._slowest], input)
+            twice = self.response([2.0 * self._steady_frequency], input)
             ratio = np.maximum(np.abs(near), 1e-300) / np.maximum(np.abs(twice), 1e-300)
             order = np.maximum(np.rint(np.log2(ratio)), 0.0)
             growth = (near * s[steady] ** order).real
@@ -190,9 +196,10 @@ class LinearModel:
 
     def _refuse_unstable(self) -> None:
         """Refuse a model with a pole that grows; one that integrates is fine."""
-        sampled = self.rate is not None
-        growth = np.abs(self.poles) - 1.0 if sampled else self.poles.real
-        integrates = np.abs(self.poles - sampled) <= INTEGRATES * self._scale
+        is_sampled = self.rate is not None
+        integrator_pole = 1.0 if is_sampled else 0.0
+        growth = np.abs(self.poles) - 1.0 if is_sampled else self.poles.real
+        integrates = np.abs(self.poles - integrator_pole) <= INTEGRATOR_DISTANCE * self._pole_size
         if (growth[~integrates] >= 0.0).any():
             raise DomainError(
                 f"{self.name}: the linear model is unstable (poles {self.poles}), so bandwidth and "
@@ -201,7 +208,7 @@ class LinearModel:
 
     def _search_end(self) -> float:
         """Frequency far beyond all poles, or half the rate of a sampled model. [Hz]"""
-        return 1e3 * self._scale if self.rate is None else 0.5 * self.rate
+        return 1e3 * self._pole_size if self.rate is None else 0.5 * self.rate
 
     def _largest(self, grid: Array) -> float:
         """Largest magnitude of the first output's response."""
@@ -284,17 +291,17 @@ class LinearModel:
         6.8
         """
 
-        def loop(frequency: Array) -> ComplexArray:
-            factor = np.asarray(controller(frequency) if callable(controller) else controller)
-            if factor.dtype.kind not in "iufc" or factor.shape not in ((), frequency.shape):
+        def open_loop(frequency: Array) -> ComplexArray:
+            gain = np.asarray(controller(frequency) if callable(controller) else controller)
+            if gain.dtype.kind not in "iufc" or gain.shape not in ((), frequency.shape):
                 raise InputError(
                     f"{self.name}: the controller must be a gain, or a function of frequencies "
                     "[Hz] that gives as many numbers."
                 )
-            return np.asarray(factor * self.response(frequency)[0])
+            return np.asarray(gain * self.response(frequency)[0])
 
         self._refuse_unstable()
-        return loop_margins(loop, self.delay, self._search_end(), self.name)
+        return loop_margins(open_loop, self.delay, self._search_end(), self.name)
 
     # --- other forms ------------------------------------------------------------------------------
 

@@ -65,8 +65,8 @@ def look(
             arrays.append(numbers)
     lengths = [signal.rows for signal in readable]
     columns = [(signal.name, signal.unit) for signal in readable]
-    shown = {"format": form, "columns": columns, "left_out": left_out, "lengths": lengths}
-    return shown, arrays
+    contents = {"format": form, "columns": columns, "left_out": left_out, "lengths": lengths}
+    return contents, arrays
 
 
 _LARGEST = 256 << 20
@@ -90,7 +90,7 @@ def _form_of(reader: str, path: Path) -> str:
         return "MDF 4"
     if reader != "MATLAB":
         return reader
-    # HDF5 begins at 0 or, behind MATLAB's own header, at a power of two
+    # HDF5 begins at 0 or, after MATLAB's own header, at a power of two
     if any(head[offset:].startswith(b"\x89HDF\r\n\x1a\n") for offset in (0, 512, 1024, 2048)):
         return "MATLAB 7.3"
     if size > _LARGEST:
@@ -333,13 +333,13 @@ def _wave_rows(array: Any) -> dict[str, Array]:
         [str(word).lower() for word in labels[name].asstr()[...]]
         for name in ("complex", "radiating_dof")
     )
-    moved = [number for number, freedom in enumerate(freedoms) if freedom in _MOTIONS]
-    motions = np.array([_MOTIONS.index(freedoms[number]) + 1.0 for number in moved])
+    motion_numbers = [number for number, freedom in enumerate(freedoms) if freedom in _MOTIONS]
+    motions = np.array([_MOTIONS.index(freedoms[number]) + 1.0 for number in motion_numbers])
     directions, frequencies = (np.asarray(labels[name][...], np.float64) for name in _AXES[:2])
     grids = np.meshgrid(directions, frequencies, motions, indexing="ij")
     columns = dict(zip(("wave_direction", "omega", "motion"), grids, strict=True))
     for part in ("re", "im"):
-        columns[part] = np.asarray(table[components.index(part)][..., moved], np.float64)
+        columns[part] = np.asarray(table[components.index(part)][..., motion_numbers], np.float64)
     return {name: values.ravel() for name, values in columns.items()}
 
 
@@ -359,7 +359,7 @@ class _Refusal(logging.Handler):
 
 @contextmanager
 def _tdms(path: Path) -> Iterator[Iterable[_Item]]:
-    """npTDMS on a file; an index beside it, which may belong to another, is not used."""
+    """npTDMS on a file; an index next to it, which may belong to another, is not used."""
     nptdms = _library(path, "npTDMS", "tdms")
     nptdms.log.log_manager.console_handler.setLevel(logging.CRITICAL)
     logger, refusal = logging.getLogger("nptdms"), _Refusal()

@@ -51,7 +51,7 @@ class TextOptions:
     header_row: int | None = None
     encoding: str | None = None
 
-    # pydantic, where this is a part of a larger schema: a misspelt key is refused
+    # pydantic, if this is a part of a larger schema: a misspelt key is refused
     __pydantic_config__: ClassVar[Any] = {"extra": "forbid"}
 
     def __post_init__(self) -> None:
@@ -174,7 +174,7 @@ def date_form(cell: str) -> str | None:
     return None
 
 
-def shown(cell: str) -> str:
+def short_cell(cell: str) -> str:
     """A cell for a sentence: short and printable."""
     text = printable(cell.strip())
     return text if len(text) <= 40 else f"{text[:37]}..."
@@ -219,7 +219,7 @@ class TextLayout(NamedTuple):
         return [cell.strip() for cell in cells]
 
     def names(self, line: str) -> list[str]:
-        """Cells of a header; where spaces delimit, the one before a unit does not."""
+        """Cells of a header; if spaces delimit, the one before a unit does not."""
         if self.delimiter == " ":
             line = re.sub(r"[ \t]+([\[(])", "\0\\1", line)
         return [cell.replace("\0", " ") for cell in self.cells(line)]
@@ -237,7 +237,7 @@ class TextLayout(NamedTuple):
         return len(cells) == self.width and bool(numbers) and all(numbers)
 
     def is_blank(self, line: str) -> bool:
-        """Whether a line is no row; one of nothing but tabs is a row of empty cells."""
+        """Whether a line is not a row; one of nothing but tabs is a row of empty cells."""
         if line.strip():
             return False
         return self.delimiter != "\t" or len(self.cells(line)) != self.width
@@ -265,7 +265,7 @@ def find_layout(lines: Sequence[str], options: TextOptions, path: Path) -> TextL
         row = next((line for line in lines if "," in line), lines[0])
         readings = " or as ".join(map(str, equal))
         raise FileError(
-            f"{path} can be read in more than one way, '{shown(row)}' as {readings}; "
+            f"{path} can be read in more than one way, '{short_cell(row)}' as {readings}; "
             "give 'delimiter' or 'decimal' as an option."
         )
     layout = equal[0]  # with a point: if both signs are alike, there are whole numbers only
@@ -540,18 +540,20 @@ _KNOWN_UNITS = frozenset(
     - – − 1 none n/a dimensionless
     """.split()  # noqa: SIM905 - a list of so many strings is unreadable
 )
-_SHORT = 4
-"""Letters that a word may have that is taken for a unit because of its neighbours."""
+_LONGEST_UNKNOWN_UNIT = 4
+"""Most letters of an unknown word that counts as a unit because known units are next to it."""
 _PARTS = re.compile(r"[\s*/·.()^²³0-9-]+")
 _BRACKETS = re.compile(r"\[.*\]|\(.*\)")
 
 
 def _units_of(cells: Sequence[str]) -> _Units | None:
-    """Units in a row of units, None for an empty cell; or None if the row is not one."""
+    """Units in a row of a table, None for an empty cell; None if it is not a row of units."""
     filled = [cell for cell in cells if cell]
-    # a short word of another language may stand among units, such as Imp for pulses
-    others = [cell for cell in filled if not _is_unit(cell)]
-    if 2 * len(others) >= len(filled) or any(len(cell) > _SHORT for cell in others):
+    # a short word of another language may be among units, such as Imp for pulses
+    unknown_words = [cell for cell in filled if not _is_unit(cell)]
+    if 2 * len(unknown_words) >= len(filled):
+        return None
+    if any(len(word) > _LONGEST_UNKNOWN_UNIT for word in unknown_words):
         return None
     units: _Units = []
     for cell in cells:

@@ -205,7 +205,7 @@ _LISTED = 30
 
 
 def split_unit(name: str) -> tuple[str, str | None]:
-    """A header's name and the unit in brackets behind it: ``time [ms]``, ``time (ms)``."""
+    """A header's name and the unit in brackets after it: ``time [ms]``, ``time (ms)``."""
     match = _BRACKETED.fullmatch(name)
     if match is None or not match[1]:
         return name, None
@@ -215,7 +215,7 @@ def split_unit(name: str) -> tuple[str, str | None]:
 def unit_of(column: LogColumn, requested: str, si: str) -> str:
     """Unit of a column that `Log.find` returned: its own, the ending of its name, or else `si`.
 
-    A name like ``time_ms`` means milliseconds where that is a unit of the same quantity, or where
+    A name like ``time_ms`` means milliseconds if that is a unit of the same quantity, or if
     it was asked for as ``time``, and is just a name otherwise.
     """
     if column.unit is not None:
@@ -254,11 +254,11 @@ def check_stamps(log: Log, column: str, stamps: Array) -> None:
     late = np.flatnonzero(np.diff(stamps) <= 0.0)
     if not late.size:
         return
-    before, after = map(float, stamps[late[0] : late[0] + 2])
+    earlier, later = map(float, stamps[late[0] : late[0] + 2])
     row = log.first + int(late[0])
-    what = f"goes back from {before!r} to {after!r} in data row {row + 2}"
-    if before == after:
-        what = f"has {before!r} twice, in data rows {row + 1} and {row + 2}"
+    what = f"goes back from {earlier!r} to {later!r} in data row {row + 2}"
+    if earlier == later:
+        what = f"has {earlier!r} twice, in data rows {row + 1} and {row + 2}"
     others = f", the first of {late.size} such rows" if late.size > 1 else ""
     raise FileError(f"{log.path}: column '{column}' {what}{others}; time stamps must increase.")
 

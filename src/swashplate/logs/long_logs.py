@@ -28,7 +28,7 @@ def in_parts(log: Log, names: Sequence[str]) -> Log:
 
     Of a text log, the columns of these names (as in `Log.find`). They are held in memory; of one
     of more rows than `MOST_HELD` they are converted to Parquet once, piece after piece:
-    ``log.csv.parquet`` beside it serves until the log changes. Other formats are as they are.
+    ``log.csv.parquet`` next to it serves until the log changes. Other formats are as they are.
     """
     import polars as pl
 
@@ -56,7 +56,7 @@ def in_parts(log: Log, names: Sequence[str]) -> Log:
 
 
 def _held(log: Log, names: Sequence[str]) -> Log:
-    """A log of the columns of some names alone, which are in memory."""
+    """A log of the columns of some names only, which are in memory."""
     columns = tuple(dict.fromkeys(log.find(name) for name in names))
     arrays = [*log.read([column.name for column in columns]).values()]
 

@@ -92,7 +92,7 @@ def open_as(format: str, path: str | Path) -> Log:
 
 
 def _check_readable(source: Path, why: str = "") -> None:
-    """Refuse a folder, a file whose name is wrong already, and what is no ordinary, full file."""
+    """Refuse a folder, a file of an unsuitable name, and what is not an ordinary, full file."""
     try:
         if source.is_dir():
             why = "is a folder, not a log"
@@ -146,8 +146,8 @@ def read_series(
     Raises
     ------
     FileError
-        If the file cannot be read, a cell is no number, a number is missing or not finite, or time
-        stamps do not increase; the sentence names file, column and row.
+        If the file cannot be read, a cell is not a number, a number is missing or not finite, or
+        time stamps do not increase; the sentence names file, column and row.
     InputError
         If a column is missing or its unit wrong; the sentence lists what there is.
 

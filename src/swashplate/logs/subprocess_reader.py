@@ -52,19 +52,21 @@ def open_in_subprocess(reader: str, path: Path) -> Log:
     def load(positions: Sequence[int], first: int = 0, last: int | None = None) -> list[Array]:
         return ask([*positions], first, last)[1]
 
-    shown = ask()[0]
-    columns = tuple(LogColumn(*column) for column in shown["columns"])
-    return Log(path, shown["format"], columns, load, shown["left_out"], tuple(shown["lengths"]))
+    contents = ask()[0]
+    columns = tuple(LogColumn(*column) for column in contents["columns"])
+    return Log(
+        path, contents["format"], columns, load, contents["left_out"], tuple(contents["lengths"])
+    )
 
 
 class _ReaderProcess:
-    """The other process. It is asked in a line of JSON and answers in one, arrays behind it."""
+    """The other process. It is asked in a line of JSON and answers in one, arrays after it."""
 
     lock = threading.Lock()
     running: _ReaderProcess | None = None
 
     def __init__(self) -> None:
-        # what it says of an error, and what libraries leave behind of a damaged file
+        # what it says of an error, and what libraries leave of a damaged file
         self._scratch = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
         self._error_file = Path(self._scratch.name) / "errors"
         threads = min(4, os.cpu_count() or 1)  # each takes a share of the memory that it may have
@@ -161,7 +163,7 @@ def _ended(process: subprocess.Popen[bytes], scratch: tempfile.TemporaryDirector
 # --- the other process ----------------------------------------------------------------------------
 
 _SPARE = 3 << 30
-"""Memory that reading takes at least, most of it addresses alone. [byte]"""
+"""Memory that reading takes at least, most of it mere addresses. [byte]"""
 _INFLATION = 1032
 """No more bytes than this come out of one byte of zlib's; Parquet's codecs are no better."""
 _USED = Path("/proc/self/statm")
@@ -173,7 +175,7 @@ def serve() -> None:
     os.dup2(2, 1)  # what libraries print must not get between the answers
     warnings.simplefilter("ignore")
     for line in sys.stdin.buffer:
-        reader, name, shown, *requested = json.loads(line)
+        reader, name, name_in_messages, *requested = json.loads(line)
         answer, arrays = dict[str, Any](), list[Array]()
         try:
             _limit_memory(Path(name))
@@ -188,7 +190,7 @@ def serve() -> None:
                     f"{name} cannot be read as {reader}, it is damaged or of another kind: "
                     f"{first_sentence(error)}."
                 )
-            answer = {"error": what.replace(name, shown), "kind": type(error).__name__}
+            answer = {"error": what.replace(name, name_in_messages), "kind": type(error).__name__}
         answer["sizes"] = [array.size for array in arrays]
         answers.write(json.dumps(answer).encode() + b"\n")
         for array in arrays:

@@ -27,7 +27,7 @@ from swashplate.logs.dialect import (
     find_layout,
     is_number_text,
     read_heading,
-    shown,
+    short_cell,
 )
 from swashplate.logs.log import Array, Log, LogColumn, printable
 
@@ -37,10 +37,10 @@ if TYPE_CHECKING:
 PIECE = 1 << 20
 """Bytes that are read at a time."""
 LONGEST_LINE = 1 << 24
-"""A line of more characters is no row of a table."""
+"""A line of more characters is not a row of a table."""
 _HEAD = 2000  # lines in which the header and the first row of data must be
 _SAMPLE = 60  # lines that decide on delimiter and decimal sign, from the start and all over
-_SAMPLED = 1 << 20  # letters of them: fewer lines where there are thousands of columns
+_SAMPLED = 1 << 20  # letters of them: fewer lines if there are thousands of columns
 
 
 def open_text(path: Path, options: TextOptions | None = None) -> Log:
@@ -123,7 +123,7 @@ class _Table:
             count += len(lines)
 
     def _at_once(self, piece: str, begin: int) -> tuple[Sequence[int], polars.DataFrame] | None:
-        """Numbers of a piece's lines, and their cells; None if some may be no plain rows."""
+        """Numbers of a piece's lines, and their cells; None if some may not be plain rows."""
         import polars as pl
 
         text = piece.split("\n", max(self.first - begin, 0))[-1]
@@ -202,7 +202,7 @@ class _Table:
             kind = f"number with a decimal {'comma' if other_mark == '.' else 'point'}"
         raise FileError(
             f"{self.path}: column '{self.columns[position].name}' holds "
-            f"'{shown(text[row])}', which is not a {kind}, in data row {count + row + 1} "
+            f"'{short_cell(text[row])}', which is not a {kind}, in data row {count + row + 1} "
             f"(line {lines[row]})."
         )
 
@@ -240,7 +240,7 @@ class _Clock:
     """A column of dates of one form, read piece after piece.
 
     Stamps count from 1970 in universal time if a zone is written; a clock without a date begins
-    anew at midnight.
+    again at midnight.
     """
 
     def __init__(self, form: str) -> None:

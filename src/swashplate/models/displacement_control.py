@@ -398,27 +398,38 @@ def tight_step(pressure: float, opening: float, p: Stroking, h: float, symmetric
 def _tight_step(
     pressure: float, opening: float, p: Stroking, h: float, symmetric: Flag
 ) -> tuple[float, float, float, float, float, float, float]:
-    # that by Z7 is the one at Z7 = 0: the leakage's rate along the parabola, carried to the end of
-    # the step and integrated by the trapezoidal rule
+    """Partial derivatives of the pressure after one step of a machine without leakage.
+
+    In this order by: pressure δP, opening x_eff, Z6, Z7, Z8, Z9, step h. With the root
+    r = √((Z9 - σδP)/2), which is r_end = r - σ g x_eff after the step, and the gain
+    g = Z8 h/(4 (1 + Z6)), the pressure is σ (Z9 - 2 r_end²).
+
+    Z7 is 0 here, but the derivative by it is not: the pressure that leakage takes, at its rate
+    along the parabola, is carried to the end of the step and integrated by the trapezoidal rule.
+    """
     head, sign = flow_head(pressure, opening, p.Z9, symmetric)
-    r = sqrt(head)
-    inverse = 1.0 / (1.0 + p.Z6)
+    root = sqrt(head)
+    mobility = 1.0 / (1.0 + p.Z6)
     gain = 0.25 * p.Z8 * h / (1.0 + p.Z6)
-    if sign * gain * opening > r:
+    if sign * gain * opening > root:
+        # the head is used up within the step: the pressure is σ Z9
         return 0.0, 0.0, 0.0, 0.0, 0.0, sign, 0.0
-    half_inverse = 0.5 / r if head > 0.0 else 0.0
-    r_end = r - sign * gain * opening
-    by_gain = 4.0 * opening * r_end
-    by_root = 4.0 * gain * opening
-    leaked = pressure * (r_end * (2.0 * half_inverse)) + pumped(pressure, opening, gain, r, sign)
+    root_by_head = 0.5 / root if head > 0.0 else 0.0
+    root_at_end = root - sign * gain * opening
+    pressure_by_gain = 4.0 * opening * root_at_end
+    pressure_by_root = 4.0 * gain * opening
+    carried_to_end = root_at_end * (2.0 * root_by_head)
+    pressure_at_end = pumped(pressure, opening, gain, root, sign)
+    # twice the mean of the pressures at both ends
+    leaking_pressure = pressure * carried_to_end + pressure_at_end
     return (
-        1.0 - sign * by_root * (0.5 * half_inverse),
-        4.0 * gain * r_end,
-        -by_gain * (0.25 * p.Z8 * h * (inverse * inverse)),
-        -0.5 * h * inverse * leaked,
-        by_gain * (0.25 * h * inverse),
-        by_root * (0.5 * half_inverse),
-        by_gain * (0.25 * p.Z8 * inverse),
+        1.0 - sign * pressure_by_root * (0.5 * root_by_head),
+        4.0 * gain * root_at_end,
+        -pressure_by_gain * (0.25 * p.Z8 * h * (mobility * mobility)),
+        -0.5 * h * mobility * leaking_pressure,
+        pressure_by_gain * (0.25 * h * mobility),
+        pressure_by_root * (0.5 * root_by_head),
+        pressure_by_gain * (0.25 * p.Z8 * mobility),
     )
 
 

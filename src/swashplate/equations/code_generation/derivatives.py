@@ -19,7 +19,7 @@ _derived_functions: dict[Any, Derived] = {}
 
 
 def declared(function: Any) -> Callable[[F], F]:
-    """Declare the derivatives of an equation, where the generated ones would not do.
+    """Declare the derivatives of an equation, if the generated ones do not do.
 
     Parameters
     ----------

@@ -28,19 +28,28 @@ def _choose(test: bool, if_true: Any, if_false: Any) -> Any:
     return if_true if test else if_false
 
 
-def _selected(typing: Any, test: Any, if_true: Any, if_false: Any) -> Any:
-    kind = typing.unify_types(if_true, if_false)
+def _select_intrinsic(typing: Any, test: Any, if_true: Any, if_false: Any) -> Any:
+    """Signature and code of `choose` for Numba: LLVM's ``select`` of two numbers of one type."""
+    result_type = typing.unify_types(if_true, if_false)
 
     def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        sides = (context.cast(builder, values[side], signature.args[side], kind) for side in (1, 2))
-        return builder.select(values[0], *sides)
+        test_value, true_value, false_value = values
+        _, true_type, false_type = signature.args
+        return builder.select(
+            test_value,
+            context.cast(builder, true_value, true_type, result_type),
+            context.cast(builder, false_value, false_type, result_type),
+        )
 
-    return kind(types.boolean, if_true, if_false), generate
+    return result_type(types.boolean, if_true, if_false), generate
 
 
-choose: Any = _choose if JIT_OFF else intrinsic(_selected)
-"""``choose(test, a, b)`` is one of two numbers that both have been computed: from ``a if test else
-b`` the compiler makes branches, or a choice between two addresses, and gathers."""
+choose: Any = _choose if JIT_OFF else intrinsic(_select_intrinsic)
+"""``choose(test, a, b)`` is one of two numbers, both computed before.
+
+It is not written as ``a if test else b``: from that the compiler makes a branch, or a choice
+between two addresses to load from, and loops no longer become good vector code.
+"""
 
 
 @lowers(choose)
@@ -49,10 +58,10 @@ def _lowered_choice(code: Lowering, test: Operand, if_true: Operand, if_false: O
 
 
 FUNCTIONS: dict[str, Any] = {name: function for function, name in [*MATH.items(), *CHOICES.items()]}
-"""What texts call."""
+"""Functions that generated texts call, by name."""
 FUNCTIONS["choose"] = choose
 RESERVED = {*FUNCTIONS, "inf", "nan", "range", "int", "float", "None", "True", "False"}
-"""Names that texts use themselves."""
+"""Names that generated texts must not give to values."""
 
 
 _clock = {"depth": 0.0, "seconds": 0.0}
@@ -63,7 +72,7 @@ def generating(function: Callable[P, R]) -> Callable[P, R]:
     remembered = lru_cache(maxsize=256)(function)
 
     @wraps(function)
-    def alone(*args: P.args, **kwargs: P.kwargs) -> R:
+    def locked(*args: P.args, **kwargs: P.kwargs) -> R:
         with GENERATING:
             start = perf_counter()
             _clock["depth"] += 1.0
@@ -74,7 +83,7 @@ def generating(function: Callable[P, R]) -> Callable[P, R]:
                 if not _clock["depth"]:
                     _clock["seconds"] += perf_counter() - start
 
-    return alone
+    return locked
 
 
 def generating_time() -> float:
@@ -127,11 +136,11 @@ class Function:
         return space[self.name]
 
 
-def fresh_name(stem: str, taken: set[str]) -> str:
+def fresh_name(stem: str, used_names: set[str]) -> str:
     """A name that is not yet taken, and is from now on."""
     name, times = stem, 1
-    while name in taken:
+    while name in used_names:
         times += 1
         name = f"{stem}_{times}"
-    taken.add(name)
+    used_names.add(name)
     return name

@@ -60,7 +60,7 @@ class Derived(Function):
 
 def derived_function(
     name: str,
-    says: str,
+    docstring: str,
     formals: Sequence[str],
     results: Sequence[tuple[str, Node]],
     by: Sequence[tuple[str, str]],
@@ -79,7 +79,12 @@ def derived_function(
     inputs = tuple(path for path, _ in by)
     hints = {**labels, **gradients.hints(outputs, inputs, labels)}
     text, functions = function_text(
-        name, says, formals, [*gradients.values, *gradients.partials.values()], hints, flat=True
+        name,
+        docstring,
+        formals,
+        [*gradients.values, *gradients.partials.values()],
+        hints,
+        always_tuple=True,
     )
     for argument in formals:
         if argument in FUNCTIONS and re.search(rf"\b{argument}\(", text):

@@ -173,7 +173,7 @@ class Inner(NamedTuple):
     source: Parsed
     labels: dict[Node, str]
     origins: dict[Node, Parsed]
-    taken: set[str]
+    used_names: set[str]
     leading: dict[str, str]
     """Kinds of the scalars of its first arguments, which the loop gives."""
     formals: dict[str, str]
@@ -187,13 +187,15 @@ class Inner(NamedTuple):
         """Name of the equation."""
         return self.source.name
 
-    def function(self, *, flat: bool = False) -> Function:
-        """The equation as a function of scalars, which returns a tuple if it is to be `flat`."""
+    def function(self, *, always_tuple: bool = False) -> Function:
+        """The equation as a function of scalars, which returns a tuple if it is `always_tuple`."""
         nodes = [node for _, node in leaves(self.result)]
         formals = [*self.leading, *self.formals]
         name = f"{self.name}_{UNNAMED}"
-        says = f"{self.name} of scalars."
-        text, names = function_text(name, says, formals, nodes, self.labels, flat=flat)
+        docstring = f"{self.name} of scalars."
+        text, names = function_text(
+            name, docstring, formals, nodes, self.labels, always_tuple=always_tuple
+        )
         return Function(*named_by_text(name, text), dict(names))
 
 
@@ -210,7 +212,7 @@ def _inner(outer: Runner, callee: Callee, leading: Sequence[Value], rest: Sequen
     """An equation whose `leading` arguments the loop gives, the others as where it is called."""
     source = callee.source
     trace = outer.inner(source)
-    taken = {*FUNCTIONS, *RESERVED}
+    used_names = {*FUNCTIONS, *RESERVED}
     names = [argument.arg for argument in source.arguments]
     values, stands_for = dict[str, Value](), dict[Node, Node]()
 
@@ -229,7 +231,7 @@ def _inner(outer: Runner, callee: Callee, leading: Sequence[Value], rest: Sequen
         if value.op == "number" and not always:
             return value
         kind = "float" if always and value.kind == "int" else value.kind
-        node = graph.name(fresh_name(stem, taken), kind)
+        node = graph.name(fresh_name(stem, used_names), kind)
         stands_for[node] = value
         return node
 
@@ -244,7 +246,7 @@ def _inner(outer: Runner, callee: Callee, leading: Sequence[Value], rest: Sequen
         source=source,
         labels=trace.labels,
         origins=trace.origins,
-        taken=taken,
+        used_names=used_names,
         leading={node.value: node.kind for node in first},
         formals={node.value: node.kind for node in read},
         actuals=[stands_for[node] for node in read],
@@ -255,7 +257,7 @@ def _inner(outer: Runner, callee: Callee, leading: Sequence[Value], rest: Sequen
 def called_apart(trace: Runner, callee: Callee, values: Sequence[Value]) -> Value:
     """An equation as a call of a generated function, without derivatives."""
     inner = _inner(trace, callee, [], values)
-    function = inner.function(flat=True)
+    function = inner.function(always_tuple=True)
     count = sum(1 for _ in leaves(inner.result))
     called = Call(function, count, loop=Loop(function.name, "once", inner))
     call = make("call", *inner.actuals, value=called)
@@ -274,7 +276,7 @@ def solved(trace: Runner, callee: Callee, low: Value, high: Value, rest: Sequenc
             None, "a residual or a bracket that is a tuple", "let each be one float"
         )
     function = inner.function()
-    ends = [fresh_name(end_name, inner.taken) for end_name in ("low", "high")]
+    ends = [fresh_name(end_name, inner.used_names) for end_name in ("low", "high")]
     arguments = ", ".join([*ends, *inner.formals])
     name = f"root_of_{function.name}"
     return_line = f"return (root({function.name}, {arguments}),)"
@@ -332,7 +334,7 @@ def repetition(
         instead = "let it take and return the same named tuple of floats, or a float"
         trace.under_way[-1].source.refuse(None, what, instead)
     *state_names, number = inner.leading
-    count_name = fresh_name("count", inner.taken)
+    count_name = fresh_name("count", inner.used_names)
     formals = [count_name, *state_names, *inner.formals]
     states = ", ".join(state_names)
     step_arguments = ", ".join([*state_names, f"float({number})", *inner.formals])
@@ -374,7 +376,7 @@ def _tangent_loop(
     inputs = [formals[index] for index in moving if index > 0]
     *state_names, number = inner.leading
     width = len(inputs)
-    taken = {*inner.taken}
+    used_names = {*inner.used_names}
     differentiated_by = [*state_names, *(name for name in inputs if name not in state_names)]
     step = derived_function(
         f"{inner.name}_{UNNAMED}",
@@ -385,11 +387,11 @@ def _tangent_loop(
         inner.labels,
         chained=True,
     )
-    slopes, column = fresh_name("slopes", taken), fresh_name("c", taken)
-    next_names = [fresh_name(f"new_{name}", taken) for name in state_names]
-    slopes_before = [fresh_name(f"by_{name}", taken) for name in state_names]
+    slopes, column = fresh_name("slopes", used_names), fresh_name("c", used_names)
+    next_names = [fresh_name(f"new_{name}", used_names) for name in state_names]
+    slopes_before = [fresh_name(f"by_{name}", used_names) for name in state_names]
     partials = [
-        fresh_name(f"d_{next_names[output]}_{differentiated_by[source]}", taken)
+        fresh_name(f"d_{next_names[output]}_{differentiated_by[source]}", used_names)
         for output, source in step.entries
     ]
     slope_of = {
@@ -442,9 +444,9 @@ def _tangent_loop(
         f"return {', '.join(returned)},",
     ]
     moved = [formals[index] for index in moving]
-    says = f"{inner.name}, repeated, with its derivatives by {listed(moved)}."
+    docstring = f"{inner.name}, repeated, with its derivatives by {listed(moved)}."
     name = f"{loop}_{UNNAMED}"
-    text = function_source(f"{name}({', '.join(formals)})", says, lines, "")
+    text = function_source(f"{name}({', '.join(formals)})", docstring, lines, "")
     return Derived(
         *named_by_text(name, text),
         {step.name: step},

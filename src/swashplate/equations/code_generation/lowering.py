@@ -134,9 +134,9 @@ class Scope:
     number: int
     space: Mapping[str, Any]
     end: str
-    """Label behind the function."""
+    """Label after the function."""
     local: dict[str, Any] = field(default_factory=dict)
-    """Names of what is no operand: functions, tuples, fields."""
+    """Names of what is not an operand: functions, tuples, fields."""
     result: Any = None
     """What it returns: an operand, or a tuple of them; None if nothing."""
 
@@ -145,7 +145,7 @@ class Scope:
         return f"{name}.{self.number}"
 
     def find(self, name: str) -> Any:
-        """What a name stands for that is no variable."""
+        """Meaning of a name that is not a variable."""
         if name in self.local:
             return self.local[name]
         return self.space[name] if name in self.space else getattr(builtins, name)
@@ -306,12 +306,12 @@ class Lowering:
                 raise not_lowered(target)
 
     def _if(
-        self, test: ast.expr, then: list[ast.stmt], other: list[ast.stmt], scope: Scope
+        self, test: ast.expr, then: list[ast.stmt], otherwise: list[ast.stmt], scope: Scope
     ) -> bool:
         then_label, else_label, end = self._label("then"), self._label("else"), self._label("end")
         self._fork(self._test(test, scope), then_label, else_label)
         reached = False
-        for label, statements in ((then_label, then), (else_label, other)):
+        for label, statements in ((then_label, then), (else_label, otherwise)):
             self._begin(label)
             if self._body(statements, scope):
                 self._jump(end)
@@ -342,6 +342,7 @@ class Lowering:
         self._begin(end)
 
     def _while(self, test: ast.expr, body: list[ast.stmt], scope: Scope) -> None:
+        """Write a ``while`` loop: a block that tests, one that does the body and one after it."""
         head, inside, end = self._label("while"), self._label("do"), self._label("end")
         self._jump(head)
         self._begin(head)
@@ -351,6 +352,7 @@ class Lowering:
         self._begin(end)
 
     def _loop(self, body: list[ast.stmt], onwards: str, end: str, scope: Scope) -> None:
+        """Write a loop's body, from which ``continue`` jumps `onwards` and ``break`` to `end`."""
         self._loops.append((onwards, end))
         if self._body(body, scope):
             self._jump(onwards)
@@ -389,7 +391,7 @@ class Lowering:
             case ast.BoolOp(op, tests):
                 return self._joined(tests, scope, every=isinstance(op, ast.And))
             case ast.IfExp(test, then, other):
-                return self._chosen(test, then, other, scope)
+                return self._conditional(test, then, other, scope)
             case ast.Subscript(array, index):
                 return self.load(self._value(array, scope), self._value(index, scope))
             case ast.Attribute(value, name):
@@ -425,14 +427,14 @@ class Lowering:
     def alike(
         self, first: Operand, second: Operand, least: str = "bool"
     ) -> tuple[Operand, Operand]:
-        """Two numbers as the wider one of their kinds, or one that is no less wide."""
+        """Two numbers as the wider one of their kinds, or one that is at least as wide."""
         kind = KINDS[max(map(KINDS.index, (first.kind, second.kind, least)))]
         return self.cast(first, kind), self.cast(second, kind)
 
     def compared(self, op: str, first: Operand, second: Operand) -> Operand:
         """A comparison."""
         first, second = self.alike(first, second)
-        if first.kind == "float":  # true of what is no number only if it is `!=`
+        if first.kind == "float":  # NaN is only `!=`
             instruction = f"fcmp {'u' if op == '!=' else 'o'}{TESTS[op]}"
         else:
             instruction = f"icmp {'' if op in ('==', '!=') else 's'}{TESTS[op]}"
@@ -483,19 +485,21 @@ class Lowering:
         self._begin(end)
         return self._load(key)
 
-    def _chosen(self, test: ast.expr, then: ast.expr, other: ast.expr, scope: Scope) -> Any:
+    def _conditional(
+        self, test: ast.expr, then: ast.expr, otherwise: ast.expr, scope: Scope
+    ) -> Any:
         """One of two numbers, or tuples of them, of which only that one is computed."""
         key = self._label("chosen$")
         then_label, else_label, end = self._label("then"), self._label("else"), self._label("end")
         self._fork(self._test(test, scope), then_label, else_label)
-        chosen: Any = None
-        for label, node in ((then_label, then), (else_label, other)):
+        result: Any = None
+        for label, node in ((then_label, then), (else_label, otherwise)):
             self._begin(label)
-            chosen = self._value(node, scope)
-            self._keep(key, chosen)
+            result = self._value(node, scope)
+            self._keep(key, result)
             self._jump(end)
         self._begin(end)
-        return self._kept(key, chosen)
+        return self._stored_value(key, result)
 
     def _keep(self, key: str, value: Any) -> None:
         """Store a number, or each of a tuple."""
@@ -505,7 +509,7 @@ class Lowering:
         for index, element in enumerate(value):
             self._store(f"{key}.{index}", element)
 
-    def _kept(self, key: str, like: Any) -> Any:
+    def _stored_value(self, key: str, like: Any) -> Any:
         """What was stored: a number, or a tuple as long as another."""
         if isinstance(like, Operand):
             return self._load(key)
@@ -538,7 +542,9 @@ class Lowering:
         if self._body(function.tree.body, scope):
             self._jump(scope.end)
         self._begin(scope.end)
-        return None if scope.result is None else self._kept(scope.key("result$"), scope.result)
+        return (
+            None if scope.result is None else self._stored_value(scope.key("result$"), scope.result)
+        )
 
     def called(self, name: str, *arguments: Operand) -> Operand:
         """A function of floats, of LLVM or of C."""

@@ -24,7 +24,7 @@ from swashplate.equations.keeping import cached_on_disk
 
 SYMBOL = "code"
 """Name of every function within its own module."""
-LEVEL = 3
+OPTIMISATION_LEVEL = 3
 """Of optimisation, as Numba's."""
 
 
@@ -36,7 +36,7 @@ class Code:
 
     def __init__(self, content: bytes, kinds: Sequence[str]) -> None:
         with global_compiler_lock:
-            self._engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _machine())
+            self._engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _target_machine())
             self._engine.add_object_file(llvm.ObjectFileRef.from_data(content))
             self._engine.finalize_object()
             self.address: int = self._engine.get_function_address(SYMBOL)
@@ -92,14 +92,14 @@ def _host() -> tuple[str, str, str]:
     return triple, processor, features
 
 
-def _machine() -> Any:
-    """What makes code for this machine."""
+def _target_machine() -> Any:
+    """LLVM's generator of machine code for this processor."""
     triple, processor, features = _host()
     target = llvm.Target.from_triple(triple)
     return target.create_target_machine(
         cpu=processor,
         features=features,
-        opt=LEVEL,
+        opt=OPTIMISATION_LEVEL,
         reloc="static" if target.name.startswith("x86") else "default",
         codemodel="jitdefault",
         jit=True,
@@ -108,7 +108,7 @@ def _machine() -> Any:
 
 def _passes(machine: Any) -> Any:
     """What optimises: loops become vector instructions, and arithmetic stays as it is written."""
-    options = llvm.create_pipeline_tuning_options(speed_level=LEVEL)
+    options = llvm.create_pipeline_tuning_options(speed_level=OPTIMISATION_LEVEL)
     options.loop_vectorization, options.slp_vectorization = True, False
     return llvm.create_pass_builder(machine, options)
 
@@ -116,7 +116,7 @@ def _passes(machine: Any) -> Any:
 def optimised(text: str) -> Any:
     """A module of LLVM's, in the form in which it becomes machine code."""
     with global_compiler_lock:
-        machine, module = _machine(), llvm.parse_assembly(text)
+        machine, module = _target_machine(), llvm.parse_assembly(text)
         module.triple, module.data_layout = machine.triple, str(machine.target_data)
         module.verify()
         for function in module.functions:
@@ -133,7 +133,7 @@ def _compiled(name: str, text: str) -> bytes:
     try:
         module = optimised(text)
         with global_compiler_lock:
-            content: bytes = _machine().emit_object(module)
+            content: bytes = _target_machine().emit_object(module)
         return content
     finally:
         progress.end(work)

@@ -74,7 +74,7 @@ class Language(ABC):
         """
 
     @abstractmethod
-    def branch(self, test: str, then: list[str], other: list[str], pad: str) -> list[str]:
+    def branch(self, test: str, then: list[str], otherwise: list[str], pad: str) -> list[str]:
         """Lines of an `if` and its `else`."""
 
     def declared(self, names: Mapping[str, Node], pad: str, *, always: bool) -> list[str]:
@@ -164,13 +164,13 @@ class Python(Language):
         )
         return assigned(unpacked, f"{call.value.function.name}({', '.join(arguments)})", pad)
 
-    def branch(self, test: str, then: list[str], other: list[str], pad: str) -> list[str]:
+    def branch(self, test: str, then: list[str], otherwise: list[str], pad: str) -> list[str]:
         """Lines of an `if` and its `else`."""
         if not then:
-            return [*bracketed("if not (", test, "):", pad), *other]
+            return [*bracketed("if not (", test, "):", pad), *otherwise]
         fits = len(pad) + len(test) < WIDTH - 4
         head = [f"{pad}if {test}:"] if fits else bracketed("if (", test, "):", pad)
-        return [*head, *then, *([f"{pad}else:", *other] if other else [])]
+        return [*head, *then, *([f"{pad}else:", *otherwise] if otherwise else [])]
 
 
 PYTHON, BRANCHING = Python(), Python(branches=True)
@@ -225,14 +225,14 @@ class CodeBlock:
         self,
         results: Sequence[Node],
         labels: Mapping[Node, str],
-        taken: set[str],
+        used_names: set[str],
         *,
         available: Mapping[Node, str] | None = None,
         flat: Flat | None = None,
         language: Language = PYTHON,
         named: bool = False,
     ) -> None:
-        self._labels, self._taken, self._available = labels, taken, dict(available or {})
+        self._labels, self._used_names, self._available = labels, used_names, dict(available or {})
         self._language = language
         self.functions: dict[str, Function] = {}
         self._schedule = Schedule(results, self._available, flat)
@@ -241,7 +241,7 @@ class CodeBlock:
         self._named: dict[tuple[Node, Region], str] = {}
         self._outlive: dict[Conditional | None, dict[str, Node]] = {}
         """Names of each branch that are read after it, while its test is known to hold."""
-        self._uses = self._counted(results)
+        self._uses = self._uses_of(results)
         outermost = self._schedule.whole
         self.statements = [*self._steps(outermost, "")]
         self.results = [self._result(node, named=named) for node in results]
@@ -262,7 +262,7 @@ class CodeBlock:
 
     # -- names -------------------------------------------------------------------------------------
 
-    def _counted(self, results: Sequence[Node]) -> dict[tuple[Node, Region], list[Region]]:
+    def _uses_of(self, results: Sequence[Node]) -> dict[tuple[Node, Region], list[Region]]:
         """From where each value is read, by where it is computed."""
         uses: dict[tuple[Node, Region], list[Region]] = {}
 
@@ -329,7 +329,7 @@ class CodeBlock:
     def _fresh(self, node: Node) -> str:
         stem = self._labels.get(node) or STEMS.get(node.op, "part")
         stem = re.sub(r"\W+", "_", stem)
-        return fresh_name(f"value_{stem}" if stem[0].isdigit() else stem, self._taken)
+        return fresh_name(f"value_{stem}" if stem[0].isdigit() else stem, self._used_names)
 
     # -- lines -------------------------------------------------------------------------------------
 
@@ -515,50 +515,52 @@ def assigned(left: str, text: str, pad: str = "") -> list[str]:
 
 
 def indented(lines: Iterable[str]) -> list[str]:
-    """Lines moved in."""
+    """Lines indented by four spaces."""
     return [f"    {line}" for line in lines]
 
 
-def function_source(head: str, says: str, lines: Iterable[str], mark: str = "@kernel") -> str:
+def function_source(head: str, docstring: str, lines: Iterable[str], mark: str = "@kernel") -> str:
     """Text of a function."""
     head = f"{mark}\ndef {head}:" if mark else f"def {head}:"
-    return "\n".join([head, f'    """{says}"""', *indented(lines), ""])
+    return "\n".join([head, f'    """{docstring}"""', *indented(lines), ""])
 
 
 def function_text(
     name: str,
-    says: str,
-    formals: Sequence[str],
+    docstring: str,
+    parameters: Sequence[str],
     results: Sequence[Node],
     labels: Mapping[Node, str],
     *,
-    flat: bool = False,
+    always_tuple: bool = False,
 ) -> tuple[str, dict[str, Function]]:
     """Text of a function of scalars, and the generated functions that it calls.
 
-    It returns a tuple of the results; of a single one the number, unless it is to be `flat`.
+    It returns a tuple of the results; of a single one the number, unless it is `always_tuple`.
     """
-    arguments = {formal.partition(".")[0] for formal in formals}
+    arguments = {parameter.partition(".")[0] for parameter in parameters}
     block = CodeBlock(results, labels, {*FUNCTIONS, *arguments, *RESERVED, name})
     returned = ", ".join(block.texts) or "()"
-    if len(results) == 1 and flat:
+    if len(results) == 1 and always_tuple:
         returned += ","
-    fits = len(returned) < WIDTH - 10
-    lines = [
-        *block.lines,
-        *([f"return {returned}"] if fits else bracketed("return (", returned, ")")),
-    ]
-    head = bracketed(f"def {name}(", ", ".join(formals), "):")
-    if len(says) > WIDTH - 6:
-        says = "\n    (".join(says.rsplit(" (", 1))
-    return "\n".join([*head, f'    """{says}"""', *indented(lines), ""]), block.functions
+    if len(returned) < WIDTH - 10:
+        return_lines = [f"return {returned}"]
+    else:
+        return_lines = bracketed("return (", returned, ")")
+    head = bracketed(f"def {name}(", ", ".join(parameters), "):")
+    if len(docstring) > WIDTH - 6:
+        # a parenthesis at its end goes onto a line of its own
+        docstring = "\n    (".join(docstring.rsplit(" (", 1))
+    body = indented([*block.lines, *return_lines])
+    text = "\n".join([*head, f'    """{docstring}"""', *body, ""])
+    return text, block.functions
 
 
 UNNAMED = "00000000"
-"""What stands in a function's name until its text is known."""
+"""Placeholder in a function's name for the hash of its text, until that is known."""
 
 
 def named_by_text(name: str, text: str) -> tuple[str, str]:
-    """A name for a function that no other has in place of one with `UNNAMED`, and its text."""
+    """Name and text of a function, with the hash of its text instead of `UNNAMED`."""
     digest = blake2b(text.encode(), digest_size=4).hexdigest()
     return name.replace(UNNAMED, digest), text.replace(UNNAMED, digest, 1)

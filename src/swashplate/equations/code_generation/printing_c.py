@@ -69,9 +69,9 @@ def helpers_in(text: str) -> list[str]:
     return [helper for name, helper in HELPERS.items() if f"{name}(" in text]
 
 
-def filled(text: str, words: Mapping[str, Any]) -> str:
+def filled(text: str, replacements: Mapping[str, Any]) -> str:
     """A text with words in the place of their names, ``@name@``."""
-    for name, word in words.items():
+    for name, word in replacements.items():
         text = text.replace(f"@{name}@", str(word))
     return text
 
@@ -127,10 +127,11 @@ _OF_COMMENTS = re.compile(r"\*(?=/)|/(?=\*)|\?(?=\?)")
 
 
 def comment_line(text: str) -> str:
-    """A text as one line within a comment, which nothing in it can begin or end.
+    """A text as one line of a comment, changed so that no part of it can begin or end a comment.
 
-    C removes a backslash at the end of a line, and C99 replaces trigraphs such as ``??/``, before
-    it looks for comments: two harmless lines could be joined to the end of one.
+    Before C looks for comments, it joins lines that end in a backslash, and C99 replaces trigraphs
+    such as ``??/``, which is a backslash. Two harmless lines could thus become the end of a
+    comment.
     """
     line = "".join(c if c.isprintable() else " " for c in text)
     line = line.replace("\\", "|")
@@ -138,27 +139,30 @@ def comment_line(text: str) -> str:
 
 
 def comment(text: str, pad: str = "", width: int = WIDTH) -> list[str]:
-    """A text of one line as a comment, on as many as it takes."""
+    """A text of one line as a comment of C, wrapped to a width."""
     line = f"{pad}/* {comment_line(text)} */"
     lines = list[str]()
-    while len(line) > width and " " in line[len(pad) + 20 : width - 3]:
-        at = line.rindex(" ", len(pad) + 20, width - 3)
-        lines.append(line[:at])
-        line = f"{pad} * {line[at + 1 :]}"
+    # a break leaves at least some words on a line, and room for the end of the comment
+    earliest = len(pad) + 20
+    latest = width - 3
+    while len(line) > width and " " in line[earliest:latest]:
+        break_at = line.rindex(" ", earliest, latest)
+        lines.append(line[:break_at])
+        line = f"{pad} * {line[break_at + 1 :]}"
     return [*lines, line]
 
 
 def indented(lines: Iterable[str]) -> list[str]:
-    """Lines of C moved in, long ones on several."""
+    """Lines of C indented by four spaces, long ones wrapped."""
     parts: list[str] = []
     for line in lines:
         parts += wrapped(f"    {line}") if line else [""]
     return parts
 
 
-def function(says: str, head: str, body: Iterable[str]) -> str:
+def function(description: str, head: str, body: Iterable[str]) -> str:
     """Text of a function of C."""
-    heading = comment(says) if says else []
+    heading = comment(description) if description else []
     return "\n".join([*heading, *wrapped(head), "{", *indented(body), "}"])
 
 
@@ -183,8 +187,10 @@ class C(Language):
         Names of the block that is printed.
     """
 
-    def __init__(self, functions: Loops, origins: Mapping[Node, Parsed], taken: set[str]) -> None:
-        self._functions, self._origins, self._taken = functions, origins, taken
+    def __init__(
+        self, functions: Loops, origins: Mapping[Node, Parsed], used_names: set[str]
+    ) -> None:
+        self._functions, self._origins, self._used_names = functions, origins, used_names
         self._sources: dict[Parsed, int] = {}
 
     # -- expressions -------------------------------------------------------------------------------
@@ -260,7 +266,7 @@ class C(Language):
         pad: str,
     ) -> list[str]:
         """A call of what does the loop: it returns a root, and moves a state where it stands."""
-        name = self._functions.name_of(call.value.loop, self._taken)
+        name = self._functions.name_of(call.value.loop, self._used_names)
         kind = call.value.loop.kind
         # ahead of the equation's other arguments: a bracket, nothing, or a count and a state
         leading = {"root": 2, "once": 0}.get(kind, 1 + len(targets))
@@ -275,7 +281,7 @@ class C(Language):
         lines: list[str] = []
         addresses: list[str] = []
         for index, target in enumerate(targets):
-            variable = target or fresh_name("unused", self._taken)
+            variable = target or fresh_name("unused", self._used_names)
             addresses.append(f"&{variable}")
             start = variable if target in declared else f"double {variable}"
             if kind == "repeated":
@@ -286,20 +292,20 @@ class C(Language):
         call_arguments = [*count, *texts[leading:], *addresses]
         return [*lines, f"{pad}{name}({', '.join(call_arguments)});"]
 
-    def branch(self, test: str, then: list[str], other: list[str], pad: str) -> list[str]:
+    def branch(self, test: str, then: list[str], otherwise: list[str], pad: str) -> list[str]:
         """`if` and `else`, or `else if` if there is nothing but that."""
         if not then:
-            return [f"{pad}if (!({test})) {{", *other, f"{pad}}}"]
+            return [f"{pad}if (!({test})) {{", *otherwise, f"{pad}}}"]
         lines = [f"{pad}if ({test}) {{", *then]
-        if not other:
+        if not otherwise:
             return [*lines, f"{pad}}}"]
         inner = f"{pad}    "
-        nested = other[1:] if _HEADING.match(other[0]) else other
+        nested = otherwise[1:] if _HEADING.match(otherwise[0]) else otherwise
         at_level = [line for line in nested if line[len(inner)] not in " }"]
         if at_level == nested[:1] and at_level[0].startswith(f"{inner}if ("):
             first, *rest = [line[4:] for line in nested]
             return [*lines, f"{pad}}} else {first.lstrip()}", *rest]
-        return [*lines, f"{pad}}} else {{", *other, f"{pad}}}"]
+        return [*lines, f"{pad}}} else {{", *otherwise, f"{pad}}}"]
 
     def declared(self, names: Mapping[str, Node], pad: str, *, always: bool) -> list[str]:
         """Declarations by type; zero if only one side gives a value."""
@@ -332,7 +338,7 @@ class C(Language):
                 headed += run
                 continue
             pad = run[0][: len(run[0]) - len(run[0].lstrip())]
-            says = first_line(source)
+            summary = first_line(source)
             new = source not in introduced
             introduced.add(source)
             short_run = len(run) < FEW and run[0].endswith(";") and not new
@@ -342,7 +348,7 @@ class C(Language):
                 continue
             if headed and not headed[-1].endswith("{") and headed[-1]:
                 headed.append("")
-            text = f"{source.name}: {says}" if new and says else source.name
+            text = f"{source.name}: {summary}" if new and summary else source.name
             headed += [*comment(text, pad, WIDTH - 4), *run]
         return headed
 
@@ -408,33 +414,35 @@ class Loops:
         Names of functions, and others that they may not have.
     """
 
-    def __init__(self, taken: Iterable[str] = ()) -> None:
+    def __init__(self, used_names: Iterable[str] = ()) -> None:
         self.texts: list[str] = []
-        self.taken = {*WORDS, *taken}
+        self.used_names = {*WORDS, *used_names}
         self._names: dict[str, str] = {}
 
-    def fresh(self, stem: str, taken: Iterable[str] = ()) -> str:
+    def fresh(self, stem: str, used_names: Iterable[str] = ()) -> str:
         """A name for a function."""
-        name = fresh_name(c_name(stem), {*self.taken, *taken})
-        self.taken.add(name)
+        name = fresh_name(c_name(stem), {*self.used_names, *used_names})
+        self.used_names.add(name)
         return name
 
-    def name_of(self, loop: Any, taken: set[str]) -> str:
+    def name_of(self, loop: Any, used_names: set[str]) -> str:
         """Name of the function that does a loop."""
         key = loop.name
         if key not in self._names:
             inner: Inner = loop.inner
-            name = self.fresh(inner.source.name, taken)
+            name = self.fresh(inner.source.name, used_names)
             self.texts.append(self.function(name, inner))
             if loop.kind == "once":
                 self._names[key] = name
-                taken.add(name)
+                used_names.add(name)
                 return name
-            outer = self.fresh(f"{'root_of' if loop.kind == 'root' else 'repeated'}_{name}", taken)
+            outer = self.fresh(
+                f"{'root_of' if loop.kind == 'root' else 'repeated'}_{name}", used_names
+            )
             write = self._root if loop.kind == "root" else self._repeated
             self.texts.append(write(outer, name, inner))
             self._names[key] = outer
-            taken |= {name, outer}
+            used_names |= {name, outer}
         return self._names[key]
 
     def function(self, name: str, inner: Inner) -> str:
@@ -450,9 +458,9 @@ class Loops:
 
     def _root(self, name: str, residual: str, inner: Inner) -> str:
         reserved = {"low", "high", "x_1", "x_2", "x_3", "f_1", "f_2", "f_3", "t", "x", "f", "best"}
-        taken = {*WORDS, *reserved, "smallest", "reach", "xi", "phi", "steps", residual}
+        used_names = {*WORDS, *reserved, "smallest", "reach", "xi", "phi", "steps", residual}
         others = [
-            (kind, fresh_name(c_name(formal), taken)) for formal, kind in inner.formals.items()
+            (kind, fresh_name(c_name(formal), used_names)) for formal, kind in inner.formals.items()
         ]
         words = {
             "name": name,
@@ -468,12 +476,12 @@ class Loops:
 
     def _repeated(self, name: str, step: str, inner: Inner) -> str:
         *state, number = inner.leading
-        taken = {*WORDS, "count", step}
+        used_names = {*WORDS, "count", step}
         others = [
-            (kind, fresh_name(c_name(formal), taken)) for formal, kind in inner.formals.items()
+            (kind, fresh_name(c_name(formal), used_names)) for formal, kind in inner.formals.items()
         ]
-        state_names = [fresh_name(c_name(formal), taken) for formal in state]
-        number = fresh_name(c_name(number), taken)
+        state_names = [fresh_name(c_name(formal), used_names) for formal in state]
+        number = fresh_name(c_name(number), used_names)
         formals = ["double count", *(f"{TYPES[kind]} {formal}" for kind, formal in others)]
         formals += [f"double *{formal}" for formal in state_names]
         arguments = [*(f"*{formal}" for formal in state_names), f"(double){number}"]
@@ -502,14 +510,14 @@ def scalar_function(
     the last arguments point, named as in `results`.
     """
     result_type, pointers = returned(results)
-    taken = {*functions.taken, name, *(path for path, _ in results)}
+    used_names = {*functions.used_names, name, *(path for path, _ in results)}
     words = {formal: re.sub(r"[.\[\]]+", "_", formal).strip("_") for formal in formals}
-    names = {formal: fresh_name(c_name(word), taken) for formal, word in words.items()}
+    names = {formal: fresh_name(c_name(word), used_names) for formal, word in words.items()}
     available = {graph.name(formal, kind): names[formal] for formal, kind in formals.items()}
-    language = C(functions, origins, taken)
+    language = C(functions, origins, used_names)
     c_labels = {node: c_name(label) for node, label in labels.items()}
     nodes = [node for _, node in results]
-    block = CodeBlock(nodes, c_labels, taken, available=available, language=language)
+    block = CodeBlock(nodes, c_labels, used_names, available=available, language=language)
     lines = language.headed(block.lines, source)
     used = without_comments("\n".join([*block.lines, *block.texts]))
     unused = [f"(void){formal};" for formal in names.values() if not mentions(used, formal)]
@@ -530,5 +538,5 @@ def mentions(text: str, name: str) -> bool:
 
 
 def without_comments(text: str) -> str:
-    """A text of C without what it says beside the code."""
+    """A text of C without its comments."""
     return re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)

@@ -470,8 +470,8 @@ class _Tracer:
             return self.trace.make("**", left, value=ast.literal_eval(node.right))
         right = self.scalar(node.right)
         if left.kind == right.kind == "int" and left.op == right.op == "number" and op != "/":
-            counted = {"+": int.__add__, "-": int.__sub__, "*": int.__mul__}[op]
-            return graph.number(counted(left.value, right.value))
+            integer_operation = {"+": int.__add__, "-": int.__sub__, "*": int.__mul__}[op]
+            return graph.number(integer_operation(left.value, right.value))
         if op == "*" and left.kind == right.kind == "float":  # a factor that is known to be one
             for factor, other in ((left, right), (right, left)):
                 if graph.is_number(factor, 1.0):
@@ -524,7 +524,7 @@ class _Tracer:
         if kind is plain(root) or kind is plain(repeated):
             return self.loop(node, kind.__name__)
         if kind is plain(interpolate):
-            return self.table(self.arguments(node, ("x", "knots", "values"), ()), node)
+            return self.interpolation(self.arguments(node, ("x", "knots", "values"), ()), node)
         if not _is_equation(called):
             text = ast.unparse(node.func)
             self.refuse(node, f"a call of {text}", f"make {text} an @equation")
@@ -575,8 +575,8 @@ class _Tracer:
             self.refuse(node, what, f"let it take {', '.join(own_arguments)} and the rest")
         return make_of(self.trace, inner, values[0], values[1], values[2:])
 
-    def table(self, arguments: Mapping[str, Value], node: ast.Call) -> Value:
-        """Value of `interpolate`."""
+    def interpolation(self, arguments: Mapping[str, Value], node: ast.Call) -> Value:
+        """Value of a call of `interpolate`, whose arguments are checked."""
         x, knots, values = arguments.values()
         if not (
             isinstance(x, Node)
@@ -590,18 +590,21 @@ class _Tracer:
                 "type them tuple[float, float, ...] with every element, or give derive their "
                 "lengths",
             )
-        numbers = [[node for _, node in leaves(table)] for table in (knots, values)]
-        return self.interpolated(x, *numbers)
+        return self.interpolated(
+            x,
+            knots=[leaf for _, leaf in leaves(knots)],
+            values=[leaf for _, leaf in leaves(values)],
+        )
 
     def interpolated(self, x: Node, knots: Sequence[Node], values: Sequence[Node]) -> Node:
-        """`interpolate`, written out."""
+        """Nodes of `interpolate`: the segment of x is chosen, then a straight line evaluated."""
         make, label = self.trace.make, self.trace.label
         ends = [knots[0], knots[1], values[0], values[1]]
         for segment in range(1, len(knots) - 1):
             beyond = make(">=", x, knots[segment])
             next_ends = knots[segment], knots[segment + 1], values[segment], values[segment + 1]
             ends = [
-                choose(beyond, after, before) for before, after in zip(ends, next_ends, strict=True)
+                choose(beyond, next_end, end) for end, next_end in zip(ends, next_ends, strict=True)
             ]
             for node, name in zip(ends, ("left", "right", "low", "high"), strict=True):
                 label(self.trace.noted(node), name)

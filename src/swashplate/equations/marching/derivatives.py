@@ -40,10 +40,10 @@ def _slopes(
 ) -> dict[Moved, float]:
     """Derivatives of constants and of states at the start by all parameters that move them."""
     code = structure.start_code(start)
-    before = dict.fromkeys(first, 0.0)
+    signals_before = dict.fromkeys(first, 0.0)
     if start == "steady":
-        before.update(first)
-    values = [instance.number_at(argument, before, h) for argument in code.arguments]
+        signals_before.update(first)
+    values = [instance.number_at(argument, signals_before, h) for argument in code.arguments]
     try:
         results = code.derived.python(*values)
     except NO_NUMBER as error:
@@ -80,9 +80,9 @@ def _initialised(
     delays = instance.tap_delays(structure.signals, h)
     scale = layout.program.scale.copy()
     for term, factor in layout.factors:
-        moved, _ = factor
-        if moved.kind == "fraction":
-            scale[term] *= delays.slope[int(moved.path)]
+        factor_id, _ = factor
+        if factor_id.kind == "fraction":
+            scale[term] *= delays.slope[int(factor_id.path)]
         else:
             scale[term] *= slopes[factor]
     return Struct(layout.program._replace(scale=scale)), tangent
@@ -140,7 +140,7 @@ def residuals(
     values of the run's own unknowns.
     """
     rows = np.empty((1, observed.rows))
-    _march(instance, observed, run_values, columns=(), to=(), rows=rows, before=0)
+    _march(instance, observed, run_values, columns=(), row_places=(), rows=rows, offset_start=0)
     return np.asarray(rows[0])
 
 
@@ -150,32 +150,33 @@ def jacobian(
     columns: Sequence[str],
     run_values: RunValues = NO_RUN_VALUES,
     *,
-    moved: Sequence[bool] | None = None,
+    can_depend: Sequence[bool] | None = None,
     out: Array | None = None,
 ) -> Jacobian:
     """The same residuals with their exact derivatives by columns.
 
-    Columns are paths of parameters, and ``start.`` with the path of a state; `moved` says whether
-    the record may depend on each at all: the others give zeros. `out` is (k + 1, m) memory to write
-    to, the `rows` of an earlier call for example: new memory takes longer to get than the march.
+    Columns are paths of parameters, and ``start.`` with the path of a state; `can_depend` says
+    whether the record may depend on each at all: the others give zeros. `out` is (k + 1, m) memory
+    to write to, the `rows` of an earlier call for example: new memory takes longer to get than the
+    march.
     """
-    to = np.flatnonzero(np.ones(len(columns)) if moved is None else moved)
+    dependent = np.flatnonzero(np.ones(len(columns)) if can_depend is None else can_depend)
     names = (*columns, *observed.own_columns)
     shape = (len(names) + 1, observed.rows)
     if out is None:
         out = np.empty(shape)
     elif out.shape != shape or out.dtype != np.float64 or not out.flags.carray:
         raise InputError(f"out must be a plain array of floats of shape {shape}.")
-    for c in set(range(len(columns))).difference(to):
+    for c in set(range(len(columns))).difference(dependent):
         out[c] = 0.0
     _march(
         instance,
         observed,
         run_values,
-        columns=[columns[c] for c in to.tolist()],
-        to=to,
+        columns=[columns[c] for c in dependent.tolist()],
+        row_places=dependent,
         rows=out,
-        before=len(columns),
+        offset_start=len(columns),
     )
     return Jacobian(names, out)
 
@@ -186,24 +187,24 @@ def triangle(
     columns: Sequence[str],
     run_values: RunValues = NO_RUN_VALUES,
     *,
-    moved: Sequence[bool] | None = None,
+    can_depend: Sequence[bool] | None = None,
 ) -> Triangle:
     """Triangular factor of [J r]; arguments as in `jacobian`, which is never held.
 
     Memory does not grow with the record, apart from the record and the observations themselves.
     """
-    to = np.flatnonzero(np.ones(len(columns)) if moved is None else moved)
+    dependent = np.flatnonzero(np.ones(len(columns)) if can_depend is None else can_depend)
     names = (*columns, *observed.own_columns)
-    used = np.concatenate([to, np.arange(len(columns), len(names) + 1)])
+    used = np.concatenate([dependent, np.arange(len(columns), len(names) + 1)])
     factor_of_used = np.zeros((used.size, used.size))
     _march(
         instance,
         observed,
         run_values,
-        columns=[columns[c] for c in to.tolist()],
-        to=range(to.size),
+        columns=[columns[c] for c in dependent.tolist()],
+        row_places=range(dependent.size),
         rows=aligned(used.size, ROWS),
-        before=to.size,
+        offset_start=dependent.size,
         factor=factor_of_used,
     )
     factor = np.zeros((len(names) + 1, len(names) + 1))
@@ -227,14 +228,14 @@ def _march(
     run_values: RunValues,
     *,
     columns: Sequence[str],
-    to: ArrayLike,
+    row_places: ArrayLike,
     rows: Array,
-    before: int,
+    offset_start: int,
     factor: Array = NO_FACTOR,
 ) -> None:
-    """March, and fill rows, or fold them into a `factor`.
+    """Fill `rows` with observations and derivatives, or update the QR factor `factor` with them.
 
-    ``to[i]`` is the row of column i. Rows of free offsets begin at row `before`.
+    ``row_places[i]`` is the row of column i. Rows of free offsets begin at row `offset_start`.
     """
     records = observed.records
     h = observed.record.step
@@ -264,12 +265,12 @@ def _march(
         length=rows.shape[1],
         rows=rows,
         derived=len(columns),
-        target=np.array(to, dtype=np.int64),
-        first_offset_row=before,
+        target=np.array(row_places, dtype=np.int64),
+        first_offset_row=offset_start,
         folded=int(factor.size > 0),
         factor=factor,
         offset=observed.offsets(run_values.offsets),
-        offset_row=observed.offset_rows(before),
+        offset_row=observed.offset_rows(offset_start),
     )
     sink = Struct(fields)
     room = layout.take_room()
@@ -306,7 +307,7 @@ class BoundModel(NamedTuple):
     """Values of the run's own unknowns."""
     paths: Sequence[str] = ()
     """Columns of derivatives."""
-    moved: Sequence[bool] | None = None
+    can_depend: Sequence[bool] | None = None
     """Whether the record may depend on each column at all; by default it may."""
 
     def residuals(self, observed: ObservedRecord) -> Array:
@@ -316,9 +317,16 @@ class BoundModel(NamedTuple):
     def jacobian(self, observed: ObservedRecord, out: Array | None = None) -> Jacobian:
         """The same residuals with their exact derivatives; see `jacobian`."""
         return jacobian(
-            self.instance, observed, self.paths, self.run_values, moved=self.moved, out=out
+            self.instance,
+            observed,
+            self.paths,
+            self.run_values,
+            can_depend=self.can_depend,
+            out=out,
         )
 
     def triangle(self, observed: ObservedRecord) -> Triangle:
         """Triangular factor of [J r]; see `triangle`."""
-        return triangle(self.instance, observed, self.paths, self.run_values, moved=self.moved)
+        return triangle(
+            self.instance, observed, self.paths, self.run_values, can_depend=self.can_depend
+        )

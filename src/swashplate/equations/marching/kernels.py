@@ -48,7 +48,7 @@ Fields = TypeVar("Fields", bound=tuple[Any, ...])
 Kernel = Any
 """What is called: machine code (`Code`), or a plain function if nothing is compiled."""
 PlannedCode = Callable[[], Kernel]
-"""Compiles a kernel when it is first needed (`generating`): residuals alone need no derivatives."""
+"""Compiles a kernel when it is first needed (`generating`): residuals need no derivatives."""
 
 
 def routine(function: Callable[..., None]) -> Kernel:
@@ -210,6 +210,6 @@ def call_recurrence(
 @lowers(call_recurrence)
 def _call_recurrence(code: Lowering, address: Operand, *arguments: Operand) -> None:
     count, lanes, size, tangent, arrays = arguments
-    taken = _array_pointers(code, arrays)
-    taken[2], taken[4] = lanes, tangent
-    _run(code, address, (count, size, number(0.0), *taken))
+    array_pointers = _array_pointers(code, arrays)
+    array_pointers[2], array_pointers[4] = lanes, tangent
+    _run(code, address, (count, size, number(0.0), *array_pointers))

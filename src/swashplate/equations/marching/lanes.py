@@ -66,7 +66,7 @@ DIGEST = 8
 
 
 def is_vector(statement: Statement) -> bool:
-    """Whether a processor can do a statement for many lanes at once: it is no branch."""
+    """Whether a processor can do a statement for many lanes at once: it is not a branch."""
     return len(statement.names) <= 1 and all_vector(statement.nodes)
 
 
@@ -174,7 +174,7 @@ def vectorisation_report(model: Model, output: str | None = None, *, options: An
     sample_code = SampleCode(model, signals, options_of_parts, [signal])
     for used in sample_code.used:
         ends = sample_code.ends[used.part]
-        _, available = sample_code.ahead(used, ends, still=fractions_of(used))
+        _, available = sample_code.ahead(used, ends, constant_names=fractions_of(used))
         block = sample_code.printed(used, ends, available=available, flat=all_vector)
         for statement in block.statements:
             if is_vector(statement):
@@ -272,17 +272,17 @@ class _Writer:
             worst = self._part(part, signal, following, worst)
         if worst:
             following.append(("worst", worst, frozenset((worst,))))
-        shown = "value"
+        observed = "value"
         if is_rate:
-            following.append(("rate", shown, frozenset((shown,))))
-            trapezium = frozenset(("total", "half", "rate", shown))
-            straight.let("integral", f"total + half * (rate + {shown})", trapezium)
-            shown = "integral"
-            following.append(("total", shown, frozenset((shown,))))
-        straight.let("error", f"{shown} - target", frozenset((shown, "target")))
+            following.append(("rate", observed, frozenset((observed,))))
+            trapezium = frozenset(("total", "half", "rate", observed))
+            straight.let("integral", f"total + half * (rate + {observed})", trapezium)
+            observed = "integral"
+            following.append(("total", observed, frozenset((observed,))))
+        straight.let("error", f"{observed} - target", frozenset((observed, "target")))
         square = frozenset(("cost", "counts", "error"))
         following.append(("cost", "cost + counts * error * error", square))
-        following.append(("shown", shown, frozenset((shown,))))
+        following.append(("shown", observed, frozenset((observed,))))
         # what a lane sees of a record at a place of its own is fetched a sample ahead of its use: a
         # row that was just written number by number cannot be read as a whole at once
         first: list[str] = []

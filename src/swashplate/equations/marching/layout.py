@@ -148,12 +148,12 @@ class JacobianLayout:
         model = self.structure.model
         column_index = {column: index for index, column in enumerate(self.columns)}
         moves = self.structure.start_code(start).moves if self.columns else ()
-        for moved, column in moves:
-            if moved.kind == "state":
-                self._start_moves.add((moved, column))
+        for moved_id, column in moves:
+            if moved_id.kind == "state":
+                self._start_moves.add((moved_id, column))
             elif column in column_index:
-                terms = self._by.setdefault(moved, {})
-                terms[column_index[column]] = Term(factor=(moved, column))
+                terms = self._by.setdefault(moved_id, {})
+                terms[column_index[column]] = Term(factor=(moved_id, column))
         taps = taps_of(model, self.structure.signals)
         for part in self.structure.facts.parts:
             part_index, prefix = part.part, model.prefix(part.part)

@@ -89,9 +89,9 @@ class SampleCode:
     ) -> None:
         self.model = model
         self.signals = tuple(signals)
-        taken = {*RESERVED, *self.signals, *(f"{signal}_before" for signal in self.signals)}
+        used_names = {*RESERVED, *self.signals, *(f"{signal}_before" for signal in self.signals)}
         self.parts = [
-            PartCode(model, index, signals, options_of_part, taken)
+            PartCode(model, index, signals, options_of_part, used_names)
             for index, options_of_part in enumerate(options)
         ]
         self.ends: list[list[Node]] = [[] for _ in self.parts]
@@ -184,7 +184,7 @@ class SampleCode:
         block = CodeBlock(
             results,
             labels,
-            part.taken,
+            part.used_names,
             available=available,
             named=named,
             flat=flat,
@@ -194,14 +194,14 @@ class SampleCode:
         return block
 
     def ahead(
-        self, part: PartCode, ends: Sequence[Node], still: Collection[str] = ()
+        self, part: PartCode, ends: Sequence[Node], constant_names: Collection[str] = ()
     ) -> tuple[list[str], dict[Node, str]]:
         """Lines ahead of a loop that computes some nodes, and the names that they give.
 
         They take the parameters and givens that are read, and compute what follows from these and
         the step alone.
         """
-        block = self.printed(part, part.ahead(ends, still), named=True)
+        block = self.printed(part, part.ahead(ends, constant_names), named=True)
         lines = [*self.given(part, names_in(ends)), *block.lines]
         return lines, block.names
 
@@ -408,7 +408,7 @@ def march_source(
     last = parts[-1]
     passed = [last.source(source) for source in sample_code.sources if source.part != last.part]
     if passed and any(sample_code.carried[part.part] for part in parts[:-1]):
-        # the last part is a sample behind the others, so that neither waits for the other
+        # the last part is a sample later than the others, so that neither waits for the other
         late = re.compile(rf"\b({'|'.join(passed)})\b")
         lines += [*(f"{name} = 0.0" for name in passed), "for m in range(first, last + 1):"]
         lines += indented([f"late_{name} = {name}" for name in passed])
@@ -419,14 +419,14 @@ def march_source(
         lines += ["for n in range(first, last):", *indented(chain(*samples))]
     lines += saved
     if margins:
-        # a sum is no number once a margin was none
+        # a sum is NaN once a margin was NaN
         lines += [
             "worst = worst if total == total or worst <= 0.0 else total",
             "lower = worst < worst_margin[0] or worst != worst",
             "worst_margin[0] = worst if lower else worst_margin[0]",
         ]
-    says = f"March {model.name} over its inputs."
-    return sample_code.module(function_source(f"march({KERNEL_ARGUMENTS})", says, lines, ""))
+    docstring = f"March {model.name} over its inputs."
+    return sample_code.module(function_source(f"march({KERNEL_ARGUMENTS})", docstring, lines, ""))
 
 
 def step_source(
@@ -475,10 +475,17 @@ def step_source(
             compared = sample_code.printed(part, [lowest])
             ends += [*compared.lines, f"worst = {compared.texts[0]}"]
         ends += [*states.step, *states.save]
-    head, says = "prepare(params, given, h, constants)", f"Constants of {model.name}."
-    prepared = function_source(head, says, [*prepare, "return"])
-    says, lines = f"One sample of {model.name}.", [*lines, *ends, "return worst"]
-    stepped = function_source("step(context)", says, lines, "@inlined")
+    prepared = function_source(
+        "prepare(params, given, h, constants)",
+        f"Constants of {model.name}.",
+        [*prepare, "return"],
+    )
+    stepped = function_source(
+        "step(context)",
+        f"One sample of {model.name}.",
+        [*lines, *ends, "return worst"],
+        "@inlined",
+    )
     return sample_code.module(prepared, stepped), count
 
 

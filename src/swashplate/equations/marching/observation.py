@@ -79,7 +79,7 @@ class Observation:
 
 
 class RunValues(NamedTuple):
-    """Values of what belongs to one experiment alone, not to the machine."""
+    """Values of what belongs to one experiment only, not to the machine."""
 
     start: Mapping[str, float] = MappingProxyType({})
     """Parts of the state at the first sample, by path; others are those of the start."""

@@ -82,50 +82,52 @@ class PartCode:
         part: int,
         signals: Sequence[str],
         options: Any,
-        taken: set[str] | None = None,
+        used_names: set[str] | None = None,
         trace: Trace | None = None,
     ) -> None:
         self.model, self.part, self.part_model = model, part, model.parts[part]
         self.records, self.options = tuple(signals), options
         self.trace = Trace(replacements=self.part_model.replacements) if trace is None else trace
-        self.taken: set[str] = set() if taken is None else taken
+        self.used_names: set[str] = set() if used_names is None else used_names
         self.prefix = f"{self.part_model.name}_" if len(model.parts) > 1 else ""
-        self.taken.add("h")
+        self.used_names.add("h")
         self.taps = [tap for tap in taps_of(model, self.records) if tap.part == part]
         for tap in self.taps:
-            self.taken |= {
+            self.used_names |= {
                 *self.tap_samples(tap),
                 self.delay_fraction(tap),
                 self.delay_samples(tap),
             }
-        own = self.part_model
-        self.p = _named(own.parameters, self._fresh("p"))
-        self.given = _named(own.given, self._fresh("given")) if own.given else Tuple(None, ())
-        self.state = _named(own.state, self._fresh("s"))
+        part_model = self.part_model
+        self.p = _named(part_model.parameters, self._fresh("p"))
+        self.given = (
+            _named(part_model.given, self._fresh("given")) if part_model.given else Tuple(None, ())
+        )
+        self.state = _named(part_model.state, self._fresh("s"))
         self.parameters = {node.value: path for path, node in leaves(self.p)}
         """Path of each parameter by the name that stands for it."""
         self.arguments: dict[str, Value] = {"p": self.p, "h": graph.name("h"), "given": self.given}
         self.arguments["state"] = self.state
-        self.inputs = {name: self._input(name) for name in own.input_types}
+        self.inputs = {name: self._input(name) for name in part_model.input_types}
         self.arguments |= self.inputs
-        if own.inputs is not None:
-            self.arguments["inputs"] = Tuple(own.inputs, tuple(self.inputs.values()))
-        if own.sample is not None:
-            self.arguments["signals"] = self._call(own.sample)
-        self.following = self._call(own.step)
+        if part_model.inputs is not None:
+            self.arguments["inputs"] = Tuple(part_model.inputs, tuple(self.inputs.values()))
+        if part_model.sample is not None:
+            self.arguments["signals"] = self._call(part_model.sample)
+        self.following = self._call(part_model.step)
         cls = self.following.cls if isinstance(self.following, Tuple) else None
         numbers = tuple(
             path for path, node in leaves(self.following) if node.kind in ("float", "int")
         )
-        if cls is not own.state or numbers != floats_of(own.state):
+        if cls is not part_model.state or numbers != floats_of(part_model.state):
             raise InputError(
-                f"Model {own.name}: {plain(own.step).__name__} must return a {own.state.__name__} "
-                "of numbers on every path."
+                f"Model {part_model.name}: {plain(part_model.step).__name__} must return a "
+                f"{part_model.state.__name__} of numbers on every path."
             )
 
     def fresh(self, stem: str) -> str:
         """A name that is not yet taken."""
-        return fresh_name(stem.replace(".", "_"), self.taken)
+        return fresh_name(stem.replace(".", "_"), self.used_names)
 
     def _fresh(self, letter: str) -> Callable[[str], str]:
         """What gives the numbers of a named tuple their names."""
@@ -211,13 +213,13 @@ class PartCode:
             return []
         return [node for _, node in leaves(self._call(self.part_model.limits))]
 
-    def ahead(self, ends: Iterable[Node], still: Collection[str] = ()) -> list[Node]:
+    def ahead(self, ends: Iterable[Node], further_constants: Collection[str] = ()) -> list[Node]:
         """What some ends need that follows from parameters, givens and the step alone.
 
         The last nodes on the way that do; `still` are further names that do not change.
         """
         numbers = {node.value for _, node in (*leaves(self.p), *leaves(self.given))}
-        constant_names = {"h", *numbers, *still}
+        constant_names = {"h", *numbers, *further_constants}
         moves = dict[Node, bool]()
         constants = dict[Node, None]()
         ends = [*ends]
@@ -265,25 +267,25 @@ class PartCode:
         At rest every signal is zero, or what its default parameter is; ``steady`` is the steady
         state under the inputs as they come. A part without an equation for that has no state.
         """
-        own = self.part_model
-        if start == "steady" and own.settled is not None:
-            return self._call(own.settled)
-        if own.rest is None:
-            defaults = own.state._field_defaults
+        part_model = self.part_model
+        if start == "steady" and part_model.settled is not None:
+            return self._call(part_model.settled)
+        if part_model.rest is None:
+            defaults = part_model.state._field_defaults
             first = [defaults.get(path.split(".")[0], 0.0) for path, _ in leaves(self.state)]
             return rebuilt(self.state, (graph.number(float(number)) for number in first))
         inputs: dict[str, Value] = {}
-        for name in own.input_types:
-            if name in own.defaults:
-                inputs[name] = dict(leaves(self.p))[own.defaults[name]]
-            elif own.tap(name).width:
-                zeros = (graph.ZERO,) * own.tap(name).width
+        for name in part_model.input_types:
+            if name in part_model.defaults:
+                inputs[name] = dict(leaves(self.p))[part_model.defaults[name]]
+            elif part_model.tap(name).width:
+                zeros = (graph.ZERO,) * part_model.tap(name).width
                 inputs[name] = Tuple(Window, (Tuple(None, zeros), graph.ZERO))
             else:
                 inputs[name] = graph.ZERO
-        if own.inputs is not None:
-            inputs["inputs"] = Tuple(own.inputs, tuple(inputs.values()))
-        return self._call(own.rest, **inputs)
+        if part_model.inputs is not None:
+            inputs["inputs"] = Tuple(part_model.inputs, tuple(inputs.values()))
+        return self._call(part_model.rest, **inputs)
 
 
 def _named(kind: Any, name_of: Callable[[str], str], path: str = "") -> Value:

@@ -26,7 +26,7 @@ class Sampling(TypedDict, total=False):
 
 
 SOURCE_RATE = 512.0
-"""Rate of Kruse's logs; a drive's step is no longer than one of its samples. [Hz]"""
+"""Rate of Kruse's logs; a drive's step is at most one of its samples. [Hz]"""
 LONGEST = 100_000_000
 """Steps that a record may take: 54 hours at 512 Hz. More is a mistake, in a unit perhaps."""
 SLOWEST, FASTEST = 10.0, 100_000.0
@@ -137,9 +137,9 @@ def record_of(
 def least_substeps(rate: float, requested: int | None = None) -> int:
     """Steps a sample that keep a drive's h at or below 1/512 s, or those that are requested."""
     if not is_real(rate) or not SLOWEST <= rate <= FASTEST:
-        shown = f"{rate:g}" if is_real(rate) else repr(rate)
+        text = f"{rate:g}" if is_real(rate) else repr(rate)
         raise InputError(
-            f"The rate is {shown} Hz, but must be between {SLOWEST:g} and {FASTEST:g} Hz."
+            f"The rate is {text} Hz, but must be between {SLOWEST:g} and {FASTEST:g} Hz."
         )
     least = max(ceil(SOURCE_RATE / rate - 1e-9), 1)
     if is_real(requested) and requested < least:
@@ -151,7 +151,7 @@ def least_substeps(rate: float, requested: int | None = None) -> int:
 
 
 def check_rate(value: float, what: str = "rate", unit: str = "Hz") -> None:
-    """Refuse a rate, or a step, that is no finite number above 0."""
+    """Refuse a rate, or a step, that is not a finite number above 0."""
     if not is_real(value) or not 0.0 < value < np.inf:
         raise InputError(f"The {what} is {value!r} {unit}, but must be a number above 0.")
 

@@ -32,7 +32,7 @@ BLOCK = 512
 """Most samples of a block."""
 STRIDE = BLOCK + 16
 """From one row to the next: not a power of two, so that rows do not share places in a cache; and
-room before and behind a row for the samples next to the block."""
+room before and after a row for the samples next to the block."""
 
 
 # Routines read these named tuples as structs (see `kernels.Struct`), whose arrays do not know their
@@ -86,7 +86,7 @@ class Plan(NamedTuple):
     cell: Indices
     """(m,) point of the grid at or before the stamp, never falling within an observation."""
     fraction: Array
-    """(m,) how far behind it the stamp lies, in steps, 0 to 1."""
+    """(m,) how far after it the stamp lies, in steps, 0 to 1."""
     measured: Array
     """(m,) measured values."""
     weight: Array
@@ -111,7 +111,7 @@ class Sink(NamedTuple):
     target: Indices
     """(d,) rows where they go."""
     first_offset_row: int
-    """First row of those by the observations' own offsets; residuals come behind them."""
+    """First row of those by the observations' own offsets; residuals come after them."""
     folded: int
     """Whether a triangle is wanted."""
     factor: Array
@@ -129,7 +129,7 @@ class Room(NamedTuple):
     """Of the block, in numbers."""
     block: Array
     tangent: Array
-    """Derivatives of the states at the first sample, replaced by those behind the last."""
+    """Derivatives of the states at the first sample, replaced by those after the last."""
     aside: Array
     """(STRIDE,) a row before it is interpolated."""
     products: Array
@@ -193,7 +193,7 @@ def dot(a: Array, b: Array, room: Array) -> float:
 def absorb(sink: int, room: int) -> None:
     """Rotate the rows of a sink into the triangular factor of all rows before it.
 
-    They are used up, and are to be zeros where there are fewer than ROWS.
+    They are used up, and are to be zeros if there are fewer than ROWS.
     """
     columns = fields_of(sink, Sink).columns
     rows = fields_of(sink, Sink).rows
@@ -229,7 +229,7 @@ def upright(factor: Array) -> Array:
 
 
 def combine(struct: int, flat: Array, t: int, shift: int, count: int, row: Array) -> None:
-    """Sum the products of the terms of a program's sum t, from `shift` behind their rows' first."""
+    """Sum the products of the terms of a program's sum t, from `shift` after their rows' first."""
     program = fields_of(struct, Program)
     first = program.first[t]
     end = program.first[t + 1]
@@ -240,13 +240,13 @@ def combine(struct: int, flat: Array, t: int, shift: int, count: int, row: Array
         scale = program.scale[s]
         factor = row_from(flat, program.first_factor[s] + shift)
         if program.second_factor[s] >= 0:
-            other = row_from(flat, program.second_factor[s] + shift)
+            second = row_from(flat, program.second_factor[s] + shift)
             if s == first:
                 for m in range(count):
-                    row[m] = scale * (factor[m] * other[m])
+                    row[m] = scale * (factor[m] * second[m])
             else:
                 for m in range(count):
-                    row[m] += scale * (factor[m] * other[m])
+                    row[m] += scale * (factor[m] * second[m])
         elif s == first:
             for m in range(count):
                 row[m] = scale * factor[m]
@@ -380,7 +380,7 @@ def write_observation(
     plan = fields_of(march.plan, Plan)
     sink = fields_of(march.sink, Sink)
     room = fields_of(march.room, Room)
-    # off the grid the point behind the stamp must be known as well
+    # off the grid the point after the stamp must be known as well
     points = first + count
     if points < size and plan.regular[r] == 0:
         points -= 1

@@ -21,8 +21,8 @@ from swashplate.equations.fields import (
     check_mapping,
     floats_of,
     is_real,
-    made,
     numbers_of,
+    tuple_from,
     value_at,
 )
 from swashplate.equations.keeping import cached_on_disk, key_of
@@ -86,11 +86,14 @@ class InitialStates(NamedTuple):
 
 
 class TapDelays(NamedTuple):
-    """Where all taps read, an element each; see `TapDelay`."""
+    """Where the taps read, as one array for each field of `TapDelay`, an element for each tap."""
 
     samples: NDArray[np.int64]
+    """Whole samples of the delay."""
     fraction: Array
+    """Rest of the delay, in samples."""
     slope: Array
+    """Derivative of the fraction by the delay. [1/s]"""
 
 
 @dataclass(frozen=True)
@@ -137,19 +140,22 @@ class Instance:
 
     def _tap_delays(self, signals: tuple[str, ...], h: float) -> TapDelays:
         delays = []
-        for tap in taps_of(self.model, signals):
-            name = tap.tap.delay
-            delay = float(value_at(self.parts[tap.part].p, name)) if name else 0.0
+        for tapped in taps_of(self.model, signals):
+            name = tapped.tap.delay
+            delay = 0.0
+            if name:
+                parameters = self.parts[tapped.part].p
+                delay = float(value_at(parameters, name))
             if not 0.0 <= delay < math.inf:
                 raise InputError(f"{self.name}: {name} is {delay:g} s, but a delay is at least 0.")
-            delays.append(tap_delay(tap.tap, delay, h))
+            delays.append(tap_delay(tapped.tap, delay, h))
         return TapDelays(
             samples=np.array([delay.samples for delay in delays], dtype=np.int64),
             fraction=np.array([delay.fraction for delay in delays], dtype=np.float64),
             slope=np.array([delay.slope for delay in delays], dtype=np.float64),
         )
 
-    def number_at(self, stored: SignalId, before: Mapping[str, float], h: float) -> float:
+    def number_at(self, stored: SignalId, signals_before: Mapping[str, float], h: float) -> float:
         """Number that is known ahead of a sample, of constant records; 0 for a tap's fraction."""
         numbers = self.parts[stored.part]
         kind = stored.kind
@@ -160,7 +166,7 @@ class Instance:
         if kind in ("tap", "input"):
             part = self.model.parts[stored.part]
             name, _, _ = stored.path.partition(".")
-            return before.get(part.tap(name).signal, 0.0)
+            return signals_before.get(part.tap(name).signal, 0.0)
         return h if kind == "h" else 0.0
 
     def check_inputs(self, signals: Collection[str]) -> None:
@@ -199,7 +205,9 @@ class Instance:
     ) -> InitialStates:
         check_start(start)
         self.check_inputs(first)
-        before = {name: value if start == "steady" else 0.0 for name, value in first.items()}
+        signals_before = {
+            name: value if start == "steady" else 0.0 for name, value in first.items()
+        }
         states: list[Any] = []
         arguments_of_parts: list[Mapping[str, Any]] = []
         for index, (part, numbers) in enumerate(zip(self.model.parts, self.parts, strict=True)):
@@ -218,7 +226,7 @@ class Instance:
                     )
                     continue
                 if tap.signal in first:
-                    value = (before if name in part.taps else first)[tap.signal]
+                    value = (signals_before if name in part.taps else first)[tap.signal]
                 else:
                     value = float(value_at(numbers.p, part.defaults[name]))
                 arguments[name] = Window((value,) * tap.width, 0.0) if tap.width else value
@@ -235,9 +243,9 @@ class Instance:
                 except NO_NUMBER:
                     # outside the domain; the march, which asks for its margin, says what is wrong
                     none = dict.fromkeys(floats_of(part.signals or tuple), math.nan)
-                    arguments["signals"] = made(part.signals or tuple, none)
+                    arguments["signals"] = tuple_from(part.signals or tuple, none)
             arguments_of_parts.append(arguments)
-        return InitialStates(tuple(states), before, tuple(arguments_of_parts))
+        return InitialStates(tuple(states), signals_before, tuple(arguments_of_parts))
 
     def _state(self, part: Model, arguments: Mapping[str, Any], start: Start) -> Any:
         equation = part.rest if start == "rest" else part.settled
@@ -256,7 +264,7 @@ class Instance:
             )
         defaults = part.state._field_defaults
         empty = [path for path in floats_of(part.state) if path.split(".")[0] not in defaults]
-        return made(part.state, dict.fromkeys(empty, 0.0))
+        return tuple_from(part.state, dict.fromkeys(empty, 0.0))
 
     def _called(
         self, part: Model, equation: Callable[..., Any], arguments: Mapping[str, Any]
@@ -532,7 +540,7 @@ def arrays_of(
 
 
 def check_domain(instance: Instance, states: Array, worst: float, cause: str) -> None:
-    """Refuse what was computed outside the model's equations, or is no finite state."""
+    """Refuse what was computed outside the model's equations, or is not a finite state."""
     if not worst > 0.0:
         raise DomainError(f"{instance.name}: {outside(instance.model, worst, cause)}")
     if np.isfinite(states).all():

@@ -59,11 +59,11 @@ class Sensitivities(Generic[R]):
         return f"{type(self).__name__}({self.run!r}, by {count})"
 
     def __getitem__(self, signal: str) -> Array:
-        """(n, k) derivatives of a signal behind the input, by its name."""
+        """(n, k) derivatives of a signal downstream of the input, by its name."""
         if signal not in self.computed:
             (driver, record), *others = self.run.records.items()
-            beside = {name: other.values for name, other in others}
-            observed = every_sample(record, signal, driver, self.run.start, beside)
+            measured_values = {name: stamped.values for name, stamped in others}
+            observed = every_sample(record, signal, driver, self.run.start, measured_values)
             columns = self.bound.jacobian(observed).columns
             self._check(signal, columns)
             self.computed[signal] = columns

@@ -1,10 +1,10 @@
-"""Which derivative flows into which: the structure behind a model's Jacobian, and its kernels.
+"""Which derivative flows into which: the structure of a model's Jacobian, and its kernels.
 
 A column of the Jacobian is the derivative of every state by one parameter, over all samples. It
 follows the linear recurrence ds[n+1] = A[n] ds[n] + b[n]. The partial derivatives A and b are known
 once the states are (`fill` kernels, without a wait between samples); which of them are zero
 whatever the numbers is known when the code is generated. So states fall into groups that wait for
-each other (strongly connected components, a `recurrence` each), behind those that they need.
+each other (strongly connected components, a `recurrence` each), after those that they need.
 """
 
 from __future__ import annotations
@@ -182,7 +182,7 @@ class _Structuring:
         self.partials: dict[SignalId, dict[SignalId, Term]] = {}
         self.kernels: list[PlannedKernel] = []
         self._constants: dict[int, dict[Node, str]] = {}
-        """By part, what follows from parameters alone, with its names."""
+        """By part, what follows from parameters only, with its names."""
         # part by part, so that the kernels of the first ones are the same whatever follows
         self.parts = [self._part(part) for part in self.sample_code.used]
         for signal in self.observed:
@@ -458,21 +458,22 @@ def recurrence(pattern: tuple[tuple[float | None, ...], ...]) -> PlannedKernel:
     lines += [f"width = (size - {len(changing)}) // {3 * size}"]
     lines += [f"for c in range(0, width, {len(together)}):"]
     lines += indented([*ahead, "for m in range(count):", *indented(inner), *after])
-    name, says = f"recurrence_{size}", f"Derivatives of {size} states that wait for each other."
+    name = f"recurrence_{size}"
+    docstring = f"Derivatives of {size} states that wait for each other."
     head = KERNEL_ARGUMENTS
     for argument, instead in (("first", "size"), ("delay_samples", "lanes"), ("params", "tangent")):
         head = head.replace(argument, instead)
-    return PlannedKernel(name, name, function_source(f"{name}({head})", says, lines, ""))
+    return PlannedKernel(name, name, function_source(f"{name}({head})", docstring, lines, ""))
 
 
 def _sum(terms: Sequence[str]) -> str:
-    """Text of a sum, its parts beside each other: none waits for all before it."""
+    """Text of a sum, its parts next to each other: none waits for all earlier ones."""
     half = len(terms) // 2
     return terms[0] if not half else f"({_sum(terms[:half])} + {_sum(terms[half:])})"
 
 
 def _strongly_connected(flows: Mapping[SignalId, list[SignalId]]) -> Iterable[tuple[SignalId, ...]]:
-    """States in groups that wait for each other, each group behind those that it needs."""
+    """States in groups that wait for each other, each group after those that it needs."""
     reach = {state: {state} for state in flows}
     for _ in flows:  # no way is longer
         for state, sources in flows.items():

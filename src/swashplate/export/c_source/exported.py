@@ -30,7 +30,7 @@ class Exported:
     ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     """Least and largest value of a measured input."""
     stable: Mapping[int, Equation] = field(default_factory=dict)
-    """By part: margin above 0 where its equations bear the step, of ``p, h, options``."""
+    """By part: margin above 0 if its equations bear the step, of ``p, h, options``."""
     follows: Mapping[tuple[int, str], Equation] = field(default_factory=dict)
     """By part and option: whether it is on, of ``p``; it cannot be set."""
     internal: frozenset[str] = frozenset()
@@ -38,7 +38,7 @@ class Exported:
     longest: float = inf
     """Longest step. [s]"""
     free_step: str = ""
-    """Option without which the equations are for one step alone; none if empty."""
+    """Option without which the equations are for one step only; none if empty."""
 
     @property
     def file(self) -> str:
@@ -107,7 +107,7 @@ class Exported:
 
     @cached_property
     def measured(self) -> tuple[str, ...]:
-        """External signals for which a parameter stands where they are not given."""
+        """External signals that a parameter replaces if they are not given."""
         replaceable: dict[str, None] = {}
         for part_index, part in enumerate(self.model.parts):
             for name in part.input_types:

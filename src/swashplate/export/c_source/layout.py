@@ -40,9 +40,9 @@ class Layout:
         self.exported, self.model = exported, exported.model
         self.P = exported.prefix.upper()
         public = [f"{exported.prefix}_{word}" for word in PUBLIC.split()]
-        taken = {*OWN.split(), *public}
-        taken |= {exported.type, f"{exported.prefix}_window", f"{exported.prefix}_memory"}
-        self.structs, self.loops = Structs(exported.prefix, taken), Loops(taken)
+        used_names = {*OWN.split(), *public}
+        used_names |= {exported.type, f"{exported.prefix}_window", f"{exported.prefix}_memory"}
+        self.structs, self.loops = Structs(exported.prefix, used_names), Loops(used_names)
         self.tags: list[dict[str, str]] = []
         for part in self.model.parts:
             kinds = {"": part.parameters, "options": part.options, "given": part.given}

@@ -84,8 +84,10 @@ class Writer:
             note = f" /* of {origin.name} */" if origin is not None else ""
             fields.append(f"double {name};{note}")
         part_name = part.part_model.name
-        says = f"What follows from the parameters of the {part_name}, its options and the step."
-        return struct(says, tag, fields)
+        description = (
+            f"What follows from the parameters of the {part_name}, its options and the step."
+        )
+        return struct(description, tag, fields)
 
     # -- the sample --------------------------------------------------------------------------------
 
@@ -109,15 +111,15 @@ class Writer:
             }
             signal = trace.call(link.equation, sources)
             assert isinstance(signal, Node)
-            taken = {*self.loops.taken, "m"}
+            used_names = {*self.loops.used_names, "m"}
             labels = {node: c_name(label) for node, label in trace.labels.items()}
-            language = C(self.loops, trace.origins, taken)
-            block = CodeBlock([signal], labels, taken, language=language)
+            language = C(self.loops, trace.origins, used_names)
+            block = CodeBlock([signal], labels, used_names, language=language)
             function_name = self.loops.fresh(name)
             lines = [*language.headed(block.lines), f"return {block.texts[0]};"]
-            says = first_line(trace.callee(link.equation).source)
+            description = first_line(trace.callee(link.equation).source)
             head = f"static double {function_name}(const {self.exported.type} *m)"
-            self.links[name] = function(says, head, lines)
+            self.links[name] = function(description, head, lines)
             self._link_names[name] = function_name
         return f"{self._link_names[name]}(m)"
 
@@ -160,9 +162,9 @@ class Writer:
             tests.insert(0, "good")
             body.insert(0, "bool good = true;")
         body.append(f"return {' && '.join(tests)} ? {self.P}_OK : {self.P}_DOMAIN;")
-        says = "One sample: everything at this instant, then all states to the next."
+        description = "One sample: everything at this instant, then all states to the next."
         head = f"static int one_sample({self.exported.type} *m)"
-        return function(says, head, body)
+        return function(description, head, body)
 
     def _starts(self, settled: bool) -> list[str]:
         """States at the first sample, at rest or settled: of each part, and of all."""
@@ -217,15 +219,15 @@ class Writer:
         if misplaced:
             test = f"if ({' || '.join(misplaced)}) {{"
             checks += [test, f"    return {self.P}_BAD_DELAY;", "}"]
-        says = "Options, stability and delays of these parameters and this step."
+        description = "Options, stability and delays of these parameters and this step."
         body = [*options, *checks]
         body = [*(body or ["(void)m;"]), f"return {self.P}_OK;"]
-        texts.append(function(says, f"static int checked({self.exported.type} *m)", body))
+        texts.append(function(description, f"static int checked({self.exported.type} *m)", body))
         parts_with_constants = [part for part in self.parts if part.constants]
         texts += [part.computed() for part in parts_with_constants]
-        says, head = "Constants of these parameters and this step.", "static void computed"
+        description, head = "Constants of these parameters and this step.", "static void computed"
         calls = [f"{part.names['constants']}(m);" for part in parts_with_constants] or ["(void)m;"]
-        texts.append(function(says, f"{head}({self.exported.type} *m)", calls))
+        texts.append(function(description, f"{head}({self.exported.type} *m)", calls))
         return "\n\n".join(texts)
 
     def _finite_states(self) -> str:
@@ -235,14 +237,14 @@ class Writer:
             f"s->{members[part_index]}.{path_of(path)}"
             for part_index, path in self.model.places("state")
         ]
-        says = "Whether all states are finite: what is not leaves no zero behind."
+        description = "Whether all states are finite: what is not leaves no zero behind."
         head = f"static bool all_finite(const struct {self.exported.prefix}_memory *s)"
-        return function(says, head, _finite(states, "s"))
+        return function(description, head, _finite(states, "s"))
 
     def _finite_outputs(self) -> str:
-        says = "Whether all outputs of the sample are finite."
+        description = "Whether all outputs of the sample are finite."
         head = f"static bool finite_outputs(const {self.exported.type} *m)"
-        return function(says, head, _finite([*map(self.output, self.exported.names)], "m"))
+        return function(description, head, _finite([*map(self.output, self.exported.names)], "m"))
 
     # -- numbers -----------------------------------------------------------------------------------
 

@@ -46,7 +46,7 @@ class _Interface:
 
     def filled(self, text: str, **further: str) -> str:
         exported, signals = self.exported, "".join(f", double {name}" for name in self.arguments)
-        words = {
+        placeholders = {
             "type": exported.type,
             "p": exported.prefix,
             "P": self.P,
@@ -65,7 +65,7 @@ class _Interface:
             "count": len(self.numbers) + len(self.writer.constant_names()) + 1,
             "longest": literal(exported.longest),
         }
-        return filled(text, {**words, **further})
+        return filled(text, {**placeholders, **further})
 
     # -- header ------------------------------------------------------------------------------------
 
@@ -161,7 +161,7 @@ class _Interface:
                 TEXTS["interface"],
                 settle=self.filled(TEXTS["settled"]) if exported.settles else "",
                 constants=self.constants(),
-                move=self.moved(),
+                move=self.advance_line(),
                 outputs=self.outputs(),
                 limits=self.limits(),
                 places=self.places(),
@@ -215,7 +215,7 @@ class _Interface:
             lines.append(f"m->line[{row}][m->newest] = {self.writer.layout.value_of(signal)};")
         return _body(lines or ["(void)m;"])
 
-    def moved(self) -> str:
+    def advance_line(self) -> str:
         if not self.exported.lines:
             return ""
         return f"    m->newest = m->newest > 0 ? m->newest - 1 : {self.P}_LINE - 1;\n"
@@ -284,14 +284,14 @@ class _Interface:
             test = " || ".join(f"m->{member} != 0.0" for member in members)
             line = f"m->{member}_options.{c_name(option)} = {test};"
             cases.setdefault(line, []).extend(str(index_of[member]) for member in members)
-        says = "Terms of the equations that are on where their parameters are not 0."
+        description = "Terms of the equations that are on where their parameters are not 0."
         head = f"static void switched({self.exported.type} *m, int parameter)"
         if not cases:
-            return function(says, head, ["(void)m;", "(void)parameter;"]) + "\n"
+            return function(description, head, ["(void)m;", "(void)parameter;"]) + "\n"
         lines = ["switch (parameter) {"]
         for line, numbers in cases.items():
             lines += [*(f"case {number}:" for number in numbers), f"    {line}", "    break;"]
-        return function(says, head, [*lines, "default:", "    break;", "}"]) + "\n"
+        return function(description, head, [*lines, "default:", "    break;", "}"]) + "\n"
 
     def places(self) -> str:
         """Whether taps and the newest sample lie within their lines."""
@@ -329,10 +329,12 @@ def _body(lines: Sequence[str]) -> str:
     return "".join(f"{line}\n" for line in indented(lines))
 
 
-def _enum(says: str, prefix: str, names: Sequence[str], count: str, *, bits: bool = False) -> str:
+def _enum(
+    description: str, prefix: str, names: Sequence[str], count: str, *, bits: bool = False
+) -> str:
     if not names and not count:
         return ""
-    lines = [f"/* {says}. */", "enum {"]
+    lines = [f"/* {description}. */", "enum {"]
     for index, name in enumerate(names):
         constant = 1 << index if bits else index
         comma = "," if count or index + 1 < len(names) else ""

@@ -76,9 +76,9 @@ class PartInC:
             self._symbols = kind(*flags)
         self._trace(self.trace())
         self._trace(self.trace(outlined=formulas(self.part.trace)))
-        taken = {*OWN}
+        used_names = {*OWN}
         self.windows = [
-            fresh_name(c_name(tap.input if tap.tap.width else f"{tap.input}_window"), taken)
+            fresh_name(c_name(tap.input if tap.tap.width else f"{tap.input}_window"), used_names)
             for tap in self.part.taps
         ]
         self.names = {
@@ -144,15 +144,15 @@ class PartInC:
 
     def _constants(self, ends: Sequence[Node]) -> dict[Node, str]:
         """What follows from parameters and step, if it has a name or takes a library's function."""
-        still = {node.value for node in self.options.values()}
-        taken = set[str]()
+        option_names = {node.value for node in self.options.values()}
+        used_names = set[str]()
         constants = dict[Node, str]()
-        pending = self.part.ahead(ends, still)[::-1]
+        pending = self.part.ahead(ends, option_names)[::-1]
         while pending:
             node = graph.plain_value(pending.pop())
             if node in constants or node.op in (*LEAVES, "call"):
                 continue
-            if not names_in([node]) - still:
+            if not names_in([node]) - option_names:
                 continue
             named = node in self._labels and node.kind == "float"
             if not named and not any(
@@ -161,7 +161,7 @@ class PartInC:
                 continue
             if named or node.op in LIBRARY or node.op == "result":
                 stem = self._labels.get(node) or STEMS.get(node.op, node.op)
-                constants[node] = fresh_name(c_name(stem), taken)
+                constants[node] = fresh_name(c_name(stem), used_names)
             else:
                 pending += node.args[::-1]
         return constants
@@ -210,13 +210,15 @@ class PartInC:
         `inputs` are values that get their names ahead, each with its name and its text. The `last`
         of all is returned. `pointers` are further declarations, or others, by name.
         """
-        taken = {*self.layout.loops.taken, *OWN, *self.windows}
-        names = {node: fresh_name(name, taken) for node, (name, _) in inputs.items()}
+        used_names = {*self.layout.loops.used_names, *OWN, *self.windows}
+        names = {node: fresh_name(name, used_names) for node, (name, _) in inputs.items()}
         nodes = [node for results_of_word in results.values() for _, node in results_of_word]
         nodes += [last] if last is not None else []
-        language = C(self.layout.loops, trace.origins, taken)
+        language = C(self.layout.loops, trace.origins, used_names)
         labels = self.labels(trace, nodes)
-        block = CodeBlock(nodes, labels, taken, available={**available, **names}, language=language)
+        block = CodeBlock(
+            nodes, labels, used_names, available={**available, **names}, language=language
+        )
         lines, texts = language.headed(block.lines), iter(block.texts)
         for word, results_of_word in results.items():
             lines += [""] if results_of_word and lines else []
@@ -247,13 +249,15 @@ class PartInC:
         model = layout.exported.model
         c_texts: dict[Node, str] = {}
         named: dict[Node, tuple[str, str]] = {}
-        before = {
+        before_record = {
             signal: f"m->before_record[{row}]" for row, signal in enumerate(layout.exported.lines)
         }
         for tap, window in zip(self.part.taps, self.windows, strict=True):
             for age, name in enumerate(self.part.tap_samples(tap)):
                 signal = tap.tap.signal
-                c_texts[graph.name(name)] = before[signal] if start else f"{window}->s[{age}]"
+                c_texts[graph.name(name)] = (
+                    before_record[signal] if start else f"{window}->s[{age}]"
+                )
             c_texts[graph.name(self.part.delay_fraction(tap))] = "0.0" if start else f"{window}->f"
         for name in self.part_model.input_types:
             node = self.part.inputs[name]
@@ -268,7 +272,7 @@ class PartInC:
                 continue
             text = layout.value_of(signal)
             if name in self.part_model.taps:
-                text = before[signal] if start else self._looked(node, c_texts)
+                text = before_record[signal] if start else self._looked(node, c_texts)
             if default is not None:
                 is_set = f"m->inputs.measured[{layout.P}_INPUT_{c_name(signal)}].given"
                 text = f"{is_set} ? {text} : p->{path_of(default)}"
@@ -302,9 +306,9 @@ class PartInC:
         result_type = "void" if margin is None else "bool"
         head = f"static {result_type} {self.names['sample']}({', '.join(formals)})"
         part = self.part_model.name
-        says = f"A sample of the {part}: what is known at it, and the state at the next."
+        description = f"A sample of the {part}: what is known at it, and the state at the next."
         lines = [*(f"(void){name};" for name in unused), *lines]
-        return function(says, head, lines if "m->" in text else ["(void)m;", *lines])
+        return function(description, head, lines if "m->" in text else ["(void)m;", *lines])
 
     def start(self, settled: bool) -> str:
         """The state at the first sample."""
@@ -345,8 +349,8 @@ class PartInC:
         pointer = f"struct {tag} *k = &m->{self.member}_constants;"
         lines = self.body(self.part.trace, {"k": results}, available, {}, pointers={"k": pointer})
         part = self.part_model.name
-        says = f"What follows from the parameters of the {part}, its options and the step."
-        return function(says, head, lines)
+        description = f"What follows from the parameters of the {part}, its options and the step."
+        return function(description, head, lines)
 
     def decided(self, name: str, equation: Equation) -> str:
         """A function that returns what an equation of parameters, options and step says."""
@@ -358,9 +362,9 @@ class PartInC:
         }
         lines = self.body(trace, {}, available, {}, decision)
         result_type = "bool" if decision.kind == "bool" else "double"
-        says = (equation.__doc__ or "").strip().partition("\n")[0]
+        description = (equation.__doc__ or "").strip().partition("\n")[0]
         return function(
-            says, f"static {result_type} {name}(const {self.layout.exported.type} *m)", lines
+            description, f"static {result_type} {name}(const {self.layout.exported.type} *m)", lines
         )
 
     # -- numbers -----------------------------------------------------------------------------------
@@ -370,7 +374,16 @@ class PartInC:
 
         They read ``params``, ``given``, ``options`` and ``h``, and fill ``constants``.
         """
-        taken = {*FUNCTIONS, *RESERVED, "params", "given", "options", "h", "constants", "prepare"}
+        used_names = {
+            *FUNCTIONS,
+            *RESERVED,
+            "params",
+            "given",
+            "options",
+            "h",
+            "constants",
+            "prepare",
+        }
         available = {}
         for array, numbers in (("params", self.part.p), ("given", self.part.given)):
             paths = self.layout.exported.model.places(
@@ -380,7 +393,7 @@ class PartInC:
                 available[node] = f"{array}[{paths.index((self.number, path))}]"
         for name, node in self.options.items():
             available[node] = f"options[{self.layout.exported.options.index((self.number, name))}]"
-        block = CodeBlock([*self.constants], self._labels, taken, available=available)
+        block = CodeBlock([*self.constants], self._labels, used_names, available=available)
         lines = [*block.lines]
         for index, text in enumerate(block.texts):
             lines += assigned(f"constants[{first + index}]", text)
@@ -388,7 +401,7 @@ class PartInC:
 
 
 def formulas(trace: Trace) -> set[Parsed]:
-    """Equations of numbers alone that a part uses more than once: they become functions of C."""
+    """Equations of numbers only that a part uses more than once: they become functions of C."""
     repeated = set()
     for source, calls in trace.calls.items():
         arguments, results = max(calls, key=lambda call: len(ordered(call[1], call[0])))

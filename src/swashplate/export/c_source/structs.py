@@ -20,8 +20,8 @@ class Structs:
         Tag and text of each, by the class of named tuples that it stands for.
     """
 
-    def __init__(self, prefix: str, taken: Iterable[str]) -> None:
-        self.prefix, self._taken = prefix, {*taken}
+    def __init__(self, prefix: str, used_names: Iterable[str]) -> None:
+        self.prefix, self._used_names = prefix, {*used_names}
         self.texts: dict[Any, tuple[str, str]] = {}
 
     def of(self, cls: Any) -> str:
@@ -36,13 +36,13 @@ class Structs:
                 note = comment_line(notes[name])
                 fields.append(f"{declared} /* {note} */" if note else declared)
             doc = inspect.getdoc(cls) or ""
-            says = "" if doc.startswith(f"{cls.__name__}(") else doc.splitlines()[0]
-            self.texts[cls] = tag, struct(says, tag, fields)
+            description = "" if doc.startswith(f"{cls.__name__}(") else doc.splitlines()[0]
+            self.texts[cls] = tag, struct(description, tag, fields)
         return self.texts[cls][0]
 
     def fresh(self, stem: str) -> str:
         """A tag that nothing else has."""
-        return fresh_name(c_name(f"{self.prefix}_{stem}"), self._taken)
+        return fresh_name(c_name(f"{self.prefix}_{stem}"), self._used_names)
 
     def _type(self, hint: Any) -> str:
         if is_named_tuple(hint):
@@ -50,9 +50,9 @@ class Structs:
         return "double" if hint in (float, int) else "bool"
 
 
-def struct(says: str, tag: str, fields: Iterable[str]) -> str:
+def struct(description: str, tag: str, fields: Iterable[str]) -> str:
     """Text of a struct; one without fields has a byte, as C99 wants it."""
-    head = comment(says) if says else []
+    head = comment(description) if description else []
     lines = [f"    {declaration}" for declaration in fields] or ["    char nothing;"]
     return "\n".join([*head, f"struct {tag} {{", *lines, "};"])
 

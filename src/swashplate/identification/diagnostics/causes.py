@@ -1,4 +1,4 @@
-"""What explains an error that is not noise: one thing that is freed, and then a refit with it."""
+"""Causes of an error that is not noise: each is a further unknown, tried by a refit with it."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ named at most."""
 TOLERANCE, FEWEST_EVALUATIONS, MOST_EVALUATIONS = 1e-6, 6, 30
 """Of a refit, which begins at the optimum without the cause."""
 WORK = 20_000_000
-"""Samples that one refit may march, again and again: about 6 s."""
+"""Samples that one refit may march in all: about 6 s."""
 SAME_DIRECTION = 1e-4
 """Part of a cause's effect outside the estimates' below which both are the same: its square is a
 difference, which has 16 digits less those of this one."""
@@ -127,10 +127,10 @@ def causes_of(stages: Sequence[StageFit]) -> tuple[Cause, ...] | None:
         quick = isinstance(stage.problem.model, EquationModel)
         if stage.solution.loss != "linear" or not quick:
             continue
-        before = squares_of(stage.problem, stage.solution.vector)
-        if before.noise_share >= EXPLAINED:
+        original_squares = squares_of(stage.problem, stage.solution.vector)
+        if original_squares.noise_share >= EXPLAINED:
             continue
-        causes = _causes_of_stage(stage, before)
+        causes = _causes_of_stage(stage, original_squares)
         if causes:
             # what an earlier stage lacks, the later ones inherit
             break
@@ -162,20 +162,20 @@ def squares_of(problem: Problem, vector: Array) -> Squares:
         for name, residual in problem.residuals(vector, number).items():
             used = run[name].used
             time = run[name].time[used]
-            counted = residual[used]
+            used_residual = residual[used]
             if time.size < 2:
                 continue
             block = max(round(BLOCK / float(np.median(np.diff(time)))), 2)
-            starts = np.arange(0, counted.size, block)
-            counts = np.diff(np.append(starts, counted.size))
-            slow += float(np.sum(np.add.reduceat(counted, starts) ** 2 / counts))
-            total += float(counted @ counted)
-            samples += counted.size
+            starts = np.arange(0, used_residual.size, block)
+            counts = np.diff(np.append(starts, used_residual.size))
+            slow += float(np.sum(np.add.reduceat(used_residual, starts) ** 2 / counts))
+            total += float(used_residual @ used_residual)
+            samples += used_residual.size
             blocks += starts.size
     return Squares(slow, max(total - slow, 0.0), samples / max(blocks, 1.0))
 
 
-def _causes_of_stage(stage: StageFit, before: Squares) -> tuple[Cause, ...]:
+def _causes_of_stage(stage: StageFit, original_squares: Squares) -> tuple[Cause, ...]:
     """Causes of one stage's residuals, the largest share first."""
     plausible = [
         score
@@ -185,7 +185,7 @@ def _causes_of_stage(stage: StageFit, before: Squares) -> tuple[Cause, ...]:
     plausible.sort(key=lambda score: -score.share)
     causes = list[Cause]()
     for score in plausible[:TRIED]:
-        cause = _refitted(stage, score, before)
+        cause = _refitted(stage, score, original_squares)
         if cause is not None:
             causes.append(cause)
     causes.sort(key=lambda cause: -cause.share)
@@ -321,14 +321,14 @@ def _of_channel(
     """
     channel, time = experiment[name], experiment[name].time
     slope = np.gradient(output, time) if time.size > 2 else np.zeros_like(output)
-    moved = output - output[0] if channel.is_position else output
+    motion = output - output[0] if channel.is_position else output
     effects = {
-        SCALE.format(name): moved,
+        SCALE.format(name): motion,
         f"time stamps of {name}": -slope,
         f"lag of {name}": (behind_lag(time, output) - output) / SMALL_LAG,
     }
     if channel.kind not in CURRENTS:
-        effects[DRIFT.format(name)] = moved * position
+        effects[DRIFT.format(name)] = motion * position
         effects[RESISTED.format(name)] = -lost(experiment, name, output, resisting=True)
         effects[PULLED.format(name)] = -lost(experiment, name, output, resisting=False)
     return effects
@@ -351,7 +351,7 @@ def lost(experiment: Experiment, name: str, output: Array, *, resisting: bool) -
 
 
 def behind_lag(time: Array, values: Array, lag: float = SMALL_LAG) -> Array:
-    """(m,) values behind a first-order lag [s], at rest before."""
+    """(m,) values after a first-order lag [s], at rest before."""
     decay = np.exp(-np.diff(time) / lag)
     bands = np.vstack([np.ones(time.size), np.append(-decay, 0.0)])
     lagged = solve_banded((1, 0), bands, np.append(values[:1], (1.0 - decay) * values[1:]))
@@ -436,8 +436,8 @@ def _time(size: float) -> str:
 
 
 def _lost_speed(unit: str, load: str, size: float) -> str:
-    shown = display_unit(unit, abs(size))
-    return f"{shown.factor * size:.3g} {shown.name} of speed are lost to {load}"
+    display = display_unit(unit, abs(size))
+    return f"{display.factor * size:.3g} {display.name} of speed are lost to {load}"
 
 
 def _of_commands(stage: StageFit) -> Iterator[CandidateCause]:
@@ -472,7 +472,7 @@ def _of_numbers(stage: StageFit) -> Iterator[CandidateCause]:
         name=name,
         least=0.0,
         most=0.1 * largest,
-        freed=partial(_with_number, stage, name),
+        freed=partial(_with_freed_number, stage, name),
         states=lambda size: (
             f"spool and solenoids have a friction or hysteresis of ±{1e3 * size:.3g} mA, "
             f"{percent(size / largest)} of the largest current"
@@ -490,7 +490,7 @@ def _of_numbers(stage: StageFit) -> Iterator[CandidateCause]:
             name=name,
             least=low,
             most=high,
-            freed=partial(_with_number, stage, name),
+            freed=partial(_with_freed_number, stage, name),
             states=partial(_other_value, name, definition.unit, value),
             advice=f"measure it ({definition.name}), or let the fit setup estimate it",
             free=name,
@@ -545,10 +545,10 @@ def _driving(stage: StageFit, experiment: Experiment) -> Array:
 # --- a refit with it ------------------------------------------------------------------------------
 
 
-def _refitted(stage: StageFit, score: _Score, before: Squares) -> Cause | None:
+def _refitted(stage: StageFit, score: _Score, original_squares: Squares) -> Cause | None:
     """A candidate after a refit; None if it does not remove half of the squares."""
     candidate = score.candidate
-    best = _solved(stage, candidate, score.size, before)
+    best = _solved(stage, candidate, score.size, original_squares)
     if best is None:
         return None
     size, share = best
@@ -556,17 +556,17 @@ def _refitted(stage: StageFit, score: _Score, before: Squares) -> Cause | None:
         # along the size the squares are a parabola: its slope at 0 is known
         curvature = share - 2.0 * score.share
         if curvature < 0.0 and abs(score.share / curvature + 1.0) > 0.1:
-            other = -score.share / curvature * score.size
-            better = _solved(stage, candidate, other, before)
-            if better is not None and better[1] > share:
-                size, share = better
+            other_size = -score.share / curvature * score.size
+            other_fit = _solved(stage, candidate, other_size, original_squares)
+            if other_fit is not None and other_fit[1] > share:
+                size, share = other_fit
     if share < EXPLAINED or not candidate.least < size < candidate.most:
         return None
     return Cause(candidate.name, size, share, candidate.states(size), candidate.advice)
 
 
 def _solved(
-    stage: StageFit, candidate: CandidateCause, size: float, before: Squares
+    stage: StageFit, candidate: CandidateCause, size: float, original_squares: Squares
 ) -> tuple[float, float] | None:
     """Size of a candidate and the share of the squares that a refit removes; None if it fails."""
     problem, vector = stage.problem, stage.solution.vector
@@ -579,7 +579,7 @@ def _solved(
                 start[k] = estimated[name]
         most = min(max(WORK // problem.samples, FEWEST_EVALUATIONS), MOST_EVALUATIONS)
         solution: Solution = solve(freed, start, tolerance=TOLERANCE, max_evaluations=most)
-        share = 1.0 - squares_of(freed, solution.vector).slow / before.slow
+        share = 1.0 - squares_of(freed, solution.vector).slow / original_squares.slow
     except (DomainError, InputError, ParameterError):
         return None
     if candidate.free:
@@ -588,22 +588,29 @@ def _solved(
     return size, share
 
 
-def _with_number(stage: StageFit, name: str, size: float) -> Problem:
-    """The problem with a fixed number of the drive free, from what one step says on."""
-    problem, model = stage.problem, stage.problem.model
+def _with_freed_number(stage: StageFit, name: str, change: float) -> Problem:
+    """The problem with a fixed number of the drive as a further unknown.
+
+    `change` is that of the number to first order, from which the refit starts.
+    """
+    problem = stage.problem
+    model = problem.model
     assert isinstance(model, DriveModel)
     value = stage.parameters.numbers.get(name, 0.0)
-    start = value + size
+    start = value + change
     if name in HYSTERESIS:
-        extra = Unknown(name, start, 0.01 * start, 20.0 * start, log=True)
+        freed = Unknown(name, start, 0.01 * start, 20.0 * start, log=True)
         options = model.parameters.options | {SWITCHES[name]}
         model = replace(model, parameters=model.parameters.with_numbers({name: start}, options))
     else:
-        low, high = sorted((0.4 * value, 2.1 * value))
-        if CATALOGUE[COLUMNS[name]].unit == "s":
-            low, high = 0.0, value + LATEST
-        extra = Unknown(name, start, low, high)
-    unknowns = Unknowns((*problem.unknowns.items, extra))
+        is_time = CATALOGUE[COLUMNS[name]].unit == "s"
+        if is_time:
+            low = 0.0
+            high = value + LATEST
+        else:
+            low, high = sorted((0.4 * value, 2.1 * value))
+        freed = Unknown(name, start, low, high)
+    unknowns = Unknowns((*problem.unknowns.items, freed))
     return replace(problem, model=model, unknowns=unknowns)
 
 
@@ -627,21 +634,21 @@ def _with_values(run: Experiment, name: str, values: Array) -> Experiment:
     return replace(run, channels=channels)
 
 
-def _moved(run: Experiment, name: str) -> tuple[Array, Array]:
-    """What a channel measured from its zero on, and the zero."""
+def _from_zero(run: Experiment, name: str) -> tuple[Array, Array]:
+    """Readings of a channel relative to its zero, and the zero (1,): a position's first reading."""
     values = run[name].values
     zero = values[:1] if run[name].is_position else np.zeros(1)
     return values - zero, zero
 
 
 def _scaled(run: Experiment, name: str, _: Array, __: float, size: float) -> Experiment:
-    moved, zero = _moved(run, name)
-    return _with_values(run, name, zero + moved / (1.0 + size))
+    readings, zero = _from_zero(run, name)
+    return _with_values(run, name, zero + readings / (1.0 + size))
 
 
 def _undone_drift(run: Experiment, name: str, _: Array, position: float, size: float) -> Experiment:
-    moved, zero = _moved(run, name)
-    return _with_values(run, name, zero + moved / (1.0 + size * position))
+    readings, zero = _from_zero(run, name)
+    return _with_values(run, name, zero + readings / (1.0 + size * position))
 
 
 def _late(run: Experiment, name: str, _: Array, __: float, size: float) -> Experiment:
@@ -673,14 +680,14 @@ def _with_command(
         signal = run.input
         largest = float(np.abs(signal.values).max())
         values = np.clip(change(signal.time, signal.values, size), -largest, largest)
-        moved = replace(run, input=replace(signal, values=values))
-        runs.append(moved)
+        shifted = replace(run, input=replace(signal, values=values))
+        runs.append(shifted)
         if run.name in currents:
             if _drives(stage, run):
                 start = model.starts.get(run.name, {})
-                currents[run.name] = simulated_current(moved, model.parameters, start)
+                currents[run.name] = simulated_current(shifted, model.parameters, start)
             else:
-                currents[run.name] = measured_current(moved, stage.stage.current_scale)
+                currents[run.name] = measured_current(shifted, stage.stage.current_scale)
     return replace(problem, experiments=tuple(runs), model=replace(model, currents=currents))
 
 

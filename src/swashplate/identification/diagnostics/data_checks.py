@@ -37,12 +37,12 @@ from swashplate.tables import count
 
 Array = NDArray[np.float64]
 
-WINDOW = 0.2
-"""Time over which the speed behind a position is taken. [s]"""
+SPEED_WINDOW = 0.2
+"""Time over which a mean speed is taken from a position. [s]"""
 MOVING = 0.1
-"""Of the largest motion in any run, from which a run's own can be judged."""
+"""Motion of a run that is enough to judge it, as a part of the largest in any run. [1]"""
 FAR_OFF = 3.0
-"""By which a channel should not differ from the nominal drive."""
+"""Factor by which a channel should not differ from the nominal drive. [1]"""
 FROZEN, DEAD = 1.0, 0.2
 """Time for which no position stands still while its drive runs [s]; and the part of a channel's
 largest simulated range that a run must have for a still sensor to be broken."""
@@ -73,7 +73,7 @@ refusal, warning = partial(Finding, "refuse"), partial(Finding, "warn")
 
 
 def check_runs(experiments: Sequence[Experiment], nominal: ParameterSet) -> list[Finding]:
-    """What stands in the way of a fit: runs beside each other and beside the nominal drive.
+    """What stands in the way of a fit: runs against each other and against the nominal drive.
 
     What must be refused comes first. Later checks need what earlier ones found sound, so that not
     everything that is wrong is always listed at once. Runs or a drive that cannot be simulated are
@@ -89,24 +89,29 @@ def check_runs(experiments: Sequence[Experiment], nominal: ParameterSet) -> list
     if not _refused(findings):
         for name, runs in simulated_readings(experiments, nominal).items():
             named = {finding.run for finding in findings if finding.channel is None}
-            still = list(_still(name, [readings for readings in runs if readings.run not in named]))
-            named |= {finding.run for finding in still}
-            findings += still
-            others = [readings for readings in runs if readings.run not in named]
-            findings += contradictions(name, others)
+            unnamed = [readings for readings in runs if readings.run not in named]
+            stuck_sensors = list(_stuck_sensors(name, unnamed))
+            named |= {finding.run for finding in stuck_sensors}
+            findings += stuck_sensors
+            unnamed = [readings for readings in runs if readings.run not in named]
+            findings += contradictions(name, unnamed)
     return sorted(findings, key=lambda finding: finding.severity != "refuse")
 
 
 def unfitted_currents(experiments: Sequence[Experiment], setup: FitSetup) -> list[Finding]:
-    """Currents of an amplifier that are measured, and fitted by no stage."""
-    fitted = {kind for stage in setup.stages for kind in stage.channels or kinds_of(stage.part)}
+    """Warnings of currents of an amplifier that are measured, but that no stage uses."""
     if any(stage.current == "measured" for stage in setup.stages):
         return []
+    fitted_kinds = set[str]()
+    for stage in setup.stages:
+        fitted_kinds.update(stage.channels or kinds_of(stage.part))
+    unfitted_kinds = set(CURRENTS) - fitted_kinds
     unfitted = dict.fromkeys(
         name
         for run in experiments
+        if run.input.kind == "voltage"
         for name, channel in run.channels.items()
-        if run.input.kind == "voltage" and channel.kind in CURRENTS and channel.kind not in fitted
+        if channel.kind in unfitted_kinds
     )
     return [
         warning(
@@ -183,7 +188,7 @@ def _unchanging(run: Experiment, names: Sequence[str]) -> Iterator[Finding]:
 def contradicting_runs(
     experiments: Sequence[Experiment], parameters: ParameterSet
 ) -> list[Finding]:
-    """Runs whose sign or scale contradicts the others, beside a drive that was fitted to all."""
+    """Runs whose sign or scale contradicts the others, judged by a drive that was fitted to all."""
     return [
         finding
         for name, runs in simulated_readings(experiments, parameters).items()
@@ -309,11 +314,11 @@ def _within_dead_zone(run: Experiment, nominal: ParameterSet) -> str:
     return f"stays between {least:.3g} and {most:.3g} {unit}, within {zone}"
 
 
-# --- what channels do beside the nominal drive ----------------------------------------------------
+# --- channels against the nominal drive -----------------------------------------------------------
 
 
 class SimulatedReadings(NamedTuple):
-    """What a channel did in a run, measured and simulated, where it counts."""
+    """What a channel did in a run, measured and simulated, at the samples that count."""
 
     run: str
     channel: Channel
@@ -326,7 +331,7 @@ class SimulatedReadings(NamedTuple):
 
     @property
     def gain(self) -> float:
-        """Measured over simulated, in the least-squares sense; negative where turned round."""
+        """Measured over simulated, in the least-squares sense; negative if turned round."""
         return float(self.measured @ self.simulated / (self.simulated @ self.simulated))
 
     @property
@@ -342,7 +347,7 @@ class SimulatedReadings(NamedTuple):
 def simulated_readings(
     experiments: Sequence[Experiment], parameters: ParameterSet
 ) -> dict[str, list[SimulatedReadings]]:
-    """What each channel did in each run, by the channel's name; runs that hardly move left out."""
+    """Measured and simulated readings by channel, of the runs in which the drive moves enough."""
     by_channel = dict[str, list[SimulatedReadings]]()
     for experiment in experiments:
         simulation = simulated_run(experiment, parameters)
@@ -356,16 +361,20 @@ def simulated_readings(
 
 
 def _readings_of(run: str, channel: Channel, simulation: Simulation) -> SimulatedReadings:
-    """A channel of a run beside its simulation."""
-    time, measured = channel.time[channel.used], channel.values[channel.used]
+    """Used readings of a channel in a run, and the simulated ones; of a position mean speeds."""
+    time = channel.time[channel.used]
+    measured = channel.values[channel.used]
     signal = SIGNALS[channel.kind]
-    parts = ("current_positive", "current_negative") if signal == "current_sum" else (signal,)
+    if signal == "current_sum":
+        summands: tuple[str, ...] = ("current_positive", "current_negative")
+    else:
+        summands = (signal,)
     simulated = np.sum(
-        [np.interp(time, simulation.time, simulation[part]) for part in parts], axis=0
+        [np.interp(time, simulation.time, simulation[name]) for name in summands], axis=0
     )
     if channel.is_position:
-        # mean speeds in short windows: where a position drifts to says little
-        windows = max(int((time[-1] - time[0]) / WINDOW), 4)
+        # a position drifts with small errors of speed: speeds are what can be compared
+        windows = max(int((time[-1] - time[0]) / SPEED_WINDOW), 4)
         grid = np.linspace(time[0], time[-1], windows + 1)
         measured = np.diff(np.interp(grid, time, measured)) / np.diff(grid)
         simulated = np.diff(np.interp(grid, time, simulated)) / np.diff(grid)
@@ -382,7 +391,7 @@ def _moving(runs: Sequence[SimulatedReadings]) -> list[SimulatedReadings]:
     ]
 
 
-def _still(name: str, runs: Sequence[SimulatedReadings]) -> Iterator[Finding]:
+def _stuck_sensors(name: str, runs: Sequence[SimulatedReadings]) -> Iterator[Finding]:
     """Sensors that show nothing while the drive moves, and positions that freeze for a while."""
     ranges = [float(np.ptp(readings.simulated)) for readings in runs]
     fastest = max((float(np.abs(readings.simulated).max()) for readings in runs), default=0.0)
@@ -420,7 +429,7 @@ def _frozen(name: str, readings: SimulatedReadings, least: float) -> Iterator[Fi
 
 
 def contradictions(name: str, runs: Sequence[SimulatedReadings]) -> Iterator[Finding]:
-    """Runs whose sign or scale beside the drive cannot be right, or a channel's as a whole."""
+    """Runs whose sign or scale against the drive cannot be right, or a channel's as a whole."""
     against = [turned(readings.simulated, readings.measured) for readings in runs]
     if len(runs) > 1 and all(against):
         yield refusal(
@@ -475,7 +484,7 @@ def _far_off_gains(name: str, runs: Sequence[SimulatedReadings]) -> Iterator[Fin
 def clipped_channels(experiments: Sequence[Experiment]) -> Iterator[Finding]:
     """Channels that stand at an end of their instrument, with the limits to state.
 
-    A channel is clipped where it reads its very largest or smallest value for 0.1 s and longer
+    A channel is clipped if it reads its very largest or smallest value for 0.1 s and longer
     while the input moves by more than a tenth of its range: no noisy signal does that. Nor does one
     stand there so long at inputs that far apart, a machine at its stop included; but one without
     noise does, and one that reads it at a run's first sample is at rest. Positions are passed over,
@@ -498,19 +507,19 @@ def clipped_channels(experiments: Sequence[Experiment]) -> Iterator[Finding]:
             if not spans.size or low == high:
                 continue
             rests = any(run[name].values[0] == end for run in runs)
-            moved, apart = float(np.ptp(spans, axis=1).max()), float(np.ptp(spans))
+            largest_range, total_range = float(np.ptp(spans, axis=1).max()), float(np.ptp(spans))
             # a rounded reading stands still by itself for as long as a step of it lasts
             coarse = float(np.diff(np.unique(np.round(values / (high - low), 9))).min())
             step = max(coarse, 3e-4) * (high - low)
-            if apart > moved and not rests and _is_noisy(values, step):
-                moved = apart
-            if moved > (0.1 + 2.0 * coarse) * reach:
+            if total_range > largest_range and not rests and _is_noisy(values, step):
+                largest_range = total_range
+            if largest_range > (0.1 + 2.0 * coarse) * reach:
                 yield refusal(
                     None,
                     name,
                     f"'{name}' reads exactly {end:.6g} {runs[0][name].unit} at inputs that differ "
-                    f"by {moved:.3g} {runs[0].input.unit}: it is clipped there. Set limits = "
-                    f"[{low:.6g}, {high:.6g}] in its channel, and such samples are ignored.",
+                    f"by {largest_range:.3g} {runs[0].input.unit}: it is clipped there. Set limits "
+                    f"= [{low:.6g}, {high:.6g}] in its channel, and such samples are ignored.",
                 )
 
 
@@ -522,9 +531,9 @@ def _inputs_at(end: float, experiment: Experiment, name: str) -> list[tuple[floa
     """
     channel, spans = experiment[name], list[tuple[float, float]]()
     edges = np.flatnonzero(np.diff(channel.values == end, prepend=False, append=False))
-    for first, after in edges.reshape(-1, 2):
-        if channel.time[after - 1] - channel.time[first] >= DWELLS:
-            inputs = experiment.input.at(channel.time[first : after - (after - first) // 4])
+    for first, stop in edges.reshape(-1, 2):
+        if channel.time[stop - 1] - channel.time[first] >= DWELLS:
+            inputs = experiment.input.at(channel.time[first : stop - (stop - first) // 4])
             spans.append((float(inputs.min()), float(inputs.max())))
     return spans
 
@@ -536,10 +545,10 @@ def _is_noisy(values: Array, step: float) -> bool:
     one step makes, a tenth are such.
     """
     inner = (values > values.min()) & (values < values.max())
-    first, after = np.diff(values)[:-1], np.diff(values)[1:]
+    first, second = np.diff(values)[:-1], np.diff(values)[1:]
     within = inner[:-2] & inner[1:-1] & inner[2:]
-    least = np.minimum(np.abs(first), np.abs(after))
-    turns = within & (first * after < 0.0) & (least > 1.5 * step)
+    least = np.minimum(np.abs(first), np.abs(second))
+    turns = within & (first * second < 0.0) & (least > 1.5 * step)
     return bool(turns.sum() > TO_AND_FRO * max(within.sum(), 1))
 
 
@@ -567,7 +576,7 @@ def check_rank(where: str, problem: Problem) -> list[Finding]:
 
 
 def beside_the_drives(campaign: Campaign) -> list[str]:
-    """Sentences on runs that stand out beside a simulation of their axis's drive."""
+    """Sentences on runs that stand out against a simulation of their axis's drive."""
     sentences = list[str]()
     for name, axis in campaign.axes.items():
         if axis.drive is None:

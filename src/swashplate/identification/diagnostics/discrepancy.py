@@ -44,7 +44,7 @@ COMMANDED = 0.01
 OWN = 0.01
 """Of 1 less leverage: directions that one maneuver alone determines stay fitted, as one step says
 little of where they would be without it."""
-LEVEL = 0.9
+BOUND_LEVEL = 0.9
 """Probability with which the error of a new maneuver lies below the stated one."""
 USUAL_SPREAD, WORTH = 1.3, 20.0
 """Standard deviation of the logarithm of a maneuver's squared error over the variance function, and
@@ -106,7 +106,7 @@ class _RunPart(NamedTuple):
 
 
 def _shifts(fit: LinearisedFit, groups: Mapping[str, str]) -> dict[str, _Shift]:
-    """Of each group of runs; products alone are kept of them."""
+    """Of each group of runs; only products are kept of them."""
     parts = defaultdict[str, list[_RunPart]](list)
     for run, jacobian in fit.jacobians():
         if run.name in groups:
@@ -134,8 +134,8 @@ def _shifted(fit: LinearisedFit, run: LinearisedRun, jacobian: Array, shift: _Sh
     """(n,) differences of a run, simulated less measured, after a shift. [unit]"""
     directions, whitening = fit.inverse.of_run(run.name)
     _, of_run, of_shift = np.intersect1d(directions, shift.directions, return_indices=True)
-    moved = run.residual + jacobian @ (whitening[:, of_run] @ shift.size[of_shift])
-    return np.asarray(moved if run.weight is None else moved / run.weight)
+    shifted = run.residual + jacobian @ (whitening[:, of_run] @ shift.size[of_shift])
+    return np.asarray(shifted if run.weight is None else shifted / run.weight)
 
 
 # --- errors over windows --------------------------------------------------------------------------
@@ -268,7 +268,7 @@ def window_weights(record: ChannelErrors, window: float) -> Array:
 
 
 def windowed(values: Array, weights: Array) -> Array:
-    """(n,) weighted sums about each of (n,) samples, NaN where a part of the window is missing."""
+    """(n,) weighted sums about each of (n,) samples, NaN if a part of the window is missing."""
     half = weights.size // 2
     sums = np.full(values.size, np.nan)
     if values.size > weights.size:
@@ -299,7 +299,7 @@ def classes_of(
 
 
 class WindowCell(NamedTuple):
-    """Windows of one class in one run, one beside another, over the range of the signal."""
+    """Windows of one class in one run, next to each other, over the range of the signal."""
 
     run: str
     maneuver: str
@@ -508,7 +508,7 @@ def variance_function(cells: Sequence[WindowCell]) -> Array:
     for _ in range(12):
         spread = np.maximum(terms @ coefficients, 1e-3 * coefficients.sum()) + noise + 1e-14
         coefficients = nnls(terms / spread[:, None], squares / spread)[0]
-    # what the noise's own scatter leaves open is no less than two standard errors of its mean
+    # what the noise's own scatter leaves open is at least two standard errors of its mean
     coefficients[0] += 2.0 * float(np.sqrt(2.0 * np.mean(noise**2) / noise.size))
     return np.asarray(coefficients)
 
@@ -521,7 +521,7 @@ def bound_of_variance(cells: Sequence[WindowCell]) -> Array:
         maneuvers[cell.maneuver].append(cell)
     ratios = np.array([log_ratio(of_maneuver, coefficients) for of_maneuver in maneuvers.values()])
     deviation, freedom = spread_of(ratios)
-    bound = float(stdtrit(freedom, LEVEL)) * deviation * np.sqrt(1.0 + 1.0 / ratios.size)
+    bound = float(stdtrit(freedom, BOUND_LEVEL)) * deviation * np.sqrt(1.0 + 1.0 / ratios.size)
     return coefficients * float(np.exp(ratios.mean() + bound))
 
 
@@ -539,6 +539,6 @@ def log_ratio(cells: Sequence[WindowCell], coefficients: Array) -> float:
 
 def spread_of(ratios: Array) -> tuple[float, float]:
     """Standard deviation of logarithms of some maneuvers, and its degrees of freedom."""
-    own = ratios.size - 1.0
+    freedom = ratios.size - 1.0
     squares = float(np.sum((ratios - ratios.mean()) ** 2)) + WORTH * USUAL_SPREAD**2
-    return float(np.sqrt(squares / (own + WORTH))), own + WORTH
+    return float(np.sqrt(squares / (freedom + WORTH))), freedom + WORTH

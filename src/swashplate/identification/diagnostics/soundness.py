@@ -1,4 +1,4 @@
-"""Whether the data are sound: runs beside the model that was fitted to all of them."""
+"""Whether the data are sound: runs against the model that was fitted to all of them."""
 
 from __future__ import annotations
 
@@ -96,35 +96,40 @@ def outlying_runs(stages: Sequence[StageFit], predicted: Sequence[RunQuality]) -
         if stage is not None:
             channels = list(stage.problem.channels)
         for channel in dict.fromkeys(channels):
-            for finding in _of_channel(stage, channel, predicted):
+            for finding in _outliers_by_channel(stage, channel, predicted):
                 if finding.run not in named:
                     named.add(str(finding.run))
                     yield finding
 
 
-def _of_channel(
+def _outliers_by_channel(
     stage: StageFit | None, channel: str, predicted: Sequence[RunQuality]
 ) -> list[Finding]:
-    """The runs that one channel shows to be unsound.
+    """The runs that one channel shows to be outliers, found one by one.
 
-    Empty if these would be half of all: runs that disagree altogether show what the model lacks.
+    None if these would be half of all: runs that all disagree show what the model lacks.
     """
     findings = list[Finding]()
-    names = list[str]()
+    excluded = list[str]()
     while True:
-        before = _ErrorRatios.of(_records(stage, channel, predicted, names), names)
-        suspect = None if before is None else before.farthest
+        ratios = _ErrorRatios.of(_records(stage, channel, predicted, excluded), excluded)
+        suspect = None if ratios is None else ratios.farthest
         if suspect is None:
             break
-        records = _records(stage, channel, predicted, [*names, suspect])
-        after = _ErrorRatios.of(records, [*names, suspect])
-        if after is None or after.excess(suspect) <= after.limit or after.is_shared(suspect):
+        # the suspect must stand out from a fit that it does not influence
+        excluded.append(suspect)
+        records = _records(stage, channel, predicted, excluded)
+        ratios = _ErrorRatios.of(records, excluded)
+        if ratios is None:
             break
-        names.append(suspect)
+        log_excess = ratios.excess(suspect)
+        if log_excess <= ratios.limit or ratios.is_shared(suspect):
+            break
         record = next(record for record in records if record.run == suspect)
-        times = float(np.exp(0.5 * after.excess(suspect)))
-        findings.append(refusal(suspect, channel, _sentence(record, channel, records, times)))
-        if 2 * len(findings) >= len(after.ratios):
+        error_ratio = float(np.exp(0.5 * log_excess))
+        sentence = _sentence(record, channel, records, error_ratio)
+        findings.append(refusal(suspect, channel, sentence))
+        if 2 * len(findings) >= len(ratios.ratios):
             return []
     return findings
 
@@ -161,7 +166,7 @@ def _records(
 
 @dataclass(frozen=True)
 class _ErrorRatios:
-    """Logarithms of the runs' errors, beside those of the runs that count as sound."""
+    """Logarithms of the runs' squared errors, to compare with those of the sound runs."""
 
     suspects: tuple[str, ...]
     """Runs that may be unsound."""
@@ -195,7 +200,7 @@ class _ErrorRatios:
         return np.array([self.ratios[name] for name in self.sound])
 
     def excess(self, run: str) -> float:
-        """How far a run is above the median of the sound ones."""
+        """Logarithm of a run's squared error over the median of the sound ones."""
         if run not in self.ratios:
             return 0.0
         return self.ratios[run] - float(np.median(self._sound_ratios))
@@ -229,19 +234,19 @@ class _ErrorRatios:
 
 
 def _sentence(
-    record: ChannelErrors, channel: str, records: Iterable[ChannelErrors], times: float
+    record: ChannelErrors, channel: str, records: Iterable[ChannelErrors], error_ratio: float
 ) -> str:
     """What is wrong with a run, if that can be found out, and the line to write."""
     fault = (
-        f"{record.run}: '{channel}' is {times:.2g} times as far from the simulation as in the "
-        "other runs"
+        f"{record.run}: '{channel}' is {error_ratio:.2g} times as far from the simulation as in "
+        "the other runs"
     )
     measured, simulated = _motion(record)
     mean_square = float(np.mean((simulated - measured) ** 2))
     ignored = 'leave it out with role = "ignore"'
-    span = _still(record)
-    if span is not None:
-        first, last = span
+    standstill = _standstill(record)
+    if standstill is not None:
+        first, last = standstill
         return (
             f"{fault}: it does not move from {first:.4g} to {last:.4g} s. Check the sensor; ignore "
             f"this window, or {ignored}."
@@ -259,20 +264,22 @@ def _sentence(
             f"{fault}: it moves {gain:.3g} times as far. Check its unit, scale and "
             f"counts_per_turn, or {ignored}."
         )
-    for other in records:
-        if _follows(record, measured, other, EXPLAINED * mean_square):
+    for other_record in records:
+        if _follows(record, measured, other_record, EXPLAINED * mean_square):
             return (
-                f"{fault}, but follows the command of {other.run}: are their logs swapped? Give "
-                f"each run its own file, or {ignored}."
+                f"{fault}, but follows the command of {other_record.run}: are their logs swapped? "
+                f"Give each run its own file, or {ignored}."
             )
     return f"{fault}. Is it a log of this axis and this command? If not, {ignored}."
 
 
-def _follows(record: ChannelErrors, measured: Array, other: ChannelErrors, least: float) -> bool:
+def _follows(
+    record: ChannelErrors, measured: Array, other_record: ChannelErrors, least: float
+) -> bool:
     """Whether a run moves as another run of another maneuver is simulated."""
-    if other.maneuver == record.maneuver or abs(other.step - record.step) > 1e-9:
+    if other_record.maneuver == record.maneuver or abs(other_record.step - record.step) > 1e-9:
         return False
-    _, simulated = _motion(other)
+    _, simulated = _motion(other_record)
     size = min(simulated.size, measured.size)
     if size < 0.5 * max(simulated.size, measured.size):
         return False
@@ -303,20 +310,20 @@ def _delayed(record: ChannelErrors, measured: Array, simulated: Array) -> tuple[
     return float(shifts[best] * record.step), float(mean_squares[best])
 
 
-def _still(record: ChannelErrors) -> tuple[float, float] | None:
+def _standstill(record: ChannelErrors) -> tuple[float, float] | None:
     """First and last instant at which a position stands still though the model moves. [s]"""
     if not record.is_position:
         return None
     moves = np.abs(record.signal) > MOVES * float(np.abs(record.signal).max())
-    still = (np.diff(record.measured, prepend=np.nan) == 0.0) & moves
+    is_still = (np.diff(record.measured, prepend=np.nan) == 0.0) & moves
     # a coarse encoder has many samples a count
     steps = np.abs(np.diff(record.measured))
     count = float(steps[steps > 0.0].min(initial=np.inf))
-    moved = np.abs(np.diff(np.cumsum(record.signal) * record.step, prepend=0.0))
-    edges = np.flatnonzero(np.diff(still, prepend=False, append=False)).reshape(-1, 2)
-    for first, after in edges.tolist():
-        long = (after - first) * record.step > STANDS_STILL
-        if long and float(moved[first:after].sum()) > STEPS * count:
+    simulated_way = np.abs(np.diff(np.cumsum(record.signal) * record.step, prepend=0.0))
+    edges = np.flatnonzero(np.diff(is_still, prepend=False, append=False)).reshape(-1, 2)
+    for first, stop in edges.tolist():
+        long = (stop - first) * record.step > STANDS_STILL
+        if long and float(simulated_way[first:stop].sum()) > STEPS * count:
             start, step = record.start, record.step
-            return start + (first - 1) * step, start + (after - 1) * step
+            return start + (first - 1) * step, start + (stop - 1) * step
     return None

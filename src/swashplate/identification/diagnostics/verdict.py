@@ -155,7 +155,9 @@ class Verdict(Result):
         )
         for prediction in decisive:
             tested = {stated.motion for stated in prediction.classes}
-            unknown = [words for motion, words in MOTIONS.items() if motion not in tested]
+            unknown = [
+                description for motion, description in MOTIONS.items() if motion not in tested
+            ]
             if unknown:
                 sentences += (
                     f" {prediction.signal}: unknown in {listed(unknown)}, as no run has it."
@@ -369,11 +371,11 @@ def _unfinished(stages: Sequence[StageFit], planned: Sequence[str]) -> Iterator[
 # --- words ----------------------------------------------------------------------------------------
 
 
-def _state(found: ClassError, required: float) -> str:
+def _state(stated: ClassError, required: float) -> str:
     """Whether the stated error of a class is within what is required."""
-    if isnan(found.error):
+    if isnan(stated.error):
         return "-"
-    return "met" if found.error <= required else "NOT MET"
+    return "met" if stated.error <= required else "NOT MET"
 
 
 def _starts(stages: Sequence[StageFit]) -> Iterator[str]:
@@ -389,11 +391,13 @@ def _starts(stages: Sequence[StageFit]) -> Iterator[str]:
 
 
 def _assumed(stages: Sequence[StageFit]) -> Iterator[str]:
-    """What the instruments and the fixed numbers are taken for, as no residual shows it."""
+    """Phrases on what a fit cannot check: the channels' scales and the fixed parameters."""
     channels = dict[str, Channel]()
     for stage in stages:
         for run in stage.problem.experiments:
-            channels |= {n: run[n] for n in stage.problem.channels if n in run.channels}
+            for name in stage.problem.channels:
+                if name in run.channels:
+                    channels[name] = run[name]
     for name, channel in channels.items():
         if channel.encoder is not None:
             yield f"the scale of {name}, {channel.encoder.counts_per_turn:.6g} counts per turn"
@@ -403,21 +407,25 @@ def _assumed(stages: Sequence[StageFit]) -> Iterator[str]:
             yield f"the scale of {name}"
     fixed = [name for stage in stages for name in fixed_numbers(stage)]
     symbols = list(dict.fromkeys(COLUMNS[name] for name in fixed))
-    if symbols:
-        known = {
-            name
-            for stage in stages
-            for deviations in stage.problem.uncertain
-            for name in deviations
-        }
-        stated = list(dict.fromkeys(COLUMNS[name] for name in fixed if name in known))
-        also = f", {listed(stated)} within a standard uncertainty" if stated else ""
-        yield f"the fixed {listed(symbols)} as stated{also}"
+    if not symbols:
+        return
+    with_uncertainty = set[str]()
+    for stage in stages:
+        for deviations in stage.problem.uncertain:
+            with_uncertainty.update(deviations)
+    uncertain_symbols = list(
+        dict.fromkeys(COLUMNS[name] for name in fixed if name in with_uncertainty)
+    )
+    phrase = f"the fixed {listed(symbols)} as stated"
+    if uncertain_symbols:
+        phrase += f", {listed(uncertain_symbols)} within a standard uncertainty"
+    yield phrase
 
 
 def maneuvers_tested(tested: Mapping[str, Experiment]) -> str:
     """``ramps, steps and sines of up to 0.3 Hz from -9 to 9 V``."""
-    runs, fastest = list(tested.values()), _fastest_sine(tested)
+    runs = list(tested.values())
+    fastest = _fastest_sine(tested)
     several = {kind: f"{kind}s" for kind in ("ramp", "step", "sine", "chirp")}
     several["unnamed"] = "unnamed motions"
     kinds = dict[str, None]()
@@ -426,8 +434,8 @@ def maneuvers_tested(tested: Mapping[str, Experiment]) -> str:
         kinds[several.get(word, word)] = None
     low = min(float(experiment.input.values.min()) for experiment in runs)
     high = max(float(experiment.input.values.max()) for experiment in runs)
-    words = [f"sines of up to {fastest:.3g} Hz" if k == "sines" and fastest else k for k in kinds]
-    return f"{listed(words)} from {low:.3g} to {high:.3g} {runs[0].input.unit}"
+    phrases = [f"sines of up to {fastest:.3g} Hz" if k == "sines" and fastest else k for k in kinds]
+    return f"{listed(phrases)} from {low:.3g} to {high:.3g} {runs[0].input.unit}"
 
 
 def _fastest_sine(tested: Mapping[str, Experiment]) -> float:
@@ -437,34 +445,38 @@ def _fastest_sine(tested: Mapping[str, Experiment]) -> float:
 
 
 def _validity(stages: Sequence[StageFit], tested: Mapping[str, Experiment]) -> str:
-    """What the fit holds for, which limits its runs never reach, and which the model has not."""
-    said, stage = f"Holds for {maneuvers_tested(tested)}", stages[-1]
+    """Sentence on the maneuvers that the fit holds for, and on limits never reached or modelled."""
+    sentence = f"Holds for {maneuvers_tested(tested)}"
+    stage = stages[-1]
     if not isinstance(stage.problem.model, DriveModel):
-        return f"{said}."
+        return f"{sentence}."
     try:
-        runs, parameters = _fitted_runs(stages), stage.drive.parameters
+        runs = _fitted_runs(stages)
+        parameters = stage.drive.parameters
         reached = {limit for run in runs for limit in limits_reached(run, parameters)}
     except (DomainError, InputError):
-        return f"{said}."
-    never, lacking = list[str](), list[str]()
-    for name, words in LIMITS.items():
+        return f"{sentence}."
+    never_reached = list[str]()
+    not_modelled = list[str]()
+    for name, description in LIMITS.items():
         columns = [column for column in LIMIT_COLUMNS if column.startswith(name)]
         unreached = [column for column in columns if column not in reached]
         absent = [column for column in unreached if isinf(parameters.numbers[column])]
-        lacking += _limits_named(words, absent, columns)
-        never += _limits_named(words, [c for c in unreached if c not in absent], columns)
-    if never:
-        said += f"; never reached: {listed(never)}"
-    if lacking:
-        said += f"; not in the model: {listed(lacking)}"
-    return f"{said}."
+        modelled = [column for column in unreached if column not in absent]
+        not_modelled += _limits_named(description, absent, columns)
+        never_reached += _limits_named(description, modelled, columns)
+    if never_reached:
+        sentence += f"; never reached: {listed(never_reached)}"
+    if not_modelled:
+        sentence += f"; not in the model: {listed(not_modelled)}"
+    return f"{sentence}."
 
 
-def _limits_named(words: str, some: Sequence[str], columns: Sequence[str]) -> list[str]:
-    """A limit in words, by its direction if only some of its columns are meant."""
+def _limits_named(description: str, some: Sequence[str], columns: Sequence[str]) -> list[str]:
+    """Description of a limit, with the direction if only some of its columns are meant."""
     if not some:
         return []
     if len(some) == len(columns):
-        return [words]
+        return [description]
     ways = {"plus": "positive", "minus": "negative"}
-    return [f"{words} in {ways[column.rpartition('_')[2]]} direction" for column in some]
+    return [f"{description} in {ways[column.rpartition('_')[2]]} direction" for column in some]

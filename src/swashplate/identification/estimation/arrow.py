@@ -48,7 +48,7 @@ class RunRows(NamedTuple):
 
     run: str
     own: Numbers
-    """(q,) numbers of the unknowns that belong to this run alone."""
+    """(q,) numbers of the unknowns that belong only to this run."""
     rows: Array
     """(n, q + M) derivatives by them, then by the shared unknowns."""
 
@@ -111,17 +111,19 @@ def arrow_factor(size: int, shared: Numbers, blocks: Iterable[RunRows]) -> Arrow
     blocks : iterable of RunRows
         Rows of each run; several of one run are taken together. They are reduced one by one.
     """
-    own, triangles = dict[str, Numbers](), dict[str, Array]()
+    columns_of_runs, triangles = dict[str, Numbers](), dict[str, Array]()
     for block in blocks:
         rows = block.rows
         if block.run in triangles:
             rows = np.vstack([triangles[block.run], rows])
-        own[block.run], triangles[block.run] = block.own, triangular_factor(rows)
+        columns_of_runs[block.run], triangles[block.run] = block.own, triangular_factor(rows)
     runs, gathered = dict[str, RunFactor](), [np.zeros((0, shared.size))]
     for run, triangle in triangles.items():
-        count = own[run].size
+        count = columns_of_runs[run].size
         if count:
-            runs[run] = RunFactor(own[run], triangle[:count, :count], triangle[:count, count:])
+            runs[run] = RunFactor(
+                columns_of_runs[run], triangle[:count, :count], triangle[:count, count:]
+            )
         gathered.append(triangle[count:, count:])
         if sum(map(len, gathered)) > GATHERED:
             gathered = [triangular_factor(np.vstack(gathered))]
@@ -163,7 +165,7 @@ class Whitening:
     """Matrix W with W Wᵀ the inverse of JᵀJ on what is determined: columns of J W are orthonormal.
 
     Its columns are directions: first those of the machine, in which each run's own unknowns follow,
-    then those of each run, in which its own unknowns move alone.
+    then those of each run, in which only its own unknowns change.
     """
 
     factor: ArrowFactor
@@ -187,10 +189,10 @@ class Whitening:
         if run not in self.runs:
             return directions, self.machine
         first, inverse, follow = self.runs[run]
-        own = np.arange(first, first + inverse.shape[1])
-        alone = np.zeros((len(self.machine), own.size))
-        matrix = np.block([[follow, inverse], [self.machine, alone]])
-        return np.concatenate([directions, own]), matrix
+        run_columns = np.arange(first, first + inverse.shape[1])
+        zeros = np.zeros((len(self.machine), run_columns.size))
+        matrix = np.block([[follow, inverse], [self.machine, zeros]])
+        return np.concatenate([directions, run_columns]), matrix
 
     @cached_property
     def matrix(self) -> Array:
@@ -198,9 +200,9 @@ class Whitening:
         matrix = np.zeros((self.factor.size, self.rank))
         matrix[self.factor.shared, : self.machine.shape[1]] = self.machine
         for run, (first, inverse, follow) in self.runs.items():
-            own = self.factor.runs[run].own
-            matrix[own, : follow.shape[1]] = follow
-            matrix[own, first : first + inverse.shape[1]] = inverse
+            run_columns = self.factor.runs[run].own
+            matrix[run_columns, : follow.shape[1]] = follow
+            matrix[run_columns, first : first + inverse.shape[1]] = inverse
         if self.null.size:
             lengths = self.factor.lengths[:, None]
             along = self.null @ (self.null.T @ (lengths * matrix))
@@ -246,9 +248,11 @@ def whitening(factor: ArrowFactor, free: NDArray[np.bool_], tolerance: float) ->
     reduced, largest = dict[str, _Reduced](), 0.0
     rest = factor.rest[:, columns] / by_shared
     gram = rest.T @ rest
-    for run, (own, triangle, coupling) in factor.runs.items():
-        alone, along = triangle[:, moving[own]], coupling[:, columns] / by_shared
-        parts = np.linalg.svd(alone / scale[own[moving[own]]], full_matrices=True)
+    for run, (columns_of_run, triangle, coupling) in factor.runs.items():
+        triangle_left, along = triangle[:, moving[columns_of_run]], coupling[:, columns] / by_shared
+        parts = np.linalg.svd(
+            triangle_left / scale[columns_of_run[moving[columns_of_run]]], full_matrices=True
+        )
         reduced[run] = _Reduced(*parts, along)
         largest = max(largest, float(parts[1].max(initial=0.0)))
         gram += along.T @ along
@@ -270,14 +274,17 @@ def whitening(factor: ArrowFactor, free: NDArray[np.bool_], tolerance: float) ->
     null[shared[columns]] = right[count:].T
     runs, alone_null, first = dict[str, RunDirections](), [null], count
     for run, (left, sizes, rows, coupling) in reduced.items():
-        rank, own = ranks[run], factor.runs[run].own
-        free_own = own[moving[own]]
+        rank, columns_of_run = ranks[run], factor.runs[run].own
+        free_own = columns_of_run[moving[columns_of_run]]
         inverse = rows[:rank].T / sizes[:rank]
         solution = -inverse @ (left[:, :rank].T @ coupling)
         null[free_own] = solution @ right[count:].T
-        padded, followed = np.zeros((own.size, rank)), np.zeros((own.size, count))
-        padded[moving[own]] = inverse / scale[free_own, None]
-        followed[moving[own]] = solution @ along / scale[free_own, None]
+        padded, followed = (
+            np.zeros((columns_of_run.size, rank)),
+            np.zeros((columns_of_run.size, count)),
+        )
+        padded[moving[columns_of_run]] = inverse / scale[free_own, None]
+        followed[moving[columns_of_run]] = solution @ along / scale[free_own, None]
         runs[run] = RunDirections(first, padded, followed)
         first += rank
         if rank < free_own.size:

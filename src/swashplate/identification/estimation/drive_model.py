@@ -12,8 +12,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from swashplate.campaign import CURRENTS as CURRENTS
 from swashplate.campaign import (
-    APART,
+    LARGEST_CERTAIN_INTERVAL,
     RISE,
     SIGNALS,
     Channel,
@@ -23,7 +24,6 @@ from swashplate.campaign import (
     InputSignal,
     signed_by_command,
 )
-from swashplate.campaign import CURRENTS as CURRENTS
 from swashplate.drive import (
     PRESSURE_PATH,
     START,
@@ -136,7 +136,7 @@ def _jumps_at_once(signal: InputSignal, *, even: bool) -> bool:
     if signal.interpolation == "linear" or (signal.is_held and not even):
         return False
     jumps = signal.jumps
-    return bool(jumps.size) and float(np.diff(signal.time)[jumps].max()) <= APART
+    return bool(jumps.size) and float(np.diff(signal.time)[jumps].max()) <= LARGEST_CERTAIN_INTERVAL
 
 
 def voltage_record(experiment: Experiment) -> Record:
@@ -191,7 +191,7 @@ def simulated_current(
     record = voltage_record(experiment)
     observation = Observation("current", record.points, np.zeros(record.values.size))
     observed = ObservedRecord(record, (observation,), "voltage", experiment.begins)
-    # refinements begin behind the card
+    # refinements begin downstream of the card
     ready = DriveModel(parameters.plain, "card").ready(
         start, experiment, SimulationRequest(observed)
     )
@@ -234,7 +234,7 @@ def limits_unreached(
 ) -> dict[str, float]:
     """Columns of the limits that no run shows, and how far the runs went. [SI]
 
-    Of Z13 to Z16, whether the model has such a limit or not: behind what was reached anything may
+    Of Z13 to Z16, whether the model has such a limit or not: beyond what was reached anything may
     lie. A run shows a limit if it would go beyond by `SHOWN` without it: what is merely touched a
     slightly smaller gain does as well. Errors are those of `simulated_run`.
     """
@@ -338,12 +338,14 @@ class DriveModel(Result, EquationModel):
 
         With the edges of the command where `values` say.
         """
-        moved = with_edges(experiment, values)
+        with_instants = with_edges(experiment, values)
         if self.part != "pump":
-            return "voltage", voltage_record(moved), {}
+            return "voltage", voltage_record(with_instants), {}
         given = self.currents.get(experiment.name)
-        if moved is not experiment:
-            given = simulated_current(moved, self.parameters, self.starts.get(moved.name, {}))
+        if with_instants is not experiment:
+            given = simulated_current(
+                with_instants, self.parameters, self.starts.get(with_instants.name, {})
+            )
         return "current", measured_current(experiment) if given is None else given, {}
 
     def ready(
@@ -391,8 +393,10 @@ class DriveModel(Result, EquationModel):
     def parameters_at(self, values: Mapping[str, float]) -> ParameterSet:
         """The set for some values of the unknowns; a `DomainError` if one breaks a rule."""
         forces = () if self.forces is None else self.forces.names
-        known = {*self.parameters.definitions.columns, *forces}
-        return _at(self, tuple((name, value) for name, value in values.items() if name in known))
+        set_names = {*self.parameters.definitions.columns, *forces}
+        return _at(
+            self, tuple((name, value) for name, value in values.items() if name in set_names)
+        )
 
 
 @lru_cache(maxsize=8)
@@ -422,13 +426,13 @@ def _instants_of(command: InputSignal) -> dict[str, Edge]:
     return {f"edge at {edge.middle:.6g} s": edge for edge in command.edges}
 
 
-def unknown_instants(run: Experiment, found: Instants) -> list[Unknown]:
+def unknown_instants(run: Experiment, earlier_instants: Instants) -> list[Unknown]:
     """Instants of a voltage's edges, anywhere between two samples or as an earlier stage found."""
     unknowns = list[Unknown]()
     edges = _instants_of(run.input) if run.input.kind == "voltage" else {}
     for name, edge in edges.items():
         most = 0.5 * (edge.interval + RISE)
-        prior = found.get((run.name, name), Prior(0.0, edge.interval / sqrt(12.0)))
+        prior = earlier_instants.get((run.name, name), Prior(0.0, edge.interval / sqrt(12.0)))
         unknown = Unknown(
             name,
             prior.mean,

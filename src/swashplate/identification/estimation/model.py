@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.campaign import Edge, Experiment
-from swashplate.equations import BoundModel, instance_of, made, parameter_paths, state_paths
+from swashplate.equations import BoundModel, instance_of, parameter_paths, state_paths, tuple_from
 from swashplate.equations import Model as Equations
 from swashplate.equations.marching import (
     Observation,
@@ -32,7 +32,7 @@ INSTANT_STEP = 1e-5
 
 
 class MachineModel(Protocol):
-    """A model of the machine; with `simulate` alone it is differentiated by central differences.
+    """A model of the machine; with only `simulate` it is differentiated by central differences.
 
     One that knows its derivatives has ``linearise(values, experiment, names)`` as well, which gives
     for each channel a `Linearised`.
@@ -144,8 +144,8 @@ def _check_outputs(outputs: object, experiment: Experiment, names: int | None = 
         method, of_channel = "simulate", "an array of floats"
 
     def refused(must: str, returned: object) -> InputError:
-        words = _type_words(returned)
-        return InputError(f"{experiment.name}: {method} must return {must}, not {words}.")
+        type_name = _type_words(returned)
+        return InputError(f"{experiment.name}: {method} must return {must}, not {type_name}.")
 
     if not isinstance(outputs, Mapping):
         first = next(iter(experiment.channels), "speed")
@@ -218,9 +218,14 @@ class EquationModel(ABC):
 
     def columns(self, names: Sequence[str]) -> tuple[list[str], Array]:
         """Columns that some names move, and (columns, names) their derivatives by these."""
-        moved = [self.moves(name) for name in names]
-        columns = list(dict.fromkeys(column for derivatives in moved for column in derivatives))
-        rows = [[derivatives.get(column, 0.0) for derivatives in moved] for column in columns]
+        derivatives_of_names = [self.moves(name) for name in names]
+        columns = list(
+            dict.fromkeys(column for derivatives in derivatives_of_names for column in derivatives)
+        )
+        rows = [
+            [derivatives.get(column, 0.0) for derivatives in derivatives_of_names]
+            for column in columns
+        ]
         return columns, np.array(rows).reshape(len(columns), len(names))
 
     def observed(
@@ -309,7 +314,7 @@ class UserModel(Result, EquationModel):
 
     model: Equations
     rate: float | None = None
-    """Samples a second; by default the input's. Needed where its stamps are not even. [Hz]"""
+    """Samples a second; by default the input's. Needed if its stamps are not even. [Hz]"""
     options: Any = None
     given: Any = None
     """The model's givens, or a mapping of them by the experiments' names."""
@@ -394,7 +399,9 @@ class UserModel(Result, EquationModel):
                     f"{model.name} has no state '{path}' to begin at; it has {', '.join(states)}."
                 )
         try:
-            p = made(model.parameters, {name: values[name] for name in values if name in paths})
+            p = tuple_from(
+                model.parameters, {name: values[name] for name in values if name in paths}
+            )
         except KeyError as error:
             raise InputError(
                 f"{model.name} has no value of {error.args[0]}: let it be free, or fix it."

@@ -214,7 +214,7 @@ class Problem(Result):
         return Evaluation(np.concatenate([*values, residuals]), np.vstack([*jacobians, rows]))
 
     def cost(self, vector: Array) -> float:
-        """Half the sum of squares alone, which is quicker."""
+        """Only half the sum of squares, which is quicker."""
         priors, _ = self.unknowns.prior_rows(vector)
         return 0.5 * (sum(self._each(partial(self._squares, vector))) + float(priors @ priors))
 
@@ -284,7 +284,7 @@ class Problem(Result):
         return Evaluation(np.concatenate(values), np.vstack(by))
 
     def _factored(self, vector: Array, number: int) -> RunRows:
-        """[J r] of one experiment where the march cannot make its triangular factor."""
+        """[J r] of one experiment if the march cannot make its triangular factor."""
         residuals, jacobian = self._full(vector, number)
         factor = triangular_factor(np.column_stack([jacobian, residuals]))
         return self._block(number, factor)
@@ -344,7 +344,7 @@ class Problem(Result):
 
 
 def _factors(weight: Array, scale: float) -> Array:
-    """(m,) factors on residuals; where all are alike, an array that takes no memory."""
+    """(m,) factors on residuals; if all are equal, an array that takes no memory."""
     if weight.size and weight.min() == weight.max():
         return np.broadcast_to(np.sqrt(weight[0]) / scale, weight.shape)
     return np.sqrt(weight) / scale
@@ -368,8 +368,8 @@ def noise_scales(experiments: Sequence[Experiment], channels: Sequence[str]) -> 
     for name in channels:
         having: list[Channel] = [run[name] for run in experiments if name in run.channels]
         if not having:
-            known = ", ".join(dict.fromkeys(c for run in experiments for c in run.channels))
-            raise InputError(f"No experiment has a channel '{name}'; there are {known}.")
+            channel_names = ", ".join(dict.fromkeys(c for run in experiments for c in run.channels))
+            raise InputError(f"No experiment has a channel '{name}'; there are {channel_names}.")
         stated = [channel.noise for channel in having if channel.noise is not None]
         if stated:
             scales[name] = float(np.sqrt(np.mean(np.square(stated))))
@@ -414,7 +414,7 @@ class LinearisedRun(NamedTuple):
     residual: Array
     """(n,) weighted: w times (simulated less measured)."""
     weight: Array | None = None
-    """(n,) the factors w; None where all are alike. Samples of factor 0 are dropped."""
+    """(n,) the factors w; None if all are equal. Samples of factor 0 are dropped."""
 
     @property
     def unweighted(self) -> Array:

@@ -240,7 +240,7 @@ def solve(
             if leg.cost < lowest:
                 best = leg.x
                 lowest = float(leg.cost)
-            # steps that round to nothing are counted by SciPy alone
+            # steps that round to nothing are counted only by SciPy
             spent = max(spent + int(leg.nfev), memory.evaluations)
             if hopeless is not None and ending == 0 and hopeless(memory.full(best)):
                 ending = GIVEN_UP

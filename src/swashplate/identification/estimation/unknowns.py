@@ -126,7 +126,7 @@ class Unknown:
         if self.prior is not None and not self.prior.deviation > 0.0:
             raise ParameterError(f"The prior of {name} needs a positive standard deviation.")
         if not self.scale:
-            # one that begins at next to nothing, or at 0, is known by its bounds alone
+            # one that begins at next to nothing, or at 0, is known only by its bounds
             size, reach = abs(self.start), high - low
             object.__setattr__(self, "scale", size if size > 1e-6 * reach else 0.25 * reach)
 
@@ -270,7 +270,7 @@ class Unknowns(Result):
 
     @cached_property
     def at_bound(self) -> NDArray[np.int8]:
-        """(K,) -1 where the point is at the lower bound, 1 at the upper, 0 between."""
+        """(K,) -1 if the point is at the lower bound, 1 at the upper, 0 between."""
         low, high = self.bounds
         near = AT_BOUND * (high - low)
         return np.where(self.vector <= low + near, -1, self.vector >= high - near).astype(np.int8)
@@ -305,7 +305,7 @@ class Unknowns(Result):
         return np.where(self.logarithmic, powers, vector * self.scales)
 
     def to_vector(self, values: Array) -> Array:
-        """(..., K) vectors of values, positive where logarithmic."""
+        """(..., K) vectors of values, positive if logarithmic."""
         logarithms = np.log(np.where(self.logarithmic, values, 1.0))
         return np.where(self.logarithmic, logarithms, values / self.scales)
 
@@ -336,7 +336,7 @@ class Unknowns(Result):
 
     @cached_property
     def _of_runs(self) -> Mapping[str, NDArray[np.intp]]:
-        """By run the numbers of the unknowns that belong to it alone."""
+        """By run the numbers of the unknowns that belong only to it."""
         numbers: dict[str, list[int]] = {}
         for k, unknown in enumerate(self.items):
             if unknown.run is not None:
@@ -344,7 +344,7 @@ class Unknowns(Result):
         return {run: np.array(of_run, np.intp) for run, of_run in numbers.items()}
 
     def of_run(self, run: str) -> NDArray[np.intp]:
-        """(q,) numbers of the unknowns that belong to one experiment alone."""
+        """(q,) numbers of the unknowns that belong only to one experiment."""
         return self._of_runs.get(run, np.zeros(0, np.intp))
 
     def columns(self, run: str) -> NDArray[np.intp]:

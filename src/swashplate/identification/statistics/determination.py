@@ -24,9 +24,9 @@ from swashplate.results import Result
 from swashplate.tables import listed
 
 Array = NDArray[np.float64]
-Known = Mapping[str, float]
-Move = Callable[[float, Known], float]
-"""Derivative of a parameter along a gauge, from its value and those of all by symbol."""
+Values = Mapping[str, float]
+GaugeDerivative = Callable[[float, Values], float]
+"""Derivative of a parameter along a gauge, from its value and the values of all, by symbol."""
 
 WIDE = 0.1
 """Half width of a 95 % interval, of the value or the scale, from which an unknown is weak. [1]"""
@@ -35,40 +35,43 @@ VAGUE = 1.0
 [1]"""
 HALF = 1.96
 """Half width of a 95 % interval, in standard errors."""
-MENTIONED, NAMED = 0.02, 6
-"""Parts of a direction below this share of its largest, by effect, are not part of it; changes that
-a sentence names, the largest first."""
+LEAST_EFFECT = 0.02
+"""Effect of an unknown's change that still belongs to a direction, over the largest effect. [1]"""
+NAMED = 6
+"""Changes that a sentence names, the largest first."""
 
 
 @dataclass(frozen=True, eq=False)
 class Gauge:
-    """Parameters that can move together without changing what is measured."""
+    """Parameters that can change together without changing what is measured."""
 
     name: str
-    moves: Mapping[str, Move]
-    """By the parameter's symbol, without direction or number."""
+    derivatives: Mapping[str, GaugeDerivative]
+    """Those of the parameters that change, by symbol, without direction or number."""
     determined: str
     """What the tests can tell instead, as an engineer writes it."""
     fix: tuple[str, ...]
     """Symbols to fix, the best first; the others then follow."""
 
-    def tangent(self, variables: Unknowns, fixed: Known | None = None) -> Array:
-        """Derivative (K,) of the solver's vector along the gauge.
+    def tangent(self, variables: Unknowns, fixed: Values | None = None) -> Array:
+        """Direction (K,) of the solver's vector in which the measured signals do not change.
 
-        0 for what does not move, and throughout if a value that the gauge needs is neither among
-        the unknowns nor among the `fixed` ones, by symbol.
+        An element is 0 if its unknown is not part of the gauge. All are 0 if a value that the gauge
+        needs is neither that of an unknown nor among the `fixed` ones, by symbol.
         """
         symbols = [symbol_of(unknown) for unknown in variables]
         estimates = variables.estimates.tolist()
-        known = {**(fixed or {}), **dict(zip(symbols, estimates, strict=True))}
-        slopes = np.zeros(len(variables))
+        values = dict(fixed or {})
+        values.update(zip(symbols, estimates, strict=True))
+        changes = np.zeros(len(variables))
         try:
             for k, (symbol, value) in enumerate(zip(symbols, estimates, strict=True)):
-                if symbol in self.moves:
-                    slopes[k] = self.moves[symbol](value, known)
+                if symbol in self.derivatives:
+                    changes[k] = self.derivatives[symbol](value, values)
         except KeyError:
             return np.zeros(len(variables))
-        return np.asarray(slopes / variables.slopes)
+        # from the parameters to the solver's vector, which has logarithms of some
+        return np.asarray(changes / variables.slopes)
 
 
 def symbol_of(unknown: Unknown) -> str:
@@ -80,20 +83,34 @@ def symbol_of(unknown: Unknown) -> str:
 
 
 def _gauge(
-    name: str, symmetry: str, determined: str, fix: str, *others: str, **moves: Move
+    name: str,
+    symmetry: str,
+    determined: str,
+    fix: str,
+    *others: str,
+    **derivatives: GaugeDerivative,
 ) -> Gauge:
-    """A gauge along one of the models' symmetries, with others in proportion and further moves."""
+    """A gauge along one of the models' symmetries.
+
+    `others` also change in proportion to their values; `derivatives` adds parameters, or replaces
+    their derivatives.
+    """
     powers = {
         symbol: definition.symmetry[symmetry]
         for symbol, definition in CATALOGUE.items()
         if symmetry in definition.symmetry
     } | dict.fromkeys(others, 1.0)
 
-    def power(exponent: float) -> Move:
-        return lambda value, known: exponent * value
+    def power(exponent: float) -> GaugeDerivative:
+        return lambda value, values: exponent * value
 
     in_proportion = {symbol: power(exponent) for symbol, exponent in powers.items()}
-    return Gauge(name, in_proportion | moves, f"only {determined} determined", tuple(fix.split()))
+    return Gauge(
+        name=name,
+        derivatives=in_proportion | derivatives,
+        determined=f"only {determined} determined",
+        fix=tuple(fix.split()),
+    )
 
 
 GAUGES = (
@@ -109,7 +126,7 @@ GAUGES = (
         ZERO,
         "Z9 - Z2/Z1 is",
         "Z2 Z9",
-        Z2=lambda value, known: known["Z1"] * known["Z9"],
+        Z2=lambda value, values: values["Z1"] * values["Z9"],
     ),
     _gauge(
         "scale of spool travel",
@@ -123,7 +140,7 @@ GAUGES = (
         MOTION,
         "Z8/(1+Z6) is",
         "Z6 Z8",
-        Z6=lambda value, known: 1.0 + value,
+        Z6=lambda value, values: 1.0 + value,
     ),
 )
 """Those of the model, in an order in which none undoes an earlier one; the sentence on Z8/(1+Z6)
@@ -131,11 +148,11 @@ holds away from the swash plate's stops."""
 
 
 class NullDirection(NamedTuple):
-    """A way for the unknowns to move together that the tests do not see, or hardly."""
+    """A common change of the unknowns that the tests do not see, or hardly."""
 
     changes: Mapping[str, float]
-    """By name, strongest effect first, in per cent of the value (of the scale, where the unknown
-    is not logarithmic); the largest is 1 %. [%]"""
+    """By name, strongest effect first, in per cent of the value (of the scale, if the unknown is
+    not logarithmic); the largest is 1 %. [%]"""
     half_width: float
     """Of the 95 % interval of the unknown to fix, of its value or scale; inf for no effect. [1]"""
     gauge: Gauge | None
@@ -264,7 +281,7 @@ def identifiability(
     *,
     covariance: Array | None = None,
     tolerance: float = TOLERANCE,
-    fixed: Known | None = None,
+    fixed: Values | None = None,
 ) -> Identifiability:
     """Judge what derivatives tell of the unknowns; an `InputError` if one is not finite.
 
@@ -289,12 +306,12 @@ def identifiability(
         raise InputError(f"The derivatives by {names[column]} are not all finite.")
     if triangle.shape[0] > len(variables):
         triangle = triangular_factor(triangle)
-    lengths = np.linalg.norm(triangle, axis=0)
+    column_norms = np.linalg.norm(triangle, axis=0)
     # a column of mere rounding changes nothing
-    moving = variables.free & (lengths > 1e-14 * lengths.max(initial=0.0))
+    moving = variables.free & (column_norms > 1e-14 * column_norms.max(initial=0.0))
     columns = np.flatnonzero(moving)
     null, rank = _null_directions(
-        triangle, variables, columns, lengths, tolerance=tolerance, fixed=fixed
+        triangle, variables, columns, column_norms, tolerance=tolerance, fixed=fixed
     )
     # those found are fixed, so that the weak ones are what is left without them
     fixed_columns = [names.index(direction.fix) for direction in null]
@@ -307,11 +324,11 @@ def identifiability(
         remaining = covariance[np.ix_(columns, columns)]
     return Identifiability(
         variables=variables,
-        sensitivity=0.01 * lengths,
+        sensitivity=0.01 * column_norms,
         rank=rank,
         unexcited=tuple(names[k] for k in np.flatnonzero(variables.free & ~moving)),
         null=tuple(null),
-        weak=tuple(_weak_directions(remaining, variables, columns, lengths)),
+        weak=tuple(_weak_directions(remaining, variables, columns, column_norms)),
     )
 
 
@@ -319,19 +336,19 @@ def _null_directions(
     triangle: Array,
     variables: Unknowns,
     columns: NDArray[np.intp],
-    lengths: Array,
+    column_norms: Array,
     *,
     tolerance: float,
-    fixed: Known | None,
+    fixed: Values | None,
 ) -> tuple[list[NullDirection], int]:
     """Directions that change nothing, the model's gauges first, and the rank of the others.
 
-    Of the unknowns in some columns; `lengths` (K,) are those of all columns of the triangle.
+    Of the unknowns in some columns; `column_norms` (K,) are those of all columns of the triangle.
     """
     null = list[NullDirection]()
     if not columns.size:
         return null, 0
-    scale = lengths[columns]
+    scale = column_norms[columns]
     symbols = [symbol_of(variables[int(k)]) for k in columns]
     _, sizes, rows = np.linalg.svd(triangle[:, columns] / scale, full_matrices=True)
     rank = int(np.count_nonzero(sizes > tolerance * sizes[0]))
@@ -347,19 +364,21 @@ def _null_directions(
             if fix is not None:
                 fixes.append(fix)
                 null.append(
-                    _direction(vector / scale, variables, columns, lengths, fix=fix, gauge=gauge)
+                    _direction(
+                        vector / scale, variables, columns, column_norms, fix=fix, gauge=gauge
+                    )
                 )
     # the rest of the null space, with one unknown to fix for each direction
     rest = free @ null_space(free[fixes]) if fixes else free
     if rest.shape[1]:
         order = qr(rest.T, mode="r", pivoting=True)[1][: rest.shape[1]]
         for vector, fix in zip((rest @ np.linalg.inv(rest[order])).T, order, strict=True):
-            null.append(_direction(vector / scale, variables, columns, lengths, fix=int(fix)))
+            null.append(_direction(vector / scale, variables, columns, column_norms, fix=int(fix)))
     return null, rank
 
 
 def _weak_directions(
-    covariance: Array, variables: Unknowns, columns: NDArray[np.intp], lengths: Array
+    covariance: Array, variables: Unknowns, columns: NDArray[np.intp], column_norms: Array
 ) -> Iterator[NullDirection]:
     """Directions with wide intervals, each with those before it fixed.
 
@@ -373,35 +392,46 @@ def _weak_directions(
         if half_width <= WIDE:
             return
         follow = covariance[widest] / covariance[widest, widest]
-        yield _direction(follow, variables, columns, lengths, fix=widest, half_width=half_width)
+        yield _direction(
+            follow, variables, columns, column_norms, fix=widest, half_width=half_width
+        )
         others = np.arange(columns.size) != widest
         covariance = (covariance - np.outer(covariance[widest], follow))[others][:, others]
         columns = columns[others]
 
 
 def _direction(
-    moved: Array,
+    changes_of_columns: Array,
     variables: Unknowns,
     columns: NDArray[np.intp],
-    lengths: Array,
+    column_norms: Array,
     *,
     fix: int,
     gauge: Gauge | None = None,
     half_width: float = inf,
 ) -> NullDirection:
-    """From changes (k,) of the unknowns in some columns, of which number `fix` is to be fixed."""
-    # a short column needs a large change for the same effect: judged by effect, not by size
-    effect = np.abs(moved) * lengths[columns]
-    least = MENTIONED * effect.max()
+    """The null direction, scaled so that its largest change is 1, without negligible effects.
+
+    `changes_of_columns` (k,) are those of the unknowns in the columns (k,); the one at index `fix`
+    of these is to be fixed. `column_norms` (K,) are those of all columns.
+    """
+    # a column of small norm needs a large change for the same effect: effects are compared
+    effect = np.abs(changes_of_columns) * column_norms[columns]
+    least = LEAST_EFFECT * effect.max()
     order = [k for k in np.argsort(-effect, kind="stable") if effect[k] >= least]
-    largest = max((float(moved[k]) for k in order), key=abs)
+    largest = max((float(changes_of_columns[k]) for k in order), key=abs)
     names = variables.names
-    changes = {names[columns[k]]: float(moved[k]) / largest for k in order}
-    return NullDirection(changes, half_width, gauge, names[columns[fix]])
+    changes = {names[columns[k]]: float(changes_of_columns[k]) / largest for k in order}
+    return NullDirection(
+        changes=changes,
+        half_width=half_width,
+        gauge=gauge,
+        fix=names[columns[fix]],
+    )
 
 
 def _fixing(candidates: list[int], vector: Array, null: Array, fixed: list[int]) -> int | None:
-    """The first unknown that removes a gauge beside those fixed already; None if none does."""
+    """The first unknown that removes a gauge if it is fixed, too; None if none does."""
     for candidate in map(int, candidates):
         if abs(vector[candidate]) >= 1e-3 and candidate not in fixed:
             singular = np.linalg.svd(null[[*fixed, candidate]], compute_uv=False)

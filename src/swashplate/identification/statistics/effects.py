@@ -1,4 +1,4 @@
-"""What estimates follow beside the noise: earlier stages, fixed numbers, instruments, runs.
+"""What estimates depend on besides noise: earlier stages, fixed numbers, instruments, runs.
 
 Estimates absorb such an effect, so that residuals do not show it. How far they move is linear in
 it: a standard uncertainty of each effect, times this slope, goes into the intervals (JCGM 100:2008,
@@ -36,7 +36,7 @@ SMALL = 0.02
 """Part of a standard uncertainty of the command's zero by which it is moved for the derivative: a
 whole one may lie beyond a switch of the card, where the derivative is another one."""
 IN_RUN = " in "
-"""What stands between an effect and the run that it belongs to alone."""
+"""What stands between an effect and the only run that it belongs to."""
 HYSTERESIS = ("solenoid_hysteresis", "spool_friction")
 """Parameters by which a drive has a hysteresis of its own."""
 FEWEST_RUNS = 5
@@ -62,12 +62,12 @@ def source_of(stage: StageFit) -> Callable[[Experiment], MachineModel]:
     model = stage.problem.model
     if not isinstance(model, DriveModel):
         return lambda experiment: model
-    own, chain = (
+    part_model, chain = (
         replace(model, parameters=stage.drive.parameters, part=part)
         for part in (model.part, "chain")
     )
     by_card = model.part == "pump" and stage.stage.current == "simulated"
-    return lambda run: chain if by_card and run.input.kind == "voltage" else own
+    return lambda run: chain if by_card and run.input.kind == "voltage" else part_model
 
 
 def slopes_by_earlier(stage: StageFit, earlier: StageFit) -> Array:
@@ -105,12 +105,12 @@ def _slopes_by_names(stage: StageFit, names: Sequence[str], by: Array) -> Array:
     jacobians = linearised.jacobians()
     for number, experiment in enumerate(problem.experiments):
         values = problem.model_values(vector, number)
-        moved = linearised_model(source(experiment), values, experiment, names)
+        response = linearised_model(source(experiment), values, experiment, names)
         directions, whitening = linearised.inverse.of_run(experiment.name)
         for name, weight in problem.weights[number].items():
             used = weight > 0.0
             if used.any():
-                changes = weight[used, None] * (moved[name].by[used] @ by)
+                changes = weight[used, None] * (response[name].by[used] @ by)
                 _, jacobian = next(jacobians)
                 products[directions] += whitening.T @ (jacobian.T @ changes)
     slopes: Array = -linearised.whitening @ products
@@ -149,14 +149,14 @@ def changes_of(experiment: Experiment, resolution: float) -> Iterator[Change]:
     -----
     Limits of an instrument's error are taken for ends of a rectangular distribution, whose standard
     deviation is 1/√3 of them (JCGM 100:2008, 4.3.7). The zero of a command is another one in each
-    run, because the converter rounds each level of it anew. What a command does between two samples
+    run, because the converter rounds each of its levels again. What a command does between samples
     is known to half of the time between them: the instant of a jump, or when a staircase that looks
     like a ramp passes a threshold.
     """
     command, run = experiment.input, experiment.name
     accuracy = command.instrument
-    apart = float(np.median(np.diff(command.time)))
-    late = 0.5 * apart if accuracy.time is None else accuracy.time
+    interval = float(np.median(np.diff(command.time)))
+    late = 0.5 * interval if accuracy.time is None else accuracy.time
     if late > 0.0:
         later = replace(command, time=command.time + late / sqrt(3.0))
         yield Change(f"instant of the command{IN_RUN}{run}", replace(experiment, input=later))
@@ -166,8 +166,10 @@ def changes_of(experiment: Experiment, resolution: float) -> Iterator[Change]:
         # a card takes no more than its full voltage, which a command may have reached
         largest = float(np.abs(command.values).max())
         shifted = np.clip(command.values + SMALL * zero, -largest, largest)
-        moved = replace(command, values=shifted)
-        yield Change(f"zero of the command{IN_RUN}{run}", replace(experiment, input=moved), SMALL)
+        shifted_command = replace(command, values=shifted)
+        yield Change(
+            f"zero of the command{IN_RUN}{run}", replace(experiment, input=shifted_command), SMALL
+        )
     if accuracy.gain > 0.0:
         weaker = replace(command, values=command.values * (1.0 - accuracy.gain / sqrt(3.0)))
         yield Change("gain of the command", replace(experiment, input=weaker))
@@ -187,7 +189,7 @@ def changes_of(experiment: Experiment, resolution: float) -> Iterator[Change]:
 
 
 def after_play(values: Array, width: float) -> Array:
-    """A signal behind a play of a full width, in the middle of which it begins."""
+    """A signal downstream of a play of a full width, in the middle of which it begins."""
     output, half = np.empty_like(values), 0.5 * width
     follower = values[0]
     for n, value in enumerate(values.tolist()):
@@ -206,11 +208,12 @@ def responses(stage: StageFit, number: int, resolution: float) -> Iterator[tuple
     simulation = SimulatedRun(stage, number)
     middle = simulation.of(experiment)
     for effect, changed, part in changes_of(experiment, resolution):
-        moved = simulation.of(changed) if _acts(stage, experiment, changed) else middle
+        changed_signals = simulation.of(changed) if _acts(stage, experiment, changed) else middle
         yield (
             effect,
             {
-                name: (moved[name] - middle[name] - changed[name].values + channel.values) / part
+                name: (changed_signals[name] - middle[name] - changed[name].values + channel.values)
+                / part
                 for name, channel in experiment.channels.items()
                 if name in middle
             },
@@ -220,7 +223,7 @@ def responses(stage: StageFit, number: int, resolution: float) -> Iterator[tuple
 
 
 def _acts(stage: StageFit, experiment: Experiment, changed: Experiment) -> bool:
-    """Whether a change acts on what is simulated, and not on what was measured alone."""
+    """Whether a change acts on what is simulated, and not only on what was measured."""
     model = stage.problem.model
     if changed.input is not experiment.input or not isinstance(model, DriveModel):
         return True  # a user-defined model may take any channel as an input
@@ -249,7 +252,7 @@ class SimulatedRun:
     def behind_hysteresis(self, experiment: Experiment) -> dict[str, Array]:
         """By how much these change if the current that drives the pump has a hysteresis.
 
-        Of a drive alone; empty if the stage has no pump, the hysteresis is 0, or the drive has one
+        Of a drive only; empty if the stage has no pump, the hysteresis is 0, or the drive has one
         of its own.
         """
         model, width = self.stage.problem.model, self.stage.stage.current_hysteresis
@@ -264,11 +267,13 @@ class SimulatedRun:
             current = simulated_current(experiment, parameters)
         late = replace(current, values=after_play(current.values, width))
         pump = replace(model, parameters=parameters, part="pump", starts={})
-        before, after = (
+        without_hysteresis, with_hysteresis = (
             simulated(replace(pump, currents={experiment.name: record}), self.values, experiment)
             for record in (current, late)
         )
-        return {name: after[name] - before[name] for name in before}
+        return {
+            name: with_hysteresis[name] - without_hysteresis[name] for name in without_hysteresis
+        }
 
 
 # --- all effects of a stage -----------------------------------------------------------------------
@@ -287,7 +292,7 @@ class RunToRun(Result):
 
 @dataclass(frozen=True, eq=False)
 class Effects(Result):
-    """What a stage's estimates follow beside the noise."""
+    """What a stage's estimates depend on besides noise."""
 
     systematic: Mapping[str, Array]
     """(K,) changes of the solver's vector for a standard uncertainty of each effect, by name."""
@@ -378,7 +383,7 @@ def _run_to_run(fit: LinearisedFit, motions: Sequence[_Motion]) -> RunToRun | No
 
     Notes
     -----
-    A machine differs from run to run: its oil is warmer, a pressure is set anew. What of that is a
+    A machine differs from run to run: its oil is warmer, a pressure is set again. What of that is a
     scale of the motion, by b_i in run i, shows in the products q_i = z_iᵀ r. At the optimum
     q = A b + noise with A = ZᵀZ - ZᵀJ (JᵀJ)⁻¹ JᵀZ. The variance of b is that of the method of
     moments (Henderson 1953): the sum of the q², each in units of |z_i|, less what the noise adds

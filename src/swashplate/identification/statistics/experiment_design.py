@@ -7,7 +7,7 @@ what they would add.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import inf
@@ -51,9 +51,10 @@ Array = NDArray[np.float64]
 
 # --- what the runs tell ---------------------------------------------------------------------------
 
-MOST, ALONE = 0.2, 0.9
-"""Share of a run's information from which it is one of those that tell most of an unknown, and from
-which the unknown is said to rest on that run."""
+LARGE_SHARE = 0.2
+"""Share of the information on an unknown from which a run is one of the most informative. [1]"""
+SINGLE_RUN_SHARE = 0.9
+"""Share of it from which the unknown is said to rest on one run only. [1]"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,33 +78,32 @@ class RunInformation(Result):
     @cached_property
     def identifiability(self) -> Identifiability:
         """Which unknowns the runs determine, and directions that change nothing."""
-        fit, taken = (
-            self.linearised,
-            {t for unknown in self.problem.unknowns for t in unknown.targets},
-        )
+        fit = self.linearised
+        estimated = {target for unknown in self.problem.unknowns for target in unknown.targets}
         numbers = self._model.parameters.numbers
-        fixed = {name: value for name, value in numbers.items() if name not in taken}
+        fixed = {name: value for name, value in numbers.items() if name not in estimated}
         return identifiability(fit.triangle, fit.variables, tolerance=fit.tolerance, fixed=fixed)
 
     @cached_property
     def shares(self) -> dict[str, dict[str, float]]:
-        """Part of what is known of an unknown, by name, from each run, its channels together."""
+        """Share of each run in the information on an unknown, by unknown and run."""
         fit = self.linearised
         squares = {run.name: np.zeros(len(fit.variables)) for run in self.problem.experiments}
         for run, jacobian in fit.jacobians():
             squares[run.name][fit.variables.columns(run.name)] += np.sum(jacobian**2, axis=0)
         total = np.maximum(sum(squares.values()), 1e-300)
-        return {
-            name: {run: float(own[k] / total[k]) for run, own in squares.items()}
-            for name, k in ((name, fit.variables.index(name)) for name in self.names)
-        }
+        shares = dict[str, dict[str, float]]()
+        for name in self.names:
+            k = fit.variables.index(name)
+            shares[name] = {run: float(of_run[k] / total[k]) for run, of_run in squares.items()}
+        return shares
 
     def effect(self, name: str) -> float:
         """Length of the change of all weighted residuals for 1 % of an unknown; 1 is one noise."""
         return float(self.identifiability.sensitivity[self.linearised.variables.index(name)])
 
-    def need(self, name: str) -> str:
-        """What an unknown needs, in words; parameters that say nothing of it tilt the plate."""
+    def required_excitation(self, name: str) -> str:
+        """What a test must reach to inform of an unknown; by default a tilted swash plate."""
         forces = self._model.forces
         if forces is not None and name in forces.names:
             return f"{abs(forces.currents[name]):g} A beyond Z17"
@@ -111,41 +111,78 @@ class RunInformation(Result):
         return (definition.needs if definition is not None else "") or "a tilted swash plate"
 
     def sentences(self) -> tuple[str, ...]:
-        """What no run tells of, why, and what rests on one run alone."""
-        groups: dict[str, list[str]] = {}
+        """Sentences on unknowns that no run informs of, and on those that one run only does."""
+        return (*self._unexcited_sentences(), *self._single_run_sentences())
+
+    def _unexcited_sentences(self) -> Iterator[str]:
+        """One sentence for all unknowns that need the same excitation."""
+        names_by_reason: dict[str, list[str]] = {}
         for name in self.identifiability.unexcited:
             if name in self.names:
-                force = self.problem.unknowns[self.problem.unknowns.index(name)].kind == "force"
-                need = "currents of their size beyond Z17" if force else self.need(name)
-                side = next((f" ({s})" for s in ("plus", "minus") if f"_{s}" in name), "")
-                instead = "ask for forces at smaller currents" if force else "fix it"
-                why = f"{need}{side}, which no sample shows: {instead}, or add a test that has it."
-                groups.setdefault(why, []).append(name)
-        said = [
-            f"{listed(names)} need{'s' if len(names) == 1 else ''} {why}"
-            for why, names in groups.items()
-        ]
-        for name, shares in self.shares.items() if len(self.problem.experiments) > 1 else ():
+                names_by_reason.setdefault(self._unexcited_reason(name), []).append(name)
+        for reason, names in names_by_reason.items():
+            verb = "needs" if len(names) == 1 else "need"
+            yield f"{listed(names)} {verb} {reason}"
+
+    def _unexcited_reason(self, name: str) -> str:
+        """What an unknown needs that no sample has, and the remedies."""
+        unknown = self.problem.unknowns[self.problem.unknowns.index(name)]
+        if unknown.kind == "force":
+            excitation = "currents of their size beyond Z17"
+            remedy = "ask for forces at smaller currents"
+        else:
+            excitation = self.required_excitation(name)
+            remedy = "fix it"
+        direction = ""
+        if "_plus" in name:
+            direction = " (plus)"
+        elif "_minus" in name:
+            direction = " (minus)"
+        return (
+            f"{excitation}{direction}, which no sample shows: {remedy}, or add a test that has it."
+        )
+
+    def _single_run_sentences(self) -> Iterator[str]:
+        if len(self.problem.experiments) < 2:
+            return
+        for name, shares in self.shares.items():
             run = max(shares, key=lambda run_name: shares[run_name])
-            if shares[run] >= ALONE:
-                part = f"{100.0 * shares[run]:.0f} %"
-                said.append(f"{name}: {part} of its information is from {run} alone.")
-        return tuple(said)
+            if shares[run] >= SINGLE_RUN_SHARE:
+                percentage = f"{100.0 * shares[run]:.0f} %"
+                yield f"{name}: {percentage} of its information is from {run} alone."
 
     def table(self, runs: Sequence[str] = ()) -> Table:
         """What runs tell of each unknown, one letter a run; in a file their shares."""
-        named = runs or [run.name for run in self.problem.experiments]
-        columns = (Column("parameter"), Column("needs", wrap=True), Column("effect", ".3g"))
-        shown = (Column("stage", of="f"), *columns, Column("runs"))
-        made = Table(
-            f"Stage {self.stage.name}", (*shown, *(Column(run, ".6g", of="f") for run in named))
+        run_names = runs or [run.name for run in self.problem.experiments]
+        columns = (
+            Column("stage", of="f"),
+            Column("parameter"),
+            Column("needs", wrap=True),
+            Column("effect", ".3g"),
+            Column("runs"),
+            *(Column(run, ".6g", of="f") for run in run_names),
         )
+        table = Table(f"Stage {self.stage.name}", columns)
         for name, shares in self.shares.items():
-            parts = [shares.get(run) for run in named]
-            letters = ["-" if p is None else "#" if p >= MOST else "+" if p else "." for p in parts]
-            cells = (self.need(name), self.effect(name), "".join(letters))
-            made.add(self.stage.name, name, *cells, *parts)
-        return made
+            shares_of_runs = [shares.get(run) for run in run_names]
+            table.add(
+                self.stage.name,
+                name,
+                self.required_excitation(name),
+                self.effect(name),
+                "".join(_letter(share) for share in shares_of_runs),
+                *shares_of_runs,
+            )
+        return table
+
+
+def _letter(share: float | None) -> str:
+    """Letter of a run in a table: by its share, None for a run that the stage does not have."""
+    if share is None:
+        return "-"
+    if share >= LARGE_SHARE:
+        return "#"
+    return "+" if share else "."
 
 
 def run_information(
@@ -188,7 +225,7 @@ class Sensor(NamedTuple):
 
 
 def default_sensors(drive: Drive) -> tuple[Sensor, ...]:
-    """Those of Kruse's tests: an ammeter around both leads and, where known, its encoder.
+    """Those of Kruse's tests: an ammeter around both leads and, if known, its encoder.
 
     Of the others noise is assumed, 0.5 % of what full command makes them read.
     """
@@ -207,7 +244,7 @@ def default_sensors(drive: Drive) -> tuple[Sensor, ...]:
 
 @dataclass(frozen=True, eq=False)
 class PriorInformation(Result):
-    """A drive, what is to be found of it, and what is known so far: where candidates are tried."""
+    """A drive, what is to be found of it, and what is known before the next test."""
 
     parameters: ParameterSet
     stage: Stage
@@ -280,7 +317,7 @@ def prior_information(
 def _without_tests(
     parameters: ParameterSet, stage: Stage, sensors: Sequence[Sensor]
 ) -> PriorInformation:
-    """What priors alone tell, and those of some sensors that the stage's part of a drive moves."""
+    """What only priors tell, and those of some sensors that the stage's part of a drive moves."""
     part = stage.part
     useful = [
         sensor
@@ -313,9 +350,9 @@ def _of_residuals(
         if run.channel != name:
             continue
         # with free zeros and other unknowns of single runs fitted
-        own = jacobian[:, : fit.variables.of_run(run.name).size]
-        shift = np.linalg.lstsq(own, -run.residual, rcond=None)[0]
-        runs.append(run._replace(residual=run.residual + own @ shift))
+        run_jacobian = jacobian[:, : fit.variables.of_run(run.name).size]
+        shift = np.linalg.lstsq(run_jacobian, -run.residual, rcond=None)[0]
+        runs.append(run._replace(residual=run.residual + run_jacobian @ shift))
         derivatives.append(jacobian)
     square = np.concatenate([run.residual for run in runs]) ** 2
     noise = stated.noise * float(np.sqrt(np.mean(square)))
@@ -455,14 +492,14 @@ def advise(
     names = tuple(variables.names[k] for k in np.flatnonzero(free))
     known_now = whitening(dense_factor(present), free, TOLERANCE)
     now = known_now.matrix
-    before = np.where(known_now.determined, np.linalg.norm(now, axis=1), inf)
+    errors_now = np.where(known_now.determined, np.linalg.norm(now, axis=1), inf)
     ranked = []
     for candidate in candidates:
         both = dense_factor(np.vstack([present, candidate.derivatives]))
         known_then = whitening(both, free, TOLERANCE)
         then = known_then.matrix
-        after = np.where(known_then.determined, np.linalg.norm(then, axis=1), inf)
-        after = np.minimum(after, before)
+        errors_then = np.where(known_then.determined, np.linalg.norm(then, axis=1), inf)
+        errors_then = np.minimum(errors_then, errors_now)
         # errors then along the directions known now, in which they are 1 and independent now
         along = (present @ now).T @ (present @ then)
         shrinking = -np.linalg.slogdet(along @ along.T)[1]
@@ -472,8 +509,8 @@ def advise(
                 candidate=candidate.name,
                 duration=candidate.duration,
                 names=names,
-                before=before[free],
-                after=after[free],
+                before=errors_now[free],
+                after=errors_then[free],
                 ranks=then.shape[1] - now.shape[1],
                 d_gain=d_gain,
             )
@@ -485,7 +522,7 @@ def advise(
 def sequential_plan(
     present: Array, candidates: Sequence[CandidateTest], variables: Unknowns, count: int
 ) -> tuple[Advice, ...]:
-    """A plan of tests: the best one, then the best beside it, and so on, each at most once.
+    """A plan of tests: the best one, then the best in addition to it, and so on, each at most once.
 
     As many as `count`, fewer if none of the others tells anything new; otherwise as `advise`.
     """
@@ -521,7 +558,7 @@ def default_maneuvers() -> tuple[Maneuver, ...]:
 def advice_table(title: str, judged: Sequence[Advice]) -> Table:
     """Tests in the order given, what each would tell, and in a file all errors with it."""
     new = any(advice.newly_determined for advice in judged)
-    made = Table(
+    table = Table(
         title,
         (
             Column("test", wrap=not new),
@@ -536,13 +573,13 @@ def advice_table(title: str, judged: Sequence[Advice]) -> Table:
         first, more = advice.newly_determined[:NAMED], len(advice.newly_determined) - NAMED
         # the unknown whose error shrinks most, of those that are then known
         pairs = zip(advice.names, advice.before.tolist(), advice.after.tolist(), strict=True)
-        known = [pair for pair in pairs if pair[2] <= KNOWN]
+        determined = [pair for pair in pairs if pair[2] <= KNOWN]
         gained = ""
-        if known:
-            name, now, then = min(known, key=lambda pair: pair[2] / pair[1])
-            before = f"{_error(now)} " if now <= KNOWN else ""
-            gained = f"{name} {before}to {_error(then)}"
-        made.add(
+        if determined:
+            name, now, then = min(determined, key=lambda pair: pair[2] / pair[1])
+            error_before = f"{_error(now)} " if now <= KNOWN else ""
+            gained = f"{name} {error_before}to {_error(then)}"
+        table.add(
             advice.candidate,
             advice.duration,
             ", ".join(first) + (f" + {more}" if more > 0 else ""),
@@ -550,7 +587,7 @@ def advice_table(title: str, judged: Sequence[Advice]) -> Table:
             f"{advice.d_gain:.2f}x" if advice.d_gain > 1.0 + WORTH else "",
             *(error if error < inf else None for error in advice.after.tolist()),
         )
-    return made
+    return table
 
 
 def best_tests_table(judged: Sequence[Advice]) -> Table:

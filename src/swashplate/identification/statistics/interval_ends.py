@@ -187,7 +187,7 @@ SWITCHING = ("V_dz", "J_", "lim", "I_t", "Z13", "Z14", "Z15", "Z16", "Z17")
 STRAIGHT = 0.02
 """Half width, in the solver's vector, up to which the drive is linear in all others."""
 SHALLOW = 0.25
-"""Part of the linearised rise of the cost below which an interval's end is looked for anew."""
+"""Part of the linearised rise of the cost below which an interval's end is looked for again."""
 MOST_POINTS = 8
 """Most points of the profile on such a side."""
 LEAST_STEP = 1e-3
@@ -285,7 +285,7 @@ def checked_ends(
 def _unneeded(problem: Problem, vector: Array, index: int, cost: float, rise: float) -> bool:
     """Whether a fit with a limit out of the way is as good.
 
-    It is given up where a first linear step leaves far too much. Then it is followed for a few
+    It is given up if a first linear step leaves far too much. Then it is followed for a few
     evaluations at a time, until the cost falls so slowly that the tries left would not do.
     """
     start, minimise = vector.copy(), minimiser(problem, tolerance=1e-6, max_evaluations=LOOK)
@@ -297,15 +297,15 @@ def _unneeded(problem: Problem, vector: Array, index: int, cost: float, rise: fl
         left = 0.5 * float(np.sum((residuals - jacobian @ step) ** 2))
         if left - cost > HOPELESS * rise:
             return False
-        before = 0.5 * float(residuals @ residuals)
+        limited_cost = 0.5 * float(residuals @ residuals)
         for tried in range(LOOK, TRIES + 1, LOOK):
             now, start = minimise(index, float(start[index]), start)
             over = now - cost - rise
             if over < 0.0:
                 return True
-            if (before - now) * (TRIES - tried) / LOOK < over:
+            if (limited_cost - now) * (TRIES - tried) / LOOK < over:
                 return False
-            before = now
+            limited_cost = now
     except DomainError:
         pass
     return False

@@ -82,13 +82,13 @@ class Estimate(Result):
     """What is known of its error, or what computes it."""
 
     @cached_property
-    def _known(self) -> Interval:
+    def _interval(self) -> Interval:
         return self.source if isinstance(self.source, Interval) else self.source()
 
     @property
     def status(self) -> Status:
         """How it came about, or what its interval lacks."""
-        return self._known.status
+        return self._interval.status
 
     @property
     def standard_error(self) -> float | None:
@@ -96,7 +96,7 @@ class Estimate(Result):
 
         That of a logarithmic unknown is the value times the logarithm's.
         """
-        return self._known.standard_error
+        return self._interval.standard_error
 
     @property
     def lower(self) -> float | None:
@@ -104,12 +104,12 @@ class Estimate(Result):
 
         The interval of a logarithmic unknown is asymmetric about the value.
         """
-        return self._known.lower
+        return self._interval.lower
 
     @property
     def upper(self) -> float | None:
         """Upper end of the 95 % interval, in `unit`; None if there is no end."""
-        return self._known.upper
+        return self._interval.upper
 
     @property
     def interval(self) -> tuple[float | None, float | None]:
@@ -120,7 +120,7 @@ class Estimate(Result):
         if not isinstance(other, Estimate):
             return NotImplemented
         same = (self.name, self.value, self.unit) == (other.name, other.value, other.unit)
-        return same and self._known == other._known
+        return same and self._interval == other._interval
 
     def __hash__(self) -> int:
         return hash((self.name, self.value, self.unit))
@@ -148,8 +148,10 @@ class Estimate(Result):
 
 def reach(covariance: Covariance) -> Array:
     """(K,) half widths of the intervals in the solver's vector; 0 for unknowns without one."""
-    known = covariance.determined & covariance.variables.free
-    half_widths: Array = covariance.quantiles * np.where(known, covariance.standard_errors, 0.0)
+    has_interval = covariance.determined & covariance.variables.free
+    half_widths: Array = covariance.quantiles * np.where(
+        has_interval, covariance.standard_errors, 0.0
+    )
     return half_widths
 
 
@@ -240,12 +242,14 @@ def with_earlier_stages(
     """
     if not earlier_stages and not systematic:
         return own
-    known = np.outer(own.determined, own.determined)
+    both_determined = np.outer(own.determined, own.determined)
     columns = np.array(list(systematic.values())).reshape(-1, len(own.variables))
-    total = own.matrix + np.where(known, columns.T @ columns, 0.0)
+    total = own.matrix + np.where(both_determined, columns.T @ columns, 0.0)
     spread = np.diag(own.matrix) ** 2 / own.degrees_of_freedom
     for stage in earlier_stages:
-        added = np.where(known, stage.slopes @ stage.covariance.matrix @ stage.slopes.T, 0.0)
+        added = np.where(
+            both_determined, stage.slopes @ stage.covariance.matrix @ stage.slopes.T, 0.0
+        )
         total += added
         # of each earlier unknown by itself, as if they were independent of each other
         parts = stage.slopes**2 * np.diag(stage.covariance.matrix)
@@ -261,8 +265,8 @@ def with_runs(noise: Covariance, runs: RunToRun | None) -> Covariance:
     """A covariance of the noise with what runs differ by."""
     if runs is None:
         return noise
-    known = np.outer(noise.determined, noise.determined)
-    between = np.where(known, runs.slopes @ runs.slopes.T, 0.0)
+    both_determined = np.outer(noise.determined, noise.determined)
+    between = np.where(both_determined, runs.slopes @ runs.slopes.T, 0.0)
     spread = np.diag(noise.matrix) ** 2 / noise.degrees_of_freedom
     spread += np.diag(between) ** 2 / runs.degrees_of_freedom
     total = noise.matrix + between
@@ -340,20 +344,22 @@ class Uncertainty(Result):
 
     def _widened(self) -> Iterator[str]:
         """What earlier stages and systematic effects add to the intervals."""
-        known = self.own.determined & (np.diag(self.own.matrix) > 0.0)
-        if not known.any() or not (self.earlier_stages or self.systematic):
+        has_variance = self.own.determined & (np.diag(self.own.matrix) > 0.0)
+        if not has_variance.any() or not (self.earlier_stages or self.systematic):
             return
         causes = ["the uncertainty of earlier stages"] if self.earlier_stages else []
         if self.systematic:
             causes.append("possible errors of instruments, fixed parameters and the model")
-        wider = np.ones(known.size)
-        wider[known] = self.quoted.standard_errors[known] / self.own.standard_errors[known]
+        wider = np.ones(has_variance.size)
+        wider[has_variance] = (
+            self.quoted.standard_errors[has_variance] / self.own.standard_errors[has_variance]
+        )
         most = int(np.argmax(wider))
         name = self.own.variables.names[most]
         text = (
             f"Intervals include {' and '.join(causes)}, which widens them by a factor of "
-            f"{float(np.median(wider[known])):.2f} in the median and of {wider[most]:.2f} for "
-            f"{name}"
+            f"{float(np.median(wider[has_variance])):.2f} in the median and of {wider[most]:.2f} "
+            f"for {name}"
         )
         shares = self.budget(most)
         if shares:
@@ -420,12 +426,17 @@ def uncertainty(
         If there are no more samples than unknowns.
     """
     bounded, fit = fit.variables, released(fit)
-    own = replace(with_runs(coloured_noise_covariance(fit), runs), variables=bounded)
+    stage_covariance = replace(with_runs(coloured_noise_covariance(fit), runs), variables=bounded)
     white = fit.squares / fit.spare_samples * np.sum(fit.whitening**2, axis=1)
     ratio = np.ones_like(white)
-    np.divide(np.diag(own.matrix), white, out=ratio, where=own.determined & (white > 0.0))
+    np.divide(
+        np.diag(stage_covariance.matrix),
+        white,
+        out=ratio,
+        where=stage_covariance.determined & (white > 0.0),
+    )
     return Uncertainty(
-        own=own,
+        own=stage_covariance,
         inflation=np.maximum(ratio, 1.0),
         colours=noise_colours(fit),
         noisy=fit.squares > 0.0,

@@ -41,7 +41,7 @@ class Profile(Result):
     rise: float
     """Of the cost, up to which a value is within the interval."""
     lower: float | None
-    """End of the interval, in the solver's vector; None where there is none on that side."""
+    """End of the interval, in the solver's vector; None if there is none on that side."""
     upper: float | None
     endings: tuple[Ending, Ending]
     """Of the lower and the upper side."""
@@ -164,8 +164,8 @@ def profiles_of(
     )
     by_name: dict[str, Profile] = {}
     profiles = (executor or Serial()).run(_profiled, shared, numbers)
-    words = f"Profiling {stage.stage.name}"
-    for position, profile in counted(profiles, len(numbers), "parameters", words):
+    task = f"Profiling {stage.stage.name}"
+    for position, profile in counted(profiles, len(numbers), "parameters", task):
         number = numbers[position]
         name = variables.names[number]
         unknown = problem.unknowns.items[number]

@@ -132,7 +132,14 @@ def plot_bode(
         _draw_linear(axes, linear, response)
     _scale_axes(axes, response)
     # the lines are at the top there
-    put_text(axes[0], "\n".join(response.still()), (0.0, 0.0), (4.0, 4.0), color=GREY, va="bottom")
+    put_text(
+        axes[0],
+        "\n".join(response.sentences_on_no_motion()),
+        (0.0, 0.0),
+        (4.0, 4.0),
+        color=GREY,
+        va="bottom",
+    )
     if mark is not None and response.frequencies[0] <= mark <= response.frequencies[-1]:
         for panel in axes:
             panel.axvline(mark, color=FAINT, linewidth=1.0, zorder=1.3)
@@ -175,7 +182,7 @@ def _draw_response(
     swept = (gain, np.degrees(response.phase), 100.0 * response.distortion)
     marker = "o" if response.frequencies.size == 1 else None
     for panel, rows in zip(axes, swept, strict=False):
-        for row, moves, stroke in zip(rows, response.moves, stroke_by_name, strict=True):
+        for row, moves, stroke in zip(rows, response.has_motion, stroke_by_name, strict=True):
             style: dict[str, Any] = {"color": stroke.color, "ls": stroke.dashes, "lw": LINE}
             shown_row = np.where(moves, row, np.nan)
             panel.plot(response.frequencies, shown_row, marker=marker, ms=4.0, **style)
