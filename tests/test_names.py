@@ -47,6 +47,16 @@ def test_no_module_defines_what_it_is_called() -> None:
     assert same == []
 
 
+def test_no_class_name_stands_for_two_things() -> None:
+    modules: dict[str, list[str]] = {}
+    for path in FILES:
+        for node in ast.parse(path.read_text("utf-8")).body:
+            if isinstance(node, ast.ClassDef):
+                modules.setdefault(node.name, []).append(module_name(path))
+    assert len(modules) > 300
+    assert {name: defined for name, defined in modules.items() if len(defined) > 1} == {}
+
+
 def test_no_package_exports_a_function_called_as_one_of_its_modules() -> None:
     assert len(STUBS) > 8
     for stub in STUBS:

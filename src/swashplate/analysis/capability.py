@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 # --- steady edges ---------------------------------------------------------------------------------
 
 
-class Edge(NamedTuple):
+class ConditionEdge(NamedTuple):
     """Commands at most 1e-12 V apart, on both sides of the point at which a condition fails."""
 
     inside: float
@@ -45,14 +45,14 @@ NEARLY_FULL = (1.0 - 1e-9) * FULL_VOLTAGE
 """Above this voltage a drive counts as not saturated: its speed grows up to full voltage. [V]"""
 
 
-def edge(holds: Callable[[Array], NDArray[np.bool_]], end: float) -> Edge:
+def edge(holds: Callable[[Array], NDArray[np.bool_]], end: float) -> ConditionEdge:
     """First command on the way from 0 V to `end` [V] at which a condition fails.
 
     `holds` evaluates the condition for commands [V], element by element.
     """
     low, high = 0.0, end
     if holds(np.linspace(low, high, GRID + 1)).all():
-        return Edge(end, None)
+        return ConditionEdge(end, None)
     while abs(high - low) > CLOSE:
         grid = np.linspace(low, high, GRID + 1)
         first = int(np.argmax(~holds(grid)))
@@ -60,10 +60,10 @@ def edge(holds: Callable[[Array], NDArray[np.bool_]], end: float) -> Edge:
         if closer == (low, high):  # the numbers end before the width does
             break
         low, high = closer
-    return Edge(low, high)
+    return ConditionEdge(low, high)
 
 
-def dead_zone(drive: Drive, direction: float) -> Edge:
+def dead_zone(drive: Drive, direction: float) -> ConditionEdge:
     """Edge of the dead zone in one direction, +1 or -1: up to it the current stays within Z17."""
     dead = drive.parameters.numbers["Z17"]
     return edge(lambda volts: np.abs(drive.steady_current(volts)) <= dead, direction * FULL_VOLTAGE)

@@ -5,7 +5,7 @@ from .experiment import LARGEST_CERTAIN_INTERVAL as LARGEST_CERTAIN_INTERVAL
 from .experiment import RISE as RISE
 from .experiment import Accuracy as Accuracy
 from .experiment import Channel as Channel
-from .experiment import Edge as Edge
+from .experiment import CommandJump as CommandJump
 from .experiment import Encoder as Encoder
 from .experiment import Experiment as Experiment
 from .experiment import InputSignal as InputSignal

@@ -57,7 +57,7 @@ class SignalOrigin(NamedTuple):
         return f"{self.file.name}: column '{self.column}'"
 
 
-class Edge(NamedTuple):
+class CommandJump(NamedTuple):
     """A jump of a command between two samples, at an instant that was not logged."""
 
     row: int
@@ -189,7 +189,7 @@ class InputSignal(Result):
         return replace(self, time=time, values=values)
 
     @cached_property
-    def edges(self) -> tuple[Edge, ...]:
+    def edges(self) -> tuple[CommandJump, ...]:
         """Jumps whose instants are uncertain, because the stamps around them are far apart.
 
         A command that is held has none: it jumps at a stamp.
@@ -198,7 +198,7 @@ class InputSignal(Result):
             return ()
         intervals = np.diff(self.time)
         return tuple(
-            Edge(
+            CommandJump(
                 row=int(k),
                 middle=float(self.time[k] + 0.5 * intervals[k]),
                 interval=float(intervals[k]),

@@ -159,7 +159,7 @@ def guess_amplifier(experiments: Sequence[Experiment]) -> AmplifierGuess | None:
     )
 
 
-class _Line(NamedTuple):
+class _SteadyLine(NamedTuple):
     """Settled current of one way over the command, a dead zone and a straight line beyond it."""
 
     dead_zone: float
@@ -174,9 +174,9 @@ class _Line(NamedTuple):
     """Mean over the samples. [A²]"""
 
 
-def _static_line(measured: Sequence[_Currents], side: int) -> _Line | None:
+def _static_line(measured: Sequence[_Currents], side: int) -> _SteadyLine | None:
     """Line of a way at the delay of the least error; None if no line fits its currents."""
-    best: _Line | None = None
+    best: _SteadyLine | None = None
     for delay in SETTLED_DELAYS:
         line = _line(*_settled(measured, side, delay))
         if line is not None and (best is None or line.squared_error < best.squared_error):
@@ -210,11 +210,11 @@ def _settled(measured: Sequence[_Currents], side: int, delay: float) -> tuple[Ar
     return volts[::stride], amperes[::stride]
 
 
-def _line(volts: Array, amperes: Array) -> _Line | None:
+def _line(volts: Array, amperes: Array) -> _SteadyLine | None:
     """Dead zone, jump and gain of least squares; None if no current rises with the command."""
     if volts.size < FEWEST:
         return None
-    best: _Line | None = None
+    best: _SteadyLine | None = None
     largest = float(volts.max())
     for dead_zone in (DEAD_ZONES * largest).tolist():
         beyond = volts > dead_zone
@@ -227,7 +227,7 @@ def _line(volts: Array, amperes: Array) -> _Line | None:
             jump = 0.0
             gain = float(over @ amperes[beyond] / (over @ over))
         residual = amperes - np.where(beyond, jump + gain * (volts - dead_zone), 0.0)
-        line = _Line(
+        line = _SteadyLine(
             dead_zone=dead_zone,
             jump=jump,
             gain=gain,
@@ -248,7 +248,7 @@ class _Dynamics(NamedTuple):
     """Parameters by symbol. [SI]"""
 
 
-class _Trial(NamedTuple):
+class _DynamicsTrial(NamedTuple):
     """Error of simulated against measured currents, at the delay of the least error."""
 
     dynamics: _Dynamics
@@ -299,7 +299,7 @@ def _plus_minus(parameters: ParameterSet, symbol: str) -> PlusMinus:
 
 def _try_dynamics(
     measured: Sequence[_Currents], static: Mapping[str, PlusMinus], dynamics: _Dynamics
-) -> _Trial:
+) -> _DynamicsTrial:
     """Simulate the currents with some dynamics; the delay and error of the least squares.
 
     The error is infinite if the card refuses a command.
@@ -316,9 +316,9 @@ def _try_dynamics(
                 squares[k] += float(residual @ residual)
             size += reading.time.size
     except InputError:  # a command beyond what a card takes, or a filter too fast for the step
-        return _Trial(dynamics, 0.0, inf)
+        return _DynamicsTrial(dynamics, 0.0, inf)
     best = int(np.argmin(squares))
-    return _Trial(dynamics, float(DELAYS[best]), float(np.sqrt(squares[best] / size)))
+    return _DynamicsTrial(dynamics, float(DELAYS[best]), float(np.sqrt(squares[best] / size)))
 
 
 def _simulated_current(drive: Drive, reading: _Currents) -> tuple[Array, Array]:

@@ -35,7 +35,7 @@ from swashplate.models.drive import (
     settled_drive,
 )
 from swashplate.models.pump import searched_pressure, settled_pressure
-from swashplate.parameters import SIDES, CheckedRule, ParameterSet, Rule, apply_rule
+from swashplate.parameters import SIDES, CheckedRule, ParameterRule, ParameterSet, apply_rule
 
 Array = NDArray[np.float64]
 
@@ -181,12 +181,12 @@ def unstable_filters(
         f"{'swings too fast for' if exact else 'is unstable at'} a step of 1/{1.0 / step:g} s; "
         "simulate with "
     )
-    rules: tuple[Rule, ...] = (
-        Rule(
+    rules: tuple[ParameterRule, ...] = (
+        ParameterRule(
             lambda values: ~(values["steps"] < MOST_SUBSTEPS),
             f"{finding}a zeta nearer to 1 or a lower omega.",
         ),
-        Rule(
+        ParameterRule(
             lambda values: ~(values["steps"] < 1.0),
             f"{finding}substeps={{least:.0f}} or more, a higher rate or a lower omega.",
         ),

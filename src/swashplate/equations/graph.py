@@ -7,7 +7,7 @@ are structural, and vanish.
 Besides arithmetic there are
 
 - "if": one of two values, by a test; `and` and `or` are choices with a literal side;
-- "ruled": a value whose derivatives are declared, by the `Rule` that is the node's `value`;
+- "ruled": a value whose derivatives are declared, by the `DerivativeRule` in the node's `value`;
 - "call" of a generated function, and "result", one of the numbers that it returns.
 """
 
@@ -39,7 +39,7 @@ class Node:
         What its value is computed from.
     value : object
         Of a number itself, of a name its text, of a power its exponent, of a result its index; of a
-        ruled value its `Rule`, of a call its `Call`.
+        ruled value its `DerivativeRule`, of a call its `Call`.
     kind : str
         "float", "int" or "bool".
     """
@@ -54,7 +54,7 @@ class Node:
         return f"{self.op}({printed})" if self.args else str(self.value)
 
 
-class Rule:
+class DerivativeRule:
     """Declared derivatives of a value.
 
     `arguments` are all floats that it may follow; `slopes` gives the derivative by each of them,
@@ -204,9 +204,9 @@ def rewritten(ends: Iterable[Node], replacements: Mapping[Node, Node]) -> list[N
 
 
 def _rewritten_rule(
-    rule: Rule, arguments: tuple[Node, ...], replacements: Mapping[Node, Node]
-) -> Rule:
-    return Rule(arguments, lambda: tuple(rewritten(rule.slopes, replacements)))
+    rule: DerivativeRule, arguments: tuple[Node, ...], replacements: Mapping[Node, Node]
+) -> DerivativeRule:
+    return DerivativeRule(arguments, lambda: tuple(rewritten(rule.slopes, replacements)))
 
 
 def plain_value(node: Node) -> Node:

@@ -31,8 +31,8 @@ from swashplate.parameters import (
     Pair,
     Parameter,
     ParameterEntry,
+    ParameterRule,
     ParameterSet,
-    Rule,
     Value,
     apply_rule,
     check_range,
@@ -72,12 +72,12 @@ CHOICES: Mapping[str, Definition] = {
 }
 """What these are."""
 AGREES = 1e-9  # Relative difference up to which a given value agrees with the one that follows.
-ARM_TURNS = Rule(
+ARM_TURNS = ParameterRule(
     lambda n: ~(n["arm_sine"] < 1.0),
     "swash_arm/control_arm·tan swash_stop_{side} is {arm_sine:.4g}, but must be below 1: at its "
     "stop the swash plate would turn the feedback arm past 90°.",
 )
-LOAD_HELD = Rule(
+LOAD_HELD = ParameterRule(
     lambda n: ~(np.abs(n["rest"]) < n["ceiling"]),
     "the load holds a stroking pressure of {rest:.4g} Pa at rest, but it must stay below "
     "{ceiling:.4g} Pa, the smaller of supply_pressure and relief_pressure; check load_torque, "

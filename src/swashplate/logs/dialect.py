@@ -288,7 +288,7 @@ def _refuse_thousands(lines: Sequence[str], layout: TextLayout, path: Path) -> N
         )
 
 
-class _Trial(NamedTuple):
+class _ScoredLayout(NamedTuple):
     """Score of a layout for a sample of lines."""
 
     score: float
@@ -299,7 +299,7 @@ class _Trial(NamedTuple):
     layout: TextLayout
 
 
-def _trials(lines: Sequence[str], options: TextOptions) -> list[_Trial]:
+def _trials(lines: Sequence[str], options: TextOptions) -> list[_ScoredLayout]:
     """Layouts that are stated or possible, and under which there are rows of numbers."""
     delimiters, decimals = [",", ";", "\t", " ", "|"], [".", ","]
     if options.delimiter:
@@ -309,7 +309,7 @@ def _trials(lines: Sequence[str], options: TextOptions) -> list[_Trial]:
     # a decimal comma between commas needs quotes, or somebody who states both
     is_stated = options.delimiter is not None and options.decimal is not None
     may_be_equal = is_stated or any('"' in line for line in lines)
-    trials = list[_Trial]()
+    trials = list[_ScoredLayout]()
     for delimiter in delimiters:
         for decimal in decimals:
             if delimiter != decimal or may_be_equal:
@@ -319,7 +319,7 @@ def _trials(lines: Sequence[str], options: TextOptions) -> list[_Trial]:
     return trials
 
 
-def _try_layout(lines: Sequence[str], layout: TextLayout) -> _Trial | None:
+def _try_layout(lines: Sequence[str], layout: TextLayout) -> _ScoredLayout | None:
     """Try a layout, and complete it by its width and its columns of numbers.
 
     A log of one column has no time and gives nothing.
@@ -358,7 +358,7 @@ def _try_layout(lines: Sequence[str], layout: TextLayout) -> _Trial | None:
             header_width = len(rows[index])
     if header_width > 1:
         score += 0.5 if header_width == width else 0.25
-    return _Trial(score, len(full_rows), layout)
+    return _ScoredLayout(score, len(full_rows), layout)
 
 
 # --- names and units, above the rows --------------------------------------------------------------
@@ -366,7 +366,7 @@ def _try_layout(lines: Sequence[str], layout: TextLayout) -> _Trial | None:
 _Units = list[str | None]
 
 
-class _Line(NamedTuple):
+class _NumberedLine(NamedTuple):
     """A line of the file."""
 
     number: int
@@ -379,23 +379,23 @@ class _Heading(NamedTuple):
 
     names: list[str]
     units: _Units | None
-    first_row: _Line
+    first_row: _NumberedLine
 
 
 def read_heading(
     head: Sequence[str], layout: TextLayout, options: TextOptions, path: Path
 ) -> tuple[tuple[LogColumn, ...], int]:
     """Columns by the first lines of a file, and the line of the first row; the first line is 1."""
-    comments, plain = list[_Line](), list[_Line]()
+    comments, plain = list[_NumberedLine](), list[_NumberedLine]()
     marks = "|".join(map(re.escape, options.marks))
     for number, text in enumerate(head, 1):
         if layout.is_blank(text):
             continue
         if text.lstrip().startswith(options.marks):
             # without its mark, as NumPy writes names into one
-            comments.append(_Line(number, re.sub(rf"^\s*(?:{marks})", "", text)))
+            comments.append(_NumberedLine(number, re.sub(rf"^\s*(?:{marks})", "", text)))
         else:
-            plain.append(_Line(number, text))
+            plain.append(_NumberedLine(number, text))
     if options.header_row:
         heading = _stated_heading(head, options.header_row, comments, plain, layout, path)
     else:
@@ -410,8 +410,8 @@ def read_heading(
 def _stated_heading(
     head: Sequence[str],
     number: int,
-    comments: Sequence[_Line],
-    plain: Sequence[_Line],
+    comments: Sequence[_NumberedLine],
+    plain: Sequence[_NumberedLine],
     layout: TextLayout,
     path: Path,
 ) -> _Heading:
@@ -434,7 +434,7 @@ def _stated_heading(
     return _Heading(names, units, below[1])
 
 
-def _first_row(plain: Sequence[_Line], layout: TextLayout, path: Path) -> int:
+def _first_row(plain: Sequence[_NumberedLine], layout: TextLayout, path: Path) -> int:
     """Index of the first row among the lines that are not comments."""
     rows = list[list[str]]()
     for line in plain:
@@ -454,9 +454,9 @@ def _first_row(plain: Sequence[_Line], layout: TextLayout, path: Path) -> int:
 
 
 def _recognised_heading(
-    comments: Sequence[_Line],
-    above: Sequence[_Line],
-    first_row: _Line,
+    comments: Sequence[_NumberedLine],
+    above: Sequence[_NumberedLine],
+    first_row: _NumberedLine,
     layout: TextLayout,
     path: Path,
 ) -> _Heading:

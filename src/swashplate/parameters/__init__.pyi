@@ -37,7 +37,7 @@ from .plausible import check_plausible as check_plausible
 from .rules import FULL_VOLTAGE as FULL_VOLTAGE
 from .rules import SIDES as SIDES
 from .rules import CheckedRule as CheckedRule
-from .rules import Rule as Rule
+from .rules import ParameterRule as ParameterRule
 from .rules import apply_rule as apply_rule
 from .rules import check_range as check_range
 from .rules import check_rules as check_rules

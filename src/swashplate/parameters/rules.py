@@ -36,7 +36,7 @@ Values = dict[str, Any]
 """Values by column and derived values by name, as arrays with an element for each set; or texts."""
 
 
-class Rule(NamedTuple):
+class ParameterRule(NamedTuple):
     """A rule for values of parameter sets."""
 
     is_broken: Callable[[Values], Mask]
@@ -65,8 +65,8 @@ _single_checks = count()
 N_CHANNEL = len(CardChannel._fields)
 N_PUMP = len(Pump._fields)
 
-REFINEMENT_RULES: tuple[Rule, ...] = (
-    Rule(
+REFINEMENT_RULES: tuple[ParameterRule, ...] = (
+    ParameterRule(
         lambda n: (
             (n["spool_friction"] > 0.0)
             & np.isfinite(n["dither_time"])
@@ -75,40 +75,40 @@ REFINEMENT_RULES: tuple[Rule, ...] = (
         "dither_time is {dither_time:g} s, but spool_presliding is 0: dither acts on the small "
         "travel that friction permits; give that travel, of the order of 5e-5 m.",
     ),
-    Rule(
+    ParameterRule(
         lambda n: (n["line_stiffness"] > 0.0) & (n["load_inertia"] == 0.0),
         "line_stiffness is {line_stiffness:g} N m/rad, but load_inertia is 0: give the inertia "
         "that the line has to turn, in kg m^2 at the shaft.",
     ),
-    Rule(
+    ParameterRule(
         lambda n: n["ripple_depth"] >= 1.0,
         "cam_ripple + cam_ripple_per_torque·|load_torque| is {ripple_depth:.4g}, but must be below "
         "1: a motor whose displacement vanishes somewhere would run away.",
     ),
 )
-RULE_AT_REST = Rule(
+RULE_AT_REST = ParameterRule(
     lambda n: np.abs(n["rest"]) >= n["ceiling"],
     "the pressure at rest Z2/Z1 is {rest:g} Pa, but must stay below {ceiling:g} Pa, the smaller of "
     "Z9 and Z15.",
 )
-SIDE_RULES: tuple[Rule, ...] = (
-    Rule(
+SIDE_RULES: tuple[ParameterRule, ...] = (
+    ParameterRule(
         lambda n: n["I_t2"] >= n["I_t1"],
         "I_t2_{side} is {I_t2:g} A, but must be below I_t1_{side} = {I_t1:g} A: the decay begins "
         "at a lower current than the rate limit.",
     ),
-    Rule(
+    ParameterRule(
         lambda n: n["arm_sine"] >= 1.0,
         "Z3·tan Z13_{side} is {arm_sine:.4g}, but must be below 1: at its stop of {Z13:g} rad the "
         "swash plate would turn the feedback arm past 90°.",
     ),
-    Rule(
+    ParameterRule(
         lambda n: n["lowest"] < 0.0,
         f"the steady current of the {{side}} channel falls to {{lowest:.3g}} A within "
         f"{FULL_VOLTAGE:g} V, but a current is a magnitude; check G1_{{side}}, G2_{{side}} and "
         "G3_{side}.",
     ),
-    Rule(
+    ParameterRule(
         lambda n: ~(n["moment_sine"] < 1.0),
         f"Z5·F/√Z4 reaches {{moment_sine:.4g}} within {FULL_VOLTAGE:g} V ({{side}}), but must be "
         "below 1: the solenoid would overpower the feedback spring; check Z19 to Z22, Z4 and Z5.",
@@ -187,7 +187,7 @@ def check_rules(
             yield apply_rule(rule, side_values)
 
 
-def apply_rule(rule: Rule, values: Values) -> CheckedRule:
+def apply_rule(rule: ParameterRule, values: Values) -> CheckedRule:
     """Apply a rule to sets by their values."""
 
     def sentence(index: int) -> str:

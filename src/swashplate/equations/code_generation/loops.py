@@ -27,7 +27,7 @@ from swashplate.equations.code_generation.printing import (
 from swashplate.equations.code_generation.runner import Callee, Runner
 from swashplate.equations.code_generation.values import Flag, Tuple, Value, alike, leaves, rebuilt
 from swashplate.equations.declaration import inlined
-from swashplate.equations.graph import ONE, ZERO, Call, Node, Rule, choose, make, names_in
+from swashplate.equations.graph import ONE, ZERO, Call, DerivativeRule, Node, choose, make, names_in
 from swashplate.equations.language import Parsed
 
 S = TypeVar("S")
@@ -315,7 +315,7 @@ def solved(trace: Runner, callee: Callee, low: Value, high: Value, rest: Sequenc
             derivatives.append(choose(inside, slope, ZERO))
         return tuple(derivatives)
 
-    return trace.make("ruled", x, value=Rule((low, high, *moving), slopes))
+    return trace.make("ruled", x, value=DerivativeRule((low, high, *moving), slopes))
 
 
 def repetition(

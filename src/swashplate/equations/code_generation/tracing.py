@@ -41,7 +41,17 @@ from swashplate.equations.declaration import (
     closure,
     standing,
 )
-from swashplate.equations.graph import FALSE, LEAVES, ONE, TRUE, ZERO, Node, Rule, choose, make
+from swashplate.equations.graph import (
+    FALSE,
+    LEAVES,
+    ONE,
+    TRUE,
+    ZERO,
+    DerivativeRule,
+    Node,
+    choose,
+    make,
+)
 from swashplate.equations.language import (
     ARITHMETIC,
     CHOICES,
@@ -96,7 +106,7 @@ class Trace:
         self.labels: dict[Node, str] = {}
         self.origins: dict[Node, Parsed] = {}
         self.under_way: list[Callee] = []
-        self._rules: dict[tuple[Any, ...], Rule] = {}
+        self._rules: dict[tuple[Any, ...], DerivativeRule] = {}
 
     @property
     def replacements(self) -> Replacements:
@@ -205,7 +215,7 @@ class Trace:
 
         decided = tuple((name, _options_in(value)) for name, value in arguments.items())
         key = (source.function, decided, *floats.values(), *(node for _, node in results))
-        rule_of_all = self._rules.setdefault(key, Rule(tuple(floats.values()), slopes))
+        rule_of_all = self._rules.setdefault(key, DerivativeRule(tuple(floats.values()), slopes))
         nodes = []
         for index, (path, node) in enumerate(results):
             rule_of_one = self._rules.setdefault((*key, index), _part_of(rule_of_all, index))
@@ -231,10 +241,10 @@ def _options_in(value: Value) -> tuple[Any, ...]:
     return () if value.kind == "float" else (value,)
 
 
-def _part_of(rule: Rule, index: int) -> Rule:
+def _part_of(rule: DerivativeRule, index: int) -> DerivativeRule:
     """The rule of one result among several."""
     size = len(rule.arguments)
-    return Rule(rule.arguments, lambda: rule.slopes[index * size : (index + 1) * size])
+    return DerivativeRule(rule.arguments, lambda: rule.slopes[index * size : (index + 1) * size])
 
 
 class _Tracer:

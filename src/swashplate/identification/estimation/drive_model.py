@@ -19,7 +19,7 @@ from swashplate.campaign import (
     SIGNALS,
     Channel,
     ChannelKind,
-    Edge,
+    CommandJump,
     Experiment,
     InputSignal,
     signed_by_command,
@@ -386,7 +386,7 @@ class DriveModel(Result, EquationModel):
         leaves = ("now", "out") if self.parameters.rate is None else ("now", "before", "out")
         return [f"{START_CURRENTS[name]}.{leaf}" for leaf in leaves]
 
-    def instants_of(self, experiment: Experiment) -> Mapping[str, Edge]:
+    def instants_of(self, experiment: Experiment) -> Mapping[str, CommandJump]:
         """Edges of the command by the names of their instants; see `EquationModel.instants_of`."""
         return _instants_of(experiment.input)
 
@@ -421,7 +421,7 @@ def with_edges(experiment: Experiment, values: Mapping[str, float]) -> Experimen
     return replace(experiment, input=command.with_edges(late)) if late else experiment
 
 
-def _instants_of(command: InputSignal) -> dict[str, Edge]:
+def _instants_of(command: InputSignal) -> dict[str, CommandJump]:
     """Edges of a command by the names that a model has for their instants."""
     return {f"edge at {edge.middle:.6g} s": edge for edge in command.edges}
 

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.campaign import Edge, Experiment
+from swashplate.campaign import CommandJump, Experiment
 from swashplate.equations import BoundModel, instance_of, parameter_paths, state_paths, tuple_from
 from swashplate.equations import Model as Equations
 from swashplate.equations.marching import (
@@ -208,7 +208,7 @@ class EquationModel(ABC):
     ) -> BoundModel:
         """The model with numbers; columns as the engine names them."""
 
-    def instants_of(self, experiment: Experiment) -> Mapping[str, Edge]:
+    def instants_of(self, experiment: Experiment) -> Mapping[str, CommandJump]:
         """Edges of the command whose instants the model takes, by the names of these."""
         return {}
 
