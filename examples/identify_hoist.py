@@ -16,7 +16,7 @@ import numpy as np
 
 from swashplate import Campaign, Drive, identify, rig
 from swashplate.identification import (
-    drawn,
+    drawn_drive,
     load_setup,
     run_information,
     smooth,
@@ -38,7 +38,7 @@ options = parser.parse_args([] if "ipykernel" in sys.modules else None)
 
 # %%
 setup = load_setup("hoist")  # what is free, within which bounds, and in which order it is fitted
-truth = drawn(Drive.preset("hoist").at_every_rate(), setup, seed=1)
+truth = drawn_drive(Drive.preset("hoist").at_every_rate(), setup, seed=1)
 tests = rig.run("hoist", truth=truth, seed=1)
 path = rig.write(tests, options.out / "virtual", overwrite=True)
 

@@ -28,7 +28,7 @@ from swashplate.errors import InputError
 from swashplate.identification import (
     RunQuality,
     Search,
-    drawn,
+    drawn_drive,
     fit,
     load_setup,
     predict,
@@ -119,7 +119,8 @@ def _fitted(nominal: Drive, axis: str, runs: Sequence[Experiment], seed: int) ->
     """The better of the fits from starts about the nominal drive: one alone is caught at times."""
     setup = load_setup(f"{axis}-source")
     starts = [
-        drawn(nominal, setup, STARTS * seed + number, spread=SPREAD) for number in range(STARTS)
+        drawn_drive(nominal, setup, STARTS * seed + number, spread=SPREAD)
+        for number in range(STARTS)
     ]
     fits = [fit(start.parameters, runs, setup, search=Search(0)) for start in starts]
     return min(fits, key=lambda each: each.stages[-1].solution.cost).drive.parameters

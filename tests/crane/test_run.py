@@ -693,13 +693,13 @@ def refuse(message, error=InputError):
 
 MOVING = OperatorCommand.record(np.full((600, 3), [0.0, 0.5, 0.0]))
 REFUSED = [
-    ({"stick": slew(45.0, length=5.0)}, "slew .* 12.11 s, .* 5 s"),
-    ({"stick": slew(-45.0)}, "slew .* slew_deg = -45"),
+    ({"command": slew(45.0, length=5.0)}, "slew .* 12.11 s, .* 5 s"),
+    ({"command": slew(-45.0)}, "slew .* slew_deg = -45"),
     (
-        {"stick": MOVING, "actuation": "ideal"},
+        {"command": MOVING, "actuation": "ideal"},
         "Ideal drives .* stick .* row of zeros",
     ),
-    ({"stick": 3}, "stick .* 3, .* OperatorCommand"),
+    ({"command": 3}, "command .* 3, .* OperatorCommand"),
     ({"boom_deg": 85.0}, "boom of tg3637 .* 85 deg, .* 15 and 80"),
     ({"load": 36000.0}, "load .* 36000 kg, .* tg3637 .* 35000 kg"),
     ({"rope_m": 2.0}, "rope of tg3637 .* 2 m, .* 3 to 50 m"),

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from swashplate import Drive, export
 from swashplate.equations import Definition, Model, equation
-from swashplate.equations.code_generation import comment, comment_line, function
+from swashplate.equations.code_generation import c_comment, c_function, comment_line
 from swashplate.export.c_source import interface
 
 GCC = shutil.which("gcc")
@@ -51,8 +51,8 @@ def test_nothing_of_a_text_leaves_its_comment(standard: str, texts: list[str]) -
     lines, code = [], []
     for text in [*texts, *ATTACKS]:
         number = len(code)
-        lines += [*comment(text), f"int a{number}; /* {comment_line(text)} */"]
-        lines.append(function(text, f"int b{number}(void)", [f"return {number};"]))
+        lines += [*c_comment(text), f"int a{number}; /* {comment_line(text)} */"]
+        lines.append(c_function(text, f"int b{number}(void)", [f"return {number};"]))
         code.append(f"int a{number};int b{number}(void){{return {number};}}")
     seen = preprocessed("\n".join(lines), standard)
     assert "".join(seen.split()) == "".join("".join(code).split())

@@ -9,7 +9,13 @@ from scipy.signal import lfilter
 from tests.identification.given import bench_run, first_order, run_of, virtual
 
 from swashplate import Campaign, Drive, InputError, maneuvers, rig
-from swashplate.identification import assess_fit, ignored_windows, pooled, predict, with_speeds
+from swashplate.identification import (
+    assess_fit,
+    ignored_windows,
+    pooled_measures,
+    predict,
+    with_speeds,
+)
 from swashplate.identification.validation import compared, measures, residual_test
 
 MEASURED = np.array([0.0, 2.0, 4.0, 6.0])
@@ -155,8 +161,8 @@ def test_noise_of_a_position_is_no_error_of_the_speed_predicted(noise: float) ->
     run = run_of("a", time, {"position": noisy}, time=time)
     qualities = with_speeds([compared(run, "position", 0.99 * place)])
     error = 0.01 * np.pi / np.sqrt(2.0)
-    found = pooled(qualities, without_noise=True)["speed from position"]
-    shown = pooled(qualities)["speed from position"]
+    found = pooled_measures(qualities, without_noise=True)["speed from position"]
+    shown = pooled_measures(qualities)["speed from position"]
     # the noise's mean square over 8 s, 480 independent values, is known to within 6 %
     scatter = 2.0 * (0.06 * (shown.rmse**2 - error**2)) ** 0.5
     assert found.rmse == pytest.approx(error, rel=0.02, abs=scatter)

@@ -18,7 +18,7 @@ from swashplate.identification import (
     StageFit,
     Unknown,
     Unknowns,
-    drawn,
+    drawn_drive,
     fit,
     linearised_fit,
     load_setup,
@@ -55,7 +55,7 @@ def determined(stage: StageFit) -> list[str]:
 @pytest.mark.parametrize("axis", AXES)
 def test_the_truth_is_recovered(axis: str, seed: int, joint: bool, tmp_path: Path) -> None:
     setup = load_setup(axis)
-    truth = drawn(Drive.preset(axis).at_every_rate(), setup, seed)
+    truth = drawn_drive(Drive.preset(axis).at_every_rate(), setup, seed)
     campaign = measured(axis, truth, tmp_path)
     plan = setup.joint() if joint else setup
     # at 1e-14 the cost of slew, seed 4, 6e-15 already, creeps on along a stop that is not reached
@@ -81,7 +81,7 @@ def test_the_truth_is_recovered(axis: str, seed: int, joint: bool, tmp_path: Pat
 
 def test_counts_and_noise_leave_small_errors(tmp_path: Path) -> None:
     setup = load_setup("hoist")
-    truth = drawn(Drive.preset("hoist"), setup, seed=5)
+    truth = drawn_drive(Drive.preset("hoist"), setup, seed=5)
     campaign = virtual(tmp_path, "hoist", severity="realistic", truth=truth, seed=2)
     result = fit(campaign.drive("hoist").parameters, campaign.select(role="fit"), setup)
     fitted, true = Drive(result.parameters), truth
@@ -93,7 +93,7 @@ def test_counts_and_noise_leave_small_errors(tmp_path: Path) -> None:
 def test_a_stop_that_the_search_loses_is_found_again(seed: int, tmp_path: Path) -> None:
     """From the published values a descent leaves these machines' stop, and finds none back."""
     axis, setup = "slew", load_setup("slew")
-    truth = drawn(Drive.preset(axis), setup, seed)
+    truth = drawn_drive(Drive.preset(axis), setup, seed)
     campaign = virtual(tmp_path, axis, severity="realistic", truth=truth, seed=seed)
     values = fit(Drive.preset(axis), campaign, setup, threads=1).stages[-1].values
     for name in ("Z13_plus", "Z13_minus"):

@@ -1,8 +1,8 @@
 from .campaign import Campaign as Campaign
 from .campaign import json_schema as json_schema
-from .experiment import ASSUMED as ASSUMED
+from .experiment import ASSUMED_ACCURACY as ASSUMED_ACCURACY
+from .experiment import JUMP_TIME as JUMP_TIME
 from .experiment import LARGEST_CERTAIN_INTERVAL as LARGEST_CERTAIN_INTERVAL
-from .experiment import RISE as RISE
 from .experiment import Accuracy as Accuracy
 from .experiment import Channel as Channel
 from .experiment import CommandJump as CommandJump
@@ -14,7 +14,7 @@ from .experiment import resolution_of_inputs as resolution_of_inputs
 from .overview import BlockRanges as BlockRanges
 from .overview import LogWindow as LogWindow
 from .overview import Overview as Overview
-from .quality import ESTIMATED as ESTIMATED
+from .quality import ESTIMATED_START as ESTIMATED_START
 from .quality import Quality as Quality
 from .quality import beyond_the_card as beyond_the_card
 from .quality import campaign_findings as campaign_findings

@@ -39,7 +39,7 @@ LARGEST_NEIGHBOUR = 0.1
 """Largest change just before and just after a jump, as a part of the jump. [1]"""
 LARGEST_CERTAIN_INTERVAL = 0.003
 """Largest interval of stamps within which a jump is taken as it is logged. [s]"""
-RISE = 3.0 / 512.0
+JUMP_TIME = 3.0 / 512.0
 """Time that a jump takes in a simulation, three steps of the march. [s]"""
 ROUNDED = 1e-6
 """Share of the largest input below which two levels are one. [1]"""
@@ -81,7 +81,7 @@ class Accuracy(NamedTuple):
     """Whether the steps of its converter are a further error; not if a zero is stated."""
 
 
-ASSUMED: Mapping[str, Accuracy] = MappingProxyType(
+ASSUMED_ACCURACY: Mapping[str, Accuracy] = MappingProxyType(
     {
         "voltage": Accuracy(0.0005, 0.001, None),
         "current": Accuracy(0.005, 0.0005, None),
@@ -210,17 +210,17 @@ class InputSignal(Result):
     def with_edges(self, late: Mapping[int, float]) -> InputSignal:
         """The signal with some edges shifted: by their rows, how much later than their middle [s].
 
-        Each is rounded off over `RISE`, so that a simulation is a smooth function of the instant.
+        Each is rounded over `JUMP_TIME`, so that a simulation is a smooth function of the instant.
         """
         shifted = [(edge, edge.middle + late[edge.row]) for edge in self.edges if edge.row in late]
-        rise_instants = [instant + RISE * np.linspace(-0.5, 0.5, 9) for _, instant in shifted]
+        rise_instants = [instant + JUMP_TIME * np.linspace(-0.5, 0.5, 9) for _, instant in shifted]
         time = np.unique(np.concatenate([self.time, *rise_instants]))
         values = self.at(time)
         for edge, instant in shifted:
-            near = np.abs(time - edge.middle) <= 0.5 * edge.interval + RISE
+            near = np.abs(time - edge.middle) <= 0.5 * edge.interval + JUMP_TIME
             earlier, later = self.time[edge.row : edge.row + 2]
             start_level = self.at(np.minimum(time[near], earlier))
-            share = np.clip((time[near] - instant) / RISE + 0.5, 0.0, 1.0)
+            share = np.clip((time[near] - instant) / JUMP_TIME + 0.5, 0.0, 1.0)
             jump = self.at(np.maximum(time[near], later)) - start_level
             values[near] = start_level + jump * share**2 * (3.0 - 2.0 * share)
         return replace(self, time=time, values=values)
@@ -239,7 +239,7 @@ def _instrument(signal: InputSignal | Channel) -> Accuracy:
 
 def assumed_accuracy(kind: str, *, is_input: bool) -> Accuracy:
     """Assumed accuracy of an instrument whose accuracy is not stated."""
-    assumed = ASSUMED.get(kind, Accuracy())
+    assumed = ASSUMED_ACCURACY.get(kind, Accuracy())
     return assumed if is_input else assumed._replace(time=0.0)
 
 

@@ -125,7 +125,7 @@ def _quality(
     if moves:
         findings.append(
             "moves at the first sample, although the run is stated to begin at rest: write "
-            f"axes.{experiment.axis}.{ESTIMATED} in this run"
+            f"axes.{experiment.axis}.{ESTIMATED_START} in this run"
         )
     # the input's stamps are reported once, with the input
     if signal is drive or not np.array_equal(signal.time, drive.time):
@@ -222,7 +222,7 @@ def turned(driven: Array, motion: Array) -> bool:
     return float(driven @ motion) < -0.5 * size
 
 
-ESTIMATED = 'start = "estimated"'
+ESTIMATED_START = 'start = "estimated"'
 """Entry of a run that begins in motion."""
 
 

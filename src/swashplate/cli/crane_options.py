@@ -348,9 +348,9 @@ class Studied(Operated):
     @cached_property
     def waters(self) -> Seaway | None:
         """The seaway, in ss3 if only options of the ship are given; None if no option is."""
-        from swashplate.crane.studies import LENGTH, RUN_IN
+        from swashplate.crane.studies import EVALUATED_TIME, RUN_IN
 
-        evaluated = LENGTH if self.length is None else self.length
+        evaluated = EVALUATED_TIME if self.length is None else self.length
         run_in = RUN_IN if self.run_in is None else self.run_in
         is_stated = self._at_sea or self._lean or self.length or self.run_in
         return self.seaway(default="ss3" if is_stated else None, length=evaluated + run_in)

@@ -480,7 +480,7 @@ def demo(
     from swashplate.campaign import Campaign
     from swashplate.drive import Drive
     from swashplate.identification import (
-        drawn,
+        drawn_drive,
         estimates_table,
         identify,
         load_setup,
@@ -496,7 +496,7 @@ def demo(
     setup = load_setup("hoist")
     with long_work("", 5) as begin:
         begin("testing the virtual hoist")
-        truth = drawn(Drive.preset("hoist").at_every_rate(), setup, seed)
+        truth = drawn_drive(Drive.preset("hoist").at_every_rate(), setup, seed)
         path = rig.write(rig.run("hoist", truth=truth, seed=seed), out / "virtual", overwrite=True)
         begin("reading its logs")
         campaign = Campaign.from_toml(path)

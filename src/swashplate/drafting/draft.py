@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.campaign import (
-    ASSUMED,
-    ESTIMATED,
+    ASSUMED_ACCURACY,
+    ESTIMATED_START,
     KINDS,
     ROD,
     TURNS,
@@ -568,7 +568,7 @@ def _encoder_lines(counts_per_turn: float | None) -> list[str]:
 
 def _accuracy_lines(kind: str, unit: str | None) -> list[str]:
     """Assumed accuracy of an instrument, as a comment that is easily made an entry."""
-    assumed = ASSUMED.get(kind, Accuracy())
+    assumed = ASSUMED_ACCURACY.get(kind, Accuracy())
     limits = {"gain": assumed.gain, "zero": assumed.zero}
     if not any(limits.values()):
         return []
@@ -717,7 +717,7 @@ def _drafted_run(
         if experiment.input.kind == "voltage":
             comment += f", {experiment.maneuver}"
         if moves_at_first(experiment):
-            entry = f"axes.{toml_key(experiment.axis)}.{ESTIMATED}"
+            entry = f"axes.{toml_key(experiment.axis)}.{ESTIMATED_START}"
             entries.append(f"{entry}    # guessed: it begins in motion")
         deflection = _deflection(experiment)
         kind = experiment.recognised.kind if experiment.recognised else ""

@@ -15,11 +15,11 @@ from swashplate.equations import (
     Instance,
     Model,
     Replacement,
-    again,
     check_members,
     interpreted,
     plain,
-    uses,
+    replaced_once,
+    uses_equation,
 )
 from swashplate.equations.marching import PartNumbers
 from swashplate.errors import InputError
@@ -63,12 +63,13 @@ class Models(NamedTuple):
 def models_of(equations: tuple[Replacement, ...]) -> Models:
     """The drive's models with user-defined equations in them."""
     models = Models(drive, pump_drive, flowing_drive, flowing_pump_drive, settled_drive)
-    if any(uses(pump_drive, replacement.old) for replacement in equations):
+    if any(uses_equation(pump_drive, replacement.old) for replacement in equations):
         # where the spool closes is known in closed form of the package's equations alone
         equations = (*equations, Replacement(settled_pressure, searched_pressure))
     for replacement in equations:
         changed = [
-            again(model, replacement) if uses(model, replacement.old) else model for model in models
+            replaced_once(model, replacement) if uses_equation(model, replacement.old) else model
+            for model in models
         ]
         models = Models._make(changed)
     return models
@@ -80,13 +81,13 @@ def with_equation(parameters: ParameterSet, replacement: Replacement) -> Paramet
     check_members(members, {what: repr(member) for what, member in members.items()})
     equations = (*parameters.equations, replacement)
     models = models_of(parameters.equations)
-    if not uses(models.drive, replacement.old):
+    if not uses_equation(models.drive, replacement.old):
         raise InputError(
             f"{plain(replacement.old).__name__} is not an equation of the drive: those are in "
             "swashplate.models.amplifier, swashplate.models.displacement_control, "
             "swashplate.models.pump and swashplate.models.refinements."
         )
-    if replacement.parameters is not None and not uses(models.pump_drive, replacement.old):
+    if replacement.parameters is not None and not uses_equation(models.pump_drive, replacement.old):
         raise InputError(
             f"{plain(replacement.old).__name__} is an equation of the card: its replacement must "
             "take the same arguments; only replacements of the pump's equations can add "

@@ -63,8 +63,8 @@ from .model import join as join
 from .model import parameter_paths as parameter_paths
 from .model import state_paths as state_paths
 from .replacement import Replacement as Replacement
-from .replacement import again as again
 from .replacement import check_members as check_members
-from .replacement import found_at as found_at
 from .replacement import replaced as replaced
-from .replacement import uses as uses
+from .replacement import replaced_once as replaced_once
+from .replacement import replacement_at as replacement_at
+from .replacement import uses_equation as uses_equation

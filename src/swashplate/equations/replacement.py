@@ -54,14 +54,14 @@ class Replacement(NamedTuple):
 def _sent(places: Mapping[str, str]) -> Replacement:
     for place in places.values():
         import_module(place.partition(":")[0])
-    return found_at(places)
+    return replacement_at(places)
 
 
 PACKAGE_MODELS = "swashplate.models."
 """What the modules begin with that are imported to find an equation; all others must be already."""
 
 
-def found_at(places: Mapping[str, str]) -> Replacement:
+def replacement_at(places: Mapping[str, str]) -> Replacement:
     """A replacement by `Replacement.places`, each ``module:name``.
 
     No code runs: modules of the package's models apart, a module must be imported already.
@@ -107,7 +107,7 @@ def check_members(members: Mapping[str, Any], names: Mapping[str, str]) -> None:
         raise InputError(f"{names['parameters']} is not a class of named tuples.")
 
 
-def uses(model: Model, equation: Equation) -> bool:
+def uses_equation(model: Model, equation: Equation) -> bool:
     """Whether any of a model's equations is or calls this one."""
     parts = any(_calls(part.equations, part.replacements, equation) for part in model.parts)
     return parts or _calls(_link_equations(model).values(), model.replacements, equation)
@@ -151,7 +151,7 @@ def replaced(
         If the model does not use the equation, or the arguments do not fit.
     """
     replacement = Replacement(old, new, parameters)
-    if not uses(model, old):
+    if not uses_equation(model, old):
         raise InputError(f"Model {model.name} does not use {plain(old).__name__}.")
     parts = [_part(part, replacement) for part in model.parts]
     if model.parts == (model,):
@@ -173,12 +173,12 @@ def replaced(
         outputs=model.outputs,
         free_start=model.free_start,
         replacements=replacements,
-        recipe=(again, (model, replacement)),
+        recipe=(replaced_once, (model, replacement)),
     )
 
 
 @cache
-def again(model: Model, replacement: Replacement) -> Model:
+def replaced_once(model: Model, replacement: Replacement) -> Model:
     """What `replaced` gives, once in a process."""
     return replaced(
         model,
@@ -203,7 +203,7 @@ def _part(part: Model, replacement: Replacement) -> Model:
         if plain(getattr(part, field.name)) is plain(replacement.old)
     }
     changes["replacements"] = _with(part.replacements, replacement.old, new)
-    changes["recipe"] = again, (part, replacement)
+    changes["recipe"] = replaced_once, (part, replacement)
     return replace(part, parts=(), parameters=kind, **changes)
 
 

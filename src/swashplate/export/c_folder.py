@@ -23,7 +23,7 @@ from swashplate.drive import (
     models_of,
 )
 from swashplate.equations import Instance, Model, declared_by, instance_of
-from swashplate.equations.code_generation import c_name, comment_line, filled, literal
+from swashplate.equations.code_generation import c_literal, c_name, comment_line, filled
 from swashplate.equations.marching import SOURCE_RATE, check_rate
 from swashplate.errors import FileError, InputError, InputTypeError
 from swashplate.export.c_source import Exported, interface, numbers, writer_of
@@ -285,7 +285,7 @@ def c(
         "P": exported.prefix.upper(),
         "output": c_name(exported.names[-1 if not isinstance(what, Drive) else _SPEED]),
         "commands": "".join(", 9.0" if s == "voltage" else ", 1.0" for s in exported.signals),
-        "step": literal(step),
+        "step": c_literal(step),
     }
     title = what.parameters.title if isinstance(what, Drive) else ""
     texts[f"{name}_values.h"] = _initialiser(exported, values, name, title)
@@ -314,5 +314,5 @@ def _initialiser(exported: Exported, values: Array, name: str, title: str) -> st
              f"#ifndef {guard}", f"#define {guard}", "", "#include <math.h>", "",
              f"static const double {name}_values[{len(values)}] = {{"]  # fmt: skip
     for number, what in zip(values.tolist(), names, strict=True):
-        lines.append(f"    {literal(number)}, /* {comment_line(what)} */")
+        lines.append(f"    {c_literal(number)}, /* {comment_line(what)} */")
     return "\n".join([*lines, "};", "", "#endif", ""])

@@ -14,7 +14,7 @@ from typing import Any, Literal, NamedTuple
 
 from swashplate.drive import CHAIN, MEASURED, MOTOR
 from swashplate.equations import Definition, declared_by
-from swashplate.equations.code_generation import c_name, literal
+from swashplate.equations.code_generation import c_literal, c_name
 from swashplate.export.c_source import Exported
 
 Causality = Literal["input", "output", "parameter", "independent"]
@@ -244,9 +244,9 @@ def c_header(exported: Exported, layout: int, references: References) -> str:
     defaults = defaults_of(exported)
     defaulted = ", ".join(f"SWP_PARAMETER_{c_name(defaults[name])}" for name in exported.measured)
     names = ", ".join(f'"{name}"' for name in (*signals, *exported.measured))
-    bounds = ", ".join(literal(exported.bounds.get(name, 0.0)) for name in signals)
+    bounds = ", ".join(c_literal(exported.bounds.get(name, 0.0)) for name in signals)
     pairs = [exported.ranges.get(name, (-inf, inf)) for name in (*signals, *exported.measured)]
-    ranges = ", ".join(f"{{{literal(low)}, {literal(high)}}}" for low, high in pairs)
+    ranges = ", ".join(f"{{{c_literal(low)}, {c_literal(high)}}}" for low, high in pairs)
     free = f"swp_get_option(m, SWP_OPTION_{exported.free_step})" if exported.free_step else "1"
     return f"""\
 /* Made by swashplate: the model, value references and what goes with them. */

@@ -27,7 +27,7 @@ from .estimation.unknowns import Unknown as Unknown
 from .estimation.unknowns import Unknowns as Unknowns
 from .fitting import Fit as Fit
 from .fitting import Search as Search
-from .fitting import drawn as drawn
+from .fitting import drawn_drive as drawn_drive
 from .fitting import fit as fit
 from .identifying import identify as identify
 from .identifying import runs_to_fit as runs_to_fit
@@ -57,10 +57,10 @@ from .tables import start_words as start_words
 from .tables import truth_count as truth_count
 from .validation import RunQuality as RunQuality
 from .validation import at_instants as at_instants
-from .validation import following as following
 from .validation import ignored_windows as ignored_windows
+from .validation import input_correlations as input_correlations
 from .validation import percent as percent
-from .validation import pooled as pooled
+from .validation import pooled_measures as pooled_measures
 from .validation import predict as predict
 from .validation import range_of as range_of
 from .validation import with_speeds as with_speeds

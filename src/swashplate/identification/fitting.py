@@ -651,7 +651,7 @@ def fingerprint(experiment: Experiment) -> str:
     return digest.hexdigest()
 
 
-def drawn(nominal: Drive, setup: FitSetup, seed: int, *, spread: float = SPREAD) -> Drive:
+def drawn_drive(nominal: Drive, setup: FitSetup, seed: int, *, spread: float = SPREAD) -> Drive:
     """A drive that differs from a nominal one in what a fit setup frees, and in nothing else.
 
     Each free parameter is multiplied by a log-normal factor, each direction by another.

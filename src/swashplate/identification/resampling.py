@@ -22,7 +22,7 @@ from swashplate.identification.stage_fit import StageFit
 from swashplate.identification.validation import (
     Measures,
     measures,
-    pooled,
+    pooled_measures,
     predict,
     with_speeds,
 )
@@ -89,7 +89,9 @@ class CrossValidation(Result):
 def folds_tables(result: CrossValidation, stages: Sequence[StageFit] = ()) -> list[Table]:
     """Errors held out, next to those of the fit to all runs if its stages are given; the folds."""
     fitted_columns = "tpf" if stages else ""
-    of_all_runs = pooled(with_speeds(quality for stage in stages for quality in stage.runs))
+    of_all_runs = pooled_measures(
+        with_speeds(quality for stage in stages for quality in stage.runs)
+    )
     held_out = Table(
         "Cross-validation: each part predicted by a fit to the others",
         (

@@ -28,7 +28,7 @@ from swashplate.identification.validation import (
     Measures,
     RunQuality,
     ignored_windows,
-    pooled,
+    pooled_measures,
 )
 from swashplate.parameters import CATALOGUE, COLUMNS, ParameterSet
 from swashplate.tables import (
@@ -334,7 +334,7 @@ def runs_tables(qualities: Sequence[RunQuality]) -> list[Table]:
     All of its runs together are in the last row.
     """
     tables = []
-    for name, together in pooled(qualities).items():
+    for name, together in pooled_measures(qualities).items():
         of_channel = [quality for quality in qualities if quality.channel == name]
         table = Table(
             name,

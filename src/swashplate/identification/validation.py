@@ -370,7 +370,7 @@ def with_speeds(qualities: Iterable[RunQuality]) -> tuple[RunQuality, ...]:
         )
         pairs[-1] = quality, quality_of_speed
     speeds = [of_speed for _, of_speed in pairs if of_speed is not None]
-    clean, raw = pooled(speeds, without_noise=True), pooled(speeds)
+    clean, raw = pooled_measures(speeds, without_noise=True), pooled_measures(speeds)
     clear = {name for name in raw if clean[name].spread ** 2 >= 0.5 * raw[name].spread ** 2}
     return tuple(
         quality
@@ -414,7 +414,9 @@ def _white_noise(quality: RunQuality) -> float:
     return float(max(white, steps[steps > 0.0].min() / np.sqrt(12.0)))
 
 
-def pooled(qualities: Iterable[RunQuality], *, without_noise: bool = False) -> dict[str, Measures]:
+def pooled_measures(
+    qualities: Iterable[RunQuality], *, without_noise: bool = False
+) -> dict[str, Measures]:
     """Measures over all runs of each channel, by its name.
 
     Without noise, what a position's noise is in a speed made from it counts neither as error nor as
@@ -471,7 +473,7 @@ def percent(part: float) -> str:
     return f"{number:.0f} %" if number >= 9.95 else f"{number:.2g} %"
 
 
-def following(qualities: Sequence[RunQuality], name: str) -> tuple[int, list[float]]:
+def input_correlations(qualities: Sequence[RunQuality], name: str) -> tuple[int, list[float]]:
     """Runs of a channel that were tested, and correlations of those that follow the input."""
     tests = [
         quality.test

@@ -10,7 +10,7 @@ from pydantic import Field
 
 from swashplate.documents import parse_toml, read_text, validated
 from swashplate.entries import FileTable, Name, NotNegative, Number, Positive, Version
-from swashplate.equations import Replacement, again, found_at, uses
+from swashplate.equations import Replacement, replaced_once, replacement_at, uses_equation
 from swashplate.errors import InputError, MissingFileError, ParameterError, meant
 from swashplate.parameters.definitions import Block, Definition, definitions_of, options_of
 from swashplate.parameters.parameter_set import (
@@ -251,10 +251,10 @@ def _replacements(entries: Sequence[EquationPlaces], origin: str) -> tuple[Repla
     pump_model = pump_drive
     for entry in entries:
         try:
-            replacement = found_at(entry.model_dump(exclude_none=True))
-            model = again(model, replacement)
-            if uses(pump_model, replacement.old):
-                pump_model = again(pump_model, replacement)
+            replacement = replacement_at(entry.model_dump(exclude_none=True))
+            model = replaced_once(model, replacement)
+            if uses_equation(pump_model, replacement.old):
+                pump_model = replaced_once(pump_model, replacement)
             elif replacement.parameters is not None:
                 raise InputError(f"{entry.old} is an equation of the card and takes no parameters.")
         except (ImportError, InputError) as error:

@@ -93,7 +93,7 @@ def prepare(crane: Crane, command: OperatorCommand, options: RunOptions) -> Prep
         )
     if not isinstance(command, OperatorCommand):
         raise InputError(
-            f"The stick is {command!r}, but must be an OperatorCommand, as "
+            f"The command is {command!r}, but must be an OperatorCommand, as "
             "OperatorCommand.rest(60)."
         )
     commands, end = command.sample(crane, stepper.fixed.home, RATE)

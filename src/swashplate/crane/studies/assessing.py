@@ -29,7 +29,7 @@ from swashplate.crane.studies.crane_assessment import (
 from swashplate.crane.studies.following import follow
 from swashplate.crane.studies.run_outcome import RunOutcome
 from swashplate.crane.studies.spectral import linear_response
-from swashplate.crane.studies.study import NONE, Case, Controllers, Study
+from swashplate.crane.studies.study import NO_CONTROL, Case, Controllers, Study
 from swashplate.drive import Limit
 from swashplate.errors import InputError
 from swashplate.tables import count
@@ -86,7 +86,7 @@ def assess(
     _check_allowed(allowed_share_worse)
     checked_questions = _questions(crane, questions)
     variants = Study.of(crane, control, **{"seeds": range(SEAWAYS), **study})
-    none = variants.cases[NONE]
+    none = variants.cases[NO_CONTROL]
     damped = none.swing_damping > 0.0  # an undamped swing has no stationary answer
     outcomes = tuple(variants.outcomes(list(variants.cases.values())))
     linear = None
@@ -252,7 +252,7 @@ def _result(
 
     With `only_if_sufficient`, None also as soon as it certainly is not sufficient.
     """
-    uncontrolled = assessment.of(NONE)
+    uncontrolled = assessment.of(NO_CONTROL)
     seaways = len(assessment.study.seeds)
     is_sufficiency_question = "sufficiency" in assessment.questions
     limits = assessment.study.crane.limits_si if is_sufficiency_question else {}

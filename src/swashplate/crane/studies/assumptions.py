@@ -26,7 +26,7 @@ from swashplate.errors import SwashplateError
 
 SEAWAYS = 6
 """Number of seaways of the short runs."""
-LENGTH = 300.0
+SHORT_RUN_TIME = 300.0
 """Evaluated time of each short run: half an hour for all of them. [s]"""
 UNDECIDED_FROM = 0.9
 """Ratio to a limit, or to the swing without control, from which short runs do not decide; they
@@ -93,7 +93,7 @@ def tipping_points_of(
     case = study.cases[variant]
     if case.command.samples is not None or case.command.parts:
         return ()  # an operator's command cannot be shortened
-    case = case._replace(command=OperatorCommand.rest(study.run_in + LENGTH))
+    case = case._replace(command=OperatorCommand.rest(study.run_in + SHORT_RUN_TIME))
     short = replace(study, seeds=study.seeds[:SEAWAYS], progress=None)
     base = _passes(short, study.seaway, case, limits)
     tipping_points = []

@@ -31,7 +31,7 @@ from swashplate.crane.sea.transfer_functions import CRANE_SHIP, Hull
 from swashplate.crane.studies.assumptions import TippingPoint
 from swashplate.crane.studies.run_outcome import RunOutcome
 from swashplate.crane.studies.spectral import LinearResponse
-from swashplate.crane.studies.study import NONE, Study, assumed_sentences
+from swashplate.crane.studies.study import NO_CONTROL, Study, assumed_sentences
 from swashplate.drive import Limit
 from swashplate.results import Drawn, Tabular
 from swashplate.tables import Column, Table, count, listed
@@ -170,7 +170,7 @@ class Assessment(Tabular, Drawn):
         ]
         return {reason: reasons.count(reason) for reason in dict.fromkeys(reasons)}
 
-    def difference(self, name: str, other: str = NONE) -> ConfidenceInterval:
+    def difference(self, name: str, other: str = NO_CONTROL) -> ConfidenceInterval:
         """Mean paired difference of the root mean square swing to another variant. [rad]"""
         return mean_of(self.swing(name) - self.swing(other))
 
@@ -180,7 +180,7 @@ class Assessment(Tabular, Drawn):
         One that leaves the model, or is stopped, is worse than one that does not; if both do, that
         seaway is not decided.
         """
-        return share_worse_of(self.of(name), self.of(NONE))
+        return share_worse_of(self.of(name), self.of(NO_CONTROL))
 
     def limited(self, name: str) -> tuple[AssessedQuantity, ...]:
         """Quantities of a variant that have a limit."""
@@ -222,7 +222,7 @@ class Assessment(Tabular, Drawn):
     def idle(self) -> bool:
         """Whether the assessed variant swings as no control does, in every seaway."""
         controlled = self.swing(self.assessed_variant)
-        same = np.allclose(controlled, self.swing(NONE), rtol=IDLE, equal_nan=True)
+        same = np.allclose(controlled, self.swing(NO_CONTROL), rtol=IDLE, equal_nan=True)
         return bool(same and np.isfinite(controlled).any())
 
     @property
@@ -270,7 +270,7 @@ class Assessment(Tabular, Drawn):
         """Say whether the assessed variant harms, and by how much it changes the swing."""
         share = self.share_worse(self.assessed_variant)
         seaways = len(self.study.seeds)
-        without = np.degrees(rms_of(self.swing(NONE)).value)
+        without = np.degrees(rms_of(self.swing(NO_CONTROL)).value)
         controlled = np.degrees(rms_of(self.swing(self.assessed_variant)).value)
         drives = f"With the drives '{self.assessed_variant}' the controller"
         if self.idle:
@@ -284,7 +284,7 @@ class Assessment(Tabular, Drawn):
             return f"{drives} does no harm: it makes {worse}{rms}."
         if self.harmless == "no":
             return f"{drives} harms: it makes {worse}{rms}{self._cause()}."
-        pairs = zip(self.of(self.assessed_variant), self.of(NONE), strict=True)
+        pairs = zip(self.of(self.assessed_variant), self.of(NO_CONTROL), strict=True)
         undecided = sum(bool(run.departure_reason and none.departure_reason) for run, none in pairs)
         if undecided:
             return (
@@ -406,11 +406,11 @@ class Assessment(Tabular, Drawn):
                 rms.high,
                 largest_of(self.of(name), "swing").value,
                 sum(self.departures(name).values()),
-                look=name != NONE and self.share_worse(name).value > self.allowed_share_worse,
+                look=name != NO_CONTROL and self.share_worse(name).value > self.allowed_share_worse,
             )
-            if name == NONE and self.linear is not None:
+            if name == NO_CONTROL and self.linear is not None:
                 swing = self.linear.values["swing"]
-                table.add(f"{NONE}, by its spectrum", swing.rms, nan, nan, swing.largest, 0)
+                table.add(f"{NO_CONTROL}, by its spectrum", swing.rms, nan, nan, swing.largest, 0)
         return table
 
     def _worse_table(self) -> Table:
@@ -440,12 +440,14 @@ class Assessment(Tabular, Drawn):
             Column("from", ".3g", none="–"),
             Column("to", ".3g", none="–"),
             Column("within"),
-            Column(NONE, ".3g", none="–"),
+            Column(NO_CONTROL, ".3g", none="–"),
         )
         table = Table(
             f"Limits, '{self.assessed_variant}'", columns, "in 3 h: most probable largest value"
         )
-        uncontrolled = {quantity.name: quantity.largest.value for quantity in self.limited(NONE)}
+        uncontrolled = {
+            quantity.name: quantity.largest.value for quantity in self.limited(NO_CONTROL)
+        }
         for quantity in self.limited(self.assessed_variant):
             unit, factor = quantity.shown_unit
             without_control = uncontrolled.get(quantity.name, nan)
@@ -528,7 +530,7 @@ class Assessment(Tabular, Drawn):
         """State the basis of the answers, in sentences."""
         study = self.study
         crane = study.crane
-        none = study.cases[NONE]
+        none = study.cases[NO_CONTROL]
         start = "a stationary swing" if none.swing_damping > 0.0 else "rest, as it is undamped"
         rule = (
             f"Each seaway is evaluated for {study.length:g} s after {study.run_in:g} s from "

@@ -29,7 +29,7 @@ from swashplate.crane.studies.spectral import DEMANDS, linear_response
 from swashplate.crane.studies.study import (
     BUILT,
     IDEAL,
-    NONE,
+    NO_CONTROL,
     Case,
     Drives,
     Study,
@@ -256,7 +256,7 @@ def operability(
         column = columns[position]
         for row, cell in column_cells.items():
             cells[column.variant][row, column.heading] = cell
-        if too_slow < hoist[0] and column.variant == NONE:
+        if too_slow < hoist[0] and column.variant == NO_CONTROL:
             hoist = (too_slow, column.period, column.heading)
     ordered = {name: dict(sorted(of_name.items())) for name, of_name in cells.items()}
     seaways = count(len(study.seeds), "seaway")

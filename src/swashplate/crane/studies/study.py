@@ -44,9 +44,9 @@ IDEAL, BUILT = "ideal", "identified"
 ACTUATED: Mapping[str, Actuation] = {IDEAL: "ideal", BUILT: "inverse", "volts": "volts"}
 """Drives that follow instantaneously; the crane's own after their inverse maps; the same, 10 V for
 full speed."""
-NONE = "no control"
+NO_CONTROL = "no control"
 """The crane as it is built, under the operator's command only."""
-LENGTH, RUN_IN = 600.0, 120.0
+EVALUATED_TIME, RUN_IN = 600.0, 120.0
 """Time for which a run counts, and that of its run-in: seven decay times of a swing that control
 damps by 10 %. [s]"""
 SHORTEST = 60.0
@@ -177,7 +177,7 @@ class Study(Result):
         sea: str | Spectrum | Seaway = "ss3",
         drives: Drives = (IDEAL, BUILT),
         command: OperatorCommand | None = None,
-        length: float = LENGTH,
+        length: float = EVALUATED_TIME,
         run_in: float = RUN_IN,
         executor: Executor | None = None,
         progress: Callable[[int, int], None] | None = None,
@@ -246,7 +246,7 @@ class Study(Result):
             )
         pose: Any = {"slew_deg": 90.0, "boom_deg": 45.0, "rope_m": 27.0, **options}
         none = Case((crane,), pose | {"control": None, "actuation": "inverse"}, command)
-        cases = {NONE: none}
+        cases = {NO_CONTROL: none}
         for controller, stages in controllers.items():
             for name, drives_of_set in sets.items():
                 case = _driven(none.changed(control=stages), name, drives_of_set)

@@ -14,7 +14,7 @@ from swashplate.crane.crane import Crane
 from swashplate.crane.sea.seaway import HIGHEST, Seaway
 from swashplate.crane.studies.changed_drives import with_design_change
 from swashplate.crane.studies.spectral import linear_response
-from swashplate.crane.studies.study import NONE, Case, Controllers, Study
+from swashplate.crane.studies.study import NO_CONTROL, Case, Controllers, Study
 from swashplate.errors import InputError
 from swashplate.results import Result, figures
 from swashplate.tables import Column, Table
@@ -92,7 +92,7 @@ class Sweep(Result):
         unit = SWEPT[self.over].unit.replace("deg", "rad")
         columns = [Column(self.over, ".0f" if unit == "rad" else ".2f", unit)]
         columns += [Column(name, ".2f", "rad", none="left the model") for name in self.names]
-        columns.append(Column(f"{NONE}, by its spectrum", ".2f", "rad", none="–"))
+        columns.append(Column(f"{NO_CONTROL}, by its spectrum", ".2f", "rad", none="–"))
         table = Table("Swing, RMS over seaways", columns)
         rows = zip(self.points.tolist(), self.rms().tolist(), self.spectrum.tolist(), strict=True)
         for point, row, spectrum in rows:
@@ -137,9 +137,9 @@ def sweep(
             + "."
         )
     swept_study = Study.of(crane, control, **{"seeds": SEEDS, **study})
-    none = swept_study.cases[NONE]
+    none = swept_study.cases[NO_CONTROL]
     variants = {
-        name: case for name, case in swept_study.cases.items() if name == NONE or case != none
+        name: case for name, case in swept_study.cases.items() if name == NO_CONTROL or case != none
     }
     values = np.empty((len(swept_study.seeds), grid.size, len(variants)))
     spectrum = np.full(grid.size, np.nan)

@@ -84,7 +84,7 @@ def c_name(name: str) -> str:
     return f"{plain_name}_" if plain_name in WORDS else plain_name
 
 
-def literal(value: float) -> str:
+def c_literal(value: float) -> str:
     """A number as C writes it."""
     if isinstance(value, bool):
         return "true" if value else "false"
@@ -138,7 +138,7 @@ def comment_line(text: str) -> str:
     return _OF_COMMENTS.sub(lambda pair: f"{pair[0]} ", line)
 
 
-def comment(text: str, pad: str = "", width: int = WIDTH) -> list[str]:
+def c_comment(text: str, pad: str = "", width: int = WIDTH) -> list[str]:
     """A text of one line as a comment of C, wrapped to a width."""
     line = f"{pad}/* {comment_line(text)} */"
     lines = list[str]()
@@ -160,9 +160,9 @@ def indented(lines: Iterable[str]) -> list[str]:
     return parts
 
 
-def function(description: str, head: str, body: Iterable[str]) -> str:
+def c_function(description: str, head: str, body: Iterable[str]) -> str:
     """Text of a function of C."""
-    heading = comment(description) if description else []
+    heading = c_comment(description) if description else []
     return "\n".join([*heading, *wrapped(head), "{", *indented(body), "}"])
 
 
@@ -199,7 +199,7 @@ class C(Language):
 
     def number(self, value: Any) -> Text:
         """A literal number."""
-        text = literal(value)
+        text = c_literal(value)
         return text, UNARY if text[0] == "-" else ATOM
 
     def operation(self, node: Node, operands: Sequence[Text], computed: int) -> Text:
@@ -349,7 +349,7 @@ class C(Language):
             if headed and not headed[-1].endswith("{") and headed[-1]:
                 headed.append("")
             text = f"{source.name}: {summary}" if new and summary else source.name
-            headed += [*comment(text, pad, WIDTH - 4), *run]
+            headed += [*c_comment(text, pad, WIDTH - 4), *run]
         return headed
 
     def _runs(
@@ -468,8 +468,8 @@ class Loops:
             "formals": "".join(f", {TYPES[kind]} {formal}" for kind, formal in others),
             "given": "".join(f", {formal}" for _, formal in others),
             "steps": STEPS,
-            "precision": literal(PRECISION),
-            "tiny": literal(TINY),
+            "precision": c_literal(PRECISION),
+            "tiny": c_literal(TINY),
         }
         lines = filled(ROOT, words).rstrip("\n").split("\n")
         return "\n".join(part for line in lines for part in wrapped(line))
@@ -492,7 +492,7 @@ class Loops:
             line = f"    {step}({', '.join([*arguments, *state_names])});"
         head = f"static void {name}({', '.join(formals)})"
         loop = f"for (long long {number} = 0; {number} < whole_number(count); {number}++) {{"
-        return function(f"{inner.source.name}, repeated.", head, [loop, line, "}"])
+        return c_function(f"{inner.source.name}, repeated.", head, [loop, line, "}"])
 
 
 def scalar_function(
@@ -529,7 +529,7 @@ def scalar_function(
         lines += [f"*{path} = {text};" for (path, _), text in zip(results, values, strict=True)]
     declared = [f"{TYPES[kind]} {names[formal]}" for formal, kind in formals.items()]
     head = f"static {result_type} {name}({', '.join([*declared, *pointers]) or 'void'})"
-    return function(first_line(source), head, [*unused, *lines])
+    return c_function(first_line(source), head, [*unused, *lines])
 
 
 def mentions(text: str, name: str) -> bool:

@@ -28,11 +28,11 @@ from swashplate.equations.code_generation import (
     CodeBlock,
     Function,
     Trace,
+    c_function,
+    c_literal,
     c_name,
     first_line,
-    function,
     function_source,
-    literal,
 )
 from swashplate.equations.graph import Node, names_in
 from swashplate.equations.marching import SampleCode, module, output_of
@@ -119,7 +119,7 @@ class Writer:
             lines = [*language.headed(block.lines), f"return {block.texts[0]};"]
             description = first_line(trace.callee(link.equation).source)
             head = f"static double {function_name}(const {self.exported.type} *m)"
-            self.links[name] = function(description, head, lines)
+            self.links[name] = c_function(description, head, lines)
             self._link_names[name] = function_name
         return f"{self._link_names[name]}(m)"
 
@@ -164,7 +164,7 @@ class Writer:
         body.append(f"return {' && '.join(tests)} ? {self.P}_OK : {self.P}_DOMAIN;")
         description = "One sample: everything at this instant, then all states to the next."
         head = f"static int one_sample({self.exported.type} *m)"
-        return function(description, head, body)
+        return c_function(description, head, body)
 
     def _starts(self, settled: bool) -> list[str]:
         """States at the first sample, at rest or settled: of each part, and of all."""
@@ -186,7 +186,7 @@ class Writer:
                 ]
         what = "settled under what it was given" if settled else "at rest"
         head = f"static void {'settled' if settled else 'rested'}_start({self.exported.type} *m)"
-        return [*texts, function(f"States before the first sample, {what}.", head, body)]
+        return [*texts, c_function(f"States before the first sample, {what}.", head, body)]
 
     def _updates(self) -> str:
         """What follows from parameters and step: options, constants, places of the taps."""
@@ -214,7 +214,7 @@ class Writer:
                 else "0.0"
             )
             misplaced.append(
-                f"!placed(m, {number}, {delay}, {literal(float(tap.ahead))}, {tap.samples})"
+                f"!placed(m, {number}, {delay}, {c_literal(float(tap.ahead))}, {tap.samples})"
             )
         if misplaced:
             test = f"if ({' || '.join(misplaced)}) {{"
@@ -222,12 +222,12 @@ class Writer:
         description = "Options, stability and delays of these parameters and this step."
         body = [*options, *checks]
         body = [*(body or ["(void)m;"]), f"return {self.P}_OK;"]
-        texts.append(function(description, f"static int checked({self.exported.type} *m)", body))
+        texts.append(c_function(description, f"static int checked({self.exported.type} *m)", body))
         parts_with_constants = [part for part in self.parts if part.constants]
         texts += [part.computed() for part in parts_with_constants]
         description, head = "Constants of these parameters and this step.", "static void computed"
         calls = [f"{part.names['constants']}(m);" for part in parts_with_constants] or ["(void)m;"]
-        texts.append(function(description, f"{head}({self.exported.type} *m)", calls))
+        texts.append(c_function(description, f"{head}({self.exported.type} *m)", calls))
         return "\n\n".join(texts)
 
     def _finite_states(self) -> str:
@@ -239,12 +239,12 @@ class Writer:
         ]
         description = "Whether all states are finite: what is not leaves no zero behind."
         head = f"static bool all_finite(const struct {self.exported.prefix}_memory *s)"
-        return function(description, head, _finite(states, "s"))
+        return c_function(description, head, _finite(states, "s"))
 
     def _finite_outputs(self) -> str:
         description = "Whether all outputs of the sample are finite."
         head = f"static bool finite_outputs(const {self.exported.type} *m)"
-        return function(description, head, _finite([*map(self.output, self.exported.names)], "m"))
+        return c_function(description, head, _finite([*map(self.output, self.exported.names)], "m"))
 
     # -- numbers -----------------------------------------------------------------------------------
 

@@ -8,13 +8,13 @@ from math import inf
 from swashplate.equations import Definition
 from swashplate.equations.code_generation import (
     HELPERS,
+    c_function,
+    c_literal,
     c_name,
     comment_line,
     filled,
-    function,
     helpers_in,
     indented,
-    literal,
     sections,
     wrapped,
 )
@@ -63,7 +63,7 @@ class _Interface:
             "zeros": ", 0.0" * len(self.arguments),
             "checked": len(self.numbers) + 1,
             "count": len(self.numbers) + len(self.writer.constant_names()) + 1,
-            "longest": literal(exported.longest),
+            "longest": c_literal(exported.longest),
         }
         return filled(text, {**placeholders, **further})
 
@@ -205,7 +205,7 @@ class _Interface:
             bound = self.exported.bounds.get(name)
             tests.append(
                 f"is_finite({argument})" if bound is None
-                else f"{argument} >= -{literal(bound)} && {argument} <= {literal(bound)}"
+                else f"{argument} >= -{c_literal(bound)} && {argument} <= {c_literal(bound)}"
             )  # fmt: skip
         return " && ".join(tests) or "true"
 
@@ -236,7 +236,7 @@ class _Interface:
             )
             closed = definition.can_be_off and definition.upper == inf
             limits = (definition.lower, definition.upper, above, closed, member in flags)
-            number = ranges.setdefault(", ".join(map(literal, limits)), len(ranges))
+            number = ranges.setdefault(", ".join(map(c_literal, limits)), len(ranges))
             rows.append(f"    {{offsetof({exported.type}, {member}), {number}}},")
         lines = [f"static const struct {exported.prefix}_range ranges[] = {{"]
         lines += [*(f"    {{{limits_of_range}}}," for limits_of_range in ranges), "};", ""]
@@ -256,7 +256,7 @@ class _Interface:
         pairs = [exported.ranges.get(name, (-inf, inf)) for name in exported.measured] or [
             (0.0, 0.0)
         ]
-        listed = ", ".join(f"{{{literal(low)}, {literal(high)}}}" for low, high in pairs)
+        listed = ", ".join(f"{{{c_literal(low)}, {c_literal(high)}}}" for low, high in pairs)
         lines += [*wrapped(f"static const double input_ranges[][2] = {{{listed}}};"), ""]
         lines.append("static const unsigned flag_places[] = {")
         lines += [
@@ -287,11 +287,11 @@ class _Interface:
         description = "Terms of the equations that are on where their parameters are not 0."
         head = f"static void switched({self.exported.type} *m, int parameter)"
         if not cases:
-            return function(description, head, ["(void)m;", "(void)parameter;"]) + "\n"
+            return c_function(description, head, ["(void)m;", "(void)parameter;"]) + "\n"
         lines = ["switch (parameter) {"]
         for line, numbers in cases.items():
             lines += [*(f"case {number}:" for number in numbers), f"    {line}", "    break;"]
-        return function(description, head, [*lines, "default:", "    break;", "}"]) + "\n"
+        return c_function(description, head, [*lines, "default:", "    break;", "}"]) + "\n"
 
     def places(self) -> str:
         """Whether taps and the newest sample lie within their lines."""

@@ -24,12 +24,12 @@ from swashplate.equations.code_generation import (
     Value,
     as_double,
     assigned,
+    c_function,
+    c_literal,
     c_name,
     fixed,
     fresh_name,
-    function,
     leaves,
-    literal,
     mentions,
     undecided,
     without_comments,
@@ -308,7 +308,7 @@ class PartInC:
         part = self.part_model.name
         description = f"A sample of the {part}: what is known at it, and the state at the next."
         lines = [*(f"(void){name};" for name in unused), *lines]
-        return function(description, head, lines if "m->" in text else ["(void)m;", *lines])
+        return c_function(description, head, lines if "m->" in text else ["(void)m;", *lines])
 
     def start(self, settled: bool) -> str:
         """The state at the first sample."""
@@ -331,9 +331,9 @@ class PartInC:
                 first = defaults.get(path.split(".")[0], 0.0)
                 for field in path.split(".")[1:]:
                     first = getattr(first, field, 0.0)
-                lines.append(f"next->{path_of(path)} = {literal(float(first))};")
+                lines.append(f"next->{path_of(path)} = {c_literal(float(first))};")
         how = "settled under its inputs" if settled else "at rest"
-        return function(
+        return c_function(
             f"The state of the {self.part_model.name} {how}.", head, lines or ["(void)m;"]
         )
 
@@ -350,7 +350,7 @@ class PartInC:
         lines = self.body(self.part.trace, {"k": results}, available, {}, pointers={"k": pointer})
         part = self.part_model.name
         description = f"What follows from the parameters of the {part}, its options and the step."
-        return function(description, head, lines)
+        return c_function(description, head, lines)
 
     def decided(self, name: str, equation: Equation) -> str:
         """A function that returns what an equation of parameters, options and step says."""
@@ -363,7 +363,7 @@ class PartInC:
         lines = self.body(trace, {}, available, {}, decision)
         result_type = "bool" if decision.kind == "bool" else "double"
         description = (equation.__doc__ or "").strip().partition("\n")[0]
-        return function(
+        return c_function(
             description, f"static {result_type} {name}(const {self.layout.exported.type} *m)", lines
         )
 

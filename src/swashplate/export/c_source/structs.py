@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from typing import Any, get_type_hints
 
 from swashplate.equations import definition_of, is_named_tuple
-from swashplate.equations.code_generation import c_name, comment, comment_line, fresh_name
+from swashplate.equations.code_generation import c_comment, c_name, comment_line, fresh_name
 
 
 class Structs:
@@ -52,7 +52,7 @@ class Structs:
 
 def struct(description: str, tag: str, fields: Iterable[str]) -> str:
     """Text of a struct; one without fields has a byte, as C99 wants it."""
-    head = comment(description) if description else []
+    head = c_comment(description) if description else []
     lines = [f"    {declaration}" for declaration in fields] or ["    char nothing;"]
     return "\n".join([*head, f"struct {tag} {{", *lines, "};"])
 

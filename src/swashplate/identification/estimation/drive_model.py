@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from swashplate.campaign import CURRENTS as CURRENTS
 from swashplate.campaign import (
+    JUMP_TIME,
     LARGEST_CERTAIN_INTERVAL,
-    RISE,
     SIGNALS,
     Channel,
     ChannelKind,
@@ -431,7 +431,7 @@ def unknown_instants(run: Experiment, earlier_instants: Instants) -> list[Unknow
     unknowns = list[Unknown]()
     edges = _instants_of(run.input) if run.input.kind == "voltage" else {}
     for name, edge in edges.items():
-        most = 0.5 * (edge.interval + RISE)
+        most = 0.5 * (edge.interval + JUMP_TIME)
         prior = earlier_instants.get((run.name, name), Prior(0.0, edge.interval / sqrt(12.0)))
         unknown = Unknown(
             name,

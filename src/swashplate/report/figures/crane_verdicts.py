@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from swashplate.crane import LIMITED, AssessedQuantity, Assessment, Hull, Operability
 from swashplate.crane.sea import rms_of
-from swashplate.crane.studies import NONE, WORKABLE, label_of
+from swashplate.crane.studies import NO_CONTROL, WORKABLE, label_of
 from swashplate.report import style
 from swashplate.report.figures.crane import assumed, remark, remarks, seaway_label
 from swashplate.results import GivenAxes
@@ -140,7 +140,7 @@ def _draw_swings(ax: Axes, result: Assessment) -> None:
     labels = []
     for row, (name, swing) in enumerate(swings.items()):
         rows = row + random.uniform(0.0, 0.34, swing.size)
-        colors = np.where(swing > swings[NONE], style.VERMILION, style.BLUE)
+        colors = np.where(swing > swings[NO_CONTROL], style.VERMILION, style.BLUE)
         ax.scatter(swing, rows, s=10.0, c=colors, alpha=0.55, linewidths=0.0, zorder=2.0)
         _diamond(ax, row - 0.16, swing)
         departures = sum(result.departures(name).values())
@@ -149,13 +149,13 @@ def _draw_swings(ax: Axes, result: Assessment) -> None:
             ax.plot(*point, "x", color=style.INK, ms=6.0)
             style.put_text(ax, f"{departures}", point, (7.0, -3.0), coords="data")
         label = style.in_lines(name, NAME)
-        if name != NONE:
+        if name != NO_CONTROL:
             worse = round(result.share_worse(name).value * swing.size)
             label += f"\nworse than none: {worse} of {swing.size}"
         labels.append(label)
     if result.linear is not None:
         by_spectrum = np.degrees(result.linear.values["swing"].rms)
-        row = names.index(NONE)
+        row = names.index(NO_CONTROL)
         ax.vlines(by_spectrum, row - 0.4, row + 0.4, color=style.INK, linewidth=1.0, zorder=4.0)
     with_departures = any(result.departures(name) for name in names)
     _swing_axis(ax, edge, with_departures=with_departures)
@@ -235,7 +235,7 @@ def _draw_limits(ax: Axes, result: Assessment, limited: Sequence[AssessedQuantit
     ax.axvspan(1.0, axis_end, color=style.VERMILION, alpha=0.07, linewidth=0.0, zorder=0.5)
     ax.axvline(1.0, color=style.VERMILION, linewidth=1.0, zorder=1.5)
     for variant, quantities in others.items():
-        marker = "s" if variant == NONE else "o"
+        marker = "s" if variant == NO_CONTROL else "o"
         for quantity in quantities:
             if quantity.name in names:
                 row = names.index(quantity.name) + 0.18

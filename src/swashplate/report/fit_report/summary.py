@@ -23,7 +23,14 @@ from swashplate.analysis import (
 from swashplate.campaign import Campaign
 from swashplate.drive import Drive
 from swashplate.errors import SwashplateError
-from swashplate.identification import StageFit, Verdict, following, percent, pooled, range_of
+from swashplate.identification import (
+    StageFit,
+    Verdict,
+    input_correlations,
+    percent,
+    pooled_measures,
+    range_of,
+)
 from swashplate.identification.statistics import unseen_limits, weak_unknowns
 from swashplate.parameters import FULL_VOLTAGE
 from swashplate.report.fit_report.html_page import PageBlock, Section, listed_block, text
@@ -329,7 +336,9 @@ def run_error(run: ShownRun, runs: Sequence[ShownRun]) -> float:
     )
     if not reach > 0.0:
         return np.inf
-    return pooled([judged_channel], without_noise=True)[judged_channel.channel].rmse / reach
+    return (
+        pooled_measures([judged_channel], without_noise=True)[judged_channel.channel].rmse / reach
+    )
 
 
 def run_lights(
@@ -346,7 +355,7 @@ def run_lights(
         look = [
             f"residuals of {channel.quality.channel} follow the input"
             for channel in run.channels
-            if following([channel.quality], channel.quality.channel)[1]
+            if input_correlations([channel.quality], channel.quality.channel)[1]
         ]
         if run_findings := findings.get(name, []):
             look.append(count(len(run_findings), "finding"))

@@ -11,7 +11,7 @@ import numpy as np
 from markupsafe import Markup
 
 from swashplate.crane import AXES, UNUSABLE, Assessment, Crane, Hull, Operability, Seaway, follow
-from swashplate.crane.studies import NONE, WORKABLE, Decision, label_of
+from swashplate.crane.studies import NO_CONTROL, WORKABLE, Decision, label_of
 from swashplate.errors import DomainError, InputError
 from swashplate.report.fit_report.html_page import (
     PageBlock,
@@ -168,7 +168,7 @@ def _drives_limits(assessment: Assessment, acting: Table) -> list[PageBlock]:
     if not acting.rows:
         return []
     study = assessment.study
-    pose = study.cases[NONE].pose
+    pose = study.cases[NO_CONTROL].pose
     seas = [study.seaway.sea]
     followable = follow(study.crane, PERIODS, seas=seas, seaway=study.seaway, **pose)
     return [text(ABOUT_LIMITS), _figure_block(followable.plot(), FOLLOWED), *titled(acting)]
@@ -181,7 +181,7 @@ def _example(assessment: Assessment) -> list[PageBlock]:
     seed = assessment.typical
     assessed = assessment.assessed_variant
     try:
-        runs = {name: assessment.run(name, seed) for name in (NONE, assessed)}
+        runs = {name: assessment.run(name, seed) for name in (NO_CONTROL, assessed)}
     except (DomainError, InputError):  # a run that was stopped has no signals
         return []
     caption = (
@@ -195,7 +195,7 @@ def _basis(assessment: Assessment) -> list[PageBlock]:
     """Pose, controllers, drives, ship, limits and geometry."""
     study = assessment.study
     crane = study.crane
-    pose = study.cases[NONE].pose
+    pose = study.cases[NO_CONTROL].pose
     basis = [
         f"Boom at {pose['slew_deg']:g}° from the bow to starboard and {pose['boom_deg']:g}° up, "
         f"rope {pose['rope_m']:g} m.",
@@ -203,7 +203,7 @@ def _basis(assessment: Assessment) -> list[PageBlock]:
     ]
     for name, case in study.cases.items():
         control = case.options["control"]
-        if name != NONE:
+        if name != NO_CONTROL:
             drives = count(len(case.cranes), "crane") if case.driven else "ideal drives"
             description = control.description() if control is not None else "no control"
             basis.append(f"{name}: {description}, {drives}.")
@@ -277,7 +277,7 @@ def _summary_sentence(operability: Operability) -> str:
     """
     name = operability.names[-1]
     with_control = 100.0 * operability.workable(name)
-    without = 100.0 * operability.workable(NONE)
+    without = 100.0 * operability.workable(NO_CONTROL)
     sentence = (
         f"'{name}' can work {with_control:.0f} % of the year, the crane without control "
         f"{without:.0f} %."
