@@ -131,7 +131,8 @@ def test_assess_ends_with_the_verdict_as_its_exit_code(tmp_path):
     page, table = tmp_path / "assessment.html", tmp_path / "assessment.csv"
     fails = said(*ASSESS, "--out", str(table), "--plot", str(tmp_path / "assessment.png"))
     assert fails.exit_code == 1, fails.output
-    assert "3 seaways cannot show that control does no harm: 72 are needed" in fails.stderr
+    assert "3 seaways" in fails.stderr
+    assert "72 or more are needed" in fails.stderr
     assert "Fails: With the drives 'identified' the controller harms:" in fails.stderr
     assert "It does not suffice: in 3 h" in " ".join(fails.stderr.split())
     assert "Numbers of every seaway, in SI:" in fails.stdout
