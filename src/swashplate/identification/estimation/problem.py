@@ -63,7 +63,8 @@ class Evaluation(NamedTuple):
     """(m, K)"""
 
 
-class _MarchedRun(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class _MarchedRun(Result):
     """An experiment as the march of a model of equations sees it."""
 
     observed: ObservedRecord
