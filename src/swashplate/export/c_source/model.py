@@ -308,7 +308,7 @@ class Writer:
 
 @lru_cache(maxsize=16)
 def writer_of(exported: Exported) -> Writer:
-    """Writer of a model's C, kept for the last models: sources, numbers and names all ask for it."""
+    """Writer of a model's C, kept for the last models: text, numbers and names all ask for it."""
     with GENERATING:
         return Writer(exported)
 
