@@ -54,6 +54,12 @@ def read_run(
         The run, for sentences about the campaign file.
     name : str
         Name of the run.
+    run : RunEntry
+        What the file says of it.
+    axes : Axes
+        All axes of the campaign, by name.
+    log : Log
+        The run's log, as it was opened.
 
     Returns
     -------

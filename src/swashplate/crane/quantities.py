@@ -96,6 +96,8 @@ def user_quantity(name: str, value: Any) -> CraneQuantity:
 
     Parameters
     ----------
+    name : str
+        Of the quantity, a key of `GEOMETRY`.
     value : float or sequence of float
         As many as `GEOMETRY` has of this name.
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
+from typing import NamedTuple
 
 from swashplate.drive.instance import (
     PRESSURE_PATH,
@@ -35,10 +36,20 @@ def requested_columns(definitions: Definitions, names: tuple[str, ...]) -> tuple
     return tuple(columns)
 
 
+class _ModelPaths(NamedTuple):
+    """Where columns lie in the model."""
+
+    paths: list[str]
+    """Of each column; a state at the start is its own path."""
+    parts: list[str]
+    """The part that each path leads to, ``card.plus`` for example."""
+
+
 @lru_cache(maxsize=256)
-def _paths(definitions: Definitions, columns: tuple[str, ...]) -> list[str]:
-    """Path in the model of each column; a state at the start is its own."""
-    return [name if name.startswith(START) else definitions.path_of(name) for name in columns]
+def _model_paths(definitions: Definitions, columns: tuple[str, ...]) -> _ModelPaths:
+    """Where columns lie in the model."""
+    paths = [name if name.startswith(START) else definitions.path_of(name) for name in columns]
+    return _ModelPaths(paths, [path.rpartition(".")[0] for path in paths])
 
 
 def bound_drive(
@@ -99,13 +110,12 @@ def _bound(
         "start.pump": pump_is_observed,
     }
     can_move["card"] = can_move["card.plus"] or can_move["card.minus"]
-    paths = _paths(parameters.definitions, names)
-    prefixes = [path.rpartition(".")[0] for path in paths]
+    paths, parts = _model_paths(parameters.definitions, names)
     return BoundModel(
         instance,
         run_values._replace(start=start),
         paths,
-        [can_move[prefix] for prefix in prefixes],
+        [can_move[part] for part in parts],
     )
 
 

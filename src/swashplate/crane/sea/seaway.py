@@ -428,6 +428,8 @@ def ship_motion(
     columns : mapping of str to str, optional
         Column of each motion, surge, sway, heave, roll, pitch, yaw; those that are left out are
         zero. By default all six by these names.
+    time_column : str
+        Column of the time stamps. [s], if its header gives no unit
     rate : float
         Of the motion returned, 10 Hz to 100 kHz; a crane takes 512 Hz.
     options : TextOptions, optional

@@ -187,6 +187,8 @@ class Study(Result):
 
         Parameters
         ----------
+        crane : Crane
+            With the drives as identified.
         control : Control or mapping of str to Control or None
             One controller, or several by name.
         seeds : sequence of int

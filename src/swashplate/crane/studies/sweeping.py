@@ -117,6 +117,8 @@ def sweep(
         Bearing of the boom from the bow to starboard [deg]; significant height of the waves [m], of
         whose sea period and peak factor count; factor on the luff drive's in-line orifice under
         control.
+    points : array_like, optional
+        Values of the quantity, in its unit; by default bearings every 15 deg, 7 heights, 8 factors.
     control, **study
         Controllers, seaways, drives, where each run begins: see `Study.of`.
 

@@ -198,7 +198,7 @@ class CodeBlock:
         What is wanted.
     labels : mapping of Node to str
         What equations call a value.
-    taken : set of str
+    used_names : set of str
         Names that stand for something else; those of the block are added.
     available : mapping of Node to str, optional
         Values that are there already, with their names.

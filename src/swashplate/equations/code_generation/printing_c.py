@@ -183,7 +183,7 @@ class C(Language):
         Where functions go that the lines call.
     origins : mapping of Node to Parsed
         The equation that a value comes from: comments say where one begins.
-    taken : set of str
+    used_names : set of str
         Names of the block that is printed.
     """
 
@@ -410,7 +410,7 @@ class Loops:
     ----------
     texts : list of str
         The functions, each after those that it calls.
-    taken : set of str
+    used_names : set of str
         Names of functions, and others that they may not have.
     """
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.equations.code_generation.functions import generating
-from swashplate.equations.marching.kernels import Struct, addresses, pointers
+from swashplate.equations.marching.kernels import Struct, pointers
 from swashplate.equations.marching.layout import JacobianLayout, layout_of, started_by
 from swashplate.equations.marching.observation import ObservedRecord, RunValues
 from swashplate.equations.marching.rows import (
@@ -288,10 +288,9 @@ def _march(
         worst_margin,
         room.fields.block,
     )
-    kernels = addresses(structure.facts.kernels, layout.kernels)
     structs = march_struct(program, plan, sink, room)
     march = compiled_march()
-    march(kernels, pointers(arrays), values[0].size, h, structs.address)
+    march(layout.kernels, pointers(arrays), values[0].size, h, structs.address)
     layout.give_back(room)
     check_domain(instance, states, float(worst_margin[0]), observed.driven_by)
 

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections import deque
 from contextlib import suppress
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.equations.code_generation.functions import generating
 from swashplate.equations.fields import floats_of
-from swashplate.equations.marching.kernels import Struct
+from swashplate.equations.marching.kernels import Struct, addresses
 from swashplate.equations.marching.part_code import SignalId, taps_of
 from swashplate.equations.marching.rows import (
     CALL,
@@ -46,8 +48,6 @@ class JacobianLayout:
     ----------
     program : Program
         What is done in every block.
-    kernels : set of int
-        Numbers of the kernels that it calls.
     factors : list of (int, Moved)
         Terms with a factor that is known only with the parameters, and which factor that is.
     tangents : int
@@ -106,10 +106,16 @@ class JacobianLayout:
             value=np.array([row for row, _ in observations], dtype=np.int64),
             integral_count=sum(what == INTEGRATE for what, *_ in todo),
         )
-        self.kernels = {kernel for what, kernel, *_ in todo if what in (CALL, RECUR)}
+        self._called = {kernel for what, kernel, *_ in todo if what in (CALL, RECUR)}
+        """Numbers of the kernels that the program calls."""
         self.factors = [
             (index, term.factor) for index, term in enumerate(terms) if term.factor is not None
         ]
+
+    @cached_property
+    def kernels(self) -> Any:
+        """What `rows.march_observed` is given of the kernels, which are compiled for that."""
+        return addresses(self.structure.facts.kernels, self._called)
 
     def take_room(self) -> Struct[Room]:
         """Memory for a march, of an earlier one if it can be: new memory takes longer to get."""

@@ -73,7 +73,7 @@ class PartCode:
     """One sample of a part, as nodes of numbers that have names.
 
     `signals` are the external ones that are given as records; for the others the default parameter
-    counts. `taken` are names that are in use already.
+    counts. `used_names` are names that are in use already.
     """
 
     def __init__(
@@ -216,7 +216,8 @@ class PartCode:
     def ahead(self, ends: Iterable[Node], further_constants: Collection[str] = ()) -> list[Node]:
         """What some ends need that follows from parameters, givens and the step alone.
 
-        The last nodes on the way that do; `still` are further names that do not change.
+        The last nodes on the way that do; `further_constants` are more names that do not
+        change.
         """
         numbers = {node.value for _, node in (*leaves(self.p), *leaves(self.given))}
         constant_names = {"h", *numbers, *further_constants}
