@@ -103,8 +103,9 @@ static double root_of_pressure_gain(double low, double high, double force, doubl
 static double limited_current(double target, double previous, double steady, double p_lim1,
     double p_lim2, double p_I_t1, double p_I_t2, double p_a, double h, bool split)
 {
+    const bool rising = target >= previous;
     double chosen;
-    if (target >= previous) {
+    if (rising) {
         if (target <= p_I_t1) {
             chosen = target;
         } else {
@@ -113,24 +114,29 @@ static double limited_current(double target, double previous, double steady, dou
                 ? lesser_of(greater_of(previous, p_I_t1) + product, target)
                 : lesser_of(p_I_t1 + product * (target - p_I_t1) / (target - previous), target);
         }
-    } else if (previous > p_I_t2) {
-        const double fallen = greater_of(greater_of(previous - p_lim2 * h, 0.0), target);
-        if (!split || fallen >= p_I_t2) {
-            chosen = fallen;
-        } else {
-            const double decay = exp(-p_a * h);
-            const double left = p_I_t2 * (decay + (previous - p_I_t2) / (previous - fallen)
-                * (1.0 - decay));
-            chosen = steady == 0.0 ? left : greater_of(left, target);
-        }
     } else {
-        const double decay_2 = exp(-p_a * h);
-        const double value = previous * decay_2;
+        const bool above_I_t2 = previous > p_I_t2;
+        if (above_I_t2) {
+            const double fallen = greater_of(greater_of(previous - p_lim2 * h, 0.0), target);
+            if (!split || fallen >= p_I_t2) {
+                chosen = fallen;
+            } else {
+                const double decay = exp(-p_a * h);
+                const double left = p_I_t2 * (decay
+                    + (previous - p_I_t2) / (previous - fallen) * (1.0 - decay));
+                chosen = steady == 0.0 ? left : greater_of(left, target);
+            }
+        } else {
+            const double decay_2 = exp(-p_a * h);
+            const double value = previous * decay_2;
 
-        /* faded: A value, or zero where it has faded below 1e-30; the derivatives take no
-         * notice. */
-        const double faded = fabs(value) < 1e-30 ? 0.0 : value;
-        chosen = steady == 0.0 ? faded : greater_of(faded, target); /* limited_current */
+            /* faded: A value, or zero if its size is below 1e-30, so that no subnormal number
+             * slows a march. */
+            const double faded = fabs(value) < 1e-30 ? 0.0 : value;
+
+            /* limited_current */
+            chosen = steady == 0.0 ? faded : greater_of(faded, target);
+        }
     }
     return chosen;
 }

@@ -20,7 +20,10 @@ def interpolated(newer: float, older: float, fraction: float) -> float:
 
 @equation
 def faded(value: float) -> float:
-    """A value, or zero where it has faded below 1e-30; the derivatives take no notice."""
+    """A value, or zero if its size is below 1e-30, so that no subnormal number slows a march.
+
+    Its derivative is 1 throughout.
+    """
     return 0.0 if abs(value) < FADED else value
 
 

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from swashplate.__about__ import __version__
 from swashplate.drive import (
     INPUT_RANGES,
     Drive,
@@ -23,7 +24,13 @@ from swashplate.drive import (
     models_of,
 )
 from swashplate.equations import Instance, Model, declared_by, instance_of
-from swashplate.equations.code_generation import c_literal, c_name, comment_line, filled
+from swashplate.equations.code_generation import (
+    c_comment,
+    c_literal,
+    c_name,
+    comment_line,
+    filled,
+)
 from swashplate.equations.marching import SOURCE_RATE, check_rate
 from swashplate.errors import FileError, InputError, InputTypeError
 from swashplate.export.c_source import Exported, interface, numbers, writer_of
@@ -70,6 +77,7 @@ def _exported(equations: tuple[Any, ...]) -> Exported:
         outputs=(*Sample._fields[1:], "motor_torque", "motor_pressure_drop"),
         bounds={"voltage": FULL_VOLTAGE},
         ranges=INPUT_RANGES,
+        notes={"voltage": "joystick voltage, positive towards positive speed [V]"},
         stable={0: stable_step},
         follows={(1, "steep"): steep_stops},
         internal=frozenset({"own"}),
@@ -286,6 +294,7 @@ def c(
         "output": c_name(exported.names[-1 if not isinstance(what, Drive) else _SPEED]),
         "commands": "".join(", 9.0" if s == "voltage" else ", 1.0" for s in exported.signals),
         "step": c_literal(step),
+        "version": __version__,
     }
     title = what.parameters.title if isinstance(what, Drive) else ""
     texts[f"{name}_values.h"] = _initialiser(exported, values, name, title)
@@ -307,12 +316,30 @@ _SPEED = Sample._fields[1:].index("shaft_speed")
 def _initialiser(exported: Exported, values: Array, name: str, title: str) -> str:
     """Values as an array of C, each with its name."""
     writer = writer_of(exported)
-    names = ["step [s]", *(written for written, _ in writer.values()), *writer.constant_names()]
+    units = {name: definition.unit for name, _, definition in writer.ranges()}
+    names = ["step [s]"]
+    for value_name, _ in writer.values():
+        unit = units.get(value_name)
+        names.append(f"{value_name} [{unit}]" if unit else value_name)
+    texts = [
+        f"    {c_literal(number)}, /* {comment_line(what)} */"
+        for number, what in zip(values.tolist(), [*names, *writer.constant_names()], strict=True)
+    ]
+    if len(texts) > len(names):
+        follows = (
+            "    /* The rest follows from those above: do not edit these numbers, call set. */"
+        )
+        texts.insert(len(names), follows)
     guard = f"{name.upper()}_VALUES_H"
-    head = f"Values of {name} for {exported.prefix}_init, as swashplate computed them."
-    lines = [f"/* {comment_line(f'{head} {title}'.strip())} */",
-             f"#ifndef {guard}", f"#define {guard}", "", "#include <math.h>", "",
-             f"static const double {name}_values[{len(values)}] = {{"]  # fmt: skip
-    for number, what in zip(values.tolist(), names, strict=True):
-        lines.append(f"    {c_literal(number)}, /* {comment_line(what)} */")
+    head = f"Values of {name} for {exported.prefix}_init, computed by swashplate {__version__}."
+    lines = [
+        *c_comment(f"{head} {title}." if title else head),
+        f"#ifndef {guard}",
+        f"#define {guard}",
+        "",
+        "#include <math.h>",
+        "",
+        f"static const double {name}_values[{len(values)}] = {{",
+        *texts,
+    ]
     return "\n".join([*lines, "};", "", "#endif", ""])

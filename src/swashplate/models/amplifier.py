@@ -130,14 +130,14 @@ class CardSignals(NamedTuple):
     """What is known of the card at a sample."""
 
     current: float  # Signed, that of the positive channel less that of the negative one. [A]
-    current_positive: float
-    current_negative: float  # I of each channel, never negative. [A]
-    steady_positive: float
-    steady_negative: float  # I_ss of each channel. [A]
-    filtered_positive: float
-    filtered_negative: float  # I* of each channel. [A]
-    rate_positive: float
-    rate_negative: float  # Rate of I* of each channel. [A/s]
+    current_positive: float  # I of the positive channel, never negative. [A]
+    current_negative: float  # I of the negative channel, never negative. [A]
+    steady_positive: float  # I_ss of the positive channel. [A]
+    steady_negative: float  # I_ss of the negative channel. [A]
+    filtered_positive: float  # I* of the positive channel. [A]
+    filtered_negative: float  # I* of the negative channel. [A]
+    rate_positive: float  # Rate of I* of the positive channel. [A/s]
+    rate_negative: float  # Rate of I* of the negative channel. [A/s]
 
 
 class Currents(NamedTuple):
@@ -373,14 +373,14 @@ def exact_filter(
     swings = h * odd  # I* one step after 1 A/s, without I_ss. [s]
     pull = p.omega * p.omega * swings  # Rate one step after I_ss came up to 1 A, at rest. [1/s]
     slows = even - p.zeta * w * odd  # Rate one step after 1 A/s, without I_ss. [1]
-    # I* at the end of a step in which I_ss rose from 0 to 1 A [1], and its rate there [1/s]
-    ramp = 1.0 - 2.0 * p.zeta / w * gone - odd
-    ramp_rate = gone / h
+    ramp = 1.0 - 2.0 * p.zeta / w * gone - odd  # I* after I_ss rose from 0 to 1 A in a step. [1]
+    ramp_rate = gone / h  # Rate of I* after that step. [1/s]
 
     off = s.now - begins
     rise = ends - begins
     rate = slows * s.before - pull * off + ramp_rate * rise
-    left = soft_threshold(rate, p.C * swings)
+    width = p.C * swings  # Rate that the Coulomb term can take in a step. [A/s]
+    left = soft_threshold(rate, width)
     filtered = begins + stays * off + swings * s.before + ramp * rise
     lost = gone / pull  # I* lost for each rate that the Coulomb term takes. [s]
     return faded(filtered - lost * (rate - left)), faded(left)
@@ -401,15 +401,17 @@ def limited_current(
     with it where the output passes I_t1 or I_t2: then it follows both thresholds, and anything
     before them, without flat stretches or jumps.
     """
-    decay = exp(-p.a * h)
-    if target >= previous:
+    decay = exp(-p.a * h)  # What the final decay leaves of the current after a step. [1]
+    rising = target >= previous
+    above_I_t2 = previous > p.I_t2
+    if rising:
         if target <= p.I_t1:
             return target
         if split is None or previous >= p.I_t1:
             return min(max(previous, p.I_t1) + p.lim1 * h, target)
         # the way to I_t1 counts as straight, what is left of the step is lim1's
         return min(p.I_t1 + p.lim1 * h * (target - p.I_t1) / (target - previous), target)
-    if previous > p.I_t2:
+    if above_I_t2:
         fallen = max(previous - p.lim2 * h, 0.0, target)
         if split is None or fallen >= p.I_t2:
             return fallen

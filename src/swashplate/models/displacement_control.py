@@ -195,8 +195,8 @@ PUBLISHED_FORMS = frozenset({"symmetric", "leaky", "loaded", "steep"})
 class PressureLimits(NamedTuple):
     """Pressures at which the stroking pressure is limited. [Pa]"""
 
-    lower_stop: float
-    upper_stop: float  # At which the swash plate reaches its stops.
+    lower_stop: float  # At which the swash plate reaches its lower stop.
+    upper_stop: float  # At which the swash plate reaches its upper stop.
     lower: float
     upper: float  # The same within ±Z15: the pressure never leaves them.
 
@@ -312,8 +312,8 @@ def pressure_limits(p: Pump) -> PressureLimits:
 
     The stops are (∓tan Z13 + Z2)/Z1. δP never leaves the other two, so nothing winds up at a stop.
     """
-    lower_stop = (p.Z2 - tan(p.Z13_minus)) / p.Z1
-    upper_stop = (p.Z2 + tan(p.Z13_plus)) / p.Z1
+    lower_stop = (p.Z2 - tan(p.Z13_minus)) / p.Z1  # δP at which the plate meets its stop. [Pa]
+    upper_stop = (p.Z2 + tan(p.Z13_plus)) / p.Z1  # δP at which the plate meets its stop. [Pa]
     return PressureLimits(lower_stop, upper_stop, max(-p.Z15, lower_stop), min(p.Z15, upper_stop))
 
 
@@ -448,7 +448,8 @@ def leaky_step(pressure: float, opening: float, p: Stroking, h: float, symmetric
 def plate_motion(pressure: float, p: Pump) -> float:
     """Z6 while the swash plate can move, 0 while it rests on a stop."""
     limits = pressure_limits(p)
-    return 0.0 if pressure >= limits.upper_stop or pressure <= limits.lower_stop else p.Z6
+    on_stop = pressure >= limits.upper_stop or pressure <= limits.lower_stop
+    return 0.0 if on_stop else p.Z6
 
 
 @equation

@@ -50,7 +50,7 @@ from swashplate.models.refinements import (
 
 
 class PumpInputs(NamedTuple):
-    """What drives the pump at a sample; where nothing was measured, the parameter's value."""
+    """What drives the pump at a sample; the parameter's value if nothing was measured."""
 
     current: float  # Signed, that of the positive channel less that of the negative one. [A]
     pump_speed: float  # Speed of the prime mover, relative to that of Z10. [1]
@@ -59,7 +59,11 @@ class PumpInputs(NamedTuple):
 
 
 class PumpState(NamedTuple):
-    """What the pump remembers from sample to sample; what belongs to an option is 0 without it."""
+    """What the pump remembers from sample to sample.
+
+    What belongs to an option is kept without it, too, so that the option can be switched on in a
+    running drive; only the shaft's angle is 0 without ripple.
+    """
 
     pressure: float  # δP at this sample. [Pa]
     plate_pressure: float = 0.0  # At which the plate would stand still now (damping). [Pa]
@@ -89,8 +93,8 @@ class PumpSignals(NamedTuple):
     flow_speed: float  # Speed that the pump's flow would give a stiff line. [rad/s]
     shaft_speed: float  # Speed of the shaft, of the turret for slew. [rad/s]
     shaft_angle: float  # Since the start, as the ripple needs it; 0 without. [rad]
-    motor_torque: float  # Positive where the motor drives towards positive speed. [N m]
-    motor_pressure_drop: float  # P_hi - P_lo, 0 where the motor's constant is not known. [Pa]
+    motor_torque: float  # Positive if the motor drives towards positive speed. [N m]
+    motor_pressure_drop: float  # P_hi - P_lo, 0 if the motor's constant is not known. [Pa]
 
 
 class PumpLimits(NamedTuple):
@@ -129,18 +133,22 @@ def flow_speed(
     A prime mover at another speed pumps in proportion: Z10 and Z12 hold its flow. The rate of its
     speed is taken as small.
     """
-    Z11 = p.Z11
+    flow_gain = p.Z10 * inputs.pump_speed
+    lost_to_load = p.Z11
     lost = 0.0
     if options.leakage is not None and options.line is None:
         # a load that hangs on the hoist slows hoisting and speeds lowering up (eq. 6.70)
-        Z11 = p.Z11 + p.motor_leakage * inputs.load_torque
-        Z12 = p.Z12 + p.motor_leakage * p.load_inertia * p.Z10
-        lost = load_leakage(tangent, rate, Z12 * inputs.pump_speed)
+        lost_to_load = p.Z11 + p.motor_leakage * inputs.load_torque
+        # Speed lost for an acceleration of the plate, Z12 and that of the motor's leakage. [1]
+        inertial_leakage = p.Z12 + p.motor_leakage * p.load_inertia * p.Z10
+        leakage_now = inertial_leakage * inputs.pump_speed
+        lost = load_leakage(tangent, rate, leakage_now)
     elif options.loaded is not None:
-        lost = load_leakage(tangent, rate, p.Z12 * inputs.pump_speed)
+        leakage_now = p.Z12 * inputs.pump_speed
+        lost = load_leakage(tangent, rate, leakage_now)
     else:
         lost = unloaded_leakage(tangent, rate * inputs.pump_speed, p.Z12)
-    return shaft_speed(angle, lost, p.Z10 * inputs.pump_speed, Z11)
+    return shaft_speed(angle, lost, flow_gain, lost_to_load)
 
 
 # --- the pump ------------------------------------------------------------------------------------
@@ -155,6 +163,7 @@ def pump_sample(
     The order is the chain's: hysteresis, force, balance of the spool, friction, opening, rate of
     the plate, leakage, ripple, line.
     """
+    first_sample = state.initialised == 0.0
     current = inputs.current
     if options.hysteresis is not None:
         current = magnetising_current(current, state.magnetising_current, p.solenoid_hysteresis)
@@ -165,7 +174,7 @@ def pump_sample(
     deflection = 0.0
     if options.friction is not None:
         balance = stopped_spool(spool, p)
-        before = balance if state.initialised == 0.0 else state.spool
+        before = balance if first_sample else state.spool
         deflection = held_back(
             state.deflection,
             balance,
@@ -199,7 +208,7 @@ def pump_sample(
         torque = stiff_line_torque(
             tangent, rate, inputs.load_torque, p.load_inertia, p.Z10 * inputs.pump_speed
         )
-    elif state.initialised == 0.0:
+    elif first_sample:
         torque = inputs.load_torque
         speed = flow - p.motor_leakage * torque
     else:
@@ -214,7 +223,7 @@ def pump_sample(
     turned = 0.0
     if options.ripple is not None:
         moved = 0.5 * h * (state.speed + speed)
-        turned = state.shaft_angle if state.initialised == 0.0 else state.shaft_angle + moved
+        turned = state.shaft_angle if first_sample else state.shaft_angle + moved
 
     return PumpSignals(
         magnetising_current=current,
@@ -250,27 +259,27 @@ def pump_step(
     Z6 = plate_motion(state.pressure, p) if options.damping is None else 0.0
     stroking = Stroking(Z6, p.Z7, p.Z8, inputs.supply_pressure)
     if options.leaky is None:
-        free = tight_step(state.pressure, opening, stroking, h, options.symmetric)
+        free_pressure = tight_step(state.pressure, opening, stroking, h, options.symmetric)
     else:
-        free = leaky_step(state.pressure, opening, stroking, h, options.symmetric)
-    plate = 0.0
+        free_pressure = leaky_step(state.pressure, opening, stroking, h, options.symmetric)
+    plate_pressure = free_pressure
     if options.damping is not None:
         lag = damping_factor(p.swash_damping, p.Z6, h)
-        free, follower = plate_follows(free, state.plate_pressure, p.Z6, lag)
-        plate = min(max(follower, limits.lower), limits.upper)
-    turning = options.ripple is not None or options.line is not None
+        free_pressure, plate_pressure = plate_follows(
+            free_pressure, state.plate_pressure, p.Z6, lag
+        )
     return PumpState(
-        pressure=min(max(free, limits.lower), limits.upper),
-        plate_pressure=plate,
-        magnetising_current=0.0 if options.hysteresis is None else signals.magnetising_current,
-        spool=0.0 if options.friction is None else signals.spool_free,
+        pressure=min(max(free_pressure, limits.lower), limits.upper),
+        plate_pressure=min(max(plate_pressure, limits.lower), limits.upper),
+        magnetising_current=signals.magnetising_current,
+        spool=signals.spool_free,
         deflection=signals.spool_deflection,
-        torque=0.0 if options.line is None else signals.motor_torque,
-        speed=signals.shaft_speed if turning else 0.0,
-        flow_speed=0.0 if options.line is None else signals.flow_speed,
-        load_torque=0.0 if options.line is None else inputs.load_torque,
+        torque=signals.motor_torque,
+        speed=signals.shaft_speed,
+        flow_speed=signals.flow_speed,
+        load_torque=inputs.load_torque,
         shaft_angle=signals.shaft_angle,
-        initialised=1.0 if turning or options.friction is not None else 0.0,
+        initialised=1.0,
     )
 
 
@@ -320,17 +329,15 @@ def pump_rates(
 
 
 @equation
-def standing(
-    pressure: float, current: float, load_torque: float, options: PumpOptions
-) -> PumpState:
+def standing(pressure: float, current: float, load_torque: float) -> PumpState:
     """State of a pump whose plate stands and whose line bears the load, nothing held back."""
     return PumpState(
         pressure=pressure,
-        plate_pressure=0.0 if options.damping is None else pressure,
-        magnetising_current=0.0 if options.hysteresis is None else current,
+        plate_pressure=pressure,
+        magnetising_current=current,
         spool=0.0,
         deflection=0.0,
-        torque=0.0 if options.line is None else load_torque,
+        torque=load_torque,
         speed=0.0,
         flow_speed=0.0,
         load_torque=0.0,
@@ -340,9 +347,9 @@ def standing(
 
 
 @equation
-def pump_rest(p: Pump, options: PumpOptions, inputs: PumpInputs) -> PumpState:
+def pump_rest(p: Pump, inputs: PumpInputs) -> PumpState:
     """State of a pump without current: the plate upright at δP = Z2/Z1."""
-    return standing(p.Z2 / p.Z1, 0.0, inputs.load_torque, options)
+    return standing(p.Z2 / p.Z1, 0.0, inputs.load_torque)
 
 
 @equation
@@ -378,7 +385,7 @@ def pump_settled(inputs: PumpInputs, p: Pump, options: PumpOptions) -> PumpState
     change the mean of a turn, must be off.
     """
     pressure = settled_pressure(inputs, p, options)
-    return standing(pressure, inputs.current, inputs.load_torque, options)
+    return standing(pressure, inputs.current, inputs.load_torque)
 
 
 @equation
@@ -393,16 +400,20 @@ def pump_limits(
     lower_stop, upper_stop, lower, upper = pressure_limits(p)
     free = signals.spool_free
     pressure = signals.stroker_pressure
-    orifice = p.Z16_plus if free > 0.0 else p.Z16_minus
+    spool_positive = free > 0.0
+    orifice = p.Z16_plus if spool_positive else p.Z16_minus
+    at_upper = pressure >= upper
+    at_lower = pressure <= lower
+    distance = abs(free)
     # against a stop nothing accelerates, however wide the spool is open
-    held = (pressure >= upper and free > 0.0) or (pressure <= lower and free < 0.0)
+    blocked = (at_upper and spool_positive) or (at_lower and free < 0.0)
+    on_stop = pressure >= upper_stop or pressure <= lower_stop
     return PumpLimits(
         dead_zone=abs(signals.magnetising_current) <= p.Z17,
-        orifice=min(abs(free), p.Z14) > orifice and not held,
-        spool=abs(free) > p.Z14,
-        swash_stop=pressure >= upper_stop or pressure <= lower_stop,
-        relief=(pressure >= upper and upper < upper_stop)
-        or (pressure <= lower and lower > lower_stop),
+        orifice=min(distance, p.Z14) > orifice and not blocked,
+        spool=distance > p.Z14,
+        swash_stop=on_stop,
+        relief=(at_upper and upper < upper_stop) or (at_lower and lower > lower_stop),
     )
 
 

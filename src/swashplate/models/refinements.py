@@ -39,7 +39,7 @@ give a stiff line; k = B/(K_mf² V) its stiffness felt at the shaft. Kruse (2001
 stiff (k → ∞), which leaves Ω = Ω_0 - K_mL (C_g + J Ω').
 """
 
-from math import exp, sin, sqrt
+from math import exp, inf, sin, sqrt
 
 from swashplate.equations import declared, equation
 from swashplate.models.displacement_control import Pump
@@ -72,8 +72,9 @@ def held_back(
     spool fast. The friction's work on the spool is never less than what its travel stores, k x_s
     d²/(2 w): over a closed path it takes energy.
     """
-    free = (presliding * (deflection * factor) + width * (balance - before)) / (presliding + width)
-    return min(max(free, -width), width)
+    dragged = presliding * (deflection * factor) + width * (balance - before)
+    unlimited = dragged / (presliding + width)
+    return min(max(unlimited, -width), width)
 
 
 @equation
@@ -105,7 +106,7 @@ def rippled_angle(
 @equation
 def damping_factor(swash_damping: float, Z6: float, h: float) -> float:
     """What is left of δP - p after one step without flow, exp(-h (1 + Z6)/T), T above 0. [1]"""
-    return exp(-h * (1.0 + Z6) / swash_damping)
+    return exp(-h * (1.0 + Z6) / swash_damping) if swash_damping > 0.0 else 0.0
 
 
 @equation
@@ -176,9 +177,10 @@ def line_step(
     lowers it by h K_mL T² at the middle of the step: stable at any step. It is accurate while
     h √(k/J) is well below 1: at 512 samples a second, up to some 20 Hz.
     """
-    half = 0.5 * h
-    kick = half / p.load_inertia
-    charge = half * p.line_stiffness
+    half = 0.5 * h  # Half of a step. [s]
+    # exported C computes this without a line, too, and then without an inertia
+    kick = half / p.load_inertia if p.load_inertia > 0.0 else inf  # Speed for a torque. [1/(N m s)]
+    charge = half * p.line_stiffness  # Torque for a speed that lasts half a step. [N m s/rad]
     # both unknowns at the middle of the step
     middle = (torque + charge * (flow_speed - speed + kick * load_torque)) / (
         1.0 + charge * (p.motor_leakage + kick)

@@ -515,7 +515,9 @@ def scalar_function(
     names = {formal: fresh_name(c_name(word), used_names) for formal, word in words.items()}
     available = {graph.name(formal, kind): names[formal] for formal, kind in formals.items()}
     language = C(functions, origins, used_names)
-    c_labels = {node: c_name(label) for node, label in labels.items()}
+    c_labels = {
+        node: "result" if label == source.name else c_name(label) for node, label in labels.items()
+    }
     nodes = [node for _, node in results]
     block = CodeBlock(nodes, c_labels, used_names, available=available, language=language)
     lines = language.headed(block.lines, source)

@@ -29,6 +29,8 @@ class Exported:
     """Largest magnitude of an input."""
     ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     """Least and largest value of a measured input."""
+    notes: Mapping[str, str] = field(default_factory=dict)
+    """What an external signal is, if no named tuple of inputs says it."""
     stable: Mapping[int, Equation] = field(default_factory=dict)
     """By part: margin above 0 if its equations bear the step, of ``p, h, options``."""
     follows: Mapping[tuple[int, str], Equation] = field(default_factory=dict)

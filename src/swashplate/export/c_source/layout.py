@@ -10,10 +10,11 @@ from swashplate.export.c_source.exported import Exported
 from swashplate.export.c_source.structs import Structs
 
 OWN = """
-number_at put_at is_finite all_finite in_range number_of placed seen constant_window before_all
-good_inputs put_inputs taken one_sample rested_start settled_start checked computed switched
-ranges value_table option_places parameter_names output_names input_names option_names name_of
-one_of flag_at put_flag input_ranges flag_places finite_outputs
+get_number set_number is_finite all_finite in_range index_of_name place_tap read_window
+constant_window fill_lines inputs_in_range put_inputs take_sample one_sample READY VALUES
+CONSTANTS_FROM rested_start settled_start check_parameters compute_constants switch_terms ranges
+value_table option_places parameter_names output_names input_names option_names name_at_index
+is_index get_flag set_flag input_ranges flag_places finite_outputs
 """
 PUBLIC = """
 size value_count init reset settle step correct output limits set_input clear_input set get

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from functools import cached_property, lru_cache
-from typing import Any
+from typing import Any, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,8 @@ from swashplate.equations import (
     SignalSource,
     declared_by,
     graph,
+    parsed,
+    plain,
     value_at,
 )
 from swashplate.equations.code_generation import (
@@ -39,7 +41,7 @@ from swashplate.equations.marching import SampleCode, module, output_of
 from swashplate.export.c_source.exported import Exported
 from swashplate.export.c_source.layout import Layout, path_of
 from swashplate.export.c_source.parts import PartInC
-from swashplate.export.c_source.structs import struct
+from swashplate.export.c_source.structs import notes_of, struct
 
 Array = NDArray[np.float64]
 
@@ -80,9 +82,7 @@ class Writer:
         """Struct of what follows from a part's parameters, options and the step."""
         fields = []
         for node, name in part.constants.items():
-            origin = part.part.trace.origins.get(node)
-            note = f" /* of {origin.name} */" if origin is not None else ""
-            fields.append(f"double {name};{note}")
+            fields.append((f"double {name};", part.constant_note(node)))
         part_name = part.part_model.name
         description = (
             f"What follows from the parameters of the {part_name}, its options and the step."
@@ -132,7 +132,7 @@ class Writer:
         lines, names = [], []
         for tap in part.part.taps:
             line = self.exported.lines.index(tap.tap.signal)
-            seen = f"seen(m, {tap.number}, {line}, {tap.tap.samples})"
+            seen = f"read_window(m, {tap.number}, {line}, {tap.tap.samples})"
             text = f"constant_window(m->before_record[{line}])" if constant else seen
             name = f"{part.member}_{c_name(tap.input)}"
             lines.append(f"const struct {self.exported.prefix}_window {name} = {text};")
@@ -214,7 +214,7 @@ class Writer:
                 else "0.0"
             )
             misplaced.append(
-                f"!placed(m, {number}, {delay}, {c_literal(float(tap.ahead))}, {tap.samples})"
+                f"!place_tap(m, {number}, {delay}, {c_literal(float(tap.ahead))}, {tap.samples})"
             )
         if misplaced:
             test = f"if ({' || '.join(misplaced)}) {{"
@@ -222,10 +222,15 @@ class Writer:
         description = "Options, stability and delays of these parameters and this step."
         body = [*options, *checks]
         body = [*(body or ["(void)m;"]), f"return {self.P}_OK;"]
-        texts.append(c_function(description, f"static int checked({self.exported.type} *m)", body))
+        texts.append(
+            c_function(description, f"static int check_parameters({self.exported.type} *m)", body)
+        )
         parts_with_constants = [part for part in self.parts if part.constants]
         texts += [part.computed() for part in parts_with_constants]
-        description, head = "Constants of these parameters and this step.", "static void computed"
+        description, head = (
+            "Constants of these parameters and this step.",
+            "static void compute_constants",
+        )
         calls = [f"{part.names['constants']}(m);" for part in parts_with_constants] or ["(void)m;"]
         texts.append(c_function(description, f"{head}({self.exported.type} *m)", calls))
         return "\n\n".join(texts)
@@ -245,6 +250,40 @@ class Writer:
         description = "Whether all outputs of the sample are finite."
         head = f"static bool finite_outputs(const {self.exported.type} *m)"
         return c_function(description, head, _finite([*map(self.output, self.exported.names)], "m"))
+
+    # -- what is said of numbers -------------------------------------------------------------------
+
+    def output_note(self, name: str) -> str:
+        """What an output is."""
+        if name in self.model.integrals:
+            return f"integral of {self.model.integrals[name]}, 0 at the first sample"
+        stored, _ = output_of(self.model, name)
+        if stored.kind == "link":
+            link = self.model.links[stored.path]
+            return "" if link.equation is None else first_line(parsed(plain(link.equation)))
+        part = self.model.parts[stored.part]
+        kind = part.signals if stored.kind == "signals" else part.state
+        return notes_of(kind).get(stored.path, "")
+
+    def input_note(self, name: str) -> str:
+        """What an external signal is."""
+        if name in self.exported.notes:
+            return self.exported.notes[name]
+        for part in self.model.parts:
+            for input_name in part.input_types:
+                if part.tap(input_name).signal == name and part.inputs is not None:
+                    return notes_of(part.inputs).get(input_name, "")
+        return ""
+
+    def option_note(self, part: int, name: str) -> str:
+        """What an option is."""
+        return notes_of(self.model.parts[part].options).get(name, "")
+
+    def limit_note(self, part: int, name: str) -> str:
+        """What a limit is."""
+        limits = self.model.parts[part].limits
+        assert limits is not None
+        return notes_of(get_type_hints(plain(limits))["return"]).get(name, "")
 
     # -- numbers -----------------------------------------------------------------------------------
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from math import inf
 
 from swashplate.equations import Definition
@@ -21,6 +21,7 @@ from swashplate.equations.code_generation import (
 from swashplate.export.c_source.exported import Exported
 from swashplate.export.c_source.layout import path_of
 from swashplate.export.c_source.model import writer_of
+from swashplate.export.c_source.structs import noted, with_comment
 
 TEXTS = sections(__package__, "interface.c.in")
 """Sections of the text around the equations, by name."""
@@ -70,32 +71,66 @@ class _Interface:
     # -- header ------------------------------------------------------------------------------------
 
     def header(self) -> str:
-        exported, P = self.exported, self.P
-        parameters = [name for name, _, _ in self.rows]
-        options = [name for _, name in exported.settable]
-        limits = [name for _, name in exported.limits]
+        exported, P, writer = self.exported, self.P, self.writer
+        outputs = {name: writer.output_note(name) for name in exported.names}
+        parameters = {name: noted(definition) for name, _, definition in self.rows}
+        inputs = {name: self.input_note(name) for name in exported.measured}
+        options = {name: writer.option_note(part, name) for part, name in exported.settable}
+        limits = {name: writer.limit_note(part, name) for part, name in exported.limits}
         enums = [
-            _enum("Outputs", f"{P}_", exported.names, f"{P}_OUTPUTS"),
+            _enum("Outputs", f"{P}_", outputs, f"{P}_OUTPUTS"),
             _enum("Parameters", f"{P}_PARAMETER_", parameters, f"{P}_PARAMETERS"),
             _enum(
                 "Inputs beside those of a step, for which parameters stand",
-                f"{P}_INPUT_", exported.measured, f"{P}_INPUTS",
+                f"{P}_INPUT_",
+                inputs,
+                f"{P}_INPUTS",
             ),
             _enum(
                 "Options; terms that belong to a parameter come on with it",
-                f"{P}_OPTION_", options, f"{P}_OPTIONS",
+                f"{P}_OPTION_",
+                options,
+                f"{P}_OPTIONS",
             ),
             _enum("Limits, as bits", f"{P}_LIMIT_", limits, "", bits=True),
-        ]  # fmt: skip
+        ]
         structs = [text for _, text in self.writer.structs.texts.values()]
         structs += [*self.writer.constants, self.struct()]
         settle = self.filled(TEXTS["settle"]) if exported.settles else ""
         return self.filled(
             TEXTS["header"],
+            commands=self.commands(),
             enums="\n\n".join(enum for enum in enums if enum),
             structs="\n\n".join(structs),
             settle=settle,
         )
+
+    def input_note(self, name: str) -> str:
+        """What a measured input is, and its range."""
+        note, limits = self.writer.input_note(name), self.exported.ranges.get(name)
+        return note if limits is None else f"{note} {limits[0]:g} to {limits[1]:g}".strip()
+
+    def commands(self) -> str:
+        """Lines of a comment on what a step takes."""
+        lines = ""
+        for name, argument in zip(self.exported.signals, self.arguments, strict=True):
+            note = self.writer.input_note(name)
+            bound = self.exported.bounds.get(name)
+            limits = "" if bound is None else f"within ±{bound:g}"
+            said = ", ".join(filter(None, (note, limits)))
+            lines += f" * `{argument}`: {comment_line(said)}\n" if said else ""
+        return lines
+
+    def cleared(self) -> str:
+        """Statements that set what is known of a sample to 0."""
+        words = ("signals", "limits")
+        members = [
+            f"m->{member}_{word}"
+            for member, tags in zip(self.exported.members, self.writer.tags, strict=True)
+            for word in words
+            if word in tags
+        ]
+        return "".join(f"        memset(&{member}, 0, sizeof {member});\n" for member in members)
 
     def struct(self) -> str:
         """The struct that holds all of a model."""
@@ -132,12 +167,13 @@ class _Interface:
             lines += [
                 f"    int whole[{count}];       /* samples by which taps look back */",
                 f"    double fraction[{count}]; /* and the rest of one */",
-                f"    double line[{rows}][{self.P}_LINE];",
-                f"    double before_record[{rows}];",
+                f"    double line[{rows}][{self.P}_LINE]; /* inputs, a ring for each */",
+                f"    double before_record[{rows}]; /* what they were before the first sample */",
                 "    int newest; /* place of the newest sample */",
             ]
         lines.append("    bool stale;   /* what follows from parameters is to be computed */")
         lines.append("    bool settled; /* the start is not at rest */")
+        lines.append("    unsigned ready; /* init has succeeded */")
         return "\n".join([*lines, "};"])
 
     # -- source ------------------------------------------------------------------------------------
@@ -161,6 +197,7 @@ class _Interface:
                 TEXTS["interface"],
                 settle=self.filled(TEXTS["settled"]) if exported.settles else "",
                 constants=self.constants(),
+                cleared=self.cleared(),
                 move=self.advance_line(),
                 outputs=self.outputs(),
                 limits=self.limits(),
@@ -231,11 +268,17 @@ class _Interface:
         rows = []
         for _, member in self.numbers:
             definition = declared.get(member, Definition("", "", can_be_off=True))
-            above = definition.above is not None or (
+            lower_open = definition.above is not None or (
                 member in declared and definition.lower == -inf
             )
-            closed = definition.can_be_off and definition.upper == inf
-            limits = (definition.lower, definition.upper, above, closed, member in flags)
+            upper_closed = definition.can_be_off and definition.upper == inf
+            limits = (
+                definition.lower,
+                definition.upper,
+                not lower_open,
+                upper_closed,
+                member in flags,
+            )
             number = ranges.setdefault(", ".join(map(c_literal, limits)), len(ranges))
             rows.append(f"    {{offsetof({exported.type}, {member}), {number}}},")
         lines = [f"static const struct {exported.prefix}_range ranges[] = {{"]
@@ -277,15 +320,17 @@ class _Interface:
     def switched(self) -> str:
         """Terms that come on and go off with their parameters."""
         cases: dict[str, list[str]] = {}
-        index_of = {member: index for index, (_, member, _) in enumerate(self.rows)}
+        name_of = {member: name for name, member, _ in self.rows}
         for (part, option), paths in self.exported.switches.items():
             member = self.exported.members[part]
             members = [f"{member}.{path_of(path)}" for path in paths]
             test = " || ".join(f"m->{member} != 0.0" for member in members)
             line = f"m->{member}_options.{c_name(option)} = {test};"
-            cases.setdefault(line, []).extend(str(index_of[member]) for member in members)
-        description = "Terms of the equations that are on where their parameters are not 0."
-        head = f"static void switched({self.exported.type} *m, int parameter)"
+            cases.setdefault(line, []).extend(
+                f"{self.P}_PARAMETER_{path_name(name_of[member])}" for member in members
+            )
+        description = "Switch a term on if its parameter is not 0, off if it is 0."
+        head = f"static void switch_terms({self.exported.type} *m, int parameter)"
         if not cases:
             return c_function(description, head, ["(void)m;", "(void)parameter;"]) + "\n"
         lines = ["switch (parameter) {"]
@@ -330,14 +375,15 @@ def _body(lines: Sequence[str]) -> str:
 
 
 def _enum(
-    description: str, prefix: str, names: Sequence[str], count: str, *, bits: bool = False
+    description: str, prefix: str, notes: Mapping[str, str], count: str, *, bits: bool = False
 ) -> str:
-    if not names and not count:
+    """An enum with a constant for each name, and what is said of it."""
+    if not notes and not count:
         return ""
     lines = [f"/* {description}. */", "enum {"]
-    for index, name in enumerate(names):
+    for index, (name, note) in enumerate(notes.items()):
         constant = 1 << index if bits else index
-        comma = "," if count or index + 1 < len(names) else ""
-        lines.append(f"    {prefix}{path_name(name)} = {constant}{comma}")
-    lines += [f"    {count} = {len(names)}"] if count else []
+        comma = "," if count or index + 1 < len(notes) else ""
+        lines += with_comment(f"{prefix}{path_name(name)} = {constant}{comma}", note)
+    lines += [f"    {count} = {len(notes)}"] if count else []
     return "\n".join([*lines, "};"])

@@ -6,7 +6,9 @@ all that is known at it and the next state, the start, and what options follow f
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
+from inspect import getsource
 from types import MappingProxyType
 from typing import Any, get_type_hints
 
@@ -27,6 +29,7 @@ from swashplate.equations.code_generation import (
     c_function,
     c_literal,
     c_name,
+    first_line,
     fixed,
     fresh_name,
     leaves,
@@ -165,6 +168,18 @@ class PartInC:
             else:
                 pending += node.args[::-1]
         return constants
+
+    def constant_note(self, node: Node) -> str:
+        """What a constant is: the comment at its line in the equation, or the equation's own."""
+        origin = self.part.trace.origins.get(node)
+        if origin is None:
+            return ""
+        label = re.escape(self.part.trace.labels.get(node, ""))
+        source = getsource(origin.function)
+        behind = re.search(rf"^ +{label} = [^#\n]*# *(.+)$", source, re.MULTILINE)
+        ahead = re.search(rf"^ +# *([A-Z].+\])\n +{label} = ", source, re.MULTILINE)
+        comment = behind or ahead
+        return first_line(origin) if not label or comment is None else comment[1]
 
     # -- places ------------------------------------------------------------------------------------
 

@@ -7,8 +7,17 @@ import re
 from collections.abc import Iterable
 from typing import Any, get_type_hints
 
-from swashplate.equations import definition_of, is_named_tuple
-from swashplate.equations.code_generation import c_comment, c_name, comment_line, fresh_name
+from swashplate.equations import Definition, declared_by, is_named_tuple
+from swashplate.equations.code_generation import (
+    c_comment,
+    c_name,
+    comment_line,
+    fresh_name,
+    indented,
+)
+
+WIDTH = 100
+"""Characters of a line."""
 
 
 class Structs:
@@ -28,13 +37,12 @@ class Structs:
         """Tag of the struct of a class of named tuples."""
         if cls not in self.texts:
             tag = self.fresh(_snake(cls.__name__))
-            notes = _notes(cls)
+            notes = notes_of(cls)
             hints = get_type_hints(cls)
             fields = []
             for name in cls._fields:
                 declared = f"{self._type(hints.get(name, float))} {c_name(name)};"
-                note = comment_line(notes[name])
-                fields.append(f"{declared} /* {note} */" if note else declared)
+                fields.append((declared, notes[name]))
             doc = inspect.getdoc(cls) or ""
             description = "" if doc.startswith(f"{cls.__name__}(") else doc.splitlines()[0]
             self.texts[cls] = tag, struct(description, tag, fields)
@@ -50,11 +58,20 @@ class Structs:
         return "double" if hint in (float, int) else "bool"
 
 
-def struct(description: str, tag: str, fields: Iterable[str]) -> str:
-    """Text of a struct; one without fields has a byte, as C99 wants it."""
+def struct(description: str, tag: str, fields: Iterable[tuple[str, str]]) -> str:
+    """Text of a struct: declarations, and what is said of each.
+
+    One without fields has a byte, as C99 wants it.
+    """
     head = c_comment(description) if description else []
-    lines = [f"    {declaration}" for declaration in fields] or ["    char nothing;"]
+    lines = [line for declared, note in fields for line in with_comment(declared, note)]
+    lines = lines or ["    char nothing;"]
     return "\n".join([*head, f"struct {tag} {{", *lines, "};"])
+
+
+def noted(definition: Definition) -> str:
+    """What a definition says, with its unit."""
+    return f"{definition.name} [{definition.unit}]" if definition.unit else definition.name
 
 
 def _snake(name: str) -> str:
@@ -62,16 +79,26 @@ def _snake(name: str) -> str:
     return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name).lower()
 
 
-def _notes(cls: Any) -> dict[str, str]:
+def with_comment(code: str, note: str) -> list[str]:
+    """A line within braces, with a comment behind it, or ahead if there is no room."""
+    line = f"    {code}"
+    if not note:
+        return [line]
+    with_note = f"{line} /* {comment_line(note)} */"
+    if len(with_note) <= WIDTH:
+        return [with_note]
+    return [*indented(c_comment(note)), line]
+
+
+def notes_of(cls: Any) -> dict[str, str]:
     """What is said about each field: its definition, or the comment after it."""
-    hints = get_type_hints(cls, include_extras=True)
     try:
         text = inspect.getsource(cls)
     except (OSError, TypeError):
         text = ""
     notes = dict(re.findall(r"^    (\w+):.*?# (?!fmt|noqa|type:)(.*)$", text, re.MULTILINE))
-    for name in cls._fields:
-        definition = definition_of(hints.get(name))
-        if definition is not None and definition.unit:
-            notes[name] = f"{definition.name} [{definition.unit}]"
+    for definition in declared_by(cls):
+        for path in definition.fields:
+            if definition.unit and path in cls._fields:
+                notes[path] = noted(definition)
     return {name: notes.get(name, "") for name in cls._fields}
