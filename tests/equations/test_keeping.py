@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from swashplate.equations import Model, equation, join, simulate
+from swashplate.equations import Model, derive, equation, join, simulate
 
 pytestmark = pytest.mark.slow
 
@@ -205,6 +205,106 @@ def test_a_cell_of_a_notebook_that_is_run_again_counts() -> None:
         found = simulate(space["rod"], space["Lag"](0.5), {"command": np.ones(4)}, 100.0)
         ends.append(found["position"][-1])
     assert ends == pytest.approx([expected(5.0)[0], expected(-1.0)[0]], rel=1e-14)
+
+
+def test_a_helper_alone_that_is_run_again_counts(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The cell that makes the model is not run again: only the one below it."""
+    monkeypatch.setattr(sys, "ps1", "In [1]: ", raising=False)
+    space: dict[str, Any] = {"__name__": "__main__"}
+    head, _, tail = MACHINE.partition("@equation\ndef deepest")
+    helper, _, rest = tail.partition("@equation\ndef deeper")
+    cell(100, head, space)
+    cell(101, f"@equation\ndef deepest{helper}", space)
+    cell(102, f"@equation\ndef deeper{rest}", space)
+    command = {"command": np.ones(4)}
+
+    def end() -> float:
+        return float(simulate(space["rod"], space["Lag"](0.5), command, 100.0)["position"][-1])
+
+    assert end() == pytest.approx(expected(5.0)[0], rel=1e-14)
+    cell(103, f"@equation\ndef deepest{helper.replace('x + TABLE', 'x - TABLE')}", space)
+    assert end() == pytest.approx(expected(-1.0)[0], rel=1e-14)
+    cell(104, "GAIN = 4.0", space)
+    assert end() == pytest.approx(expected(1.0)[0], rel=1e-14)
+    found = derive(space["deeper"], "x")
+    assert found.python(1.0) == (1.0, 4.0)
+    cell(105, "GAIN = 6.0", space)
+    assert derive(space["deeper"], "x").python(1.0) == (3.0, 6.0)
+
+
+TABLES = """
+from typing import NamedTuple
+import one, two, three
+import tables
+from swashplate.equations import Model, equation, interpolate
+
+class Gain(NamedTuple):
+    gain: float
+
+class Rod(NamedTuple):
+    position: float
+
+@equation
+def first(x: float) -> float:
+    return one.GAIN * x
+
+@equation
+def second(x: float) -> float:
+    return two.GAIN * x
+
+@equation
+def third(x: float) -> float:
+    return three.GAIN * x
+
+@equation
+def step(state: Rod, command: float, p: Gain) -> Rod:
+    drawn = interpolate(command, tables.KNOTS, tables.VALUES)
+    return Rod(state.position + first(command) + second(command) + third(command) + drawn)
+
+rod = Model("rod", parameters=Gain, state=Rod, step=step)
+"""
+TABLES_RUN = """
+import sys
+sys.path.insert(0, sys.argv[1])
+import numpy as np
+import machine
+from swashplate.equations import simulate
+run = simulate(machine.rod, machine.Gain(0.0), {"command": np.ones(2)}, 100.0)
+print(run["position"][-1])
+"""
+
+
+def test_constants_and_tables_of_modules_are_edited(tmp_path: Path) -> None:
+    """Of three modules one constant of the same name each, and a table."""
+    texts = {
+        "one": "GAIN = 1.0", "two": "GAIN = 2.0", "three": "GAIN = 3.0",
+        "tables": "KNOTS = (0.0, 2.0)\nVALUES = (0.0, 20.0)", "machine": TABLES,
+    }  # fmt: skip
+
+    def end() -> float:
+        for name, text in texts.items():
+            (tmp_path / f"{name}.py").write_text(text, "utf-8")
+        environment = {"NUMBA_DISABLE_JIT": "0", "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+        environment["PYTHONDONTWRITEBYTECODE"] = "1"  # the files change within a second
+        done = subprocess.run(
+            [sys.executable, "-c", TABLES_RUN, str(tmp_path)],
+            capture_output=True,
+            text=True,
+            check=True,
+            env={**os.environ, **environment},
+        )
+        return float(done.stdout)
+
+    assert end() == 1.0 + 2.0 + 3.0 + 10.0
+    for name, text, change in (
+        ("one", "GAIN = 5.0", 4.0),
+        ("two", "GAIN = 12.0", 10.0),
+        ("three", "GAIN = 13.0", 10.0),
+        ("tables", "KNOTS = (0.0, 2.0)\nVALUES = (0.0, 40.0)", 10.0),
+        ("tables", "KNOTS = (0.0, 4.0)\nVALUES = (0.0, 40.0)", -10.0),
+    ):
+        before, texts[name] = end(), text
+        assert end() == before + change, name
 
 
 class Level(NamedTuple):

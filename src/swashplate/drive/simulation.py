@@ -81,6 +81,7 @@ class Simulation(Run):
     """
 
     first_signals = FIRST_SIGNALS
+    has_states = False
     plotted = ("shaft_speed",)
 
     limit_names = tuple(str(limit.name).lower() for limit in Limit)

@@ -22,6 +22,7 @@ from .fields import Definition as Definition
 from .fields import Flag as Flag
 from .fields import check_mapping as check_mapping
 from .fields import declared_by as declared_by
+from .fields import defaults_of as defaults_of
 from .fields import definition_of as definition_of
 from .fields import floats_of as floats_of
 from .fields import is_real as is_real

@@ -7,8 +7,9 @@ a file, decides whether machine code kept on disk still holds.
 import inspect
 import linecache
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from hashlib import blake2b
+from itertools import chain, count
 from pathlib import Path
 from types import CellType, CodeType, FunctionType, MappingProxyType, ModuleType, SimpleNamespace
 from typing import Any, TypeVar, get_args
@@ -179,6 +180,11 @@ def interpreted(function: Any, replacements: Replacements = NO_REPLACEMENTS) -> 
     return _uncompiled[key]
 
 
+def forget_interpreted() -> None:
+    """Have functions made anew as plain Python when they are next asked for."""
+    _uncompiled.clear()
+
+
 def _interpreted(member: Any, names: Iterable[str], replacements: Replacements) -> Any:
     """What a function names, with all equations of these names as plain Python."""
     if is_function(member):
@@ -234,9 +240,11 @@ def _referenced(function: Any) -> Iterator[tuple[str, Any]]:
             continue
         if isinstance(member, ModuleType):
             for attribute in names:
-                value = getattr(member, attribute, None)
-                if is_function(value) or isinstance(value, int | float):
+                value = getattr(member, attribute, member)
+                if is_function(value) or is_named_tuple(value):
                     yield attribute, value
+                elif _is_constant(value):
+                    yield f"{member.__name__}.{attribute}", value
         elif is_function(member) or is_named_tuple(member) or _is_constant(member):
             yield name, member
     yield from _types_named(python_function)
@@ -271,15 +279,21 @@ def closure(function: Any) -> dict[str, Any]:
             if not is_constant and plain(member) in visited:
                 continue
             if name in members:
-                if is_constant and repr(members[name]) == repr(member):
+                if is_constant and _fingerprint(members[name]) == _fingerprint(member):
                     continue
                 module = getattr(member, "__module__", None) or plain(referring).__module__
-                name = f"{module}.{name}"
+                name = _unused(f"{module}.{name}", members)
             members[name] = member
             if not is_constant:
                 visited.add(plain(member))
                 pending.append(member)
     return members
+
+
+def _unused(name: str, members: Collection[str]) -> str:
+    """A name that no member has, by a number behind it."""
+    names = chain([name], (f"{name} {number}" for number in count(2)))
+    return next(unused for unused in names if unused not in members)
 
 
 def functions_run(functions: Iterable[Any], replacements: Replacements) -> set[FunctionType]:

@@ -238,15 +238,37 @@ def numbers_of(value: Any) -> list[float]:
     return numbers
 
 
-def tuple_from(kind: Any, numbers: Mapping[str, float], prefix: str = "") -> Any:
-    """A nested named tuple from numbers by path after a prefix; others keep their defaults."""
+def defaults_of(kind: Any) -> dict[str, float]:
+    """Defaults of a nested named tuple's numbers by path, as far as there are some.
+
+    The default of a field that is a tuple counts before those of the tuple's own fields.
+    """
+    defaults: dict[str, float] = {}
     hints = get_type_hints(kind)
-    values = []
     for name in kind._fields:
-        path = f"{prefix}{name}"
+        default = kind._field_defaults.get(name)
         if is_named_tuple(hints[name]):
-            values.append(tuple_from(hints[name], numbers, f"{path}."))
-        else:
-            number = numbers.get(path)
-            values.append(kind._field_defaults[name] if number is None else float(number))
+            inner = defaults_of(hints[name])
+            if default is not None:
+                inner = dict(zip(floats_of(hints[name]), numbers_of(default), strict=True))
+            defaults |= {f"{name}.{path}": number for path, number in inner.items()}
+        elif default is not None:
+            defaults[name] = float(default)
+    return defaults
+
+
+def tuple_from(kind: Any, numbers: Mapping[str, float]) -> Any:
+    """A nested named tuple from numbers by path; others keep their defaults."""
+    given = {path: float(number) for path, number in numbers.items()}
+    return _built(kind, defaults_of(kind) | given, "")
+
+
+def _built(kind: Any, numbers: Mapping[str, float], prefix: str) -> Any:
+    hints = get_type_hints(kind)
+    values = [
+        _built(hints[name], numbers, f"{prefix}{name}.")
+        if is_named_tuple(hints[name])
+        else numbers[f"{prefix}{name}"]
+        for name in kind._fields
+    ]
     return kind(*values)

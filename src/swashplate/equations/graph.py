@@ -112,6 +112,8 @@ def _kind(op: str, operands: tuple[Node, ...]) -> str:
 def make(op: str, *operands: Node, value: Any = None, kind: str | None = None) -> Node:
     """The expression of an operation and its operands."""
     text = repr(value) if op == "number" else value
+    if op == "**" and value < 0:
+        kind = "float"
     kind = kind or _kind(op, operands)
     key = (op, operands, text, kind)
     node = _nodes.get(key)

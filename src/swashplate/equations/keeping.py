@@ -128,7 +128,7 @@ def key_of(model: Model) -> str:
             sorted(part.defaults.items()),
         )
         digest.update(f"{description!r}\0".encode())
-        roles = (part.step, part.sample, part.rest, part.settled, part.limits, part.domain)
+        roles = roles_of(part)
         digest.update(f"{[_hash_of(role) for role in roles]}\0".encode())
         equations += [role for role in roles if role is not None]
         digest.update(f"{_replacement_hashes(part.replacements)!r}\0".encode())
@@ -139,6 +139,11 @@ def key_of(model: Model) -> str:
     equations += _new_equations(model.replacements)
     digest.update(fingerprint(equations).encode())
     return digest.hexdigest()
+
+
+def roles_of(part: Model) -> tuple[Any, ...]:
+    """Equations of a part, None for those that it does not have."""
+    return part.step, part.sample, part.rest, part.settled, part.limits, part.domain
 
 
 def _hash_of(equation: Any) -> str:

@@ -12,10 +12,10 @@ import math
 import os
 import sys
 import typing
-from collections.abc import Iterable
+from collections.abc import Collection, Hashable, Iterable
 from dataclasses import dataclass
 from functools import lru_cache
-from types import FunctionType, SimpleNamespace
+from types import FunctionType, ModuleType, SimpleNamespace
 from typing import Any, NoReturn
 from weakref import WeakKeyDictionary
 
@@ -148,8 +148,14 @@ def is_range(node: ast.For) -> bool:
     """Whether a loop counts in a literal range."""
     match node:
         case ast.For(ast.Name(), ast.Call(ast.Name("range"), args, []), orelse=[]):
-            return None not in map(whole, args)
+            bounds = [whole(arg) for arg in args]
+            return None not in bounds and 1 <= len(bounds) <= 3 and bounds[2:] != [0]
     return False
+
+
+def is_among(thing: Any, table: Collection[Any]) -> bool:
+    """Whether something stands in a table of functions; lists and their like never do."""
+    return isinstance(thing, Hashable) and thing in table
 
 
 # --- sources --------------------------------------------------------------------------------------
@@ -328,6 +334,10 @@ def _check_call(source: Parsed, node: ast.Call) -> None:
     function = node.func
     base = function.value if isinstance(function, ast.Attribute) else function
     if not isinstance(base, ast.Name) or base.id in source.local:
+        if isinstance(function, ast.Attribute) and _is_module(source, base):
+            name = ast.unparse(function)
+            instead = f"import {function.attr} itself, or the module {ast.unparse(base)}, by a name"
+            source.refuse(node, f"a call of {name}", instead)
         if isinstance(function, ast.Attribute):
             instead = "call equations; make a new named tuple, as in State(t.a, b)"
             source.refuse(node, f"the method {function.attr}", instead)
@@ -337,7 +347,9 @@ def _check_call(source: Parsed, node: ast.Call) -> None:
         called = source.called(function)
     except (NameError, AttributeError):
         return  # defined further down, or missing: seen when it is wanted
-    if called in MATH or called in CHOICES or is_named_tuple(called) or not callable(called):
+    if not callable(called) or is_named_tuple(called):
+        return
+    if is_among(called, MATH) or is_among(called, CHOICES):
         return
     if isinstance(plain(called), FunctionType):
         return
@@ -348,6 +360,22 @@ def _check_call(source: Parsed, node: ast.Call) -> None:
     if getattr(builtins, short, None) is called:
         instead = INSTEAD_OF_BUILTIN.get(short, instead)
     source.refuse(node, f"a call of {ast.unparse(function)}", instead)
+
+
+def _is_module(source: Parsed, node: ast.expr) -> bool:
+    """Whether an expression is a module within a module."""
+    root = node
+    while isinstance(root, ast.Attribute):
+        root = root.value
+    if not isinstance(root, ast.Name) or root.id in source.local:
+        return False
+    try:
+        member = source.called(root)
+        for name in ast.unparse(node).split(".")[1:]:
+            member = getattr(member, name)
+    except (NameError, AttributeError):
+        return False
+    return isinstance(member, ModuleType)
 
 
 def _is_index(index: ast.expr, counters: set[str]) -> bool:

@@ -10,7 +10,7 @@ from swashplate.equations.code_generation.functions import GENERATING
 from swashplate.equations.code_generation.gradients import Derived, derived_function, listed
 from swashplate.equations.code_generation.tracing import Trace
 from swashplate.equations.code_generation.values import Value, arguments, leaves
-from swashplate.equations.declaration import RULES, inlined, module_of
+from swashplate.equations.declaration import RULES, closure_hash, inlined, module_of
 from swashplate.equations.language import parsed, plain
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -86,7 +86,7 @@ def derive(
     options, lengths = dict(options or {}), dict(lengths or {})
     with GENERATING:
         settings = repr((by, sorted(options.items()), sorted(lengths.items())))
-        key = (plain(function), settings)
+        key = (plain(function), settings, closure_hash(function))
         if key not in _derived_functions:
             values = arguments(parsed(function), options, lengths)
             digest = blake2b(settings.encode(), digest_size=3).hexdigest()

@@ -65,11 +65,14 @@ RESERVED = {*FUNCTIONS, "inf", "nan", "range", "int", "float", "None", "True", "
 
 
 _clock = {"depth": 0.0, "seconds": 0.0}
+_memories: list[Any] = []
+"""What remembers things that were generated."""
 
 
 def generating(function: Callable[P, R]) -> Callable[P, R]:
     """Remember what a function generates, and let one thread at a time do so."""
     remembered = lru_cache(maxsize=256)(function)
+    _memories.append(remembered)
 
     @wraps(function)
     def locked(*args: P.args, **kwargs: P.kwargs) -> R:
@@ -84,6 +87,13 @@ def generating(function: Callable[P, R]) -> Callable[P, R]:
                     _clock["seconds"] += perf_counter() - start
 
     return locked
+
+
+def forget_generated() -> None:
+    """Have everything generated anew when it is next asked for."""
+    with GENERATING:
+        for memory in _memories:
+            memory.cache_clear()
 
 
 def generating_time() -> float:

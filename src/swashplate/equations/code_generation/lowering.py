@@ -437,7 +437,9 @@ class Lowering:
         if first.kind == "float":  # NaN is only `!=`
             instruction = f"fcmp {'u' if op == '!=' else 'o'}{TESTS[op]}"
         else:
-            instruction = f"icmp {'' if op in ('==', '!=') else 's'}{TESTS[op]}"
+            # a test is one bit, which is -1 if it has a sign
+            sign = "u" if first.kind == "bool" else "s"
+            instruction = f"icmp {'' if op in ('==', '!=') else sign}{TESTS[op]}"
         return self.operand(
             "bool", f"{instruction} {TYPES[first.kind]} {first.text}, {second.text}"
         )

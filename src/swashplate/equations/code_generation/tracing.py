@@ -59,12 +59,17 @@ from swashplate.equations.language import (
     MATH,
     Parsed,
     has_return,
+    is_among,
     is_named_tuple,
     parsed,
     plain,
 )
 
 Names = dict[str, Value]
+MOST_WAYS = 500
+"""Ways through an equation to a return: what follows an `if` with one is done for each."""
+LARGEST_WHOLE = 2**63
+"""Whole numbers from here on are floats: compiled code has none as large."""
 R = TypeVar("R")
 
 LOOPS = {
@@ -254,6 +259,8 @@ class _Tracer:
         self.source, self.trace, self.refuse = source, trace, source.refuse
         self.local = source.local
         self.names: Names = {}
+        self.ways = 0
+        """How often what follows an `if` that returns was done once more."""
 
     def result(self, arguments: Mapping[str, Value]) -> Value:
         """What the equation returns for some arguments."""
@@ -282,6 +289,13 @@ class _Tracer:
                     if test.op == "number":
                         pending[:0] = statement.body if test.value else statement.orelse
                     elif has_return([statement]):
+                        self.ways += 1
+                        if self.ways > MOST_WAYS:
+                            self.refuse(
+                                statement,
+                                f"more than {MOST_WAYS} ways to a return",
+                                "set a variable on each way, and return it at the end",
+                            )
                         if_true, _ = self.in_branch(self.returned, [*statement.body, *pending])
                         if_false, _ = self.in_branch(self.returned, [*statement.orelse, *pending])
                         return self.select(statement, test, if_true, if_false)
@@ -366,7 +380,11 @@ class _Tracer:
             setting = self.setting_of(node, value)
             return setting if isinstance(setting, Node) else graph.number(setting is not None)
         if isinstance(value, Node):
-            return graph.number(bool(value.value)) if value.op == "number" else value
+            if value.op == "number":
+                return graph.number(bool(value.value))
+            if value.kind == "bool":
+                return value
+            return self.trace.make("!=", value, ZERO if value.kind == "float" else graph.number(0))
         self.refuse(node, "a test of a tuple", "compare its elements")
 
     def setting_of(self, node: ast.AST, option: Flag) -> Any:
@@ -391,7 +409,7 @@ class _Tracer:
             case ast.Constant(value=None):
                 return Flag(None)
             case ast.Constant(value=int(number) | float(number)):
-                return graph.number(number)
+                return graph.number(_whole(number))
             case ast.Tuple(elts=elements):
                 return Tuple(None, tuple(map(self.value, elements)))
             case ast.Name(id=name) if name in self.names:
@@ -442,7 +460,10 @@ class _Tracer:
         value = fixed(constant)
         if value is None:
             what = f"{text}, which is {type(constant).__name__}"
-            self.refuse(node, what, "from outside, an equation reads only numbers")
+            instead = "from outside, an equation reads only numbers"
+            if any(map(_is_of_numpy, constant if isinstance(constant, tuple) else [constant])):
+                instead = "make it a float or an int of Python where it is defined"
+            self.refuse(node, what, instead)
         return value
 
     def field(self, node: ast.Attribute) -> Value:
@@ -481,7 +502,7 @@ class _Tracer:
         right = self.scalar(node.right)
         if left.kind == right.kind == "int" and left.op == right.op == "number" and op != "/":
             integer_operation = {"+": int.__add__, "-": int.__sub__, "*": int.__mul__}[op]
-            return graph.number(integer_operation(left.value, right.value))
+            return graph.number(_whole(integer_operation(left.value, right.value)))
         if op == "*" and left.kind == right.kind == "float":  # a factor that is known to be one
             for factor, other in ((left, right), (right, left)):
                 if graph.is_number(factor, 1.0):
@@ -518,6 +539,10 @@ class _Tracer:
             if test.op == "number" and bool(test.value) != conjunction:
                 return test
             join = graph.both if conjunction else graph.either
+            value = self.value(operand)
+            if isinstance(value, Node) and value.kind != "bool":
+                word, text = ("and" if conjunction else "or"), ast.unparse(operand)
+                self.refuse(node, f"{word} of the number {text}", f"compare it, as {text} != 0.0")
             test = self.trace.noted(join(test, self.test(operand)))
         return test
 
@@ -526,7 +551,7 @@ class _Tracer:
     def call(self, node: ast.Call) -> Value:
         """Value of a call."""
         called = self.outside(node.func)
-        if called in MATH or called in CHOICES:
+        if is_among(called, MATH) or is_among(called, CHOICES):
             return self.function(node, MATH.get(called) or CHOICES[called])
         if is_named_tuple(called):
             return Tuple(called, tuple(self.arguments(node, called._fields, ()).values()))
@@ -537,6 +562,9 @@ class _Tracer:
             return self.interpolation(self.arguments(node, ("x", "knots", "values"), ()), node)
         if not _is_equation(called):
             text = ast.unparse(node.func)
+            if not callable(called):
+                what = f"a call of {text}, which is of type {type(called).__name__}"
+                self.refuse(node, what, "call an @equation")
             self.refuse(node, f"a call of {text}", f"make {text} an @equation")
         callee = self.trace.callee(called)
         names = [argument.arg for argument in callee.source.arguments]
@@ -623,6 +651,16 @@ class _Tracer:
         label(share, "share")
         inside = make("min", make("max", ZERO, share), ONE)
         return make("+", low, make("*", inside, make("-", high, low)))
+
+
+def _is_of_numpy(constant: Any) -> bool:
+    """Whether a constant has a type of NumPy's."""
+    return type(constant).__module__ == "numpy"
+
+
+def _whole(number: float) -> float:
+    """A literal number, a float if it is too large for a whole number of compiled code."""
+    return number if abs(number) < LARGEST_WHOLE else float(number)
 
 
 def _is_equation(function: Any) -> bool:

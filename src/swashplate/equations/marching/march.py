@@ -21,7 +21,7 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from swashplate.equations import graph
-from swashplate.equations.code_generation.functions import Function
+from swashplate.equations.code_generation.functions import Function, fresh_name
 from swashplate.equations.code_generation.printing import (
     BRANCHING,
     PYTHON,
@@ -78,6 +78,8 @@ class SampleCode:
         Signals that other parts or links need.
     functions : dict of str to Function
         Generated functions that what was printed calls.
+    records, before : dict of str to str
+        Names of a signal's record, and of its value before that.
     """
 
     def __init__(
@@ -89,7 +91,11 @@ class SampleCode:
     ) -> None:
         self.model = model
         self.signals = tuple(signals)
-        used_names = {*RESERVED, *self.signals, *(f"{signal}_before" for signal in self.signals)}
+        used_names = {*RESERVED}
+        self.records = {signal: fresh_name(signal, used_names) for signal in self.signals}
+        self.before = {
+            signal: fresh_name(f"{signal}_before", used_names) for signal in self.signals
+        }
         self.parts = [
             PartCode(model, index, signals, options_of_part, used_names)
             for index, options_of_part in enumerate(options)
@@ -247,6 +253,10 @@ class SampleCode:
         ]
         return lines
 
+    def past(self, signal: str, back: str) -> str:
+        """A signal some samples before sample ``n`` of a march."""
+        return f"{self.records[signal]}[n - ({back})] if n >= {back} else {self.before[signal]}"
+
     def body(
         self,
         part: PartCode,
@@ -385,7 +395,10 @@ def march_source(
     parts = sample_code.used
     lines, saved, samples = ["last = first + count"], list[str](), list[list[str]]()
     for index, signal in enumerate(sample_code.signals):
-        lines += [f"{signal} = records[{index}]", f"{signal}_before = before[{index}]"]
+        lines += [
+            f"{sample_code.records[signal]} = records[{index}]",
+            f"{sample_code.before[signal]} = before[{index}]",
+        ]
     lines += ["everything = worst_margin[1] != 0.0"] if further else []
     for part in parts:
         ahead, available = sample_code.ahead(part, sample_code.ends[part.part])
@@ -394,9 +407,7 @@ def march_source(
         lines += [*sample_code.delays(part), *ahead, *states.load]
         saved += states.save
         fetched = sample_code.fetched(
-            part,
-            lambda signal, back: f"{signal}[n - ({back})] if n >= {back} else {signal}_before",
-            lambda signal: f"{signal}[n]",
+            part, sample_code.past, lambda signal: f"{sample_code.records[signal]}[n]"
         )
         inner = [*fetched, *sample.lines]
         if sample.margin:

@@ -10,7 +10,7 @@ from swashplate.equations import graph
 from swashplate.equations.code_generation.functions import fresh_name
 from swashplate.equations.code_generation.tracing import Trace, callee_of
 from swashplate.equations.code_generation.values import Flag, Tuple, Value, fixed, leaves, rebuilt
-from swashplate.equations.fields import floats_of
+from swashplate.equations.fields import defaults_of, floats_of
 from swashplate.equations.graph import LEAVES, Node, names_in, ordered
 from swashplate.equations.language import is_named_tuple, plain
 from swashplate.equations.model import (
@@ -99,6 +99,10 @@ class PartCode:
                 self.delay_samples(tap),
             }
         part_model = self.part_model
+        self.used_names |= {f"x_{part_model.tap(name).signal}" for name in part_model.input_types}
+        self.used_names |= {
+            self.source(source) for link in model.links.values() for source in link.sources
+        }
         self.p = _named(part_model.parameters, self._fresh("p"))
         self.given = (
             _named(part_model.given, self._fresh("given")) if part_model.given else Tuple(None, ())
@@ -272,9 +276,9 @@ class PartCode:
         if start == "steady" and part_model.settled is not None:
             return self._call(part_model.settled)
         if part_model.rest is None:
-            defaults = part_model.state._field_defaults
-            first = [defaults.get(path.split(".")[0], 0.0) for path, _ in leaves(self.state)]
-            return rebuilt(self.state, (graph.number(float(number)) for number in first))
+            first = defaults_of(part_model.state)
+            numbers = (first.get(path, 0.0) for path, _ in leaves(self.state))
+            return rebuilt(self.state, (graph.number(float(number)) for number in numbers))
         inputs: dict[str, Value] = {}
         for name in part_model.input_types:
             if name in part_model.defaults:

@@ -19,6 +19,7 @@ from swashplate.equations.code_generation.machine_code import code_of_function
 from swashplate.equations.declaration import JIT_OFF, Replacements, inlined, interpreted
 from swashplate.equations.fields import (
     check_mapping,
+    defaults_of,
     floats_of,
     is_real,
     numbers_of,
@@ -35,6 +36,7 @@ from swashplate.equations.marching.kernels import (
 )
 from swashplate.equations.marching.march import march_source
 from swashplate.equations.marching.part_code import SignalId, taps_of
+from swashplate.equations.marching.renewal import renew
 from swashplate.equations.model import (
     Link,
     Model,
@@ -262,9 +264,8 @@ class Instance:
                 f"{self.name}: {part.name} has no equation for its steady state ('settled'), so "
                 "it cannot start settled."
             )
-        defaults = part.state._field_defaults
-        empty = [path for path in floats_of(part.state) if path.split(".")[0] not in defaults]
-        return tuple_from(part.state, dict.fromkeys(empty, 0.0))
+        zeros = dict.fromkeys(floats_of(part.state), 0.0)
+        return tuple_from(part.state, zeros | defaults_of(part.state))
 
     def _called(
         self, part: Model, equation: Callable[..., Any], arguments: Mapping[str, Any]
@@ -318,6 +319,7 @@ def instance_of(model: Model, p: Any, *, options: Any = None, given: Any = None)
     ParameterError
         If a parameter lies beyond the range of its `Definition`.
     """
+    renew(model)
     parts = []
     for part in model.parts:
         numbers = PartNumbers(p, options, given)

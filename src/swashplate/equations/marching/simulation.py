@@ -73,9 +73,16 @@ class MarchOutputs(NamedTuple):
 
 
 @lru_cache(maxsize=256)
-def march_outputs(model: Model, first_signals: tuple[str, ...]) -> MarchOutputs:
-    """What the marches of a model compute; the first one all signals if none is named."""
+def march_outputs(
+    model: Model, first_signals: tuple[str, ...], *, states: bool = True
+) -> MarchOutputs:
+    """What the marches of a model compute; the first one all signals if none is named.
+
+    Numbers of the state are among them with `states`.
+    """
     names = model.every_signal
+    if not states:
+        names = tuple(name for name in names if output_of(model, name)[0].kind != "state")
     first = {name: output_of(model, name)[0] for name in first_signals or names}
     further = {name: output_of(model, name)[0] for name in names if name not in first}
     limited = dict.fromkeys(part for part, _ in model.limit_bits.values())
@@ -118,6 +125,8 @@ class Run(Tabular):
     """Signals that `plot` shows unless others are named; all of them if none is here."""
     first_signals: ClassVar[tuple[str, ...]] = ()
     """Signals that the first march computes; all of them if none is named."""
+    has_states: ClassVar[bool] = True
+    """Whether numbers of the state are signals, too."""
 
     def marched(self) -> Self:
         """The run with its first march done."""
@@ -126,7 +135,7 @@ class Run(Tabular):
 
     def _march(self, *, everything: bool = False) -> None:
         """Compute the signals of the first march, or all of them and the limits."""
-        outputs = march_outputs(self.instance.model, self.first_signals)
+        outputs = march_outputs(self.instance.model, self.first_signals, states=self.has_states)
         records = {name: record.values for name, record in self.records.items()}
         table = marched(
             self.instance,

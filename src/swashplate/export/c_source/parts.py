@@ -12,7 +12,14 @@ from inspect import getsource
 from types import MappingProxyType
 from typing import Any, get_type_hints
 
-from swashplate.equations import Equation, Parsed, SignalSource, arguments_of, graph
+from swashplate.equations import (
+    Equation,
+    Parsed,
+    SignalSource,
+    arguments_of,
+    defaults_of,
+    graph,
+)
 from swashplate.equations.code_generation import (
     FEW,
     FUNCTIONS,
@@ -340,13 +347,11 @@ class PartInC:
             available = {**self.places(), **c_texts}
             lines = self.body(trace, results, available, named, pointers={"next": pointer})
         else:
-            defaults = self.part_model.state._field_defaults
+            defaults = defaults_of(self.part_model.state)
             lines = [pointer] if self.part_model.state._fields else []
             for path, _ in leaves(self.part.state):
-                first = defaults.get(path.split(".")[0], 0.0)
-                for field in path.split(".")[1:]:
-                    first = getattr(first, field, 0.0)
-                lines.append(f"next->{path_of(path)} = {c_literal(float(first))};")
+                first = defaults.get(path, 0.0)
+                lines.append(f"next->{path_of(path)} = {c_literal(first)};")
         how = "settled under its inputs" if settled else "at rest"
         return c_function(
             f"The state of the {self.part_model.name} {how}.", head, lines or ["(void)m;"]
