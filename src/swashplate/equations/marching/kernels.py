@@ -23,7 +23,7 @@ from swashplate.equations.code_generation.lowering import (
     lowers,
     number,
 )
-from swashplate.equations.code_generation.machine_code import code_of_function
+from swashplate.equations.code_generation.machine_code import address_of, code_of_function
 from swashplate.equations.declaration import JIT_OFF
 
 KERNEL_ARGUMENTS = (
@@ -87,7 +87,7 @@ def pointers(arrays: tuple[NDArray[Any], ...]) -> Any:
     """What compiled code is given of several arrays, which must be kept as well."""
     if JIT_OFF:
         return arrays
-    return np.array([array.ctypes.data for array in arrays], dtype=np.int64)
+    return np.array([*map(address_of, arrays)], dtype=np.int64)
 
 
 class Struct(Generic[Fields]):
@@ -105,7 +105,7 @@ class Struct(Generic[Fields]):
     @cached_property
     def address(self) -> Any:
         """What `fields_of` is given."""
-        return self if self._words is None else self._words.ctypes.data
+        return self if self._words is None else address_of(self._words)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Struct, (self.fields,)
