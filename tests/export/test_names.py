@@ -136,7 +136,7 @@ def numbers_of(module: ModuleType) -> Any:
 USED = ("h", "state", "p", "given", "options", "signals", "limits")
 MACROS = ("NASTY_LINE",)
 LEFT_OUT = {
-    "input": ("inputs", "before", "count", *USED),
+    "input": ("inputs", *USED),
     "local": USED,
     "option": (*MACROS, "bool"),
     **dict.fromkeys(("parameter", "state", "signal", "limit"), MACROS),
