@@ -279,6 +279,13 @@ def whole_interface(model: Any) -> None:
             broken[at] = bad
             model.init(broken)
     model.init(values, 3)
+    statuses = [
+        model.step(1.0), model.correct(1.0), model.settle(1.0), model.reset(), model.update(),
+        model.set(0, 1.0), model.set_input(0, 1.0), model.clear_input(0),
+        model.set_option(0, True), model.set_step(0.001),
+    ]  # fmt: skip
+    assert statuses == 10 * [5]  # SWP_NOT_READY
+    assert not model.valid()
     # a search for the steady state that ends at an end of its bracket: as with leakage, and hardly
     # any supply pressure
     flags = 1 + model.number("", "pump_speed") + 1

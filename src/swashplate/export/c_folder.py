@@ -291,7 +291,7 @@ def c(
         "type": exported.type,
         "p": exported.prefix,
         "P": exported.prefix.upper(),
-        "output": c_name(exported.names[-1 if not isinstance(what, Drive) else _SPEED]),
+        "output": exported.constants[""][exported.names[-1 if isinstance(what, Model) else _SPEED]],
         "commands": "".join(", 9.0" if s == "voltage" else ", 1.0" for s in exported.signals),
         "step": c_literal(step),
         "version": __version__,

@@ -14,7 +14,7 @@ from typing import Any, Literal, NamedTuple
 
 from swashplate.drive import CHAIN, MEASURED, MOTOR
 from swashplate.equations import Definition, declared_by
-from swashplate.equations.code_generation import c_literal, c_name
+from swashplate.equations.code_generation import c_literal
 from swashplate.export.c_source import Exported
 
 Causality = Literal["input", "output", "parameter", "independent"]
@@ -242,7 +242,8 @@ def c_header(exported: Exported, layout: int, references: References) -> str:
     signals = exported.signals
     arguments = "".join(f", (u)[{index}]" for index in range(len(signals)))
     defaults = defaults_of(exported)
-    defaulted = ", ".join(f"SWP_PARAMETER_{c_name(defaults[name])}" for name in exported.measured)
+    constants = exported.constants["PARAMETER_"]
+    defaulted = ", ".join(constants[defaults[name]] for name in exported.measured)
     names = ", ".join(f'"{name}"' for name in (*signals, *exported.measured))
     bounds = ", ".join(c_literal(exported.bounds.get(name, 0.0)) for name in signals)
     pairs = [exported.ranges.get(name, (-inf, inf)) for name in (*signals, *exported.measured)]

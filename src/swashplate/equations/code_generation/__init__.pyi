@@ -14,6 +14,7 @@ from .printing_c import HELPERS as HELPERS
 from .printing_c import C as C
 from .printing_c import Loops as Loops
 from .printing_c import as_double as as_double
+from .printing_c import ascii_name as ascii_name
 from .printing_c import c_comment as c_comment
 from .printing_c import c_function as c_function
 from .printing_c import c_literal as c_literal

@@ -26,17 +26,46 @@ WIDTH = 100
 TYPES = {"float": "double", "int": "long long", "bool": "bool"}
 """Types of values by their kinds."""
 ZEROS = {"float": "0.0", "int": "0", "bool": "false"}
+MATH_H = """
+acos acosh asin asinh atan atan2 atanh cbrt ceil copysign cos cosh erf erfc exp exp2 expm1 fabs fdim
+floor fma fmax fmin fmod frexp hypot ilogb ldexp lgamma llrint llround log log10 log1p log2 logb
+lrint lround modf nan nearbyint nextafter nexttoward pow remainder remquo rint round scalbln scalbn
+sin sinh sqrt tan tanh tgamma trunc
+""".split()  # noqa: SIM905
+"""Functions of C99's math.h, each with its twins for float and long double."""
+FLOAT_H = """
+DIG EPSILON MANT_DIG MAX MAX_10_EXP MAX_EXP MIN MIN_10_EXP MIN_EXP HAS_SUBNORM TRUE_MIN DECIMAL_DIG
+NORM_MAX
+""".split()  # noqa: SIM905
+"""Macros of float.h, each for float, double and long double."""
+CPP = """
+alignas alignof and and_eq asm atomic_cancel atomic_commit atomic_noexcept bitand bitor catch
+char8_t char16_t char32_t class co_await co_return co_yield compl concept const_cast consteval
+constexpr constinit decltype delete dynamic_cast explicit export friend mutable namespace new
+noexcept not not_eq nullptr operator or or_eq private protected public reflexpr reinterpret_cast
+requires static_assert static_cast synchronized template this thread_local throw try typeid typename
+typeof using virtual wchar_t xor xor_eq
+""".split()  # noqa: SIM905
+"""Words of C++ beside those of C: a header may be read as C++."""
 WORDS = set(
     """
 auto break case char const continue default do double else enum extern float for goto if inline int
 long register restrict return short signed sizeof static struct switch typedef union unsigned void
 volatile while bool true false NULL INFINITY NAN size_t offsetof main errno memcpy memset strcmp
+memchr memcmp memmove strcat strchr strcoll strcpy strcspn strerror strlen strncat strncmp strncpy
+strpbrk strrchr strspn strstr strtok strxfrm ptrdiff_t max_align_t float_t double_t math_errhandling
+HUGE_VAL HUGE_VALF HUGE_VALL MATH_ERRNO MATH_ERREXCEPT FP_NAN FP_INFINITE FP_ZERO FP_SUBNORMAL
+FP_NORMAL FP_FAST_FMA FP_FAST_FMAF FP_FAST_FMAL FP_ILOGB0 FP_ILOGBNAN FLT_RADIX FLT_ROUNDS
+FLT_EVAL_METHOD DECIMAL_DIG fpclassify isnormal isgreater isgreaterequal isless islessequal
+islessgreater isunordered
 isfinite isnan isinf signbit lesser_of greater_of whole_power whole_number fabs fmod pow ldexp frexp
 modf ceil round trunc rint cosh sinh tanh acosh asinh atanh cbrt log10 log2 log1p exp2 expm1 erf
 erfc gamma lgamma tgamma fmin fmax fdim fma j0 j1 jn y0 y1 yn index time signal div abs linux unix
 """.split()  # noqa: SIM905
-) | set(MATH.values())
-"""Names that C or its library keeps for itself."""
+)
+WORDS |= {*MATH.values(), *CPP, *(f"{name}{kind}" for name in MATH_H for kind in ("", "f", "l"))}
+WORDS |= {f"{kind}_{name}" for name in FLOAT_H for kind in ("FLT", "DBL", "LDBL")}
+"""Names that C, its library or C++ keeps for itself."""
 BREAKS = re.compile(r"[,;\"] | (?=[?:+/=*-] |&& |\|\| )|\{(?=\.)")
 """Where a long line of C may end."""
 _LEVELS = (("if",), ("or",), ("and",), ("==", "!="), ("<", "<=", ">", ">="), ("+", "-"), ("*", "/"))
@@ -76,12 +105,17 @@ def filled(text: str, replacements: Mapping[str, Any]) -> str:
     return text
 
 
-def c_name(name: str) -> str:
-    """A name of Python's as one of C's."""
-    plain_name = "".join(
+def ascii_name(name: str) -> str:
+    """A name of Python's in the letters of C."""
+    return "".join(
         character if character.isascii() else f"u{ord(character):04x}" for character in name
     )
-    return f"{plain_name}_" if plain_name in WORDS else plain_name
+
+
+def c_name(name: str) -> str:
+    """A name of Python's as one of C's and C++'s; two names stay two."""
+    letters = ascii_name(name)
+    return f"{letters}_" if letters.rstrip("_") in WORDS else letters
 
 
 def c_literal(value: float) -> str:
@@ -212,6 +246,8 @@ class C(Language):
         if op == "neg":
             text = grouped(operands[0], level)
             return f"-({text})" if text.startswith("-") else f"-{text}", level
+        if op == "abs" and node.args[0].kind == "bool":
+            return operands[0]
         doubles = [as_double(*pair) for pair in zip(node.args, operands, strict=True)]
         if op == "**":
             (base,) = doubles
@@ -535,8 +571,8 @@ def scalar_function(
 
 
 def mentions(text: str, name: str) -> bool:
-    """Whether a name stands in a text."""
-    return re.search(rf"\b{re.escape(name)}\b", text) is not None
+    """Whether a name stands in a text of C, not as a member of something else."""
+    return re.search(rf"(?<!->)(?<!\.)\b{re.escape(name)}\b", text) is not None
 
 
 def without_comments(text: str) -> str:

@@ -2,14 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import inf
 
 from swashplate.equations import Equation, Model, declared_by, floats_of
-from swashplate.equations.code_generation import c_name
+from swashplate.equations.code_generation import ascii_name, c_name, fresh_name
 from swashplate.equations.marching import TapOf, taps_of
+from swashplate.export.c_source.names import (
+    ARGUMENTS,
+    CONSTANTS,
+    FILES,
+    FUNCTIONS,
+    MEMBERS,
+    PART_MEMBERS,
+    PUBLIC,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,29 +54,84 @@ class Exported:
     @property
     def file(self) -> str:
         """Name of header and source."""
-        is_named_after_model = self.prefix == c_name(self.model.name)
-        return self.prefix if is_named_after_model else f"swashplate_{self.model.name}"
+        name = c_name(self.model.name)
+        if self.prefix == name and name.lower() not in FILES.split():
+            return name
+        return f"swashplate_{name}"
 
     @property
     def type(self) -> str:
         """Name of the struct."""
-        is_named_after_model = self.prefix == c_name(self.model.name)
-        return f"{self.prefix}_{'model' if is_named_after_model else self.model.name}"
+        name = c_name(self.model.name)
+        is_free = name != self.prefix and f"{self.prefix}_{name}" not in self.public
+        return f"{self.prefix}_{name if is_free else 'model'}"
 
     # -- names -------------------------------------------------------------------------------------
 
     @cached_property
+    def public(self) -> set[str]:
+        """Names of the functions and structs of its interface."""
+        return {f"{self.prefix}_{word}" for word in PUBLIC.split()}
+
+    @cached_property
+    def constants(self) -> dict[str, dict[str, str]]:
+        """By kind, such as ``PARAMETER_``, and by name: constants that stand for its numbers.
+
+        The kind of outputs is empty.
+        """
+        capitals = self.prefix.upper()
+        used_names = {*self.public, *self._statuses}
+        names_of_kind = {
+            "PARAMETER_": [name for _, _, name in self.named("parameters")],
+            "INPUT_": self.measured,
+            "OPTION_": [name for _, name in self.settable],
+            "LIMIT_": [name for _, name in self.limits],
+            "": self.names,
+        }
+        return {
+            kind: {
+                name: fresh_name(f"{capitals}_{kind}{_flat(name)}", used_names)
+                for name in dict.fromkeys(names)
+            }
+            for kind, names in names_of_kind.items()
+        }
+
+    @property
+    def _statuses(self) -> set[str]:
+        return {f"{self.prefix.upper()}_{word}" for word in CONSTANTS.split()}
+
+    @cached_property
+    def reserved(self) -> set[str]:
+        """Names that no function, argument or variable may have."""
+        constants = {name for names in self.constants.values() for name in names.values()}
+        return {*FUNCTIONS.split(), *self.public, self.type, *self._statuses, *constants}
+
+    @cached_property
+    def arguments(self) -> dict[str, str]:
+        """What the inputs of a step are called, by their signals."""
+        used_names = {*ARGUMENTS.split(), *self.reserved}
+        return {signal: fresh_name(c_name(signal), used_names) for signal in self.signals}
+
+    @cached_property
     def members(self) -> list[str]:
         """Name of each part within the structs."""
-        return [c_name(part.name) for part in self.model.parts]
+        used_names = {*MEMBERS.split()}
+        return [_fresh_member(part.name, PART_MEMBERS, used_names) for part in self.model.parts]
+
+    @cached_property
+    def integrals(self) -> dict[str, str]:
+        """Name of each integral within the structs."""
+        used_names = {*MEMBERS.split(), *self.members}
+        return {
+            name: _fresh_member(name, ("", "_rate"), used_names) for name in self.model.integrals
+        }
 
     def named(self, kind: str) -> list[tuple[int, str, str]]:
         """Part, path and name of every number of its parameters or givens."""
         numbers_named = []
         for part, path in self.model.places(kind):
             full = f"{self.model.prefix(part)}{path}"
-            name = self.parameters.get(full) or full.replace(".", "_")
-            numbers_named.append((part, path, c_name(name)))
+            numbers_named.append((part, path, _flat(self.parameters.get(full) or full)))
         return numbers_named
 
     @cached_property
@@ -164,3 +228,17 @@ class Exported:
     def widest(self) -> int:
         """Samples of the widest window."""
         return max([tap.tap.samples for tap in self.taps], default=3)
+
+
+def _flat(name: str) -> str:
+    """A path as a name of its own."""
+    return ascii_name(name.replace(".", "_"))
+
+
+def _fresh_member(name: str, endings: Iterable[str], used_names: set[str]) -> str:
+    """Name of members that differ in their endings, none of which is taken."""
+    member = c_name(name)
+    while any(f"{member}{ending}" in used_names for ending in endings):
+        member += "_"
+    used_names |= {f"{member}{ending}" for ending in endings}
+    return member

@@ -34,6 +34,7 @@ from swashplate.equations.code_generation import (
     c_literal,
     c_name,
     first_line,
+    fresh_name,
     function_source,
 )
 from swashplate.equations.graph import Node, names_in
@@ -127,14 +128,16 @@ class Writer:
         """A sample of each part."""
         return "\n\n".join(part.sample() for part in self.parts)
 
-    def _windows(self, part: PartInC, *, constant: bool) -> tuple[list[str], list[str]]:
+    def _windows(
+        self, part: PartInC, used_names: set[str], *, constant: bool
+    ) -> tuple[list[str], list[str]]:
         """Declarations of what a part sees through its taps, and their names."""
         lines, names = [], []
         for tap in part.part.taps:
             line = self.exported.lines.index(tap.tap.signal)
             seen = f"read_window(m, {tap.number}, {line}, {tap.tap.samples})"
             text = f"constant_window(m->before_record[{line}])" if constant else seen
-            name = f"{part.member}_{c_name(tap.input)}"
+            name = fresh_name(f"{part.member}_{c_name(tap.input)}", used_names)
             lines.append(f"const struct {self.exported.prefix}_window {name} = {text};")
             names.append(f"&{name}")
         return lines, names
@@ -142,16 +145,17 @@ class Writer:
     def _sample(self) -> str:
         """One sample of the whole model."""
         body: list[str] = []
+        used_names = {*self.loops.used_names}
         margins = any(part.part.margin is not None for part in self.parts)
         for part in self.parts:
-            lines, windows = self._windows(part, constant=False)
+            lines, windows = self._windows(part, used_names, constant=False)
             arguments = ["m", f"&m->now.{part.member}", *windows]
             call = f"{part.names['sample']}({', '.join(arguments)})"
             holds = part.part.margin is not None
             body += [*lines, f"good = {call} && good;" if holds else f"{call};"]
         for name, signal in self.model.integrals.items():
             rate = self.output(signal)
-            integral = c_name(name)
+            integral = self.exported.integrals[name]
             body.append(f"m->now.{integral}_rate = {rate};")
             rates = f"(m->before.{integral}_rate + m->now.{integral}_rate)"
             grown = f"m->before.{integral} + 0.5 * m->step * {rates}"
@@ -171,12 +175,13 @@ class Writer:
         word = "settled" if settled else "rest"
         texts = [part.start(settled) for part in self.parts]
         body: list[str] = []
+        used_names = {*self.loops.used_names}
         for index, part in enumerate(self.parts):
             body.append(f"{part.names[word]}(m);")
             later = "\n".join(texts[index + 1 :])
             if f"m->{part.member}_signals" in later or f"m->before.{part.member}." in later:
-                lines, windows = self._windows(part, constant=True)
-                following = f"{part.member}_next"
+                lines, windows = self._windows(part, used_names, constant=True)
+                following = fresh_name(f"{part.member}_next", used_names)
                 arguments = ", ".join(["m", f"&{following}", *windows])
                 body += [
                     f"m->before.{part.member} = m->now.{part.member};",
@@ -290,7 +295,7 @@ class Writer:
     def output(self, name: str) -> str:
         """Where an output is read."""
         if name in self.model.integrals:
-            return f"m->now.{c_name(name)}"
+            return f"m->now.{self.exported.integrals[name]}"
         stored, _ = output_of(self.model, name)
         if stored.kind == "link":
             return self._link(self.model.links[stored.path])

@@ -42,7 +42,7 @@ class _Interface:
     def __init__(self, exported: Exported) -> None:
         self.exported, self.model, self.writer = exported, exported.model, writer_of(exported)
         self.P = self.writer.P
-        self.arguments = [c_name(name) for name in exported.signals]
+        self.arguments = [*exported.arguments.values()]
         self.rows, self.numbers = list(self.writer.ranges()), self.writer.values()
 
     def filled(self, text: str, **further: str) -> str:
@@ -72,27 +72,28 @@ class _Interface:
 
     def header(self) -> str:
         exported, P, writer = self.exported, self.P, self.writer
+        constants = exported.constants
         outputs = {name: writer.output_note(name) for name in exported.names}
         parameters = {name: noted(definition) for name, _, definition in self.rows}
         inputs = {name: self.input_note(name) for name in exported.measured}
         options = {name: writer.option_note(part, name) for part, name in exported.settable}
         limits = {name: writer.limit_note(part, name) for part, name in exported.limits}
         enums = [
-            _enum("Outputs", f"{P}_", outputs, f"{P}_OUTPUTS"),
-            _enum("Parameters", f"{P}_PARAMETER_", parameters, f"{P}_PARAMETERS"),
+            _enum("Outputs", constants[""], outputs, f"{P}_OUTPUTS"),
+            _enum("Parameters", constants["PARAMETER_"], parameters, f"{P}_PARAMETERS"),
             _enum(
                 "Inputs beside those of a step, for which parameters stand",
-                f"{P}_INPUT_",
+                constants["INPUT_"],
                 inputs,
                 f"{P}_INPUTS",
             ),
             _enum(
                 "Options; terms that belong to a parameter come on with it",
-                f"{P}_OPTION_",
+                constants["OPTION_"],
                 options,
                 f"{P}_OPTIONS",
             ),
-            _enum("Limits, as bits", f"{P}_LIMIT_", limits, "", bits=True),
+            _enum("Limits, as bits", constants["LIMIT_"], limits, "", bits=True),
         ]
         structs = [text for _, text in self.writer.structs.texts.values()]
         structs += [*self.writer.constants, self.struct()]
@@ -138,8 +139,8 @@ class _Interface:
         lines = [f"struct {exported.prefix}_memory {{ /* what changes from sample to sample */"]
         for member, part_tags in zip(exported.members, tags, strict=True):
             lines.append(f"    struct {part_tags['state']} {member};")
-        for name in self.model.integrals:
-            lines += [f"    double {c_name(name)};", f"    double {c_name(name)}_rate;"]
+        for name in exported.integrals.values():
+            lines += [f"    double {name};", f"    double {name}_rate;"]
         lines += ["    bool started; /* a sample was taken */", "};", ""]
         lines += [
             f"struct {exported.prefix}_measured {{",
@@ -227,7 +228,7 @@ class _Interface:
     def before_all(self) -> str:
         lines = [f"m->inputs.{name} = {name};" for name in self.arguments]
         for row, signal in enumerate(self.exported.lines):
-            initial = c_name(signal) if signal in self.exported.signals else "0.0"
+            initial = self.exported.arguments.get(signal, "0.0")
             lines += [
                 f"m->before_record[{row}] = {initial};",
                 f"for (int i = 0; i < {self.P}_LINE; i++) {{",
@@ -327,7 +328,7 @@ class _Interface:
             test = " || ".join(f"m->{member} != 0.0" for member in members)
             line = f"m->{member}_options.{c_name(option)} = {test};"
             cases.setdefault(line, []).extend(
-                f"{self.P}_PARAMETER_{path_name(name_of[member])}" for member in members
+                self.exported.constants["PARAMETER_"][name_of[member]] for member in members
             )
         description = "Switch a term on if its parameter is not 0, off if it is 0."
         head = f"static void switch_terms({self.exported.type} *m, int parameter)"
@@ -352,22 +353,18 @@ class _Interface:
         lines = []
         for name in self.exported.names:
             read = self.writer.output(name)
-            lines += [f"    case {self.P}_{path_name(name)}:", f"        return {read};"]
+            lines += [f"    case {self.exported.constants[''][name]}:", f"        return {read};"]
         return "".join(f"{line}\n" for line in lines)
 
     def limits(self) -> str:
         if not self.exported.limits:
             return _body(["(void)m;", "return 0u;"])
         lines = ["unsigned bits = 0u;"]
+        bit_of = self.exported.constants["LIMIT_"]
         for part_index, name in self.exported.limits:
             member = f"m->{self.exported.members[part_index]}_limits.{c_name(name)}"
-            lines.append(f"bits |= {member} ? (unsigned){self.P}_LIMIT_{c_name(name)} : 0u;")
+            lines.append(f"bits |= {member} ? (unsigned){bit_of[name]} : 0u;")
         return _body([*lines, "return bits;"])
-
-
-def path_name(name: str) -> str:
-    """A signal's name as part of one in an enum."""
-    return c_name(name.replace(".", "_"))
 
 
 def _body(lines: Sequence[str]) -> str:
@@ -375,15 +372,20 @@ def _body(lines: Sequence[str]) -> str:
 
 
 def _enum(
-    description: str, prefix: str, notes: Mapping[str, str], count: str, *, bits: bool = False
+    description: str,
+    constants: Mapping[str, str],
+    notes: Mapping[str, str],
+    count: str,
+    *,
+    bits: bool = False,
 ) -> str:
     """An enum with a constant for each name, and what is said of it."""
     if not notes and not count:
         return ""
     lines = [f"/* {description}. */", "enum {"]
     for index, (name, note) in enumerate(notes.items()):
-        constant = 1 << index if bits else index
+        number = 1 << index if bits else index
         comma = "," if count or index + 1 < len(notes) else ""
-        lines += with_comment(f"{prefix}{path_name(name)} = {constant}{comma}", note)
+        lines += with_comment(f"{constants[name]} = {number}{comma}", note)
     lines += [f"    {count} = {len(notes)}"] if count else []
     return "\n".join([*lines, "};"])

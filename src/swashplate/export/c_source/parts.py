@@ -296,7 +296,7 @@ class PartInC:
             if name in self.part_model.taps:
                 text = before_record[signal] if start else self._looked(node, c_texts)
             if default is not None:
-                is_set = f"m->inputs.measured[{layout.P}_INPUT_{c_name(signal)}].given"
+                is_set = f"m->inputs.measured[{layout.exported.constants['INPUT_'][signal]}].given"
                 text = f"{is_set} ? {text} : p->{path_of(default)}"
             named[node] = c_name(name), text
         return c_texts, named
@@ -330,7 +330,7 @@ class PartInC:
         part = self.part_model.name
         description = f"A sample of the {part}: what is known at it, and the state at the next."
         lines = [*(f"(void){name};" for name in unused), *lines]
-        return c_function(description, head, lines if "m->" in text else ["(void)m;", *lines])
+        return c_function(description, head, lines if mentions(text, "m") else ["(void)m;", *lines])
 
     def start(self, settled: bool) -> str:
         """The state at the first sample."""

@@ -23,7 +23,7 @@ int main(void)
             return status;
         }
         if (n % every == 0) {
-            printf("%8.4f %.9g\n", (double)n * step, @p@_output(&model, @P@_@output@));
+            printf("%8.4f %.9g\n", (double)n * step, @p@_output(&model, @output@));
         }
     }
     return 0;
