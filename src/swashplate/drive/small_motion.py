@@ -20,6 +20,7 @@ from swashplate.equations import Instance, interpreted
 from swashplate.equations.marching import SOURCE_RATE, called
 from swashplate.linear import LinearModel, Matrices, linearize
 from swashplate.models.amplifier import Card
+from swashplate.models.displacement_control import PumpOptions
 from swashplate.models.refinements import dither_factor, friction_width
 from swashplate.parameters import ParameterSet
 
@@ -135,7 +136,7 @@ def small_motion_model(
     )
     A, B, C = model.A, model.B, model.C
     states = model.states
-    names = _names(side, step, front.options)
+    names = _names(side, step, front.options, options)
     if options.friction is not None and step > 0.0:
         # the next sample knows the spool's place x and its deflection d as d e^(-h/T) - x w/x_s
         # alone, the deflection that would be left if it came back to its balance
@@ -170,18 +171,20 @@ def small_motion_model(
     )
 
 
-def _names(side: str, step: float, options: Any) -> dict[str, str]:
-    """Paths of the states that small motions can move, and what they are called."""
+def _names(side: str, step: float, options: Any, pump_options: PumpOptions) -> dict[str, str]:
+    """Paths of the states that small motions can move and that count, and what they are called."""
     ending = "_before" if step > 0.0 else ""
-    names = {
-        "pump.pressure": "stroker_pressure",
-        "pump.plate_pressure": "plate_pressure",
-        "pump.deflection": "spool_deflection",
-        "pump.torque": f"motor_torque{ending}",
-        "pump.speed": f"shaft_speed{ending}",
-        "pump.flow_speed": f"flow_speed{ending}",
-        "pump.load_torque": f"load_torque{ending}",
-    }
+    names = {"pump.pressure": "stroker_pressure"}
+    if pump_options.damping is not None:
+        names["pump.plate_pressure"] = "plate_pressure"
+    names["pump.deflection"] = "spool_deflection"
+    if pump_options.line is not None:
+        names |= {
+            "pump.torque": f"motor_torque{ending}",
+            "pump.speed": f"shaft_speed{ending}",
+            "pump.flow_speed": f"flow_speed{ending}",
+            "pump.load_torque": f"load_torque{ending}",
+        }
     if not side:
         return names
     name_before = "current_rate" if step == 0.0 or options.exact is not None else "current_before"
