@@ -80,7 +80,6 @@ def _exported(equations: tuple[Any, ...]) -> Exported:
         notes={"voltage": "joystick voltage, positive towards positive speed [V]"},
         stable={0: stable_step},
         follows={(1, "steep"): steep_stops},
-        internal=frozenset({"own"}),
         longest=LONGEST_STEP,
         free_step="exact",
     )

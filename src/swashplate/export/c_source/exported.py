@@ -44,8 +44,6 @@ class Exported:
     """By part: margin above 0 if its equations bear the step, of ``p, h, options``."""
     follows: Mapping[tuple[int, str], Equation] = field(default_factory=dict)
     """By part and option: whether it is on, of ``p``; it cannot be set."""
-    internal: frozenset[str] = frozenset()
-    """Options that belong to the equations, and are not for users."""
     longest: float = inf
     """Longest step. [s]"""
     free_step: str = ""
@@ -160,11 +158,7 @@ class Exported:
     def settable(self) -> list[tuple[int, str]]:
         """Options that do not follow from parameters."""
         follows = {*self.switches, *self.follows}
-        return [
-            option
-            for option in self.options
-            if option not in follows and option[1] not in self.internal
-        ]
+        return [option for option in self.options if option not in follows]
 
     @cached_property
     def signals(self) -> tuple[str, ...]:

@@ -118,8 +118,9 @@ class _Interface:
             note = self.writer.input_note(name)
             bound = self.exported.bounds.get(name)
             limits = "" if bound is None else f"within ±{bound:g}"
-            said = ", ".join(filter(None, (note, limits)))
-            lines += f" * `{argument}`: {comment_line(said)}\n" if said else ""
+            description = comment_line(", ".join(filter(None, (note, limits))))
+            if description:
+                lines += f" * `{argument}`: {description}\n"
         return lines
 
     def cleared(self) -> str:
