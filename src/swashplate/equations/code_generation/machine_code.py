@@ -34,6 +34,7 @@ def address_of(array: NDArray[Any]) -> int:
     if not array.size:
         return 0
     try:
+        # an array offers its buffer, which NumPy's types do not say on Python 3.11
         return addressof(c_char.from_buffer(array))  # type: ignore[arg-type]
     except TypeError:  # read-only
         return int(array.ctypes.data)

@@ -36,7 +36,6 @@ from swashplate.equations.marching.kernels import (
 )
 from swashplate.equations.marching.march import march_source
 from swashplate.equations.marching.part_code import SignalId, taps_of
-from swashplate.equations.marching.renewal import renew
 from swashplate.equations.model import (
     Link,
     Model,
@@ -46,6 +45,7 @@ from swashplate.equations.model import (
     state_paths,
     tap_delay,
 )
+from swashplate.equations.renewal import renew
 from swashplate.errors import DomainError, InputError, ParameterError
 
 Array = NDArray[np.float64]
