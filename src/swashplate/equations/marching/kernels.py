@@ -10,7 +10,7 @@ same for all: compiled once, kept on disk, as is each kernel for all models that
 from collections.abc import Callable, Container, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
-from typing import Any, Generic, TypeVar, get_args
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,6 +43,12 @@ FLOATS, INTS = "*float", "*int"
 KERNEL_KINDS = ("int", "int", "float", f"*{FLOATS}", FLOATS, INTS, *(FLOATS,) * 6)
 """Kinds of these arguments, see `lowering`."""
 
+_KINDS = {int: "int", float: "float", NDArray[np.float64]: FLOATS, NDArray[np.int64]: INTS}
+"""Kinds by annotation.
+
+Compared, not taken apart: what ``NDArray[...]`` is made of differs between versions of NumPy.
+"""
+
 Fields = TypeVar("Fields", bound=tuple[Any, ...])
 
 Kernel = Any
@@ -60,18 +66,9 @@ def routine(function: Callable[..., None]) -> Kernel:
     if JIT_OFF:
         return function
     annotations = function.__annotations__
-    kinds = tuple(_kind_of(annotations[name]) for name in annotations if name != "return")
+    kinds = tuple(_KINDS[annotations[name]] for name in annotations if name != "return")
     name = function.__name__
     return code_of_function(name, name, kinds, lambda: function_definition_of(function))
-
-
-def _kind_of(hint: Any) -> str:
-    """Kind in compiled code of what has an annotation: a number, or a pointer for an array."""
-    if hint in (int, float):
-        return str(hint.__name__)
-    _, dtype = get_args(hint)
-    (element,) = get_args(dtype)
-    return INTS if np.issubdtype(element, np.integer) else FLOATS
 
 
 def addresses(kernels: Sequence[PlannedCode], needed: Container[int]) -> Any:
@@ -115,7 +112,7 @@ class Struct(Generic[Fields]):
 def _array_types(kind: Any) -> tuple[str, ...]:
     """Of each field of a named tuple the type of an array's numbers, in NumPy's words."""
     types = {INTS: np.dtype(np.int64).str, FLOATS: np.dtype(np.float64).str}
-    return tuple(types.get(_kind_of(hint), "") for hint in kind.__annotations__.values())
+    return tuple(types.get(_KINDS[hint], "") for hint in kind.__annotations__.values())
 
 
 def _word(field: Any, kind: str) -> int:
@@ -158,7 +155,7 @@ class _Fields:
 
     def field(self, code: Lowering, name: str) -> Operand:
         """A whole number, or a pointer in the place of an array."""
-        kind = _kind_of(self.kind.__annotations__[name])
+        kind = _KINDS[self.kind.__annotations__[name]]
         word = code.load(self.words, number(self.kind._fields.index(name)))
         return word if kind == "int" else _pointer(code, kind, word)
 
