@@ -1,12 +1,14 @@
 """Files that earlier versions wrote are read as they were meant; numbers are from their text."""
 
+import json
 import shutil
+import tomllib
 from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
 
-from swashplate import Campaign, Drive
+from swashplate import Campaign, Drive, ParameterError
 from swashplate.cli import app
 from swashplate.crane import Crane
 from swashplate.identification import Identification, load_setup
@@ -22,10 +24,16 @@ def kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def done(*words: str) -> str:
+def printed(*words: str) -> str:
+    """What a command prints that succeeds."""
     result = CliRunner().invoke(app, [*words], prog_name="swashplate")
     assert result.exit_code == 0, result.output
-    return " ".join(result.stdout.split())
+    return result.stdout
+
+
+def done(*words: str) -> str:
+    """The same, its words one blank apart."""
+    return " ".join(printed(*words).split())
 
 
 def test_a_campaign() -> None:
@@ -105,3 +113,88 @@ def test_a_fit_is_made_again_from_them(kept: Path) -> None:
     again = Drive.from_toml(kept / "again" / "drive.toml")
     assert again["J"].value == pytest.approx((0.2603880540489157, 0.30959937418097794), rel=1e-3)
     assert again["Z8"].value == pytest.approx(1654888.5752785797, rel=0.01)
+
+
+# --- the number of a file's layout ----------------------------------------------------------------
+
+READERS = {
+    "campaign/campaign.toml": Campaign.from_toml,
+    "campaign/drive.toml": Drive.from_toml,
+    "campaign/setup.toml": load_setup,
+    "crane.toml": Crane.from_toml,
+    "fitted/fit.json": Identification.load,
+}
+
+
+def numbered(path: Path, number: str, rest: str = "") -> None:
+    """State the layout of a file, with something else at its beginning."""
+    text = path.read_text("utf-8").replace("format = 1\n", "")
+    if path.suffix == ".json":
+        path.write_text(text.replace("{", f'{{"schema": {number},{rest}', 1), "utf-8")
+    else:
+        path.write_text(f"schema = {number}\n{rest}\n{text}", "utf-8")
+
+
+@pytest.mark.parametrize("file", READERS)
+def test_the_first_layout_may_be_stated(kept: Path, file: str) -> None:
+    numbered(kept / file, "1")
+    READERS[file](kept / file)
+
+
+@pytest.mark.parametrize("file", READERS)
+@pytest.mark.parametrize("number", ["2", "17"])
+def test_a_newer_layout_is_refused_before_what_it_brings(
+    kept: Path, file: str, number: str
+) -> None:
+    numbered(kept / file, number, '"titel": 1,' if file.endswith("json") else "titel = 1")
+    with pytest.raises(ParameterError) as refusal:
+        READERS[file](kept / file)
+    said = str(refusal.value)
+    assert said.startswith(f"{kept / file}: schema: {number} ")
+    assert "reads up to 1: update swashplate" in said
+
+
+@pytest.mark.parametrize("file", READERS)
+@pytest.mark.parametrize("number", ['"1"', "true", "1.0", "0", "-1", "[1]"])
+def test_a_layout_is_a_whole_number(kept: Path, file: str, number: str) -> None:
+    numbered(kept / file, number)
+    with pytest.raises(ParameterError) as refusal:
+        READERS[file](kept / file)
+    assert str(refusal.value).startswith(f"{kept / file}: schema: ")
+    assert "a whole number from 1 up" in str(refusal.value)
+
+
+@pytest.mark.parametrize("file", READERS)
+def test_the_inner_name_of_the_number_is_no_entry(kept: Path, file: str) -> None:
+    numbered(kept / file, "1", '"layout": 1,' if file.endswith("json") else "layout = 1")
+    with pytest.raises(ParameterError, match="no entry 'layout'"):
+        READERS[file](kept / file)
+
+
+@pytest.mark.parametrize("file", ["campaign/drive.toml", "crane.toml"])
+def test_format_as_it_was_called_is_checked_too(kept: Path, file: str) -> None:
+    text = (kept / file).read_text("utf-8")
+    (kept / file).write_text(text.replace("format = 1\n", "format = 2\n"), "utf-8")
+    with pytest.raises(ParameterError, match="2 is the layout of a newer swashplate"):
+        READERS[file](kept / file)
+
+
+def test_whatever_is_written_states_its_layout(kept: Path) -> None:
+    Drive.from_toml("campaign/drive.toml").to_toml("written.toml")
+    Identification.load("fitted").save("saved")
+    done("rig", "hoist", "--out", "virtual", "--maneuver", "step:4,start=0.5,stop=2.5,length=4")
+    done("campaign", "init", "campaign/hoist_up.csv", "--out", "drafted.toml")
+    Path("crane.toml").write_text(printed("crane", "show", "tg3637", "--toml"), "utf-8")
+    Path("hoist.toml").write_text(printed("show", "hoist", "--toml"), "utf-8")
+    for file in (
+        "written.toml",
+        "saved/drive.toml",
+        "saved/setup.toml",
+        "virtual/campaign.toml",
+        "drafted.toml",
+        "crane.toml",
+        "hoist.toml",
+    ):
+        assert tomllib.loads(Path(file).read_text("utf-8"))["schema"] == 1, file
+    assert json.loads(Path("saved/fit.json").read_text("utf-8"))["schema"] == 1
+    assert Identification.load("saved").drive == Identification.load("fitted").drive

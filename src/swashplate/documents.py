@@ -209,8 +209,13 @@ _SHORT.maxstring = _SHORT.maxother = _SHORT.maxlong = 100
 
 
 def _sentence(errors: Sequence[ErrorDetails], model: type[BaseModel]) -> str:
-    """The first error in words; one of a misspelt entry before those that follow from it."""
-    error = next((error for error in errors if _near(error, model)), errors[0])
+    """The first error in words; one of a misspelt entry before those that follow from it.
+
+    That of the layout's number goes before all: the others may follow from it.
+    """
+    of_layout = [error for error in errors if error["loc"][-1:] == ("schema",)]
+    misspelt = (error for error in errors if _near(error, model))
+    error = of_layout[0] if of_layout else next(misspelt, errors[0])
     location = map(str, error["loc"])
     where = [part for part in location if _names_entry(part)]
     # of a list the entries count from 1, as in other sentences

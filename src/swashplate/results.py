@@ -42,7 +42,8 @@ def short(value: object) -> str:
         names = [field.name for field in fields(value) if field.repr]
     else:  # a model of pydantic's, or a named tuple
         kind: Any = type(value)
-        names = list(getattr(kind, "model_fields", ()) or getattr(kind, "_fields", ()))
+        shown = [name for name, field in getattr(kind, "model_fields", {}).items() if field.repr]
+        names = shown or list(getattr(kind, "_fields", ()))
     text = ", ".join(f"{name}={_brief(getattr(value, name))}" for name in names)
     kind = type(value).__name__
     return f"{kind}({shorten(text, LONGEST - len(kind) - 2, placeholder=' ...')})"

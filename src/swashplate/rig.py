@@ -31,6 +31,7 @@ from numpy.typing import NDArray
 from swashplate.__about__ import __version__
 from swashplate.campaign import CHANNEL_KINDS, KINDS, SIGNALS, ChannelKind
 from swashplate.drive import Drive, Simulation
+from swashplate.entries import SCHEMA
 from swashplate.equations.marching import SOURCE_RATE
 from swashplate.errors import FileError, InputError, ParameterError
 from swashplate.maneuvers import Maneuver, positive, source_tests, whole
@@ -665,7 +666,7 @@ def _contents(tests: VirtualTests) -> tuple[str, str]:
         if instruments.counter_bits:
             entry["rolls_over_at"] = 2**instruments.counter_bits
     runs = [{"file": f"{run.stem}.csv", "role": run.role} for run in tests.runs.values()]
-    content = {"title": f"Virtual tests, {tests.axis}", "virtual": True}
+    content = {"schema": SCHEMA, "title": f"Virtual tests, {tests.axis}", "virtual": True}
     truth = {"virtual": True, "axis": tests.axis, "drive": DRIVE_FILE}
     truth |= {key: getattr(tests, key) for key in ("severity", "seed", "counts_per_turn")}
     truth |= {"runs": list(tests.runs), "instruments": asdict(instruments)}

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, field_validator, model_validator
 
-from swashplate.entries import FileTable, Finite, Flag, NotNegative, Positive, Sign
+from swashplate.entries import Document, FileTable, Finite, Flag, NotNegative, Positive, Sign
 from swashplate.errors import InputError
 from swashplate.logs import TextOptions
 from swashplate.units import of_shaft, scaling, speed_unit
@@ -402,7 +402,7 @@ class RunEntry(FileTable):
         return self
 
 
-class CampaignFile(FileTable):
+class CampaignFile(Document):
     """A campaign: the tests of a machine, next to their logs."""
 
     title: str = Field("", description="For the report.")

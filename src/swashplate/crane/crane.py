@@ -10,7 +10,7 @@ from math import cos, degrees, radians, sin
 from pathlib import Path
 from typing import Annotated, Literal, NamedTuple
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import ConfigDict, Field
 
 from swashplate.analysis import InverseMap, inverse_map
 from swashplate.crane.axes import AXES, check_names
@@ -28,6 +28,7 @@ from swashplate.crane.quantities import (
 )
 from swashplate.documents import parse_toml, read_text, validated
 from swashplate.drive import Drive
+from swashplate.entries import FormerlyFormat
 from swashplate.errors import InputError, ParameterError
 from swashplate.tables import Column, Table
 
@@ -41,12 +42,11 @@ class Deck(NamedTuple):
     """From the plane of symmetry to the side. [m]"""
 
 
-class CraneFile(BaseModel):
+class CraneFile(FormerlyFormat):
     """A crane's file; drives are packaged names, or files and folders of fits next to it."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+    model_config = ConfigDict(strict=True)
 
-    format: Literal[1] = 1
     name: str
     title: str = ""
     drives: Annotated[dict[Literal["hoist", "slew", "luff"], str], Field(min_length=3)]

@@ -37,6 +37,7 @@ from swashplate.campaign import (
     turns_over,
 )
 from swashplate.documents import parse_toml, toml_key, toml_string, validated
+from swashplate.entries import SCHEMA
 from swashplate.errors import FileError, InputError
 from swashplate.logs import Log, LogColumn, open_log
 from swashplate.parameters import NEUTRAL, preset_names
@@ -193,7 +194,7 @@ def draft_campaign(
     guesses = _guesses(headers, blocks, counts_per_turn, kinds, units)
     # an axis is called like its drive, but no machine like the start for any of them
     axes = _axes(guesses, "drive" if drive in (None, NEUTRAL) else Path(drive or "").stem)
-    heading = f"title = {toml_string(title or folder.name)}"
+    heading = f"schema = {SCHEMA}\ntitle = {toml_string(title or folder.name)}"
     if title is None:
         heading += "    # guessed, the folder's name: the report's heading; machine, place, author"
     lines = [HEADER, heading, ""]

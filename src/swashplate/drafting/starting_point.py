@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from swashplate.drafting.amplifier import AmplifierGuess
 from swashplate.drafting.guess import Guess, steady_speed
 from swashplate.drive import Drive
+from swashplate.entries import SCHEMA
 from swashplate.errors import ParameterError
 from swashplate.parameters import SIDES, ParameterSet, set_of
 
@@ -38,6 +39,7 @@ SETUP_TEMPLATE = """\
 # Written by `swashplate guess` from the logs of the axis '{0}'. Parameters that they
 # show are free, within bounds about the first guess. A limit that the guess did not see
 # is also free, within wide bounds: a fit distinguishes it from a lag.
+schema = {1}
 title = "{0}, guessed"
 """
 CHAIN = """
@@ -187,7 +189,7 @@ def guessed_fit_setup(guess: Guess, start: ParameterSet | Drive) -> str:
     One stage from the command to the motion, or, if a current was measured, one of the amplifier
     and one of the pump.
     """
-    numbers, text = set_of(start).numbers, SETUP_TEMPLATE.format(guess.axis)
+    numbers, text = set_of(start).numbers, SETUP_TEMPLATE.format(guess.axis, SCHEMA)
     longest = max(2.0 * guess.delay, guess.delay + 0.1)
     delay = f"tau = {{ bounds = [0.0, {longest:.4g}] }}    # delay"
     if guess.amplifier is None:

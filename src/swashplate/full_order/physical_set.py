@@ -12,12 +12,12 @@ from difflib import get_close_matches
 from functools import cache
 from importlib.resources import files
 from math import pi, sqrt
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from swashplate.documents import parse_toml, validated
-from swashplate.entries import FileTable
+from swashplate.entries import FormerlyFormat
 from swashplate.equations import Definition, Flag, declared_by, interpreted
 from swashplate.errors import ParameterError, UnknownParameterError
 from swashplate.models import machine as equations
@@ -484,10 +484,9 @@ def _motor_leakage(owner: str, Z: Mapping[str, float], n: Mapping[str, float]) -
 # --- packaged sets --------------------------------------------------------------------------------
 
 
-class PhysicalFile(FileTable):
+class PhysicalFile(FormerlyFormat):
     """Assumptions of a packaged set; the rest follows from the parameter set of its name."""
 
-    format: Literal[1]
     name: str
     title: str
     physical: dict[str, ParameterEntry]

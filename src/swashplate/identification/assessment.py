@@ -20,7 +20,7 @@ from swashplate.__about__ import __version__
 from swashplate.campaign import Between, Campaign, Experiment
 from swashplate.documents import read_json
 from swashplate.drive import Drive
-from swashplate.entries import FileTable
+from swashplate.entries import Document, FileTable
 from swashplate.errors import DomainError, FileError, InputError, MissingFileError
 from swashplate.identification import tables
 from swashplate.identification.diagnostics.verdict import REQUIRED, Verdict, assess_fit
@@ -470,7 +470,7 @@ class StoredVerdict(FileTable):
         )
 
 
-class FitFile(FileTable):
+class FitFile(Document):
     """The whole file."""
 
     swashplate: str

@@ -9,7 +9,15 @@ from typing import TYPE_CHECKING, Annotated
 from pydantic import Field
 
 from swashplate.documents import parse_toml, read_text, validated
-from swashplate.entries import FileTable, Name, NotNegative, Number, Positive, Version
+from swashplate.entries import (
+    SCHEMA,
+    FileTable,
+    FormerlyFormat,
+    Name,
+    NotNegative,
+    Number,
+    Positive,
+)
 from swashplate.equations import Replacement, replaced_once, replacement_at, uses_equation
 from swashplate.errors import InputError, MissingFileError, ParameterError, meant
 from swashplate.parameters.definitions import Block, Definition, definitions_of, options_of
@@ -71,10 +79,9 @@ class ModelOptions(FileTable):
     """Limits that the tests never reached, by column, and how far they went. [SI]"""
 
 
-class CardFile(FileTable):
+class CardFile(FormerlyFormat):
     """A control card by itself, so that several sets can use it."""
 
-    format: Version = 1
     name: Name
     title: str = ""
     rate: Positive | None = None
@@ -82,10 +89,9 @@ class CardFile(FileTable):
     control_card: dict[str, ParameterEntry]
 
 
-class SetFile(FileTable):
+class SetFile(FormerlyFormat):
     """A whole drive; `control_card` is the name of a packaged card or the card's own table."""
 
-    format: Version = 1
     name: Name
     title: str = ""
     control_card: str | dict[str, ParameterEntry]
@@ -306,7 +312,7 @@ def dump_set(parameters: ParameterSet) -> str:
         blocks.setdefault(parameter.definition.block, {})[symbol] = _parameter_entry(parameter)
     text = document()
     text.add(comment("swashplate parameter set; SI units; [plus, minus] as magnitudes"))
-    text.add("format", 1)
+    text.add("schema", SCHEMA)
     for name in ("name", "title", "card"):
         text.add(name, getattr(parameters, name))
     for block, entries in blocks.items():

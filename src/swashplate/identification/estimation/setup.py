@@ -19,7 +19,7 @@ from pydantic import AfterValidator, Field, model_validator
 
 from swashplate.campaign import LARGEST_PRESSURE, ChannelKind, TimeWindow, WeightWindow
 from swashplate.documents import parse_toml, read_text, validated
-from swashplate.entries import FileTable, Finite, Flag, NotNegative, Positive
+from swashplate.entries import SCHEMA, Document, FileTable, Finite, Flag, NotNegative, Positive
 from swashplate.equations import is_real
 from swashplate.errors import (
     ParameterError,
@@ -211,7 +211,7 @@ class Stage(FileTable):
         return f"to extend the search, widen {where} of the stage '{self.name}' and fit again"
 
 
-class FitSetup(FileTable):
+class FitSetup(Document):
     """A fit in one stage or several, each starting from what the ones before found."""
 
     title: str = ""
@@ -350,4 +350,4 @@ def setup_text(setup: FitSetup) -> str:
         for name, entry in stage["free"].items():
             stage["free"][name] = inline_table()
             stage["free"][name].update(entry)
-    return dumps(content)
+    return dumps({"schema": SCHEMA} | content)
