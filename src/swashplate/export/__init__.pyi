@@ -11,6 +11,7 @@ from .fmi import fmu as fmu
 from .libraries import PLATFORMS as PLATFORMS
 from .libraries import WASM as WASM
 from .libraries import compiled_c as compiled_c
+from .libraries import licensed as licensed
 from .libraries import packaged as packaged
 from .libraries import wasm as wasm
 from .variable_list import Variable as Variable

@@ -53,6 +53,8 @@ LONGEST_IDENTIFIER = 63
 """Characters of a name that every C99 compiler looks at."""
 FURTHER = ("main.c", "CMakeLists.txt", "README.md")
 """Files of a folder in addition to the model's own."""
+OWN_LICENCE, THIRD_PARTY = "LICENSE.txt", "THIRD_PARTY.txt"
+"""Texts of licences: binaries and sources must be passed on with them."""
 
 
 def exported_drive(drive: Drive | None = None) -> Exported:
@@ -228,6 +230,15 @@ def source_text(name: str) -> str:
     return (files("swashplate.export") / "sources" / name).read_text("utf-8")
 
 
+def licence_texts() -> dict[str, str]:
+    """The package's licence and those of what is linked into its libraries, by a file's name.
+
+    Texts of the package, the same as those at the repository's root.
+    """
+    folder = files("swashplate.export") / "licenses"
+    return {name: (folder / name).read_text("utf-8") for name in (OWN_LICENCE, THIRD_PARTY)}
+
+
 # --- a folder -------------------------------------------------------------------------------------
 
 
@@ -256,7 +267,8 @@ def c(
     Returns
     -------
     list of Path
-        Header, source, values, an example, ``CMakeLists.txt`` and ``README.md``.
+        Header, source, values, an example, ``CMakeLists.txt``, ``README.md`` and
+        ``LICENSE.txt``.
 
     Raises
     ------
@@ -275,7 +287,7 @@ def c(
     Examples
     --------
     >>> from swashplate import Drive, export
-    >>> sorted(path.name for path in export.c(Drive.preset("hoist"), "source"))[2:]
+    >>> sorted(path.name for path in export.c(Drive.preset("hoist"), "source"))[3:]
     ['hoist_values.h', 'main.c', 'swashplate_drive.c', 'swashplate_drive.h']
     """
     prefix = c_name(what.name) if isinstance(what, Model) else "swp"
@@ -299,6 +311,8 @@ def c(
     texts[f"{name}_values.h"] = _initialiser(exported, values, name, title)
     for file in FURTHER:
         texts[file] = filled(source_text(f"folder/{file}"), placeholders)
+    # source alone: nothing of others is linked into it
+    texts[OWN_LICENCE] = licence_texts()[OWN_LICENCE]
     to = Path(folder)
     try:
         to.mkdir(parents=True, exist_ok=True)

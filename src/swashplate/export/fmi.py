@@ -24,7 +24,14 @@ from swashplate.__about__ import __version__
 from swashplate.drive import Drive
 from swashplate.equations import Model, value_at
 from swashplate.errors import FileError, InputError
-from swashplate.export.c_folder import LONGEST_STEP, Content, content_of
+from swashplate.export.c_folder import (
+    LONGEST_STEP,
+    OWN_LICENCE,
+    THIRD_PARTY,
+    Content,
+    content_of,
+    licence_texts,
+)
 from swashplate.export.c_source import feedthrough, newest
 from swashplate.export.libraries import (
     Platform,
@@ -172,6 +179,10 @@ def packed(content: Content, fmi: Version, platforms: Collection[Platform]) -> b
     }
     if fmi == "3.0":
         members["sources/buildDescription.xml"] = _build_description(name)
+    # both standards begin at license.txt and leave the other names free
+    texts = licence_texts()
+    members["documentation/licenses/license.txt"] = texts[OWN_LICENCE].encode()
+    members[f"documentation/licenses/{THIRD_PARTY}"] = texts[THIRD_PARTY].encode()
     for platform in platforms:
         library = (
             packaged(platform.library)

@@ -30,6 +30,7 @@ from swashplate.export.c_folder import (
     Content,
     content_of,
     exported_drive,
+    licence_texts,
     source_text,
 )
 from swashplate.export.c_source import Exported, interface
@@ -198,6 +199,8 @@ def packaged(name: str) -> bytes:
 VALUES_SECTION = "swashplate.values"
 """Section of a ``.wasm`` file with the drive's numbers, little-endian doubles: what
 ``WebAssembly.Module.customSections`` finds, and the function ``swp_page_init`` takes."""
+LICENSES_SECTION = "swashplate.licenses"
+"""Section with the texts of its licences."""
 
 
 def wasm(
@@ -244,11 +247,19 @@ def wasm(
     content = content_of(what, step, parameters=parameters, options=options, given=given)
     numbers = content.values.astype("<f8").tobytes()
     code = packaged(WASM) if content.packaged else compiled_wasm(sources(content))
-    name = VALUES_SECTION.encode()
-    section = bytes([len(name)]) + name + numbers
-    module = code + b"\0" + _leb128(len(section)) + section
-    write_bytes(module, path)
+    write_bytes(licensed(code) + _section(VALUES_SECTION, numbers), path)
     return Path(path)
+
+
+def licensed(module: bytes) -> bytes:
+    """WebAssembly with the texts of its licences, which a single file can carry only inside."""
+    return module + _section(LICENSES_SECTION, "\n".join(licence_texts().values()).encode())
+
+
+def _section(name: str, content: bytes) -> bytes:
+    """A custom section of WebAssembly."""
+    section = bytes([len(name)]) + name.encode() + content
+    return b"\0" + _leb128(len(section)) + section
 
 
 def _leb128(number: int) -> bytes:

@@ -25,7 +25,7 @@ from swashplate.campaign import (
 from swashplate.drive import Drive, Limit
 from swashplate.equations.marching import Record, record_of
 from swashplate.errors import InputError
-from swashplate.export import WASM, exported_drive, packaged, values_of
+from swashplate.export import WASM, exported_drive, licensed, packaged, values_of
 from swashplate.identification import at_instants, ignored_windows
 from swashplate.identification.estimation import at_rate_of, voltage_record
 from swashplate.maneuvers import Maneuver
@@ -143,7 +143,7 @@ def live_page(
     values = _parameters(parameters)
     present_label = "as fitted" if any(value["main"] for value in values) else "as it is"
     content = {
-        "wasm": b64encode(packaged(WASM)).decode("ascii"),
+        "wasm": b64encode(licensed(packaged(WASM))).decode("ascii"),
         "values": b64encode(numbers.astype("<f8").tobytes()).decode("ascii"),
         "parameters": values,
         "design_variables": _design_variables(values),
