@@ -6,7 +6,7 @@ A number in a file is a number: pydantic by itself would accept ``true`` and ``"
 
 from typing import Annotated, Any, Literal
 
-from pydantic import AliasChoices, BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 from pydantic_core import PydanticKnownError
 
 from swashplate.__about__ import __version__
@@ -78,9 +78,9 @@ class Document(FileTable):
 class FormerlyFormat(Document):
     """A file whose number of the layout was called ``format`` before all had one."""
 
-    layout: Schema = Field(
-        1,
-        validation_alias=AliasChoices("schema", "format"),
-        serialization_alias="schema",
-        repr=False,
-    )
+    @model_validator(mode="before")
+    @classmethod
+    def _renamed(cls, content: Any) -> Any:
+        if not isinstance(content, dict) or "format" not in content or "schema" in content:
+            return content
+        return {"schema" if key == "format" else key: entry for key, entry in content.items()}
