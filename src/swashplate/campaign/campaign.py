@@ -129,14 +129,14 @@ class Campaign(Result):
 
     @property
     def without_runs(self) -> str:
-        """A sentence that says why it has no experiment; empty if it has one."""
+        """Why it has no experiment, a sentence without its full stop; empty if it has one."""
         if self.experiments:
             return ""
         if not self.ignored:
-            return f"{self.path}: no run has an experiment, so nothing can be said of the machine."
+            return f"{self.path}: no run has an experiment, so nothing can be said of the machine"
         return (
             f"{self.path}: no log is read, as each run has the role 'ignore'; mend what its "
-            "comment in the file names, and give it the role 'fit' or 'validate'."
+            "comment in the file names, and give it the role 'fit' or 'validate'"
         )
 
     def table(self) -> Table:

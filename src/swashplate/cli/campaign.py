@@ -289,6 +289,8 @@ def plot(
 
     with spinner(f"Reading {path}"):
         campaign = Campaign.from_toml(path)
+    if campaign.without_runs:
+        raise InputError(f"{campaign.without_runs}.")
     channels = () if run is None else campaign[run].channels
     if (run is None) != (channel is None):
         channels_listed = f"; {run} has {', '.join(channels)}" if channels else ""
