@@ -191,9 +191,9 @@ def test_the_campaign_file_itself(tmp_path: Path) -> None:
     [
         ('unit = "mA"', 'unit = "A"    # FIXME: no unit', r"\.current\]: unit = \"A\" is"),
         (
-            'unit = "mV"',
-            '# unit = "V"    # FIXME: the header gives none',
-            r"unit = \"V\" is .*none",
+            'unit = "mA"',
+            '# unit = "A"    # FIXME: the header gives none',
+            r"unit = \"A\" is .*none",
         ),
         ("gear_ratio", "scale = 1.0    # FIXME\ngear_ratio", r"\.counts\]: scale = 1.0 is"),
         ('role = "validate"', 'role = "validate"  # FIXME', r"\[\[runs\]\]: role"),
