@@ -1,6 +1,6 @@
 """Units as people write them, and what looks like a unit and is none."""
 
-from math import isfinite
+from math import isfinite, pi
 
 import pytest
 from hypothesis import example, given, settings
@@ -53,3 +53,44 @@ def test_a_number_too_large_in_si():
 )
 def test_zeros_that_are_right(value, unit, si, number):
     assert to_si(value, unit, si, "it") == pytest.approx(number, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("unit", "si", "size"),
+    [
+        *((unit, "rad", pi / 180.0) for unit in ("Grad", "º", "Â°", "Deg", "degrés", "grados")),
+        *((unit, "rad", pi / 200.0) for unit in ("gon", "Neugrad", "gradian")),
+        *((unit, "rad", 2.0 * pi) for unit in ("U", "tr", "rev", "turns")),
+        *((unit, "rad/s", pi / 180.0) for unit in ("Grad/s", "deg s-1", "°/Sec", "dps")),
+        *((unit, "rad/s", pi / 30.0) for unit in ("t/min", "tr/mn", "U min-1", "giri/min", "Upm")),
+        *((unit, "s", 1e-3) for unit in ("mS", "MS", "mSec")),
+        ("Sec", "s", 1.0),
+        ("VDC", "V", 1.0),
+        ("Amps", "A", 1.0),
+        ("PSI", "Pa", 6894.757),
+    ],
+)
+def test_a_unit_as_people_and_loggers_write_it(unit: str, si: str, size: float) -> None:
+    assert to_si(1.0, unit, si, "x") == pytest.approx(size, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("unit", "si"),
+    [
+        *((unit, "rad") for unit in ("Prad", "Mrad", "%", "ppm", "counts", "yrad")),
+        *((unit, "rad/s") for unit in ("Mrad/s", "counts/s", "Bq", "%")),
+        *((unit, "s") for unit in ("Ms", "as", "Ps")),
+        *((unit, "V") for unit in ("MV", "GV")),
+        *((unit, "Pa") for unit in ("mPa", "Mbar")),
+        ("Mm", "m"),
+    ],
+)
+def test_a_unit_that_nobody_means_is_refused(unit: str, si: str) -> None:
+    with pytest.raises(InputError, match=f"^x .*'{unit}'.* give it in {si}"):
+        to_si(1.0, unit, si, "x")
+
+
+@pytest.mark.parametrize("unit", ["grad", "GRAD", "grade", "mgrad", "grad/s"])
+def test_an_angle_in_grad_is_refused_with_the_choices(unit: str) -> None:
+    with pytest.raises(InputError, match=r"ambiguous: give it in deg.* or gon"):
+        to_si(1.0, unit, "rad/s" if "/" in unit else "rad", "x")

@@ -20,11 +20,54 @@ def _registry() -> Any:
     return UnitRegistry()
 
 
-_A_MINUTE = frozenset(
-    "1/min min-1 min**-1 u/min upm umdr/min r/min rev/min rpm tr/min turn/min turns/min".split()  # noqa: SIM905
-)
-_A_SECOND = frozenset("1/s s-1 s**-1 u/s r/s rev/s rps tr/s turn/s turns/s".split())  # noqa: SIM905
-"""Turns a minute and a second, as nameplates and loggers write them; folded by `_folded`."""
+_TURN = r"u|umdr|umdrehung(?:en)?|r|revs?|turns?|tr|tours?|omw|omdr|varv|giri|obr|vueltas?"
+"""A turn as nameplates of several countries write it; folded by `_folded`."""
+_A_MINUTE = re.compile(rf"(?:1|t|{_TURN})?/(?:min|mn)|(?:t|{_TURN})?(?:min|mn)-1|upm|rpm")
+_A_SECOND = re.compile(rf"(?:1|t|{_TURN})/(?:s|sec|sek)|(?:t|{_TURN})?(?:s|sec|sek)-1|rps")
+"""Turns a minute and a second; "t" is a French tour."""
+_SPELLINGS = {
+    spelling: spelt
+    for spelt, spellings in {
+        "deg": "Deg DEG Degs Degree Degrees DEGREES Grad Altgrad grados gradi graden grader graus "
+        "degré degrés º ˚",
+        "deg/s": "dps DPS",
+        "gon": "Gon GON Neugrad gradian gradians",
+        "rad": "Rad RAD Radian Radians",
+        "V": "Volt Volts VOLT VOLTS VDC Vdc",
+        "mV": "mVolt mVolts millivolts mVDC",
+        "A": "Amp Amps AMP AMPS amps Ampere",
+        "mA": "mAmp mAmps milliamps",
+        "s": "Sec Secs SEC SECS Second Seconds SECONDS sek Sek Sekunde Sekunden seconde secondes",
+        "ms": "mSec MSEC Millisekunden Milliseconds",
+        "us": "uSec µSec Microseconds",
+        "ns": "nSec Nanoseconds",
+        "min": "Min MIN mn Minuten Minutes",
+        "bar": "Bar BAR",
+        "mbar": "mBar MBAR",
+        "psi": "Psi PSI psig PSIG",
+        "mm": "MM",
+    }.items()
+    for spelling in spellings.split()
+}
+"""Words that have one meaning beside what a drive's logs measure, by how Pint spells them."""
+_GRADE = re.compile(r"[a-zµ]?(?:grads?|grades?)|GRADS?", re.ASCII)
+"""Degrees of German logs in lower or upper case, gradians of everybody else's."""
+_TURN_WORD = re.compile(_TURN, re.IGNORECASE)
+_WORD = re.compile(r"[^\W\d_]+|[°º˚]")
+PLAUSIBLE = {
+    "rad": (1e-9, 2.0 * pi),
+    "rad/s": (1e-9, 2e4 * pi),
+    "s": (1e-9, 7.0 * 86400.0),
+    "V": (1e-9, 1e3),
+    "A": (1e-9, 1e3),
+    "m": (1e-9, 2e3),
+    "m/s": (1e-9, 1e3),
+    "Pa": (0.1, 1e9),
+    "Hz": (1e-6, 1e4),
+}
+"""Sizes of the smallest and of the largest unit in which a quantity is written, in SI: nanoradians
+to turns, to kHz, ns to weeks, nV and nA to kV and kA, nm to miles, to km/s, µbar to GPa. A unit
+beyond them is a word that Pint takes for a prefix: "Grad" for giga, "Ms" for mega."""
 
 
 LONGEST = 80
@@ -38,8 +81,8 @@ def _written_out(unit: str) -> str:
 
 
 def _folded(unit: str) -> str:
-    plain = unit.lower().translate(str.maketrans("⁻−¹", "--1", "^ "))
-    return plain.replace(".", "").replace("(-1)", "-1")
+    plain = unit.lower().translate(str.maketrans("⁻−¹", "--1", "^ .·*"))
+    return plain.replace("(-1)", "-1")
 
 
 def speed_unit(unit: str) -> str:
@@ -47,9 +90,59 @@ def speed_unit(unit: str) -> str:
 
     1/min, min⁻¹, U/min, r/min and tr/min are turns a minute (rpm), 1/s and r/s turns a second (Hz).
     """
-    if _folded(unit) in _A_MINUTE:
+    folded = _folded(unit)
+    if _A_MINUTE.fullmatch(folded):
         return "rpm"
-    return "Hz" if _folded(unit) in _A_SECOND else unit
+    return "Hz" if _A_SECOND.fullmatch(folded) else unit
+
+
+def _unmangled(unit: str) -> str:
+    """A unit whose UTF-8 was read as Latin-1, "Â°/s", as it was written."""
+    for encoding in ("cp1252", "latin-1"):
+        try:
+            return unit.encode(encoding).decode("utf-8")
+        except UnicodeError:
+            continue
+    return unit
+
+
+def plain_unit(unit: str) -> str:
+    """A unit in the letters of its symbols: ``"V"`` for Volts, ``"deg/s"`` for Grad/s."""
+    return _WORD.sub(lambda match: _SPELLINGS.get(match[0], match[0]), _unmangled(unit))
+
+
+def ambiguous_angle(unit: str) -> tuple[str, ...]:
+    """What a unit may stand for that counts an angle in "grad": degrees, gradians; else nothing."""
+    word = next((word for word in _WORD.findall(unit) if _GRADE.fullmatch(word)), None)
+    return () if word is None else (unit.replace(word, "deg"), unit.replace(word, "gon"))
+
+
+def _spelt(unit: str, si: str, what: str) -> str:
+    """A unit as Pint spells it, from how people and loggers write that of an SI unit.
+
+    "Grad" is a German degree; "grad" and "GRAD", a degree there and a gradian elsewhere, are
+    refused.
+    """
+    unit = _unmangled(unit)
+    of_angle = si in ("rad", "rad/s")
+    if of_angle and ambiguous_angle(unit):
+        degrees, gradians = ambiguous_angle(unit)
+        raise InputError(
+            f"{what} has the unit '{unit}', which is ambiguous: give it in {degrees} (360 deg a "
+            f"turn) or {gradians} (400 gon a turn)."
+        )
+
+    def spelt_word(match: re.Match[str]) -> str:
+        word = match[0]
+        if of_angle and _TURN_WORD.fullmatch(word):
+            return "turn"
+        if word in ("S", "mS", "MS") and (si == "s" or unit[: match.start()].endswith("/")):
+            return word.replace("MS", "mS").replace("S", "s")
+        return _SPELLINGS.get(word, word)
+
+    spelt = _WORD.sub(spelt_word, unit)
+    # powers as of CF conventions, "rad s-1"
+    return re.sub(r"(?<=[a-zA-Z])(-\d)\b", r"**\1", spelt)
 
 
 def to_si(value: float, unit: str, si: str, what: str) -> float:
@@ -73,19 +166,21 @@ def to_si(value: float, unit: str, si: str, what: str) -> float:
             f"{what} has the unreadable unit '{shown}'; give it in {si}, or in a unit whose "
             "powers are plain numbers."
         )
-    if si == "rad/s" and _folded(unit) in _A_MINUTE:
+    if si == "rad/s" and _A_MINUTE.fullmatch(_folded(unit)):
         return 2.0 * pi / 60.0 * value
     if si == "rad/s" and unit.endswith(("Hz", "hertz")):
         # for pint a hertz is one a second, and so is a radian a second
         return 2.0 * pi * to_si(value, unit, "Hz", what)
+    spelt = _spelt(unit, si, what)
     from pint import DimensionalityError, UndefinedUnitError
 
     registry = _registry()
     examples = "rad/s or rpm" if si == "rad/s" else si
     try:
         # offsets (degC) are handled by Quantity, not by a factor
-        quantity = registry.Quantity(value, _written_out(unit) if unit != "1" else "")
+        quantity = registry.Quantity(value, _written_out(spelt) if unit != "1" else "")
         number = float(quantity.to(_written_out(si) if si != "1" else "").magnitude)
+        size = registry.get_root_units(quantity.units)
     except UndefinedUnitError:
         raise InputError(f"{what} has the unknown unit '{unit}'; give it in {examples}.") from None
     except DimensionalityError:
@@ -97,9 +192,32 @@ def to_si(value: float, unit: str, si: str, what: str) -> float:
         raise InputError(
             f"{what} has the unreadable unit '{shown}'; give it in {examples}."
         ) from None
+    if si in ("rad", "rad/s") and not _is_of_angle(size[1], unit):
+        raise InputError(
+            f"{what} is given in '{unit}', which does not measure the same as {si}; "
+            f"give it in {examples}."
+        )
+    if si in PLAUSIBLE:
+        smallest, largest = PLAUSIBLE[si]
+        factor = size[0] / registry.get_root_units(si)[0]
+        if not 0.999 * smallest <= factor <= 1.001 * largest:
+            raise InputError(
+                f"{what} has the unit '{shown}', which would be {factor:.3g} {si}; nobody measures "
+                f"in it: give it in {examples}."
+            )
     if isfinite(value) and not isfinite(number):
         raise InputError(f"{what} is {value:g} {unit}, too large a number in {si}; check it.")
     return number
+
+
+def _is_of_angle(root: Any, unit: str) -> bool:
+    """Whether root units, as Pint has them, are of an angle or of its rate.
+
+    For Pint an angle has no dimension, so that per cent and counts would pass for radians; the
+    plain number of "1" and "1/s" stays one.
+    """
+    names = {str(name) for name in root._units}
+    return "radian" in names or names == {"second"} or (not names and unit == "1")
 
 
 def scaling(unit: str, si: str, what: str) -> tuple[float, float]:

@@ -181,3 +181,52 @@ def test_the_campaign_file_itself(tmp_path: Path) -> None:
     (tmp_path / "campaign.toml").write_text("title = 'x'\n", "utf-8")
     with pytest.raises(ParameterError, match="entry 'axes'"):
         Campaign.from_toml(tmp_path / "campaign.toml")
+
+
+# --- entries that a person has to settle, and campaigns without runs ------------------------------
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('unit = "mA"', 'unit = "A"    # FIXME: no unit', r"\.current\]: unit = \"A\" is"),
+        (
+            'unit = "mA"',
+            '# unit = "A"    # FIXME: the header gives none',
+            r"unit = \"A\" is .*none",
+        ),
+        ("gear_ratio", "scale = 1.0    # FIXME\ngear_ratio", r"\.counts\]: scale = 1.0 is"),
+        ('role = "validate"', 'role = "validate"  # FIXME', r"\[\[runs\]\]: role"),
+        ('title = "Bench"', 'title = "FIXME"', r"line \d+: title"),
+    ],
+)
+def test_a_file_in_which_an_entry_is_open_is_refused(
+    edited: Edit, old: str, new: str, said: str
+) -> None:
+    path = edited(old, new)
+    number = next(k for k, line in enumerate(path.read_text().splitlines(), 1) if "FIXME" in line)
+    with pytest.raises(ParameterError, match=rf"campaign.toml, line {number}\b.*FIXME.*delete"):
+        Campaign.from_toml(path)
+    with pytest.raises(ParameterError, match=said):
+        Campaign.from_toml(path)
+
+
+def test_a_remark_is_no_open_entry(edited: Edit) -> None:
+    path = edited('title = "Bench"', '# FIXME is what drafts write\ntitle = "Bench"')
+    assert len(Campaign.from_toml(path)) == 2
+
+
+def test_all_open_entries_are_counted(edited: Edit) -> None:
+    edited('title = "Bench"', 'title = "Bench"    # FIXME')
+    path = edited('role = "validate"', 'role = "validate"    # FIXME')
+    with pytest.raises(ParameterError, match=r"title .* so is line \d+"):
+        Campaign.from_toml(path)
+
+
+def test_a_campaign_without_a_run_that_is_read_says_so(edited: Edit) -> None:
+    edited('role = "validate"', 'role = "ignore"')
+    path = edited('file = "up.csv"', 'file = "up.csv"\nrole = "ignore"')
+    tests = Campaign.from_toml(path)
+    assert len(tests) == 0
+    assert "role 'ignore'" in tests.without_runs
+    assert not Campaign.from_toml(edited('\nrole = "ignore"', "")).without_runs

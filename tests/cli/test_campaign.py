@@ -137,6 +137,41 @@ def test_what_a_draft_leaves_open_is_printed_with_its_table(done, tmp_path) -> N
     assert 'title = "Winch 3"' in (tmp_path / "campaign.toml").read_text("utf-8")
 
 
+def test_what_is_left_out_is_printed_and_an_empty_campaign_is_a_finding(
+    run: Callable[..., Result], done: Words, tmp_path: Path
+) -> None:
+    rows = "\n".join(f"{k / 100},{k},{k}" for k in range(100))
+    (tmp_path / "good.csv").write_text(f"time [s],voltage [V],speed [rpm]\n{rows}\n")
+    (tmp_path / "dates.csv").write_text(
+        "time [s],voltage [V],speed [rpm]\n11-Xyz,1,2\n12-Xyz,2,3\n"
+    )
+    (tmp_path / "other.csv").write_text(f"time [s],pegel [V/m],speed [rpm]\n{rows}\n")
+    said = " ".join(done("campaign", "init", "good.csv", "other.csv", "dates.csv").split())
+    assert "pegel [V/m] (only in other.csv)" in said
+    assert "'voltage [V]' among 'time [s]', 'pegel [V/m]'" in said
+    assert "'11-Xyz', which is not a number" in said
+    done("campaign", "init", "dates.csv", "--force")
+    assert "no log is read" in done("campaign", "check")
+    assert run("campaign", "check", "--strict").exit_code == 1
+    for command in (("guess",), ("fit",), ("advise",), ("campaign", "plot")):
+        refused = run(*command, "campaign.toml")
+        assert refused.exit_code == 2
+        assert "no log is read" in " ".join(refused.output.split())
+
+
+def test_no_command_reads_a_file_with_an_open_entry(
+    run: Callable[..., Result], done: Words, logs: list[str]
+) -> None:
+    done("campaign", "init", *logs, "--drive", "hoist")
+    for command in (
+        *(("campaign", "check"), ("campaign", "plot"), ("guess",), ("fit",), ("advise",)),
+        ("validate", "hoist"),
+    ):
+        refused = run(*command, "campaign.toml")
+        assert refused.exit_code == 2
+        assert "counts_per_turn = 1000 is marked FIXME" in " ".join(refused.output.split())
+
+
 # --- virtual tests --------------------------------------------------------------------------------
 
 

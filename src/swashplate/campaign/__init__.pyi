@@ -1,3 +1,4 @@
+from .campaign import FIXME as FIXME
 from .campaign import Campaign as Campaign
 from .campaign import json_schema as json_schema
 from .experiment import ASSUMED_ACCURACY as ASSUMED_ACCURACY

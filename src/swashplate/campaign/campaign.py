@@ -27,8 +27,10 @@ if TYPE_CHECKING:
     from swashplate.drive import Drive
     from swashplate.results import Figure
 
-_FIXME_ENTRY = re.compile("=.*FIXME")
-"""A line of a draft that a person has to fill in."""
+FIXME = "FIXME"
+"""Mark of an entry that a person has to settle."""
+_TABLE = re.compile(r"\s*\[{1,2}[^\[\]=]+\]{1,2}\s*(?:#|$)")
+"""A line of TOML that begins a table."""
 LISTED = 12
 """Runs that a sentence names."""
 
@@ -123,6 +125,18 @@ class Campaign(Result):
             in_recorded_order(experiments),
             tuple(ignored),
             tuple(overviews),
+        )
+
+    @property
+    def without_runs(self) -> str:
+        """Why it has no experiment, a sentence without its full stop; empty if it has one."""
+        if self.experiments:
+            return ""
+        if not self.ignored:
+            return f"{self.path}: no run has an experiment, so nothing can be said of the machine"
+        return (
+            f"{self.path}: no log is read, as each run has the role 'ignore'; mend what its "
+            "comment in the file names, and give it the role 'fit' or 'validate'"
         )
 
     def table(self) -> Table:
@@ -257,24 +271,36 @@ def read_campaign_file(path: str | Path) -> schema.CampaignFile:
     FileError
         If it cannot be read or is not TOML.
     ParameterError
-        If an entry is wrong. The message names the entry, and the lines marked FIXME if there are
-        any.
+        If an entry is wrong, or is marked FIXME, as `draft_campaign` marks what it could not know.
+        The message names the entry.
     """
     origin = str(path)
     text = read_text(path)
-    try:
-        return validated(parse_toml(text, origin), schema.CampaignFile, origin)
-    except ParameterError as error:
-        # a draft marks the entries that its author still has to fill in: most often they are the
-        # cause
-        lines = enumerate(text.splitlines(), 1)
-        fixme_lines = [str(number) for number, line in lines if _FIXME_ENTRY.search(line)]
-        if not fixme_lines:
-            raise
-        if len(fixme_lines) == 1:
-            subject = f"line {fixme_lines[0]} is"
-        else:
-            subject = f"lines {', '.join(fixme_lines)} are"
-        raise ParameterError(
-            f"{str(error).rstrip('.')}; {subject} marked FIXME: fill in what is missing."
-        ) from None
+    content = parse_toml(text, origin)
+    _refuse_open_entries(text, origin)
+    return validated(content, schema.CampaignFile, origin)
+
+
+def _refuse_open_entries(text: str, origin: str) -> None:
+    """Refuse a file in which an entry is marked FIXME, even if it has a value."""
+    table, marked = "", list[tuple[int, str]]()
+    for number, line in enumerate(text.splitlines(), 1):
+        if _TABLE.match(line):
+            table = line.partition("#")[0].strip()
+        entry, mark, reason = line.partition(FIXME)
+        # a remark on a line of its own is no entry, one that is commented out is
+        if mark and (not entry.lstrip().startswith("#") or "=" in entry):
+            entry = line.strip().lstrip("# ").partition("    #")[0]
+            place = f"line {number}, {table}" if table else f"line {number}"
+            reason = reason.lstrip(": ") if "#" in line else ""
+            marked.append((number, f"{place}: {entry} is marked {FIXME}{reason and f': {reason}'}"))
+    if not marked:
+        return
+    sentence = marked[0][1].rstrip(".")
+    if len(marked) > 1:
+        numbers = ", ".join(str(number) for number, _ in marked[1 : 1 + LISTED])
+        sentence += f"; so {'is line' if len(marked) == 2 else 'are lines'} {numbers}"
+    raise ParameterError(
+        f"{origin}, {sentence}. Write what is right there, without a # in front, and delete the "
+        "mark."
+    )

@@ -138,7 +138,8 @@ def init(
     full scale, is scaled to volts; a sensor in such words needs its range.
     Correct the entries, then run 'swashplate campaign check'.
     """
-    from swashplate.drafting import FIXME, NO_ENCODER, UNUSED, draft_campaign
+    from swashplate.campaign import FIXME
+    from swashplate.drafting import LEFT_OUT, NO_ENCODER, SEVERAL, UNUSED, draft_campaign
 
     target = out or logs[0].parent / "campaign.toml"
     check_writable(target, CAMPAIGN_FILE, force=force)
@@ -168,11 +169,11 @@ def init(
     guessed = text.count("# guessed")
     note(f"{count(guessed, 'entry is', 'entries are')} guessed: look for '# guessed'.")
     table = ""
-    open_ends = (f"# {FIXME}", f'column = "{FIXME}"')
+    open_ends = (f"# {FIXME}", f'column = "{FIXME}"', f"# {LEFT_OUT}", "# another input?")
     for line in text.splitlines():
         if line.startswith(("[", "file = ")):  # a run is known by its file
             table = line.partition("    #")[0]
-        if line.startswith((UNUSED, NO_ENCODER)):
+        if line.startswith((UNUSED, NO_ENCODER, SEVERAL)):
             note(f"  {line.lstrip('# ')}")
         elif any(end in line for end in open_ends):
             note(f"  {table} {line.lstrip('# ')}")
@@ -213,9 +214,12 @@ def check(
             experiment.name: tests.examine(experiment, unsigned) for experiment in campaign
         }
         of_file = dict.fromkeys((*tests.campaign_findings(campaign), *beside_the_drives(campaign)))
+        if campaign.without_runs:
+            of_file = {campaign.without_runs: None}
     roles = [experiment.role for experiment in campaign]
     counts_by_role = ", ".join(f"{roles.count(role)} to {role}" for role in dict.fromkeys(roles))
-    note(f"{parsing.title_of(campaign)}: {len(campaign)} experiments ({counts_by_role})")
+    in_roles = f" ({counts_by_role})" if roles else ""
+    note(f"{parsing.title_of(campaign)}: {len(campaign)} experiments{in_roles}")
     for overview in campaign.overviews:
         show(overview.table())
         bullets([overview.sentence])
@@ -226,7 +230,8 @@ def check(
         for quality in qualities_of_run:
             for text in quality.findings:  # unbroken: a line to paste may be in it
                 note(ended(f"! {quality.signal}: {text}"))
-    note(LEGEND)
+    if len(campaign):
+        note(LEGEND)
     for text in of_file:
         say(ended(f"! {text}"))
     findings = len(of_file)
@@ -284,6 +289,8 @@ def plot(
 
     with spinner(f"Reading {path}"):
         campaign = Campaign.from_toml(path)
+    if campaign.without_runs:
+        raise InputError(f"{campaign.without_runs}.")
     channels = () if run is None else campaign[run].channels
     if (run is None) != (channel is None):
         channels_listed = f"; {run} has {', '.join(channels)}" if channels else ""

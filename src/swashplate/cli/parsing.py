@@ -88,6 +88,8 @@ def campaign_of(path: Path, axis: str | None = None) -> tuple[Campaign, str]:
         )
     check_file_kind(path, "campaign")
     campaign = Campaign.from_toml(path)
+    if campaign.without_runs:
+        raise InputError(f"{campaign.without_runs}.")
     if axis is None and len(campaign.axes) > 1:
         raise InputError(f"{path} has the axes {', '.join(campaign.axes)}; name one with --axis.")
     if axis is not None:

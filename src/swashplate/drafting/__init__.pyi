@@ -1,8 +1,9 @@
 from .amplifier import AmplifierGuess as AmplifierGuess
 from .amplifier import amplifier_table as amplifier_table
 from .amplifier import guess_amplifier as guess_amplifier
-from .draft import FIXME as FIXME
+from .draft import LEFT_OUT as LEFT_OUT
 from .draft import NO_ENCODER as NO_ENCODER
+from .draft import SEVERAL as SEVERAL
 from .draft import UNUSED as UNUSED
 from .draft import draft_campaign as draft_campaign
 from .guess import Guess as Guess

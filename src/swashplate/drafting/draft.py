@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from datetime import UTC, datetime
 from itertools import pairwise
 from math import floor, inf, pi
@@ -21,6 +22,7 @@ from numpy.typing import NDArray
 from swashplate.campaign import (
     ASSUMED_ACCURACY,
     ESTIMATED_START,
+    FIXME,
     KINDS,
     ROD,
     TURNS,
@@ -41,13 +43,14 @@ from swashplate.entries import SCHEMA
 from swashplate.errors import FileError, InputError
 from swashplate.logs import Log, LogColumn, open_log
 from swashplate.parameters import NEUTRAL, preset_names
-from swashplate.units import speed_unit, to_si
+from swashplate.units import ambiguous_angle, plain_unit, speed_unit, to_si
 
 Array = NDArray[np.float64]
 
 HEADER = """\
-# A draft, made from the headers of the logs: check each line that says "guessed", and fill in each
-# that says "FIXME". Value of a signal: sign * (scale * number + offset), in its unit.
+# A draft, made from the headers of the logs: check each line that says "guessed", and settle each
+# that says "FIXME": write the entry without a # in front, and delete the mark. No command reads
+# the file before. Value of a signal: sign * (scale * number + offset), in its unit.
 # Every entry is explained in the reference, "Campaign file"; `swashplate campaign check` reads
 # all logs and says what is wrong with them.
 """
@@ -59,8 +62,9 @@ UNORDERED = (
     "# No clock gives the time at which each run was recorded. A drift over the campaign is found "
     "only in the\n# order of time: sort the runs, or state recorded = 2026-05-04T13:20:00 in each."
 )
-FIXME = "FIXME"
-"""Mark of a line that a person must fill in."""
+SEVERAL = "# Several axes"
+LEFT_OUT = "left out"
+"""Marks what is said of logs that hold several axes, and of a log or a channel that is not read."""
 TIME = (
     r"time|zeit|uhrzeit|zeitstempel|temps|heure|tijd|tid|tiempo|tempo|stamp|timestamp|time stamp|"
     r"datetime|date time|clock|t|seconds?|exp time"
@@ -68,6 +72,12 @@ TIME = (
 """Names of columns of time stamps; those of signals are in `KINDS`."""
 COMPLEMENT = "(?: (?:of|der|des|du|de|del|della|do|da|van|av) .*)?"
 """Complement that may follow in such a name: "Drehzahl der Trommel"."""
+DEGREES_AS_GRAD = re.compile(
+    r"\b(?:\w*zeit|zeitstempel|\w*spannung|\w*drehzahl|\w*winkel|\w*strom|\w*druck|\w*wert|\w*weg|"
+    r"\w*geschwindigkeit|hebel|stellgröße|stellgroesse|drehgeber|trommel|"
+    r"tid|\w*vinkel|\w*hastighe[dt]|turtall|varvtal|omdrejningstal|sp[eæä]n[nd]ing|str[øö]m)\b"
+)
+"""German and Scandinavian words in the names of columns: there "grad" is a degree."""
 INPUTS = get_args(InputKind)
 HALVES = {"current_plus", "current_minus"}
 PLC = re.compile(
@@ -117,6 +127,8 @@ class _Guess(NamedTuple):
     """Reason for its unit, next to the entry, if it is not in the header."""
     has_plc_name: bool = False
     """Whether its name is that of a PLC's word."""
+    seems_input: bool = False
+    """Whether it looks like an input, even where another column is stated to be it."""
     full_scale: int = 0
     """Reading of a PLC's word at full scale; 0 if the numbers are not such words."""
 
@@ -160,8 +172,9 @@ def draft_campaign(
     -------
     str
         Commented TOML that `Campaign.from_toml` reads, guesses marked as such. A run that could
-        not be read has the role ``"ignore"``, with the reason. Where no column looks like an input
-        or like a measurement the line says FIXME, and the file is refused until it is mended.
+        not be read has the role ``"ignore"``, and what no entry uses is in a comment, both with the
+        reason. Where no column looks like an input or like a measurement, or a unit may mean two
+        things, the line says FIXME, and the file is refused until it is mended.
 
     Raises
     ------
@@ -183,7 +196,7 @@ def draft_campaign(
     if not logs:
         raise InputError("A draft needs at least one log.")
     kinds, units, folder = dict(columns or {}), dict(units or {}), Path(folder).resolve()
-    opened = [open_log(path) for path in logs]
+    opened = _with_common_names([open_log(path) for path in logs], {*kinds, *units})
     headers = dict[str, LogColumn]()
     for log in opened:
         for column in log.columns:
@@ -200,7 +213,8 @@ def draft_campaign(
     lines = [HEADER, heading, ""]
     for name, axis in axes.items():
         lines += _axis_lines(name, axis, guesses, blocks, opened[0], drive, counts_per_turn)
-    lines += _unused_lines(guesses, axes, opened[0], counts_per_turn)
+    lines += _several_lines(axes)
+    lines += _unused_lines(guesses, axes, opened, numbers, counts_per_turn)
     lines += _run_lines(opened, numbers, axes, folder, text="\n".join(lines))
     return "\n".join(lines).rstrip() + "\n"
 
@@ -218,6 +232,59 @@ def _check_stated(
             raise InputError(f"No log has a column '{name}'; there are {names}.")
     for name in sorted(kinds.keys() & units.keys()):
         _check_unit(kinds[name], units[name], f"Column '{name}' ({kinds[name]})")
+
+
+def _with_common_names(logs: Sequence[Log], stated: set[str]) -> list[Log]:
+    """Logs in which a column whose unit changes from log to log is called without its unit.
+
+    A logger that scales itself writes "Voltage [V]" in one log and "Voltage [mV]" in the next.
+    Columns that the caller states keep their names.
+    """
+    units = dict[str, dict[str, LogColumn]]()
+    for log in logs:
+        for column in log.columns:
+            if column.unit is not None and column.name not in stated:
+                units.setdefault(_without_brackets(column.name), {})[column.name] = column
+    names = {
+        column.name: bare
+        for bare, columns in units.items()
+        if len(columns) > 1
+        and all(_has_one(log, bare, columns) for log in logs)
+        and _is_one_quantity(list(columns.values()))
+        for column in columns.values()
+    }
+    return [
+        replace(
+            log,
+            columns=tuple(
+                column._replace(name=names.get(column.name, column.name)) for column in log.columns
+            ),
+        )
+        for log in logs
+    ]
+
+
+def _without_brackets(name: str) -> str:
+    """A name without what stands in brackets."""
+    return re.sub(r"[\[(].*[\])]", "", name).strip()
+
+
+def _has_one(log: Log, bare: str, columns: Mapping[str, LogColumn]) -> bool:
+    """Whether a name without unit means one of some columns of a log, or the log has none."""
+    if not any(_without_brackets(column.name) == bare for column in log.columns):
+        return True
+    try:
+        return log.find(bare).name in columns
+    except (FileError, InputError):
+        return False
+
+
+def _is_one_quantity(columns: Sequence[LogColumn]) -> bool:
+    """Whether columns are of one kind, and their units of one quantity, as they are converted."""
+    (kind, *others) = {_by_header(column, None).kind for column in columns}
+    if others or not all(_is_unit_of(column.unit or "", kind) for column in columns):
+        return False
+    return kind == "time" or len({conversion(kind, column.unit, "")[0] for column in columns}) == 1
 
 
 def _readable_columns(log: Log, names: list[str]) -> dict[str, Array]:
@@ -246,7 +313,7 @@ def _by_words(column: LogColumn, name: str, unit: str | None) -> _Guess:
     words = _words(name)
     if re.fullmatch(TIME, _words(name.rpartition("/")[2])):
         return _Guess(column.name, "time", "", column.unit)
-    rotational_unit = speed_unit(unit or "")
+    rotational_unit = speed_unit(plain_unit(unit or ""))
     first_kind = ""
     axis: str | None = None
     for kind, entry in KINDS.items():
@@ -257,12 +324,16 @@ def _by_words(column: LogColumn, name: str, unit: str | None) -> _Guess:
             axis = match[1] or ""
         if not first_kind and (match is not None or rotational_unit in entry.marks):
             first_kind = kind
+    numbered = re.fullmatch(r"(.+) (\d+|left|right|links|rechts)", words)
+    if axis is None and numbered is not None:
+        of_name = _by_words(column, numbered[1], unit)
+        return of_name._replace(axis=f"{of_name.axis} {numbered[2]}".strip())
     return _Guess(column.name, first_kind, axis or "", column.unit)
 
 
 def _by_header(column: LogColumn, kind: str | None) -> _Guess:
     """Guess from a header, of a kind if it is stated; the unit may be the end of its name."""
-    name = re.sub(r"[\[(].*[\])]", "", column.name).strip()
+    name = _without_brackets(column.name)
     plc_name = PLC.fullmatch(name) if column.unit is None else None
     if plc_name is not None:
         name = plc_name["after"] or plc_name["before"]
@@ -279,7 +350,8 @@ def _by_header(column: LogColumn, kind: str | None) -> _Guess:
     if (
         column.unit is None
         and by_name.kind not in HALVES
-        and _is_unit_of(ending, by_last_word.kind)
+        and not ending.isdigit()
+        and (_is_unit_of(ending, by_last_word.kind) or _counts_in_grad(by_last_word.kind, ending))
     ):
         return by_last_word._replace(unit=ending, in_header=False)
     return by_name._replace(
@@ -309,6 +381,12 @@ def _is_unit_of(unit: str, kind: str) -> bool:
     return True
 
 
+def _counts_in_grad(kind: str, unit: str | None) -> bool:
+    """Whether a kind measures an angle or its rate, and a unit counts that in "grad"."""
+    of_angle = kind in KINDS and not {"rad", "rad/s"}.isdisjoint(KINDS[kind].units)
+    return of_angle and bool(ambiguous_angle(unit or ""))
+
+
 def _guesses(
     headers: Mapping[str, LogColumn],
     blocks: Mapping[str, list[Array]],
@@ -326,14 +404,20 @@ def _guesses(
         taken.add("time")
     if "voltage" in kinds.values() or "current" in kinds.values():
         taken.update(INPUTS)
+    is_german = any(DEGREES_AS_GRAD.search(_words(name)) for name in headers)
     guesses = list[_Guess]()
     for name, column in headers.items():
         guess = _by_header(column, kinds.get(name))
+        guess = guess._replace(seems_input=guess.kind in INPUTS)
         if name in kinds:
             guess = guess._replace(kind=kinds[name], is_stated=True)
         elif guess.kind in taken:
             guess = guess._replace(kind="")
         values = [part for part in blocks[name] if part.size]
+        if is_german and _counts_in_grad(guess.kind, guess.unit):
+            degrees, _ = ambiguous_angle(guess.unit or "")
+            comment = f"guessed: {guess.unit}, of a log with German or Scandinavian names"
+            guess = guess._replace(unit=degrees, in_header=False, unit_comment=comment)
         if name in units:
             guess = guess._replace(unit=units[name], in_header=False, unit_comment="given")
         elif guess.unit is None:
@@ -421,7 +505,7 @@ def _full_scale(blocks: Sequence[Array], *, has_plc_name: bool) -> int:
 def _turn(values: Sequence[Array], unit: str) -> float:
     """A whole turn in a unit if positions jump by it, 0 if not or if the unit is not an angle's."""
     try:
-        turn = to_si(2.0 * pi, "rad", unit, "")
+        turn = 2.0 * pi / to_si(1.0, unit, "rad", "")
     except InputError:
         return 0.0
     return turn if any(turns_over(part, turn) for part in values) else 0.0
@@ -438,7 +522,31 @@ def _axes(guesses: Sequence[_Guess], plain: str) -> dict[str, _Axis]:
         axis = _axis_of([guess for guess in guesses if guess.axis == prefix])
         if axis.channels:
             axes[prefix] = axis
-    return axes if len(axes) > 1 else {plain: _axis_of(guesses)}
+    if len(axes) > 1:
+        return axes
+    others = _of_other_axes(guesses)
+    return {plain: _axis_of([guess for guess in guesses if guess.name not in others])}
+
+
+def _of_other_axes(guesses: Sequence[_Guess]) -> dict[str, str]:
+    """Channels of other axes than the only one that has an input here: their names and axes.
+
+    By the beginning of their names, if the input has a channel that begins as it does: another
+    column that begins like the channel looks like an input, or both axes measure one quantity.
+    """
+    own = next((guess.axis for guess in guesses if guess.kind in INPUTS), "")
+    channels = [guess for guess in guesses if guess.kind not in ("", "time", *INPUTS)]
+    measured = {guess.kind for guess in channels if guess.axis == own}
+    if not own or not measured:
+        return {}
+    commanded = {guess.axis for guess in guesses if guess.seems_input}
+    return {
+        guess.name: guess.axis
+        for guess in channels
+        if guess.axis not in ("", own)
+        and not guess.is_stated
+        and (guess.axis in commanded or guess.kind in measured)
+    }
 
 
 def _axis_of(guesses: Sequence[_Guess]) -> _Axis:
@@ -537,7 +645,7 @@ def _signal_lines(
         reason = (
             f"range of the instrument over {guess.full_scale}, as of a PLC's word at full scale"
         )
-        lines.append(f"scale = 1.0    # {FIXME}: {reason}")
+        lines.append(f"# scale = 1.0    # {FIXME}: {reason}")
     if guess.rolls_over_at:
         lines.append(f"rolls_over_at = {guess.rolls_over_at:.9g}    # guessed: wraps there")
     empty = sum(int(np.count_nonzero(~np.isfinite(part))) for part in blocks)
@@ -590,8 +698,11 @@ def _unit_lines(signal: _Guess) -> list[str]:
     units = KINDS[signal.kind].units
     usual = units[0] if units else "1"
     if signal.unit is not None and units and not _is_unit_of(signal.unit, signal.kind):
+        choices = " or ".join(ambiguous_angle(signal.unit))
         reason = f"'{signal.unit}', as the header has it, is not a unit of a {signal.kind}"
-        return [f"unit = {toml_string(usual)}    # {FIXME}: {reason}"]
+        if choices and _counts_in_grad(signal.kind, signal.unit):
+            reason = f"'{signal.unit}', as the header has it, is ambiguous: {choices}"
+        return [f"# unit = {toml_string(usual)}    # {FIXME}: {reason}"]
     if signal.in_header:
         return []
     if signal.unit is not None:
@@ -600,8 +711,9 @@ def _unit_lines(signal: _Guess) -> list[str]:
         usual = "deg"
     elif signal.kind == "position" and _is_rod(signal.name):
         usual = "mm"
-    mark = FIXME if signal.kind in OPEN_UNITS else "guessed"
-    return [f"unit = {toml_string(usual)}    # {mark}: the header gives none"]
+    if signal.kind in OPEN_UNITS:
+        return [f"# unit = {toml_string(usual)}    # {FIXME}: the header gives none"]
+    return [f"unit = {toml_string(usual)}    # guessed: the header gives none"]
 
 
 def _is_rod(name: str) -> bool:
@@ -609,23 +721,57 @@ def _is_rod(name: str) -> bool:
     return bool(re.fullmatch(rf"(?:.* )?(?:{ROD}){COMPLEMENT}", _words(name)))
 
 
+def _several_lines(axes: Mapping[str, _Axis]) -> list[str]:
+    """A comment if the logs hold several axes, or seem to."""
+    if len(axes) > 1:
+        return [f"{SEVERAL}, by the beginnings of the columns' names: {', '.join(axes)}", ""]
+    (axis,) = axes.values()
+    kinds = [guess.kind for guess in axis.channels.values()]
+    if len(axis.inputs) > 1 and len(set(kinds)) < len(kinds):
+        inputs, channels = (
+            ", ".join(guess.name for guess in guesses)
+            for guesses in (axis.inputs, axis.channels.values())
+        )
+        return [
+            f"{SEVERAL}? Inputs: {inputs}; channels: {channels}: keep those of one axis here, and "
+            "write another [axes.NAME] for each other one",
+            "",
+        ]
+    return []
+
+
 def _unused_lines(
     guesses: Sequence[_Guess],
     axes: Mapping[str, _Axis],
-    log: Log,
+    logs: Sequence[Log],
+    numbers: Sequence[Mapping[str, Array]],
     counts_per_turn: float | None,
 ) -> list[str]:
-    """Comments on columns of the first log, and on counts of a turn, that no entry uses."""
+    """Comments on what no entry uses: columns of the logs, with a reason, and counts of a turn."""
     used = [guess for axis in axes.values() for guess in (*axis.inputs, *axis.channels.values())]
-    names = {column.name for column in log.columns} - {guess.name for guess in used}
-    unused = ", ".join(
-        guess.name for guess in guesses if guess.name in names and guess.kind != "time"
-    )
+    taken = {guess.name for guess in (*used, *guesses) if guess in used or guess.kind == "time"}
+    reasons = {name: f"of axis '{axis}'" for name, axis in _of_other_axes(guesses).items()}
+    where = dict[str, list[str]]()
+    for log, readable in zip(logs, numbers, strict=True):
+        for column in log.columns:
+            if column.name not in readable:
+                reasons.setdefault(column.name, "it holds cells that are no numbers")
+            if column.name not in taken:
+                where.setdefault(column.name, []).append(log.path.name)
+        for name, reason in log.left_out.items():
+            reasons.setdefault(name, reason)
+            where.setdefault(name, []).append(log.path.name)
+    unused = list[str]()
+    for name, files in where.items():
+        remarks = [reasons[name]] if name in reasons else []
+        if len(files) < len(logs):
+            remarks.append(f"only in {', '.join(files)}")
+        unused.append(f"{name} ({'; '.join(remarks)})" if remarks else name)
     lines = list[str]()
     if unused:
-        lines += [f"{UNUSED}: {unused}", ""]
+        lines += [f"{UNUSED}: {', '.join(unused)}", ""]
     if counts_per_turn is not None and all(guess.kind != "encoder_counts" for guess in used):
-        among = f" among {unused}" if unused else ""
+        among = f" among {', '.join(where)}" if where else ""
         lines += [f"{NO_ENCODER}{among}; counts_per_turn = {counts_per_turn:.12g} is left out", ""]
     return lines
 
@@ -697,13 +843,14 @@ def _drafted_run(
         written=path.stat().st_mtime,
     )
     if not tested:
-        return run._replace(role='"ignore"    # it has no input')
+        reason = _untested_reason(log, axes)
+        return run._replace(role=f'"ignore"    # {LEFT_OUT}: {reason}')
     if f'column = "{FIXME}"' in text:
         return run
     try:
         experiments, overview = _trial_reading(log, run, text)
     except (FileError, InputError) as error:
-        return run._replace(role=f'"ignore"    # {FIXME}: {error}')
+        return run._replace(role=f'"ignore"    # {LEFT_OUT}: {error}')
     duration = float(experiments[-1].input.time[-1] - experiments[0].input.time[0])
     if overview is not None:
         duration = overview.end - overview.begin
@@ -753,18 +900,28 @@ def _tested_axes(
         for key, guess in axis.channels.items():
             if guess.name not in names:
                 entry = f"axes.{toml_key(name)}.channels.{toml_key(key)} = false"
-                entries.append(f"{entry}    # no column {toml_string(guess.name)}")
+                entries.append(f"{entry}    # {LEFT_OUT}: no column {toml_string(guess.name)}")
     if tested and len(tested) < len(axes):
         entries.insert(0, f"only = [{', '.join(map(toml_string, tested))}]")
     return tested, entries
+
+
+def _untested_reason(log: Log, axes: Mapping[str, _Axis]) -> str:
+    """Reason for which a log tests no axis."""
+    names = {column.name for column in log.columns}
+    inputs = [axis.inputs[0].name for axis in axes.values() if axis.inputs]
+    listed = ", ".join(repr(column.name) for column in log.columns)
+    if inputs and names.isdisjoint(inputs):
+        missing = " or ".join(map(repr, inputs))
+        return f"it has no input: no column {missing} among {listed}"
+    return f"it has no number of any channel in {listed}"
 
 
 def _trial_reading(
     log: Log, run: _DraftedRun, text: str
 ) -> tuple[Sequence[Experiment], Overview | None]:
     """Experiments of a run as the drafted file has it, with entries in place of open ones."""
-    text = text.replace("# counts_per_turn = 1000", "counts_per_turn = 1000")
-    text = text.replace(NO_TIME, NO_TIME.lstrip("# "))
+    text = re.sub(rf"^# (?=\w+ = .*# {FIXME})", "", text, flags=re.MULTILINE)
     text = "\n".join([text, "[[runs]]", f"file = {run.file}", *run.entries])
     content = validated(parse_toml(text, "the draft"), CampaignFile, "the draft")
     return read_run("the draft", "run", content.runs[0], content.axes, log)
