@@ -22,7 +22,6 @@ from .quality import examine as examine
 from .quality import has_sign as has_sign
 from .quality import moves_at_first as moves_at_first
 from .quality import quality_table as quality_table
-from .quality import spiked as spiked
 from .quality import turned as turned
 from .quality import unsigned_currents as unsigned_currents
 from .quality import wrapped_positions as wrapped_positions
@@ -58,3 +57,4 @@ from .speed import DIFFERENTIATOR as DIFFERENTIATOR
 from .speed import LOW_PASS as LOW_PASS
 from .speed import speed_from_angle as speed_from_angle
 from .speed import speed_of as speed_of
+from .spikes import spiked as spiked
