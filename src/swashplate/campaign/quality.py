@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from swashplate.campaign import schema
 from swashplate.campaign.campaign import Campaign, read_campaign_file
+from swashplate.campaign.dropouts import dropout_sentences
 from swashplate.campaign.experiment import Channel, Experiment, InputSignal
 from swashplate.campaign.samples import (
     StampStatistics,
@@ -148,6 +149,7 @@ def _quality(
     else:
         findings += _of_input(signal, low, high, limits)
         findings += spike_sentences(experiment, signal)
+        findings += dropout_sentences(experiment, signal)
     return Quality(
         signal=name,
         kind=signal.kind,
@@ -194,6 +196,7 @@ def _of_channel(experiment: Experiment, channel: Channel, signed: bool) -> Itera
     if np.ptp(values) == 0.0 and np.ptp(drive.values) > 0.0:
         yield "never changes although the input does: is it connected?"
     yield from spike_sentences(experiment, channel)
+    yield from dropout_sentences(experiment, channel)
     yield from lost_count_sentences(experiment, channel)
     if channel.kind == "rectified_current" and has_sign([values], NEGATIVE):
         yield "turns negative, so it is not rectified: should it be signed_current?"

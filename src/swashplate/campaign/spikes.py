@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from swashplate.campaign.dropouts import dropout_sentences, dropouts
 from swashplate.campaign.experiment import Channel, Experiment, InputSignal
 from swashplate.campaign.samples import find_lost_counts
 from swashplate.tables import count
@@ -176,7 +177,12 @@ def lost_counts(channel: Channel) -> list[LostCounts]:
 
 def lost_count_sentences(experiment: Experiment, channel: Channel) -> Iterator[str]:
     """A sentence on counts that are lost for good, with the lines that cut the run there."""
-    lasting = [jump for jump in lost_counts(channel) if not jump.returns]
+    windows = [(lost.begin, lost.end) for lost in dropouts(experiment, channel)]
+    lasting = [
+        jump
+        for jump in lost_counts(channel)
+        if not jump.returns and not any(a <= jump.begin <= b for a, b in windows)
+    ]
     if not lasting:
         return
     times = ", ".join(f"{spike.begin:.6g} s" for spike in lasting[:NAMED])
@@ -192,7 +198,7 @@ def lost_count_sentences(experiment: Experiment, channel: Channel) -> Iterator[s
 
 
 def spiked(experiments: Sequence[Experiment]) -> dict[tuple[str, str], tuple[str, bool]]:
-    """Channels with spikes or lost counts, by run and name, and the line that mends each.
+    """Channels with spikes, dropouts or lost counts, by run and name, and the line that mends each.
 
     Beside the sentence, whether it is gross: twice as far from the median as the channel moves
     in any run, so that squared errors would be the spike's.
@@ -202,13 +208,16 @@ def spiked(experiments: Sequence[Experiment]) -> dict[tuple[str, str], tuple[str
         for name, channel in experiment.channels.items():
             used, far = channel.used, 0.0
             middle = float(np.median(channel.values[used])) if used.any() else 0.0
-            for begin, end, value in spikes(channel, experiment.input):
+            off = spikes(channel, experiment.input)
+            off += [(lost.begin, lost.end, lost.value) for lost in dropouts(experiment, channel)]
+            for begin, end, value in off:
                 used &= (channel.time < begin) | (channel.time > end)
                 far = max(far, abs(value - middle))
             if used.any():
                 moves[name] = max(moves.get(name, 0.0), float(np.ptp(channel.values[used])))
             sentences = [f"has {sentence}" for sentence in spike_sentences(experiment, channel)]
             sentences += lost_count_sentences(experiment, channel)
+            sentences += dropout_sentences(experiment, channel)
             if sentences:
                 sentences_by_channel[experiment.name, name] = (
                     f"{experiment.name}: '{name}' {'; it '.join(sentences)}",
