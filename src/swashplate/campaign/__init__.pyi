@@ -1,5 +1,7 @@
 from .campaign import Campaign as Campaign
 from .campaign import json_schema as json_schema
+from .directions import reversed_commands as reversed_commands
+from .directions import turned as turned
 from .experiment import ASSUMED_ACCURACY as ASSUMED_ACCURACY
 from .experiment import JUMP_TIME as JUMP_TIME
 from .experiment import LARGEST_CERTAIN_INTERVAL as LARGEST_CERTAIN_INTERVAL
@@ -11,6 +13,7 @@ from .experiment import Experiment as Experiment
 from .experiment import InputSignal as InputSignal
 from .experiment import SignalOrigin as SignalOrigin
 from .experiment import resolution_of_inputs as resolution_of_inputs
+from .instruments import is_noisy as is_noisy
 from .overview import BlockRanges as BlockRanges
 from .overview import LogWindow as LogWindow
 from .overview import Overview as Overview
@@ -22,7 +25,6 @@ from .quality import examine as examine
 from .quality import has_sign as has_sign
 from .quality import moves_at_first as moves_at_first
 from .quality import quality_table as quality_table
-from .quality import turned as turned
 from .quality import unsigned_currents as unsigned_currents
 from .quality import wrapped_positions as wrapped_positions
 from .reading import read_run as read_run

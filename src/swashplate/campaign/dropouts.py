@@ -114,7 +114,7 @@ def _loss(
     noisy = all(_is_noisy(step) for step in steps)
     repeats = max(float(np.mean(step == 0.0)) for step in steps)
     # none among so many may still be three in a hundred: the rule of three
-    repeats = max(repeats, 3.0 / min(step.size for step in steps))
+    repeats = max(repeats, 3.0 / sum(step.size for step in steps))
     by_chance = values.size * min(repeats, 1.0) ** (stop - first)
     is_input = isinstance(signal, InputSignal)
     if is_input:

@@ -16,8 +16,15 @@ from numpy.typing import NDArray
 
 from swashplate.campaign import schema
 from swashplate.campaign.campaign import Campaign, read_campaign_file
+from swashplate.campaign.directions import (
+    currents_are_turned,
+    reversed_commands,
+    swapped_currents,
+    turned_channels,
+)
 from swashplate.campaign.dropouts import dropout_sentences
 from swashplate.campaign.experiment import Channel, Experiment, InputSignal
+from swashplate.campaign.instruments import instrument_sentences
 from swashplate.campaign.samples import (
     StampStatistics,
     find_lost_counts,
@@ -150,6 +157,7 @@ def _quality(
         findings += _of_input(signal, low, high, limits)
         findings += spike_sentences(experiment, signal)
         findings += dropout_sentences(experiment, signal)
+        findings += instrument_sentences(signal)
     return Quality(
         signal=name,
         kind=signal.kind,
@@ -197,6 +205,7 @@ def _of_channel(experiment: Experiment, channel: Channel, signed: bool) -> Itera
         yield "never changes although the input does: is it connected?"
     yield from spike_sentences(experiment, channel)
     yield from dropout_sentences(experiment, channel)
+    yield from instrument_sentences(channel)
     yield from lost_count_sentences(experiment, channel)
     if channel.kind == "rectified_current" and has_sign([values], NEGATIVE):
         yield "turns negative, so it is not rectified: should it be signed_current?"
@@ -211,13 +220,14 @@ def _of_channel(experiment: Experiment, channel: Channel, signed: bool) -> Itera
                 f"{_percent(step / extent)} of its range: smaller motions and dead zones "
                 "cannot be resolved"
             )
-    motion, at = values, time
-    if channel.is_position:
-        motion, at = np.diff(values) / np.diff(time), 0.5 * (time[1:] + time[:-1])
-    directed = ("signed_current", "shaft_speed", "swash_angle", "spool_position")
-    directional = signed and (channel.is_position or channel.kind in directed)
-    if directional and turned(drive.at(at) - drive.values[0], motion):
+    currents_turned = currents_are_turned(experiment)
+    if signed and not currents_turned and channel.name in turned_channels(experiment):
         yield "moves against the input: should its sign be -1?"
+    if channel.kind == "current_plus" and swapped_currents(experiment):
+        yield (
+            "flows while the command is negative, although the motion follows the command: swap "
+            "the columns of current_plus and current_minus"
+        )
     if outside := int(np.count_nonzero((time < drive.time[0]) | (time > drive.time[-1]))):
         yield f"{count(outside, 'sample is', 'samples are')} before or after the input's record"
 
@@ -225,15 +235,6 @@ def _of_channel(experiment: Experiment, channel: Channel, signed: bool) -> Itera
 def _percent(share: float) -> str:
     """A share in per cent, with two digits."""
     return f"{float(f'{100.0 * share:.2g}'):g} %"
-
-
-def turned(driven: Array, motion: Array) -> bool:
-    """Whether a motion (n,) goes against what it should be (n,), in any units, both about zero.
-
-    Their correlation is below -0.5.
-    """
-    size = float(np.linalg.norm(driven) * np.linalg.norm(motion))
-    return float(driven @ motion) < -0.5 * size
 
 
 ESTIMATED_START = 'start = "estimated"'
@@ -366,6 +367,7 @@ def campaign_findings(campaign: Campaign) -> tuple[str, ...]:
             findings += _unused(f"{of}.ignore", channel.ignore, runs, long, key)
             findings += _unused(f"{of}.weights", channel.weights, runs, long, key)
         findings += [*_one_sided(name, runs), *_of_other_scale(runs)]
+        findings += [sentence for _, sentence in reversed_commands(runs)]
     for number, run in enumerate(file.runs, 1):
         of_run = [
             experiment

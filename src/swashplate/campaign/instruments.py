@@ -1,0 +1,140 @@
+"""What an instrument cannot read or has not read: beyond its kind, clipped, or without a sign."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from types import MappingProxyType
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swashplate.campaign.experiment import Channel, InputSignal
+from swashplate.campaign.schema import shown_unit
+from swashplate.campaign.spikes import step_of_reading
+from swashplate.units import display_unit
+
+Array = NDArray[np.float64]
+
+
+class Bound(NamedTuple):
+    """Largest magnitude that any machine's signal has."""
+
+    largest: float
+    """[SI]"""
+    reason: str
+
+
+BOUNDS: Mapping[tuple[str, str], Bound] = MappingProxyType(
+    {
+        ("current", "A"): Bound(10.0, "proportional solenoids take 0.6 to 4 A"),
+        ("signed_current", "A"): Bound(10.0, "proportional solenoids take 0.6 to 4 A"),
+        ("current_plus", "A"): Bound(10.0, "proportional solenoids take 0.6 to 4 A"),
+        ("current_minus", "A"): Bound(10.0, "proportional solenoids take 0.6 to 4 A"),
+        ("rectified_current", "A"): Bound(10.0, "proportional solenoids take 0.6 to 4 A"),
+        ("shaft_speed", "rad/s"): Bound(1200.0, "the fastest hydraulic motors turn at 11,000 rpm"),
+        ("shaft_speed", "m/s"): Bound(20.0, "the fastest servo cylinders reach 15 m/s"),
+        ("position", "m"): Bound(100.0, "draw-wire sensors reach 60 m"),
+        ("stroker_pressure", "Pa"): Bound(1e8, "hydraulic machines stay below 1,000 bar"),
+        ("swash_angle", "rad"): Bound(0.8, "bent-axis units, the steepest, reach 45 deg"),
+        ("spool_position", "m"): Bound(0.05, "spools travel up to 25 mm"),
+    }
+)
+"""By kind and unit, whatever the drive: data sheets of Bosch Rexroth (4WRA and 4WRZ valves, A2FM
+motors of size 5, 45 deg of the A2F), of servo cylinders with hydrostatic bearings and of draw-wire
+sensors, with a margin. A shaft's angle and an encoder's counts have none; a command in V has the
+range of its card."""
+WORDS = (16, 32)
+"""Bits of a controller's words."""
+STANDS = 0.3
+"""Time for which a reading stands at its very end only if it is clipped there. [s]"""
+TO_AND_FRO = 0.05
+"""Share of a signal's changes that turn back by more than one step if it is noisy. [1]"""
+
+
+def instrument_sentences(signal: Channel | InputSignal) -> Iterator[str]:
+    """Sentences on readings beyond their kind, words read without their sign, and clipping."""
+    values = signal.values[signal.used]
+    if values.size < 2:
+        return
+    bits = unsigned_word(values)
+    if bits:
+        half, whole = 1 << (bits - 1), 1 << bits
+        yield (
+            f"values above {half - 1} are negative words of {bits} bits: read '"
+            f"{signal.source.column}' as int{bits}, or subtract {whole} from them"
+        )
+        return
+    bound = BOUNDS.get((signal.kind, signal.unit))
+    largest = float(values[np.abs(values).argmax()])
+    if bound is not None and abs(largest) > bound.largest:
+        display = display_unit(shown_unit(signal.kind, signal.unit), abs(largest))
+        yield (
+            f"reaches {display.factor * largest:.4g} {display.name}, but {bound.reason}: check "
+            "unit, scale and offset"
+        )
+    for level in clipping_levels(signal):
+        display = display_unit(shown_unit(signal.kind, signal.unit), float(np.ptp(values)))
+        table = f"channels.{signal.name}" if isinstance(signal, Channel) else "input"
+        at_level = signal.time[signal.used][values == level]
+        yield (
+            f"clipped at {display.factor * level:.4g} {display.name}, which it reads exactly in "
+            f"{at_level.size} samples from {at_level[0]:.4g} to {at_level[-1]:.4g} s, without its "
+            f"noise: check the range of {table}, or leave the run out"
+        )
+
+
+def unsigned_word(values: Array) -> int:
+    """Bits of the words that readings (n,) are if their sign was not read, 0 if they are none.
+
+    Such readings are small or close to the end of the word, with nothing in its middle half. A
+    scale is allowed for: the smallest step between them is that of a word.
+    """
+    sizes = np.abs(values)
+    step = step_of_reading(sizes)
+    if step == 0.0 or (values.min() < 0.0 < values.max()):
+        return 0
+    numbers = sizes / step
+    if np.abs(numbers - np.rint(numbers)).max() > 1e-3:
+        return 0
+    for bits in WORDS:
+        quarter = float(1 << (bits - 2))
+        small, large = numbers < quarter, numbers > 3.0 * quarter - 0.5
+        if numbers.max() < 4.0 * quarter and small.any() and large.any() and (small | large).all():
+            return bits
+    return 0
+
+
+def clipping_levels(signal: Channel | InputSignal) -> Iterator[float]:
+    """Ends at which a noisy signal stands without noise, for 0.3 s or longer.
+
+    Zero is none: it is what a current or a speed at rest reads. Positions are passed over, as they
+    stand still by themselves, and so is what has limits, which say where it ends.
+    """
+    if signal.kind == "other" or signal.limits is not None:
+        return
+    if isinstance(signal, Channel) and signal.is_position:
+        return
+    time, values = signal.time[signal.used], signal.values[signal.used]
+    if np.ptp(values) == 0.0 or not is_noisy(values, step_of_reading(values)):
+        return
+    for level in (float(values.min()), float(values.max())):
+        edges = np.flatnonzero(np.diff(values == level, prepend=False, append=False))
+        stretches = edges.reshape(-1, 2)
+        longest = max(float(time[stop - 1] - time[first]) for first, stop in stretches)
+        if abs(level) > 0.1 * np.abs(values).max() and longest >= STANDS:
+            yield level
+
+
+def is_noisy(values: Array, step: float) -> bool:
+    """Whether samples (n,) go to and fro by two of their steps or more, both ends left out.
+
+    No motion does that from sample to sample, nor rounding. Of the pairs of changes that noise of
+    one step makes, a tenth are such.
+    """
+    inner = (values > values.min()) & (values < values.max())
+    first, second = np.diff(values)[:-1], np.diff(values)[1:]
+    within = inner[:-2] & inner[1:-1] & inner[2:]
+    least = np.minimum(np.abs(first), np.abs(second))
+    turns = within & (first * second < 0.0) & (least > 1.5 * step)
+    return bool(turns.sum() > TO_AND_FRO * max(within.sum(), 1))
