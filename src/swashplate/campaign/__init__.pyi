@@ -1,6 +1,7 @@
 from .campaign import Campaign as Campaign
 from .campaign import json_schema as json_schema
 from .directions import reversed_commands as reversed_commands
+from .directions import solenoid_side as solenoid_side
 from .directions import turned as turned
 from .experiment import ASSUMED_ACCURACY as ASSUMED_ACCURACY
 from .experiment import JUMP_TIME as JUMP_TIME

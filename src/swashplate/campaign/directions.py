@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -90,7 +91,7 @@ def reversed_commands(experiments: Sequence[Experiment]) -> Iterator[tuple[Exper
         axis = against[0].axis
         yield (
             None,
-            f"in all {len(against)} runs of the axis '{axis}' the current flows in the solenoid "
+            f"In all {len(against)} runs of the axis '{axis}' the current flows in the solenoid "
             f"opposite to the command: {why}; reverse the input with sign = -1 in "
             f"[axes.{axis}.input]",
         )
@@ -115,3 +116,40 @@ def swapped_currents(experiment: Experiment) -> bool:
     """Whether both solenoids' currents go against a command that the motion follows."""
     halves = experiment.of_kind("current_plus", "current_minus")
     return bool(halves) and currents_are_turned(experiment) and not _moves_against(experiment)
+
+
+def solenoid_side(
+    commands: Sequence[Array], first: Sequence[Array], second: Sequence[Array]
+) -> Literal[-1, 0, 1]:
+    """Side of the command on which the first of two solenoids' currents flows, 0 if unknown.
+
+    From arrays (n,) of some logs. The currents must take turns: while one is beyond half of its
+    largest value the other is below a quarter of its own.
+    """
+    logs = [
+        log
+        for log in zip(commands, first, second, strict=False)
+        if log[0].size == log[1].size == log[2].size
+    ]
+    if not logs or not len(commands) == len(first) == len(second):
+        return 0
+    command, one, other = (np.concatenate(parts) for parts in zip(*logs, strict=True))
+    finite = np.isfinite(command) & np.isfinite(one) & np.isfinite(other)
+    command = command[finite]
+    flows = list[Array]()
+    for current in (np.abs(one[finite]), np.abs(other[finite])):
+        # a solenoid may have a bias at rest; single samples do not count
+        if not current.size:
+            return 0
+        low, high = np.quantile(current, (0.01, 0.99))
+        if high <= low:
+            return 0
+        flows.append((current - low) / (high - low))
+    alone = [(flows[0] > 0.5) & (flows[1] < 0.25), (flows[1] > 0.5) & (flows[0] < 0.25)]
+    together = (flows[0] > 0.5) & (flows[1] > 0.5)
+    if min(part.sum() for part in alone) <= together.sum():
+        return 0
+    levels = [float(np.median(command[part])) for part in alone]
+    if levels[0] == levels[1]:
+        return 0
+    return 1 if levels[0] > levels[1] else -1

@@ -9,7 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.campaign.experiment import Channel, InputSignal
+from swashplate.campaign.dropouts import dropouts
+from swashplate.campaign.experiment import Channel, Experiment, InputSignal
 from swashplate.campaign.schema import shown_unit
 from swashplate.campaign.spikes import step_of_reading
 from swashplate.units import display_unit
@@ -52,7 +53,7 @@ TO_AND_FRO = 0.05
 """Share of a signal's changes that turn back by more than one step if it is noisy. [1]"""
 
 
-def instrument_sentences(signal: Channel | InputSignal) -> Iterator[str]:
+def instrument_sentences(experiment: Experiment, signal: Channel | InputSignal) -> Iterator[str]:
     """Sentences on readings beyond their kind, words read without their sign, and clipping."""
     values = signal.values[signal.used]
     if values.size < 2:
@@ -73,15 +74,36 @@ def instrument_sentences(signal: Channel | InputSignal) -> Iterator[str]:
             f"reaches {display.factor * largest:.4g} {display.name}, but {bound.reason}: check "
             "unit, scale and offset"
         )
+    lost = {dropout.value for dropout in dropouts(experiment, signal)}
     for level in clipping_levels(signal):
-        display = display_unit(shown_unit(signal.kind, signal.unit), float(np.ptp(values)))
-        table = f"channels.{signal.name}" if isinstance(signal, Channel) else "input"
-        at_level = signal.time[signal.used][values == level]
-        yield (
-            f"clipped at {display.factor * level:.4g} {display.name}, which it reads exactly in "
-            f"{at_level.size} samples from {at_level[0]:.4g} to {at_level[-1]:.4g} s, without its "
-            f"noise: check the range of {table}, or leave the run out"
+        if level not in lost:
+            yield _clipped(experiment, signal, level)
+
+
+def _clipped(experiment: Experiment, signal: Channel | InputSignal, level: float) -> str:
+    """A sentence on a signal that is clipped at a level, with what leaves it out."""
+    time, values = signal.time[signal.used], signal.values[signal.used]
+    at_level = time[values == level]
+    stretches = np.split(at_level, np.flatnonzero(np.diff(at_level) > STANDS) + 1)
+    display = display_unit(shown_unit(signal.kind, signal.unit), float(np.ptp(values)))
+    said = (
+        f"clipped at {display.factor * level:.4g} {display.name}, which it reads {at_level.size} "
+        f"times between {at_level[0]:.4g} and {at_level[-1]:.4g} s, without its noise"
+    )
+    if not isinstance(signal, Channel):
+        return (
+            f'{said}: what was commanded beyond is lost; leave the run out with role = "ignore", '
+            "or cut it before with span"
         )
+    half = 0.5 * float(np.median(np.diff(time)))
+    windows = [
+        f'{{ from = {part[0] - half:.6g}, to = {part[-1] + half:.6g}, why = "clipped" }}'
+        for part in stretches
+    ]
+    return (
+        f"{said}: leave out with axes.{experiment.axis}.channels.{signal.name}.ignore = "
+        f"[{', '.join(windows)}] in this run"
+    )
 
 
 def unsigned_word(values: Array) -> int:

@@ -24,7 +24,7 @@ from swashplate.campaign.directions import (
 )
 from swashplate.campaign.dropouts import dropout_sentences
 from swashplate.campaign.experiment import Channel, Experiment, InputSignal
-from swashplate.campaign.instruments import instrument_sentences
+from swashplate.campaign.instruments import instrument_sentences, unsigned_word
 from swashplate.campaign.samples import (
     StampStatistics,
     find_lost_counts,
@@ -157,7 +157,7 @@ def _quality(
         findings += _of_input(signal, low, high, limits)
         findings += spike_sentences(experiment, signal)
         findings += dropout_sentences(experiment, signal)
-        findings += instrument_sentences(signal)
+        findings += instrument_sentences(experiment, signal)
     return Quality(
         signal=name,
         kind=signal.kind,
@@ -205,7 +205,7 @@ def _of_channel(experiment: Experiment, channel: Channel, signed: bool) -> Itera
         yield "never changes although the input does: is it connected?"
     yield from spike_sentences(experiment, channel)
     yield from dropout_sentences(experiment, channel)
-    yield from instrument_sentences(channel)
+    yield from instrument_sentences(experiment, channel)
     yield from lost_count_sentences(experiment, channel)
     if channel.kind == "rectified_current" and has_sign([values], NEGATIVE):
         yield "turns negative, so it is not rectified: should it be signed_current?"
@@ -221,7 +221,8 @@ def _of_channel(experiment: Experiment, channel: Channel, signed: bool) -> Itera
                 "cannot be resolved"
             )
     currents_turned = currents_are_turned(experiment)
-    if signed and not currents_turned and channel.name in turned_channels(experiment):
+    signed = signed and not currents_turned and not unsigned_word(values)
+    if signed and channel.name in turned_channels(experiment):
         yield "moves against the input: should its sign be -1?"
     if channel.kind == "current_plus" and swapped_currents(experiment):
         yield (
