@@ -14,7 +14,6 @@ from .experiment import Experiment as Experiment
 from .experiment import InputSignal as InputSignal
 from .experiment import SignalOrigin as SignalOrigin
 from .experiment import resolution_of_inputs as resolution_of_inputs
-from .instruments import is_noisy as is_noisy
 from .overview import BlockRanges as BlockRanges
 from .overview import LogWindow as LogWindow
 from .overview import Overview as Overview

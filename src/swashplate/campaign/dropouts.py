@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from swashplate.campaign.experiment import Channel, Experiment, InputSignal
 from swashplate.campaign.schema import CURRENTS, shown_unit
+from swashplate.parameters import FULL_VOLTAGE
 from swashplate.units import display_unit
 
 Array = NDArray[np.float64]
@@ -37,6 +38,8 @@ TO_AND_FRO = 0.25
 REACTS, STRIDE = 0.3, 0.05
 """Time within which a drive begins to follow a jump of its command, and within which a command that
 changes by more than a tenth of its range jumps. [s]"""
+LARGEST_COMMAND = {"voltage": FULL_VOLTAGE, "current": 10.0}
+"""Range of a card [V], and more than any solenoid takes [A]."""
 NAMED = 6
 """Windows that a sentence names."""
 Loss = Literal["mark", "fallen", "frozen"]
@@ -60,11 +63,11 @@ def dropouts(experiment: Experiment, signal: Channel | InputSignal) -> list[Drop
 
     Notes
     -----
-    A mark is beyond all other values by more than their range. A signal falls, or freezes, if it
-    could not do that: it jumps there and back by steps five times as large as those beside them, or
-    its noise stops, or a position stands still between two fast motions, and the command does not
-    jump before. Of equal samples in a row the probability follows from how many there are beside
-    the stretch: readings that rest, or whose steps are coarse, are not frozen.
+    A mark is beyond all other values by more than their range, a command's beyond the card. What
+    else is lost could not do that: it jumps there and back by steps five times as large as those
+    beside them, or its noise stops, or a position stands still between two fast motions, and the
+    command does not jump before. Of equal samples in a row the probability follows from how many
+    there are beside the stretch: readings that rest, or whose steps are coarse, are not frozen.
     """
     time, values = signal.time[signal.used], signal.values[signal.used]
     if signal.kind == "other" or values.size < 4 * FEWEST or np.ptp(values) == 0.0:
@@ -100,7 +103,7 @@ def _loss(
     far_off = high > low and not 2.0 * low - high <= value <= 2.0 * high - low
     at_an_end = first < 2 or stop > values.size - 2
     # a log may begin or end with an instrument that is off
-    if far_off and not (at_an_end and value == 0.0):
+    if far_off and _is_mark(experiment, signal, value, window) and not (at_an_end and value == 0.0):
         return "mark"
     if at_an_end:
         return None
@@ -136,6 +139,15 @@ def _loss(
         in_motion = abs(value) > MOVES * max(abs(low), abs(high))
         frozen = in_motion and low < value < high and (noisy or abs(leaves) > least_jump)
     return "frozen" if frozen and unexplained else None
+
+
+def _is_mark(
+    experiment: Experiment, signal: Channel | InputSignal, value: float, window: tuple[float, float]
+) -> bool:
+    """Whether a value far off is a mark for none, and not a command or what answers one."""
+    if isinstance(signal, InputSignal):
+        return abs(value) > LARGEST_COMMAND[signal.kind]
+    return not _command_jumps(experiment.input, window)
 
 
 def _moved(values: Array, rows: int) -> Array:

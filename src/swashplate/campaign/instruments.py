@@ -45,12 +45,15 @@ BOUNDS: Mapping[tuple[str, str], Bound] = MappingProxyType(
 motors of size 5, 45 deg of the A2F), of servo cylinders with hydrostatic bearings and of draw-wire
 sensors, with a margin. A shaft's angle and an encoder's counts have none; a command in V has the
 range of its card."""
+FEWEST = 10
+"""Turns that show noise."""
 WORDS = (16, 32)
 """Bits of a controller's words."""
 STANDS = 0.3
 """Time for which a reading stands at its very end only if it is clipped there. [s]"""
-TO_AND_FRO = 0.05
-"""Share of a signal's changes that turn back by more than one step if it is noisy. [1]"""
+TO_AND_FRO = 0.2
+"""Share of the samples at which a noisy signal turns back: three quarters of those of white noise,
+of which at least a third stand out from the steps of the converter. [1]"""
 
 
 def instrument_sentences(experiment: Experiment, signal: Channel | InputSignal) -> Iterator[str]:
@@ -113,7 +116,9 @@ def unsigned_word(values: Array) -> int:
     scale is allowed for: the smallest step between them is that of a word.
     """
     sizes = np.abs(values)
-    step = step_of_reading(sizes)
+    # the differences of small numbers are exact
+    small_ones = sizes[sizes < 0.25 * sizes.max()]
+    step = step_of_reading(small_ones) or step_of_reading(sizes)
     if step == 0.0 or (values.min() < 0.0 < values.max()):
         return 0
     numbers = sizes / step
@@ -138,7 +143,7 @@ def clipping_levels(signal: Channel | InputSignal) -> Iterator[float]:
     if isinstance(signal, Channel) and signal.is_position:
         return
     time, values = signal.time[signal.used], signal.values[signal.used]
-    if np.ptp(values) == 0.0 or not is_noisy(values, step_of_reading(values)):
+    if np.ptp(values) == 0.0 or not _is_noisy(values):
         return
     for level in (float(values.min()), float(values.max())):
         edges = np.flatnonzero(np.diff(values == level, prepend=False, append=False))
@@ -148,15 +153,14 @@ def clipping_levels(signal: Channel | InputSignal) -> Iterator[float]:
             yield level
 
 
-def is_noisy(values: Array, step: float) -> bool:
-    """Whether samples (n,) go to and fro by two of their steps or more, both ends left out.
+def _is_noisy(values: Array) -> bool:
+    """Whether samples (n,) go to and fro about a smooth curve by more than their rounding does.
 
-    No motion does that from sample to sample, nor rounding. Of the pairs of changes that noise of
-    one step makes, a tenth are such.
+    Second differences of noise turn back in three of four samples; those of a motion do not, and
+    those of a rounded one are a step or two.
     """
-    inner = (values > values.min()) & (values < values.max())
-    first, second = np.diff(values)[:-1], np.diff(values)[1:]
-    within = inner[:-2] & inner[1:-1] & inner[2:]
-    least = np.minimum(np.abs(first), np.abs(second))
-    turns = within & (first * second < 0.0) & (least > 1.5 * step)
-    return bool(turns.sum() > TO_AND_FRO * max(within.sum(), 1))
+    bends = np.diff(values, 2)
+    least = np.minimum(np.abs(bends[1:]), np.abs(bends[:-1]))
+    turns = (bends[1:] * bends[:-1] < 0.0) & (least > 1.5 * step_of_reading(values))
+    # what is clipped, or rests, does not bend
+    return bool(turns.sum() > max(TO_AND_FRO * np.count_nonzero(least), FEWEST))

@@ -203,6 +203,10 @@ def _of_channel(experiment: Experiment, channel: Channel, signed: bool) -> Itera
         return
     if np.ptp(values) == 0.0 and np.ptp(drive.values) > 0.0:
         yield "never changes although the input does: is it connected?"
+    if unsigned_word(values):
+        # its jumps are those of the words, and say nothing else
+        yield from instrument_sentences(experiment, channel)
+        return
     yield from spike_sentences(experiment, channel)
     yield from dropout_sentences(experiment, channel)
     yield from instrument_sentences(experiment, channel)
@@ -221,8 +225,7 @@ def _of_channel(experiment: Experiment, channel: Channel, signed: bool) -> Itera
                 "cannot be resolved"
             )
     currents_turned = currents_are_turned(experiment)
-    signed = signed and not currents_turned and not unsigned_word(values)
-    if signed and channel.name in turned_channels(experiment):
+    if signed and not currents_turned and channel.name in turned_channels(experiment):
         yield "moves against the input: should its sign be -1?"
     if channel.kind == "current_plus" and swapped_currents(experiment):
         yield (

@@ -25,7 +25,7 @@ UNUSUAL = 2.0
 """Factor by which a spike's own steps exceed the larger ones of the motion around it: at a turning
 point, the steps to and from it are the motion's own."""
 FEW = 3
-"""Excursions up to which two levels are not taken for neighbouring steps of a converter."""
+"""Excursions from which on levels are taken for steps of a converter."""
 NAMED = 6
 """Windows that a sentence names."""
 
@@ -96,12 +96,12 @@ def _stands_out(values: Array, first: int, last: int) -> bool:
 def step_of_reading(values: Array) -> float:
     """Step of the converter that readings (n,) come from, 0 if they do not show any.
 
-    The smallest distance between two of their levels. Two levels are a step only if the readings go
-    to and fro between them: one sample far off is no converter's step.
+    The smallest distance between two of their levels, if the readings go to and fro between them:
+    one sample far off is no converter's step.
     """
-    levels = np.unique(values)
-    if levels.size < 2 or (levels.size == 2 and np.count_nonzero(np.diff(values)) < 2 * FEW):
+    if np.count_nonzero(np.diff(values)) < 2 * FEW:
         return 0.0
+    levels = np.unique(values)
     distances = np.diff(levels)
     # rounding of a decimal number, or of a scale, makes equal levels differ
     distances = distances[distances > 1e-9 * float(np.abs(levels).max())]

@@ -15,7 +15,6 @@ from swashplate.campaign import (
     Channel,
     Experiment,
     beyond_the_card,
-    is_noisy,
     reversed_commands,
     spiked,
     turned,
@@ -50,6 +49,8 @@ FROZEN, DEAD = 1.0, 0.2
 largest simulated range that a run must have for a still sensor to be broken."""
 NAMED = 8
 """Unknowns that a sentence names."""
+TO_AND_FRO = 0.05
+"""Share of a channel's changes that turn back by more than one step if it is noisy. [1]"""
 DWELLS = 0.1
 """Time for which a noisy channel stands at its very largest value only if it is clipped. [s]"""
 
@@ -515,7 +516,7 @@ def clipped_channels(experiments: Sequence[Experiment]) -> Iterator[Finding]:
             # a rounded reading stands still by itself for as long as a step of it lasts
             coarse = float(np.diff(np.unique(np.round(values / (high - low), 9))).min())
             step = max(coarse, 3e-4) * (high - low)
-            if total_range > largest_range and not rests and is_noisy(values, step):
+            if total_range > largest_range and not rests and _is_noisy(values, step):
                 largest_range = total_range
             if largest_range > (0.1 + 2.0 * coarse) * reach:
                 yield refusal(
@@ -540,6 +541,20 @@ def _inputs_at(end: float, experiment: Experiment, name: str) -> list[tuple[floa
             inputs = experiment.input.at(channel.time[first : stop - (stop - first) // 4])
             spans.append((float(inputs.min()), float(inputs.max())))
     return spans
+
+
+def _is_noisy(values: Array, step: float) -> bool:
+    """Whether samples (n,) go to and fro by two of their steps or more, both ends left out.
+
+    No motion does that from sample to sample, nor rounding. Of the pairs of changes that noise of
+    one step makes, a tenth are such.
+    """
+    inner = (values > values.min()) & (values < values.max())
+    first, second = np.diff(values)[:-1], np.diff(values)[1:]
+    within = inner[:-2] & inner[1:-1] & inner[2:]
+    least = np.minimum(np.abs(first), np.abs(second))
+    turns = within & (first * second < 0.0) & (least > 1.5 * step)
+    return bool(turns.sum() > TO_AND_FRO * max(within.sum(), 1))
 
 
 # --- what the runs determine ----------------------------------------------------------------------
