@@ -314,6 +314,15 @@ class _Columns:
             values = factor * sign * (signal.scale * numbers[used] + signal.offset) + zero
             largest = float(np.max(np.abs(values)))
         if not largest < LARGEST:
+            far_off = ~(np.abs(values) < LARGEST)
+            marks = time[used][far_off]
+            if far_off.mean() < 0.5:
+                raise InputError(
+                    f"{described} reads {numbers[used][far_off][0]:.3g} in {marks.size} samples from "
+                    f"{marks[0]:.6g} to {marks[-1]:.6g} s, an instrument's mark for no value: leave "
+                    f"them out with ignore = [{{ from = {marks[0]:.6g}, to = {marks[-1]:.6g}, "
+                    'why = "dropout" }] in its table.'
+                )
             raise InputError(
                 f"{described} reaches {largest:.3g} {si}; check its unit, scale and offset."
             )
