@@ -318,11 +318,11 @@ class _Columns:
             marks = time[used][far_off]
             if far_off.mean() < 0.5:
                 mark = numbers[used][far_off][0]
-                window = f'{{ from = {marks[0]:.6g}, to = {marks[-1]:.6g}, why = "dropout" }}'
+                entry = f'{{ from = {marks[0]:.6g}, to = {marks[-1]:.6g}, why = "dropout" }}'
                 raise InputError(
                     f"{described} reads {mark:.3g} in {marks.size} samples from {marks[0]:.6g} to "
                     f"{marks[-1]:.6g} s, an instrument's mark for no value: leave them out with "
-                    f"ignore = [{window}] in its table."
+                    f"ignore = [{entry}] in its table."
                 )
             raise InputError(
                 f"{described} reaches {largest:.3g} {si}; check its unit, scale and offset."
