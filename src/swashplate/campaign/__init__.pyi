@@ -1,6 +1,9 @@
 from .campaign import FIXME as FIXME
 from .campaign import Campaign as Campaign
 from .campaign import json_schema as json_schema
+from .directions import reversed_commands as reversed_commands
+from .directions import solenoid_side as solenoid_side
+from .directions import turned as turned
 from .experiment import ASSUMED_ACCURACY as ASSUMED_ACCURACY
 from .experiment import JUMP_TIME as JUMP_TIME
 from .experiment import LARGEST_CERTAIN_INTERVAL as LARGEST_CERTAIN_INTERVAL
@@ -23,8 +26,6 @@ from .quality import examine as examine
 from .quality import has_sign as has_sign
 from .quality import moves_at_first as moves_at_first
 from .quality import quality_table as quality_table
-from .quality import spiked as spiked
-from .quality import turned as turned
 from .quality import unsigned_currents as unsigned_currents
 from .quality import wrapped_positions as wrapped_positions
 from .reading import read_run as read_run
@@ -59,3 +60,4 @@ from .speed import DIFFERENTIATOR as DIFFERENTIATOR
 from .speed import LOW_PASS as LOW_PASS
 from .speed import speed_from_angle as speed_from_angle
 from .speed import speed_of as speed_of
+from .spikes import spiked as spiked

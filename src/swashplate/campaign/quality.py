@@ -8,16 +8,23 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from math import ceil, inf, isfinite, isnan, nan, pi
+from math import ceil, isnan, nan, pi
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.campaign import schema
 from swashplate.campaign.campaign import Campaign, read_campaign_file
+from swashplate.campaign.directions import (
+    currents_are_turned,
+    reversed_commands,
+    swapped_currents,
+    turned_channels,
+)
+from swashplate.campaign.dropouts import dropout_sentences
 from swashplate.campaign.experiment import Channel, Experiment, InputSignal
+from swashplate.campaign.instruments import instrument_sentences, unsigned_word
 from swashplate.campaign.samples import (
     StampStatistics,
     find_lost_counts,
@@ -25,6 +32,12 @@ from swashplate.campaign.samples import (
     turns_over,
 )
 from swashplate.campaign.schema import applying, ends, inside, shown_unit
+from swashplate.campaign.spikes import (
+    NEIGHBOURS,
+    lost_count_sentences,
+    spike_sentences,
+    step_of_reading,
+)
 from swashplate.parameters import FULL_VOLTAGE
 from swashplate.results import Result
 from swashplate.tables import Column, Table, count
@@ -46,14 +59,14 @@ SURE = 6.0
 AT_FIRST, SLOW = 0.1, 0.1
 """Share of the greatest speed from which a run begins in motion; intervals of a position longer
 than so many seconds tell nothing of it. [s]"""
-NEIGHBOURS = 11
-"""Samples of the running median: up to five in a row may be a spike."""
 COARSE = 0.03
 """Step of a reading over its range from which slow motions cannot be resolved."""
 AVERAGED, HELD, LARGE, OFF_SCALE = 0.5, 1.0, 0.4, 3.0
 """Time over which motions are averaged, and for which a command has been larger than this part of
 the largest one, so that the machine has about its steady speed [s]; and the factor by which a run's
 speed for a volt does not differ from that of the other runs of one machine."""
+TOGGLING = 3.0
+"""Steps of its converter up to which a reading's change is no motion."""
 NAMED = 6
 """Windows, or maneuvers, that a sentence names."""
 
@@ -142,7 +155,9 @@ def _quality(
             lost = int(find_lost_counts(signal.time[used], signal.counts[used]).size)
     else:
         findings += _of_input(signal, low, high, limits)
-        findings += _of_spikes(experiment, signal)
+        findings += spike_sentences(experiment, signal)
+        findings += dropout_sentences(experiment, signal)
+        findings += instrument_sentences(experiment, signal)
     return Quality(
         signal=name,
         kind=signal.kind,
@@ -188,38 +203,42 @@ def _of_channel(experiment: Experiment, channel: Channel, signed: bool) -> Itera
         return
     if np.ptp(values) == 0.0 and np.ptp(drive.values) > 0.0:
         yield "never changes although the input does: is it connected?"
-    yield from _of_spikes(experiment, channel)
-    yield from _of_lost_counts(experiment, channel)
+    if unsigned_word(values):
+        # its jumps are those of the words, and say nothing else
+        yield from instrument_sentences(experiment, channel)
+        return
+    yield from spike_sentences(experiment, channel)
+    yield from dropout_sentences(experiment, channel)
+    yield from instrument_sentences(experiment, channel)
+    yield from lost_count_sentences(experiment, channel)
     if channel.kind == "rectified_current" and has_sign([values], NEGATIVE):
         yield "turns negative, so it is not rectified: should it be signed_current?"
-    steps = np.diff(np.unique(values))
-    if channel.kind in ("shaft_speed", "position") and steps.size > 2:
-        step, extent = float(np.median(steps)), float(np.ptp(values))
-        if step > COARSE * extent:
+    levels, extent = np.unique(values), float(np.ptp(values))
+    if channel.kind in ("shaft_speed", "position"):
+        step = float(np.median(np.diff(levels))) if levels.size > 3 else step_of_reading(values)
+        toggles = np.count_nonzero(np.diff(values)) >= 2 * levels.size
+        if step > COARSE * extent and (levels.size > 3 or toggles):
             size = display_unit(channel.shown_unit, extent)
             yield (
                 f"reads in steps of {size.factor * step:.3g} {size.name}, "
-                f"{100.0 * step / extent:.2g} % of its range: smaller motions and dead zones "
+                f"{_percent(step / extent)} of its range: smaller motions and dead zones "
                 "cannot be resolved"
             )
-    motion, at = values, time
-    if channel.is_position:
-        motion, at = np.diff(values) / np.diff(time), 0.5 * (time[1:] + time[:-1])
-    directed = ("signed_current", "shaft_speed", "swash_angle", "spool_position")
-    directional = signed and (channel.is_position or channel.kind in directed)
-    if directional and turned(drive.at(at) - drive.values[0], motion):
+    currents_turned = currents_are_turned(experiment)
+    if signed and not currents_turned and channel.name in turned_channels(experiment):
         yield "moves against the input: should its sign be -1?"
+    if channel.kind == "current_plus" and swapped_currents(experiment):
+        yield (
+            "flows while the command is negative, although the motion follows the command: swap "
+            "the columns of current_plus and current_minus"
+        )
     if outside := int(np.count_nonzero((time < drive.time[0]) | (time > drive.time[-1]))):
         yield f"{count(outside, 'sample is', 'samples are')} before or after the input's record"
 
 
-def turned(driven: Array, motion: Array) -> bool:
-    """Whether a motion (n,) goes against what it should be (n,), in any units, both about zero.
-
-    Their correlation is below -0.5.
-    """
-    size = float(np.linalg.norm(driven) * np.linalg.norm(motion))
-    return float(driven @ motion) < -0.5 * size
+def _percent(share: float) -> str:
+    """A share in per cent, with two digits."""
+    return f"{float(f'{100.0 * share:.2g}'):g} %"
 
 
 ESTIMATED_START = 'start = "estimated"'
@@ -321,167 +340,6 @@ def wrapped_positions(experiments: Iterable[Experiment]) -> dict[tuple[str, str]
     return sentences
 
 
-# --- spikes ---------------------------------------------------------------------------------------
-
-
-def spikes(signal: Channel | InputSignal, drive: InputSignal) -> list[tuple[float, float, float]]:
-    """Single samples that no motion explains: up to five in a row, of the input itself up to two.
-
-    For each the instants before and after it, half an interval off [s], and its value farthest from
-    what lasts [unit of the signal]. Of an encoder, jumps of its counter that come back.
-
-    Notes
-    -----
-    A sample is one where it lies more than 8 median absolute deviations from the running median of
-    11 samples, and beyond all values of that median by a tenth of their range; or, of a channel
-    while the input has stood still for 0.3 s, by a quarter of the range from the median within it.
-    Of a position that wraps a quarter of a turn is enough: it is read while it goes back.
-    """
-    from scipy.ndimage import median_filter
-
-    time, values = signal.time[signal.used], signal.values[signal.used]
-    if isinstance(signal, Channel) and signal.counts is not None:
-        return [(jump.begin, jump.end, jump.value) for jump in lost_counts(signal) if jump.returns]
-    if signal.kind == "other" or time.size < 4 * NEIGHBOURS:
-        return []
-    lasting = median_filter(values, size=NEIGHBOURS, mode="nearest")
-    low, high = float(lasting.min()), float(lasting.max())
-    off = np.abs(values - lasting)
-    least = 8.0 * float(np.median(off))
-    room, most = max(0.1 * (high - low), least), 2
-    is_spike = (values > high + room) | (values < low - room)
-    if signal is not drive:
-        most = NEIGHBOURS // 2
-        within = off > max(0.25 * (high - low), least)
-        if within.any():
-            grid = np.linspace(-0.3, 0.0, 7)[:, None] + time
-            commands = drive.at(grid.ravel()).reshape(grid.shape)
-            is_spike |= within & (np.ptp(commands, axis=0) <= 0.02 * np.ptp(drive.values))
-        if isinstance(signal, Channel) and signal.rolls_over_at is not None:
-            is_spike |= off > 0.25 * signal.rolls_over_at
-    rows = np.flatnonzero(is_spike & (off > least))
-    half = 0.5 * float(np.median(np.diff(time)))
-    groups = np.split(rows, np.flatnonzero(np.diff(rows) > NEIGHBOURS // 2) + 1)
-    return [
-        (float(time[g[0]]) - half, float(time[g[-1]]) + half, float(values[g[off[g].argmax()]]))
-        for g in groups
-        if g.size and g[-1] - g[0] < most
-    ]
-
-
-def _of_spikes(experiment: Experiment, signal: Channel | InputSignal) -> Iterator[str]:
-    """A sentence on a signal's spikes, with the line that leaves them out."""
-    spiked_at = spikes(signal, experiment.input)
-    windows = [f'{{ from = {a:.6g}, to = {b:.6g}, why = "spike" }}' for a, b, _ in spiked_at]
-    rest = f" and {len(spiked_at) - NAMED} more like these" if len(spiked_at) > NAMED else ""
-    table = f"channels.{signal.name}" if isinstance(signal, Channel) else "input"
-    line = f"axes.{experiment.axis}.{table}.ignore = [{', '.join(windows[:NAMED])}]"
-    if spiked_at:
-        largest = f"{max((value for _, _, value in spiked_at), key=abs):.4g} {signal.unit}"
-        if isinstance(signal, Channel) and signal.counts is not None:
-            jumps = [jump.counts for jump in lost_counts(signal) if jump.returns]
-            largest = f"{max(jumps, key=abs):+.0f} counts"
-        spike = count(len(spiked_at), "spike")
-        yield f"{spike}, up to {largest}{rest}: leave out with {line} in this run"
-
-
-class LostCounts(NamedTuple):
-    """A jump of an encoder's counter that no motion explains."""
-
-    begin: float
-    """Half an interval before it. [s]"""
-    end: float
-    """Half an interval before it came back; infinite if it did not. [s]"""
-    counts: float
-    """Counts that it jumped by, less those of the motion before it."""
-    value: float
-    """Reading after it. [unit]"""
-
-    @property
-    def returns(self) -> bool:
-        """Whether the counter came back, so that leaving out the samples between is enough."""
-        return isfinite(self.end)
-
-
-def lost_counts(channel: Channel) -> list[LostCounts]:
-    """Jumps of an encoder's counter, see `samples.find_lost_counts`.
-
-    Two that cancel within five samples, but for what the shaft moves meanwhile, are one that came
-    back.
-    """
-    if channel.counts is None:
-        return []
-    time, counts = channel.time[channel.used], channel.counts[channel.used]
-    values, rows = channel.values[channel.used], find_lost_counts(time, counts).tolist()
-    half = 0.5 * float(np.median(np.diff(time))) if rows else 0.0
-    usual = float(np.median(np.abs(np.diff(counts)))) if rows else 0.0
-
-    def jump_at(row: int) -> float:
-        last_step = counts[row - 1] - counts[row - 2] if row > 1 else 0.0
-        return float(counts[row] - counts[row - 1] - last_step)
-
-    jumps, skip = list[LostCounts](), False
-    for number, row in enumerate(rows):
-        if skip:
-            skip = False
-            continue
-        jump, end = jump_at(row), inf
-        following = rows[number + 1] if number + 1 < len(rows) else len(counts)
-        if following < len(counts) and following - row <= NEIGHBOURS // 2:
-            room = max(0.1 * abs(jump), 2.0 * usual * (following - row))
-            back = float(counts[following] - counts[row - 1])
-            skip = abs(back) <= room
-            end = float(time[following]) - half if skip else inf
-        jumps.append(LostCounts(float(time[row]) - half, end, jump, float(values[row])))
-    return jumps
-
-
-def _of_lost_counts(experiment: Experiment, channel: Channel) -> Iterator[str]:
-    """A sentence on counts that are lost for good, with the lines that cut the run there."""
-    lasting = [jump for jump in lost_counts(channel) if not jump.returns]
-    if not lasting:
-        return
-    times = ", ".join(f"{spike.begin:.6g} s" for spike in lasting[:NAMED])
-    times += f" and {len(lasting) - NAMED} times more" if len(lasting) > NAMED else ""
-    most = max((spike.counts for spike in lasting), key=abs)
-    cut = f"{lasting[0].begin:.6g}"
-    yield (
-        f"jumps by up to {most:+.0f} counts at {times} faster than any motion, and does not come "
-        f"back: lost or doubled counts. Cut the run there: span = {{ to = {cut} }} in this run, "
-        "and add a second run of the same file with "
-        f'name = "{experiment.run} from {cut} s", span = {{ from = {cut} }}, start = "estimated"'
-    )
-
-
-def spiked(experiments: Sequence[Experiment]) -> dict[tuple[str, str], tuple[str, bool]]:
-    """Channels with spikes or lost counts, by run and name, and the line that mends each.
-
-    Beside the sentence, whether it is gross: twice as far from the median as the channel moves
-    in any run, so that squared errors would be the spike's.
-    """
-    sentences_by_channel, moves = dict[tuple[str, str], tuple[str, float]](), dict[str, float]()
-    for experiment in experiments:
-        for name, channel in experiment.channels.items():
-            used, far = channel.used, 0.0
-            middle = float(np.median(channel.values[used])) if used.any() else 0.0
-            for begin, end, value in spikes(channel, experiment.input):
-                used &= (channel.time < begin) | (channel.time > end)
-                far = max(far, abs(value - middle))
-            if used.any():
-                moves[name] = max(moves.get(name, 0.0), float(np.ptp(channel.values[used])))
-            sentences = [f"has {sentence}" for sentence in _of_spikes(experiment, channel)]
-            sentences += _of_lost_counts(experiment, channel)
-            if sentences:
-                sentences_by_channel[experiment.name, name] = (
-                    f"{experiment.name}: '{name}' {'; it '.join(sentences)}",
-                    far,
-                )
-    return {
-        (run, name): (sentence, far > 2.0 * moves.get(name, 0.0))
-        for (run, name), (sentence, far) in sentences_by_channel.items()
-    }
-
-
 # --- the campaign as a whole ----------------------------------------------------------------------
 
 
@@ -513,6 +371,7 @@ def campaign_findings(campaign: Campaign) -> tuple[str, ...]:
             findings += _unused(f"{of}.ignore", channel.ignore, runs, long, key)
             findings += _unused(f"{of}.weights", channel.weights, runs, long, key)
         findings += [*_one_sided(name, runs), *_of_other_scale(runs)]
+        findings += [sentence for _, sentence in reversed_commands(runs)]
     for number, run in enumerate(file.runs, 1):
         of_run = [
             experiment
@@ -543,14 +402,23 @@ def _one_sided(axis: str, runs: Sequence[Experiment]) -> Iterator[str]:
         return
     speeds, driven = list[Array](), list[Array]()
     for run in runs:
-        for _, time, speed in _mean_speeds(run):
-            speeds.append(speed)
-            driven.append(run.input.at(time))
+        for channel, time, speed in _mean_speeds(run):
+            step = step_of_reading(channel.values[channel.used])
+            within_steps = TOGGLING * step / (AVERAGED if channel.is_position else 1.0)
+            if np.abs(speed).max(initial=0.0) > within_steps:
+                speeds.append(speed)
+                driven.append(run.input.at(time))
     motion, command = (np.concatenate([np.zeros(0), *parts]) for parts in (speeds, driven))
     most = float(np.abs(motion).max(initial=0.0))
     at_rest = np.abs(motion) < 0.02 * most
     if at_rest.any() and min(motion.max(), -motion.min()) > most / 3.0:
         rest = float(np.median(command[at_rest]))
+        if abs(rest) < 0.02 * float(np.abs(command).max()):
+            yield (
+                f"axis '{axis}': it moves both ways although its command never changes sign and "
+                "rests at 0 V: it is logged without its sign; look for a column of the direction"
+            )
+            return
         yield (
             f"axis '{axis}': it moves both ways although its command never changes sign; a stick "
             f"that rests at {rest:.3g} V needs offset = {-rest:.3g} in [axes.{axis}.input]"

@@ -314,6 +314,16 @@ class _Columns:
             values = factor * sign * (signal.scale * numbers[used] + signal.offset) + zero
             largest = float(np.max(np.abs(values)))
         if not largest < LARGEST:
+            far_off = ~(np.abs(values) < LARGEST)
+            marks = time[used][far_off]
+            if far_off.mean() < 0.5:
+                mark = numbers[used][far_off][0]
+                entry = f'{{ from = {marks[0]:.6g}, to = {marks[-1]:.6g}, why = "dropout" }}'
+                raise InputError(
+                    f"{described} reads {mark:.3g} in {marks.size} samples from {marks[0]:.6g} to "
+                    f"{marks[-1]:.6g} s, an instrument's mark for no value: leave them out with "
+                    f"ignore = [{entry}] in its table."
+                )
             raise InputError(
                 f"{described} reaches {largest:.3g} {si}; check its unit, scale and offset."
             )

@@ -36,6 +36,7 @@ from swashplate.campaign import (
     moves_at_first,
     read_run,
     rolls_over_at,
+    solenoid_side,
     turns_over,
 )
 from swashplate.documents import parse_toml, toml_key, toml_string, validated
@@ -80,6 +81,8 @@ DEGREES_AS_GRAD = re.compile(
 """German and Scandinavian words in the names of columns: there "grad" is a degree."""
 INPUTS = get_args(InputKind)
 HALVES = {"current_plus", "current_minus"}
+SIGNED_NAME = r"\b(?:plus|minus|positive|negative)\b"
+"""Names of the solenoids' currents that say which is which."""
 PLC = re.compile(
     r"(?:PIW|PEW|PQW|PAW|AIW|AQW|IW|EW)\d*[_ ](?P<after>.+)|(?P<before>.+)[_ ](?:W|WORD|INT|RAW)",
     re.IGNORECASE,
@@ -423,12 +426,40 @@ def _guesses(
         elif guess.unit is None:
             guess = _with_unit_of_numbers(guess, values)
         guesses.append(_by_numbers(guess, values, counts_per_turn))
+    guesses = _with_halves(guesses, blocks)
     present = {(guess.axis, guess.kind) for guess in guesses}
     for index, guess in enumerate(guesses):
         is_half = guess.kind in HALVES and not guess.is_stated
         if is_half and any((guess.axis, half) not in present for half in HALVES):
             guesses[index] = guess._replace(kind="rectified_current")
     return guesses
+
+
+def _with_halves(guesses: Sequence[_Guess], blocks: Mapping[str, list[Array]]) -> list[_Guess]:
+    """Guesses in which two currents that take turns are those of both solenoids.
+
+    Which is which follows from the command while each flows, whatever they are called, unless their
+    names say plus and minus.
+    """
+    changed = {guess.name: guess for guess in guesses}
+    for axis in dict.fromkeys(guess.axis for guess in guesses):
+        of_axis = [guess for guess in guesses if guess.axis == axis]
+        currents = [
+            guess
+            for guess in of_axis
+            if guess.kind in ("rectified_current", *HALVES) and not guess.is_stated
+        ]
+        command = next((guess for guess in of_axis if guess.kind in INPUTS), None)
+        named = any(re.search(SIGNED_NAME, _words(guess.name)) for guess in currents)
+        if len(currents) != 2 or command is None or named:
+            continue
+        first, second = currents
+        side = solenoid_side(blocks[command.name], blocks[first.name], blocks[second.name])
+        kinds = ("current_plus", "current_minus")[:: side or 1]
+        for guess, kind in zip(currents, kinds, strict=True):
+            if side:
+                changed[guess.name] = guess._replace(kind=kind)
+    return list(changed.values())
 
 
 def _by_numbers(guess: _Guess, blocks: Sequence[Array], counts_per_turn: float | None) -> _Guess:

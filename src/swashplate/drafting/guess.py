@@ -16,7 +16,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.campaign import CURRENTS, Campaign, Channel, ChannelKind, Experiment, spiked
+from swashplate.campaign import (
+    CURRENTS,
+    Campaign,
+    Channel,
+    ChannelKind,
+    Experiment,
+    reversed_commands,
+    spiked,
+)
 from swashplate.drafting.amplifier import AmplifierGuess, guess_amplifier
 from swashplate.drafting.mean_speeds import (
     ACCELERATION,
@@ -163,7 +171,8 @@ def guess_drive(tests: Campaign | Sequence[Experiment]) -> Guess:
     ------
     InputError
         If no run has such a channel, the input is not a voltage, the speed of a run or of all moves
-        opposite to the command, a channel has gross spikes, or too little moves.
+        opposite to the command, the command is reversed, a channel has gross spikes, or too little
+        moves.
     """
     experiments = tests.select(role="fit") if isinstance(tests, Campaign) else tuple(tests)
     runs, unit = _moving_runs(experiments)
@@ -225,6 +234,8 @@ def _moving_runs(experiments: Sequence[Experiment]) -> tuple[list[MovingRun], st
         runs.append(run)
         if not goes_with_command(run):
             reversed_runs.append((experiment.name, channel.name))
+    for _, sentence in reversed_commands(experiments):
+        raise InputError(f"{sentence}.")
     if 0 < len(reversed_runs) < len(runs):
         run_name, channel_name = reversed_runs[0]
         raise InputError(

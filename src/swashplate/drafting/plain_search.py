@@ -252,7 +252,8 @@ def searched_numbers(
     grid = _grid_points(search)
     if (grid[0].gain[search.tried] <= 0.0).any():
         raise InputError(
-            "The speed is opposite to the command: reverse it with sign = -1 in its channel."
+            "The speed is opposite to the command: reverse it with sign = -1 in its channel, or in "
+            "the input if that was logged the wrong way round."
         )
     unlimited = search.best_from((point.unknowns for point in grid[:3]), free_without_limits)
     best = search.best_from(_limited_starts(unlimited.unknowns), free_without_jump)

@@ -15,6 +15,7 @@ from swashplate.campaign import (
     Channel,
     Experiment,
     beyond_the_card,
+    reversed_commands,
     spiked,
     turned,
     unsigned_currents,
@@ -81,6 +82,10 @@ def check_runs(experiments: Sequence[Experiment], nominal: ParameterSet) -> list
     """
     unsigned = {**unsigned_currents(experiments), **wrapped_positions(experiments)}
     findings = [refusal(None, name, f"{clause}.") for (_, name), clause in unsigned.items()]
+    findings += [
+        refusal(run.name if run else None, None, f"{sentence}.")
+        for run, sentence in reversed_commands(experiments)
+    ]
     for run in experiments:
         of_the_drive = [name for name, channel in run.channels.items() if channel.kind in SIGNALS]
         findings += _samples(run, of_the_drive)
