@@ -462,6 +462,56 @@ def test_data_are_checked_before_the_search() -> None:
     assert fit(servo, RUNS, RANGES, noise=NOISE).doubts == ()
 
 
+class Turning(NamedTuple):
+    place: float
+    speed: float
+
+
+@equation
+def turning_step(state: Turning, command: float, supply: float, p: Servo, h: float) -> Turning:
+    speed = state.speed + h / p.lag * (p.gain * command * supply - state.speed)
+    return Turning(state.place + h * speed, speed)
+
+
+turning = Model("turning", parameters=Servo, state=Turning, step=turning_step)
+"""A model of two signals, so that a fit goes on if a channel of one of them is called otherwise."""
+
+
+class Optional:
+    """The servo as a program that gives what it knows of a run's channels."""
+
+    def simulate(self, values, experiment):
+        outputs = {"place": values["gain"] * experiment["supply"].values}
+        if "speed" in experiment.channels:
+            outputs["speed"] = values["gain"] * experiment["supply"].values
+        return outputs
+
+
+@pytest.mark.parametrize("model", [turning, Optional()], ids=["equations", "program"])
+@pytest.mark.parametrize(
+    ("name", "named"),
+    [("sped", r"did you mean speed\?"), ("n_motor", "without a channel: speed")],
+)
+def test_a_channel_that_is_no_signal_of_the_model_is_refused(model, name, named) -> None:
+    """Dropped in silence, it would leave what it measures to be guessed."""
+    channel = replace(RUNS[0]["place"], name=name)
+    tests = [replace(each, channels={**each.channels, name: channel}) for each in RUNS]
+    setup = ModelSetup(model, {"gain": (0.1, 1.0, 10.0)}, fixed={"lag": 0.3})
+    with pytest.raises(InputError, match=rf"one: the channel '{name}' is no signal.*{named}"):
+        setup.nominal(tests)
+
+
+def test_a_channel_is_left_out_if_that_is_said() -> None:
+    tests = [
+        replace(each, channels={**each.channels, "oil": replace(RUNS[0]["place"], name="oil")})
+        for each in RUNS
+    ]
+    with pytest.raises(InputError, match=r"'oil' .* channels = \(\"place\",\)"):
+        ModelSetup(servo, RANGES).nominal(tests)
+    stated = ModelSetup(servo, RANGES, channels=("place",)).nominal(tests)
+    assert list(stated.scales) == ["place"]
+
+
 def lag_alone(**stated: object) -> None:
     ModelSetup(servo, {"lag": (0.1, 0.3, 1.0)}, **stated).nominal(RUNS)
 
