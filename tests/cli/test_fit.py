@@ -85,8 +85,8 @@ def test_a_campaign_becomes_a_drive(done, refused, campaign, tmp_path, monkeypat
     assert "swashplate simulate drive.toml step:4" in printed
     # the stick was moved to 4 and -5 V
     ranked = done("advise", "../virtual/campaign.toml", "--drive", "drive.toml", "--top", "30")
-    assert "step +4 V" in ranked
-    assert "step +9 V" not in ranked
+    assert "step 4 V" in ranked
+    assert "step 9 V" not in ranked
 
 
 @pytest.mark.slow

@@ -46,7 +46,7 @@ def diagonal(*errors: float) -> np.ndarray:
 def test_no_usual_test_goes_beyond_the_largest_command(largest) -> None:
     """A stick that ends at 5 V cannot make a step of 9 V."""
     usual = default_maneuvers(largest)
-    assert len({test.name for test in usual}) == len(usual) == 19
+    assert len({test.name for test in usual}) == len(usual) == 18
     ends = [(float(v.max()), float(v.min())) for v in (test.sample(100.0) for test in usual)]
     assert max(high for high, _ in ends) == pytest.approx(largest[0], rel=0.11)
     assert max(high for high, _ in ends) <= largest[0] + 1e-9

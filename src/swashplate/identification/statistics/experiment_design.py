@@ -592,7 +592,8 @@ def largest_of_machine(experiments: Sequence[Experiment]) -> tuple[float, float]
             ends.append((high, -low))
     if not ends:
         return FULL
-    plus, minus = (min(max(each), FULL_VOLTAGE) for each in zip(*ends, strict=True))
+    # to more than two digits it is noise of the log
+    plus, minus = (min(float(f"{max(each):.2g}"), FULL_VOLTAGE) for each in zip(*ends, strict=True))
     # noise about 0 V is not a command
     least = NO_COMMAND * max(plus, minus)
     if max(plus, minus) <= 0.0:

@@ -76,8 +76,8 @@ def machine_numbers_of(drive: Drive, largest: Commands = FULL) -> Array:
     """Characteristic numbers of a drive, (6, 2): each way, positive and negative. SI
 
     Dead zone [V]; top speed [rad/s], steady under the largest command; largest acceleration
-    [rad/s²], delay and lag [s] of a step from rest to the largest command, the delay up to 2 % of the change to the
-    speed that settles, the lag from there to 63 %; creep, the steady speed at 0 V [rad/s]. NaN
+    [rad/s²], delay and lag [s] of a step from rest to the largest command, the delay up to 2 % of
+    the change to the speed that settles, the lag from there to 63 %; creep, the steady speed at 0 V [rad/s]. NaN
     where the drive has none.
     """
     rest = float(drive.steady_speed(0.0))
@@ -495,7 +495,7 @@ def _next_steps(
             plus, minus = tested_commands(stages)
             volts = plus or -minus
             code = Markup("Try it in the folder of the fit: <code>{}</code>.")
-            step = f"step:{_three_digits(volts, towards_zero=True)}"
+            step = f"step:{volts:.2g}"  # to more digits it is noise of the log
             steps.append(code.format(f"swashplate simulate {FITTED_DRIVE} {step}"))
     return steps
 
