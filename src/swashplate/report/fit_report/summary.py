@@ -77,8 +77,8 @@ def machine_numbers_of(drive: Drive, largest: Commands = FULL) -> Array:
 
     Dead zone [V]; top speed [rad/s], steady under the largest command; largest acceleration
     [rad/s²], delay and lag [s] of a step from rest to the largest command, the delay up to 2 % of
-    the change to the speed that settles, the lag from there to 63 %; creep, the steady speed at 0 V [rad/s]. NaN
-    where the drive has none.
+    the change to the speed that settles, the lag from there to 63 %; creep, the steady speed
+    at 0 V [rad/s]. NaN where the drive has none.
     """
     rest = float(drive.steady_speed(0.0))
     numbers = np.full((6, 2), np.nan)
