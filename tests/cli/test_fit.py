@@ -3,6 +3,7 @@
 import csv
 import os
 import re
+import shlex
 import signal
 import subprocess
 import sys
@@ -10,6 +11,7 @@ import time
 import tomllib
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from html import unescape
 from math import exp
 from pathlib import Path
 
@@ -42,7 +44,7 @@ def campaign(done: Words, tmp_path: Path) -> Path:
 # --- fit ------------------------------------------------------------------------------------------
 
 
-def test_a_campaign_becomes_a_drive(done, refused, campaign, tmp_path) -> None:
+def test_a_campaign_becomes_a_drive(done, refused, campaign, tmp_path, monkeypatch) -> None:
     words = ("fit", CAMPAIGN, "--setup", "setup.toml", "--out", "fitted")
     said = done(*words, "--timing")
     (times,) = re.findall(r"^Time: +(.*)$", said, re.MULTILINE)
@@ -73,6 +75,18 @@ def test_a_campaign_becomes_a_drive(done, refused, campaign, tmp_path) -> None:
         assert "Z16_plus" in advice
         assert "Z13" not in advice
     assert "fitted/drive.toml " in refused(*words)
+    # what the report prints runs as printed, in the folder of the report
+    page = unescape((tmp_path / "fitted" / "report.html").read_text("utf-8"))
+    printed = re.findall(r"<code>(swashplate [^<]+)</code>", page)
+    assert printed
+    monkeypatch.chdir(tmp_path / "fitted")
+    for command in printed:
+        done(*shlex.split(command)[1:])
+    assert "swashplate simulate drive.toml step:4" in printed
+    # the stick was moved to 4 and -5 V
+    ranked = done("advise", "../virtual/campaign.toml", "--drive", "drive.toml", "--top", "30")
+    assert "step 4 V" in ranked
+    assert "step 9 V" not in ranked
 
 
 @pytest.mark.slow

@@ -18,6 +18,61 @@ NUMBER = re.compile(r"(?<!\S)[-+]?\d[\d.e+-]*(?!\S)")
 
 # --- simulate -------------------------------------------------------------------------------------
 
+STICKS = {
+    "offset": ({"unit": "V", "offset": -5.0}, lambda volts: volts + 5.0),
+    "reversed": ({"offset": 5.0, "sign": -1, "unit": "V"}, lambda volts: -volts - 5.0),
+    "per cent": ({"scale": 0.1, "unit": "V"}, lambda volts: 10.0 * volts),
+    "millivolts": ({"unit": "mV", "offset": -2500.0}, lambda volts: 1e3 * volts + 2500.0),
+}
+"""How a campaign states its command, and the number of the log for a voltage at the card."""
+
+
+def fitted_drive(path: Path, **command: object) -> None:
+    """A parameter file as a fit writes it, with what its campaign states of the command."""
+    Drive.preset("hoist").to_toml(path)
+    lines = ["[command]", 'column = "Joystick"']
+    lines += [f"{name} = {value!r}".replace("'", '"') for name, value in command.items()]
+    path.write_text(path.read_text("utf-8") + "\n" + "\n".join(lines) + "\n", "utf-8")
+
+
+@pytest.mark.parametrize("stick", STICKS)
+def test_the_column_of_the_fit_is_read_as_the_fit_read_it(done, number, tmp_path, stick):
+    """The stick of a machine rests at 5 V: without the campaign's offset that is half speed."""
+    stated, numbers = STICKS[stick]
+    fitted_drive(tmp_path / "mine.toml", **stated)
+    volts = maneuvers.step(6.0).sample()
+    time = np.arange(volts.size) / 512.0
+    pl.DataFrame({"time": time, "Joystick": numbers(volts), "card": volts}).write_csv("log.csv")
+    words = ("simulate", "mine.toml", "log.csv", "--interpolation", "previous", "--column")
+    text = done(*words, "Joystick", "--out", "run.csv")
+    assert "Joystick" in text
+    assert pl.read_csv("run.csv")["voltage"].to_numpy() == pytest.approx(volts, abs=1e-9)
+    # another column holds the card's volts, which is said
+    assert "'card' is taken as volts at the card" in done(*words, "card", "--out", "other.csv")
+    assert pl.read_csv("other.csv")["voltage"].to_numpy() == pytest.approx(volts, abs=1e-9)
+
+
+@pytest.mark.parametrize("stick", STICKS)
+def test_compensation_is_told_in_the_numbers_of_the_stick(done, tmp_path, stick):
+    stated, numbers = STICKS[stick]
+    fitted_drive(tmp_path / "mine.toml", **stated)
+    text = done("compensate", "mine.toml", "--speed-deg-s", "100", "--out", "map.csv")
+    assert "the voltage at the card is" in text
+    table = pl.read_csv("map.csv")
+    expected = [float(numbers(volts)) for volts in table["voltage"]]
+    assert table["Joystick, as logged"].to_list() == pytest.approx(expected, rel=1e-9)
+    # without a campaign's offset nothing is added
+    assert "as logged" not in done("compensate", "hoist", "--speed-deg-s", "100")
+
+
+def test_a_drive_keeps_how_its_logs_hold_the_command(done, tmp_path):
+    fitted_drive(tmp_path / "mine.toml", **STICKS["offset"][0])
+    drive = Drive.from_toml(tmp_path / "mine.toml")
+    drive.replace(Z10=11.0).to_toml(tmp_path / "changed.toml")
+    changed = Drive.from_toml(tmp_path / "changed.toml").parameters.command
+    assert changed == ("Joystick", "V", 1.0, -5.0, 1)
+    assert Drive.preset("hoist").parameters.command is None
+
 
 def test_a_step_prints_the_known_speeds(done, number):
     text = done("simulate", "hoist", "step:9")

@@ -167,6 +167,14 @@ def test_a_short_delay_is_warned_of_with_a_step_that_would_do(hoist, tmp_path):
         export.fmu(exact, tmp_path / "a.fmu", step=1.6e-3, platforms=["linux64"])
 
 
+@pytest.mark.parametrize("tau", [0.0, 6.6e-12, 1e-7, 2e-5])
+def test_no_step_is_proposed_for_a_delay_that_is_practically_none(hoist, tmp_path, tau):
+    """A fitted delay at its lower bound is no reason to step in picoseconds."""
+    with pytest.warns(UserWarning, match="sets inputs before it reads outputs") as warned:
+        export.fmu(hoist.replace(tau=tau), tmp_path / "a.fmu", platforms=["linux64"])
+    assert not any("choose a step" in str(each.message) for each in warned)
+
+
 def test_same_drive_same_bytes_and_another_another_token(hoist, files, fmi, tmp_path):
     again = export.fmu(hoist, tmp_path / "other.fmu", fmi=fmi)
     assert again.read_bytes() == files[fmi].read_bytes()

@@ -29,6 +29,7 @@ from swashplate.identification.statistics.experiment_design import (
     MEMORY,
     CandidateTest,
     Sensor,
+    default_maneuvers,
     default_sensors,
 )
 from swashplate.maneuvers import sine, step
@@ -39,6 +40,17 @@ AB = unknowns_of("ab", np.ones(2))
 def diagonal(*errors: float) -> np.ndarray:
     """Rows that leave standard errors as given."""
     return np.diag([0.0 if np.isinf(each) else 1.0 / each for each in errors])
+
+
+@pytest.mark.parametrize("largest", [(10.0, 10.0), (5.0, 5.0), (5.0, 4.2), (0.8, 9.3), (9.0, 9.0)])
+def test_no_usual_test_goes_beyond_the_largest_command(largest) -> None:
+    """A stick that ends at 5 V cannot make a step of 9 V."""
+    usual = default_maneuvers(largest)
+    assert len({test.name for test in usual}) == len(usual) == 18
+    ends = [(float(v.max()), float(v.min())) for v in (test.sample(100.0) for test in usual)]
+    assert max(high for high, _ in ends) == pytest.approx(largest[0], rel=0.11)
+    assert max(high for high, _ in ends) <= largest[0] + 1e-9
+    assert min(low for _, low in ends) >= -largest[1] - 1e-9
 
 
 def test_a_candidate_that_mixes_known_and_unknown_tells_of_the_unknown_alone() -> None:

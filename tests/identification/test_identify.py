@@ -50,6 +50,18 @@ def result(campaign: Campaign) -> Identification:
     return swashplate.identify(campaign, free=TWO_STAGES)
 
 
+def test_the_campaigns_stick_travels_with_the_drive(result: Identification, tmp_path: Path) -> None:
+    """The offset of a stick that rests at 5 V would be lost with the campaign."""
+    assert result.drive.parameters.command is None  # as logged, these are the card's volts
+    (name, axis), *_ = result.campaign.axes.items()
+    stick = {"column": "Joystick", "offset": -5.0, "sign": -1}
+    stated = axis.model_copy(update={"input": axis.input.model_copy(update=stick)})
+    tests = replace(result.campaign, axes={name: stated})
+    replace(result, campaign=tests).save(tmp_path)
+    command = Drive.from_toml(tmp_path).parameters.command
+    assert (command.column, command.offset, command.sign) == ("Joystick", -5.0, -1)
+
+
 def test_the_truth_is_found_and_judged(result: Identification) -> None:
     for name, true in TRUTH.items():
         estimate = result[name]

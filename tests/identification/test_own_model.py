@@ -34,11 +34,13 @@ from swashplate.identification import (
     UserModel,
     assess_fit,
     fit,
+    identifiability_of,
     predict,
     solve,
     uncertainty_of,
 )
 from swashplate.identification.estimation.model import linearised
+from swashplate.identification.estimation.problem import rounded_unknowns
 
 RATE = 20.0
 TIME = np.arange(240) / RATE
@@ -460,6 +462,106 @@ def test_data_are_checked_before_the_search() -> None:
     with pytest.raises(InputError, match="servo: .* gain"):
         fit(servo, idle, {"gain": RANGES["gain"]}, noise=NOISE, fixed={"lag": 0.3})
     assert fit(servo, RUNS, RANGES, noise=NOISE).doubts == ()
+
+
+class Turning(NamedTuple):
+    place: float
+    speed: float
+
+
+@equation
+def turning_step(state: Turning, command: float, supply: float, p: Servo, h: float) -> Turning:
+    speed = state.speed + h / p.lag * (p.gain * command * supply - state.speed)
+    return Turning(state.place + h * speed, speed)
+
+
+turning = Model("turning", parameters=Servo, state=Turning, step=turning_step)
+"""A model of two signals, so that a fit goes on if a channel of one of them is called otherwise."""
+
+
+class Optional:
+    """The servo as a program that gives what it knows of a run's channels."""
+
+    def simulate(self, values, experiment):
+        outputs = {"place": values["gain"] * experiment["supply"].values}
+        if "speed" in experiment.channels:
+            outputs["speed"] = values["gain"] * experiment["supply"].values
+        return outputs
+
+
+@pytest.mark.parametrize("model", [turning, Optional()], ids=["equations", "program"])
+@pytest.mark.parametrize(
+    ("name", "named"),
+    [("sped", r"did you mean speed\?"), ("n_motor", "without a channel: speed")],
+)
+def test_a_channel_that_is_no_signal_of_the_model_is_refused(model, name, named) -> None:
+    """Dropped in silence, it would leave what it measures to be guessed."""
+    channel = replace(RUNS[0]["place"], name=name)
+    tests = [replace(each, channels={**each.channels, name: channel}) for each in RUNS]
+    setup = ModelSetup(model, {"gain": (0.1, 1.0, 10.0)}, fixed={"lag": 0.3})
+    with pytest.raises(InputError, match=rf"one: the channel '{name}' is no signal.*{named}"):
+        setup.nominal(tests)
+
+
+def test_a_channel_is_left_out_if_that_is_said() -> None:
+    tests = [
+        replace(each, channels={**each.channels, "oil": replace(RUNS[0]["place"], name="oil")})
+        for each in RUNS
+    ]
+    with pytest.raises(InputError, match=r"'oil' .* channels = \(\"place\",\)"):
+        ModelSetup(servo, RANGES).nominal(tests)
+    stated = ModelSetup(servo, RANGES, channels=("place",)).nominal(tests)
+    assert list(stated.scales) == ["place"]
+
+
+class Late:
+    """A gain behind a delay, as a program that turns the delay into samples in its own way."""
+
+    def __init__(self, samples) -> None:
+        self.samples = samples
+
+    def simulate(self, values, experiment):
+        time, command = experiment.input.time, experiment.input.values
+        samples = self.samples(values["delay"] * RATE)
+        late = np.interp(time - samples / RATE, time, command)
+        return {"position": np.clip(values["gain"] * late, -values["limit"], values["limit"])}
+
+
+@pytest.mark.parametrize("samples", [int, round, np.ceil], ids=["int", "round", "ceil"])
+@pytest.mark.parametrize("nominal", [0.07, 0.1, 0.125])
+def test_a_delay_that_the_model_rounds_is_named_as_such(samples, nominal) -> None:
+    """A tenth of a sample changes nothing, ten do: no search can move it, wherever it begins."""
+    model = Late(samples)
+    command = np.interp(TIME, np.arange(0.0, 12.0, 1.5), [0.0, 2.0, -1.0, 1.5, 0.5, -2.0, 1.0, 0.0])
+    runs = [run_of("a", command, {"position": np.zeros(TIME.size)}, time=TIME, kind="other")]
+    truth = {"gain": 1.2, "delay": 0.2, "limit": 50.0}
+    channel = replace(
+        runs[0]["position"], values=model.simulate(truth, runs[0])["position"], noise=0.01
+    )
+    runs[0] = replace(runs[0], channels={"position": channel})
+    free = {"gain": (0.1, 1.0, 10.0), "delay": (0.0, nominal, 2.0, "s"), "limit": (1.0, 40.0, 80.0)}
+    (stage,) = fit(model, runs, free).stages
+    sentences = identifiability_of(stage).sentences()
+    assert any(
+        re.match("The model rounds delay: a change by [0-9].* s .*np.interp", s) for s in sentences
+    )
+    unexercised = [sentence for sentence in sentences if "No test exercises" in sentence]
+    assert [sentence.partition(":")[0] for sentence in unexercised] == ["No test exercises limit"]
+
+
+def test_a_delay_that_the_model_follows_is_not_called_rounded() -> None:
+    """Nor is a limit that no test reaches, whichever way its bounds lie."""
+    model = Late(float)
+    (each,) = [run_of("a", COMMAND, {"position": COMMAND}, time=TIME, kind="other")]
+    each = replace(each, channels={"position": replace(each["position"], noise=0.01)})
+    for limit in (3.0, 79.0):
+        unknowns = (
+            Unknown("gain", 1.0, 0.1, 10.0),
+            Unknown("delay", 0.07, 0.0, 2.0, "s"),
+            Unknown("limit", limit, 1.0, 80.0),
+        )
+        made = problem(model, each, free=unknowns)
+        assert rounded_unknowns(made, made.start) == ()
 
 
 def lag_alone(**stated: object) -> None:

@@ -102,14 +102,14 @@ def test_numbers_of_what_was_tested_hold(found: Fit) -> None:
             assert low - slack <= degrees.get(name, 1.0) * truth[row, way] <= high + slack, name
 
 
-def test_a_top_speed_that_was_not_reached_is_at_least_what_was(found: Fit) -> None:
+def test_the_top_speed_is_that_of_the_largest_command_that_was_tested(found: Fit) -> None:
+    """Of a stick that ends there, one at 10 V would be nobody's."""
     shown = cells(found)[ROWS["top speed"]]
     for text, volts in zip(shown, (8.0, -7.0), strict=True):
-        assert text.startswith("at least ")
-        assert text.endswith(", not seen")
+        low, high = interval(text)
         seen = np.degrees(float(WINCH.steady_speed(volts)))
-        assert float(text.split()[2].rstrip(",")) == pytest.approx(seen, rel=0.02)
-        assert abs(float(text.split()[2].rstrip(","))) <= abs(seen) * 1.001
+        slack = 0.25 * (high - low)
+        assert low - slack <= seen <= high + slack
 
 
 def test_an_orifice_that_the_fit_does_not_look_for_leaves_no_interval(

@@ -15,7 +15,7 @@ from swashplate.analysis.outcomes import rms_difference
 from swashplate.drive import Drive
 from swashplate.equations.marching import SOURCE_RATE
 from swashplate.errors import DomainError, InputError
-from swashplate.parameters import FULL_VOLTAGE
+from swashplate.parameters import FULL_VOLTAGE, LoggedCommand
 from swashplate.results import GivenAxes, Result, figures, short
 from swashplate.tables import (
     UNIT,
@@ -86,6 +86,8 @@ class InverseMap(Result):
     error: float
     """Largest interpolation error: steady speed less reference speed half way between two
     points. [rad/s]"""
+    logged: LoggedCommand | None = None
+    """How the logs of the drive's fit hold the command, if not as the voltage at the card."""
 
     @property
     def limits(self) -> tuple[float, float]:
@@ -211,19 +213,32 @@ class InverseMap(Result):
         return self.voltage(reference + self.lag * np.gradient(reference, 1.0 / rate), clip=True)
 
     def to_polars(self) -> polars.DataFrame:
-        """Table of the points, voltage rising: ``speed`` [rad/s] and ``voltage`` [V], SI."""
+        """Table of the points, voltage rising: ``speed`` [rad/s] and ``voltage`` [V], SI.
+
+        If logs of the drive hold other numbers, these as a column by the name of theirs.
+        """
         return self._points(MOST).to_polars()
 
     def _points(self, most: int) -> Table:
         """The map at some points each way, and at rest."""
-        table = Table("", (Column("speed", "z.3f", "rad/s"), Column("voltage", "z.4f", "V")))
+        columns = (Column("speed", "z.3f", "rad/s"), Column("voltage", "z.4f", "V"))
+        table = Table("", (*columns, *self._logged_column()))
         rest = MapBranch(np.array([self.creep]), np.zeros(1))
         for branch in (self.minus, rest, self.plus):
             size = branch.speed.size
             spread = np.linspace(0, size - 1, min(most, size))
             for index in np.unique(spread.round().astype(int)):
-                table.add(float(branch.speed[index]), float(branch.voltage[index]))
+                speed, voltage = float(branch.speed[index]), float(branch.voltage[index])
+                table.add(speed, voltage, *self._logged_numbers(voltage))
         return table
+
+    def _logged_column(self) -> tuple[Column, ...]:
+        """A column for the numbers that a log of the drive would hold, if they are others."""
+        return () if self.logged is None else (Column(f"{self.logged.column}, as logged", "z.4f"),)
+
+    def _logged_numbers(self, voltage: float) -> tuple[float, ...]:
+        """The number in a log of the drive for a voltage at the card, if it is another."""
+        return () if self.logged is None else (float(self.logged.numbers(np.array(voltage))),)
 
     def tables(self, speeds: Sequence[float] = ()) -> list[Table]:
         """Voltages of reference speeds [rad/s]; the map at a few points; where it holds."""
@@ -231,6 +246,7 @@ class InverseMap(Result):
             Column("reference speed", "g", "rad/s"),
             Column("voltage", "z.4f", "V"),
             Column("settles at", "z.3f", "rad/s"),
+            *self._logged_column(),
         )
         voltages_table = Table("", columns)
         voltages = self.voltage(speeds)
@@ -239,7 +255,7 @@ class InverseMap(Result):
         map_speeds = np.concatenate([self.minus.speed, [self.creep], self.plus.speed])
         settled = np.interp(voltages, map_voltages, map_speeds)
         for row in zip(speeds, voltages, settled, strict=True):
-            voltages_table.add(*map(float, row))
+            voltages_table.add(*map(float, row), *self._logged_numbers(float(row[1])))
         gap_start, gap_end = self.gap
         if any(gap_start < speed < gap_end for speed in speeds):
             low, high = (quantity(edge, "rad/s", spec="z.3f") for edge in (gap_start, gap_end))
@@ -291,6 +307,8 @@ class InverseMap(Result):
             "rest": {"speed": self.creep},
             "plus": {name: each.tolist() for name, each in self.plus._asdict().items()},
         }
+        if self.logged is not None:
+            content["command"] = self.logged._asdict()
         write_text(COMMENTS + dumps(content), path)
 
 
@@ -365,6 +383,7 @@ def inverse_map(drive: Drive, points: int = 101) -> InverseMap:
         acceleration=(abs(upwards), abs(downwards)),
         lag=0.5 * sum(lags),
         error=max(errors),
+        logged=drive.parameters.command,
     )
 
 

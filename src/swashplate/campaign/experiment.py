@@ -21,7 +21,7 @@ from swashplate.campaign.schema import (
     Role,
     shown_unit,
 )
-from swashplate.errors import UnknownNameError
+from swashplate.errors import UnknownNameError, meant
 from swashplate.results import Result, Tabular, figures
 from swashplate.tables import UNIT, Column, Table
 
@@ -393,7 +393,8 @@ class Experiment(Tabular):
         """
         if channel not in self.channels:
             names = ", ".join(self.channels)
-            raise UnknownNameError(f"{self.name} has no channel '{channel}'; it has {names}.")
+            near = meant(channel, self.channels)
+            raise UnknownNameError(f"{self.name} has no channel '{channel}'{near}; it has {names}.")
         return self.channels[channel]
 
     def of_kind(self, *kinds: ChannelKind) -> tuple[Channel, ...]:

@@ -422,6 +422,8 @@ def compensate(
     save(out, "Inverse map, in SI", inverse.write)
     draw_figure(plot, "plot_compensation", inverse, improvement)
     drive.note(f"{drive.title}: voltage for a required speed")
+    if inverse.logged is not None:
+        note(f"{inverse.logged.sentence}; the tables give both.")
     show(*tables)
 
 

@@ -505,6 +505,18 @@ def advise(
             metavar="MANEUVER", help="Test to rank in place of the usual ones; may be repeated."
         ),
     ] = None,
+    largest: Annotated[
+        float | None,
+        typer.Option(
+            metavar="V",
+            min=0.1,
+            max=10.0,
+            help=(
+                "Largest command that the usual tests may have (default: the range of the input "
+                "that the campaign states, or the largest command of its runs)."
+            ),
+        ),
+    ] = None,
     top: Annotated[int, typer.Option(metavar="N", min=0, help="Number of tests to list.")] = 10,
     tests: Annotated[
         int, typer.Option(metavar="N", min=0, help="Number of tests in the plan.")
@@ -542,6 +554,7 @@ def advise(
         advice_table,
         best_tests_table,
         default_maneuvers,
+        largest_of_machine,
         sequential_plan,
     )
 
@@ -571,11 +584,15 @@ def advise(
             run_names = [experiment.name for experiment in experiments]
             prior = prior_information(start, basis.setup, experiments, fitted=drive is not None)
         else:
+            experiments = ()
             untested = parsing.parameters_of(subject)
             prior = prior_information(smooth(untested), load_setup(setup or untested.name))
         machine = Drive(prior.parameters)
+        most = largest_of_machine(experiments)
+        if largest is not None:
+            most = (largest, largest)
         requested = [trials.named_maneuver(word, machine) for word in maneuver or ()]
-        maneuvers = {test.name: test for test in requested or default_maneuvers()}
+        maneuvers = {test.name: test for test in requested or default_maneuvers(most)}
         candidates = [prior.candidate(test) for test in maneuvers.values()]
         ranked = advise(prior.present, candidates, prior.variables)
         plan_of_tests = sequential_plan(prior.present, candidates, prior.variables, tests)

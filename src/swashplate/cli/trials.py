@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from swashplate.analysis import Trial
     from swashplate.cli.options import CommandSampling, Simulating, Start
     from swashplate.drive import Drive, Simulation
-    from swashplate.logs import Series
+    from swashplate.logs import Log, Series
     from swashplate.maneuvers import Maneuver
 
 _ENDING = re.compile(r"\.[A-Za-z]\w*$")
@@ -92,7 +92,7 @@ def simulated_run(
         name = Path(command).name
         log = command
         error_prefix = f"{command}: "
-        series = _command_series(command, options)
+        series = _command_series(drive, command, options)
         values = series.values
         time = series.time
     else:
@@ -117,9 +117,16 @@ def simulated_run(
         raise InputError(f"{error_prefix}{error}") from None
 
 
-def _command_series(command: str, options: CommandSampling) -> Series:
-    """Read the voltage of a command from a log; refuses another kind of file."""
-    from swashplate.logs import open_log, read_series
+def _command_series(drive: Drive, command: str, options: CommandSampling) -> Series:
+    """Read the voltage of a command from a log; refuses another kind of file.
+
+    The column that the drive was fitted to is read as its campaign reads it.
+    """
+    import numpy as np
+
+    from swashplate.cli.terminal import note
+    from swashplate.errors import FileError
+    from swashplate.logs import open_log, read_series, unit_of
 
     kind = file_kind(Path(command))
     if kind not in ("log", ""):
@@ -134,13 +141,40 @@ def _command_series(command: str, options: CommandSampling) -> Series:
             log.find(column)
         except InputError as error:
             raise InputError(f"{str(error).rstrip('.')}, with {option}.") from None
-    series = read_series(command, options.column, "V", time_column=options.time_column)
+    logged = drive.parameters.command
+    if logged is not None and _is_column(log, options.column, logged.column):
+        times = read_series(command, options.time_column, "s", time_column=options.time_column)
+        unit = logged.unit or unit_of(log.find(options.column), options.column, "V")
+        logged = logged._replace(unit=unit)
+        volts = logged.volts(log.read([options.column])[options.column])
+        if not np.isfinite(volts).all():
+            row = int(np.argmin(np.isfinite(volts)))
+            raise FileError(
+                f"{command}: column '{options.column}' has no finite number in data row {row}."
+            )
+        series = times._replace(values=volts)
+        note(f"{logged.sentence}.")
+    else:
+        series = read_series(command, options.column, "V", time_column=options.time_column)
+        if logged is not None:
+            note(
+                f"'{options.column}' is taken as volts at the card; the fit's own command is "
+                f"'{logged.column}'."
+            )
     if options.interpolation is None:
         raise InputError(
             f"{command} needs --interpolation linear (a straight line from row to row) or "
             "--interpolation previous (each row held until the next)."
         )
     return series
+
+
+def _is_column(log: Log, requested: str, column: str) -> bool:
+    """Whether two names, with or without a unit, mean one column of a log."""
+    try:
+        return log.find(requested) == log.find(column)
+    except InputError:
+        return False
 
 
 def _measured_inputs(assignments: Sequence[str], log: str, time_column: str) -> dict[str, Any]:

@@ -65,6 +65,9 @@ ABILITIES_2 = (
     "canNotUseMemoryManagementFunctions",
 )
 ABILITIES_3 = ("canGetAndSetFMUState", "canSerializeFMUState")
+SHORTEST_STEP_INSTEAD = 0.1
+"""Of the step, the shortest one that is proposed in its place: a delay that would need a shorter
+one, such as a fitted delay that ended at its lower bound, is practically none. [1]"""
 _NOT_XML = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 _EARLIEST = (1980, 1, 1, 0, 0, 0)
 
@@ -149,8 +152,10 @@ def exportable(what: Drive | Model, step: float, **numbers: Any) -> Content:
                 f"{delay / LONGEST_LINE:.3g} s or more."
             )
     for signal, (delay, steps) in newest(content.exported, content.instance, step).items():
-        shorter = f"choose a step of {delay / steps:.3g} s or less" if delay > 0.0 else ""
-        advice = shorter or "a master that sets inputs before it reads outputs gets them exactly"
+        enough = delay / steps
+        advice = "a master that sets inputs before it reads outputs gets them exactly"
+        if enough >= SHORTEST_STEP_INSTEAD * step:
+            advice = f"choose a step of {enough:.3g} s or less"
         delay_name = "tau" if isinstance(what, Drive) else f"the delay of {signal}"
         warnings.warn(
             f"{what.name}: {delay_name} is {delay:g} s, below {steps:g} steps of {step:g} s, so "

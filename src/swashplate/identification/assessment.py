@@ -52,6 +52,7 @@ from swashplate.parameters import (
     FITTED_DRIVE,
     FITTED_NUMBERS,
     NEUTRAL,
+    LoggedCommand,
     Motion,
     ParameterSet,
     dump_set,
@@ -356,7 +357,19 @@ class Identification(Estimated):
             "parameters": parameters,
             "motion": motion_of(self.fit.runs),
             "unreached": self._unreached(),
+            "command": self._logged_command(),
         }
+
+    def _logged_command(self) -> LoggedCommand | None:
+        """How the campaign's logs hold the command, unless as the volts of the card."""
+        axis = self.campaign.axes.get(self.fit.runs[0].axis)
+        if axis is None or axis.input.kind != "voltage":
+            return None
+        entry = axis.input
+        command = LoggedCommand(
+            entry.column, entry.unit or "", entry.scale, entry.offset, entry.sign
+        )
+        return None if command.is_voltage else command
 
     def _unreached(self) -> dict[str, float]:
         """Limits that the fitted runs do not reach; none of a drive that cannot be simulated."""

@@ -25,6 +25,7 @@ from .files import set_file as set_file
 from .parameter_set import Change as Change
 from .parameter_set import Entries as Entries
 from .parameter_set import HasParameters as HasParameters
+from .parameter_set import LoggedCommand as LoggedCommand
 from .parameter_set import Motion as Motion
 from .parameter_set import Pair as Pair
 from .parameter_set import Parameter as Parameter

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field
 
@@ -24,6 +24,7 @@ from swashplate.parameters.definitions import Block, Definition, definitions_of,
 from swashplate.parameters.parameter_set import (
     CardSwitch,
     CoulombSign,
+    LoggedCommand,
     Motion,
     Pair,
     Parameter,
@@ -59,6 +60,16 @@ class EquationPlaces(FileTable):
     old: str
     new: str
     parameters: str | None = None
+
+
+class CommandEntry(FileTable):
+    """How the logs of a fitted drive hold its command: sign * (scale * number + offset)."""
+
+    column: str
+    unit: str = ""
+    scale: Number = 1.0
+    offset: Number = 0.0
+    sign: Literal[1, -1] = 1
 
 
 class ModelOptions(FileTable):
@@ -101,6 +112,7 @@ class SetFile(FormerlyFormat):
     model: ModelOptions = ModelOptions()
     refinements: dict[str, ParameterEntry] = Field({})
     """Options beyond Kruse's equations; all are off by default."""
+    command: CommandEntry | None = None
 
 
 # --- reading --------------------------------------------------------------------------------------
@@ -243,7 +255,21 @@ def read_set(text: str, origin: str) -> ParameterSet:
         equations=equations,
         motion=model.motion,
         unreached=model.unreached,
+        command=_logged_command(contents.command, origin),
     )
+
+
+def _logged_command(entry: CommandEntry | None, origin: str) -> LoggedCommand | None:
+    """How logs hold the command, its unit and scale checked."""
+    if entry is None:
+        return None
+    if entry.scale == 0.0:
+        raise ParameterError(f"{origin}: [command] scale is 0, which leaves nothing of it.")
+    try:
+        to_si(1.0, entry.unit or "V", "V", "[command] unit")
+    except InputError as error:
+        raise ParameterError(f"{origin}: {error}") from None
+    return LoggedCommand(**entry.model_dump())
 
 
 def _replacements(entries: Sequence[EquationPlaces], origin: str) -> tuple[Replacement, ...]:
@@ -315,6 +341,8 @@ def dump_set(parameters: ParameterSet) -> str:
     text.add("schema", SCHEMA)
     for name in ("name", "title", "card"):
         text.add(name, getattr(parameters, name))
+    if parameters.command is not None:
+        blocks["command"] = parameters.command._asdict()
     for block, entries in blocks.items():
         text.add(block, entries)
     return dumps(text)

@@ -9,6 +9,7 @@ from types import MappingProxyType
 from typing import Any, Literal, NamedTuple, Protocol, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from swashplate.equations import Replacement, is_real
 from swashplate.errors import InputError, ParameterError
@@ -26,13 +27,56 @@ from swashplate.parameters.plausible import check_plausible
 from swashplate.parameters.rules import check_options, check_rules, refuse
 from swashplate.results import Result
 from swashplate.tables import UNIT, Column, Table, listed
-from swashplate.units import Quantity, in_si
+from swashplate.units import Quantity, in_si, to_si
 
 PressureRoot = Literal["published", "symmetric"]
 CoulombSign = Literal["smooth", "literal"]
 CardSwitch = Literal["sampled", "split"]
 Motion = Literal["shaft", "rod"]
 Status = Literal["fitted", "fixed", "assumed", "approximate", "inactive", "user"]
+
+
+class LoggedCommand(NamedTuple):
+    """How the numbers of a log become the voltage at a drive's card, as in the campaign of its fit.
+
+    The voltage is sign · (scale · number + offset), in a unit.
+    """
+
+    column: str
+    """Column of the logs."""
+    unit: str = ""
+    """Of what scale and offset give; if empty, that of the log's header, or V."""
+    scale: float = 1.0
+    offset: float = 0.0
+    sign: int = 1
+
+    @property
+    def is_voltage(self) -> bool:
+        """Whether the log's numbers are the card's volts as they stand."""
+        return self.unit in ("", "V") and self[2:] == (1.0, 0.0, 1)
+
+    def volts(self, numbers: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Voltage at the card for numbers of a log. [V]"""
+        return self._factor * self.sign * (self.scale * numbers + self.offset)
+
+    def numbers(self, volts: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Numbers of a log for voltages at the card [V]."""
+        return (self.sign * volts / self._factor - self.offset) / self.scale
+
+    @property
+    def _factor(self) -> float:
+        return to_si(1.0, self.unit or "V", "V", f"the unit of '{self.column}'")
+
+    @property
+    def sentence(self) -> str:
+        """How to read a number of the column."""
+        number = f"'{self.column}'" if self.scale == 1.0 else f"{self.scale:g} x '{self.column}'"
+        if self.offset:
+            number += f" {'-' if self.offset < 0.0 else '+'} {abs(self.offset):g}"
+        if self.sign < 0:
+            number = f"-({number})"
+        unit = self.unit or "V"
+        return f"As in the campaign of the fit, the voltage at the card is {number} {unit}"
 
 
 class Pair(NamedTuple):
@@ -190,6 +234,8 @@ class ParameterSet(Entries):
     unreached: Mapping[str, float] = field(default_factory=dict)
     """Limits that the tests of this drive never reached, by column, and how far they went, 0 if
     that is not known: such a limit lies there or beyond, wherever its value stands. [SI]"""
+    command: LoggedCommand | None = None
+    """How logs of this drive hold its command; None if they hold the card's volts."""
     numbers: Mapping[str, float] = field(init=False, repr=False, compare=False)
     """Every single value by column, e.g. ``Z16_plus``."""
 

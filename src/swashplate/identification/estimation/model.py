@@ -23,7 +23,7 @@ from swashplate.equations.marching import (
     on_grid,
     started_by,
 )
-from swashplate.errors import DomainError, InputError
+from swashplate.errors import DomainError, InputError, meant
 from swashplate.results import Result, short
 
 Array = NDArray[np.float64]
@@ -175,7 +175,10 @@ def part_of(outputs: Mapping[str, Output], experiment: Experiment, channel: str)
     """Output of a model for a channel; an `InputError` if it gives none."""
     if channel not in outputs:
         names = ", ".join(outputs)
-        raise InputError(f"{experiment.name}: the model gives no '{channel}'; it gives {names}.")
+        raise InputError(
+            f"{experiment.name}: the model gives no '{channel}'{meant(channel, outputs)}; it gives "
+            f"{names}."
+        )
     return outputs[channel]
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from importlib import import_module
 from math import inf
@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.campaign import Experiment
+from swashplate.campaign import Channel, Experiment
 from swashplate.documents import validated
 from swashplate.equations import Model as Equations
 from swashplate.equations import check_mapping, is_real, parameter_paths
@@ -40,6 +40,7 @@ from swashplate.identification.estimation.solving import solve
 from swashplate.identification.estimation.unknowns import Unknown, Unknowns, zero_name
 from swashplate.parameters import check_plausible
 from swashplate.results import Result
+from swashplate.tables import listed
 
 Array = NDArray[np.float64]
 Range = tuple[float, float, float] | tuple[float, float, float, str]
@@ -193,8 +194,8 @@ class ModelSetup(Result):
         strange = [name for name in self.noise if name not in measured]
         if strange:
             raise InputError(
-                f"{self.name}: noise is stated for '{strange[0]}', but the channels are "
-                f"{', '.join(measured) or 'none'}."
+                f"{self.name}: noise is stated for '{strange[0]}'{meant(strange[0], measured)}, "
+                f"but the channels are {', '.join(measured) or 'none'}."
             )
         problem = self.problem(experiments)
         numbers = {**self.fixed, **problem.unknowns.targets(problem.start, "")}
@@ -237,15 +238,44 @@ class ModelSetup(Result):
         )
 
     def _channels_given(self, experiments: Sequence[Experiment]) -> tuple[str, ...]:
-        """Names of the channels that the model gives."""
+        """Names of the channels that the model gives; one that it does not know is refused."""
         values = {unknown.name: unknown.start for unknown in self.free.values()} | dict(self.fixed)
-        names = dict[str, None]()
+        given = dict[str, None]()
         for experiment in experiments:
             if isinstance(self.model, UserModel):
-                names |= dict.fromkeys(self.model.signals_of(experiment))
+                names = [*self.model.signals_of(experiment)]
+                taken = {*self.model.model.external, *self.model.begin.values()}
+                signals = self.model.signals
             else:
-                names |= dict.fromkeys(simulated(self.model, values, experiment))
-        return tuple(names)
+                read = _ReadChannels(experiment.channels)
+                names = [*simulated(self.model, values, replace(experiment, channels=read))]
+                taken = read.names
+                signals = [*names, *sorted(taken)]
+            self._check_channels(experiment, names, taken, signals)
+            given |= dict.fromkeys(names)
+        return tuple(given)
+
+    def _check_channels(
+        self,
+        experiment: Experiment,
+        given: Collection[str],
+        taken: Collection[str],
+        signals: Sequence[str],
+    ) -> None:
+        """Refuse a channel that the model neither gives nor takes: its name may be a slip."""
+        for name in experiment.channels:
+            if name in given or name in taken:
+                continue
+            unmeasured = [signal for signal in signals if signal not in experiment.channels]
+            without_channel = ""
+            if unmeasured:
+                without_channel = f" Signals of the model without a channel: {listed(unmeasured)}."
+            fitted = "".join(f'"{channel}", ' for channel in given).strip()
+            raise UnknownNameError(
+                f"{experiment.name}: the channel '{name}' is no signal of {self.name}"
+                f"{meant(name, unmeasured)}.{without_channel} Call the channel like its signal; if "
+                f"it is to be left out, state channels = ({fitted}) beside the model."
+            )
 
     def unknowns_of_run(self, experiment: Experiment) -> tuple[Unknown, ...]:
         """The unknowns of a single run: where its state begins, and the zeros of its sensors."""
@@ -286,6 +316,25 @@ class ModelSetup(Result):
             zeros=zeros,
         )
         return problem.outputs(solve(problem).vector, 0)
+
+
+class _ReadChannels(Mapping[str, Channel]):
+    """Channels of an experiment that remember which of them a model asked for."""
+
+    def __init__(self, channels: Mapping[str, Channel]) -> None:
+        self._channels = channels
+        self.names = set[str]()
+        """Names that were asked for, whether there is such a channel or not."""
+
+    def __getitem__(self, name: str) -> Channel:
+        self.names.add(name)
+        return self._channels[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._channels)
+
+    def __len__(self) -> int:
+        return len(self._channels)
 
 
 def _without_zeros(

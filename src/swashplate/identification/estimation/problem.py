@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from swashplate.campaign import Channel, Experiment
 from swashplate.equations import Model as OfEquations
 from swashplate.equations.marching import ObservedRecord
-from swashplate.errors import InputError
+from swashplate.errors import DomainError, InputError
 from swashplate.identification.estimation.arrow import (
     ArrowFactor,
     RunRows,
@@ -24,6 +24,7 @@ from swashplate.identification.estimation.arrow import (
     whitening,
 )
 from swashplate.identification.estimation.model import (
+    RELATIVE_STEP,
     EquationModel,
     Linearised,
     MachineModel,
@@ -387,6 +388,93 @@ def noise_scales(experiments: Sequence[Experiment], channels: Sequence[str]) -> 
         if scales[name] == 0.0:
             raise InputError(f"The channel '{name}' never changes: nothing can be fitted to it.")
     return scales
+
+
+# --- what a model rounds --------------------------------------------------------------------------
+
+FARTHER = 10.0
+"""Factor from one tried change of an unknown to the next."""
+
+
+class RoundedUnknown(NamedTuple):
+    """An unknown that a model rounds: small changes of it change no sample."""
+
+    def __repr__(self) -> str:
+        return short(self)
+
+    name: str
+    same: float
+    """Largest change of it that was tried and changed nothing. [unit]"""
+    other: float
+    """Smallest one that changed something. [unit]"""
+    unit: str
+
+    @property
+    def sentence(self) -> str:
+        """What the fit cannot do about it, and what its author can."""
+        unit = f" {self.unit}" if self.unit else ""
+        return (
+            f"The model rounds {self.name}: a change by {self.same:.2g}{unit} changes no sample, "
+            f"one by {self.other:.2g}{unit} does, so that no search can move it. Let the model "
+            f"follow {self.name} without steps, a delay as np.interp(time - {self.name}, time, "
+            "command), or fix it and compare fits at several values."
+        )
+
+
+def rounded_unknowns(problem: Problem, vector: Array) -> tuple[RoundedUnknown, ...]:
+    """Unknowns that a model rounds, such as a delay by whole samples.
+
+    Only of a model that is differentiated by differences. Larger and larger changes towards the
+    farther bound are tried: an unknown is rounded if the first that changes a sample lands on
+    another step, on which small changes change nothing again. A limit that is not reached before
+    is no such step, as beyond it every change counts.
+    """
+    if getattr(problem.model, "linearise", None):
+        return ()
+    point = problem.unknowns.at(vector)
+    found = (_rounded(problem, point, k) for k in range(len(point)))
+    return tuple(rounded for rounded in found if rounded is not None)
+
+
+def _rounded(problem: Problem, point: Unknowns, k: int) -> RoundedUnknown | None:
+    """See `rounded_unknowns`, of one unknown."""
+    unknown = point[k]
+    value = float(point.estimates[k])
+    room_above, room_below = unknown.high - value, value - unknown.low
+    direction = 1.0 if room_above >= room_below else -1.0
+    smallest = RELATIVE_STEP * max(abs(value), 1e-3)
+    numbers = [
+        number
+        for number, experiment in enumerate(problem.experiments)
+        if unknown.run in (None, experiment.name)
+    ]
+
+    def are_same(one: float, another: float) -> bool:
+        """Whether two changes of the unknown give the same samples in every run."""
+        vectors = []
+        for change in (one, another):
+            values = point.estimates.copy()
+            values[k] += direction * change
+            vectors.append(problem.unknowns.to_vector(values))
+        for number in numbers:
+            first, second = (problem.outputs(vector, number) for vector in vectors)
+            if any(not np.array_equal(first[name], second[name]) for name in first):
+                return False
+        return True
+
+    room = max(room_above, room_below)
+    same = smallest
+    try:
+        while FARTHER * same < room:
+            other = FARTHER * same
+            if not are_same(smallest, other):
+                # it may land on the very edge of a step
+                on_step = are_same(other, other + smallest) or are_same(other, other - smallest)
+                return RoundedUnknown(unknown.label, same, other, unknown.unit) if on_step else None
+            same = other
+    except DomainError:
+        pass
+    return None
 
 
 # --- at the optimum -------------------------------------------------------------------------------

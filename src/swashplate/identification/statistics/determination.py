@@ -14,7 +14,11 @@ from scipy.linalg import null_space, qr
 
 from swashplate.errors import InputError
 from swashplate.identification.estimation.arrow import dense_factor, triangular_factor, whitening
-from swashplate.identification.estimation.problem import TOLERANCE
+from swashplate.identification.estimation.problem import (
+    TOLERANCE,
+    RoundedUnknown,
+    rounded_unknowns,
+)
 from swashplate.identification.estimation.unknowns import Unknown, Unknowns
 from swashplate.identification.stage_fit import StageFit, once_per_stage
 from swashplate.identification.statistics.intervals import estimates_of, uncertainty_of
@@ -213,6 +217,8 @@ class Identifiability(Result):
     """Directions that change nothing."""
     weak: tuple[NullDirection, ...]
     """Directions along which intervals are wider than ±10 %, those before it fixed."""
+    rounded: tuple[RoundedUnknown, ...] = ()
+    """Unknowns that the model rounds, so that their derivatives say nothing."""
 
     @property
     def complete(self) -> bool:
@@ -233,10 +239,13 @@ class Identifiability(Result):
     def sentences(self) -> tuple[str, ...]:
         """The verdict in words, one sentence each."""
         sentences = [self._determined()]
-        if self.unexcited:
-            them = "them" if len(self.unexcited) > 1 else "it"
-            names = ", ".join(self.unexcited)
+        rounded = {unknown.name for unknown in self.rounded}
+        unexcited = [name for name in self.unexcited if name not in rounded]
+        if unexcited:
+            them = "them" if len(unexcited) > 1 else "it"
+            names = ", ".join(unexcited)
             sentences.append(f"No test exercises {names}: fix {them}, or add a test that does.")
+        sentences += [unknown.sentence for unknown in self.rounded]
         sentences += [direction.sentence for direction in self.null]
         if len(self.weak) == 1:
             sentences.append(self.weak[0].sentence)
@@ -282,6 +291,7 @@ def identifiability(
     covariance: Array | None = None,
     tolerance: float = TOLERANCE,
     fixed: Values | None = None,
+    rounded: tuple[RoundedUnknown, ...] = (),
 ) -> Identifiability:
     """Judge what derivatives tell of the unknowns; an `InputError` if one is not finite.
 
@@ -298,6 +308,8 @@ def identifiability(
         See `problem.TOLERANCE`.
     fixed : mapping of str to float, optional
         Values of parameters that are not unknowns, by symbol; some gauges need them.
+    rounded : tuple of RoundedUnknown
+        What the model rounds, see `problem.rounded_unknowns`.
     """
     triangle = np.asarray(derivatives, dtype=np.float64)
     names = variables.names
@@ -329,6 +341,7 @@ def identifiability(
         unexcited=tuple(names[k] for k in np.flatnonzero(variables.free & ~moving)),
         null=tuple(null),
         weak=tuple(_weak_directions(remaining, variables, columns, column_norms)),
+        rounded=rounded,
     )
 
 
@@ -459,6 +472,7 @@ def identifiability_of(stage: StageFit) -> Identifiability:
         covariance=quoted,
         tolerance=linearised.tolerance,
         fixed=fixed,
+        rounded=rounded_unknowns(stage.problem, stage.solution.vector),
     )
 
 

@@ -422,6 +422,10 @@ def _machine_rows(problem: Problem) -> Array:
 KNOWN, WORTH = 1.0, 1e-3
 """Standard error of a solver's number, 100 %, up to which an unknown counts as determined; relative
 gain below which nothing is said of it."""
+FULL = (FULL_VOLTAGE, FULL_VOLTAGE)
+"""Largest commands of a machine of which nothing is known, plus and minus. [V]"""
+NO_COMMAND = 0.05
+"""Share of the largest command up to which one the other way is none. [1]"""
 NAMED = 4
 """Unknowns that a row of advice names."""
 
@@ -538,21 +542,63 @@ def sequential_plan(
     return tuple(plan)
 
 
-def default_maneuvers() -> tuple[Maneuver, ...]:
-    """Small and large, slow and fast, both ways: what to choose from if nothing is named."""
-    both, up_and_down = (1.0, -1.0), (2.0, 4.0, 6.0, 8.0, 10.0, 8.0, 6.0, 4.0, 2.0, 0.0)
-    climbs = {s: stairs([s * volts + 0.0 for volts in up_and_down], 2.0) for s in both}
-    many = {volts: multisine(volts, (0.05, 2.0, 8), length=60.0) for volts in (4.0, 9.0)}
+def default_maneuvers(largest: tuple[float, float] = FULL) -> tuple[Maneuver, ...]:
+    """Small and large, slow and fast, both ways: what to choose from if nothing is named.
+
+    `largest` are the largest commands of the machine, plus and minus, as magnitudes [V]; none goes
+    beyond, and one that goes both ways not beyond the smaller one.
+    """
+    both = dict(zip((1.0, -1.0), largest, strict=True))
+    smaller = min(largest)
+
+    def levels(most: float, *usual: float) -> list[float]:
+        """Usual levels of a machine that goes to 9 V, shrunk if it does not."""
+        shrunk = min(most / usual[-1], 1.0)
+        return [float(f"{shrunk * volts:.3g}") for volts in usual]
+
+    climbs = []
+    for sign, most in both.items():
+        up = levels(most, 2.0, 4.0, 6.0, 8.0, 10.0)
+        volts = [sign * level + 0.0 for level in (*up, *up[-2::-1], 0.0)]
+        name = f"stairs to {sign * up[-1]:g} V and back"
+        climbs.append(replace(stairs(volts, 2.0), name=name))
+    small, middle, high = levels(smaller, 2.0, 5.0, 9.0)
+    many = {
+        volts: multisine(volts, (0.05, 2.0, 8), length=60.0) for volts in levels(smaller, 4.0, 9.0)
+    }
+    of_steps = {sign: levels(most, 2.0, 5.0, 9.0) for sign, most in both.items()}
     return (
-        *(step(sign * volts) for volts in (2.0, 5.0, 9.0) for sign in both),
-        *(ramp(sign) for sign in both),
-        *(replace(m, name=f"stairs to {10.0 * s:g} V and back") for s, m in climbs.items()),
-        stairs([5.0, -5.0, 5.0, -5.0, 0.0], 2.0),
-        stairs([9.0, -9.0, 0.0], 3.0),
-        *(sine(volts, 0.1, length=30.0) for volts in (2.0, 5.0, 9.0)),
-        sine(9.0, 0.3, length=20.0),
+        *(step(sign * of_steps[sign][k]) for k in range(3) for sign in both),
+        *(ramp(sign, limit=levels(most, 10.0)[0]) for sign, most in both.items()),
+        *climbs,
+        stairs([middle, -middle, middle, -middle, 0.0], 2.0),
+        stairs([high, -high, 0.0], 3.0),
+        *(sine(volts, 0.1, length=30.0) for volts in (small, middle, high)),
+        sine(high, 0.3, length=20.0),
         *(replace(m, name=f"multisine {v:g} V 0.05 to 2 Hz") for v, m in many.items()),
     )
+
+
+def largest_of_machine(experiments: Sequence[Experiment]) -> tuple[float, float]:
+    """Largest commands plus and minus, magnitudes: the stick's stated range, or what was tested.
+
+    Of a way that no test goes the other's; never beyond what a card takes. [V]
+    """
+    ends = list[tuple[float, float]]()
+    for run in experiments:
+        if run.input.kind == "voltage":
+            values = run.input.values
+            low, high = run.input.limits or (float(values.min()), float(values.max()))
+            ends.append((high, -low))
+    if not ends:
+        return FULL
+    # to more than two digits it is noise of the log
+    plus, minus = (min(float(f"{max(each):.2g}"), FULL_VOLTAGE) for each in zip(*ends, strict=True))
+    # noise about 0 V is not a command
+    least = NO_COMMAND * max(plus, minus)
+    if max(plus, minus) <= 0.0:
+        return FULL
+    return (plus if plus > least else minus, minus if minus > least else plus)
 
 
 def advice_table(title: str, judged: Sequence[Advice]) -> Table:

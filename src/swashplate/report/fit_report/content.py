@@ -114,7 +114,17 @@ def write_fit_report(
             _folds_section(result.folds, stages),
         ]
         setup = _setup_section(result.campaign, fit.nominal, fit.setup.title, result.notes, stages)
-        page = _page("Fit", facts, result.campaign, fit, runs, result.verdict, setup, sections)
+        page = _page(
+            "Fit",
+            facts,
+            result.campaign,
+            fit,
+            runs,
+            result.verdict,
+            setup,
+            sections,
+            folder=Path(path).parent,
+        )
     write_text(page, path)
 
 
@@ -157,7 +167,10 @@ def write_validation_report(
     )
     assessed = verdict if verdict is not None else assess_fit((), predicted)
     setup = _setup_section(campaign, drive, "", notes or {}, ())
-    write_text(_page("Validation", facts, campaign, drive, runs, assessed, setup), path)
+    content = _page(
+        "Validation", facts, campaign, drive, runs, assessed, setup, folder=Path(path).parent
+    )
+    write_text(content, path)
 
 
 def _units_of_people() -> AbstractContextManager[None]:
@@ -175,6 +188,8 @@ def _page(
     verdict: Verdict,
     setup: Section,
     other_sections: Sequence[Section] = (),
+    *,
+    folder: Path,
 ) -> str:
     """A page of a fit, which has sections of its own, or of a drive held against runs."""
     stages = fitted.stages if isinstance(fitted, Fit) else ()
@@ -199,7 +214,9 @@ def _page(
     )
     known_drive = Drive(drive) if isinstance(drive, ParameterSet) else None
     sections = [
-        summary_section(verdict, campaign, known_drive, stages, runs, len(sentences)),
+        summary_section(
+            verdict, campaign, known_drive, stages, runs, len(sentences), folder=folder
+        ),
         _agreement_section(runs, findings, verdict),
         _curves_section(runs, campaign.virtual),
         *other_sections,

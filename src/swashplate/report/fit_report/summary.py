@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import os
+import shlex
 from collections.abc import Iterable, Mapping, Sequence
 from math import ceil, floor, log10
+from pathlib import Path
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -32,7 +35,7 @@ from swashplate.identification import (
     range_of,
 )
 from swashplate.identification.statistics import unseen_limits, weak_unknowns
-from swashplate.parameters import FULL_VOLTAGE
+from swashplate.parameters import FITTED_DRIVE, FULL_VOLTAGE
 from swashplate.report.fit_report.html_page import PageBlock, Section, listed_block, text
 from swashplate.report.fit_report.runs import ShownRun
 from swashplate.tables import NONE, UNIT, Cell, Column, Table, count, listed
@@ -72,10 +75,10 @@ FULL: Commands = (FULL_VOLTAGE, FULL_VOLTAGE)
 def machine_numbers_of(drive: Drive, largest: Commands = FULL) -> Array:
     """Characteristic numbers of a drive, (6, 2): each way, positive and negative. SI
 
-    Dead zone [V]; top speed [rad/s], steady under ±10 V; largest acceleration [rad/s²], delay and
-    lag [s] of a step from rest to the largest command, the delay up to 2 % of the change to the
-    speed that settles, the lag from there to 63 %; creep, the steady speed at 0 V [rad/s]. NaN
-    where the drive has none.
+    Dead zone [V]; top speed [rad/s], steady under the largest command; largest acceleration
+    [rad/s²], delay and lag [s] of a step from rest to the largest command, the delay up to 2 % of
+    the change to the speed that settles, the lag from there to 63 %; creep, the steady speed
+    at 0 V [rad/s]. NaN where the drive has none.
     """
     rest = float(drive.steady_speed(0.0))
     numbers = np.full((6, 2), np.nan)
@@ -86,7 +89,7 @@ def machine_numbers_of(drive: Drive, largest: Commands = FULL) -> Array:
         run = drive.simulate(command, RATE, start="steady")
         final = float(drive.steady_speed(volts))
         numbers[DEAD_ZONE, side] = dead_zone(drive, direction).inside
-        numbers[TOP_SPEED, side] = float(drive.steady_speed(direction * FULL_VOLTAGE))
+        numbers[TOP_SPEED, side] = final
         numbers[CREEP, side] = rest
         if final == rest:
             continue
@@ -161,9 +164,11 @@ def numbers_table(drive: Drive, stages: Sequence[StageFit]) -> tuple[Table, list
         except SwashplateError as error:
             sentences.append(f"There are no intervals: {error}")
     table = Table("", (Column("quantity"), Column("positive", "s"), Column("negative", "s"), UNIT))
+    plus, minus = largest
+    commands = f"±{plus:.3g} V" if plus == minus else f"{plus:.3g} and -{minus:.3g} V"
     rows = (
         ("Dead zone, up to", "V"),
-        ("Top speed at ±10 V", "rad/s"),
+        (f"Top speed at {commands}", "rad/s"),
         ("Largest acceleration", "rad/s^2"),
         ("Delay, to 2 % of final speed", "s"),
         ("Lag, from there to 63 %", "s"),
@@ -183,7 +188,7 @@ def numbers_table(drive: Drive, stages: Sequence[StageFit]) -> tuple[Table, list
         )
     if largest != FULL:
         sentences.append(
-            "Acceleration, delay and lag are those of steps from rest to "
+            "Top speed, acceleration, delay and lag are those of steps from rest to "
             f"{largest[0]:.3g} and -{largest[1]:.3g} V, the largest commands of the fitted runs."
         )
     return table, sentences
@@ -376,8 +381,13 @@ def summary_section(
     stages: Sequence[StageFit],
     runs: Sequence[ShownRun],
     findings: int,
+    *,
+    folder: Path,
 ) -> Section:
-    """The first screen: `drive` is None for a user-defined model, which has no such numbers."""
+    """The first screen: `drive` is None for a user-defined model, which has no such numbers.
+
+    Commands are printed as they run in `folder`, that of the report.
+    """
     look: Light = "good" if judged.usable else "bad"
     headline = judged.headline.replace(" %", "\N{NO-BREAK SPACE}%")
     blocks = [
@@ -402,7 +412,7 @@ def summary_section(
         limits.append(PageBlock("heading", "What limits it", "h3"))
         limits += listed_block(_limit_sentences(drive, stages))
     limits.append(PageBlock("heading", "What to do next", "h3"))
-    limits += listed_block(_next_steps(judged, campaign, stages, runs, findings))
+    limits += listed_block(_next_steps(judged, campaign, stages, runs, findings, folder))
     blocks.append(
         PageBlock("pair", [PageBlock("tile", tile) for tile in (numbers, limits) if tile])
     )
@@ -456,6 +466,7 @@ def _next_steps(
     stages: Sequence[StageFit],
     runs: Sequence[ShownRun],
     findings: int,
+    folder: Path,
 ) -> list[str | Markup]:
     steps: list[str | Markup] = [f"Settle first: {sentence}." for sentence in judged.unfinished]
     steps += [f"Settle first: {finding.sentence}" for finding in judged.unsound[:3]]
@@ -471,15 +482,28 @@ def _next_steps(
         steps.append(f"Not determined to within ±10 %: {named}. Add tests that move them.")
     elif weak:
         code = Markup(
-            "Not determined to within ±10 %: {}. The tests that would determine them are ranked by "
-            "<code>swashplate advise {} --drive drive.toml --setup setup.toml</code>."
+            "Not determined to within ±10 %: {}. The tests that would determine them are ranked, "
+            "in the folder of the fit, by <code>{}</code>."
         )
-        steps.append(code.format(named, campaign.path))
+        steps.append(code.format(named, _advise_command(campaign, stages, folder)))
     if stages and not any(run.role == "validate" for run in runs):
         steps.append('Hold a run out of the fit (role = "validate"): nothing was predicted yet.')
     if judged.usable:
         advice = f"Use the {subject}"
         steps.append(f"{advice}. {judged.validity}" if judged.validity else f"{advice}.")
         if stages and subject == "drive":
-            steps.append(Markup("Try it: <code>swashplate simulate drive.toml step:9</code>."))
+            plus, minus = tested_commands(stages)
+            volts = plus or -minus
+            code = Markup("Try it in the folder of the fit: <code>{}</code>.")
+            step = f"step:{volts:.2g}"  # to more digits it is noise of the log
+            steps.append(code.format(f"swashplate simulate {FITTED_DRIVE} {step}"))
     return steps
+
+
+def _advise_command(campaign: Campaign, stages: Sequence[StageFit], folder: Path) -> str:
+    """The command that ranks further tests, as it runs in the folder of the fit."""
+    tests = os.path.relpath(campaign.path, folder)
+    command = ["swashplate", "advise", tests, "--drive", FITTED_DRIVE, "--setup", "setup.toml"]
+    if len(campaign.axes) > 1:
+        command += ["--axis", stages[0].problem.experiments[0].axis]
+    return shlex.join(command)
