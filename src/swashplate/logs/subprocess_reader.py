@@ -27,6 +27,7 @@ import numpy as np
 from swashplate.errors import FileError, InputError, SwashplateError
 from swashplate.logs.binary import look
 from swashplate.logs.log import Array, Log, LogColumn, first_sentence, printable
+from swashplate.stopping import undone
 
 _PATIENCE = 30.0
 """How long a small file may take [s]."""
@@ -101,7 +102,8 @@ class _ReaderProcess:
                     f"{error.strerror}."
                 ) from None
             try:
-                answer, arrays = process._answer(path, question)
+                with undone(process._process.kill):
+                    answer, arrays = process._answer(path, question)
             except BaseException:
                 # also at Ctrl-C: what is half said must not meet the next question
                 cls.running = None
