@@ -12,7 +12,7 @@ from itertools import islice
 from typing import TYPE_CHECKING, Any, Protocol
 
 from swashplate.errors import InputError, SwashplateError
-from swashplate.stopping import undone
+from swashplate.stopping import as_a_whole, undone
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor as Pool
@@ -79,8 +79,8 @@ _shared: Any = None
 def _receive(shared: Any) -> None:
     """Initialise a worker: keep what all items share, and end when its parent does, and only then.
 
-    Ctrl-C reaches the workers as well as the parent, which ends them. A parent that is killed cannot
-    end its workers, and what they hold of its pipes would keep whoever reads them waiting.
+    Ctrl-C reaches the workers as well as the parent, which ends them. A parent that is killed
+    cannot end its workers, and what they hold of its pipes would keep whoever reads them waiting.
     """
     from multiprocessing import parent_process
     from threading import Thread
@@ -171,7 +171,8 @@ def _completed(
     try:
         while True:
             for k, item in islice(waiting, 2 * workers - len(running)):
-                with _deaf_to_interrupts():
+                # a worker that gets half of what it is to run says so
+                with as_a_whole(), _deaf_to_interrupts():
                     running[pool.submit(function, item)] = k
             if not running:
                 return

@@ -14,7 +14,7 @@ import socket
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from threading import Thread
+from threading import Thread, current_thread, main_thread
 from types import FrameType
 from typing import Any
 
@@ -94,6 +94,9 @@ def undone(undo: Callable[[], object]) -> Iterator[None]:
 @contextmanager
 def as_a_whole() -> Iterator[None]:
     """Put `Stopped` off to the end of what takes less than `GRACE`, such as a folder's files."""
+    if _State.put_off or current_thread() is not main_thread():
+        yield
+        return
     _State.put_off = True
     try:
         yield

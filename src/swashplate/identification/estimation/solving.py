@@ -166,8 +166,8 @@ def solve(
     hopeless : callable, optional
         Called with the best point after each `LEG` evaluations; true gives the search up.
     keep_best : bool
-        At Ctrl-C return the best point so far, a `Solution` that is `interrupted`, instead of passing
-        it on. Whoever asks for it must look: taken for an optimum, the Ctrl-C is lost.
+        At Ctrl-C return the best point so far, a `Solution` that is `interrupted`, instead of
+        passing it on. Whoever asks for it must look: taken for an optimum, the Ctrl-C is lost.
 
     Returns
     -------
