@@ -86,6 +86,7 @@ def doctor() -> None:
     note(f"Installed in {sys.prefix}")
     cache = cache_folder()
     if cache is None:
+        # why, a warning has said
         note(UNCACHED)
     else:
         sizes = [path.stat().st_size for path in cache.rglob("*.nbc")]
