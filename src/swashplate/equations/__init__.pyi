@@ -1,5 +1,5 @@
 from . import graph as graph
-from .cache import UNCACHED as UNCACHED
+from .cache import no_cache_reason as no_cache_reason
 from .cache import cache_folder as cache_folder
 from .cache import generated as generated
 from .cache import kernel as kernel

@@ -298,6 +298,13 @@ def generated_folder() -> Path | None:
     return _folder(str(config.CACHE_DIR or ""))  # type: ignore[attr-defined]
 
 
+def no_cache_reason() -> str:
+    """Why there is no folder for the cache, in a sentence, if `cache_folder` gives none."""
+    folder = Path(str(config.CACHE_DIR or "."))  # type: ignore[attr-defined]
+    why = exposed(folder) if config.CACHE_DIR else None  # type: ignore[attr-defined]
+    return OPEN.format(folder=folder, why=why) if why else UNCACHED
+
+
 def cache_folder() -> Path | None:
     """Folder below which generated modules and their machine code are kept, None if nowhere."""
     folder = generated_folder()
