@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import os
+import signal
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from itertools import islice
 from typing import TYPE_CHECKING, Any, Protocol
 
 from swashplate.errors import InputError, SwashplateError
+from swashplate.stopping import as_a_whole, undone
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor as Pool
@@ -74,15 +77,16 @@ _shared: Any = None
 
 
 def _receive(shared: Any) -> None:
-    """Initialise a worker: keep what all items share, and end when its parent does.
+    """Initialise a worker: keep what all items share, and end when its parent does, and only then.
 
-    A parent that is killed cannot end its workers, and what they hold of its pipes would keep
-    whoever reads them waiting.
+    Ctrl-C reaches the workers as well as the parent, which ends them. A parent that is killed
+    cannot end its workers, and what they hold of its pipes would keep whoever reads them waiting.
     """
     from multiprocessing import parent_process
     from threading import Thread
 
     global _shared
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
     _shared = shared
     parent = parent_process()
 
@@ -116,10 +120,18 @@ class Processes:
             yield from Serial().run(function, shared, items)
             return
         others = set(active_children())
+
+        def end_workers() -> None:
+            for worker in set(active_children()) - others:
+                worker.kill()
+
         # spawned, not forked: a fork copies locks of NumPy's and Numba's threads in any state
-        with ProcessPoolExecutor(
-            workers, get_context("spawn"), initializer=_receive, initargs=(shared,)
-        ) as pool:
+        with (
+            undone(end_workers),
+            ProcessPoolExecutor(
+                workers, get_context("spawn"), initializer=_receive, initargs=(shared,)
+            ) as pool,
+        ):
             try:
                 yield from _completed(pool, partial(_apply, function), items, workers)
             except BrokenProcessPool:
@@ -128,9 +140,24 @@ class Processes:
                     "module, and guard the start of a script by if __name__ == '__main__'."
                 ) from None
             except BaseException:  # Ctrl-C, or whoever asked has had enough: nobody waits for them
-                for worker in set(active_children()) - others:
-                    worker.terminate()
+                end_workers()
                 raise
+
+
+@contextmanager
+def _deaf_to_interrupts() -> Iterator[None]:
+    """Have processes that are started meanwhile never hear Ctrl-C, not even while they import.
+
+    What a thread blocks is blocked in the processes that it starts. A Ctrl-C of this moment waits.
+    """
+    if not hasattr(signal, "pthread_sigmask"):  # Windows, where a worker is deaf once initialised
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _completed(
@@ -144,7 +171,9 @@ def _completed(
     try:
         while True:
             for k, item in islice(waiting, 2 * workers - len(running)):
-                running[pool.submit(function, item)] = k
+                # a worker that gets half of what it is to run says so
+                with as_a_whole(), _deaf_to_interrupts():
+                    running[pool.submit(function, item)] = k
             if not running:
                 return
             for future in wait(running, return_when=FIRST_COMPLETED).done:

@@ -13,6 +13,7 @@ from threading import get_ident
 from warnings import warn
 
 from swashplate.errors import FileError
+from swashplate.stopping import undone
 from swashplate.tables import made_folder
 
 NAME = ".swashplate.lock"
@@ -54,7 +55,8 @@ def locked(folder: Path) -> Iterator[None]:
         _owners[resolved] = get_ident()
         os.truncate(handle, 0)
         os.write(handle, _description().encode())
-        yield
+        with undone(path.unlink):
+            yield
     finally:
         del _owners[resolved]
         if sys.platform == "win32":  # an open file cannot be removed there

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from html import escape
 from math import floor, isfinite, isnan, log10
@@ -19,6 +20,7 @@ from stat import S_IMODE, S_IWUSR
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from swashplate.errors import FileError
+from swashplate.stopping import Stopped, undone
 from swashplate.units import SHAFT_ANGLE, chosen_unit, display_unit
 
 if TYPE_CHECKING:
@@ -390,7 +392,7 @@ def write_whole(path: str | Path, write: Callable[[Path], object]) -> None:
     check_place(target)
     temporary = target.parent / f".{target.stem}-{token_hex(4)}{target.suffix}"
     try:
-        try:
+        with undone(temporary.unlink), _removed(temporary):
             temporary.touch(exist_ok=False)
             mode = _permissions(target)
             # before anybody else can read it, and again, as a library may have made another file
@@ -402,13 +404,6 @@ def write_whole(path: str | Path, write: Callable[[Path], object]) -> None:
             with temporary.open("rb") as written:  # a power cut leaves the old file or the new one
                 os.fsync(written.fileno())
             temporary.replace(target)
-        finally:
-            try:
-                temporary.unlink(missing_ok=True)
-            except KeyboardInterrupt:
-                # on Ctrl-C Polars raises one of its own and leaves Python's to come: it comes here
-                temporary.unlink(missing_ok=True)
-                raise
     except FileError:
         raise
     except OSError as error:
@@ -418,6 +413,20 @@ def write_whole(path: str | Path, write: Callable[[Path], object]) -> None:
         if reason is None:
             raise
         raise FileError(f"{target} cannot be written: {reason}.") from None
+
+
+@contextmanager
+def _removed(temporary: Path) -> Iterator[None]:
+    """Remove a file in the end, if it is still there."""
+    try:
+        yield
+    finally:
+        try:
+            temporary.unlink(missing_ok=True)
+        except (KeyboardInterrupt, Stopped):
+            # on Ctrl-C Polars raises one of its own and leaves Python's to come: it comes here
+            temporary.unlink(missing_ok=True)
+            raise
 
 
 def _permissions(path: Path) -> int | None:

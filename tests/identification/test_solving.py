@@ -116,7 +116,9 @@ def test_interrupted_with_the_best_so_far(problem: Problem) -> None:
         if progress.iteration == 2:
             raise KeyboardInterrupt
 
-    solution = solve(problem, watch=stop)
+    with pytest.raises(KeyboardInterrupt):  # who does not ask for it might take it for an optimum
+        solve(problem, watch=stop)
+    solution = solve(problem, watch=stop, keep_best=True)
     assert solution.interrupted
     assert not solution.converged
     assert solution.cost < problem.cost(problem.start)

@@ -7,7 +7,6 @@ that needs them, so that no command waits for the imports of another.
 import gc
 import io
 import os
-import signal
 import sys
 from collections.abc import Iterator, Mapping
 from functools import cache
@@ -21,6 +20,7 @@ from typer.core import TyperGroup
 from swashplate.__about__ import __version__
 from swashplate.cli.terminal import Stream, close_output, say_error
 from swashplate.errors import FileError, InputError, SwashplateError, UnsoundDataError
+from swashplate.stopping import obeying
 
 HELP = """\
 Hydrostatic drives: from a joystick's voltage to the speed of the shaft.
@@ -60,7 +60,8 @@ Examples:
 
 Files are in SI units and written atomically. Errors: one sentence on standard
 error, exit code 2. Other exit codes: 0 done, 1 not usable or does not fit,
-130 interrupted. 'swashplate COMMAND --help' describes a command.
+130 interrupted by Ctrl-C, 143 by SIGTERM. 'swashplate COMMAND --help' describes
+a command.
 """
 
 
@@ -198,6 +199,11 @@ def _check_surroundings() -> None:
 
 def main() -> None:
     """Run the command line."""
+    with obeying():
+        _run()
+
+
+def _run() -> None:
     # the matrices are tall and thin, so that threads of the linear algebra mostly wait for each
     # other; runs, starts and draws are spread over the cores instead
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -209,8 +215,6 @@ def main() -> None:
     # a process that lives for seconds need not look for cycles among what its libraries define:
     # that takes a fifth of a fit, and a second more at the end
     gc.set_threshold(50_000, 20, 50)
-    # what a batch system sends ends a command as Ctrl-C does: workers too, and with a sentence
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
     # figures are drawn into files: what a user's own notebooks draw with is of no concern here
     os.environ.pop("MPLBACKEND", None)
     try:

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import inspect
+import tomllib
 from collections.abc import Callable
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import MISSING, dataclass, fields, is_dataclass
 from functools import wraps
+from pathlib import Path
 from typing import Annotated, Any, get_type_hints
 
 import typer
 
 from swashplate.cli.terminal import RESOURCES, SAVED, say_saved
+from swashplate.errors import InputError
 from swashplate.units import shown_in
 
 Function = Callable[..., None]
@@ -60,12 +63,15 @@ def command(
         if units:
             parameters += _spread(DisplayUnits)
 
+        outputs = {parameter.name for parameter in parameters if _is_output(parameter)}
+
         @wraps(function)
         def run(**arguments: Any) -> None:
             display = _gathered(DisplayUnits, arguments) if units else DisplayUnits()
+            _refuse_inputs_as_outputs(arguments, outputs)
+            unit_names = [unit.strip() for unit in display.units.split(",") if unit.strip()]
             for parameter, group in groups.items():
                 arguments[parameter] = _gathered(group, arguments)
-            unit_names = [unit.strip() for unit in display.units.split(",") if unit.strip()]
             SAVED.set([])
             with shown_in(unit_names, display.drum), ExitStack() as resources:
                 RESOURCES.set(resources)
@@ -79,6 +85,61 @@ def command(
         return function
 
     return register
+
+
+def _is_output(parameter: inspect.Parameter) -> bool:
+    """Whether an option names a file that the command writes."""
+    options = getattr(parameter.annotation, "__metadata__", ())
+    callbacks = [getattr(option, "callback", None) for option in options]
+    return parameter.name == "out" or any(hasattr(each, "writes") for each in callbacks)
+
+
+def _refuse_inputs_as_outputs(arguments: dict[str, Any], outputs: set[str]) -> None:
+    """Refuse to write a file onto one that the same command reads, --force or not."""
+    read = list[Path]()
+    for name, value in arguments.items():
+        if name not in outputs:
+            for each in value if isinstance(value, list) else [value]:
+                read += _files_named(each)
+    for name in outputs:
+        path = arguments.get(name)
+        if isinstance(path, Path) and path.is_file():
+            same = next((each for each in read if path.samefile(each)), None)
+            if same is not None:
+                raise InputError(
+                    f"{path} is read by this command as {same}, so it cannot be its "
+                    f"--{name.replace('_', '-')}, with --force or without: choose another path."
+                )
+
+
+def _files_named(value: object) -> list[Path]:
+    """Files that an argument names: itself, behind NAME=, and those that a campaign names."""
+    if not isinstance(value, str | Path):
+        return []
+    from swashplate.documents import LARGEST_TOML
+
+    files = list[Path]()
+    for text in {str(value), str(value).partition("=")[2]}:
+        with suppress(OSError, ValueError):
+            if text and Path(text).is_file():
+                files.append(Path(text))
+    for file in [each for each in files if each.suffix.lower() == ".toml"]:
+        with suppress(OSError, ValueError, RecursionError):  # the command says what is wrong
+            if file.stat().st_size <= LARGEST_TOML:
+                files += _files_within(tomllib.loads(file.read_text("utf-8")), file.parent)
+    return files
+
+
+def _files_within(entry: object, folder: Path) -> list[Path]:
+    """Files that the texts of a document name, from its folder."""
+    if isinstance(entry, dict):
+        entry = [*entry.values()]
+    if isinstance(entry, list):
+        return [file for each in entry for file in _files_within(each, folder)]
+    with suppress(OSError, ValueError):  # a text that cannot be a name
+        if isinstance(entry, str) and entry and (folder / entry).is_file():
+            return [folder / entry]
+    return []
 
 
 def _spread(group: Any) -> list[inspect.Parameter]:

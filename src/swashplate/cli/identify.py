@@ -41,15 +41,14 @@ from swashplate.cli.terminal import (
     spinner,
 )
 from swashplate.errors import InputError
-from swashplate.tables import PRINTED, TABLE, check_folder, joined, made_folder
+from swashplate.stopping import Stopped, as_a_whole
+from swashplate.tables import PRINTED, TABLE, check_folder, count, joined, made_folder
 
 if TYPE_CHECKING:
     from swashplate.identification import Identification, Verdict
     from swashplate.identification.estimation import Parameters
     from swashplate.parameters import ParameterSet
 
-INTERRUPTED = 130
-"""Exit code after Ctrl-C, as of other programs."""
 MOST_EVALUATIONS = 600
 FILES = {
     "drive.toml": "Drive",
@@ -184,8 +183,9 @@ def fit(
     role 'validate', and shows which parameters the data determine. Writes the
     fitted drive as a parameter file, the fit setup, the estimates with
     their intervals, and the data that 'report' needs. Exit code 1: the result is
-    not usable. Ctrl-C or SIGTERM keeps the best result so far (of several
-    starts: those that ended) and exits with code 130.
+    not usable. Ctrl-C (exit code 130) and SIGTERM (143) end it within 5 s
+    and leave no result; of several starts, those that have ended are kept for
+    --resume.
     """
     clock = StageClock()
     check_folder(out)
@@ -208,30 +208,31 @@ def fit(
         if begin is not None:
             start = parsing.parameters_of(begin)
     with spinner("Fitting"), clock.part("search"):
-        result = identify(
-            campaign,
-            start,
-            setup,
-            axis=axis_name,
-            joint=joint,
-            starts=starts,
-            folds=folds,
-            profiles=profile or (),
-            seed=seed,
-            loss=loss,
-            max_evaluations=evaluations,
-            required=require / 100.0,
-            executor=Dask(dask) if dask is not None else Processes(jobs or None),
-            store=out / "starts",
-            resume=resume,
-        )
-    if result.fit.interrupted and starts:
-        stage_fit = result.fit.stages[-1]
-        note(
-            f"Interrupted in the stage '{stage_fit.stage.name}': {stage_fit.solution.message}. "
-            "Only the starts are written; the same command with --resume continues."
-        )
-        raise typer.Exit(INTERRUPTED)
+        try:
+            result = identify(
+                campaign,
+                start,
+                setup,
+                axis=axis_name,
+                joint=joint,
+                starts=starts,
+                folds=folds,
+                profiles=profile or (),
+                seed=seed,
+                loss=loss,
+                max_evaluations=evaluations,
+                required=require / 100.0,
+                executor=Dask(dask) if dask is not None else Processes(jobs or None),
+                store=out / "starts",
+                resume=resume,
+            )
+        except Stopped:
+            if ended := len([*(out / "starts").glob("*/start-*.json")]):
+                note(
+                    f"Interrupted: {count(ended, 'finished start is', 'finished starts are')} kept "
+                    f"in {out / 'starts'}; the same command with --resume continues."
+                )
+            raise
     with spinner("Assessing"), clock.part("assessment"):
         verdict = result.verdict
     with clock.part("report"):
@@ -241,9 +242,6 @@ def fit(
     _say_fit(result)
     for line in [*lines, f"Time:      {clock}"] if timing else lines:
         note(line)
-    if result.fit.interrupted:
-        note("Interrupted: this is the best so far, not an optimum.")
-        raise typer.Exit(INTERRUPTED)
     _say_verdict(verdict)
 
 
@@ -265,7 +263,8 @@ def _say_fit(result: Identification) -> None:
 
 def _written(result: Identification, out: Path) -> list[str]:
     """Write the folder of a fit; lines that name its files."""
-    return [f"{FILES[file.name] + ':':10} {file}" for file in result.save(out)]
+    with as_a_whole():
+        return [f"{FILES[file.name] + ':':10} {file}" for file in result.save(out)]
 
 
 def _reported(result: Identification, out: Path, truth: ParameterSet | None = None) -> str:

@@ -75,7 +75,7 @@ def doctor() -> None:
     show(table)
     with spinner("Simulating the hoist"):
         from swashplate.drive import Drive
-        from swashplate.equations import UNCACHED, cache_folder
+        from swashplate.equations import cache_folder, no_cache_reason
         from swashplate.maneuvers import step
 
         run = Drive.preset("hoist").simulate(step(9.0, start=0.0, stop=10.0, length=10.0))
@@ -86,7 +86,7 @@ def doctor() -> None:
     note(f"Installed in {sys.prefix}")
     cache = cache_folder()
     if cache is None:
-        note(UNCACHED)
+        note(no_cache_reason())
     else:
         sizes = [path.stat().st_size for path in cache.rglob("*.nbc")]
         note(f"Compiled kernels: {len(sizes)} files, {sum(sizes) / 1e6:.1f} MB, below {cache}")

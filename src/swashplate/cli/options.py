@@ -40,6 +40,7 @@ def new_file(form: Form, help: str, *, metavar: str = "FILE") -> Any:
         check_writable(path, form, force=context.params["force"])
         return path
 
+    check.writes = True  # type: ignore[attr-defined]  # see `commands`: never onto an input
     return typer.Option(metavar=metavar, help=help, callback=check)
 
 

@@ -1,8 +1,8 @@
 from . import graph as graph
-from .cache import UNCACHED as UNCACHED
 from .cache import cache_folder as cache_folder
 from .cache import generated as generated
 from .cache import kernel as kernel
+from .cache import no_cache_reason as no_cache_reason
 from .code_generation.derivatives import declared as declared
 from .code_generation.derivatives import derive as derive
 from .code_generation.gradients import Derived as Derived

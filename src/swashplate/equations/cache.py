@@ -16,6 +16,7 @@ from functools import cache, cached_property
 from glob import escape
 from hashlib import blake2b
 from pathlib import Path
+from stat import S_IWGRP, S_IWOTH
 from time import time
 from types import ModuleType
 from typing import Any, ParamSpec, TypeVar
@@ -44,6 +45,10 @@ UNCACHED = (
     "swashplate's compiled kernels cannot be stored, so every session compiles them again; set "
     "NUMBA_CACHE_DIR to a writable folder."
 )
+OPEN = (
+    "swashplate's compiled kernels are not read from {folder}, as {why}: what it holds is run. "
+    "Remove it, or set NUMBA_CACHE_DIR to a folder that only you can write to."
+)
 COMPILING = "Compiling equations, once on this machine"
 GENERATED = "swashplate_generated"
 """Package of the generated modules."""
@@ -55,7 +60,58 @@ UNUSED = 30.0 * DAY
 DOCSTRING = re.compile(r'^ *""".*?"""\n', re.MULTILINE | re.DOTALL)
 
 
+# --- who can write --------------------------------------------------------------------------------
+
+
+def exposed(path: str | Path) -> str | None:
+    """Why others can change a file or folder, None if nobody but its user and root can.
+
+    A folder of byte code beside the source is as trustworthy as the source, whoever owns it.
+    """
+    if sys.platform == "win32" or Path(path).name == "__pycache__":
+        return None
+    try:
+        status = Path(path).stat()
+    except OSError:  # not made yet
+        return None
+    if status.st_uid not in (0, os.geteuid()):
+        return "it belongs to another user"
+    if status.st_mode & S_IWOTH:
+        return "every user can write to it"
+    if status.st_mode & S_IWGRP and not _is_own_group(status.st_gid):
+        return "its group can write to it"
+    return None
+
+
+@cache
+def _is_own_group(number: int) -> bool:
+    """Whether a group is that of one user alone, as many systems make one for each.
+
+    Its name is then the user's and it has no other members, by which OpenSSH of Debian knows it.
+    """
+    if sys.platform == "win32":
+        return False
+    import grp
+    import pwd
+
+    try:
+        group, user = grp.getgrgid(number), pwd.getpwuid(os.geteuid())
+    except KeyError:
+        return False
+    return group.gr_name == user.pw_name and {*group.gr_mem} <= {user.pw_name}
+
+
+@cache
+def _warn_exposed(folder: str, why: str) -> None:
+    """Say once of a folder that it is not used."""
+    warn(OPEN.format(folder=folder, why=why), RuntimeWarning, stacklevel=2)
+
+
 # --- kernels --------------------------------------------------------------------------------------
+
+
+class _ExposedError(Exception):
+    """Others can write to the folder of a cache; it and why."""
 
 
 class _Index(IndexDataCacheFile):
@@ -110,6 +166,8 @@ class _Index(IndexDataCacheFile):
             file.write(blake2b(payload, digest_size=16).digest() + payload)
 
     def _unpickled(self, path: str) -> Any:
+        if Path(path).parent.name != "__pycache__" and exposed(path):
+            raise ValueError(path)
         content = Path(path).read_bytes()
         if blake2b(content[16:], digest_size=16).digest() != content[:16]:
             raise ValueError(path)
@@ -123,6 +181,9 @@ class _KernelCache(FunctionCache):
         self._name, self._py_func = repr(function), function
         self._impl = self._impl_class(function)  # type: ignore[no-untyped-call]
         self._cache_path = self._impl.locator.get_cache_path()
+        for folder in {str(config.CACHE_DIR or self._cache_path), self._cache_path}:  # type: ignore[attr-defined]
+            if why := exposed(folder):
+                raise _ExposedError(folder, why)
         self._compiling = list[progress.Work]()
         self.enable()  # type: ignore[no-untyped-call]
 
@@ -198,6 +259,8 @@ def kernel(function: Callable[P, R]) -> Callable[P, R]:
     if not JIT_OFF:
         try:
             compiled._cache = _KernelCache(function)
+        except _ExposedError as error:
+            _warn_exposed(*error.args)
         except RuntimeError:
             # typed into a session, it has no file to be known by; else no folder can be written
             if Path(plain(function).__code__.co_filename).is_file():
@@ -217,17 +280,29 @@ def _folder(numba_cache_dir: str) -> Path | None:
         user = AppDirs(appname="swashplate", appauthor=False).user_cache_dir  # type: ignore[no-untyped-call]
         folder = Path(user) / "generated"
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        folder.mkdir(mode=0o700, exist_ok=True)
         tempfile.TemporaryFile(dir=folder).close()
     except OSError:
         warn(UNCACHED, RuntimeWarning, stacklevel=3)
         return None
+    for each in (folder.parent, folder) if numba_cache_dir else (folder,):
+        if why := exposed(each):
+            _warn_exposed(str(each), why)
+            return None
     return folder
 
 
 def generated_folder() -> Path | None:
     """Folder in which generated modules are kept, None if nowhere."""
     return _folder(str(config.CACHE_DIR or ""))  # type: ignore[attr-defined]
+
+
+def no_cache_reason() -> str:
+    """Why there is no folder for the cache, in a sentence, if `cache_folder` gives none."""
+    folder = Path(str(config.CACHE_DIR or "."))  # type: ignore[attr-defined]
+    why = exposed(folder) if config.CACHE_DIR else None  # type: ignore[attr-defined]
+    return OPEN.format(folder=folder, why=why) if why else UNCACHED
 
 
 def cache_folder() -> Path | None:

@@ -497,7 +497,7 @@ class FitFile(Document):
     nominal: str | dict[str, float]
     """What the fit began from: a drive's parameter file, or the numbers of a user-defined model."""
     setup: FitSetup
-    stages: tuple[StoredStage, ...]
+    stages: tuple[StoredStage, ...] = Field(min_length=1)
     profiles: tuple[Profile | tuple[str, Profile], ...]
     """Behind the name of their stage in older files, which do not name the unknown."""
     folds: CrossValidation | None

@@ -327,7 +327,7 @@ def fit(
         refuse_unsound(check_rank(f"Stage {stage.name}", problem), InputError)
         limits: dict[str, Any] = {"tolerance": tolerance, "max_evaluations": max_evaluations}
         with working(f"Stage {stage.name}") as work:
-            solve_stage = partial(solve, loss=loss, watch=seen, **limits)
+            solve_stage = partial(solve, loss=loss, watch=seen, keep_best=True, **limits)
             result = _solved(stage, problem, solve_stage, search, doubts)
         LOGGER.info(
             "Stage %s: %s after %d evaluations, cost %.5g",

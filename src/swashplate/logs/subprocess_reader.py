@@ -27,11 +27,10 @@ import numpy as np
 from swashplate.errors import FileError, InputError, SwashplateError
 from swashplate.logs.binary import look
 from swashplate.logs.log import Array, Log, LogColumn, first_sentence, printable
+from swashplate.stopping import undone
 
 _PATIENCE = 30.0
-"""How long a small file may take [s]."""
-_PATIENCE_AT_START = 60.0
-"""How much longer the first file may take, while the other process imports its libraries [s]."""
+"""How long a small file may take, the start of the other process included [s]."""
 _PATIENCE_PER_MEGABYTE = 1.0
 _LEAVE = 1.0
 """How long the other process has to end by itself, once it is asked no more [s]."""
@@ -87,7 +86,6 @@ class _ReaderProcess:
                 },
             )
         self._end = finalize(self, _ended, self._process, self._scratch)
-        self._started = False
 
     @classmethod
     def ask(cls, path: Path, question: Sequence[Any]) -> tuple[dict[str, Any], list[Array]]:
@@ -101,7 +99,8 @@ class _ReaderProcess:
                     f"{error.strerror}."
                 ) from None
             try:
-                answer, arrays = process._answer(path, question)
+                with undone(process._process.kill):
+                    answer, arrays = process._answer(path, question)
             except BaseException:
                 # also at Ctrl-C: what is half said must not meet the next question
                 cls.running = None
@@ -115,8 +114,6 @@ class _ReaderProcess:
         source = cast(io.BufferedReader, self._process.stdout)
         sink = cast(io.BufferedWriter, self._process.stdin)
         seconds = _PATIENCE + _PATIENCE_PER_MEGABYTE * path.stat().st_size / 1e6
-        if not self._started:
-            seconds += _PATIENCE_AT_START
         # a clock that ends the process, since not every system can wait for a pipe
         clock = threading.Timer(seconds, self._process.kill)
         clock.start()
@@ -133,7 +130,6 @@ class _ReaderProcess:
             raise FileError(
                 f"{path} could not be read within {seconds:.0f} s; it is damaged or too large."
             )
-        self._started = True
         answer = json.loads(line) if line.endswith(b"\n") else {}
         arrays = [np.empty(size) for size in answer.get("sizes", [])]
         read = [source.readinto(array.view(np.uint8).data) == array.nbytes for array in arrays]

@@ -143,6 +143,7 @@ def solve(
     max_evaluations: int = 300,
     watch: Callable[[Progress], None] | None = None,
     hopeless: Callable[[Array], bool] | None = None,
+    keep_best: bool = False,
 ) -> Solution:
     """The optimum next to a start: half the sum of squares minimised within the bounds.
 
@@ -161,9 +162,12 @@ def solve(
     max_evaluations : int
         Of the residuals.
     watch : callable, optional
-        Called at each iteration. Ctrl-C ends the search with the best point so far.
+        Called at each iteration.
     hopeless : callable, optional
         Called with the best point after each `LEG` evaluations; true gives the search up.
+    keep_best : bool
+        At Ctrl-C return the best point so far, a `Solution` that is `interrupted`, instead of
+        passing it on. Whoever asks for it must look: taken for an optimum, the Ctrl-C is lost.
 
     Returns
     -------
@@ -261,7 +265,7 @@ def solve(
                 break
             begin = leg.x if point is None else point
     except KeyboardInterrupt:
-        if memory.best is None:
+        if memory.best is None or not keep_best:
             raise
         lowest, best = memory.best
         ending = INTERRUPTED
@@ -442,8 +446,6 @@ def _solve_one(
         solution = solved(problem, start)
     except DomainError as error:
         return Solution(start, np.inf, 1, False, False, str(error), number=number)
-    if solution.interrupted:
-        raise KeyboardInterrupt
     return replace(solution, number=number)
 
 
