@@ -50,8 +50,8 @@ RATES = (10.0, 1e5)
 LARGEST = 100_000_000
 """Numbers of a motion, 0.8 GB; nine hours at 512 Hz."""
 LOWEST, HIGHEST = 1e-6, 30.0
-"""Least and largest significant height of a sea: a micrometre stands for calm water, and the largest
-height measured is 19 m. [m]"""
+"""Least and largest significant height of a sea: a micrometre stands for calm water, and the
+largest height measured is 19 m. [m]"""
 BREAKING = 1.0 / 7.0
 """Steepness at which a regular wave breaks in deep water (Stokes, Michell 1893). That of a sea, its
 significant height over the length of a wave of its peak period, stays at half of it (DNV-RP-C205,
