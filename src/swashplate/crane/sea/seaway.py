@@ -301,6 +301,8 @@ class Seaway(Result):
                 f"waves of {shortest:.3g} to {longest:.3g} s that are simulated: these are scaled "
                 "up to keep the requested significant height."
             )
+        if isinstance(self.ship, TransferFunctions) and self.ship.unchecked:
+            sentences.append(self.ship.unchecked)
         if lost > LOST and isinstance(self.ship, TransferFunctions):
             low, high = self.ship.frequencies[[0, -1]]
             sentences.append(

@@ -24,6 +24,7 @@ from swashplate.crane.limits import LIMITED
 from swashplate.crane.sea.extremes import largest_of_peaks
 from swashplate.crane.sea.scatter import Scatter
 from swashplate.crane.sea.seaway import Seaway, Spectrum
+from swashplate.crane.sea.transfer_functions import TransferFunctions
 from swashplate.crane.studies.run_outcome import RunOutcome
 from swashplate.crane.studies.spectral import DEMANDS, linear_response
 from swashplate.crane.studies.study import (
@@ -65,6 +66,13 @@ SHORTEST = 300.0
 """Least time for which each of them counts: some fifty peaks of a swing. [s]"""
 ACTS = 0.05
 """Share of time at a limit from which on a drive is what limits a cell."""
+CALM = 0.25
+"""Height of a sea in which people work with cranes; a crane that cannot, by the model, is damped by
+its crew. The lowest class of most scatter diagrams. [m]"""
+NOT_MODELLED = (
+    "Not modelled is what a crew does: it damps the swing by moving the boom and with tag lines, "
+    "so that without control a crane may work in more of the year than is shown."
+)
 LEFT_OUT = "saturation"
 """Limit that is not assessed: a drive's limits are found by what they do."""
 WORKABLE = ""
@@ -167,6 +175,15 @@ class Operability(Tabular):
         ]
         return pl.DataFrame(rows)
 
+    def _lowest_unworkable(self) -> float:
+        """Least significant height that the crane without control cannot work; inf if none. [m]"""
+        heights = [
+            float(self.scatter.height[row])
+            for (row, _), cell in self.cells[NO_CONTROL].items()
+            if cell.limited_by != WORKABLE
+        ]
+        return min(heights, default=np.inf)
+
     def sentences(self) -> tuple[str, ...]:
         """State the basis of the shares."""
         simulated = sum(cell.simulated for cells in self.cells.values() for cell in cells.values())
@@ -186,6 +203,10 @@ class Operability(Tabular):
             )
         if self.scatter.note:
             sentences.append(self.scatter.note)
+        if isinstance(self.seaway.ship, TransferFunctions) and self.seaway.ship.unchecked:
+            sentences.append(self.seaway.ship.unchecked)
+        if self._lowest_unworkable() <= CALM:
+            sentences.append(NOT_MODELLED)
         assessed = {name: limit for name, limit in self.crane.limits.items() if name != LEFT_OUT}
         return (*sentences, *assumed_sentences(replace(self.crane, limits=assessed)))
 
