@@ -189,6 +189,71 @@ def test_a_run_that_leaves_the_model_loses_to_one_that_does_not(assessed):
     assert found.tables()[0].rows[1].cells[1] == pytest.approx(rms)
 
 
+def in_waves(seed, *, left_after=None, scale=0.02, length=600.0):
+    """A run with peaks of a narrow Gaussian swing [rad]; or one that ran away after some time."""
+    peaks = scale * np.random.default_rng(seed).rayleigh(size=int(length / 5.0))
+    if left_after is None:
+        return STOPPED._replace(rms_swing=scale, departure_reason="", evaluated_time=length,
+                                peaks={"swing": peaks, "placement": 27.0 * peaks})  # fmt: skip
+    growing = np.linspace(scale, np.radians(30.0), max(int(left_after / 5.0), 3))
+    return STOPPED._replace(departure_reason="swings", evaluated_time=left_after,
+                            peaks={"swing": growing, "placement": 27.0 * growing})  # fmt: skip
+
+
+def judged(assessed, runs, length):
+    """The assessment of runs of the last variant."""
+    study = assessed.study
+    crane = study.crane.with_limits(swing=np.radians(12.0), placement=6.0)
+    crane = replace(crane, limits={name: crane.limits[name] for name in ("swing", "placement")})
+    cases = {"no control": study.cases["no control"], "own": study.cases["identified"]}
+    study = replace(study, crane=crane, seeds=tuple(range(len(runs))), cases=cases, length=length)
+    none = in_waves(10_000, length=length)
+    outcomes = tuple((none, run) for run in runs)
+    return replace(assessed, study=study, outcomes=outcomes, linear=None, allowed_share_worse=0.05)
+
+
+@pytest.mark.parametrize("length", [300.0, 1500.0])
+@pytest.mark.parametrize(("failed", "answer"), [(0, "yes"), (1, "not decided"), (15, "no")])
+def test_a_start_that_is_not_taken_over_counts_alike_in_runs_of_any_length(
+    assessed, length, failed, answer
+):
+    runs = [in_waves(seed, left_after=40.0 if seed < failed else None, length=length)
+            for seed in range(120)]  # fmt: skip
+    found = judged(assessed, runs, length)
+    assert found.sufficient == answer
+    share = found.share_of_failed_starts
+    exact = binomtest(failed, 120).proportion_ci(0.95, "exact")
+    assert (share.low, share.high) == pytest.approx((exact.low, exact.high))
+
+
+def test_a_run_that_left_the_model_leaves_no_number_beyond_it(assessed):
+    runs = [in_waves(seed, left_after=40.0 if seed < 15 else None) for seed in range(120)]
+    found = judged(assessed, runs, 600.0)
+    sentence = found.sufficiency_sentence()
+    assert "leaves the model after it is switched on in 15 of 120 seaways" in sentence
+    swing, place = found.limited("own")
+    assert "swing > 30 deg (left the model in 15 of 120 seaways)" in swing.description()
+    assert "place unknown (left the model in 15" in place.description()
+    numbers = [cell for table in found.tables() for row in table.rows for cell in row.cells[3:6]]
+    assert not any(isinstance(number, float) and np.isinf(number) for number in numbers)
+
+
+def test_what_exceeds_its_limit_without_the_runs_that_left_exceeds_it(assessed):
+    runs = [in_waves(seed, left_after=40.0 if seed < 2 else None, scale=0.08)
+            for seed in range(120)]  # fmt: skip
+    found = judged(assessed, runs, 600.0)
+    # of the 2160 peaks of three hours the largest is 0.08 sqrt(2 ln 2160) rad, 18 deg
+    assert [quantity.within for quantity in found.limited("own")] == ["no", "no"]
+    assert found.sufficient == "no"
+
+
+def test_a_swing_beyond_the_models_edge_is_no_number(assessed):
+    runs = [in_waves(seed, scale=0.16) for seed in range(40)]  # 36 deg in three hours
+    swing, place = judged(assessed, runs, 600.0).limited("own")
+    assert swing.description() == "swing > 30 deg, limit 12 deg"
+    assert place.description() == "place beyond its limit, limit 6 m"
+
+
 def test_no_seaway_in_the_model_is_no_verdict_for_control(crane):
     """In waves of 6 m both leave the model at the same time: not decided, and never a number."""
     found = assess(crane, MEANT, seeds=range(4), sea=Spectrum(6.0, 10.0),

@@ -1,5 +1,6 @@
 """Operability over a scatter diagram, and the diagrams themselves."""
 
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -16,7 +17,7 @@ from swashplate.crane import (
     linear_response,
     operability,
 )
-from swashplate.crane.studies import WORKABLE
+from swashplate.crane.studies import WORKABLE, operating
 from swashplate.crane.studies.operating import LEFT, NEAR
 from swashplate.errors import FileError, InputError
 from swashplate.executors import Serial, Threads
@@ -165,6 +166,7 @@ def test_what_was_computed_is_said(found):
     )
     for part in parts:
         assert part in words
+    assert "saturation" not in words  # which is left out
 
 
 def test_a_ship_that_does_not_reach_a_sea_of_the_diagram_is_refused_by_that_sea(crane):
@@ -200,28 +202,91 @@ def test_a_diagram_is_read_whatever_the_order_of_its_columns(tmp_path):
     assert not found.note
 
 
+# 5 ft are 1.524 m by definition
+@pytest.mark.parametrize(
+    ("text", "height", "period"),
+    [
+        ("hs [ft],tp [s],share\n5,8,1\n", 1.524, 8.0),
+        ("Hs (ft),Tp (min),Share\n5,0.2,1\n", 1.524, 12.0),
+        ("hs_cm,tp_ms,share\n150,8000,1\n", 1.5, 8.0),
+        ('"hs [m]";"tp [s]";"share"\n"1,5";"8,5";"10"\n', 1.5, 8.5),
+        ("hs [m];tp [s];share [%]\n1,5;8,5;10\n", 1.5, 8.5),
+        ("hs\ttp\tshare\n1.5\t8.5\t10.5\n", 1.5, 8.5),
+        ("hs,tp,share\nft,s,%\n5,8,10\n", 1.524, 8.0),
+    ],
+)
+def test_units_separators_and_decimal_signs_are_those_of_the_file(tmp_path, text, height, period):
+    path = tmp_path / "site.csv"
+    path.write_text(text, "utf-8")
+    found = Scatter.from_csv(path)
+    np.testing.assert_allclose([found.height, found.period], [[height], [period]])
+
+
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
-        ("", "hs, tp and share ... first line; hs "),
+        ("", "empty"),
         ("hs,tp\n1,2\n", "first line; share "),
-        ("hs,tp,share\n1,2\n", "line 2 ... 2 entries, ... 3"),
-        ("hs,tp,share\n1,two,3\n", "line 2: tp ...'two', ... number"),
+        ("hs,tp,share\n1,2\n", "3 names ... 2 fields"),
+        ("hs,tp,share\n1,two,3\n", "tp ... 'two' ... line 2"),
         ("# x\nhs,tp,share\n1,-2,3\n", "Row 1 ... period of -2"),
-        ("hs,tp,share\n1,2,3\n1,2,4\n", "1 m and 2 s twice"),
-        ("hs,tp,share\n1,2,0\n", "shares ... 0"),
-        ("hs,tp,share\n", "one row: height, period, share"),
+        ("hs,tp,share\n1,8,3\n1,8,4\n", "1 m and 8 s twice"),
+        ("hs,tp,share\n1,8,0\n", "shares ... 0"),
+        ("hs,tp,share\n", "no rows"),
         ("hs,tp,share\n1,nan,1\n", "Row 1 ... period of nan"),
+        ("hs,hs,tp,share\n1,2,8,1\n", "more than one column of hs"),
+        ("hs [m],Hs [ft],tp,share\n1,2,8,1\n", "more than one column of hs ... 'Hs [ft]'"),
+        ("hs [s],tp [s],share\n1,8,1\n", "'hs [s]' ... give it in m"),
+        ("hs,tp [m],share\n1,8,1\n", "'tp [m]' ... give it in s"),
+        ("hs,tp,share\n1e-300,8,1\n", "height ... 1e-300 ... 1e-06"),
+        # 1/7 of a wave's length of g tp²/(2 pi) = 25 m
+        ("hs,tp,share\n10,4,1\n", "10 m ... 4 s ... steeper ... 3.6 m"),
     ],
 )
 def test_what_is_no_diagram_is_said(tmp_path, text, sentence):
     path = tmp_path / "site.csv"
     path.write_text(text, "utf-8")
-    with pytest.raises(InputError) as error:
+    with pytest.raises((FileError, InputError)) as error:
         Scatter.from_csv(path)
-    for part in sentence.split("..."):
+    for part in sentence.split(" ... "):
         assert part in str(error.value)
     assert str(path) in str(error.value)
+
+
+def test_shares_of_any_size_are_divided_by_their_sum():
+    np.testing.assert_allclose(Scatter.of([1, 2], [8, 8], [1e308, 1e308]).share, [0.5, 0.5])
+
+
+def test_a_steep_sea_that_never_comes_is_no_fault():
+    assert Scatter.of([10.0, 1.0], [4.0, 8.0], [0.0, 1.0]).height.tolist() == [1.0]
+
+
+def test_a_diagram_of_many_rows_is_made_in_seconds(crane):
+    heights, periods = np.meshgrid(np.linspace(0.1, 2.0, 400), np.linspace(5.0, 15.0, 101))
+    begun = time.process_time()
+    many = Scatter.of(heights.ravel(), periods.ravel(), np.ones(heights.size))
+    with pytest.raises(InputError, match="101 different periods, .* 100 .* classes"):
+        operability(crane, CLIPPED, many)
+    assert time.process_time() - begun < 10.0  # minutes, when each row was compared with all others
+
+
+@pytest.mark.parametrize(
+    ("headings", "sentence"),
+    [
+        ((), "at least one heading"),
+        ((90.0, 90.0), "90 and 90 deg are one"),
+        ((90.0, 0.0, 450.0), "90 and 450 deg are one"),
+        ((0.0, -90.0, 270.0), "-90 and 270 deg are one"),
+        (range(0, 2000, 359), "heading .* 1077 deg"),
+        ((0.0, float("nan")), "heading .* nan deg"),
+    ],
+)
+def test_headings_are_checked_before_the_first_is_computed(
+    crane, scatter, monkeypatch, headings, sentence
+):
+    monkeypatch.setattr(operating, "_of_column", None)  # which computes
+    with pytest.raises(InputError, match=sentence):
+        operability(crane, CLIPPED, scatter, headings=headings)
 
 
 def test_a_diagram_that_is_not_there_is_said(tmp_path):

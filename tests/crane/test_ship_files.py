@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from tests.fuzz.seeds import MOTIONS, capytaine, ship_table_lines, wamit_lines
 
-from swashplate.crane import read_ship, ship_motion
+from swashplate.crane import Seaway, read_ship, ship_motion
 from swashplate.errors import FileError, InputError, SwashplateError
 from swashplate.logs import subprocess_reader
 
@@ -171,6 +171,32 @@ def test_numbers_of_a_table_that_no_ship_has_are_refused(refused, column, number
     sentence = refused(lines)
     assert f"line 4: {column} " in sentence
     assert f"'{number}'" in sentence
+
+
+def pitching(lowest, factor=1.0):
+    """Lines of a ship that follows the waves from a frequency on, [rad/s], with its rotations."""
+    names = ["heading_deg", "omega", *(f"{m}_{p}" for m in MOTIONS for p in ("re", "im"))]
+    lines = [",".join(names)]
+    for heading in (0.0, 90.0, 180.0):
+        for omega in np.linspace(lowest, 3.0, 24):
+            slope = factor * omega**2 / 9.80665
+            along, across = np.cos(np.radians(heading)), np.sin(np.radians(heading))
+            motion = [0, -along, 0, -across, 1, 0, 0, -slope * across, 0, slope * along, 0, 0]
+            lines.append(",".join(map(repr, map(float, (heading, omega, *motion)))))
+    return lines
+
+
+@pytest.mark.parametrize("lowest", [0.2, 0.3, 0.4, 0.45, 0.8])
+def test_rotations_in_degrees_are_refused_wherever_the_file_begins(tmp_path, refused, lowest):
+    sentence = refused(pitching(lowest, np.degrees(1.0)), error=InputError)
+    assert "rotations must be in rad" in sentence
+    path = tmp_path / "good.csv"
+    path.write_text("\n".join(pitching(lowest)), "utf-8")
+    unchecked = "could not be checked" in " ".join(read_ship(path).unchecked.split())
+    assert unchecked == (lowest >= 0.4)
+    if lowest == 0.4:
+        said = " ".join(Seaway("ss3", ship=read_ship(path)).sentences())
+        assert "axes and phases could not be checked" in said
 
 
 @pytest.mark.parametrize("length", [1e-300, 1e300, nan, -175.0])

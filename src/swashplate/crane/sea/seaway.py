@@ -49,8 +49,13 @@ RATES = (10.0, 1e5)
 """Samples a second that a measured motion is given at. [Hz]"""
 LARGEST = 100_000_000
 """Numbers of a motion, 0.8 GB; nine hours at 512 Hz."""
-HIGHEST = 30.0
-"""Largest significant height of a sea; the largest one measured is 19 m. [m]"""
+LOWEST, HIGHEST = 1e-6, 30.0
+"""Least and largest significant height of a sea: a micrometre stands for calm water, and the
+largest height measured is 19 m. [m]"""
+BREAKING = 1.0 / 7.0
+"""Steepness at which a regular wave breaks in deep water (Stokes, Michell 1893). That of a sea, its
+significant height over the length of a wave of its peak period, stays at half of it (DNV-RP-C205,
+3.5.4: 1/15)."""
 LEAST_ENERGY, OUTSIDE = 0.5, 0.02
 """Share of a spectrum's energy that must lie within the band; share outside from which it is
 announced."""
@@ -66,8 +71,8 @@ functions are given for [m]."""
 class Spectrum:
     """JONSWAP's spectrum of waves; Bretschneider's with a peak factor of 1.
 
-    An `InputError` unless all are above 0 and plausible, and most of the energy lies at waves of
-    1.05 to 31 s.
+    An `InputError` unless all are above 0 and plausible, the waves do not all break, and most of
+    the energy lies at waves of 1.05 to 31 s.
 
     Examples
     --------
@@ -77,19 +82,30 @@ class Spectrum:
     """
 
     height: float
-    """Significant wave height, four standard deviations of the surface; at most 30. [m]"""
+    """Significant wave height, four standard deviations of the surface; 1e-6 to 30. [m]"""
     period: float
     """Of the peak. [s]"""
     peak_factor: float = 1.0
     """γ, 3.3 for young wind seas; at most 10, seas have 1 to 7."""
 
     def __post_init__(self) -> None:
-        for name, most in (("height", HIGHEST), ("period", 1000.0), ("peak_factor", 10.0)):
+        for name, least, most in (
+            ("height", LOWEST, HIGHEST),
+            ("period", 0.0, 1000.0),
+            ("peak_factor", 0.0, 10.0),
+        ):
             value = getattr(self, name)
-            if not 0.0 < value <= most:
-                raise InputError(
-                    f"The {name} of a sea is {value:g}, but must be above 0 and at most {most:g}."
-                )
+            if not (0.0 < value <= most and value >= least):
+                bounds = f"{least:g} to {most:g}" if least else f"above 0 and at most {most:g}"
+                raise InputError(f"The {name} of a sea is {value:g}, but must be {bounds}.")
+        steepness = 2.0 * np.pi * self.height / (GRAVITY * self.period**2)
+        if steepness > BREAKING:
+            highest_wave = BREAKING * GRAVITY * self.period**2 / (2.0 * np.pi)
+            raise InputError(
+                f"A sea of {self.height:g} m with a peak at {self.period:g} s is steeper than a "
+                f"wave that breaks: at that period give at most {highest_wave:.2g} m, or a longer "
+                "period."
+            )
         lowest, highest = BAND
         if self.share(lowest, highest) < LEAST_ENERGY:
             low, high = 2.0 * np.pi / highest, 2.0 * np.pi / lowest
@@ -285,6 +301,8 @@ class Seaway(Result):
                 f"waves of {shortest:.3g} to {longest:.3g} s that are simulated: these are scaled "
                 "up to keep the requested significant height."
             )
+        if isinstance(self.ship, TransferFunctions) and self.ship.unchecked:
+            sentences.append(self.ship.unchecked)
         if lost > LOST and isinstance(self.ship, TransferFunctions):
             low, high = self.ship.frequencies[[0, -1]]
             sentences.append(

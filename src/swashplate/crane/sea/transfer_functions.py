@@ -58,6 +58,9 @@ LONG_WAVES = (
 )
 HEAVES = 0.3
 """Largest distance of heave from 1 in the longest wave of a file, which the wave's crest lifts."""
+PITCHES = 5.0
+"""Largest pitch of any wave over its slope: it is strongly damped and stays below twice the slope,
+and in degrees it is 57 times as large. Roll may be far larger at its resonance."""
 STEEPEST = 2.0
 """Largest pitch in the longest following wave of a file, over the wave's slope."""
 HULLS: Mapping[str, tuple[float, float]] = {
@@ -147,7 +150,8 @@ class TransferFunctions(Result):
     InputError
         If the longest wave, below 0.4 rad/s, does not lift the ship by about its height, carries it
         to another side than the water, pitches it by far more than the wave's slope or, below 0.2
-        rad/s, rolls it against that: another convention.
+        rad/s, rolls it against that: another convention. Also if any wave pitches it by far more
+        than its slope.
     """
 
     name: str
@@ -162,6 +166,7 @@ class TransferFunctions(Result):
 
     def __post_init__(self) -> None:
         if self.frequencies[0] >= LONGEST:
+            self._check_rotations()
             return
         longest = self.values[0, :, 0]
         heave = longest[:, 2]
@@ -181,6 +186,30 @@ class TransferFunctions(Result):
                 f"{pitch:.3g} for each metre, but the wave's slope is {slope:.3g} rad: rotations "
                 "must be in rad for each metre of wave, frequencies in rad/s."
             )
+        self._check_rotations()
+
+    def _check_rotations(self) -> None:
+        """Refuse rotations that are probably in degrees for each metre of wave."""
+        slope = self.frequencies**2 / GRAVITY
+        share = np.abs(self.values[..., MOTIONS.index("pitch")]) / slope
+        if share.max() > PITCHES:
+            speed, heading, row = np.unravel_index(int(np.argmax(share)), share.shape)
+            pitch = float(np.abs(self.values[speed, heading, row, MOTIONS.index("pitch")]))
+            raise InputError(
+                f"{self.name}: pitch is {pitch:.3g} for each metre of waves of "
+                f"{self.frequencies[row]:g} rad/s, but their slope is {slope[row]:.3g} rad: "
+                "rotations must be in rad for each metre of wave, not in degrees."
+            )
+
+    @property
+    def unchecked(self) -> str:
+        """Say that axes and phases went unchecked, without a long wave; empty if there is one."""
+        if self.frequencies[0] < LONGEST:
+            return ""
+        return (
+            f"{self.name} begins at {self.frequencies[0]:g} rad/s; without a wave below "
+            f"{LONGEST:g} rad/s its axes and phases could not be checked."
+        )
 
     def _check_long_wave(self, wave: LongWave) -> None:
         """Refuse a motion that does not go with the water."""

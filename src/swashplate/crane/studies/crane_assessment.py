@@ -8,14 +8,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import isfinite, nan, pi
+from math import inf, isfinite, nan, pi, radians
 from typing import TYPE_CHECKING, ClassVar, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.crane.axes import AXES, check_names
-from swashplate.crane.closed_loop.result import PUMPS, CraneRun, limit_table
+from swashplate.crane.closed_loop.result import (
+    FARTHEST_SWING,
+    PUMPS,
+    CraneRun,
+    limit_table,
+)
 from swashplate.crane.control import PositionLoop
 from swashplate.crane.limits import LIMITED
 from swashplate.crane.sea.confidence import (
@@ -51,6 +56,10 @@ NO_TIPPING_POINT = (
     "In short runs, no other value tried for damping, roll period, height, period, peak factor, "
     "heading or drum, each alone, clearly changes the answer."
 )
+TAKEOVER = 180.0
+"""Time after the run-in, of two minutes, in which a run that leaves the model has failed to take
+over the swing that it was switched on in: 5 min from the start, some thirty swings. Later ones are
+counted by the time that they ran. [s]"""
 IDLE = 1e-3
 """Relative difference of the swing below which control changes nothing."""
 
@@ -61,7 +70,11 @@ class AssessedQuantity(NamedTuple):
     name: str
     limit: float
     largest: ConfidenceInterval
-    """Most probable largest value in three hours; of the saturation its mean."""
+    """Most probable largest value in three hours; of the saturation its mean. If a run left the
+    model it is not known: NaN, from what the other runs surely reach to inf."""
+    left: int = 0
+    """Runs that left the model."""
+    runs: int = 0
 
     @property
     def within(self) -> Decision:
@@ -83,12 +96,18 @@ class AssessedQuantity(NamedTuple):
     def description(self) -> str:
         """Its value and limit: ``"off-lead 9.1 deg (8.7 to 9.5), limit 8 deg"``."""
         label = LIMITED[self.name].label
+        unit, factor = self.shown_unit
+        limit = f"limit {factor * self.limit:.3g} {unit}".rstrip()
+        if self.largest.high == inf:
+            left = f" (left the model in {self.left} of {count(self.runs, 'seaway')})"
+            known = f"> {FARTHEST_SWING:g} deg" if self.name == "swing" else "unknown"
+            if self.name != "swing" and self.within == "no":
+                known = "beyond its limit"
+            return f"{label} {known}{left if self.left else ''}, {limit}"
         if not all(map(isfinite, self.largest)):
             return f"{label} unknown: too few peaks"
-        unit, factor = self.shown_unit
         value, low, high = (factor * number for number in self.largest)
         largest = f"{label} {value:.3g} {unit}".rstrip()
-        limit = f"limit {factor * self.limit:.3g} {unit}".rstrip()
         return f"{largest} ({low:.3g} to {high:.3g}), {limit}"
 
 
@@ -206,17 +225,35 @@ class Assessment(Tabular, Drawn):
     def sufficient(self) -> Decision | None:
         """Whether all stays within its limits in three hours; None if the crane has no limits.
 
-        No, if the assessed variant leaves the model once in three hours or more often.
+        With a run that left the model it is never yes; see `stays`.
         """
         if not self.study.crane.limits:
             return None
         decisions = [quantity.within for quantity in self.limited(self.assessed_variant)]
-        return "no" if self._leaves_often else all_of(decisions)
+        return all_of([*decisions, self.stays])
 
     @property
-    def _leaves_often(self) -> bool:
-        departures = sum(self.departures(self.assessed_variant).values())
-        return departures * THREE_HOURS >= len(self.study.seeds) * self.study.length
+    def stays(self) -> Decision:
+        """Whether the assessed variant stays in the model, however long its runs are.
+
+        No, if it fails to take over the swing that it is switched on in more often than is allowed,
+        by the interval of `share_of_failed_starts`, or leaves the model after that once in three
+        hours or more often. Not decided if it left the model more seldom.
+        """
+        times = [run.evaluated_time for run in self.of(self.assessed_variant) if has_left(run)]
+        late = sum(time > TAKEOVER for time in times)
+        time_after = len(self.study.seeds) * (self.study.length - TAKEOVER)
+        leaves_often = late > 0 and late * THREE_HOURS >= time_after
+        if leaves_often or self.share_of_failed_starts.low > self.allowed_share_worse:
+            return "no"
+        return "not decided" if times else "yes"
+
+    @property
+    def share_of_failed_starts(self) -> ConfidenceInterval:
+        """Share of switchings-on after which the assessed variant leaves the model."""
+        runs = self.of(self.assessed_variant)
+        failed = sum(has_left(run) and run.evaluated_time <= TAKEOVER for run in runs)
+        return share_of(failed, len(runs))
 
     @property
     def idle(self) -> bool:
@@ -308,13 +345,29 @@ class Assessment(Tabular, Drawn):
         ]
         if self.sufficient == "yes":
             return "It suffices: in 3 h all quantities stay within their limits."
+        departed = self._departure_clause()
         if self.sufficient == "no":
-            departures = sum(self.departures(self.assessed_variant).values())
-            causes = beyond or [f"it leaves the model in {count(departures, 'seaway')}"]
+            causes = beyond + ([departed] if self.stays == "no" else [])
             return f"It does not suffice: in 3 h {'; '.join(causes)}."
+        if departed:
+            return f"Whether it suffices is not decided: {departed}. Run more seaways."
         return (
             f"Whether it suffices is not decided: in 3 h {'; '.join(undecided)}. Run more seaways."
         )
+
+    def _departure_clause(self) -> str:
+        """Say how often the assessed variant leaves the model; empty if it never does."""
+        departures = sum(self.departures(self.assessed_variant).values())
+        share = self.share_of_failed_starts
+        seaways = len(self.study.seeds)
+        failed = round(share.value * seaways)
+        clauses = []
+        if failed:
+            in_seaways = share_in_seaways(share, seaways)
+            clauses.append(f"it leaves the model after it is switched on in {in_seaways}")
+        if departures > failed:
+            clauses.append(f"it leaves the model later in {count(departures - failed, 'seaway')}")
+        return "; ".join(clauses)
 
     def remedy_sentences(self) -> list[str]:
         """A sentence for each remedy, or that no tried one suffices; empty if none was tried."""
@@ -395,7 +448,8 @@ class Assessment(Tabular, Drawn):
                 Column("in 3 h", ".2f", "rad", none="–"),
                 Column("left the model", "d"),
             ),
-            "in 3 h: most probable largest swing. Runs that left the model are not in the RMS",
+            f"in 3 h: most probable largest swing; – if a run left the model, more than "
+            f"{FARTHEST_SWING:g} deg. Runs that left the model are not in the RMS",
         )
         for name in self.names:
             rms = rms_of(self.swing(name))
@@ -410,7 +464,14 @@ class Assessment(Tabular, Drawn):
             )
             if name == NO_CONTROL and self.linear is not None:
                 swing = self.linear.values["swing"]
-                table.add(f"{NO_CONTROL}, by its spectrum", swing.rms, nan, nan, swing.largest, 0)
+                table.add(
+                    f"{NO_CONTROL}, by its spectrum",
+                    swing.rms,
+                    nan,
+                    nan,
+                    _in_model(swing.largest),
+                    0,
+                )
         return table
 
     def _worse_table(self) -> Table:
@@ -443,7 +504,9 @@ class Assessment(Tabular, Drawn):
             Column(NO_CONTROL, ".3g", none="–"),
         )
         table = Table(
-            f"Limits, '{self.assessed_variant}'", columns, "in 3 h: most probable largest value"
+            f"Limits, '{self.assessed_variant}'",
+            columns,
+            "in 3 h: most probable largest value; – if a run left the model",
         )
         uncontrolled = {
             quantity.name: quantity.largest.value for quantity in self.limited(NO_CONTROL)
@@ -451,7 +514,8 @@ class Assessment(Tabular, Drawn):
         for quantity in self.limited(self.assessed_variant):
             unit, factor = quantity.shown_unit
             without_control = uncontrolled.get(quantity.name, nan)
-            numbers = (quantity.limit, *quantity.largest, without_control)
+            known = (nan,) * 3 if quantity.largest.high == inf else quantity.largest
+            numbers = (quantity.limit, *known, without_control)
             # a side-lead without waves across the boom is 0, not a millionth of a degree
             limit, largest, low, high, without = (round(factor * value, 3) for value in numbers)
             table.add(
@@ -598,8 +662,32 @@ def _is_worse(run: RunOutcome, uncontrolled: RunOutcome) -> bool:
     return run.rms_swing > uncontrolled.rms_swing
 
 
+def has_left(outcome: RunOutcome) -> bool:
+    """Whether a run left the model, or was stopped."""
+    return bool(outcome.departure_reason)
+
+
+def _in_model(swing: float) -> float:
+    """A swing [rad], NaN beyond the model's edge."""
+    return swing if swing <= radians(FARTHEST_SWING) else nan
+
+
 def largest_of(outcomes: Sequence[RunOutcome], name: str) -> ConfidenceInterval:
-    """Most probable largest value of a quantity in three hours, from its peaks in many runs."""
+    """Most probable largest value of a quantity in three hours, from its peaks in many runs.
+
+    Peaks of a run that left the model are cut off at its edge, and tell nothing of what lies
+    beyond. If there is such a run, or three hours would have a swing beyond that edge, the value is
+    NaN, from what the other runs surely reach to inf.
+    """
+    stayed = [outcome for outcome in outcomes if not has_left(outcome)]
+    largest = _largest_in(stayed, name)
+    swing = largest if name == "swing" else _largest_in(stayed, "swing")
+    if len(stayed) == len(outcomes) and not swing.value > radians(FARTHEST_SWING):
+        return largest
+    return ConfidenceInterval(nan, largest.low, inf)
+
+
+def _largest_in(outcomes: Sequence[RunOutcome], name: str) -> ConfidenceInterval:
     runs = [outcome.peaks[name] for outcome in outcomes if name in outcome.peaks]
     evaluated_time = sum(outcome.evaluated_time for outcome in outcomes)
     return largest_of_peaks(runs, max(evaluated_time, 1.0))
@@ -619,7 +707,9 @@ def assessed_limits(
             if np.isfinite(shares).any():
                 quantities.append(AssessedQuantity(name, limit, mean_of(shares, 0.0)))
         elif any(name in outcome.peaks for outcome in outcomes):
-            quantities.append(AssessedQuantity(name, limit, largest_of(outcomes, name)))
+            left = sum(map(has_left, outcomes))
+            largest = largest_of(outcomes, name)
+            quantities.append(AssessedQuantity(name, limit, largest, left, len(outcomes)))
     return tuple(quantities)
 
 

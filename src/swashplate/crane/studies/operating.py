@@ -24,6 +24,7 @@ from swashplate.crane.limits import LIMITED
 from swashplate.crane.sea.extremes import largest_of_peaks
 from swashplate.crane.sea.scatter import Scatter
 from swashplate.crane.sea.seaway import Seaway, Spectrum
+from swashplate.crane.sea.transfer_functions import TransferFunctions
 from swashplate.crane.studies.run_outcome import RunOutcome
 from swashplate.crane.studies.spectral import DEMANDS, linear_response
 from swashplate.crane.studies.study import (
@@ -48,9 +49,15 @@ if TYPE_CHECKING:
     from swashplate.results import Figure
 
 Array = NDArray[np.float64]
+Rows = NDArray[np.intp]
 
 HEADINGS = tuple(range(0, 360, 45))
 """Headings of the waves by default, equally likely. [deg]"""
+LOW_SEA = 0.125
+"""Height of the sea from which the frequency domain scales: its waves break at no period that a sea
+may have. [m]"""
+MOST_PERIODS = 100
+"""Periods of a scatter diagram; classes of 0.25 s between 2 and 25 s are 92."""
 NEAR = 1.3
 """Factor on a limit, and from it, within which the frequency domain is not relied on."""
 SEEDS = (0, 1)
@@ -59,6 +66,15 @@ SHORTEST = 300.0
 """Least time for which each of them counts: some fifty peaks of a swing. [s]"""
 ACTS = 0.05
 """Share of time at a limit from which on a drive is what limits a cell."""
+CALM = 0.25
+"""Height of a sea in which people work with cranes; a crane that cannot, by the model, is damped by
+its crew. The lowest class of most scatter diagrams. [m]"""
+NOT_MODELLED = (
+    "Not modelled is what a crew does: it damps the swing by moving the boom and with tag lines, "
+    "so that without control a crane may work in more of the year than is shown."
+)
+LEFT_OUT = "saturation"
+"""Limit that is not assessed: a drive's limits are found by what they do."""
 WORKABLE = ""
 """In place of a limit, for a cell that can be worked."""
 LEFT = "leaves the model"
@@ -159,6 +175,15 @@ class Operability(Tabular):
         ]
         return pl.DataFrame(rows)
 
+    def _lowest_unworkable(self) -> float:
+        """Least significant height that the crane without control cannot work; inf if none. [m]"""
+        heights = [
+            float(self.scatter.height[row])
+            for (row, _), cell in self.cells[NO_CONTROL].items()
+            if cell.limited_by != WORKABLE
+        ]
+        return min(heights, default=np.inf)
+
     def sentences(self) -> tuple[str, ...]:
         """State the basis of the shares."""
         simulated = sum(cell.simulated for cells in self.cells.values() for cell in cells.values())
@@ -178,7 +203,12 @@ class Operability(Tabular):
             )
         if self.scatter.note:
             sentences.append(self.scatter.note)
-        return (*sentences, *assumed_sentences(self.crane))
+        if isinstance(self.seaway.ship, TransferFunctions) and self.seaway.ship.unchecked:
+            sentences.append(self.seaway.ship.unchecked)
+        if self._lowest_unworkable() <= CALM:
+            sentences.append(NOT_MODELLED)
+        assessed = {name: limit for name, limit in self.crane.limits.items() if name != LEFT_OUT}
+        return (*sentences, *assumed_sentences(replace(self.crane, limits=assessed)))
 
 
 def label_of(limit: str) -> str:
@@ -221,16 +251,16 @@ def operability(
     Raises
     ------
     InputError
-        For a crane without limits, and no heading.
+        For a crane without limits, no heading, one that is given twice, and seas or headings that
+        `Seaway` refuses: all before the first is computed.
     """
-    limits = {name: limit for name, limit in crane.limits_si.items() if name != "saturation"}
+    limits = {name: limit for name, limit in crane.limits_si.items() if name != LEFT_OUT}
     if not limits:
         raise InputError(
             f"{crane.name} has no limits: give its file a table [limits], as [limits] with "
             'side_lead = { value = 4, unit = "deg" }.'
         )
-    if not headings:
-        raise InputError("Operability needs at least one heading of the waves.")
+    _check_headings(headings)
     base = Seaway() if sea is None else sea
     study = Study.of(crane, control, sea=base, drives=drives, **{"seeds": SEEDS, **options})
     if study.length < SHORTEST:
@@ -238,13 +268,22 @@ def operability(
             f"A sea is simulated for {study.length:g} s, but its largest values in three hours "
             f"need at least {SHORTEST:g} s."
         )
-    for height, period in zip(scatter.height.tolist(), scatter.period.tolist(), strict=True):
-        replace(base, sea=Spectrum(height, period, base.spectrum.peak_factor))  # or it is refused
+    columns_of_sea = _columns_of_sea(scatter)
+    if len(columns_of_sea) > MOST_PERIODS:
+        raise InputError(
+            f"The scatter diagram has {len(columns_of_sea)} different periods, but at most "
+            f"{MOST_PERIODS} are computed: gather its seas into classes, such as 0.25 m by 0.5 s."
+        )
+    for heading in headings:
+        replace(base, heading_deg=float(heading))  # or it is refused
+    for period, rows in columns_of_sea.items():
+        highest = float(scatter.height[rows[-1]])
+        replace(base, sea=Spectrum(highest, period, base.spectrum.peak_factor))  # or it is refused
     columns = [
-        _Column(name, float(heading), float(period))
+        _Column(name, float(heading), period, rows)
         for name in study.cases
         for heading in headings
-        for period in dict.fromkeys(scatter.period.tolist())
+        for period, rows in columns_of_sea.items()
     ]
     work = (study, scatter, limits)
     cells: dict[str, dict[tuple[int, float], SeaCell]] = {name: {} for name in study.cases}
@@ -274,12 +313,36 @@ def operability(
     )
 
 
+def _check_headings(headings: Sequence[float]) -> None:
+    """Refuse no headings, and one that stands twice and would count twice."""
+    if not headings:
+        raise InputError("Operability needs at least one heading of the waves.")
+    given = dict[float, float]()
+    for heading in map(float, headings):
+        turned = heading % 360.0
+        if turned in given:
+            raise InputError(
+                f"The headings {given[turned]:g} and {heading:g} deg are one, which would count "
+                "twice: give it once."
+            )
+        given[turned] = heading
+
+
+def _columns_of_sea(scatter: Scatter) -> dict[float, Rows]:
+    """Rows of a scatter diagram by their period, those of each with the lowest waves first."""
+    order = np.lexsort((scatter.height, scatter.period))
+    ends = np.flatnonzero(np.diff(scatter.period[order])) + 1
+    return {float(scatter.period[rows[0]]): rows for rows in np.split(order, ends)}
+
+
 class _Column(NamedTuple):
     """All heights of one period and heading, for a variant."""
 
     variant: str
     heading: float
     period: float
+    rows: Rows
+    """Of the scatter diagram, the lowest waves first."""
 
 
 def _of_column(
@@ -289,19 +352,19 @@ def _of_column(
     study, scatter, limits = work
     case = study.cases[column.variant]
     factor = study.seaway.spectrum.peak_factor
-    unit = replace(
+    low = replace(
         study.seaway,
-        sea=Spectrum(1.0, column.period, factor),
+        sea=Spectrum(LOW_SEA, column.period, factor),
         heading_deg=column.heading,
     )
-    linear = _linear(case, unit, limits)
-    rows = np.flatnonzero(scatter.period == column.period)
-    rows = rows[np.argsort(scatter.height[rows])]
-    cells = {int(row): _by_spectrum(float(scatter.height[row]), linear, limits) for row in rows}
+    linear = _linear(case, low, limits)
+    cells = {
+        int(row): _by_spectrum(float(scatter.height[row]), linear, limits) for row in column.rows
+    }
 
     def simulated(row: int) -> SeaCell:
         sea = Spectrum(float(scatter.height[row]), column.period, factor)
-        return _by_simulation(study, case, replace(unit, sea=sea), limits)
+        return _by_simulation(study, case, replace(low, sea=sea), limits)
 
     open_rows = [row for row, cell in cells.items() if cell is None]
     complete = cells | _boundary(open_rows, simulated)
@@ -332,7 +395,7 @@ def _boundary(rows: Sequence[int], simulated: Callable[[int], SeaCell]) -> dict[
 
 
 class _Linear(NamedTuple):
-    """A crane in a sea of 1 m, in the frequency domain."""
+    """A crane in the frequency domain."""
 
     slope: Mapping[str, float]
     """Largest values for each metre of significant height, by names of `LIMITED`."""
@@ -343,15 +406,15 @@ class _Linear(NamedTuple):
 
 
 def _linear(case: Case, sea: Seaway, limits: Mapping[str, float]) -> _Linear:
-    """The first of a case's cranes in a sea of 1 m, in the frequency domain."""
+    """The first of a case's cranes in a sea of `LOW_SEA`, in the frequency domain."""
     control = case.options["control"]
     response = linear_response(case.cranes[0], sea, control, **case.pose, **case.hangs)
     values = response.values
     named = {*limits, "hoist_demand"}
     mean = {name: abs(values[name].mean) for name in named}
-    slope = {name: values[name].largest - mean[name] for name in named}
+    slope = {name: (values[name].largest - mean[name]) / LOW_SEA for name in named}
     demands = [name for name in DEMANDS if name in values and (case.driven or name == "clip")]
-    demand = max((values[name].largest for name in demands), default=0.0)
+    demand = max((values[name].largest for name in demands), default=0.0) / LOW_SEA
     return _Linear(slope, mean, demand if control is not None else 0.0)
 
 
