@@ -65,7 +65,7 @@ class FileTable(BaseModel):
 class Document(FileTable):
     """A whole file; without a number of its layout it is of the first."""
 
-    model_config = ConfigDict(populate_by_name=False)
+    model_config = ConfigDict(populate_by_name=False, serialize_by_alias=True)
 
     layout: Schema = Field(
         1,

@@ -34,8 +34,8 @@ class Stopped(BaseException):
     """
 
 
-class _State:
-    """What was told; the main thread writes it."""
+class _Told:
+    """What was told to stop; the main thread writes it."""
 
     obeying = False
     """Whether signals are obeyed."""
@@ -53,10 +53,10 @@ def obeying() -> Iterator[None]:
 
     For the main thread of a program, around all that it does.
     """
-    if _State.obeying:
+    if _Told.obeying:
         yield
         return
-    _State.obeying = True
+    _Told.obeying = True
     hears, rings = socket.socketpair()
     rings.setblocking(False)
     signal.set_wakeup_fd(rings.detach(), warn_on_full_buffer=False)  # open until the process ends
@@ -67,11 +67,11 @@ def obeying() -> Iterator[None]:
     try:
         yield
     except (Stopped, KeyboardInterrupt):  # Polars raises one of its own at Ctrl-C
-        sys.exit(128 + (_State.told or signal.SIGINT))
+        sys.exit(128 + (_Told.told or signal.SIGINT))
     finally:
-        _State.over = True
-        if _State.told:  # whatever became of the exception, and whatever it led to
-            sys.exit(128 + _State.told)
+        _Told.over = True
+        if _Told.told:  # whatever became of the exception, and whatever it led to
+            sys.exit(128 + _Told.told)
 
 
 @contextmanager
@@ -94,25 +94,25 @@ def undone(undo: Callable[[], object]) -> Iterator[None]:
 @contextmanager
 def as_a_whole() -> Iterator[None]:
     """Put `Stopped` off to the end of what takes less than `GRACE`, such as a folder's files."""
-    if _State.put_off or current_thread() is not main_thread():
+    if _Told.put_off or current_thread() is not main_thread():
         yield
         return
-    _State.put_off = True
+    _Told.put_off = True
     try:
         yield
     finally:
-        _State.put_off = False
-        if _State.told:
+        _Told.put_off = False
+        if _Told.told:
             raise Stopped
 
 
 def _tell(number: int, frame: FrameType | None) -> None:
     """Handle a signal, in the main thread."""
-    if _State.over:
+    if _Told.over:
         _end(number)
-    if not _State.told:
-        _State.told = number
-        if not _State.put_off:
+    if not _Told.told:
+        _Told.told = number
+        if not _Told.put_off:
             raise Stopped
 
 
@@ -132,7 +132,7 @@ def _watch(bell: socket.socket) -> None:
 def _unraisable(what: Any) -> None:
     """End the process where its `Stopped` is dropped; what else is dropped is printed."""
     if isinstance(what.exc_value, Stopped):
-        _end(_State.told)
+        _end(_Told.told)
     sys.__unraisablehook__(what)
 
 

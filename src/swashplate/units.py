@@ -62,12 +62,13 @@ PLAUSIBLE = {
     "A": (1e-9, 1e3),
     "m": (1e-9, 2e3),
     "m/s": (1e-9, 1e3),
-    "Pa": (0.1, 1e9),
+    "Pa": (0.01, 1e9),
     "Hz": (1e-6, 1e4),
 }
 """Sizes of the smallest and of the largest unit in which a quantity is written, in SI: nanoradians
-to turns, to kHz, ns to weeks, nV and nA to kV and kA, nm to miles, to km/s, µbar to GPa. A unit
-beyond them is a word that Pint takes for a prefix: "Grad" for giga, "Ms" for mega."""
+to turns, to kHz, ns to weeks, nV and nA to kV and kA, nm to miles, to km/s, hundredths of a Pa (a
+percentage times Pa) to GPa. A unit beyond them is a word that Pint takes for a prefix: "Grad" for
+giga, "Ms" for mega."""
 
 
 LONGEST = 80

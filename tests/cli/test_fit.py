@@ -219,7 +219,7 @@ def test_fits_that_are_refused(refused: Words, virtual: Path, tmp_path: Path) ->
         (tmp_path / "bad.toml").write_text(SETUP.replace(old, new, 1), "utf-8")
         assert said in refused("fit", CAMPAIGN, "--setup", "bad.toml")
     virtual.write_text(virtual.read_text("utf-8").replace('role = "fit"', 'role = "ignore"'))
-    assert "axis 'hoist' has the role 'fit'" in refused("fit", CAMPAIGN)
+    assert "each run has the role 'ignore'" in refused("fit", CAMPAIGN)
 
 
 def test_one_fit_at_a_time_into_a_folder(refused: Words, virtual: Path, tmp_path: Path) -> None:

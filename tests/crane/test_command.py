@@ -211,7 +211,7 @@ def test_follow_and_a_sweep_print_their_tables(tmp_path):
         ("run tg3637 --sea 1.5,8,1,90", "or significant height in m and peak period in s, --sea"),
         ("run tg3637 --sea 1.5,eight", "--sea 1.5,eight: 'eight' is not a number."),
         ("run tg3637 --sea 1.5,spread,8", "--sea 1.5,spread,8: 'spread' is not a number."),
-        ("run tg3637 --sea 90,8", "The height of a sea is 90, but must be above 0 and at most 30"),
+        ("run tg3637 --sea 90,8", "The height of a sea is 90, but must be 1e-06 to 30"),
         ("run tg3637 --heading 30", "--heading needs a sea: give --sea, such as --sea ss3."),
         ("run tg3637 --seed 3", "--seed needs a sea: give --sea, such as --sea ss3."),
         ("run tg3637 --roll-period 9", "--roll-period needs a sea: give --sea, such"),

@@ -3,6 +3,7 @@
 from dataclasses import replace
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
@@ -18,8 +19,9 @@ from swashplate.crane import (
     with_design_change,
 )
 from swashplate.identification import Verdict, load_setup
-from swashplate.identification.assessment import FitFile, StoredVerdict
+from swashplate.identification.assessment import FitFile, StoredStage, StoredVerdict
 from swashplate.identification.diagnostics.discrepancy import ClassError, PredictionError
+from swashplate.identification.estimation.solving import Solution
 from swashplate.report.scene import write_assessment, write_scene
 
 HEADLINES = {
@@ -28,6 +30,11 @@ HEADLINES = {
     "required.",
 }
 NONE_KNOWN = "has none: fit again"
+SOLUTION = Solution(
+    vector=np.zeros(0), cost=0.0, evaluations=1, converged=True, interrupted=False, message=""
+)
+STAGE = StoredStage(name="pump", unknowns=(), solution=SOLUTION, starts=())
+"""A fit has a stage; of this one only the verdict is read."""
 SHORT = {"length": 60.0, "run_in": 0.0, "remedies": False, "tipping_points": False}
 VALIDITY = "Holds for steps from -9 to 9 V; never reached: the swash plate's stop Z13."
 UNREACHED = (
@@ -70,7 +77,7 @@ def fit(tmp_path):
             runs={},
             nominal="",
             setup=load_setup("hoist"),
-            stages=(),
+            stages=(STAGE,),
             profiles=(),
             folds=None,
             notes={},

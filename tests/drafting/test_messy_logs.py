@@ -433,7 +433,7 @@ def test_the_unit_at_the_end_of_a_name_that_is_given(tmp_path, name, kind, unit)
 
 
 def test_a_log_without_a_clock_leaves_its_rate_open(drafted: Drafted, tmp_path: Path) -> None:
-    with pytest.raises(ParameterError, match=r"line 11, \[axes.drive\]: time .* FIXME"):
+    with pytest.raises(ParameterError, match=r"line 12, \[axes.drive\]: time .* FIXME"):
         drafted({"log.csv": {"voltage": BOTH, "speed": lagged(BOTH)}})
     path = tmp_path / "campaign.toml"
     text = path.read_text("utf-8")

@@ -15,7 +15,6 @@ import numpy as np
 import pytest
 
 from swashplate.equations import (
-    UNCACHED,
     closure,
     closure_hash,
     derive,
@@ -24,7 +23,7 @@ from swashplate.equations import (
     kernel,
     source,
 )
-from swashplate.equations.cache import DAY
+from swashplate.equations.cache import DAY, UNCACHED
 
 SLOPE = 2.0
 

@@ -58,7 +58,7 @@ class Dropout(NamedTuple):
     loss: Loss
 
 
-def dropouts(experiment: Experiment, signal: Channel | InputSignal) -> list[Dropout]:
+def find_dropouts(experiment: Experiment, signal: Channel | InputSignal) -> list[Dropout]:
     """Stretches of at least six equal samples and at most 2 s that no motion explains.
 
     Notes
@@ -185,7 +185,7 @@ def _unanswered(experiment: Experiment, window: tuple[float, float]) -> bool:
 def dropout_sentences(experiment: Experiment, signal: Channel | InputSignal) -> Iterator[str]:
     """A sentence for each way in which a signal was lost, with the line that leaves it out."""
     table = f"channels.{signal.name}" if isinstance(signal, Channel) else "input"
-    found = dropouts(experiment, signal)
+    found = find_dropouts(experiment, signal)
     for loss in dict.fromkeys(dropout.loss for dropout in found):
         lost = [dropout for dropout in found if dropout.loss == loss]
         display = display_unit(shown_unit(signal.kind, signal.unit), float(np.ptp(signal.values)))

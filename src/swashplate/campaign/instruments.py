@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.campaign.dropouts import dropouts
+from swashplate.campaign.dropouts import find_dropouts
 from swashplate.campaign.experiment import Channel, Experiment, InputSignal
 from swashplate.campaign.schema import shown_unit
 from swashplate.campaign.spikes import step_of_reading
@@ -77,7 +77,7 @@ def instrument_sentences(experiment: Experiment, signal: Channel | InputSignal) 
             f"reaches {display.factor * largest:.4g} {display.name}, but {bound.reason}: check "
             "unit, scale and offset"
         )
-    lost = {dropout.value for dropout in dropouts(experiment, signal)}
+    lost = {dropout.value for dropout in find_dropouts(experiment, signal)}
     for level in clipping_levels(signal):
         if level not in lost:
             yield _clipped(experiment, signal, level)

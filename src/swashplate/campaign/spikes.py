@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.campaign.dropouts import dropout_sentences, dropouts
+from swashplate.campaign.dropouts import dropout_sentences, find_dropouts
 from swashplate.campaign.experiment import Channel, Experiment, InputSignal
 from swashplate.campaign.samples import find_lost_counts
 from swashplate.tables import count
@@ -30,7 +30,9 @@ NAMED = 6
 """Windows that a sentence names."""
 
 
-def spikes(signal: Channel | InputSignal, drive: InputSignal) -> list[tuple[float, float, float]]:
+def find_spikes(
+    signal: Channel | InputSignal, drive: InputSignal
+) -> list[tuple[float, float, float]]:
     """Single samples that no motion explains: up to five in a row, of the input itself up to two.
 
     For each the instants before and after it, half an interval off [s], and its value farthest from
@@ -110,7 +112,7 @@ def step_of_reading(values: Array) -> float:
 
 def spike_sentences(experiment: Experiment, signal: Channel | InputSignal) -> Iterator[str]:
     """A sentence on a signal's spikes, with the line that leaves them out."""
-    spiked_at = spikes(signal, experiment.input)
+    spiked_at = find_spikes(signal, experiment.input)
     windows = [f'{{ from = {a:.6g}, to = {b:.6g}, why = "spike" }}' for a, b, _ in spiked_at]
     rest = f" and {len(spiked_at) - NAMED} more like these" if len(spiked_at) > NAMED else ""
     table = f"channels.{signal.name}" if isinstance(signal, Channel) else "input"
@@ -177,7 +179,7 @@ def lost_counts(channel: Channel) -> list[LostCounts]:
 
 def lost_count_sentences(experiment: Experiment, channel: Channel) -> Iterator[str]:
     """A sentence on counts that are lost for good, with the lines that cut the run there."""
-    windows = [(lost.begin, lost.end) for lost in dropouts(experiment, channel)]
+    windows = [(lost.begin, lost.end) for lost in find_dropouts(experiment, channel)]
     lasting = [
         jump
         for jump in lost_counts(channel)
@@ -208,8 +210,10 @@ def spiked(experiments: Sequence[Experiment]) -> dict[tuple[str, str], tuple[str
         for name, channel in experiment.channels.items():
             used, far = channel.used, 0.0
             middle = float(np.median(channel.values[used])) if used.any() else 0.0
-            off = spikes(channel, experiment.input)
-            off += [(lost.begin, lost.end, lost.value) for lost in dropouts(experiment, channel)]
+            off = find_spikes(channel, experiment.input)
+            off += [
+                (lost.begin, lost.end, lost.value) for lost in find_dropouts(experiment, channel)
+            ]
             for begin, end, value in off:
                 used &= (channel.time < begin) | (channel.time > end)
                 far = max(far, abs(value - middle))
