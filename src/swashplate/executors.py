@@ -12,7 +12,7 @@ from itertools import islice
 from typing import TYPE_CHECKING, Any, Protocol
 
 from swashplate.errors import InputError, SwashplateError
-from swashplate.stopping import as_a_whole, undone
+from swashplate.stopping import as_a_whole, let_signals_end_waits, undone
 
 if TYPE_CHECKING:
     from concurrent.futures import Executor as Pool
@@ -176,6 +176,7 @@ def _completed(
                     running[pool.submit(function, item)] = k
             if not running:
                 return
+            let_signals_end_waits()
             for future in wait(running, return_when=FIRST_COMPLETED).done:
                 yield running.pop(future), future.result()
     finally:

@@ -106,6 +106,16 @@ def as_a_whole() -> Iterator[None]:
             raise Stopped
 
 
+def let_signals_end_waits(number: int = signal.SIGINT) -> None:
+    """Let a signal end what the main thread waits for from now on.
+
+    Polars, once imported, has the system go on with a wait that a signal interrupts, so that Python
+    does not hear of it before the wait is over.
+    """
+    if hasattr(signal, "siginterrupt"):  # not on Windows
+        signal.siginterrupt(number, True)
+
+
 def _tell(number: int, frame: FrameType | None) -> None:
     """Handle a signal, in the main thread."""
     if _Told.over:
@@ -121,7 +131,10 @@ def _watch(bell: socket.socket) -> None:
     number = 0
     while number not in SIGNALS:
         number = bell.recv(1)[0]
-    # the main thread may be deaf, so that it has not been told yet
+    let_signals_end_waits(number)
+    if hasattr(signal, "pthread_kill"):  # again, in case it waits since before
+        signal.pthread_kill(main_thread().ident or 0, number)
+    # the main thread may be deaf all the same, so that it has not been told yet
     bell.settimeout(GRACE)
     with suppress(TimeoutError):
         while True:  # further signals change nothing: some programs send each twice

@@ -27,7 +27,7 @@ import numpy as np
 from swashplate.errors import FileError, InputError, SwashplateError
 from swashplate.logs.binary import look
 from swashplate.logs.log import Array, Log, LogColumn, first_sentence, printable
-from swashplate.stopping import undone
+from swashplate.stopping import let_signals_end_waits, undone
 
 _PATIENCE = 30.0
 """How long a small file may take, the start of the other process included [s]."""
@@ -102,8 +102,10 @@ class _ReaderProcess:
                 with undone(process._process.kill):
                     answer, arrays = process._answer(path, question)
             except BaseException:
-                # also at Ctrl-C: what is half said must not meet the next question
+                # also at Ctrl-C: what is half said must not meet the next question, and nobody
+                # waits for the rest
                 cls.running = None
+                process._process.kill()
                 process._end()
                 raise
         if "error" in answer:
@@ -118,6 +120,7 @@ class _ReaderProcess:
         clock = threading.Timer(seconds, self._process.kill)
         clock.start()
         line = b""
+        let_signals_end_waits()
         try:
             with suppress(BrokenPipeError):
                 sink.write(json.dumps(question).encode() + b"\n")
