@@ -9,17 +9,19 @@ from __future__ import annotations
 
 import logging
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from functools import partial
 from importlib import import_module
 from math import ceil, prod
+from numbers import Real
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from swashplate.errors import FileError
+from swashplate.errors import FileError, InputError
+from swashplate.logs.clocks import second_of
 from swashplate.logs.log import Array, check_kind, first_sentence, printable, split_unit
 
 
@@ -32,6 +34,8 @@ class _Item(NamedTuple):
     rows: int = 0
     read: Any = None
     """Gives the numbers from a row to before a last one (None: the end), while the file is open."""
+    begin: int | None = None
+    """Of stamps that count from a date: that date since 1970 [ns]; None of anything else."""
 
 
 def look(
@@ -53,9 +57,13 @@ def look(
         if not readable:
             why = "".join(f"; '{signal}': {reason}" for signal, reason in left_out.items())[:300]
             raise FileError(f"{path} has no {what} of numbers{printable(why)}.")
+        # all dates of a log count from one zero, or its channels would shift against each other
+        zero = min((item.begin for item in readable if item.begin is not None), default=0)
         arrays = []
         for item in (readable[position] for position in requested):
             numbers = np.asarray(item.read(first, last), np.float64).ravel()
+            if item.begin is not None:
+                numbers = numbers + 1e-9 * (item.begin - zero)
             claimed = len(range(item.rows)[first:last])
             if numbers.size != claimed:
                 raise FileError(
@@ -126,28 +134,32 @@ def _parquet(path: Path) -> Iterator[Iterable[_Item]]:
         holds_numbers = kind.is_temporal() or kind.is_numeric() or kind == pl.Boolean
         reason = "" if holds_numbers else f"it is of the type {kind}"
         unit = "s" if kind.is_temporal() else split_unit(name)[1]
-        items.append(_Item(name, reason, unit, rows, partial(_parquet_rows, stored.select(name))))
+        column, first_date, begin = stored.select(name), 0, None
+        if kind in (pl.Date, pl.Datetime):
+            cells = column.drop_nulls().head(1).collect().to_series().cast(pl.Datetime("ns"))
+            first_date = next(iter(cells.dt.epoch("ns")), 0)
+            # a day is no clock that others are to be aligned with
+            begin = first_date if kind == pl.Datetime and len(cells) else None
+        read = partial(_parquet_rows, column, first_date)
+        items.append(_Item(name, reason, unit, rows, read, begin))
     yield items
 
 
-def _parquet_rows(column: Any, first: int, last: int | None) -> Any:
-    """Numbers; dates and times as seconds since the first of the column, durations as seconds."""
+def _parquet_rows(column: Any, first_date: int, first: int, last: int | None) -> Any:
+    """Numbers; dates as seconds since the first one [ns], times and durations as seconds."""
     import polars as pl
 
     cells = column.slice(first, None if last is None else last - first).collect().to_series()
     if not cells.dtype.is_temporal():
         return cells.cast(pl.Float64).to_numpy()
-    zero = 0
     if cells.dtype == pl.Duration:
         ticks = cells.dt.total_nanoseconds()
     elif cells.dtype == pl.Time:
         ticks = cells.cast(pl.Int64)
     else:
         ticks = cells.cast(pl.Datetime("ns")).dt.epoch("ns")
-        begin = column.drop_nulls().head(1).collect().to_series().cast(pl.Datetime("ns"))
-        zero = next(iter(begin.dt.epoch("ns")), 0)
     # subtracted as integers: a double of nanoseconds since 1970 would be 256 ns coarse
-    return ((ticks - zero).cast(pl.Float64) / 1e9).to_numpy()
+    return ((ticks - first_date).cast(pl.Float64) / 1e9).to_numpy()
 
 
 # --- arrays: MATLAB and HDF5 ----------------------------------------------------------------------
@@ -371,14 +383,53 @@ def _tdms(path: Path) -> Iterator[Iterable[_Item]]:
         logger.removeHandler(refusal)
 
 
+class _Waveform(NamedTuple):
+    """Clock of a waveform: even stamps that count from a date."""
+
+    date: int | None
+    """Since 1970 [ns]; None if none is given."""
+    first: float
+    """First stamp [s]."""
+    step: float
+    """[s]"""
+    rows: int
+
+
+_NO_START = np.datetime64("1904-01-02")  # LabVIEW writes its zero, 1904, for a date that is not set
+
+
+def _waveform(properties: Mapping[str, Any], rows: int) -> _Waveform | str | None:
+    """Clock of a channel by its properties, None if it has none, or the reason why it has none."""
+    step, begin = properties.get("wf_increment"), properties.get("wf_start_offset", 0.0)
+    # what is a single float is written so that it is the decimal that was meant
+    step, begin = (
+        float(str(number)) if isinstance(number, np.float32) else number for number in (step, begin)
+    )
+    if not isinstance(step, Real) or not isinstance(begin, Real) or not float(step) > 0.0:
+        return None
+    unit = str(properties.get("wf_xunit_string") or "s").strip()
+    try:
+        second = second_of("s" if unit.lower() in _SECONDS else unit, "")
+    except InputError:
+        return f"its increment is in '{unit}', which is not a unit of time"
+    start = properties.get("wf_start_time")
+    is_set = isinstance(start, np.datetime64) and start > _NO_START
+    since = int(start.astype("M8[ns]").astype(np.int64)) if is_set else None
+    return _Waveform(since, second * float(begin), second * float(step), rows)
+
+
+_SECONDS = ("", "s", "sec", "secs", "second", "seconds")
+
+
 def _tdms_items(file: Any) -> Iterator[_Item]:
     """Channels and, of waveforms, whose properties hold an increment, a column ``time``.
 
-    In a file of several groups, a column is called ``group/channel``.
+    If the waveforms of a group differ in start, increment or length, each channel has a column of
+    its own, ``channel time``. In a file of several groups, a column is called ``group/channel``.
     """
     for group in file.groups():
         prefix = f"{group.name}/" if len(file.groups()) > 1 else ""
-        clocks, names = dict[tuple[float, float, int], str](), set[str]()
+        clocks, names = dict[str, _Waveform | str](), set[str]()
         for channel in group.channels():
             kind, rows, properties = channel.dtype.kind, len(channel), channel.properties
             name = prefix + channel.name
@@ -386,17 +437,26 @@ def _tdms_items(file: Any) -> Iterator[_Item]:
             if rows == 0 or kind not in "iufbM":
                 yield _Item(name, _KINDS.get(kind, _KINDS["S"]) if rows else "it is empty")
                 continue
-            unit = (
-                "s" if kind == "M" else properties.get("unit_string") or split_unit(channel.name)[1]
-            )
-            yield _Item(name, "", str(unit) if unit else None, rows, partial(_tdms_rows, channel))
-            step, begin = properties.get("wf_increment"), properties.get("wf_start_offset", 0.0)
-            if isinstance(step, float) and step > 0.0 and isinstance(begin, float):
-                clocks.setdefault((begin, step, rows), channel.name)
-        for clock, channel_name in clocks.items():
-            called = "time" if len(clocks) == 1 else f"{channel_name} time"
-            if called not in names:
-                yield _Item(prefix + called, "", "s", clock[2], partial(_stamps, *clock))
+            unit, begin = properties.get("unit_string") or split_unit(channel.name)[1], None
+            if kind == "M":
+                unit, first = "s", channel.read_data(0, 1)[0]
+                begin = None if np.isnat(first) else int(first.astype("M8[ns]").astype(np.int64))
+            read = partial(_tdms_rows, channel)
+            yield _Item(name, "", str(unit) if unit else None, rows, read, begin)
+            clock = _waveform(properties, rows)
+            if clock is not None:
+                clocks[channel.name] = clock
+        if len({*clocks.values()}) == 1:
+            clocks = {"": clock for clock in clocks.values()}
+        for channel_name, clock in clocks.items():
+            called = f"{channel_name} time".lstrip()
+            if called in names:
+                continue
+            if isinstance(clock, str):
+                yield _Item(prefix + called, clock)
+            else:
+                read = partial(_stamps, clock)
+                yield _Item(prefix + called, "", "s", clock.rows, read, clock.date)
 
 
 def _tdms_rows(channel: Any, first: int, last: int | None) -> Any:
@@ -406,9 +466,9 @@ def _tdms_rows(channel: Any, first: int, last: int | None) -> Any:
     return numbers
 
 
-def _stamps(begin: float, step: float, size: int, first: int, last: int | None) -> Array:
-    rows = range(size)[first:last]
-    return begin + step * np.arange(rows.start, rows.stop, dtype=np.float64)
+def _stamps(clock: _Waveform, first: int, last: int | None) -> Array:
+    rows = range(clock.rows)[first:last]
+    return clock.first + clock.step * np.arange(rows.start, rows.stop, dtype=np.float64)
 
 
 # --- MDF ------------------------------------------------------------------------------------------

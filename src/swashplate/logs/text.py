@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -57,7 +57,8 @@ def open_text(path: Path, options: TextOptions | None = None) -> Log:
     sample = filled[:count] + filled[count :: 1 + len(filled) // count]
     layout = find_layout(sample, options, path)
     columns, first = read_heading(head[:_HEAD], layout, options, path)
-    table = _Table(path, encoding, skipped, layout, columns, first, marks)
+    zeros = _zeros(head[first - 1 :], layout, marks)
+    table = _Table(path, encoding, skipped, layout, columns, first, marks, zeros)
 
     def load(positions: Sequence[int], begin: int = 0, end: int | None = None) -> list[Array]:
         pieces = list(table.read(positions)) or [[np.empty(0)] * len(positions)]
@@ -108,6 +109,8 @@ class _Table:
     columns: tuple[LogColumn, ...]
     first: int
     marks: tuple[str, ...]
+    zeros: Mapping[bool, int]
+    """Stamps from which clocks with a date (true), and without one, count. [µs]"""
 
     def read(self, positions: Sequence[int]) -> Iterator[list[Array]]:
         """Columns at these positions, piece after piece, in the file's units."""
@@ -189,7 +192,7 @@ class _Table:
         is_clock = position in clocks
         read = clocks[position].seconds(text) if is_clock else _numbers_of(text, decimal)
         if count == 0 and isinstance(read, int) and (form := date_form(text[read])):
-            clocks[position] = _Clock(form)
+            clocks[position] = _Clock(form, self.zeros)
             read = clocks[position].seconds(text)
         if not isinstance(read, int):
             return read
@@ -236,6 +239,40 @@ _DAY = 86_400_000_000
 """[µs]"""
 
 
+def _zeros(lines: Sequence[str], layout: TextLayout, marks: tuple[str, ...]) -> dict[bool, int]:
+    """Stamps from which the clocks of some rows count, by whether they have a date. [µs]
+
+    It is the earliest first stamp of all columns, as clocks that begin at different instants would
+    shift their signals against each other if each counted from its own.
+    """
+    import polars as pl
+
+    first_stamps: dict[bool, list[int]] = {True: [], False: []}
+    awaited = set(range(layout.width))
+    for line in lines:
+        if not awaited:
+            break
+        if line.lstrip().startswith(marks):
+            continue
+        cells = layout.cells(line)
+        for position in [*awaited]:
+            cell = cells[position] if position < len(cells) else ""
+            if not cell:
+                continue
+            awaited.discard(position)
+            form = date_form(cell)
+            clock = None if form is None else _Clock(form, {})
+            stamps = None if clock is None else clock.stamps(pl.Series([cell]))
+            if clock is not None and stamps is not None and stamps[0] is not None:
+                first_stamps[clock.dated].append(int(stamps[0]))
+    zeros = {dated: min(stamps) for dated, stamps in first_stamps.items() if stamps}
+    of_day = first_stamps[False]
+    if of_day and max(of_day) - min(of_day) > _DAY // 2:
+        # midnight is between them: the earliest one is still of the day before
+        zeros[False] = min(stamp for stamp in of_day if stamp > max(of_day) - _DAY // 2)
+    return zeros
+
+
 class _Clock:
     """A column of dates of one form, read piece after piece.
 
@@ -243,32 +280,42 @@ class _Clock:
     again at midnight.
     """
 
-    def __init__(self, form: str) -> None:
+    def __init__(self, form: str, zeros: Mapping[bool, int]) -> None:
         self.dated = form.startswith(("%Y", "%m", "%d"))
         self.form = form if self.dated else f"%Y-%m-%d {form}"
-        self.first: int | None = None  # stamp [µs]
-        self.last = self.ahead = 0  # the stamp before, and days passed since the first [µs]
+        self.zero = zeros.get(self.dated)  # stamp from which it counts [µs]
+        self.begins = False
+        self.last = self.ahead = 0  # the stamp before, and days passed since the zero [µs]
+
+    def stamps(self, text: polars.Series) -> polars.Series:
+        """Stamps [µs], null for a cell that is none."""
+        import polars as pl
+
+        plain = text.str.replace(",", ".", literal=True)  # of the fraction
+        plain = plain if self.dated else "1970-01-01 " + plain
+        return plain.str.to_datetime(self.form, time_unit="us", strict=False).cast(pl.Int64)
 
     def seconds(self, text: polars.Series) -> Array | int:
-        """Seconds since the column's first stamp, or the row of the first cell that is none."""
+        """Seconds since the log's zero, or the row of the first cell that is no such date."""
         import polars as pl
 
         text = text.set(text == "", None)
-        plain = text.str.replace(",", ".", literal=True)  # of the fraction
-        plain = plain if self.dated else "1970-01-01 " + plain
-        stamps_read = plain.str.to_datetime(self.form, time_unit="us", strict=False)
-        wrong = stamps_read.is_null() & text.is_not_null()
+        stamps = self.stamps(text)
+        wrong = stamps.is_null() & text.is_not_null()
         if wrong.any():
             return int(wrong.arg_max() or 0)
-        stamps = stamps_read.cast(pl.Int64)
         if stamps.null_count() == len(stamps):
             return np.full(len(text), np.nan)
-        if self.first is None:
-            self.first = self.last = int(stamps.drop_nulls()[0])
+        if not self.begins:
+            self.begins, self.last = True, int(stamps.drop_nulls()[0])
+            if self.zero is None:
+                self.zero = self.last
+            elif not self.dated and self.last < self.zero - _DAY // 2:
+                self.ahead = _DAY
         filled = stamps.fill_null(strategy="forward").fill_null(self.last).to_numpy()
         if not self.dated:
             back = np.diff(filled, prepend=self.last) < -_DAY // 2
             stamps = stamps + self.ahead + _DAY * pl.Series(np.cumsum(back, dtype=np.int64))
             self.ahead += _DAY * int(back.sum())
         self.last = int(filled[-1])
-        return 1e-6 * (stamps - self.first).cast(pl.Float64).to_numpy()
+        return 1e-6 * (stamps - self.zero).cast(pl.Float64).to_numpy()
