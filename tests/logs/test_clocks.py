@@ -143,4 +143,6 @@ def test_dates_of_text_that_begin_apart(tmp_path, first, second, apart, empty):
 def test_one_date_column_counts_from_its_first(tmp_path):
     rows = [f"2024-03-11 10:00:00.{number};1" for number in range(5, 9)]
     (tmp_path / "log.csv").write_text("\n".join(["t;u", *rows]), "utf-8")
-    np.testing.assert_allclose(open_log(tmp_path / "log.csv").read(["t"])["t"], [0.0, 0.1, 0.2, 0.3])
+    np.testing.assert_allclose(
+        open_log(tmp_path / "log.csv").read(["t"])["t"], [0.0, 0.1, 0.2, 0.3]
+    )

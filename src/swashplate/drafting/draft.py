@@ -38,7 +38,7 @@ from swashplate.campaign import (
 )
 from swashplate.documents import parse_toml, toml_key, toml_string, validated
 from swashplate.errors import FileError, InputError
-from swashplate.logs import Log, LogColumn, open_log
+from swashplate.logs import Log, LogColumn, open_log, split_unit
 from swashplate.parameters import NEUTRAL, preset_names
 from swashplate.units import speed_unit, to_si
 
@@ -308,6 +308,14 @@ def _is_unit_of(unit: str, kind: str) -> bool:
     return True
 
 
+def _signal_of_clock(name: str) -> str:
+    """The signal, in words, of which a column such as "Speed time" is the clock, or empty."""
+    match = re.fullmatch(
+        r"(.+) (?:time|zeit|timestamp|time stamp|stamp)", _words(split_unit(name)[0])
+    )
+    return match[1] if match else ""
+
+
 def _guesses(
     headers: Mapping[str, LogColumn],
     blocks: Mapping[str, list[Array]],
@@ -326,8 +334,11 @@ def _guesses(
     if "voltage" in kinds.values() or "current" in kinds.values():
         taken.update(INPUTS)
     guesses = list[_Guess]()
+    names = {_words(split_unit(name)[0]) for name in headers}
     for name, column in headers.items():
         guess = _by_header(column, kinds.get(name))
+        if _signal_of_clock(name) in names:
+            guess = _Guess(name, "time", "", column.unit)
         if name in kinds:
             guess = guess._replace(kind=kinds[name], is_stated=True)
         elif guess.kind in taken:
@@ -494,12 +505,16 @@ def _axis_lines(
 
 
 def _clock(signal: _Guess, guesses: Sequence[_Guess]) -> str:
-    """A signal's line of time: the first column of time in its group of the file, or of all."""
+    """A signal's line of time: its own column of time, or the first of its group, or of all."""
     times = [guess for guess in guesses if guess.kind == "time"]
     if not times:
         return ""
-    group = signal.name.rpartition("/")[0]
-    time = next((guess for guess in times if guess.name.rpartition("/")[0] == group), times[0])
+    words, group = _words(split_unit(signal.name)[0]), signal.name.rpartition("/")[0]
+    own = [guess for guess in times if _signal_of_clock(guess.name) == words]
+    # the clock of another signal is no clock of all
+    common = [guess for guess in times if not _signal_of_clock(guess.name)] or times
+    of_group = [guess for guess in common if guess.name.rpartition("/")[0] == group]
+    time = [*own, *of_group, *common][0]
     column = f"column = {toml_string(time.name)}"
     if time.in_header:
         return f"time = {{ {column} }}"

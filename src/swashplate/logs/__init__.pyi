@@ -3,6 +3,7 @@ from .log import Log as Log
 from .log import LogColumn as LogColumn
 from .log import check_duration as check_duration
 from .log import check_stamps as check_stamps
+from .log import split_unit as split_unit
 from .log import unit_of as unit_of
 from .long_logs import in_parts as in_parts
 from .opening import SUFFIXES as SUFFIXES

@@ -55,7 +55,9 @@ CALENDARS = (
     Calendar(_TICKS, 62_135_596_800.0, "ticks since the year 1, as of .NET", 0.1, True),
     # seconds of a day, from 10:09 on, are of this size, but such a log has more than 86 kHz then
     Calendar("d", 25_569.0 * _DAY, "days since 1899-12-30, as of Excel", 1.0, False),
-    Calendar("microday", 25_569.0 * _DAY, "days since 1899-12-30 times 1e6, as of WinCC", 0.1, False),
+    Calendar(
+        "microday", 25_569.0 * _DAY, "days since 1899-12-30 times 1e6, as of WinCC", 0.1, False
+    ),
     Calendar("d", 719_529.0 * _DAY, "days since the year 0, as MATLAB's datenum", 1.0, False),
     Calendar("d", 2_440_587.5 * _DAY, "Julian days", 1.0, False),
 )
@@ -100,7 +102,7 @@ def check_calendar(unit: str, stamp: float, step: float, *, is_whole: bool, what
     if calendar is not None and not isclose(size, second_of(calendar.unit, what), rel_tol=1e-6):
         raise InputError(
             f"{what} begins at {stamp:.12g}, which is not in '{unit}': its numbers are "
-            f"{calendar.name}; write unit = \"{calendar.unit}\"."
+            f'{calendar.name}; write unit = "{calendar.unit}".'
         )
     return size
 
