@@ -2,13 +2,15 @@
 
 import datetime
 
-import h5py
 import numpy as np
 import polars as pl
 import pytest
 from nptdms import ChannelObject, TdmsWriter
 
-from swashplate.logs import open_log
+from swashplate import Campaign
+from swashplate.drafting import draft_campaign
+from swashplate.errors import InputError
+from swashplate.logs import open_log, read_series
 
 BEGIN = datetime.datetime(2024, 3, 11, 10, 0, 0)
 LATER = BEGIN + datetime.timedelta(milliseconds=500)
@@ -146,3 +148,120 @@ def test_one_date_column_counts_from_its_first(tmp_path):
     np.testing.assert_allclose(
         open_log(tmp_path / "log.csv").read(["t"])["t"], [0.0, 0.1, 0.2, 0.3]
     )
+
+
+CALENDARS = {
+    # the number of 2024-03-11 10:00, and of a second; by Excel, MATLAB (datenum), .NET, Windows
+    "100 ns": (133_546_248_000_000_000, 10_000_000),
+    "100 ns of .NET": (638_457_480_000_000_000, 10_000_000),
+    "ns": (1_710_151_200_000_000_000, 1_000_000_000),
+    "us": (1_710_151_200_000_000, 1_000_000),
+    "ms": (1_710_151_200_000, 1_000),
+    "d of Excel": (45362.4166666667, 1 / 86400),
+    "d of datenum": (739322.416666667, 1 / 86400),
+    "microday": (45362416666.6667, 1e6 / 86400),
+}
+
+
+def write_stamps(path, header, first, second, rate=100):
+    """A step of a log at some rate, its stamps as numbers of a calendar."""
+    whole = isinstance(first, int)
+    lines = [f"{header};voltage [V];speed [rad/s]"]
+    for number in range(201):
+        stamp = first + number * second / rate
+        text = str(first + number * second // rate) if whole else f"{stamp:.10f}"
+        lines.append(f"{text};{6.0 * (number > 50)};{max(number - 60, 0)}")
+    path.write_text("\n".join(lines), "utf-8")
+    return path
+
+
+@pytest.mark.parametrize("header", ["time", "Time_ms", "Time [s]", "stamp of the PLC"])
+@pytest.mark.parametrize("calendar", CALENDARS)
+def test_calendars_are_told_by_the_number(tmp_path, calendar, header):
+    if calendar == "ms" and header == "Time_ms":
+        pytest.skip("right as it is")
+    log = write_stamps(tmp_path / "log.csv", header, *CALENDARS[calendar])
+    text = draft_campaign([log], tmp_path)
+    unit = calendar.partition(" of ")[0]
+    assert f'unit = "{unit}" }}    # from its numbers' in text
+    (tmp_path / "campaign.toml").write_text(text, "utf-8")
+    (run,) = Campaign.from_toml(tmp_path / "campaign.toml").experiments
+    # a double of 7e5 days is 10 us coarse
+    np.testing.assert_allclose(run.input.time, np.arange(201) / 100, atol=2e-5)
+    assert run.recorded == pytest.approx(1_710_151_200.0, abs=1e-3)
+    (tmp_path / "campaign.toml").write_text(text.replace(f'"{unit}"', '"h"'), "utf-8")
+    with pytest.raises(InputError, match=f'write unit = "{unit}" for it'):
+        Campaign.from_toml(tmp_path / "campaign.toml")
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "rate", "unit"),
+    [
+        (0, 1000, 100, "ms"),
+        (864_000_000, 1000, 100, "ms"),  # ten days since a start
+        (0, 1_000_000, 100, "us"),
+        (1_200_000_000, 1_000_000, 100, "us"),  # 20 minutes since a start
+        (1_710_151_200_000_000_000, 1_000_000_000, 1000, "ns"),
+        (40_000.0, 1.0, 100, "s"),  # of a day
+        (40_000.0, 1.0, 10_000, "s"),
+    ],
+)
+def test_other_stamps_are_as_they_were(tmp_path, first, second, rate, unit):
+    log = write_stamps(tmp_path / "log.csv", "time", first, second, rate)
+    text = draft_campaign([log], tmp_path)
+    assert f'column = "time", unit = "{unit}"' in text
+    (tmp_path / "campaign.toml").write_text(text, "utf-8")
+    (run,) = Campaign.from_toml(tmp_path / "campaign.toml").experiments
+    assert np.ptp(run.input.time) == pytest.approx(200 / rate, rel=1e-6)
+
+
+def test_ticks_since_a_start_that_may_be_of_100_ns_stay_open(tmp_path):
+    log = write_stamps(tmp_path / "log.csv", "time", 0, 10_000_000)
+    line = next(line for line in draft_campaign([log], tmp_path).splitlines() if "time =" in line)
+    assert "FIXME" in line
+    assert "10 Hz in us, 100 Hz in 100 ns" in line
+
+
+def test_two_calendars_in_one_log_keep_their_alignment(tmp_path):
+    ticks, ns = CALENDARS["100 ns"][0], CALENDARS["ns"][0]
+    lines = ["Time_cmd;voltage [V];Time_enc;speed [rad/s]"]
+    for number in range(100):
+        lines.append(
+            f"{ticks + number * 100_000};{number % 7};{ns + (50 + number) * 10_000_000};{number}"
+        )
+    (tmp_path / "log.csv").write_text("\n".join(lines), "utf-8")
+    (tmp_path / "campaign.toml").write_text(
+        """\
+[axes.hoist]
+time = { column = "Time_cmd", unit = "100 ns" }
+[axes.hoist.input]
+kind = "voltage"
+column = "voltage"
+[axes.hoist.channels.speed]
+kind = "shaft_speed"
+column = "speed"
+time = { column = "Time_enc", unit = "ns" }
+[[runs]]
+file = "log.csv"
+""",
+        "utf-8",
+    )
+    (run,) = Campaign.from_toml(tmp_path / "campaign.toml").experiments
+    assert run.input.time[0] == 0.0
+    assert run.channels["speed"].time[0] == pytest.approx(0.5, abs=1e-5)
+
+
+def test_each_signal_of_a_draft_has_its_clock(tmp_path):
+    lines = ["t_cmd,cmd [V],speed_time,speed [rpm]"]
+    lines += [f"{0.01 * n},{n % 5},{0.5 + 0.01 * n},{n}" for n in range(100)]
+    (tmp_path / "log.csv").write_text("\n".join(lines), "utf-8")
+    text = draft_campaign([tmp_path / "log.csv"], tmp_path, units={"t_cmd": "s", "speed_time": "s"})
+    (tmp_path / "campaign.toml").write_text(text, "utf-8")
+    (run,) = Campaign.from_toml(tmp_path / "campaign.toml").experiments
+    assert (run.input.time[0], run.channels["shaft_speed"].time[0]) == (0.0, 0.5)
+
+
+def test_the_unit_of_a_series_is_checked(tmp_path):
+    log = write_stamps(tmp_path / "log.csv", "time [us]", *CALENDARS["100 ns"])
+    with pytest.raises(InputError, match="FILETIME"):
+        read_series(log, "speed", "rad/s")

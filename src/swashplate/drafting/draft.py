@@ -11,7 +11,7 @@ import re
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from itertools import pairwise
-from math import floor, inf, pi
+from math import floor, inf, isclose, pi
 from pathlib import Path
 from typing import NamedTuple, get_args
 
@@ -38,7 +38,17 @@ from swashplate.campaign import (
 )
 from swashplate.documents import parse_toml, toml_key, toml_string, validated
 from swashplate.errors import FileError, InputError
-from swashplate.logs import Log, LogColumn, open_log, split_unit
+from swashplate.logs import (
+    SINCE_1970,
+    Calendar,
+    Log,
+    LogColumn,
+    Stamps,
+    calendar_of,
+    open_log,
+    second_of,
+    split_unit,
+)
 from swashplate.parameters import NEUTRAL, preset_names
 from swashplate.units import speed_unit, to_si
 
@@ -62,7 +72,7 @@ FIXME = "FIXME"
 """Mark of a line that a person must fill in."""
 TIME = (
     r"time|zeit|uhrzeit|zeitstempel|temps|heure|tijd|tid|tiempo|tempo|stamp|timestamp|time stamp|"
-    r"datetime|date time|clock|t|seconds?|exp time"
+    r"datetime|date time|clock|t|seconds?|exp time|datenum|filetime"
 )
 """Names of columns of time stamps; those of signals are in `KINDS`."""
 COMPLEMENT = "(?: (?:of|der|des|du|de|del|della|do|da|van|av) .*)?"
@@ -84,6 +94,9 @@ OPEN_UNITS = ("stroker_pressure", "swash_angle", "spool_position")
 """Kinds whose unit stays open, as hardly a logger writes them in SI."""
 TICKS = {"ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 """Units of whole numbers that count the time, and their size. [s]"""
+SLOW_LOG = 20.0
+"""Rate up to which microseconds may well be ticks of 100 ns: ten samples in half a second, in which
+a drive has reached its speed, are few. [Hz]"""
 SLOWEST_LOG = 1.0
 """Rate from which a log of a drive's motion is plausible. [Hz]"""
 OVERLAP = 0.1
@@ -291,7 +304,7 @@ def _by_header(column: LogColumn, kind: str | None) -> _Guess:
 def _check_unit(kind: str, unit: str, what: str) -> None:
     """Refuse a unit in which a kind of signal, or time, is not measured."""
     if kind == "time":
-        to_si(1.0, unit, "s", what)
+        second_of(unit, what)
     else:
         conversion(kind, unit, what)
 
@@ -309,11 +322,10 @@ def _is_unit_of(unit: str, kind: str) -> bool:
 
 
 def _signal_of_clock(name: str) -> str:
-    """The signal, in words, of which a column such as "Speed time" is the clock, or empty."""
-    match = re.fullmatch(
-        r"(.+) (?:time|zeit|timestamp|time stamp|stamp)", _words(split_unit(name)[0])
-    )
-    return match[1] if match else ""
+    """The signal, in words, whose clock a column such as "Speed time" or "t_speed" is, or empty."""
+    clock = "(?:time|zeit|timestamp|time stamp|stamp|t)"
+    match = re.fullmatch(rf"{clock} (.+)|(.+) {clock}", _words(split_unit(name)[0]))
+    return match[1] or match[2] if match else ""
 
 
 def _guesses(
@@ -335,6 +347,7 @@ def _guesses(
         taken.update(INPUTS)
     guesses = list[_Guess]()
     names = {_words(split_unit(name)[0]) for name in headers}
+    unnamed = _unnamed_clock(headers, blocks, kinds)
     for name, column in headers.items():
         guess = _by_header(column, kinds.get(name))
         if _signal_of_clock(name) in names:
@@ -346,8 +359,11 @@ def _guesses(
         values = [part for part in blocks[name] if part.size]
         if name in units:
             guess = guess._replace(unit=units[name], in_header=False, unit_comment="given")
-        elif guess.unit is None:
-            guess = _with_unit_of_numbers(guess, values)
+        else:
+            if guess.kind == "time" or name == unnamed:
+                guess = _of_calendar(guess, _calendar(values))
+            if guess.unit is None:
+                guess = _with_unit_of_numbers(guess, values)
         guesses.append(_by_numbers(guess, values, counts_per_turn))
     present = {(guess.axis, guess.kind) for guess in guesses}
     for index, guess in enumerate(guesses):
@@ -372,6 +388,38 @@ def _by_numbers(guess: _Guess, blocks: Sequence[Array], counts_per_turn: float |
     if guess.kind == "rectified_current" and not guess.is_stated and has_sign(blocks):
         return guess._replace(kind="signed_current")
     return guess
+
+
+def _calendar(blocks: Sequence[Array]) -> Calendar | None:
+    """The calendar that a column's numbers can only be of, if they are and increase."""
+    calendars = {calendar_of(Stamps.of(part)) for part in blocks}
+    finite = [part[np.isfinite(part)] for part in blocks]
+    increase = all(bool(np.all(np.diff(part) > 0.0)) for part in finite)
+    return calendars.pop() if increase and len(calendars) == 1 else None
+
+
+def _unnamed_clock(
+    headers: Mapping[str, LogColumn], blocks: Mapping[str, list[Array]], kinds: Mapping[str, str]
+) -> str:
+    """The only column whose numbers are a calendar's, if none is called like a clock; or empty."""
+    guesses = [_by_header(column, kinds.get(name)) for name, column in headers.items()]
+    if any(guess.kind == "time" for guess in guesses):
+        return ""
+    dated = [name for name in headers if name not in kinds and _calendar(blocks[name])]
+    return dated[0] if len(dated) == 1 else ""
+
+
+def _of_calendar(guess: _Guess, calendar: Calendar | None) -> _Guess:
+    """Guess of a clock with the unit of its calendar, unless its own is of the same size."""
+    if calendar is None:
+        return guess
+    guess = guess._replace(kind="time")
+    if guess.unit is not None and _is_unit_of(guess.unit, "time"):
+        size = second_of(calendar.unit, "")
+        if isclose(second_of(guess.unit, ""), size, rel_tol=1e-6):
+            return guess
+    reason = f"from its numbers, {calendar.name}"
+    return guess._replace(unit=calendar.unit, in_header=False, unit_comment=reason)
 
 
 def _with_unit_of_numbers(signal: _Guess, blocks: Sequence[Array]) -> _Guess:
@@ -410,6 +458,10 @@ def _time_unit(blocks: Sequence[Array]) -> tuple[str, str]:
     fast = (unit for unit, size in TICKS.items() if step * size <= 1.0 / SLOWEST_LOG)
     unit = next(fast, "ns")
     rate = 1.0 / (step * TICKS[unit])
+    since_1970 = bool(blocks[0].size) and TICKS[unit] * float(blocks[0][0]) > SINCE_1970
+    if unit == "us" and rate <= SLOW_LOG and not since_1970:
+        readings = f"{rate:.4g} Hz in us, {10.0 * rate:.4g} Hz in 100 ns"
+        return unit, f"{FIXME}: whole numbers that step by {step:.9g}, {readings}"
     return unit, f"guessed: whole numbers that step by {step:.9g}, {rate:.4g} Hz in {unit}"
 
 

@@ -1,3 +1,10 @@
+from .clocks import SINCE_1970 as SINCE_1970
+from .clocks import Calendar as Calendar
+from .clocks import Stamps as Stamps
+from .clocks import calendar_of as calendar_of
+from .clocks import second_of as second_of
+from .clocks import second_of_clock as second_of_clock
+from .clocks import seconds_to_1970 as seconds_to_1970
 from .dialect import TextOptions as TextOptions
 from .log import Log as Log
 from .log import LogColumn as LogColumn

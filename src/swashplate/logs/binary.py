@@ -446,17 +446,17 @@ def _tdms_items(file: Any) -> Iterator[_Item]:
             clock = _waveform(properties, rows)
             if clock is not None:
                 clocks[channel.name] = clock
-        if len({*clocks.values()}) == 1:
-            clocks = {"": clock for clock in clocks.values()}
+        differ = len({*clocks.values()}) > 1
         for channel_name, clock in clocks.items():
-            called = f"{channel_name} time".lstrip()
+            called = f"{channel_name} time" if differ else "time"
             if called in names:
                 continue
-            if isinstance(clock, str):
+            if isinstance(clock, str):  # the reason why there is none
                 yield _Item(prefix + called, clock)
             else:
                 read = partial(_stamps, clock)
                 yield _Item(prefix + called, "", "s", clock.rows, read, clock.date)
+            names.add(called)
 
 
 def _tdms_rows(channel: Any, first: int, last: int | None) -> Any:

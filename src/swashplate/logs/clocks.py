@@ -10,9 +10,14 @@ import re
 from math import inf, isclose
 from typing import NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from swashplate.errors import InputError
 from swashplate.units import to_si
 
+SINCE_1970 = 1e8
+"""Stamps that begin beyond this are a calendar's and are counted from the first. [s]"""
 _SINCE = re.compile(r"\s*(\S+)\s+since\b.*", re.DOTALL)
 _TICKS = "100 ns"  # of Windows; Pint takes no number in a unit
 _DAY = 86_400.0
@@ -64,33 +69,40 @@ CALENDARS = (
 """Calendars whose numbers of the years 2000 to 2060 do not overlap, given their steps."""
 
 
-def calendar_of(stamp: float, step: float, *, is_whole: bool) -> Calendar | None:
-    """The calendar that a stamp can only be of, None if it may be anything.
+class Stamps(NamedTuple):
+    """What tells a calendar: first number of a clock and usual interval, in its unit."""
 
-    Parameters
-    ----------
-    stamp : float
-        A stamp of a clock, in its unit.
-    step : float
-        Its usual interval, in its unit.
-    is_whole : bool
-        Whether all its stamps are whole numbers.
-    """
+    first: float
+    step: float
+    are_whole: bool
+
+    @classmethod
+    def of(cls, numbers: NDArray[np.float64], first: float | None = None) -> Stamps:
+        """Of numbers (n,) of which some may be missing; the clock may begin before them."""
+        finite = numbers[np.isfinite(numbers)]
+        if finite.size < 2:
+            return cls(0.0, 0.0, are_whole=True)
+        begin = float(finite[0]) if first is None else first
+        return cls(begin, float(np.median(np.diff(finite))), bool(np.all(finite % 1.0 == 0.0)))
+
+
+def calendar_of(stamps: Stamps) -> Calendar | None:
+    """The calendar that stamps can only be of, None if they may be anything."""
     for calendar in CALENDARS:
         size = second_of(calendar.unit, "")
         if (
-            _FROM <= size * stamp - calendar.epoch < _TO
-            and size * step <= calendar.longest_step
-            and calendar.is_whole in (None, is_whole)
+            _FROM <= size * stamps.first - calendar.epoch < _TO
+            and 0.0 < size * stamps.step <= calendar.longest_step
+            and calendar.is_whole in (None, stamps.are_whole)
         ):
             return calendar
     return None
 
 
-def check_calendar(unit: str, stamp: float, step: float, *, is_whole: bool, what: str) -> float:
+def second_of_clock(unit: str, stamps: Stamps, what: str) -> float:
     """Size of a clock's unit [s], refused if its stamps are a calendar's in another unit.
 
-    The stamps are described as in `calendar_of`; `what` names the clock in the error's sentence.
+    `what` names the clock in the error's sentence.
 
     Raises
     ------
@@ -98,19 +110,19 @@ def check_calendar(unit: str, stamp: float, step: float, *, is_whole: bool, what
         If the unit is unknown, or another than the stamps can only have.
     """
     size = second_of(unit, what)
-    calendar = calendar_of(stamp, step, is_whole=is_whole)
+    calendar = calendar_of(stamps)
     if calendar is not None and not isclose(size, second_of(calendar.unit, what), rel_tol=1e-6):
         raise InputError(
-            f"{what} begins at {stamp:.12g}, which is not in '{unit}': its numbers are "
-            f'{calendar.name}; write unit = "{calendar.unit}".'
+            f"{what} begins at {stamps.first:.12g}, which is not in '{unit}': such numbers are "
+            f'{calendar.name}; write unit = "{calendar.unit}" for it.'
         )
     return size
 
 
-def seconds_to_1970(stamp: float, unit: float) -> float:
-    """Seconds from the zero of the calendar of a stamp, in units of so many seconds, to 1970."""
+def seconds_to_1970(first: float, size: float) -> float:
+    """Seconds from the zero of a clock to 1970, by its first stamp and its unit of so many s."""
     for calendar in CALENDARS:
-        if isclose(unit, second_of(calendar.unit, ""), rel_tol=1e-6):
-            if _FROM <= unit * stamp - calendar.epoch < _TO:
-                return calendar.epoch
+        is_in_unit = isclose(size, second_of(calendar.unit, ""), rel_tol=1e-6)
+        if is_in_unit and _FROM <= size * first - calendar.epoch < _TO:
+            return calendar.epoch
     return 0.0
