@@ -225,10 +225,7 @@ def test_ticks_since_a_start_that_may_be_of_100_ns_stay_open(tmp_path):
 def test_two_calendars_in_one_log_keep_their_alignment(tmp_path):
     ticks, ns = CALENDARS["100 ns"][0], CALENDARS["ns"][0]
     lines = ["Time_cmd;voltage [V];Time_enc;speed [rad/s]"]
-    for number in range(100):
-        lines.append(
-            f"{ticks + number * 100_000};{number % 7};{ns + (50 + number) * 10_000_000};{number}"
-        )
+    lines += [f"{ticks + n * 100_000};{n % 7};{ns + (50 + n) * 10_000_000};{n}" for n in range(100)]
     (tmp_path / "log.csv").write_text("\n".join(lines), "utf-8")
     (tmp_path / "campaign.toml").write_text(
         """\

@@ -8,26 +8,32 @@ from __future__ import annotations
 
 import csv
 import io
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, get_args
 
 import numpy as np
 
 from swashplate.errors import FileError
 from swashplate.logs.dialect import (
     INFINITE,
+    MAY_BE_THOUSANDS,
     NOT_A_NUMBER,
     SIGNS,
     TextLayout,
     TextOptions,
+    Thousands,
+    ambiguous_thousands,
     date_form,
     encoding_of,
     find_layout,
+    grouped_number,
     is_number_text,
     read_heading,
     short_cell,
+    without_thousands,
 )
 from swashplate.logs.log import Array, Log, LogColumn, printable
 
@@ -115,15 +121,22 @@ class _Table:
     def read(self, positions: Sequence[int]) -> Iterator[list[Array]]:
         """Columns at these positions, piece after piece, in the file's units."""
         begin, count, clocks = 1, 0, dict[int, _Clock]()
+        doubts = {position: _Doubt() for position in positions if not self.layout.is_sure}
         for piece in _pieces(self.path, self.encoding, self.skipped):
             lines, cells = self._at_once(piece, begin) or self._line_by_line(piece, begin, count)
             begin += piece.count("\n")
+            for position, doubt in doubts.items():
+                doubt.take(cells[str(position)], self.layout.decimal, lines, count)
             if lines:
                 yield [
                     self._piece_of_column(cells[str(position)], lines, position, count, clocks)
                     for position in positions
                 ]
             count += len(lines)
+        for position, doubt in doubts.items():
+            if doubt.remains:
+                what = f"{self.path}: column '{self.columns[position].name}' holds {doubt.where}"
+                raise ambiguous_thousands(what, self.layout.decimal)
 
     def _at_once(self, piece: str, begin: int) -> tuple[Sequence[int], polars.DataFrame] | None:
         """Numbers of a piece's lines, and their cells; None if some may not be plain rows."""
@@ -188,9 +201,9 @@ class _Table:
     ) -> Array:
         """A column of a piece, before which there are `count` rows."""
         text = cells.str.strip_chars().fill_null("")
-        decimal = self.layout.decimal
+        decimal, thousands = self.layout.decimal, self.layout.thousands
         is_clock = position in clocks
-        read = clocks[position].seconds(text) if is_clock else _numbers_of(text, decimal)
+        read = clocks[position].seconds(text) if is_clock else _numbers_of(text, decimal, thousands)
         if count == 0 and isinstance(read, int) and (form := date_form(text[read])):
             clocks[position] = _Clock(form, self.zeros)
             read = clocks[position].seconds(text)
@@ -203,17 +216,58 @@ class _Table:
             kind = "date like the first one"
         elif is_number_text(text[row], other_mark):
             kind = f"number with a decimal {'comma' if other_mark == '.' else 'point'}"
+        hint = "" if thousands is not None else _hint_of_thousands(text[row])
         raise FileError(
             f"{self.path}: column '{self.columns[position].name}' holds "
             f"'{short_cell(text[row])}', which is not a {kind}, in data row {count + row + 1} "
-            f"(line {lines[row]})."
+            f"(line {lines[row]}){hint}."
         )
 
 
-def _numbers_of(text: polars.Series, decimal: str) -> Array | int:
+class _Doubt:
+    """Numbers of a column that may be thousands, in a file of whole numbers as far as was seen."""
+
+    def __init__(self) -> None:
+        self.where = ""
+        self.is_settled = False
+
+    @property
+    def remains(self) -> bool:
+        """Whether there are such numbers, and none that settles what their sign means."""
+        return bool(self.where) and not self.is_settled
+
+    def take(self, cells: polars.Series, decimal: str, lines: Sequence[int], count: int) -> None:
+        """Take in the cells of a piece, before which there are `count` rows."""
+        text = cells.str.strip_chars().fill_null("")
+        marked = text.str.contains(decimal, literal=True)
+        if self.is_settled or not marked.any():
+            return
+        may_be = text.str.contains(MAY_BE_THOUSANDS)
+        self.is_settled = bool((marked & ~may_be).any())
+        if not self.where and may_be.any():
+            row = int((marked & may_be).arg_max() or 0)
+            self.where = (
+                f"'{short_cell(text[row])}' in data row {count + row + 1} (line {lines[row]})"
+            )
+
+
+def _hint_of_thousands(cell: str) -> str:
+    """What to do about a cell that is a number with separators of thousands, or empty."""
+    for thousands in get_args(Thousands):
+        decimals = [mark for mark in (".", ",") if mark != thousands]
+        if any(re.match(grouped_number(thousands, decimal), cell) for decimal in decimals):
+            return f"; give thousands = \"{thousands}\" as an option if these are thousands"
+    return ""
+
+
+def _numbers_of(text: polars.Series, decimal: str, thousands: str | None = None) -> Array | int:
     """Numbers of a column, an empty cell as NaN; or the row of the first cell that holds none."""
     import polars as pl
 
+    if thousands is not None:
+        grouped = text.str.contains(grouped_number(thousands, decimal))
+        bare_numbers = text.str.replace_all(without_thousands(thousands), "")
+        text = bare_numbers.zip_with(grouped, text)
     plain = text
     if decimal == ",":
         # so that 1.234 is not taken for a number: it may be one thousand in this notation
