@@ -8,9 +8,12 @@ that were cut off. All of it runs in a process of its own, see `swashplate.logs.
 from __future__ import annotations
 
 import logging
+import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
+from datetime import UTC, datetime
+from fractions import Fraction
 from functools import partial
 from importlib import import_module
 from math import ceil, prod
@@ -268,10 +271,110 @@ def _hdf5_items(dataset: Any, name: str | None = None, form: str = "[{}]") -> It
             reason = reason or "its numbers are in other files"
         stated: Any = next((dataset.attrs[key] for key in _UNITS if key in dataset.attrs), [])
         units = [_decoded(number) for number in np.ravel(stated).tolist()]
-        signals = list(_vectors(name, dataset, form, units, reverse=form == "({})"))
-        yield from [_Item(name, reason)] if reason else signals
+        packing = _packing(dataset)
+        if isinstance(packing, str):
+            reason, packing = reason or packing, None
+        if reason:
+            yield _Item(name, reason)
+            return
+        for item in _vectors(name, dataset, form, units, reverse=form == "({})"):
+            unpacked = item
+            if not item.reason and packing is not None:
+                unpacked = item._replace(read=partial(_unpacked, packing, item.read))
+            yield _counted_from_date(unpacked)
     except (TypeError, ValueError) as error:  # a type that NumPy does not have
         yield _Item(name, first_sentence(error))
+
+
+class _Packing(NamedTuple):
+    """How numbers are packed by the conventions of netCDF: number = scale * stored + offset."""
+
+    scale: float
+    offset: float
+    missing: tuple[float, ...]
+    """Stored numbers that stand for none."""
+    least: float
+    most: float
+    """Range of the stored numbers that count."""
+    is_unsigned: bool
+    """Whether what is stored as a signed integer is meant without a sign."""
+
+
+_PACKED = ("scale_factor", "add_offset", "_FillValue", "missing_value", "valid_min", "valid_max")
+
+
+def _packing(dataset: Any) -> _Packing | str | None:
+    """Packing of a dataset by its attributes, None if there is none, or why it cannot be read."""
+    stated = {key: np.ravel(dataset.attrs[key]) for key in _PACKED if key in dataset.attrs}
+    if "valid_range" in dataset.attrs:
+        limits = np.ravel(dataset.attrs["valid_range"])
+        stated |= {"valid_min": limits[:1], "valid_max": limits[-1:]}
+    is_unsigned = _decoded(dataset.attrs.get("_Unsigned", "")).lower() == "true"
+    if not stated and not is_unsigned:
+        return None
+    numbers = dict[str, list[float]]()
+    for key, values in stated.items():
+        if values.dtype.kind not in "iuf" or not (values.size == 1 or key == "missing_value"):
+            return f"its attribute {key} is not a number"
+        if key not in ("scale_factor", "add_offset"):
+            # these are stored numbers
+            values = _as_stored(values.astype(dataset.dtype), is_unsigned=is_unsigned)
+        numbers[key] = [float(value) for value in values]
+    return _Packing(
+        scale=numbers.get("scale_factor", [1.0])[0],
+        offset=numbers.get("add_offset", [0.0])[0],
+        missing=(*numbers.get("_FillValue", []), *numbers.get("missing_value", [])),
+        least=numbers.get("valid_min", [-np.inf])[0],
+        most=numbers.get("valid_max", [np.inf])[0],
+        is_unsigned=is_unsigned,
+    )
+
+
+def _as_stored(numbers: Any, *, is_unsigned: bool) -> Any:
+    """Stored numbers, integers without their sign if they are meant so."""
+    if not is_unsigned or numbers.dtype.kind != "i":
+        return numbers
+    return numbers.view(numbers.dtype.str.replace("i", "u"))
+
+
+def _unpacked(packing: _Packing, read: Any, first: int, last: int | None) -> Array:
+    """Numbers that are stored packed, NaN where none is."""
+    stored = _as_stored(np.asarray(read(first, last)), is_unsigned=packing.is_unsigned)
+    numbers = np.array(stored, np.float64)
+    is_missing = np.isin(numbers, packing.missing)
+    is_missing |= (numbers < packing.least) | (numbers > packing.most)
+    numbers = packing.scale * numbers + packing.offset
+    numbers[is_missing] = np.nan
+    return numbers
+
+
+_SINCE = re.compile(r"\s*(\w+)\s+since\s+(\d{4}-\d{1,2}-\d{1,2})(?:[T ]+([0-9:.]+)\s*(Z|UTC)?)?\s*")
+
+
+def _counted_from_date(item: _Item) -> _Item:
+    """A column of "days since 2024-03-11" and the like in seconds, with the date; others as are."""
+    since = _SINCE.fullmatch(item.unit or "")
+    if since is None or item.reason:
+        return item
+    year, month, day = map(int, since[2].split("-"))
+    clock = [float(part) for part in (since[3] or "0").split(":")]
+    try:
+        second, midnight = second_of(since[1], ""), datetime(year, month, day, tzinfo=UTC)
+    except (InputError, ValueError):
+        return item
+    seconds = sum(part * unit for part, unit in zip(clock, (3600, 60, 1), strict=False))
+    begin = int(midnight.timestamp()) * 10**9 + round(1e9 * seconds)
+    first_number = np.ravel(item.read(0, 1))[:1]
+    if not np.isfinite(first_number).all():
+        return item
+    # a log's first stamp is near its others, whatever date they are counted from
+    offset = first_number[0] if first_number.size else 0
+    begin += round(Fraction(offset.item()) * Fraction(str(second)) * 10**9) if offset else 0
+
+    def read(first: int, last: int | None) -> Array:
+        return second * np.asarray(item.read(first, last) - offset, np.float64)
+
+    return item._replace(unit="s", read=read, begin=begin)
 
 
 def _matlab73_items(dataset: Any) -> Iterator[_Item]:

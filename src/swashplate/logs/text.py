@@ -256,7 +256,7 @@ def _hint_of_thousands(cell: str) -> str:
     for thousands in get_args(Thousands):
         decimals = [mark for mark in (".", ",") if mark != thousands]
         if any(re.match(grouped_number(thousands, decimal), cell) for decimal in decimals):
-            return f"; give thousands = \"{thousands}\" as an option if these are thousands"
+            return f'; give thousands = "{thousands}" as an option if these are thousands'
     return ""
 
 
