@@ -2,12 +2,14 @@
 
 import datetime
 
+import h5py
 import numpy as np
 import polars as pl
 import pytest
 from nptdms import ChannelObject, TdmsWriter
 
 from swashplate import Campaign
+from swashplate.campaign import examine
 from swashplate.drafting import draft_campaign
 from swashplate.errors import InputError
 from swashplate.logs import open_log, read_series
@@ -262,3 +264,18 @@ def test_the_unit_of_a_series_is_checked(tmp_path):
     log = write_stamps(tmp_path / "log.csv", "time [us]", *CALENDARS["100 ns"])
     with pytest.raises(InputError, match="FILETIME"):
         read_series(log, "speed", "rad/s")
+
+
+def test_single_floats_of_a_late_clock_are_rounded_stamps(tmp_path):
+    stamps = (1e5 + np.arange(801) / 100.0).astype(np.float32)
+    steps = np.where(np.arange(801) > 100, 6.0, 0.0)
+    with h5py.File(tmp_path / "log.h5", "w") as file:
+        for name, values in (("time", stamps), ("voltage", steps), ("speed", 2.0 * steps)):
+            file[name] = values
+    text = draft_campaign([tmp_path / "log.h5"], tmp_path)
+    assert "8 s at 100 Hz" in text
+    (tmp_path / "campaign.toml").write_text(text, "utf-8")
+    (run,) = Campaign.from_toml(tmp_path / "campaign.toml").experiments
+    findings = " ".join(sentence for signal in examine(run) for sentence in signal.findings)
+    assert "rounded to 7.8 ms, of an even 100 Hz" in findings
+    assert "missing" not in findings

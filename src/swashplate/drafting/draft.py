@@ -34,6 +34,7 @@ from swashplate.campaign import (
     moves_at_first,
     read_run,
     rolls_over_at,
+    stamp_statistics,
     turns_over,
 )
 from swashplate.documents import parse_toml, toml_key, toml_string, validated
@@ -841,7 +842,7 @@ def _sampling_words(
 ) -> str:
     """Duration [s] and rate of a run, and its parts, for the comment next to its file."""
     of_axis = [experiment for experiment in experiments if experiment.axis == experiments[0].axis]
-    rate = 1.0 / float(np.median(np.diff(of_axis[0].input.time)))
+    rate = stamp_statistics(of_axis[0].input.time).rate
     comment = f", {duration:.4g} s at {rate:.4g} Hz"
     if overview is not None:
         comment += f", {len(of_axis)} of {len(overview.windows)} windows with motion used"
