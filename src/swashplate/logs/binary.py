@@ -368,8 +368,8 @@ def _counted_from_date(item: _Item) -> _Item:
     if not np.isfinite(first_number).all():
         return item
     # a log's first stamp is near its others, whatever date they are counted from
-    offset = first_number[0] if first_number.size else 0
-    begin += round(Fraction(offset.item()) * Fraction(str(second)) * 10**9) if offset else 0
+    offset = first_number[0].item() if first_number.size else 0
+    begin += round(Fraction(offset) * Fraction(str(second)) * 10**9)
 
     def read(first: int, last: int | None) -> Array:
         return second * np.asarray(item.read(first, last) - offset, np.float64)
@@ -516,9 +516,10 @@ def _waveform(properties: Mapping[str, Any], rows: int) -> _Waveform | str | Non
     except InputError:
         return f"its increment is in '{unit}', which is not a unit of time"
     start = properties.get("wf_start_time")
-    is_set = isinstance(start, np.datetime64) and start > _NO_START
-    since = int(start.astype("M8[ns]").astype(np.int64)) if is_set else None
-    return _Waveform(since, second * float(begin), second * float(step), rows)
+    date = None
+    if isinstance(start, np.datetime64) and start > _NO_START:
+        date = int(start.astype("M8[ns]").astype(np.int64))
+    return _Waveform(date, second * float(begin), second * float(step), rows)
 
 
 _SECONDS = ("", "s", "sec", "secs", "second", "seconds")

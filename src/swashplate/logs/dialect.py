@@ -231,7 +231,8 @@ class TextLayout(NamedTuple):
 
     def __str__(self) -> str:
         point = "comma" if self.decimal == "," else "point"
-        return f"{_NAMES.get(self.delimiter, repr(self.delimiter))}, decimal {point}"
+        thousands = "" if self.thousands is None else f", thousands {self.thousands}"
+        return f"{_NAMES.get(self.delimiter, repr(self.delimiter))}, decimal {point}{thousands}"
 
     def cells(self, line: str, *, strict: bool = False) -> list[str]:
         """Cells of a line, stripped; `strict` refuses misplaced quotes in a `csv.Error`."""
