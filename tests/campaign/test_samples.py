@@ -21,6 +21,7 @@ from swashplate.campaign import (
     signed_by_command,
     speed_from_angle,
     speed_of,
+    stamp_statistics,
     stamps_of,
     unwrap_counts,
 )
@@ -34,6 +35,38 @@ def test_rounded_stamps_are_put_back_onto_their_grid() -> None:
     assert period == pytest.approx(1.0 / 512.0, abs=5e-5 / 599.0)
     np.testing.assert_allclose(time, grid, atol=5e-5)
     assert np.ptp(np.diff(time)) < 1e-12
+
+
+@pytest.mark.parametrize(
+    ("rate", "begin", "step"),
+    [
+        (100.0, 1e5, 2.0**-7),  # a single float of a day's seconds
+        (200.0, 4e4, 2.0**-8),
+        (60.0, 0.0, 0.01),
+        (512.0, 0.0, 1e-3),
+    ],
+)
+def test_even_stamps_that_are_rounded_coarsely_have_their_rate(rate, begin, step) -> None:
+    stamps = np.round((begin + np.arange(801) / rate) / step) * step
+    read = stamp_statistics(stamps)
+    assert read.rate == pytest.approx(rate, rel=2e-3)
+    assert read.rounded == pytest.approx(step, rel=1e-3)
+    assert read.missing == 0
+    assert read.gaps.size == 0
+
+
+@pytest.mark.parametrize("lost", [400, 799])
+def test_a_sample_that_is_missing_among_rounded_stamps_is_seen(lost) -> None:
+    stamps = np.delete(np.round(np.arange(801) / 100.0 / 2.0**-7) * 2.0**-7, lost)
+    assert stamp_statistics(stamps).rounded == 0.0
+
+
+def test_stamps_of_two_intervals_are_not_rounded() -> None:
+    # a logger that slows down, and an even one with gaps
+    slower = np.cumsum([0.0] + [0.01] * 300 + [0.02] * 300)
+    with_gaps = np.delete(np.arange(801) / 100.0, [200, 201, 600])
+    assert stamp_statistics(slower).rounded == 0.0
+    assert stamp_statistics(with_gaps).missing == 3
 
 
 # --- counts ---------------------------------------------------------------------------------------

@@ -37,6 +37,7 @@ from .samples import increasing as increasing
 from .samples import interpolate_counts as interpolate_counts
 from .samples import rolls_over_at as rolls_over_at
 from .samples import signed_by_command as signed_by_command
+from .samples import stamp_statistics as stamp_statistics
 from .samples import stamps_of as stamps_of
 from .samples import turns_over as turns_over
 from .samples import unwrap_counts as unwrap_counts

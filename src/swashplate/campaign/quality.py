@@ -190,7 +190,13 @@ def _of_stamps(stamps: StampStatistics) -> Iterator[str]:
             f"{count(stamps.gaps.size, 'gap')}, the longest {stamps.longest:.3g} s; "
             f"{count(stamps.missing, 'sample is', 'samples are')} missing at the median rate"
         )
-    if stamps.jitter > 0.2 * stamps.period:
+    if stamps.jitter > 0.2 * stamps.period and stamps.rounded > 0.0:
+        rate = f"{stamps.rate:.4g}"
+        yield (
+            f"time stamps rounded to {1e3 * stamps.rounded:.2g} ms, of an even {rate} Hz: write "
+            f"time = {{ rate = {rate} }} instead of their column"
+        )
+    elif stamps.jitter > 0.2 * stamps.period:
         yield (
             f"the interval of {1e3 * stamps.period:.3g} ms varies by {1e3 * stamps.jitter:.2g} ms: "
             "the time stamps are used as they are"

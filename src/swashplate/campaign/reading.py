@@ -30,15 +30,23 @@ from swashplate.campaign.samples import ambiguous_gaps, unwrap_counts, unwrap_po
 from swashplate.campaign.schema import applying, conversion, ends, inside
 from swashplate.documents import toml_string, validated
 from swashplate.errors import FileError, InputError
-from swashplate.logs import Log, LogColumn, check_duration, check_stamps, in_parts, unit_of
-from swashplate.units import to_si
+from swashplate.logs import (
+    SINCE_1970,
+    Log,
+    LogColumn,
+    Stamps,
+    check_duration,
+    check_stamps,
+    in_parts,
+    second_of_clock,
+    seconds_to_1970,
+    unit_of,
+)
 
 Array = NDArray[np.float64]
 Axes = Mapping[str, schema.AxisEntry]
 AnySignal = TypeVar("AnySignal", InputSignal, Channel)
 
-SINCE_1970 = 1e8
-"""Stamps that begin beyond this are seconds of a calendar and are counted from the first. [s]"""
 LARGEST = 1e30
 """Magnitude in any SI unit that no signal of a machine has: then unit or scale is wrong."""
 
@@ -196,6 +204,7 @@ class _Columns:
         first = replace(log, first=0, last=1).read(list(self.columns)) if log.first else self.values
         self._begins = {name: values[:1] for name, values in first.items()}
         self._stamps: dict[tuple[schema.ClockEntry, int], Array] = {}
+        self._seconds: dict[schema.ClockEntry, float] = {}
 
     def stamps(self, signal: schema.SignalEntry, axis: schema.AxisEntry) -> Array:
         """Increasing stamps of a signal; those of a calendar from the axis's first one on. [s]"""
@@ -214,10 +223,15 @@ class _Columns:
                 source = f"column '{self.columns[clock.column].name}'"
                 check_stamps(self.log, self.columns[clock.column].name, numbers)
                 of_main = main if main.column is not None else clock
-                begin = self._second(of_main) * float(self._begins[of_main.column or ""][0])
-                # the difference first: a float64 keeps a microsecond of a calendar's stamp
-                since = numbers if begin < SINCE_1970 else numbers - begin / factor
-                time = factor * since + clock.offset
+                second, first = self._second(of_main), self._first_stamp(of_main)
+                time = clock.offset + factor * numbers
+                if second * first >= SINCE_1970:
+                    # the difference first: a float64 keeps a microsecond of a calendar's stamp
+                    time = clock.offset + factor * (numbers - second / factor * first)
+                    if factor != second:
+                        # two calendars may have two zeros
+                        own = seconds_to_1970(self._first_stamp(clock), factor)
+                        time += seconds_to_1970(first, second) - own
             checked = check_duration(self.log, source, time)
         self._stamps[clock, size] = checked
         return checked
@@ -229,18 +243,30 @@ class _Columns:
         """
         clock, begin = axis.time, 0.0
         if clock.column is not None:
-            begin = self._second(clock) * float(self._begins[clock.column][0])
+            begin = self._second(clock) * self._first_stamp(clock)
         of_calendar = begin >= SINCE_1970
         if recorded is not None:
             first = clock.offset if of_calendar else begin + clock.offset
             return _seconds(recorded) - first
-        return begin - clock.offset if of_calendar else None
+        if not of_calendar:
+            return None
+        return begin - seconds_to_1970(self._first_stamp(clock), self._second(clock)) - clock.offset
+
+    def _first_stamp(self, clock: schema.ClockEntry) -> float:
+        """The first number of a column of stamps in the whole log, in its unit."""
+        begin = self._begins[clock.column or ""]
+        return float(begin[0]) if begin.size else 0.0
 
     def _second(self, clock: schema.ClockEntry) -> float:
         """Size of the unit of a column of stamps [s]."""
-        column = self.columns[clock.column or ""]
-        unit = clock.unit or unit_of(column, clock.column or "", "s")
-        return to_si(1.0, unit, "s", f"{self.log.path}: column '{column.name}' (the time)")
+        if clock not in self._seconds:
+            name = clock.column or ""
+            column = self.columns[name]
+            unit = clock.unit or unit_of(column, name, "s")
+            stamps = Stamps.of(self.values[name], self._first_stamp(clock))
+            what = f"{self.log.path}: column '{column.name}' (the time)"
+            self._seconds[clock] = second_of_clock(unit, stamps, what)
+        return self._seconds[clock]
 
     def _described(self, what: str, signal: schema.SignalEntry) -> str:
         """Description of a signal in the sentence of an error."""

@@ -22,6 +22,11 @@ TOLERANCE = 0.05
 Stamps of an even logger are off by what their printing rounds away: 1/512 s in steps of 0.1 ms by
 2.6 % of a period. Differences of such stamps would put the rounding into the speed.
 """
+LEAST_ROUNDED = 32
+"""Stamps from which on a line through them tells rounding from a gap."""
+ROUNDING = 0.6
+"""Share of a step that even stamps which are rounded to it lie off a line at most: half of it, and
+a little for the line."""
 
 
 class StampStatistics(NamedTuple):
@@ -40,6 +45,8 @@ class StampStatistics(NamedTuple):
     """Rows that come after a gap."""
     missing: int
     """Samples that the gaps would have held at the median rate."""
+    rounded: float = 0.0
+    """What the stamps of an even record are rounded to, if coarsely; else 0. [s]"""
 
 
 def increasing(time: ArrayLike) -> Array:
@@ -82,12 +89,39 @@ def stamp_statistics(stamps: Array) -> StampStatistics:
     """Rate, jitter and gaps of two increasing stamps [s] or more."""
     intervals = np.diff(stamps)
     median = float(np.median(intervals))
+    rounded = _rounded_to(stamps)
+    if rounded > 0.0:
+        # the median is that of the rounding, and so are intervals of twice as much
+        period = float(stamps[-1] - stamps[0]) / intervals.size
+        jitter = float(np.sqrt(np.mean((intervals - period) ** 2)))
+        longest, none = float(intervals.max()), np.zeros(0, np.intp)
+        return StampStatistics(stamps.size, 1.0 / period, period, jitter, longest, none, 0, rounded)
     wide = intervals > GAP * median
     jitter = float(np.sqrt(np.mean((intervals[~wide] - median) ** 2)))
     missing = int(np.sum(np.round(intervals[wide] / median) - 1.0))
     gaps = np.flatnonzero(wide) + 1
     longest = float(intervals.max())
     return StampStatistics(stamps.size, 1.0 / median, median, jitter, longest, gaps, missing)
+
+
+def _rounded_to(stamps: Array) -> float:
+    """What even stamps are rounded to, if more coarsely than `TOLERANCE`; 0 for any others. [s]
+
+    All their intervals are one or more of the smallest, and a straight line passes all of them by
+    no more than half of it: a missing sample would be off by half a period or more.
+    """
+    intervals = np.diff(stamps)
+    step = float(intervals.min())
+    multiples = intervals / step
+    period = float(stamps[-1] - stamps[0]) / intervals.size
+    of_steps = bool(np.all(np.abs(multiples - np.round(multiples)) < 1e-3))
+    if stamps.size < LEAST_ROUNDED or not of_steps or multiples.max() < GAP:
+        return 0.0
+    rows = np.arange(stamps.size) - 0.5 * (stamps.size - 1)
+    from_middle = stamps - stamps.mean()
+    line = rows * float(rows @ from_middle) / float(rows @ rows)
+    is_even = float(np.max(np.abs(from_middle - line))) <= ROUNDING * step
+    return step if is_even and step > TOLERANCE * period else 0.0
 
 
 def signal(name: str, values: ArrayLike, rows: int) -> Array:

@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
 from itertools import pairwise
-from math import floor, inf, pi
+from math import floor, inf, isclose, pi
 from pathlib import Path
 from typing import NamedTuple, get_args
 
@@ -37,12 +37,23 @@ from swashplate.campaign import (
     read_run,
     rolls_over_at,
     solenoid_side,
+    stamp_statistics,
     turns_over,
 )
 from swashplate.documents import parse_toml, toml_key, toml_string, validated
 from swashplate.entries import SCHEMA
 from swashplate.errors import FileError, InputError
-from swashplate.logs import Log, LogColumn, open_log
+from swashplate.logs import (
+    SINCE_1970,
+    Calendar,
+    Log,
+    LogColumn,
+    Stamps,
+    calendar_of,
+    open_log,
+    second_of,
+    split_unit,
+)
 from swashplate.parameters import NEUTRAL, preset_names
 from swashplate.units import ambiguous_angle, plain_unit, speed_unit, to_si
 
@@ -68,7 +79,7 @@ LEFT_OUT = "left out"
 """Marks what is said of logs that hold several axes, and of a log or a channel that is not read."""
 TIME = (
     r"time|zeit|uhrzeit|zeitstempel|temps|heure|tijd|tid|tiempo|tempo|stamp|timestamp|time stamp|"
-    r"datetime|date time|clock|t|seconds?|exp time"
+    r"datetime|date time|clock|t|seconds?|exp time|datenum|filetime"
 )
 """Names of columns of time stamps; those of signals are in `KINDS`."""
 COMPLEMENT = "(?: (?:of|der|des|du|de|del|della|do|da|van|av) .*)?"
@@ -98,6 +109,9 @@ OPEN_UNITS = ("stroker_pressure", "swash_angle", "spool_position")
 """Kinds whose unit stays open, as hardly a logger writes them in SI."""
 TICKS = {"ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 """Units of whole numbers that count the time, and their size. [s]"""
+SLOW_LOG = 20.0
+"""Rate up to which microseconds may well be ticks of 100 ns: ten samples in half a second, in which
+a drive has reached its speed, are few. [Hz]"""
 SLOWEST_LOG = 1.0
 """Rate from which a log of a drive's motion is plausible. [Hz]"""
 OVERLAP = 0.1
@@ -367,7 +381,7 @@ def _by_header(column: LogColumn, kind: str | None) -> _Guess:
 def _check_unit(kind: str, unit: str, what: str) -> None:
     """Refuse a unit in which a kind of signal, or time, is not measured."""
     if kind == "time":
-        to_si(1.0, unit, "s", what)
+        second_of(unit, what)
     else:
         conversion(kind, unit, what)
 
@@ -390,6 +404,13 @@ def _counts_in_grad(kind: str, unit: str | None) -> bool:
     return of_angle and bool(ambiguous_angle(unit or ""))
 
 
+def _signal_of_clock(name: str) -> str:
+    """The signal, in words, whose clock a column such as "Speed time" or "t_speed" is, or empty."""
+    clock = "(?:time|zeit|timestamp|time stamp|stamp|t)"
+    match = re.fullmatch(rf"{clock} (.+)|(.+) {clock}", _words(split_unit(name)[0]))
+    return match[1] or match[2] if match else ""
+
+
 def _guesses(
     headers: Mapping[str, LogColumn],
     blocks: Mapping[str, list[Array]],
@@ -409,8 +430,12 @@ def _guesses(
         taken.update(INPUTS)
     is_german = any(DEGREES_AS_GRAD.search(_words(name)) for name in headers)
     guesses = list[_Guess]()
+    names = {_words(split_unit(name)[0]) for name in headers}
+    unnamed = _unnamed_clock(headers, blocks, kinds)
     for name, column in headers.items():
         guess = _by_header(column, kinds.get(name))
+        if _signal_of_clock(name) in names:
+            guess = _Guess(name, "time", "", column.unit)
         guess = guess._replace(seems_input=guess.kind in INPUTS)
         if name in kinds:
             guess = guess._replace(kind=kinds[name], is_stated=True)
@@ -423,8 +448,11 @@ def _guesses(
             guess = guess._replace(unit=degrees, in_header=False, unit_comment=comment)
         if name in units:
             guess = guess._replace(unit=units[name], in_header=False, unit_comment="given")
-        elif guess.unit is None:
-            guess = _with_unit_of_numbers(guess, values)
+        else:
+            if guess.kind == "time" or name == unnamed:
+                guess = _of_calendar(guess, _calendar(values))
+            if guess.unit is None:
+                guess = _with_unit_of_numbers(guess, values)
         guesses.append(_by_numbers(guess, values, counts_per_turn))
     guesses = _with_halves(guesses, blocks)
     present = {(guess.axis, guess.kind) for guess in guesses}
@@ -479,6 +507,38 @@ def _by_numbers(guess: _Guess, blocks: Sequence[Array], counts_per_turn: float |
     return guess
 
 
+def _calendar(blocks: Sequence[Array]) -> Calendar | None:
+    """The calendar that a column's numbers can only be of, if they are and increase."""
+    calendars = {calendar_of(Stamps.of(part)) for part in blocks}
+    finite = [part[np.isfinite(part)] for part in blocks]
+    increase = all(bool(np.all(np.diff(part) > 0.0)) for part in finite)
+    return calendars.pop() if increase and len(calendars) == 1 else None
+
+
+def _unnamed_clock(
+    headers: Mapping[str, LogColumn], blocks: Mapping[str, list[Array]], kinds: Mapping[str, str]
+) -> str:
+    """The only column whose numbers are a calendar's, if none is called like a clock; or empty."""
+    guesses = [_by_header(column, kinds.get(name)) for name, column in headers.items()]
+    if any(guess.kind == "time" for guess in guesses):
+        return ""
+    dated = [name for name in headers if name not in kinds and _calendar(blocks[name])]
+    return dated[0] if len(dated) == 1 else ""
+
+
+def _of_calendar(guess: _Guess, calendar: Calendar | None) -> _Guess:
+    """Guess of a clock with the unit of its calendar, unless its own is of the same size."""
+    if calendar is None:
+        return guess
+    guess = guess._replace(kind="time")
+    if guess.unit is not None and _is_unit_of(guess.unit, "time"):
+        size = second_of(calendar.unit, "")
+        if isclose(second_of(guess.unit, ""), size, rel_tol=1e-6):
+            return guess
+    reason = f"from its numbers, {calendar.name}"
+    return guess._replace(unit=calendar.unit, in_header=False, unit_comment=reason)
+
+
 def _with_unit_of_numbers(signal: _Guess, blocks: Sequence[Array]) -> _Guess:
     """Guess of a column whose header gives no unit, with one that its numbers suggest."""
     finite = [part[np.isfinite(part)] for part in blocks]
@@ -515,6 +575,10 @@ def _time_unit(blocks: Sequence[Array]) -> tuple[str, str]:
     fast = (unit for unit, size in TICKS.items() if step * size <= 1.0 / SLOWEST_LOG)
     unit = next(fast, "ns")
     rate = 1.0 / (step * TICKS[unit])
+    since_1970 = bool(blocks[0].size) and TICKS[unit] * float(blocks[0][0]) > SINCE_1970
+    if unit == "us" and rate <= SLOW_LOG and not since_1970:
+        readings = f"{rate:.4g} Hz in us, {10.0 * rate:.4g} Hz in 100 ns"
+        return unit, f"{FIXME}: whole numbers that step by {step:.9g}, {readings}"
     return unit, f"guessed: whole numbers that step by {step:.9g}, {rate:.4g} Hz in {unit}"
 
 
@@ -634,12 +698,16 @@ def _axis_lines(
 
 
 def _clock(signal: _Guess, guesses: Sequence[_Guess]) -> str:
-    """A signal's line of time: the first column of time in its group of the file, or of all."""
+    """A signal's line of time: its own column of time, or the first of its group, or of all."""
     times = [guess for guess in guesses if guess.kind == "time"]
     if not times:
         return ""
-    group = signal.name.rpartition("/")[0]
-    time = next((guess for guess in times if guess.name.rpartition("/")[0] == group), times[0])
+    words, group = _words(split_unit(signal.name)[0]), signal.name.rpartition("/")[0]
+    own = [guess for guess in times if _signal_of_clock(guess.name) == words]
+    # the clock of another signal is no clock of all
+    common = [guess for guess in times if not _signal_of_clock(guess.name)] or times
+    of_group = [guess for guess in common if guess.name.rpartition("/")[0] == group]
+    time = [*own, *of_group, *common][0]
     column = f"column = {toml_string(time.name)}"
     if time.in_header:
         return f"time = {{ {column} }}"
@@ -963,7 +1031,7 @@ def _sampling_words(
 ) -> str:
     """Duration [s] and rate of a run, and its parts, for the comment next to its file."""
     of_axis = [experiment for experiment in experiments if experiment.axis == experiments[0].axis]
-    rate = 1.0 / float(np.median(np.diff(of_axis[0].input.time)))
+    rate = stamp_statistics(of_axis[0].input.time).rate
     comment = f", {duration:.4g} s at {rate:.4g} Hz"
     if overview is not None:
         comment += f", {len(of_axis)} of {len(overview.windows)} windows with motion used"

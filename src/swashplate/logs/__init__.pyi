@@ -1,8 +1,16 @@
+from .clocks import SINCE_1970 as SINCE_1970
+from .clocks import Calendar as Calendar
+from .clocks import Stamps as Stamps
+from .clocks import calendar_of as calendar_of
+from .clocks import second_of as second_of
+from .clocks import second_of_clock as second_of_clock
+from .clocks import seconds_to_1970 as seconds_to_1970
 from .dialect import TextOptions as TextOptions
 from .log import Log as Log
 from .log import LogColumn as LogColumn
 from .log import check_duration as check_duration
 from .log import check_stamps as check_stamps
+from .log import split_unit as split_unit
 from .log import unit_of as unit_of
 from .long_logs import in_parts as in_parts
 from .opening import SUFFIXES as SUFFIXES

@@ -8,18 +8,23 @@ that were cut off. All of it runs in a process of its own, see `swashplate.logs.
 from __future__ import annotations
 
 import logging
+import re
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
+from datetime import UTC, datetime
+from fractions import Fraction
 from functools import partial
 from importlib import import_module
 from math import ceil, prod
+from numbers import Real
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from swashplate.errors import FileError
+from swashplate.errors import FileError, InputError
+from swashplate.logs.clocks import second_of
 from swashplate.logs.log import Array, check_kind, first_sentence, printable, split_unit
 
 
@@ -32,6 +37,8 @@ class _Item(NamedTuple):
     rows: int = 0
     read: Any = None
     """Gives the numbers from a row to before a last one (None: the end), while the file is open."""
+    begin: int | None = None
+    """Of stamps that count from a date: that date since 1970 [ns]; None of anything else."""
 
 
 def look(
@@ -53,9 +60,13 @@ def look(
         if not readable:
             why = "".join(f"; '{signal}': {reason}" for signal, reason in left_out.items())[:300]
             raise FileError(f"{path} has no {what} of numbers{printable(why)}.")
+        # all dates of a log count from one zero, or its channels would shift against each other
+        zero = min((item.begin for item in readable if item.begin is not None), default=0)
         arrays = []
         for item in (readable[position] for position in requested):
             numbers = np.asarray(item.read(first, last), np.float64).ravel()
+            if item.begin is not None:
+                numbers = numbers + 1e-9 * (item.begin - zero)
             claimed = len(range(item.rows)[first:last])
             if numbers.size != claimed:
                 raise FileError(
@@ -126,28 +137,32 @@ def _parquet(path: Path) -> Iterator[Iterable[_Item]]:
         holds_numbers = kind.is_temporal() or kind.is_numeric() or kind == pl.Boolean
         reason = "" if holds_numbers else f"it is of the type {kind}"
         unit = "s" if kind.is_temporal() else split_unit(name)[1]
-        items.append(_Item(name, reason, unit, rows, partial(_parquet_rows, stored.select(name))))
+        column, first_date, begin = stored.select(name), 0, None
+        if kind in (pl.Date, pl.Datetime):
+            cells = column.drop_nulls().head(1).collect().to_series().cast(pl.Datetime("ns"))
+            first_date = next(iter(cells.dt.epoch("ns")), 0)
+            # a day is no clock that others are to be aligned with
+            begin = first_date if kind == pl.Datetime and len(cells) else None
+        read = partial(_parquet_rows, column, first_date)
+        items.append(_Item(name, reason, unit, rows, read, begin))
     yield items
 
 
-def _parquet_rows(column: Any, first: int, last: int | None) -> Any:
-    """Numbers; dates and times as seconds since the first of the column, durations as seconds."""
+def _parquet_rows(column: Any, first_date: int, first: int, last: int | None) -> Any:
+    """Numbers; dates as seconds since the first one [ns], times and durations as seconds."""
     import polars as pl
 
     cells = column.slice(first, None if last is None else last - first).collect().to_series()
     if not cells.dtype.is_temporal():
         return cells.cast(pl.Float64).to_numpy()
-    zero = 0
     if cells.dtype == pl.Duration:
         ticks = cells.dt.total_nanoseconds()
     elif cells.dtype == pl.Time:
         ticks = cells.cast(pl.Int64)
     else:
         ticks = cells.cast(pl.Datetime("ns")).dt.epoch("ns")
-        begin = column.drop_nulls().head(1).collect().to_series().cast(pl.Datetime("ns"))
-        zero = next(iter(begin.dt.epoch("ns")), 0)
     # subtracted as integers: a double of nanoseconds since 1970 would be 256 ns coarse
-    return ((ticks - zero).cast(pl.Float64) / 1e9).to_numpy()
+    return ((ticks - first_date).cast(pl.Float64) / 1e9).to_numpy()
 
 
 # --- arrays: MATLAB and HDF5 ----------------------------------------------------------------------
@@ -256,10 +271,110 @@ def _hdf5_items(dataset: Any, name: str | None = None, form: str = "[{}]") -> It
             reason = reason or "its numbers are in other files"
         stated: Any = next((dataset.attrs[key] for key in _UNITS if key in dataset.attrs), [])
         units = [_decoded(number) for number in np.ravel(stated).tolist()]
-        signals = list(_vectors(name, dataset, form, units, reverse=form == "({})"))
-        yield from [_Item(name, reason)] if reason else signals
+        packing = _packing(dataset)
+        if isinstance(packing, str):
+            reason, packing = reason or packing, None
+        if reason:
+            yield _Item(name, reason)
+            return
+        for item in _vectors(name, dataset, form, units, reverse=form == "({})"):
+            unpacked = item
+            if not item.reason and packing is not None:
+                unpacked = item._replace(read=partial(_unpacked, packing, item.read))
+            yield _counted_from_date(unpacked)
     except (TypeError, ValueError) as error:  # a type that NumPy does not have
         yield _Item(name, first_sentence(error))
+
+
+class _Packing(NamedTuple):
+    """How numbers are packed by the conventions of netCDF: number = scale * stored + offset."""
+
+    scale: float
+    offset: float
+    missing: tuple[float, ...]
+    """Stored numbers that stand for none."""
+    least: float
+    most: float
+    """Range of the stored numbers that count."""
+    is_unsigned: bool
+    """Whether what is stored as a signed integer is meant without a sign."""
+
+
+_PACKED = ("scale_factor", "add_offset", "_FillValue", "missing_value", "valid_min", "valid_max")
+
+
+def _packing(dataset: Any) -> _Packing | str | None:
+    """Packing of a dataset by its attributes, None if there is none, or why it cannot be read."""
+    stated = {key: np.ravel(dataset.attrs[key]) for key in _PACKED if key in dataset.attrs}
+    if "valid_range" in dataset.attrs:
+        limits = np.ravel(dataset.attrs["valid_range"])
+        stated |= {"valid_min": limits[:1], "valid_max": limits[-1:]}
+    is_unsigned = _decoded(dataset.attrs.get("_Unsigned", "")).lower() == "true"
+    if not stated and not is_unsigned:
+        return None
+    numbers = dict[str, list[float]]()
+    for key, values in stated.items():
+        if values.dtype.kind not in "iuf" or not (values.size == 1 or key == "missing_value"):
+            return f"its attribute {key} is not a number"
+        if key not in ("scale_factor", "add_offset"):
+            # these are stored numbers
+            values = _as_stored(values.astype(dataset.dtype), is_unsigned=is_unsigned)
+        numbers[key] = [float(value) for value in values]
+    return _Packing(
+        scale=numbers.get("scale_factor", [1.0])[0],
+        offset=numbers.get("add_offset", [0.0])[0],
+        missing=(*numbers.get("_FillValue", []), *numbers.get("missing_value", [])),
+        least=numbers.get("valid_min", [-np.inf])[0],
+        most=numbers.get("valid_max", [np.inf])[0],
+        is_unsigned=is_unsigned,
+    )
+
+
+def _as_stored(numbers: Any, *, is_unsigned: bool) -> Any:
+    """Stored numbers, integers without their sign if they are meant so."""
+    if not is_unsigned or numbers.dtype.kind != "i":
+        return numbers
+    return numbers.view(numbers.dtype.str.replace("i", "u"))
+
+
+def _unpacked(packing: _Packing, read: Any, first: int, last: int | None) -> Array:
+    """Numbers that are stored packed, NaN where none is."""
+    stored = _as_stored(np.asarray(read(first, last)), is_unsigned=packing.is_unsigned)
+    numbers = np.array(stored, np.float64)
+    is_missing = np.isin(numbers, packing.missing)
+    is_missing |= (numbers < packing.least) | (numbers > packing.most)
+    numbers = packing.scale * numbers + packing.offset
+    numbers[is_missing] = np.nan
+    return numbers
+
+
+_SINCE = re.compile(r"\s*(\w+)\s+since\s+(\d{4}-\d{1,2}-\d{1,2})(?:[T ]+([0-9:.]+)\s*(Z|UTC)?)?\s*")
+
+
+def _counted_from_date(item: _Item) -> _Item:
+    """A column of "days since 2024-03-11" and the like in seconds, with the date; others as are."""
+    since = _SINCE.fullmatch(item.unit or "")
+    if since is None or item.reason:
+        return item
+    year, month, day = map(int, since[2].split("-"))
+    clock = [float(part) for part in (since[3] or "0").split(":")]
+    try:
+        second, midnight = second_of(since[1], ""), datetime(year, month, day, tzinfo=UTC)
+    except (InputError, ValueError):
+        return item
+    seconds = sum(part * unit for part, unit in zip(clock, (3600, 60, 1), strict=False))
+    begin = int(midnight.timestamp()) * 10**9 + round(1e9 * seconds)
+    first_number = np.ravel(item.read(0, 1))[:1]
+    if not np.isfinite(first_number).all():
+        return item
+    # a log's first stamp is near its others, whatever date they are counted from
+    offset = first_number[0].item() if first_number.size else 0
+    begin += round(Fraction(offset) * Fraction(str(second)) * 10**9)
+
+    def read(first: int, last: int | None) -> Array:
+        return second * np.asarray(item.read(first, last) - offset, np.float64)
+
+    return item._replace(unit="s", read=read, begin=begin)
 
 
 def _matlab73_items(dataset: Any) -> Iterator[_Item]:
@@ -371,14 +486,54 @@ def _tdms(path: Path) -> Iterator[Iterable[_Item]]:
         logger.removeHandler(refusal)
 
 
+class _Waveform(NamedTuple):
+    """Clock of a waveform: even stamps that count from a date."""
+
+    date: int | None
+    """Since 1970 [ns]; None if none is given."""
+    first: float
+    """First stamp [s]."""
+    step: float
+    """[s]"""
+    rows: int
+
+
+_NO_START = np.datetime64("1904-01-02")  # LabVIEW writes its zero, 1904, for a date that is not set
+
+
+def _waveform(properties: Mapping[str, Any], rows: int) -> _Waveform | str | None:
+    """Clock of a channel by its properties, None if it has none, or the reason why it has none."""
+    step, begin = properties.get("wf_increment"), properties.get("wf_start_offset", 0.0)
+    # what is a single float is written so that it is the decimal that was meant
+    step, begin = (
+        float(str(number)) if isinstance(number, np.float32) else number for number in (step, begin)
+    )
+    if not isinstance(step, Real) or not isinstance(begin, Real) or not float(step) > 0.0:
+        return None
+    unit = str(properties.get("wf_xunit_string") or "s").strip()
+    try:
+        second = second_of("s" if unit.lower() in _SECONDS else unit, "")
+    except InputError:
+        return f"its increment is in '{unit}', which is not a unit of time"
+    start = properties.get("wf_start_time")
+    date = None
+    if isinstance(start, np.datetime64) and start > _NO_START:
+        date = int(start.astype("M8[ns]").astype(np.int64))
+    return _Waveform(date, second * float(begin), second * float(step), rows)
+
+
+_SECONDS = ("", "s", "sec", "secs", "second", "seconds")
+
+
 def _tdms_items(file: Any) -> Iterator[_Item]:
     """Channels and, of waveforms, whose properties hold an increment, a column ``time``.
 
-    In a file of several groups, a column is called ``group/channel``.
+    If the waveforms of a group differ in start, increment or length, each channel has a column of
+    its own, ``channel time``. In a file of several groups, a column is called ``group/channel``.
     """
     for group in file.groups():
         prefix = f"{group.name}/" if len(file.groups()) > 1 else ""
-        clocks, names = dict[tuple[float, float, int], str](), set[str]()
+        clocks, names = dict[str, _Waveform | str](), set[str]()
         for channel in group.channels():
             kind, rows, properties = channel.dtype.kind, len(channel), channel.properties
             name = prefix + channel.name
@@ -386,17 +541,26 @@ def _tdms_items(file: Any) -> Iterator[_Item]:
             if rows == 0 or kind not in "iufbM":
                 yield _Item(name, _KINDS.get(kind, _KINDS["S"]) if rows else "it is empty")
                 continue
-            unit = (
-                "s" if kind == "M" else properties.get("unit_string") or split_unit(channel.name)[1]
-            )
-            yield _Item(name, "", str(unit) if unit else None, rows, partial(_tdms_rows, channel))
-            step, begin = properties.get("wf_increment"), properties.get("wf_start_offset", 0.0)
-            if isinstance(step, float) and step > 0.0 and isinstance(begin, float):
-                clocks.setdefault((begin, step, rows), channel.name)
-        for clock, channel_name in clocks.items():
-            called = "time" if len(clocks) == 1 else f"{channel_name} time"
-            if called not in names:
-                yield _Item(prefix + called, "", "s", clock[2], partial(_stamps, *clock))
+            unit, begin = properties.get("unit_string") or split_unit(channel.name)[1], None
+            if kind == "M":
+                unit, first = "s", channel.read_data(0, 1)[0]
+                begin = None if np.isnat(first) else int(first.astype("M8[ns]").astype(np.int64))
+            read = partial(_tdms_rows, channel)
+            yield _Item(name, "", str(unit) if unit else None, rows, read, begin)
+            clock = _waveform(properties, rows)
+            if clock is not None:
+                clocks[channel.name] = clock
+        differ = len({*clocks.values()}) > 1
+        for channel_name, clock in clocks.items():
+            called = f"{channel_name} time" if differ else "time"
+            if called in names:
+                continue
+            if isinstance(clock, str):  # the reason why there is none
+                yield _Item(prefix + called, clock)
+            else:
+                read = partial(_stamps, clock)
+                yield _Item(prefix + called, "", "s", clock.rows, read, clock.date)
+            names.add(called)
 
 
 def _tdms_rows(channel: Any, first: int, last: int | None) -> Any:
@@ -406,9 +570,9 @@ def _tdms_rows(channel: Any, first: int, last: int | None) -> Any:
     return numbers
 
 
-def _stamps(begin: float, step: float, size: int, first: int, last: int | None) -> Array:
-    rows = range(size)[first:last]
-    return begin + step * np.arange(rows.start, rows.stop, dtype=np.float64)
+def _stamps(clock: _Waveform, first: int, last: int | None) -> Array:
+    rows = range(clock.rows)[first:last]
+    return clock.first + clock.step * np.arange(rows.start, rows.stop, dtype=np.float64)
 
 
 # --- MDF ------------------------------------------------------------------------------------------

@@ -15,8 +15,11 @@ from swashplate.errors import FileError, InputError
 from swashplate.logs.log import LogColumn, check_kind, printable, split_unit
 from swashplate.units import speed_unit
 
+Thousands = Literal[",", ".", "'", "space"]
 _NAMED = {"comma": ",", "semicolon": ";", "tab": "\t", "space": " ", "spaces": " ", "bar": "|"}
 _COMMENTS = ("#", "%", "//")
+_THOUSANDS = {",": ",", ".": ".", "'": "'\u2019", "space": " \u00a0\u202f\u2009"}
+"""Signs between thousands, by their name in the options."""
 
 
 @dataclass(frozen=True)
@@ -30,6 +33,9 @@ class TextOptions:
         number of spaces and tabs).
     decimal : {".", ","}, optional
         Decimal sign.
+    thousands : {",", ".", "'", "space"}, optional
+        Sign between groups of three digits, as in ``1,480.5``; by default there is none. ``"'"``
+        stands for a typographic apostrophe, too, ``"space"`` for any kind of space.
     comment : str, optional
         What lines begin with that are skipped; ``""`` if there are none. By default any of ``#``,
         ``%`` and ``//``.
@@ -47,6 +53,7 @@ class TextOptions:
 
     delimiter: str | None = None
     decimal: Literal[".", ","] | None = None
+    thousands: Thousands | None = None
     comment: str | None = None
     header_row: int | None = None
     encoding: str | None = None
@@ -64,6 +71,10 @@ class TextOptions:
             wrong = f"delimiter {mark!r} is a part of numbers; name another"
         elif self.decimal not in (None, ".", ","):
             wrong = f"decimal must be '.' or ',', not {self.decimal!r}"
+        elif self.thousands not in (None, *_THOUSANDS):
+            wrong = f"thousands must be one of {', '.join(_THOUSANDS)}, not {self.thousands!r}"
+        elif self.thousands is not None and self.thousands == self.decimal:
+            wrong = f"decimal and thousands cannot both be {self.decimal!r}"
         elif (self.header_row or 0) < 0:
             wrong = f"header_row must be the line of the header, or 0, not {self.header_row!r}"
         try:
@@ -148,9 +159,25 @@ _CLOCK = re.compile(
 )
 
 
-def is_number_text(cell: str, decimal: str) -> bool:
+def grouped_number(thousands: str, decimal: str) -> str:
+    """Pattern of a number whose digits before the decimal sign are in groups of three.
+
+    It is read by Python and by Polars. The thousands are one of `TextOptions`.
+    """
+    signs = f"[{re.escape(_THOUSANDS[thousands])}]"
+    return rf"^[+-]?[1-9][0-9]{{0,2}}(?:{signs}[0-9]{{3}})+(?:\{decimal}[0-9]*)?$"
+
+
+def without_thousands(thousands: str) -> str:
+    """Pattern of the signs that are to be taken out of such a number."""
+    return f"[{re.escape(_THOUSANDS[thousands])}]"
+
+
+def is_number_text(cell: str, decimal: str, thousands: str | None = None) -> bool:
     """Whether a cell, stripped, is a number or a text for a missing one."""
     if _NUMBER[decimal].fullmatch(cell):
+        return True
+    if thousands is not None and re.match(grouped_number(thousands, decimal), cell):
         return True
     bare = cell.lstrip(SIGNS).lower()
     return bare in NOT_A_NUMBER or bare in INFINITE or (not bare and len(cell) > 1)
@@ -183,7 +210,8 @@ def short_cell(cell: str) -> str:
 # --- delimiter and decimal sign -------------------------------------------------------------------
 
 _NAMES = {",": "commas", ";": "semicolons", "\t": "tabs", " ": "spaces", "|": "bars"}
-_THREE = re.compile(r"[+-]?[1-9]\d{0,2},\d{3}")
+MAY_BE_THOUSANDS = r"^[+-]?[1-9][0-9]{0,2}(?:[.,][0-9]{3})+$"
+"""Pattern of a number whose decimal sign may as well separate thousands."""
 
 
 class TextLayout(NamedTuple):
@@ -196,10 +224,15 @@ class TextLayout(NamedTuple):
     """Fields in a row."""
     numeric: tuple[bool, ...] = ()
     """Which of them are numbers, as far as a sample of rows shows."""
+    thousands: str | None = None
+    """As of `TextOptions`."""
+    is_sure: bool = True
+    """Whether its decimal sign is stated, or is no separator of thousands in a sample of rows."""
 
     def __str__(self) -> str:
         point = "comma" if self.decimal == "," else "point"
-        return f"{_NAMES.get(self.delimiter, repr(self.delimiter))}, decimal {point}"
+        thousands = "" if self.thousands is None else f", thousands {self.thousands}"
+        return f"{_NAMES.get(self.delimiter, repr(self.delimiter))}, decimal {point}{thousands}"
 
     def cells(self, line: str, *, strict: bool = False) -> list[str]:
         """Cells of a line, stripped; `strict` refuses misplaced quotes in a `csv.Error`."""
@@ -229,7 +262,7 @@ class TextLayout(NamedTuple):
         filled = [
             cell for cell, numeric in zip(cells, self.numeric, strict=False) if numeric and cell
         ]
-        return [is_number_text(cell, self.decimal) for cell in filled]
+        return [is_number_text(cell, self.decimal, self.thousands) for cell in filled]
 
     def fits(self, cells: Sequence[str]) -> bool:
         """Whether there are numbers wherever the sample has, and as many cells."""
@@ -269,23 +302,44 @@ def find_layout(lines: Sequence[str], options: TextOptions, path: Path) -> TextL
             "give 'delimiter' or 'decimal' as an option."
         )
     layout = equal[0]  # with a point: if both signs are alike, there are whole numbers only
-    if options.decimal is None and layout.delimiter != "," and layout.decimal == ",":
-        _refuse_thousands(lines, layout, path)
-    return layout
+    if options.decimal is not None or options.thousands is not None:
+        return layout
+    return _checked_thousands(lines, layout, path)
 
 
-def _refuse_thousands(lines: Sequence[str], layout: TextLayout, path: Path) -> None:
-    """Refuse numbers whose decimal commas may all be separators of thousands."""
-    cells = list[str]()
+def _checked_thousands(lines: Sequence[str], layout: TextLayout, path: Path) -> TextLayout:
+    """A layout, and whether its decimal sign is sure; refused if it may separate thousands.
+
+    It is sure if one number of the sample is no thousand. A point between commas is a decimal sign
+    as such files are written, unless whole numbers are beside it in its column.
+    """
+    columns: list[list[str]] = [[] for _ in layout.numeric]
     for line in lines:
-        for cell, numeric in zip(layout.cells(line), layout.numeric, strict=False):
-            if numeric and "," in cell and is_number_text(cell, ","):
-                cells.append(cell)
-    if cells and all(_THREE.fullmatch(cell) for cell in cells):
-        raise FileError(
-            f"{path} has numbers like '{cells[0]}', in which the comma may be a decimal sign or a "
-            "thousands separator; give 'decimal' as an option."
-        )
+        for position, (cell, numeric) in enumerate(
+            zip(layout.cells(line), layout.numeric, strict=False)
+        ):
+            if numeric and is_number_text(cell, layout.decimal):
+                columns[position].append(cell)
+    marked = [[cell for cell in column if layout.decimal in cell] for column in columns]
+    fractions = [cell for column in marked for cell in column]
+    if any(not re.match(MAY_BE_THOUSANDS, cell) for cell in fractions):
+        return layout
+    is_mixed = any(
+        0 < len(some) < len(column) for some, column in zip(marked, columns, strict=True)
+    )
+    usual = layout.decimal == "." and layout.delimiter == ","
+    if fractions and (is_mixed or not usual):
+        raise ambiguous_thousands(f"{path} has numbers like '{fractions[0]}'", layout.decimal)
+    return layout._replace(is_sure=bool(fractions))
+
+
+def ambiguous_thousands(what: str, mark: str) -> FileError:
+    """Refusal of numbers in which a mark may be either sign; `what` begins the sentence."""
+    name = "comma" if mark == "," else "point"
+    return FileError(
+        f"{what}, in which the {name} may be a decimal sign or a thousands separator; give "
+        f"'decimal' or 'thousands' as an option, decimal = \"{mark}\" or thousands = \"{mark}\"."
+    )
 
 
 class _ScoredLayout(NamedTuple):
@@ -306,6 +360,8 @@ def _trials(lines: Sequence[str], options: TextOptions) -> list[_ScoredLayout]:
         delimiters = [_NAMED.get(options.delimiter, options.delimiter)]
     if options.decimal:
         decimals = [options.decimal]
+    elif options.thousands in decimals:
+        decimals.remove(options.thousands)
     # a decimal comma between commas needs quotes, or somebody who states both
     is_stated = options.delimiter is not None and options.decimal is not None
     may_be_equal = is_stated or any('"' in line for line in lines)
@@ -313,7 +369,8 @@ def _trials(lines: Sequence[str], options: TextOptions) -> list[_ScoredLayout]:
     for delimiter in delimiters:
         for decimal in decimals:
             if delimiter != decimal or may_be_equal:
-                trial = _try_layout(lines, TextLayout(delimiter, decimal))
+                layout = TextLayout(delimiter, decimal, thousands=options.thousands)
+                trial = _try_layout(lines, layout)
                 if trial is not None:
                     trials.append(trial)
     return trials
@@ -325,7 +382,9 @@ def _try_layout(lines: Sequence[str], layout: TextLayout) -> _ScoredLayout | Non
     A log of one column has no time and gives nothing.
     """
     rows = [layout.cells(line) for line in lines]
-    marks = [[is_number_text(cell, layout.decimal) for cell in row] for row in rows]
+    marks = [
+        [is_number_text(cell, layout.decimal, layout.thousands) for cell in row] for row in rows
+    ]
     counts = Counter(len(row) for row, mark in zip(rows, marks, strict=True) if any(mark))
     texts = {len(row) for row, mark in zip(rows, marks, strict=True) if not any(mark)}
     # as many fields as most rows have; among equals, as many as a header has, then as the first

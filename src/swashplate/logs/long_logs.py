@@ -21,6 +21,8 @@ MOST_HELD = 4_000_000
 for each column, two hours at 512 Hz."""
 _GROUP = 1 << 18  # rows that are stored together, and found without those before them
 _KEY = "swashplate"
+_ZERO = "one zero"
+"""From where the dates of a table count; those of older tables count from each column's first."""
 
 
 def in_parts(log: Log, names: Sequence[str]) -> Log:
@@ -39,7 +41,7 @@ def in_parts(log: Log, names: Sequence[str]) -> Log:
     table = log.path.with_name(f"{log.path.name}.parquet")
     columns = {log.columns.index(log.find(name)) for name in names}
     stat = log.path.stat()
-    stamp, made_of = [stat.st_size, stat.st_mtime_ns, log.format], []
+    stamp, made_of = [stat.st_size, stat.st_mtime_ns, log.format, _ZERO], []
     with suppress(pl.exceptions.PolarsError, ValueError, OSError):
         # size, time and format of the log that a table was made of, and places of its columns
         made_of = json.loads(pl.read_parquet_metadata(table).get(_KEY, "null"))

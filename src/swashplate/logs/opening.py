@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from swashplate.errors import FileError, MissingFileError
+from swashplate.logs.clocks import Stamps, second_of_clock
 from swashplate.logs.dialect import TextOptions
 from swashplate.logs.log import (
     Array,
@@ -173,8 +174,11 @@ def read_series(
     series = []
     for name, si in ((time_column, "s"), (column, unit)):
         log_column = log.find(name)
-        stated_unit = unit_of(log_column, name, si)
+        stated_unit, what = unit_of(log_column, name, si), f"{log.path}: column '{log_column.name}'"
         stated_unit = speed_unit(stated_unit) if si == "rad/s" else stated_unit
-        factor, zero = scaling(stated_unit, si, f"{log.path}: column '{log_column.name}'")
+        if name == time_column:
+            factor, zero = second_of_clock(stated_unit, Stamps.of(time), what), 0.0
+        else:
+            factor, zero = scaling(stated_unit, si, what)
         series.append(factor * read[name] + zero)
     return Series(check_duration(log, f"column '{time_column}'", series[0]), series[1])

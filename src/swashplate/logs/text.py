@@ -8,26 +8,32 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterator, Sequence
+import re
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, get_args
 
 import numpy as np
 
 from swashplate.errors import FileError
 from swashplate.logs.dialect import (
     INFINITE,
+    MAY_BE_THOUSANDS,
     NOT_A_NUMBER,
     SIGNS,
     TextLayout,
     TextOptions,
+    Thousands,
+    ambiguous_thousands,
     date_form,
     encoding_of,
     find_layout,
+    grouped_number,
     is_number_text,
     read_heading,
     short_cell,
+    without_thousands,
 )
 from swashplate.logs.log import Array, Log, LogColumn, printable
 
@@ -57,7 +63,8 @@ def open_text(path: Path, options: TextOptions | None = None) -> Log:
     sample = filled[:count] + filled[count :: 1 + len(filled) // count]
     layout = find_layout(sample, options, path)
     columns, first = read_heading(head[:_HEAD], layout, options, path)
-    table = _Table(path, encoding, skipped, layout, columns, first, marks)
+    zeros = _zeros(head[first - 1 :], layout, marks)
+    table = _Table(path, encoding, skipped, layout, columns, first, marks, zeros)
 
     def load(positions: Sequence[int], begin: int = 0, end: int | None = None) -> list[Array]:
         pieces = list(table.read(positions)) or [[np.empty(0)] * len(positions)]
@@ -108,19 +115,28 @@ class _Table:
     columns: tuple[LogColumn, ...]
     first: int
     marks: tuple[str, ...]
+    zeros: Mapping[bool, int]
+    """Stamps from which clocks with a date (true), and without one, count. [µs]"""
 
     def read(self, positions: Sequence[int]) -> Iterator[list[Array]]:
         """Columns at these positions, piece after piece, in the file's units."""
         begin, count, clocks = 1, 0, dict[int, _Clock]()
+        doubts = {position: _Doubt() for position in positions if not self.layout.is_sure}
         for piece in _pieces(self.path, self.encoding, self.skipped):
             lines, cells = self._at_once(piece, begin) or self._line_by_line(piece, begin, count)
             begin += piece.count("\n")
+            for position, doubt in doubts.items():
+                doubt.take(cells[str(position)], self.layout.decimal, lines, count)
             if lines:
                 yield [
                     self._piece_of_column(cells[str(position)], lines, position, count, clocks)
                     for position in positions
                 ]
             count += len(lines)
+        for position, doubt in doubts.items():
+            if doubt.remains:
+                what = f"{self.path}: column '{self.columns[position].name}' holds {doubt.where}"
+                raise ambiguous_thousands(what, self.layout.decimal)
 
     def _at_once(self, piece: str, begin: int) -> tuple[Sequence[int], polars.DataFrame] | None:
         """Numbers of a piece's lines, and their cells; None if some may not be plain rows."""
@@ -185,11 +201,11 @@ class _Table:
     ) -> Array:
         """A column of a piece, before which there are `count` rows."""
         text = cells.str.strip_chars().fill_null("")
-        decimal = self.layout.decimal
+        decimal, thousands = self.layout.decimal, self.layout.thousands
         is_clock = position in clocks
-        read = clocks[position].seconds(text) if is_clock else _numbers_of(text, decimal)
+        read = clocks[position].seconds(text) if is_clock else _numbers_of(text, decimal, thousands)
         if count == 0 and isinstance(read, int) and (form := date_form(text[read])):
-            clocks[position] = _Clock(form)
+            clocks[position] = _Clock(form, self.zeros)
             read = clocks[position].seconds(text)
         if not isinstance(read, int):
             return read
@@ -200,17 +216,58 @@ class _Table:
             kind = "date like the first one"
         elif is_number_text(text[row], other_mark):
             kind = f"number with a decimal {'comma' if other_mark == '.' else 'point'}"
+        hint = "" if thousands is not None else _hint_of_thousands(text[row])
         raise FileError(
             f"{self.path}: column '{self.columns[position].name}' holds "
             f"'{short_cell(text[row])}', which is not a {kind}, in data row {count + row + 1} "
-            f"(line {lines[row]})."
+            f"(line {lines[row]}){hint}."
         )
 
 
-def _numbers_of(text: polars.Series, decimal: str) -> Array | int:
+class _Doubt:
+    """Numbers of a column that may be thousands, in a file of whole numbers as far as was seen."""
+
+    def __init__(self) -> None:
+        self.where = ""
+        self.is_settled = False
+
+    @property
+    def remains(self) -> bool:
+        """Whether there are such numbers, and none that settles what their sign means."""
+        return bool(self.where) and not self.is_settled
+
+    def take(self, cells: polars.Series, decimal: str, lines: Sequence[int], count: int) -> None:
+        """Take in the cells of a piece, before which there are `count` rows."""
+        text = cells.str.strip_chars().fill_null("")
+        marked = text.str.contains(decimal, literal=True)
+        if self.is_settled or not marked.any():
+            return
+        may_be = text.str.contains(MAY_BE_THOUSANDS)
+        self.is_settled = bool((marked & ~may_be).any())
+        if not self.where and may_be.any():
+            row = int((marked & may_be).arg_max() or 0)
+            self.where = (
+                f"'{short_cell(text[row])}' in data row {count + row + 1} (line {lines[row]})"
+            )
+
+
+def _hint_of_thousands(cell: str) -> str:
+    """What to do about a cell that is a number with separators of thousands, or empty."""
+    for thousands in get_args(Thousands):
+        decimals = [mark for mark in (".", ",") if mark != thousands]
+        if any(re.match(grouped_number(thousands, decimal), cell) for decimal in decimals):
+            return f'; give thousands = "{thousands}" as an option if these are thousands'
+    return ""
+
+
+def _numbers_of(text: polars.Series, decimal: str, thousands: str | None = None) -> Array | int:
     """Numbers of a column, an empty cell as NaN; or the row of the first cell that holds none."""
     import polars as pl
 
+    if thousands is not None:
+        grouped = text.str.contains(grouped_number(thousands, decimal))
+        bare_numbers = text.str.replace_all(without_thousands(thousands), "")
+        text = bare_numbers.zip_with(grouped, text)
     plain = text
     if decimal == ",":
         # so that 1.234 is not taken for a number: it may be one thousand in this notation
@@ -236,6 +293,40 @@ _DAY = 86_400_000_000
 """[µs]"""
 
 
+def _zeros(lines: Sequence[str], layout: TextLayout, marks: tuple[str, ...]) -> dict[bool, int]:
+    """Stamps from which the clocks of some rows count, by whether they have a date. [µs]
+
+    It is the earliest first stamp of all columns, as clocks that begin at different instants would
+    shift their signals against each other if each counted from its own.
+    """
+    import polars as pl
+
+    first_stamps: dict[bool, list[int]] = {True: [], False: []}
+    awaited = set(range(layout.width))
+    for line in lines:
+        if not awaited:
+            break
+        if line.lstrip().startswith(marks):
+            continue
+        cells = layout.cells(line)
+        for position in [*awaited]:
+            cell = cells[position] if position < len(cells) else ""
+            if not cell:
+                continue
+            awaited.discard(position)
+            form = date_form(cell)
+            clock = None if form is None else _Clock(form, {})
+            stamps = None if clock is None else clock.stamps(pl.Series([cell]))
+            if clock is not None and stamps is not None and stamps[0] is not None:
+                first_stamps[clock.dated].append(int(stamps[0]))
+    zeros = {dated: min(stamps) for dated, stamps in first_stamps.items() if stamps}
+    of_day = first_stamps[False]
+    if of_day and max(of_day) - min(of_day) > _DAY // 2:
+        # midnight is between them: the earliest one is still of the day before
+        zeros[False] = min(stamp for stamp in of_day if stamp > max(of_day) - _DAY // 2)
+    return zeros
+
+
 class _Clock:
     """A column of dates of one form, read piece after piece.
 
@@ -243,32 +334,42 @@ class _Clock:
     again at midnight.
     """
 
-    def __init__(self, form: str) -> None:
+    def __init__(self, form: str, zeros: Mapping[bool, int]) -> None:
         self.dated = form.startswith(("%Y", "%m", "%d"))
         self.form = form if self.dated else f"%Y-%m-%d {form}"
-        self.first: int | None = None  # stamp [µs]
-        self.last = self.ahead = 0  # the stamp before, and days passed since the first [µs]
+        self.zero = zeros.get(self.dated)  # stamp from which it counts [µs]
+        self.begins = False
+        self.last = self.ahead = 0  # the stamp before, and days passed since the zero [µs]
+
+    def stamps(self, text: polars.Series) -> polars.Series:
+        """Stamps [µs], null for a cell that is none."""
+        import polars as pl
+
+        plain = text.str.replace(",", ".", literal=True)  # of the fraction
+        plain = plain if self.dated else "1970-01-01 " + plain
+        return plain.str.to_datetime(self.form, time_unit="us", strict=False).cast(pl.Int64)
 
     def seconds(self, text: polars.Series) -> Array | int:
-        """Seconds since the column's first stamp, or the row of the first cell that is none."""
+        """Seconds since the log's zero, or the row of the first cell that is no such date."""
         import polars as pl
 
         text = text.set(text == "", None)
-        plain = text.str.replace(",", ".", literal=True)  # of the fraction
-        plain = plain if self.dated else "1970-01-01 " + plain
-        stamps_read = plain.str.to_datetime(self.form, time_unit="us", strict=False)
-        wrong = stamps_read.is_null() & text.is_not_null()
+        stamps = self.stamps(text)
+        wrong = stamps.is_null() & text.is_not_null()
         if wrong.any():
             return int(wrong.arg_max() or 0)
-        stamps = stamps_read.cast(pl.Int64)
         if stamps.null_count() == len(stamps):
             return np.full(len(text), np.nan)
-        if self.first is None:
-            self.first = self.last = int(stamps.drop_nulls()[0])
+        if not self.begins:
+            self.begins, self.last = True, int(stamps.drop_nulls()[0])
+            if self.zero is None:
+                self.zero = self.last
+            elif not self.dated and self.last < self.zero - _DAY // 2:
+                self.ahead = _DAY
         filled = stamps.fill_null(strategy="forward").fill_null(self.last).to_numpy()
         if not self.dated:
             back = np.diff(filled, prepend=self.last) < -_DAY // 2
             stamps = stamps + self.ahead + _DAY * pl.Series(np.cumsum(back, dtype=np.int64))
             self.ahead += _DAY * int(back.sum())
         self.last = int(filled[-1])
-        return 1e-6 * (stamps - self.first).cast(pl.Float64).to_numpy()
+        return 1e-6 * (stamps - self.zero).cast(pl.Float64).to_numpy()
