@@ -136,7 +136,10 @@ class Verdict(Result):
             return f"Not sound: {' '.join(finding.sentence for finding in self.unsound)}"
         if not self.fitted:
             return "Not assessed: a drive that was not fitted to these runs says little about them."
-        return "Sound: no run stands out from the others, none is clipped."
+        return (
+            "Sound: no fitted run stands out from the others, every held-out run is predicted as "
+            "they lead one to expect, none is clipped."
+        )
 
     @property
     def prediction(self) -> str:
@@ -274,6 +277,7 @@ def assess_fit(
     *,
     planned: Sequence[str] = (),
     required: float = REQUIRED,
+    expected: Sequence[PredictionError] = (),
 ) -> Verdict:
     """Judge a fit, or a drive by what it predicts.
 
@@ -287,13 +291,18 @@ def assess_fit(
         Names of all stages of the fit setup, to tell those that were never begun.
     required : float
         Largest error of a prediction in a new maneuver, over the range of the signal. [1]
+    expected : sequence of PredictionError
+        Of a drive that is only compared with runs, the `Verdict.predictions` of its fit: a run
+        that is farther off is named.
     """
-    predictions = prediction_errors(stages, predicted)
+    unsound = tuple(unsound_data(stages, predicted, expected))
+    unexplained = {str(finding.run) for finding in unsound}
+    held_out = {quality.experiment.name for quality in predicted}
+    predictions = prediction_errors(stages, predicted, unexplained & held_out)
     decisive = _decisive(predictions, stages, predicted)
     if not stages:
-        return Verdict(required, predictions, decisive, fitted=False)
+        return Verdict(required, predictions, decisive, fitted=False, unsound=unsound)
     unfinished = tuple(_unfinished(stages, planned))
-    unsound = tuple(unsound_data(stages, predicted))
     lost = {name for stage in stages for name in weak_unknowns(stage)}
     machine = [
         unknown.name
