@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,21 +73,21 @@ def unsound_data(
     expected : sequence of PredictionError
         What the fit of a drive that is only compared with runs stated of a new maneuver.
     """
-    unpredicted = list(unexplained_runs(stages, predicted, expected))
-    outlying = [*unpredicted, *outlying_runs(stages, predicted)]
-    if not stages:
-        return list({finding.run: finding for finding in reversed(outlying)}.values())[::-1]
-    fitted = {run.name: run for stage in stages for run in stage.problem.experiments}
-    held_out = {quality.experiment.name: quality.experiment for quality in predicted}
-    runs = list((fitted | held_out).values())
     findings = list[Finding]()
-    last = stages[-1]
-    if isinstance(last.problem.model, DriveModel):
-        findings += contradicting_runs(runs, last.drive.parameters)
-    findings += clipped_channels(runs)
-    for finding in outlying:
-        if finding.run not in {named.run for named in findings}:
-            findings.append(finding)
+    if stages:
+        fitted = {run.name: run for stage in stages for run in stage.problem.experiments}
+        held_out = {quality.experiment.name: quality.experiment for quality in predicted}
+        runs = list((fitted | held_out).values())
+        last = stages[-1]
+        if isinstance(last.problem.model, DriveModel):
+            findings += contradicting_runs(runs, last.drive.parameters)
+        findings += clipped_channels(runs)
+    for search in (
+        unexplained_runs(stages, predicted, expected),
+        outlying_runs(stages, predicted),
+    ):
+        named = {finding.run for finding in findings}
+        findings += [finding for finding in search if finding.run not in named]
     return findings
 
 
@@ -95,7 +96,7 @@ def unexplained_runs(
     predicted: Sequence[RunQuality],
     expected: Sequence[PredictionError] = (),
 ) -> Iterator[Finding]:
-    """Runs that were held out and that noise and discrepancy do not explain, each channel by itself.
+    """Runs that were held out and that noise and discrepancy do not explain, each once.
 
     Parameters
     ----------
@@ -104,18 +105,45 @@ def unexplained_runs(
 
     Notes
     -----
-    The fitted runs, each as if its maneuver had been left out, say how large the squared error of a
-    new maneuver is: `discrepancy.bound_of_variance`, here for the probability that no run of a sound
-    campaign exceeds it, shared among runs and channels (Bonferroni). A run that was held out is no
-    part of this, so that several which are wrong, or all, cannot vouch for each other. What the
-    instrument's gain may be off is expected of the motion. Without the fitted runs the errors that
-    their fit stated stand for them.
+    The fitted runs, each as if its maneuver had been left out, say how large the squared error of
+    a new maneuver is: `discrepancy.bound_of_variance`, here for the probability that no run of a
+    sound campaign exceeds it, shared among runs and channels (Bonferroni). A run that was held out
+    is no part of this, so that several which are wrong, or all, cannot vouch for each other. What
+    the instrument's gain may be off is expected of the motion. Of a drive that is only compared
+    with runs the errors that its fit stated say it.
     """
+    if not predicted:
+        return
+    named = set[str]()
     runs = {quality.experiment.name for quality in predicted}
     channels = {quality.channel for quality in predicted}
-    if not runs:
-        return
     level = 1.0 - FALSE_ALARM / (len(runs) * len(channels))
+    for channel, records, cells, median, limit in _expectations(stages, predicted, expected, level):
+        for finding in _beyond(channel, records, cells, median, limit):
+            if finding.run not in named:
+                named.add(str(finding.run))
+                yield finding
+
+
+class _Expectation(NamedTuple):
+    """What one channel of the runs that were held out is compared with."""
+
+    channel: str
+    records: ErrorsOfRuns
+    cells: Sequence[WindowCell]
+    median: Array
+    """(3,) coefficients of the squared error that half of all new maneuvers do not exceed."""
+    limit: Array
+    """(3,) of the one that no run of a sound campaign exceeds."""
+
+
+def _expectations(
+    stages: Sequence[StageFit],
+    predicted: Sequence[RunQuality],
+    expected: Sequence[PredictionError],
+    level: float,
+) -> Iterator[_Expectation]:
+    """Of each channel of a fit, or else of each channel whose error a fit stated."""
     for stage in stages:
         for channel in stage.problem.channels:
             records = errors_of_runs(channel, [stage], predicted)
@@ -123,29 +151,33 @@ def unexplained_runs(
             fitted = [cell for cell in cells if not cell.held_out]
             if not fitted:
                 continue
-            mean, limit = bound_of_variance(fitted, 0.5), bound_of_variance(fitted, level)
-            measured = stage.problem.experiments[0].channels.get(channel)
-            if measured is not None:
-                limit[1] += measured.instrument.gain**2 / 3.0
-            yield from _beyond(channel, records, cells, mean, limit)
-    for prediction in expected if not stages else ():
+            median, limit = bound_of_variance(fitted, 0.5), bound_of_variance(fitted, level)
+            limit[1] += _gain(channel, predicted) ** 2 / 3.0
+            yield _Expectation(channel, records, cells, median, limit)
+    for stated in () if stages else expected:
         records = ErrorsOfRuns(
-            tuple((q, None, True) for q in predicted if q.channel == prediction.channel)
+            tuple((q, None, True) for q in predicted if q.channel == stated.channel)
         )
         cells, reach = cells_of(records)
         if cells:
-            mean, limit = (raised(prediction, reach, part) for part in (0.5, level))
-            yield from _beyond(prediction.channel, records, cells, mean, limit)
+            median, limit = raised(stated, reach, 0.5), raised(stated, reach, level)
+            yield _Expectation(stated.channel, records, cells, median, limit)
+
+
+def _gain(channel: str, predicted: Sequence[RunQuality]) -> float:
+    """How far the gain of a channel's instrument may be off. [1]"""
+    gains = [q.experiment[channel].instrument.gain for q in predicted if q.channel == channel]
+    return max(gains, default=0.0)
 
 
 def _beyond(
     channel: str,
     records: ErrorsOfRuns,
     cells: Sequence[WindowCell],
-    mean: Array,
+    median: Array,
     limit: Array,
 ) -> Iterator[Finding]:
-    """Runs that were held out whose squares are beyond a limit, and how far above the mean."""
+    """Runs that were held out whose squares are beyond the limit of an `_Expectation`."""
     by_run = defaultdict[str, list[WindowCell]](list)
     for cell in cells:
         if cell.held_out:
@@ -154,7 +186,7 @@ def _beyond(
         if log_ratio(of_run, limit) <= 0.0:
             continue
         record = next(record for record in records if record.run == run)
-        error_ratio = float(np.exp(0.5 * log_ratio(of_run, mean)))
+        error_ratio = float(np.exp(0.5 * log_ratio(of_run, median)))
         fault = (
             f"{run}: '{channel}', which was held out, is {error_ratio:.2g} times as far from the "
             "prediction as the fitted runs lead one to expect"

@@ -277,7 +277,7 @@ def assess_fit(
     *,
     planned: Sequence[str] = (),
     required: float = REQUIRED,
-    expected: Sequence[PredictionError] = (),
+    of_fit: Verdict | None = None,
 ) -> Verdict:
     """Judge a fit, or a drive by what it predicts.
 
@@ -291,14 +291,15 @@ def assess_fit(
         Names of all stages of the fit setup, to tell those that were never begun.
     required : float
         Largest error of a prediction in a new maneuver, over the range of the signal. [1]
-    expected : sequence of PredictionError
-        Of a drive that is only compared with runs, the `Verdict.predictions` of its fit: a run
-        that is farther off is named.
+    of_fit : Verdict, optional
+        The verdict on the fit of a drive that is only compared with runs: one that is farther off
+        than the errors that it states lead one to expect is named.
     """
+    expected = () if of_fit is None else of_fit.predictions
     unsound = tuple(unsound_data(stages, predicted, expected))
-    unexplained = {str(finding.run) for finding in unsound}
+    named = {str(finding.run) for finding in unsound}
     held_out = {quality.experiment.name for quality in predicted}
-    predictions = prediction_errors(stages, predicted, unexplained & held_out)
+    predictions = prediction_errors(stages, predicted, named & held_out)
     decisive = _decisive(predictions, stages, predicted)
     if not stages:
         return Verdict(required, predictions, decisive, fitted=False, unsound=unsound)
