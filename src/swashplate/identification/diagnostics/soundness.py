@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtrit
 
+from swashplate.campaign import Experiment
 from swashplate.identification.diagnostics.data_checks import (
     Finding,
     clipped_channels,
@@ -18,6 +19,7 @@ from swashplate.identification.diagnostics.data_checks import (
     refusal,
 )
 from swashplate.identification.diagnostics.discrepancy import (
+    COMMANDED,
     USUAL_SPREAD,
     WORTH,
     ChannelErrors,
@@ -61,6 +63,7 @@ def unsound_data(
     stages: Sequence[StageFit],
     predicted: Sequence[RunQuality],
     expected: Sequence[PredictionError] = (),
+    commands: CommandRange | None = None,
 ) -> list[Finding]:
     """What in the data cannot be right, with the line to write in the campaign file.
 
@@ -72,6 +75,8 @@ def unsound_data(
         Of runs that were held out.
     expected : sequence of PredictionError
         What the fit of a drive that is only compared with runs stated of a new maneuver.
+    commands : CommandRange, optional
+        Of the runs that such a drive was fitted to.
     """
     findings = list[Finding]()
     if stages:
@@ -83,7 +88,7 @@ def unsound_data(
             findings += contradicting_runs(runs, last.drive.parameters)
         findings += clipped_channels(runs)
     for search in (
-        unexplained_runs(stages, predicted, expected),
+        unexplained_runs(stages, predicted, expected, commands),
         outlying_runs(stages, predicted),
     ):
         named = {finding.run for finding in findings}
@@ -95,12 +100,13 @@ def unexplained_runs(
     stages: Sequence[StageFit],
     predicted: Sequence[RunQuality],
     expected: Sequence[PredictionError] = (),
+    commands: CommandRange | None = None,
 ) -> Iterator[Finding]:
     """Runs that were held out and that noise and discrepancy do not explain, each once.
 
     Parameters
     ----------
-    stages, predicted, expected
+    stages, predicted, expected, commands
         As of `unsound_data`.
 
     Notes
@@ -110,8 +116,13 @@ def unexplained_runs(
     sound campaign exceeds it, shared among runs and channels (Bonferroni). A run that was held out
     is no part of this, so that several which are wrong, or all, cannot vouch for each other. What
     the instrument's gain may be off is expected of the motion. Of a drive that is only compared
-    with runs the errors that its fit stated say it.
+    with runs the errors that its fit stated say it. A run whose command goes beyond those of the
+    fitted runs is an extrapolation, of which they let one expect nothing: it is not judged here,
+    but the stated error is no less than its own.
     """
+    if stages:
+        commands = commands_of([run for stage in stages for run in stage.problem.experiments])
+    predicted = [q for q in predicted if commands is None or commands.holds(q.experiment)]
     if not predicted:
         return
     named = set[str]()
@@ -123,6 +134,32 @@ def unexplained_runs(
             if finding.run not in named:
                 named.add(str(finding.run))
                 yield finding
+
+
+class CommandRange(NamedTuple):
+    """Smallest and largest command of some runs."""
+
+    kind: str
+    """Of the command, as of `InputSignal.kind`."""
+    low: float
+    """[unit of the command]"""
+    high: float
+    """[unit of the command]"""
+
+    def holds(self, run: Experiment) -> bool:
+        """Whether the command of a run stays in the range, as far as one can tell."""
+        values = run.input.values
+        over = COMMANDED * max(abs(self.low), abs(self.high))
+        inside = self.low - over <= values.min() and values.max() <= self.high + over
+        return run.input.kind != self.kind or bool(inside)
+
+
+def commands_of(runs: Sequence[Experiment]) -> CommandRange:
+    """The range of the commands of one run at least, of those of the first one's kind."""
+    kind = runs[0].input.kind
+    values = [run.input.values for run in runs if run.input.kind == kind]
+    low, high = min(each.min() for each in values), max(each.max() for each in values)
+    return CommandRange(kind, float(low), float(high))
 
 
 class _Expectation(NamedTuple):

@@ -18,7 +18,11 @@ from swashplate.identification.diagnostics.discrepancy import (
     PredictionError,
     prediction_errors,
 )
-from swashplate.identification.diagnostics.soundness import unsound_data
+from swashplate.identification.diagnostics.soundness import (
+    CommandRange,
+    commands_of,
+    unsound_data,
+)
 from swashplate.identification.estimation.drive_model import (
     LIMIT_COLUMNS,
     LIMITS,
@@ -75,6 +79,8 @@ class Verdict(Result):
     reach; empty for a drive that was not fitted."""
     fastest_sine: float = 0.0
     """Highest frequency of the sines that it was fitted to or tested with; 0 without sines. [Hz]"""
+    commands: CommandRange | None = None
+    """Of the runs that it was fitted to; None for a drive that was not fitted."""
     assumed: tuple[str, ...] = ()
     """What these logs cannot show, and what is assumed of it."""
     remarks: tuple[str, ...] = ()
@@ -296,7 +302,8 @@ def assess_fit(
         than the errors that it states lead one to expect is named.
     """
     expected = () if of_fit is None else of_fit.predictions
-    unsound = tuple(unsound_data(stages, predicted, expected))
+    commands = None if of_fit is None else of_fit.commands
+    unsound = tuple(unsound_data(stages, predicted, expected, commands))
     named = {str(finding.run) for finding in unsound}
     held_out = {quality.experiment.name for quality in predicted}
     predictions = prediction_errors(stages, predicted, named & held_out)
@@ -325,6 +332,7 @@ def assess_fit(
         causes=causes,
         validity=_validity(stages, tested),
         fastest_sine=_fastest_sine(tested),
+        commands=commands_of(_fitted_runs(stages)),
         assumed=tuple(_assumed(stages)),
         remarks=tuple(_starts(stages)),
     )
