@@ -113,7 +113,7 @@ def unexplained_runs(
     -----
     The fitted runs, each as if its maneuver had been left out, say how large the squared error of
     a new maneuver is: `discrepancy.bound_of_variance`, here for the probability that no run of a
-    sound campaign exceeds it, shared among runs and channels (Bonferroni). A run that was held out
+    sound campaign exceeds it, shared among the runs (Bonferroni). A run that was held out
     is no part of this, so that several which are wrong, or all, cannot vouch for each other. What
     the instrument's gain may be off is expected of the motion. Of a drive that is only compared
     with runs the errors that its fit stated say it. A run whose command goes beyond those of the
@@ -127,8 +127,7 @@ def unexplained_runs(
         return
     named = set[str]()
     runs = {quality.experiment.name for quality in predicted}
-    channels = {quality.channel for quality in predicted}
-    level = 1.0 - FALSE_ALARM / (len(runs) * len(channels))
+    level = 1.0 - FALSE_ALARM / len(runs)
     for channel, records, cells, median, limit in _expectations(stages, predicted, expected, level):
         for finding in _beyond(channel, records, cells, median, limit):
             if finding.run not in named:
