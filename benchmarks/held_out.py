@@ -27,7 +27,7 @@ AXES = ("hoist", "slew", "luff")
 PERTURB = 0.1
 """Largest logarithm of the factors on what is simulated."""
 SLOWER = 0.75
-"""Top speed of another machine over that of the first: that of `data/winch/mistakes`, 45 of 60."""
+"""Z10 and J of another machine over those of the first."""
 DROPOUT = 0.4
 """Time for which the counts read 0. [s]"""
 COUNTS = "counts"
