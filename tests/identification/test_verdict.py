@@ -191,3 +191,54 @@ def test_an_interrupted_fit_is_not_usable() -> None:
     found = assess_fit([replace(whole, solution=unfinished)], [GOOD])
     assert not found.usable
     assert "did not converge (too many evaluations)" in found.headline
+
+
+@pytest.mark.parametrize("error", [0.15, 0.3, 0.6])
+def test_the_stated_error_is_never_below_what_held_out_runs_show(error: float) -> None:
+    """An offset of a held-out run, over a range of 6 and its noise, less what noise explains."""
+    found = assess_fit([stage()], [GOOD, held_out(error + 0.0 * TIME)])
+    (prediction,) = found.predictions
+    seen = [stated for stated in prediction.classes if stated.held_out]
+    assert seen
+    assert all(stated.error >= 0.98 * error / 6.0 for stated in seen)
+
+
+def test_of_many_held_out_runs_nine_of_ten_must_stay_below() -> None:
+    """Of 20 offsets of 0.2 % of range each more than the last, the 19th: one new run in ten."""
+    runs = [quality(WAVE + 0.04 * k, f"run {k}") for k in range(1, 20)]
+    found = assess_fit((), [*runs, quality(WAVE + 9.0, "far off")])
+    assert worst(found) >= 0.002 * 19 - 1e-9
+    assert worst(found) < 0.4
+
+
+def test_held_out_runs_that_are_all_wrong_are_all_named() -> None:
+    """They cannot vouch for each other: what the fitted runs show says what to expect."""
+    wrong = [
+        compared(
+            bench_run(f"held {k}", level, 0.7 * risen(level, 2.0, 0.8) + 0.02 * SWAP),
+            "y",
+            risen(level, 2.0, 0.8),
+        )
+        for k, level in enumerate((1.2, 1.8, 2.4, 2.7, 2.9))
+    ]
+    found = assess_fit([stage()], wrong)
+    assert not found.usable
+    assert {finding.run for finding in found.unsound} == {f"held {k}" for k in range(5)}
+    assert {finding.channel for finding in found.unsound} == {"y"}
+    assert "it moves 0.7 times as far" in found.headline
+    # beside a verdict on its fit a drive that is only compared with runs is judged by that
+    beside = assess_fit((), wrong, of_fit=assess_fit([stage()], [GOOD]))
+    assert {finding.run for finding in beside.unsound} == {f"held {k}" for k in range(5)}
+    assert not beside.usable
+
+
+def test_a_run_beyond_the_fitted_commands_is_no_unsound_log() -> None:
+    """The model may be wrong where nothing was fitted; the error is stated all the same."""
+    level = 6.0
+    beyond = compared(
+        bench_run("beyond", level, 0.7 * risen(level, 2.0, 0.8)), "y", risen(level, 2.0, 0.8)
+    )
+    found = assess_fit([stage()], [beyond])
+    assert found.sound
+    assert not found.usable
+    assert worst(found) > 0.1

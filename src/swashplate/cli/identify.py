@@ -348,7 +348,8 @@ def validate(
         predicted = predict(parameters, runs)
         if not predicted:
             raise InputError(f"{path}: all samples of these runs are ignored; nothing is left.")
-        verdict = assess_fit((), predicted, required=require / 100.0)
+        of_fit = parsing.verdict_of_fit(drive, parameters.numbers)
+        verdict = assess_fit((), predicted, required=require / 100.0, of_fit=of_fit)
         measures = runs_tables(with_speeds(predicted))
     lines = []
     if out is not None:

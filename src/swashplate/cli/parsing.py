@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from math import isfinite
 from pathlib import Path
@@ -17,13 +17,13 @@ if TYPE_CHECKING:
     from swashplate.analysis import FactorRange
     from swashplate.campaign import Campaign, Experiment
     from swashplate.drive import Drive
-    from swashplate.identification import FitSetup, ModelSetup
+    from swashplate.identification import FitSetup, ModelSetup, Verdict
     from swashplate.parameters import Change, Parameter, ParameterSet
 
 _NUMBER = r"[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|inf\b|nan\b)"
 _VALUE = re.compile(rf"\s*({_NUMBER})(?:/({_NUMBER}))?\s*((?:1/)?[^\W\d_].*|°.*)?")
-SETUP_FILE, NUMBERS = "setup.toml", "parameters.toml"
-"""In a folder that a fit wrote: its fit setup, or the numbers of a user-defined model."""
+SETUP_FILE, NUMBERS, FIT_FILE = "setup.toml", "parameters.toml", "fit.json"
+"""In a folder that a fit wrote: its fit setup, the numbers of a user-defined model, the fit."""
 LOAD = "load_torque"
 SENSITIVE_TO_LOAD = ("motor_leakage", "motor_constant")
 """Refinements that make the speed depend on the load."""
@@ -166,6 +166,24 @@ def model_parameters_of(folder: str, file: Path, runs: Sequence[Experiment]) -> 
                 "number."
             )
     return replace(nominal, numbers={name: float(value) for name, value in table.items()})
+
+
+def verdict_of_fit(word: str, numbers: Mapping[str, float]) -> Verdict | None:
+    """The verdict on the fit whose folder, or a file in it, is named.
+
+    None if there is no such fit, or if these numbers are not its own.
+    """
+    from swashplate.identification import read_verdict
+
+    place = Path(word) if Path(word).is_dir() else Path(word).parent
+    try:
+        stored = read_verdict(place / FIT_FILE)
+    except FileError:
+        # a packaged drive has no fit, and one of another version is no reason against a drive
+        return None
+    if stored is None or stored.numbers != dict(numbers):
+        return None
+    return stored.verdict
 
 
 # --- changes and design variables -----------------------------------------------------------------

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from math import ceil
 from typing import Literal, NamedTuple, get_args
 
 import numpy as np
@@ -316,11 +317,15 @@ class WindowCell(NamedTuple):
 def cells_of(records: Iterable[ChannelErrors]) -> tuple[list[WindowCell], float]:
     """All windows, by run and class, and the range of what was measured. [unit]
 
-    Goes through the records twice.
+    Goes through the records twice. Beside fitted runs, one that was held out counts with the range
+    that is simulated: a dropout in its log must not widen what its error is divided by.
     """
     low, high, largest = np.inf, -np.inf, 0.0
+    any_fitted = any(not record.held_out for record in records)
     for record in records:
-        values = windowed(record.measured, window_weights(record, WINDOWS["fast"]))
+        values = record.signal
+        if not (any_fitted and record.held_out):
+            values = windowed(record.measured, window_weights(record, WINDOWS["fast"]))
         low = min(low, float(np.nanmin(values, initial=np.inf)))
         high = max(high, float(np.nanmax(values, initial=-np.inf)))
         largest = max(largest, float(np.abs(record.command).max()))
@@ -364,7 +369,8 @@ class ClassError(NamedTuple):
 
     motion: MotionClass
     error: float
-    """Root mean square that nine of ten new maneuvers do not exceed, over the range. [1]"""
+    """Root mean square that nine of ten new maneuvers do not exceed, over the range; never less
+    than what runs that were held out show. [1]"""
     fitted: int
     """Fitted runs with such a motion."""
     held_out: int
@@ -412,7 +418,7 @@ class PredictionError(Result):
 
 
 def prediction_errors(
-    stages: Sequence[StageFit], predicted: Sequence[RunQuality]
+    stages: Sequence[StageFit], predicted: Sequence[RunQuality], unexplained: Collection[str] = ()
 ) -> tuple[PredictionError, ...]:
     """How far predictions of each channel may be off; channels that never move are left out.
 
@@ -422,6 +428,9 @@ def prediction_errors(
         Of the fit; none for a drive that is only compared with runs.
     predicted : sequence of RunQuality
         Of runs that were held out, as `validation.predict` gives them.
+    unexplained : collection of str
+        Those of them that noise and discrepancy do not explain: the variance function is that of
+        all others, as long as there are others.
 
     Notes
     -----
@@ -429,7 +438,10 @@ def prediction_errors(
     non-negative least squares, weighted by the inverse of the squared mean. The logarithms of
     observed over fitted squares of the maneuvers have a mean m and a deviation d; a new one stays
     below exp(m + t d √(1 + 1/k)), the bound of a prediction. What the instrument's gain may be off
-    is an error of the motion that no run of it shows.
+    is an error of the motion that no run of it shows. Of a class the error is at least the one that
+    n runs that were held out show, unexplained ones too: the ⌈0.9 (n + 1)⌉-th smallest, which a new
+    one exceeds with a probability of a tenth at most, whatever the distribution (Vovk, Gammerman
+    and Shafer 2005, section 2.2), and of fewer than ten the largest.
     """
     channels = dict.fromkeys(name for stage in stages for name in stage.problem.channels)
     if not stages:
@@ -443,7 +455,8 @@ def prediction_errors(
         cells, reach = cells_of(errors_of_runs(name, stages, predicted))
         if not cells:
             continue
-        coefficients = bound_of_variance(cells)
+        explained = [cell for cell in cells if cell.run not in unexplained]
+        coefficients = bound_of_variance(explained or cells)
         coefficients[1] += measured.instrument.gain**2 / 3.0
         constant, by_signal, by_rate = coefficients.tolist()
         errors.append(
@@ -465,12 +478,22 @@ def _class_errors(cells: Sequence[WindowCell], coefficients: Array) -> Iterator[
         of_class = [cell for cell in cells if cell.motion == motion]
         if of_class:
             terms = np.vstack([cell.terms for cell in of_class])
+            modelled = float(np.sqrt(np.mean(terms @ coefficients)))
             yield ClassError(
                 motion=motion,
-                error=float(np.sqrt(np.mean(terms @ coefficients))),
+                error=max(modelled, _shown_error(of_class)),
                 fitted=sum(not cell.held_out for cell in of_class),
                 held_out=sum(cell.held_out for cell in of_class),
             )
+
+
+def _shown_error(cells: Iterable[WindowCell]) -> float:
+    """Error that nine of ten runs that were held out do not exceed, of few the largest. [1]"""
+    squares = sorted(max(float(cell.squares.mean()), 0.0) for cell in cells if cell.held_out)
+    if not squares:
+        return 0.0
+    rank = min(ceil(BOUND_LEVEL * (len(squares) + 1)), len(squares))
+    return float(np.sqrt(squares[rank - 1]))
 
 
 def errors_of_runs(
@@ -513,16 +536,30 @@ def variance_function(cells: Sequence[WindowCell]) -> Array:
     return np.asarray(coefficients)
 
 
-def bound_of_variance(cells: Sequence[WindowCell]) -> Array:
-    """(3,) the same for the squared error that nine of ten new maneuvers do not exceed."""
+def bound_of_variance(cells: Sequence[WindowCell], level: float = BOUND_LEVEL) -> Array:
+    """(3,) the same for the squared error that a new maneuver does not exceed.
+
+    `level` is the probability of that.
+    """
     coefficients = variance_function(cells)
     maneuvers = defaultdict[str, list[WindowCell]](list)
     for cell in cells:
         maneuvers[cell.maneuver].append(cell)
     ratios = np.array([log_ratio(of_maneuver, coefficients) for of_maneuver in maneuvers.values()])
     deviation, freedom = spread_of(ratios)
-    bound = float(stdtrit(freedom, BOUND_LEVEL)) * deviation * np.sqrt(1.0 + 1.0 / ratios.size)
+    bound = float(stdtrit(freedom, level)) * deviation * np.sqrt(1.0 + 1.0 / ratios.size)
     return coefficients * float(np.exp(ratios.mean() + bound))
+
+
+def raised(prediction: PredictionError, reach: float, level: float) -> Array:
+    """(3,) of a stated error, the coefficients for another probability, over another range.
+
+    A fit does not keep the deviation of its maneuvers: the usual one stands for it.
+    """
+    coefficients = np.array(prediction.coefficients)
+    coefficients[0] *= (prediction.reach / reach) ** 2
+    further = float(stdtrit(WORTH, level) - stdtrit(WORTH, BOUND_LEVEL))
+    return np.asarray(coefficients * np.exp(USUAL_SPREAD * further))
 
 
 def log_ratio(cells: Sequence[WindowCell], coefficients: Array) -> float:

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtrit
 
+from swashplate.campaign import Experiment
 from swashplate.identification.diagnostics.data_checks import (
     Finding,
     clipped_channels,
@@ -17,13 +19,18 @@ from swashplate.identification.diagnostics.data_checks import (
     refusal,
 )
 from swashplate.identification.diagnostics.discrepancy import (
+    COMMANDED,
     USUAL_SPREAD,
     WORTH,
     ChannelErrors,
     ErrorsOfRuns,
+    PredictionError,
     WindowCell,
+    bound_of_variance,
     cells_of,
+    errors_of_runs,
     log_ratio,
+    raised,
     variance_function,
     window_weights,
     windowed,
@@ -52,35 +59,183 @@ MOVES, STEPS = 0.2, 10.0
 by at least."""
 
 
-def unsound_data(stages: Sequence[StageFit], predicted: Sequence[RunQuality]) -> list[Finding]:
-    """What in the data of a fit cannot be right, with the line to write in the campaign file.
+def unsound_data(
+    stages: Sequence[StageFit],
+    predicted: Sequence[RunQuality],
+    expected: Sequence[PredictionError] = (),
+    commands: CommandRange | None = None,
+) -> list[Finding]:
+    """What in the data cannot be right, with the line to write in the campaign file.
 
     Parameters
     ----------
     stages : sequence of StageFit
-        All stages of the fit.
+        All stages of the fit; none for a drive that is only compared with runs.
     predicted : sequence of RunQuality
         Of runs that were held out.
+    expected : sequence of PredictionError
+        What the fit of a drive that is only compared with runs stated of a new maneuver.
+    commands : CommandRange, optional
+        Of the runs that such a drive was fitted to.
     """
-    fitted = {run.name: run for stage in stages for run in stage.problem.experiments}
-    held_out = {quality.experiment.name: quality.experiment for quality in predicted}
-    runs = list((fitted | held_out).values())
     findings = list[Finding]()
-    last = stages[-1]
-    if isinstance(last.problem.model, DriveModel):
-        findings += contradicting_runs(runs, last.drive.parameters)
-    findings += clipped_channels(runs)
-    named = {finding.run for finding in findings}
-    outlying = outlying_runs(stages, predicted)
-    return [*findings, *(finding for finding in outlying if finding.run not in named)]
+    if stages:
+        fitted = {run.name: run for stage in stages for run in stage.problem.experiments}
+        held_out = {quality.experiment.name: quality.experiment for quality in predicted}
+        runs = list((fitted | held_out).values())
+        last = stages[-1]
+        if isinstance(last.problem.model, DriveModel):
+            findings += contradicting_runs(runs, last.drive.parameters)
+        findings += clipped_channels(runs)
+    for search in (
+        unexplained_runs(stages, predicted, expected, commands),
+        outlying_runs(stages, predicted),
+    ):
+        named = {finding.run for finding in findings}
+        findings += [finding for finding in search if finding.run not in named]
+    return findings
+
+
+def unexplained_runs(
+    stages: Sequence[StageFit],
+    predicted: Sequence[RunQuality],
+    expected: Sequence[PredictionError] = (),
+    commands: CommandRange | None = None,
+) -> Iterator[Finding]:
+    """Runs that were held out and that noise and discrepancy do not explain, each once.
+
+    Parameters
+    ----------
+    stages, predicted, expected, commands
+        As of `unsound_data`.
+
+    Notes
+    -----
+    The fitted runs, each as if its maneuver had been left out, say how large the squared error of
+    a new maneuver is: `discrepancy.bound_of_variance`, here for the probability that no run of a
+    sound campaign exceeds it, shared among the runs (Bonferroni). A run that was held out
+    is no part of this, so that several which are wrong, or all, cannot vouch for each other. What
+    the instrument's gain may be off is expected of the motion. Of a drive that is only compared
+    with runs the errors that its fit stated say it. A run whose command goes beyond those of the
+    fitted runs is an extrapolation, of which they let one expect nothing: it is not judged here,
+    but the stated error is no less than its own.
+    """
+    if stages:
+        commands = commands_of([run for stage in stages for run in stage.problem.experiments])
+    predicted = [q for q in predicted if commands is None or commands.holds(q.experiment)]
+    if not predicted:
+        return
+    named = set[str]()
+    runs = {quality.experiment.name for quality in predicted}
+    level = 1.0 - FALSE_ALARM / len(runs)
+    for channel, records, cells, median, limit in _expectations(stages, predicted, expected, level):
+        for finding in _beyond(channel, records, cells, median, limit):
+            if finding.run not in named:
+                named.add(str(finding.run))
+                yield finding
+
+
+class CommandRange(NamedTuple):
+    """Smallest and largest command of some runs."""
+
+    kind: str
+    """Of the command, as of `InputSignal.kind`."""
+    low: float
+    """[unit of the command]"""
+    high: float
+    """[unit of the command]"""
+
+    def holds(self, run: Experiment) -> bool:
+        """Whether the command of a run stays in the range, as far as one can tell."""
+        values = run.input.values
+        over = COMMANDED * max(abs(self.low), abs(self.high))
+        inside = self.low - over <= values.min() and values.max() <= self.high + over
+        return run.input.kind != self.kind or bool(inside)
+
+
+def commands_of(runs: Sequence[Experiment]) -> CommandRange:
+    """The range of the commands of one run at least, of those of the first one's kind."""
+    kind = runs[0].input.kind
+    values = [run.input.values for run in runs if run.input.kind == kind]
+    low, high = min(each.min() for each in values), max(each.max() for each in values)
+    return CommandRange(kind, float(low), float(high))
+
+
+class _Expectation(NamedTuple):
+    """What one channel of the runs that were held out is compared with."""
+
+    channel: str
+    records: ErrorsOfRuns
+    cells: Sequence[WindowCell]
+    median: Array
+    """(3,) coefficients of the squared error that half of all new maneuvers do not exceed."""
+    limit: Array
+    """(3,) of the one that no run of a sound campaign exceeds."""
+
+
+def _expectations(
+    stages: Sequence[StageFit],
+    predicted: Sequence[RunQuality],
+    expected: Sequence[PredictionError],
+    level: float,
+) -> Iterator[_Expectation]:
+    """Of each channel of a fit, or else of each channel whose error a fit stated."""
+    for stage in stages:
+        for channel in stage.problem.channels:
+            records = errors_of_runs(channel, [stage], predicted)
+            cells, _ = cells_of(records)
+            fitted = [cell for cell in cells if not cell.held_out]
+            if not fitted:
+                continue
+            median, limit = bound_of_variance(fitted, 0.5), bound_of_variance(fitted, level)
+            limit[1] += _gain(channel, predicted) ** 2 / 3.0
+            yield _Expectation(channel, records, cells, median, limit)
+    for stated in () if stages else expected:
+        records = ErrorsOfRuns(
+            tuple((q, None, True) for q in predicted if q.channel == stated.channel)
+        )
+        cells, reach = cells_of(records)
+        if cells:
+            median, limit = raised(stated, reach, 0.5), raised(stated, reach, level)
+            yield _Expectation(stated.channel, records, cells, median, limit)
+
+
+def _gain(channel: str, predicted: Sequence[RunQuality]) -> float:
+    """How far the gain of a channel's instrument may be off. [1]"""
+    gains = [q.experiment[channel].instrument.gain for q in predicted if q.channel == channel]
+    return max(gains, default=0.0)
+
+
+def _beyond(
+    channel: str,
+    records: ErrorsOfRuns,
+    cells: Sequence[WindowCell],
+    median: Array,
+    limit: Array,
+) -> Iterator[Finding]:
+    """Runs that were held out whose squares are beyond the limit of an `_Expectation`."""
+    by_run = defaultdict[str, list[WindowCell]](list)
+    for cell in cells:
+        if cell.held_out:
+            by_run[cell.run].append(cell)
+    for run, of_run in by_run.items():
+        if log_ratio(of_run, limit) <= 0.0:
+            continue
+        record = next(record for record in records if record.run == run)
+        error_ratio = float(np.exp(0.5 * log_ratio(of_run, median)))
+        fault = (
+            f"{run}: '{channel}', which was held out, is {error_ratio:.2g} times as far from the "
+            "prediction as the fitted runs lead one to expect"
+        )
+        yield refusal(run, channel, _sentence(record, fault, records))
 
 
 def outlying_runs(stages: Sequence[StageFit], predicted: Sequence[RunQuality]) -> Iterator[Finding]:
     """Runs whose errors are far larger than those of the others, each once, and why.
 
-    A maneuver of which every run stands out shows what the model lacks, and not an unsound log. A
-    held-out run is named only if a run of its maneuver was fitted. The linearised fit of each stage
-    is computed if it is not there yet.
+    The runs of a fit are compared with each other; without a fit those that are predicted. A
+    maneuver of which every run stands out shows what the model lacks, and not an unsound log. The
+    linearised fit of each stage is computed if it is not there yet.
 
     Notes
     -----
@@ -127,8 +282,11 @@ def _outliers_by_channel(
             break
         record = next(record for record in records if record.run == suspect)
         error_ratio = float(np.exp(0.5 * log_excess))
-        sentence = _sentence(record, channel, records, error_ratio)
-        findings.append(refusal(suspect, channel, sentence))
+        fault = (
+            f"{suspect}: '{channel}' is {error_ratio:.2g} times as far from the simulation as in "
+            "the other runs"
+        )
+        findings.append(refusal(suspect, channel, _sentence(record, fault, records)))
         if 2 * len(findings) >= len(ratios.ratios):
             return []
     return findings
@@ -140,26 +298,24 @@ def _records(
     predicted: Sequence[RunQuality],
     without: Sequence[str],
 ) -> ErrorsOfRuns:
-    """A channel of all runs, as the fit without some of them simulates it.
+    """A channel of the fitted runs, as the fit without some of them simulates it.
 
-    Those that were held out are predicted by the fit of all others: they are left out here if
-    one of these is.
+    Without a fit of the runs that are predicted.
     """
-    fitted, held_out = list[RunQuality](), list(predicted)
+    if stage is None:
+        return ErrorsOfRuns(tuple((q, None, True) for q in predicted if q.channel == channel))
     errors = dict[str, Array]()
-    if stage is not None:
-        fitted = [quality for quality in stage.runs if quality.channel == channel]
-        if any(quality.experiment.name in without for quality in fitted):
-            held_out = []
-            errors = {
-                run.name: error
-                for run, error in without_runs(stage.linearised, without)
-                if run.channel == channel
-            }
+    if without:
+        errors = {
+            run.name: error
+            for run, error in without_runs(stage.linearised, without)
+            if run.channel == channel
+        }
     return ErrorsOfRuns(
-        (
-            *((quality, None, True) for quality in held_out if quality.channel == channel),
-            *((quality, errors.get(quality.experiment.name), False) for quality in fitted),
+        tuple(
+            (quality, errors.get(quality.experiment.name), False)
+            for quality in stage.runs
+            if quality.channel == channel
         )
     )
 
@@ -168,8 +324,6 @@ def _records(
 class _ErrorRatios:
     """Logarithms of the runs' squared errors, to compare with those of the sound runs."""
 
-    suspects: tuple[str, ...]
-    """Runs that may be unsound."""
     ratios: Mapping[str, float]
     """By run."""
     maneuvers: Mapping[str, str]
@@ -191,9 +345,7 @@ class _ErrorRatios:
             name: log_ratio(cells_of_run, coefficients) for name, cells_of_run in runs.items()
         }
         maneuvers = {cell.run: cell.maneuver for cell in cells}
-        fitted = {cell.maneuver for cell in cells if not cell.held_out}
-        suspects = tuple(name for name in sound if not fitted or maneuvers[name] in fitted)
-        return cls(suspects, ratios, maneuvers, sound)
+        return cls(ratios, maneuvers, sound)
 
     @property
     def _sound_ratios(self) -> Array:
@@ -207,10 +359,10 @@ class _ErrorRatios:
 
     @property
     def farthest(self) -> str | None:
-        """The suspect that is farthest above the median."""
+        """The run that is farthest above the median."""
         if len(self.sound) < FEWEST_RUNS:
             return None
-        return max(self.suspects, key=lambda run: self.ratios[run], default=None)
+        return max(self.sound, key=lambda run: self.ratios[run])
 
     @property
     def limit(self) -> float:
@@ -233,14 +385,8 @@ class _ErrorRatios:
 # --- why ------------------------------------------------------------------------------------------
 
 
-def _sentence(
-    record: ChannelErrors, channel: str, records: Iterable[ChannelErrors], error_ratio: float
-) -> str:
+def _sentence(record: ChannelErrors, fault: str, records: Iterable[ChannelErrors]) -> str:
     """What is wrong with a run, if that can be found out, and the line to write."""
-    fault = (
-        f"{record.run}: '{channel}' is {error_ratio:.2g} times as far from the simulation as in "
-        "the other runs"
-    )
     measured, simulated = _motion(record)
     mean_square = float(np.mean((simulated - measured) ** 2))
     ignored = 'leave it out with role = "ignore"'

@@ -18,7 +18,11 @@ from swashplate.identification.diagnostics.discrepancy import (
     PredictionError,
     prediction_errors,
 )
-from swashplate.identification.diagnostics.soundness import unsound_data
+from swashplate.identification.diagnostics.soundness import (
+    CommandRange,
+    commands_of,
+    unsound_data,
+)
 from swashplate.identification.estimation.drive_model import (
     LIMIT_COLUMNS,
     LIMITS,
@@ -75,6 +79,8 @@ class Verdict(Result):
     reach; empty for a drive that was not fitted."""
     fastest_sine: float = 0.0
     """Highest frequency of the sines that it was fitted to or tested with; 0 without sines. [Hz]"""
+    commands: CommandRange | None = None
+    """Of the runs that it was fitted to; None for a drive that was not fitted."""
     assumed: tuple[str, ...] = ()
     """What these logs cannot show, and what is assumed of it."""
     remarks: tuple[str, ...] = ()
@@ -136,7 +142,10 @@ class Verdict(Result):
             return f"Not sound: {' '.join(finding.sentence for finding in self.unsound)}"
         if not self.fitted:
             return "Not assessed: a drive that was not fitted to these runs says little about them."
-        return "Sound: no run stands out from the others, none is clipped."
+        return (
+            "Sound: no fitted run stands out from the others, every held-out run is predicted as "
+            "they lead one to expect, none is clipped."
+        )
 
     @property
     def prediction(self) -> str:
@@ -274,6 +283,7 @@ def assess_fit(
     *,
     planned: Sequence[str] = (),
     required: float = REQUIRED,
+    of_fit: Verdict | None = None,
 ) -> Verdict:
     """Judge a fit, or a drive by what it predicts.
 
@@ -287,13 +297,20 @@ def assess_fit(
         Names of all stages of the fit setup, to tell those that were never begun.
     required : float
         Largest error of a prediction in a new maneuver, over the range of the signal. [1]
+    of_fit : Verdict, optional
+        The verdict on the fit of a drive that is only compared with runs: one that is farther off
+        than the errors that it states lead one to expect is named.
     """
-    predictions = prediction_errors(stages, predicted)
+    expected = () if of_fit is None else of_fit.predictions
+    commands = None if of_fit is None else of_fit.commands
+    unsound = tuple(unsound_data(stages, predicted, expected, commands))
+    named = {str(finding.run) for finding in unsound}
+    held_out = {quality.experiment.name for quality in predicted}
+    predictions = prediction_errors(stages, predicted, named & held_out)
     decisive = _decisive(predictions, stages, predicted)
     if not stages:
-        return Verdict(required, predictions, decisive, fitted=False)
+        return Verdict(required, predictions, decisive, fitted=False, unsound=unsound)
     unfinished = tuple(_unfinished(stages, planned))
-    unsound = tuple(unsound_data(stages, predicted))
     lost = {name for stage in stages for name in weak_unknowns(stage)}
     machine = [
         unknown.name
@@ -315,6 +332,7 @@ def assess_fit(
         causes=causes,
         validity=_validity(stages, tested),
         fastest_sine=_fastest_sine(tested),
+        commands=commands_of(_fitted_runs(stages)),
         assumed=tuple(_assumed(stages)),
         remarks=tuple(_starts(stages)),
     )
