@@ -97,7 +97,13 @@ def run(folder: Path, text: str) -> tuple[float, float, int]:
         capture_output=True,
         text=True,
         check=True,
-        env={**os.environ, "NUMBA_DISABLE_JIT": "0", "NUMBA_CACHE_DIR": str(folder / "cache")},
+        env={
+            **os.environ,
+            "NUMBA_DISABLE_JIT": "0",
+            "NUMBA_CACHE_DIR": str(folder / "cache"),
+            # Python knows byte code by second and size, and this file changes faster than that
+            "PYTHONDONTWRITEBYTECODE": "1",
+        },
     )
     end, slope, count = done.stdout.split()
     return float(end), float(slope), int(count)
