@@ -16,7 +16,7 @@ unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
 .PHONY: help .venv demo test test-slow test-kernels lint lint-js docs sentences figures reproduce bench cluster fuzz tools browser packages calibration faults owner-table \
-  coverage dist matrix binaries format clean
+  coverage dist matrix pythons binaries format clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[.a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' Makefile
@@ -131,8 +131,12 @@ dist: $(STAMP) ## build wheel and sdist, and run the demo from the wheel in an e
 	@build/clean/bin/pip install -qq -c constraints.txt dist/*.whl
 	@cd build && clean/bin/swashplate demo --out clean/demo
 
+pythons: $(STAMP) ## the demo and the engine's quick tests on the oldest and newest Python here, newest versions
+	@$(BIN)/python tools/matrix.py --extremes
+
 matrix: $(STAMP) ## try the wheel on each Python, with newest and lowest versions (an hour)
 	@$(BIN)/python tools/matrix.py --write $(ENVIRONMENTS)
+	@$(BIN)/python tools/matrix.py --wheels 3.14
 
 binaries: $(STAMP) ## compile the libraries that FMUs carry, run them, write their manifest
 	@$(BIN)/pip install -qq -c constraints.txt -e '.[binaries]'

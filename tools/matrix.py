@@ -1,9 +1,10 @@
 """Try the wheel in fresh environments: newest versions on each Python, lowest on the oldest.
 
-For maintainers: ``make matrix``. Each environment gets the wheel of this checkout with its extras
-and the tools of the tests, then runs the checks below in an empty folder of its own. It lies in
-build/matrix with its logs and results. Results that were obtained from this very wheel and these
-very tests are kept, so that an interrupted run goes on where it stopped.
+For maintainers: ``make matrix``; ``make pythons``, at every change, tries the demo and the engine
+on the oldest and the newest Python that the machine has. Each environment gets the wheel of this
+checkout with its extras and the tools of the tests, then runs its checks in an empty folder. It
+lies in build/matrix with its logs and results. Results that were obtained from this very wheel and
+these very tests are kept, so that an interrupted run goes on where it stopped.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ import resource
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from datetime import date
 from hashlib import sha256
@@ -25,10 +26,12 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from lowest_versions import EXTRAS, lowest_versions
+from packaging.requirements import Requirement
 
 ROOT = Path(__file__).parents[1]
 FOLDER = ROOT / "build" / "matrix"
 PAGE = ROOT / "docs" / "environments.md"
+CONSTRAINTS = ROOT / "constraints.txt"
 BEGIN, END = "<!-- table: begin -->", "<!-- table: end -->"
 
 PYTHONS = ("3.11", "3.12", "3.13", "3.14")
@@ -75,14 +78,18 @@ class Check:
     exit_codes: tuple[int, ...] = (0,)
 
 
-TESTS = "quick tests"
 CHECKS = (
     Check("demo", ("swashplate", "demo", "--out", "demo")),
     Check("export", ("swashplate", "export", "hoist", "--fmu", "hoist.fmu")),
     # 1 is a verdict, too: three seaways do not suffice for a better one
     Check("crane assess", ("swashplate", "crane", "assess", "tg3637", "--seeds", "3"), (0, 1)),
-    Check(TESTS, ("pytest", "-n", "2", "--dist", "loadfile", "-m", "not slow")),
+    Check("quick tests", ("pytest", "-n", "2", "--dist", "loadfile", "-m", "not slow")),
 )
+DEMO, ENGINE = (
+    CHECKS[0],
+    Check("engine", (*CHECKS[-1].words, "tests/equations", "tests/linear")),
+)
+"""What `make pythons` runs: the README's first command, and what compiles equations."""
 ENVIRONMENTS = (
     Environment("3.11", "lowest"),
     *(Environment(python, "newest") for python in PYTHONS),
@@ -102,6 +109,35 @@ def interpreter(version: str) -> str | None:
         if answer.stdout.strip() == version:
             return str(candidate)
     return None
+
+
+def oldest_and_newest() -> tuple[Environment, ...]:
+    """The oldest and the newest Python that this machine has, with the newest versions."""
+    here = [version for version in PYTHONS if interpreter(version)]
+    return tuple(Environment(version, "newest") for version in dict.fromkeys((here[0], here[-1])))
+
+
+def pins_without_wheel(version: str) -> str:
+    """What pip says of pins of constraints.txt for which a Python of a version has no wheel.
+
+    The Python itself need not be here: the newest one asks for it. Empty if all have one.
+    """
+    lines = (line for line in CONSTRAINTS.read_text("utf-8").splitlines() if line[:1] != "#")
+    requirements = [Requirement(line) for line in lines]
+    pins = [
+        f"{pin.name}{pin.specifier}"
+        for pin in requirements
+        if pin.marker is None or pin.marker.evaluate({"python_version": version})
+    ]
+    newest = oldest_and_newest()[-1]
+    variables = surroundings(newest)
+    del variables["PYTHONWARNINGS"]
+    words = [str(interpreter(newest.python)), "-m", "pip", "install", "--quiet", "--dry-run"]
+    words += ["--ignore-installed", "--no-deps", "--only-binary", ":all:"]
+    with TemporaryDirectory(prefix="swashplate-") as folder:
+        words += ["--python-version", version, "--target", folder, *pins]
+        answer = subprocess.run(words, env=variables, capture_output=True, text=True, check=False)
+    return "" if answer.returncode == 0 else answer.stderr
 
 
 def surroundings(environment: Environment) -> dict[str, str]:
@@ -165,13 +201,14 @@ def run_check(environment: Environment, check: Check) -> dict[str, Any]:
     work.mkdir()
     log = environment.folder / f"{check.name.replace(' ', '-')}.log"
     words = list(check.words)
-    if check.name == TESTS and environment.versions == "lowest":
+    is_test = check.words[0] == "pytest"
+    if is_test and environment.versions == "lowest":
         words += ["-W", "ignore"]
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     with log.open("w", encoding="utf-8") as file:
         done = subprocess.run(
             [str(environment.executable), "-m", *words],
-            cwd=ROOT if check.name == TESTS else work,
+            cwd=ROOT if is_test else work,
             env=surroundings(environment),
             stdout=file,
             stderr=subprocess.STDOUT,
@@ -179,7 +216,7 @@ def run_check(environment: Environment, check: Check) -> dict[str, Any]:
         )
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     printed = log.read_text("utf-8", errors="replace")
-    crashed = check.name != TESTS and "Traceback (most recent call last)" in printed
+    crashed = not is_test and "Traceback (most recent call last)" in printed
     return {
         "green": done.returncode in check.exit_codes and not crashed,
         "cpu_seconds": round(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime),
@@ -233,6 +270,24 @@ def try_environment(environment: Environment, wheel: Path, checks: tuple[Check, 
         results["date"] = date.today().isoformat()
         results["processor"] = processor()
         (environment.folder / "results.json").write_text(json.dumps(results, indent=1), "utf-8")
+
+
+def try_environments(environments: Sequence[Environment], checks: tuple[Check, ...]) -> None:
+    """Build the wheel and try it in each environment."""
+    with TemporaryDirectory(prefix="swashplate-") as folder:
+        wheel = build_wheel(Path(folder))
+        for environment in environments:
+            try_environment(environment, wheel, checks)
+
+
+def summary(environment: Environment) -> str:
+    """One line: the Python, and what came of each check."""
+    results = results_of(environment)
+    words = [
+        f"{name} {'green' if result['green'] else 'RED'} ({result['words']})"
+        for name, result in results["checks"].items()
+    ]
+    return f"Python {results['versions']['python']}: {', '.join(words)}"
 
 
 # --- table ----------------------------------------------------------------------------------------
@@ -292,23 +347,34 @@ def main() -> None:
     parser.add_argument("--checks", default=None, help="some of the checks, commas between")
     parser.add_argument("--write", action="store_true", help=f"put the table into {PAGE.name}")
     parser.add_argument("--results", action="store_true", help="run nothing: show earlier results")
+    parser.add_argument(
+        "--extremes", action="store_true", help="demo and engine on the oldest and newest Python"
+    )
+    parser.add_argument("--wheels", metavar="VERSION", help="has this Python a wheel of each pin?")
     arguments = parser.parse_args()
     unknown = set(arguments.names) - set(names)
     if unknown:
         parser.error(f"There is no environment {', '.join(sorted(unknown))}: {', '.join(names)}.")
-    chosen = [names[name] for name in arguments.names] or list(ENVIRONMENTS)
-    selected = [check.name for check in CHECKS]
-    if arguments.checks is not None:
-        selected = arguments.checks.split(",")
+    selected = (arguments.checks or ",".join(check.name for check in CHECKS)).split(",")
     checks = tuple(check for check in CHECKS if check.name in selected)
     if not checks:
         parser.error(f"--checks names none of {', '.join(check.name for check in CHECKS)}.")
-    if not arguments.results:
-        with TemporaryDirectory(prefix="swashplate-") as folder:
-            wheel = build_wheel(Path(folder))
-            for environment in chosen:
-                try_environment(environment, wheel, checks)
-    print("\n".join(table()))
+    if arguments.wheels:
+        missing = pins_without_wheel(arguments.wheels)
+        if missing:
+            sys.exit(f"Pins without a wheel for Python {arguments.wheels}:\n{missing}")
+        print(f"Every pin of {CONSTRAINTS.name} has a wheel for Python {arguments.wheels}.")
+        return
+    if arguments.extremes:
+        chosen = oldest_and_newest()
+        try_environments(chosen, (DEMO, ENGINE))
+        for environment in chosen:
+            print(summary(environment))
+    else:
+        chosen = tuple(names[name] for name in arguments.names) or ENVIRONMENTS
+        if not arguments.results:
+            try_environments(chosen, checks)
+        print("\n".join(table()))
     if arguments.write:
         write_table()
     red = [
