@@ -30,6 +30,14 @@ SLOW = {"docs", "examples", "reproduction"}
 """Folders whose tests run whole pages, notebooks and figures: `make test-slow`."""
 
 
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """Leave slow folders out of a quick run: to collect them takes seconds of each worker."""
+    named = any(Path(each).resolve().is_relative_to(collection_path) for each in config.args)
+    if collection_path.name in SLOW and config.option.markexpr == "not slow" and not named:
+        return True
+    return None
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Mark what lies in a slow folder as slow."""
     for item in items:

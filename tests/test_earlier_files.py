@@ -107,6 +107,7 @@ def test_commands_take_them(kept: Path) -> None:
     assert "boom length" in done("crane", "show", "crane.toml")
 
 
+@pytest.mark.slow
 def test_a_fit_is_made_again_from_them(kept: Path) -> None:
     words = ("fit", "campaign/campaign.toml", "--setup", "campaign/setup.toml", "--out", "again")
     assert "Usable" in done(*words)

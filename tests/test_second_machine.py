@@ -88,7 +88,9 @@ def test_converted_filter_follows_the_recursion(machine: ModuleType) -> None:
         assert np.sort_complex(np.exp(rates * h)) == pytest.approx(np.sort_complex(printed))
 
 
-@pytest.mark.parametrize("run", range(5))
+@pytest.mark.parametrize(
+    "run", [0, *(pytest.param(run, marks=pytest.mark.slow) for run in range(1, 5))]
+)
 def test_march_agrees_with_scipy(machine: ModuleType, run: int) -> None:
     """Every signal to 1e-4 of its range; measured are 6.1e-5 at most."""
     shares = machine.checks.differences(*machine.checks.RUNS[run])
@@ -240,6 +242,7 @@ def test_sizes_of_faults_of_the_machine(machine: ModuleType) -> None:
     assert np.mean(np.array(speeds)[fitted]) == pytest.approx(1.0)
 
 
+@pytest.mark.slow
 def test_what_no_fit_can_see(machine: ModuleType) -> None:
     """Gains that other numbers of hoist take up; a late encoder has no such numbers."""
     sound = machine.draws.drawn_equipment("hoist", 1000)

@@ -211,6 +211,7 @@ def test_it_prints_versions_extras_cache_and_a_simulated_speed(run) -> None:
     assert set(re.findall(r"^extra (\w+)", done.stdout, re.MULTILINE)) == extras
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kept", [True, False])
 def test_byte_code_that_is_not_kept_is_said(tmp_path: Path, kept: bool) -> None:
     """An image whose installer compiles nothing, and whose environment lets nobody do it."""

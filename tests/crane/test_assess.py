@@ -265,6 +265,7 @@ def test_no_seaway_in_the_model_is_no_verdict_for_control(crane):
     assert "nan" not in str(found.headline) + "".join(found.sentences())
 
 
+@pytest.mark.slow
 def test_what_would_do(crane):
     found = assess(
         crane,

@@ -137,6 +137,7 @@ def winch() -> tuple[Drive, list[Experiment]]:
     return drive, made
 
 
+@pytest.mark.slow
 def test_a_measured_current_gives_a_stage_of_its_own(winch) -> None:
     _, tests = winch
     found = guess_drive(tests)
@@ -170,6 +171,7 @@ def test_current_and_speed_are_fitted_from_nothing(winch) -> None:
     assert not result.doubts
 
 
+@pytest.mark.slow
 def test_a_current_that_no_stage_fits_is_named_with_what_does(winch) -> None:
     _, tests = winch
     found = guess_drive([each for each in tests if each.name != "sine"])
@@ -197,6 +199,7 @@ def test_a_gross_spike_of_the_current_is_refused_with_the_line_that_leaves_it_ou
         guess_drive(spoilt)
 
 
+@pytest.mark.slow
 def test_parameters_without_a_value_are_named_with_what_to_do(winch) -> None:
     """No test of the winch opens the relief valve."""
     _, tests = winch

@@ -194,6 +194,7 @@ def test_limits_are_found_where_they_act() -> None:
     assert found.gain == pytest.approx(GAIN, rel=0.05)
 
 
+@pytest.mark.slow
 def test_a_jump_at_the_edge_of_the_dead_zone_is_found() -> None:
     found = guess_drive(runs(jump=0.3))
     assert found.jump == pytest.approx((0.3, 0.3), rel=0.1)
@@ -259,6 +260,7 @@ def test_a_run_without_a_count_widens_the_dead_zone() -> None:
     assert min(found.dead_zone) > 0.43
 
 
+@pytest.mark.slow
 def test_a_lag_that_is_not_seen_stays_fixed() -> None:
     found = guess_drive(runs(lag=1e-4, pull=4.0))
     text = guessed_fit_setup(found, guessed_set(found, "x"))

@@ -3,6 +3,7 @@
 import tracemalloc
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.identification.given import TIME, bench_run
@@ -107,6 +108,7 @@ class Level:
         return {"y": Linearised(outputs, outputs[:, None] / values["gain"])}
 
 
+@pytest.mark.slow
 def test_memory_does_not_grow_with_runs_times_unknowns(monkeypatch) -> None:
     """200 runs with a free zero each: all derivatives together would be 26 MB."""
     monkeypatch.setattr("swashplate.identification.estimation.problem.KEPT", 1e5)

@@ -55,6 +55,7 @@ def test_a_model_of_its_own_code_is_not_tried_and_that_is_said() -> None:
     assert any("[axes.hoist.input]" in said for said in found.doubts)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("way", ["linear", "previous"])
 def test_what_a_campaign_states_is_taken_but_doubted(way: str) -> None:
     other = {"linear": "previous", "previous": "linear"}[way]

@@ -87,6 +87,7 @@ def test_a_sound_campaign_is_usable_and_has_nothing_to_explain(sound) -> None:
     assert "Z4, Z5, Z6, Z9" in assumed
 
 
+@pytest.mark.slow
 def test_a_longer_delay_than_the_fixed_one_is_found_with_its_size(tmp_path: Path) -> None:
     tau = NOMINAL.parameters.numbers["tau"]
     _, found = fitted(tmp_path, NOMINAL.replace(tau=tau + 0.02))
@@ -121,6 +122,7 @@ def test_a_hysteresis_is_found_with_its_size(tmp_path: Path) -> None:
     assert found.error.worst.error > 0.005
 
 
+@pytest.mark.slow
 def test_a_drift_is_named_and_widens_what_is_stated(sound, tmp_path: Path) -> None:
     _, found = fitted(tmp_path, each=(-0.04, -0.02, 0.0, 0.02, 0.04))
     assert found.causes
@@ -132,6 +134,7 @@ def test_a_drift_is_named_and_widens_what_is_stated(sound, tmp_path: Path) -> No
     assert sound[1].error.worst.error < 0.002
 
 
+@pytest.mark.slow
 def test_a_drift_is_found_in_the_order_of_time(tmp_path: Path) -> None:
     """In the order of the file the machine only differs between runs."""
     drifting = {3: -0.04, 5: -0.02, 8: 0.0, 9: 0.02, 12: 0.04}
@@ -140,6 +143,7 @@ def test_a_drift_is_found_in_the_order_of_time(tmp_path: Path) -> None:
     assert names_of(found)[0] == DRIFT
 
 
+@pytest.mark.slow
 def test_runs_that_differ_in_no_order_are_no_drift(tmp_path: Path) -> None:
     _, found = fitted(tmp_path, each=(0.04, -0.04, -0.04, 0.0, 0.04))
     assert DRIFT not in names_of(found)
@@ -147,6 +151,7 @@ def test_runs_that_differ_in_no_order_are_no_drift(tmp_path: Path) -> None:
     assert found.error.worst.error > 0.02
 
 
+@pytest.mark.slow
 def test_a_clipped_ammeter_is_found_with_the_limits_to_state(tmp_path: Path) -> None:
     def clip(columns: dict[str, np.ndarray]) -> None:
         columns["current"] = np.minimum(columns["current"], 0.2)

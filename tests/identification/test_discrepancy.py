@@ -122,7 +122,7 @@ def test_the_variance_function_finds_how_the_error_grows_with_the_signal() -> No
     assert by_signal == pytest.approx(9.0 * 0.7e-4, rel=0.3)
 
 
-@pytest.mark.parametrize("count", [4, 12])
+@pytest.mark.parametrize("count", [4, pytest.param(12, marks=pytest.mark.slow)])
 def test_nine_of_ten_new_maneuvers_stay_below_the_stated_error(count: int) -> None:
     rng, held = np.random.default_rng(count), 0
     for _ in range(150):

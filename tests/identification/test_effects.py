@@ -224,6 +224,7 @@ def estimated(
     ]
 
 
+@pytest.mark.slow
 def test_the_scale_of_runs_is_found_and_intervals_hold() -> None:
     """Gains that differ by 2 % from run to run: the mean of eight is known to 0.7 %."""
 

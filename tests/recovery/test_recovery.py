@@ -50,7 +50,9 @@ def determined(stage: StageFit) -> list[str]:
     return list(names[stage.linearised.determined])
 
 
-@pytest.mark.parametrize("joint", [False, True], ids=["staged", "joint"])
+@pytest.mark.parametrize(
+    "joint", [False, pytest.param(True, marks=pytest.mark.slow)], ids=["staged", "joint"]
+)
 @pytest.mark.parametrize("seed", [0, pytest.param(4, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("axis", AXES)
 def test_the_truth_is_recovered(axis: str, seed: int, joint: bool, tmp_path: Path) -> None:

@@ -169,6 +169,7 @@ def made(hoist: Drive, step: Simulation, all_limits: Simulation, task: Trial) ->
     }
 
 
+@pytest.mark.slow
 def test_everything_can_be_read(made, assert_legible) -> None:
     for figure in made.values():
         assert_legible(figure)

@@ -112,6 +112,7 @@ def test_the_top_speed_is_that_of_the_largest_command_that_was_tested(found: Fit
         assert low - slack <= seen <= high + slack
 
 
+@pytest.mark.slow
 def test_an_orifice_that_the_fit_does_not_look_for_leaves_no_interval(
     runs: list[Experiment],
 ) -> None:
@@ -130,6 +131,7 @@ def test_an_orifice_that_the_fit_does_not_look_for_leaves_no_interval(
     assert "±" in shown[ROWS["dead zone"]][0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("bounds", [(0.0, 0.4), (0.75, 2.0)])
 def test_an_estimate_at_its_bound_gives_no_interval(
     runs: list[Experiment], bounds: tuple[float, float]
