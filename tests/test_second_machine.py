@@ -88,15 +88,15 @@ def test_converted_filter_follows_the_recursion(machine: ModuleType) -> None:
         assert np.sort_complex(np.exp(rates * h)) == pytest.approx(np.sort_complex(printed))
 
 
-@pytest.mark.parametrize(
-    "run", [0, *(pytest.param(run, marks=pytest.mark.slow) for run in range(1, 5))]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("run", range(5))
 def test_march_agrees_with_scipy(machine: ModuleType, run: int) -> None:
     """Every signal to 1e-4 of its range; measured are 6.1e-5 at most."""
     shares = machine.checks.differences(*machine.checks.RUNS[run])
     assert max(shares.values()) < 1e-4, shares
 
 
+@pytest.mark.slow
 def test_campaign_is_as_a_logger_leaves_it(machine: ModuleType, tmp_path: Path) -> None:
     equipment = machine.draws.drawn_equipment("luff", 1003, rate=50.0)
     truth = machine.logger.write_campaign(equipment, tmp_path)

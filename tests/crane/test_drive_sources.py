@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from tests.marks import rest_slow
 from typer.testing import CliRunner
 
 from swashplate import Drive
@@ -200,7 +201,7 @@ def test_in_python_the_verdict_is_data_of_the_crane(fit):
 
 
 @pytest.mark.parametrize(
-    ("usable", "look"), [(True, "good"), (False, "bad"), (None, "look")], ids=str
+    ("usable", "look"), rest_slow([(False, "bad"), (True, "good"), (None, "look")]), ids=str
 )
 def test_judgment_and_page_say_the_verdict(fit, tmp_path, usable, look):
     crane = Crane.preset("tg3637").with_drive(hoist=fit(usable))

@@ -123,6 +123,7 @@ def test_the_hoist_is_too_slow_from_a_height_on(crane, scatter, found):
     )
 
 
+@pytest.mark.slow
 def test_numbers_do_not_depend_on_who_runs_them(crane, scatter, found):
     how = {"headings": (90.0,), "length": 300.0, "run_in": 60.0}
     for executor in (Serial(), Threads(3)):

@@ -50,6 +50,7 @@ CASES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", CASES)
 def test_slew_ends_where_the_independent_crane_does(crane, slewed, case):
     load, slew, rope = CASES[case]
@@ -210,6 +211,7 @@ def along_the_swing(state: Filtered, p: Gains) -> Offset:
     return Offset(p.gain * state.x / size, p.gain * state.y / size)
 
 
+@pytest.mark.slow
 def test_a_controller_without_a_number_stops_the_run(crane):
     # the load hangs straight at first: 0/0
     divides = Model("divides", Gains, Filtered, follow, sample=along_the_swing)
@@ -388,6 +390,7 @@ def test_drives_that_feel_a_load_are_loaded_by_default(crane, leaking):
     assert not simulate(leaking, command, actuation="ideal").load_torque.any()
 
 
+@pytest.mark.slow
 def test_stepper_takes_the_samples_of_a_loaded_run_with_a_hook(leaking):
     command = OperatorCommand.trapezoid(
         hoist=0.5, luff=0.5, duration=0.6, start=0.1, ramp=0.2, length=0.8

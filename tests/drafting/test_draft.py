@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from tests.drafting.conftest import Drafted
 from tests.identification.given import run_of
+from tests.marks import rest_slow
 
 from swashplate import Campaign, Drive, Experiment, InputError, ParameterError, maneuvers, rig
 from swashplate.campaign import Encoder
@@ -166,7 +167,7 @@ def runs(
     return made
 
 
-@pytest.mark.parametrize("kind", ["shaft_speed", "position"])
+@pytest.mark.parametrize("kind", rest_slow(["shaft_speed", "position"]))
 def test_dead_zones_gains_lag_and_delay_are_found_again(kind: str) -> None:
     found = guess_drive(runs(kind))
     assert found.dead_zone == pytest.approx(DEAD, abs=0.05)
@@ -179,6 +180,7 @@ def test_dead_zones_gains_lag_and_delay_are_found_again(kind: str) -> None:
     assert found.fit_percent > 97.0
 
 
+@pytest.mark.slow
 def test_a_noisy_position_shows_the_same() -> None:
     """Neighbours differ by up to 20 times what the machine moves in between."""
     found = guess_drive(runs("position", rough=0.1))
@@ -187,6 +189,7 @@ def test_a_noisy_position_shows_the_same() -> None:
     assert found.lag + found.delay == pytest.approx(LAG + DELAY, abs=0.05)
 
 
+@pytest.mark.slow
 def test_limits_are_found_where_they_act() -> None:
     found = guess_drive(runs(top=2.0, pull=4.0))
     assert found.top_speed == pytest.approx((2.0, 2.0), rel=0.02)
@@ -229,7 +232,7 @@ def encoder_runs(pulses: float, **numbers: float) -> list[Experiment]:
     return made
 
 
-@pytest.mark.parametrize("pulses", [60.0, 240.0])
+@pytest.mark.parametrize("pulses", rest_slow([60.0, 240.0]))
 def test_an_encoder_of_few_pulses_shows_no_jump(pulses: float) -> None:
     found = guess_drive(encoder_runs(pulses))
     assert found.jump == (0.0, 0.0)
@@ -238,13 +241,14 @@ def test_an_encoder_of_few_pulses_shows_no_jump(pulses: float) -> None:
     assert found.top_speed == found.acceleration == (np.inf, np.inf)
 
 
-@pytest.mark.parametrize("pulses", [60.0, 240.0])
+@pytest.mark.parametrize("pulses", rest_slow([60.0, 240.0]))
 def test_an_encoder_of_few_pulses_shows_a_jump(pulses: float) -> None:
     found = guess_drive(encoder_runs(pulses, jump=0.3))
     assert found.jump == pytest.approx((0.3, 0.3), rel=0.1)
     assert found.gain == pytest.approx(GAIN, rel=0.03)
 
 
+@pytest.mark.slow
 def test_a_run_without_a_count_widens_the_dead_zone() -> None:
     """Two large steps leave the dead zone open; a command of 0.45 V moved nothing."""
     steps = [run for run in encoder_runs(60.0) if run.name in ("up", "down")]
@@ -290,6 +294,7 @@ def test_a_guess_becomes_a_drive_and_a_fit_configuration() -> None:
         guessed_set(faster, "campaign.toml")
 
 
+@pytest.mark.slow
 def test_a_way_that_was_not_tried_is_the_other_s_and_fixed() -> None:
     found = guess_drive([each for each in runs() if each.name == "up"])
     assert found.command == (8.0, 0.0)
@@ -313,7 +318,7 @@ def rig_runs(drive: Drive, folder: Path, channel: str, **how: object) -> Campaig
 
 @pytest.mark.parametrize(
     ("offset", "seed", "channel", "counts"),
-    [(2e-5, 23, "encoder_counts", 2500.0), (-2e-5, 24, "shaft_speed", None)],
+    rest_slow([(2e-5, 23, "encoder_counts", 2500.0), (-2e-5, 24, "shaft_speed", None)]),
 )
 def test_a_creep_at_rest_is_found(
     tmp_path: Path, offset: float, seed: int, channel: str, counts: float | None
@@ -336,11 +341,13 @@ def test_a_creep_at_rest_is_found(
 
 @pytest.mark.parametrize(
     ("channel", "counts", "severity"),
-    [
-        ("shaft_speed", None, "harsh"),
-        ("encoder_counts", 2500.0, "harsh"),
-        ("encoder_counts", 40.0, "realistic"),
-    ],
+    rest_slow(
+        [
+            ("encoder_counts", 40.0, "realistic"),
+            ("shaft_speed", None, "harsh"),
+            ("encoder_counts", 2500.0, "harsh"),
+        ]
+    ),
 )
 def test_no_creep_is_made_of_noise_or_counts(
     tmp_path: Path, channel: str, counts: float | None, severity: str
@@ -355,6 +362,7 @@ def test_no_creep_is_made_of_noise_or_counts(
     assert "Z18" not in tomllib.loads(text)["stages"][0]["free"]
 
 
+@pytest.mark.slow
 def test_without_a_rest_no_creep_is_told() -> None:
     """Sines cross the dead zone too fast for the motion to end there."""
     found = guess_drive([each for each in runs() if each.name in ("sine", "small")])
@@ -381,6 +389,7 @@ def test_what_tells_nothing_is_refused() -> None:
 DATA = Path(__file__).parents[3] / "shared" / "data" / "eha"
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not DATA.exists(), reason="the actuator's logs are not beside this checkout")
 @pytest.mark.parametrize(
     "rounding", [0.0, *(pytest.param(each, marks=pytest.mark.slow) for each in (1e-12, 1e-9))]

@@ -75,6 +75,7 @@ def test_bad_command_leaves_the_state(hoist: Drive) -> None:
     assert (stepper.state.context.lines == before.context.lines).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rate", [512.0, 200.0])
 def test_what_is_measured_goes_into_a_step_as_into_a_simulation(hoist: Drive, rate: float) -> None:
     drive, n = hoist.replace(load_inertia=5e3, motor_leakage=1e-6), np.arange(1200)
@@ -171,6 +172,7 @@ LARGE = {"Z7": 1e150}
 REFINED = {"line_stiffness": 1e3, "motor_leakage": 1e-3, "load_inertia": 1.0}
 
 
+@pytest.mark.slow
 @pytest.mark.traced
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")  # of NumPy, without the JIT
 @pytest.mark.parametrize(

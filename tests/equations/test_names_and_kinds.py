@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
+from tests.marks import rest_slow
 
 from swashplate.equations import (
     Model,
@@ -65,7 +66,7 @@ NAMES = (
 )
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", rest_slow(NAMES, 4))
 def test_an_input_may_have_any_name(name: str) -> None:
     step = step_of(f"x = p.gain * {name} - v", first=name)
     model = Model("named", parameters=Gain, state=Level, step=step, outputs=("level",))
@@ -117,7 +118,7 @@ KINDS = {
 }
 
 
-@pytest.mark.parametrize(("body", "right"), KINDS.values(), ids=KINDS)
+@pytest.mark.parametrize(("body", "right"), rest_slow([*KINDS.values()], 6), ids=KINDS)
 def test_numbers_of_every_kind(body: str, right: Any) -> None:
     model = Model("kinds", parameters=Gain, state=Level, step=step_of(body), outputs=("level",))
     first = np.where(np.arange(SIZE) % 3 == 0, 0.0, FIRST)

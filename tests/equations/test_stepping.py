@@ -30,6 +30,7 @@ def marched(compiled, context, records):
 VOLTAGE = 6.0 * np.sin(np.arange(700) / 90.0) ** 3
 
 
+@pytest.mark.slow
 @pytest.mark.interpreted
 @pytest.mark.parametrize(
     ("name", "rate"), [pytest.param("slew", 512.0, marks=pytest.mark.slow), ("hoist", 1024.0)]

@@ -11,6 +11,7 @@ from xml.etree import ElementTree as ET
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.marks import rest_slow
 
 from swashplate import Drive, export
 from swashplate.equations import Definition, Model, equation
@@ -82,7 +83,7 @@ def lagged(state: Output, command: float, p: Lag, h: float) -> Output:
 
 
 @needs_gcc
-@pytest.mark.parametrize("standard", ["c99", "gnu11"])
+@pytest.mark.parametrize("standard", rest_slow(["c99", "gnu11"]))
 def test_no_text_of_a_model_or_a_drive_becomes_code(
     standard: str, hoist: Drive, tmp_path: Path
 ) -> None:

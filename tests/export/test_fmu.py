@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.marks import rest_slow
 
 from swashplate import Drive, export
 from swashplate.drive import Sample
@@ -173,9 +174,14 @@ LIMITED = {"lim1": 40.0, "I_t1": 0.2}
     [
         ({}, {}, {}, 0.0),
         ({}, {}, {}, 1234.5),
-        (REFINED, {}, {}, 0.0),
-        (LIMITED, {"coulomb_sign": "literal"}, {"literal_coulomb_sign": True}, 0.0),
-        (LIMITED, {"card_switch": "split"}, {"split_card_switch": True}, 0.0),
+        *rest_slow(
+            [
+                (REFINED, {}, {}, 0.0),
+                (LIMITED, {"coulomb_sign": "literal"}, {"literal_coulomb_sign": True}, 0.0),
+                (LIMITED, {"card_switch": "split"}, {"split_card_switch": True}, 0.0),
+            ],
+            0,
+        ),
     ],
     ids=["plain", "late", "refined", "literal Coulomb sign", "split card switch"],
 )
@@ -500,6 +506,7 @@ def test_ramps_that_lead_out_of_a_range_fail_with_the_name(made, hoist, fmi):
     refuses(master, lambda: master.get("shaft_speed"), "after the failure")
 
 
+@pytest.mark.slow
 def test_late_without_a_delay_unless_inputs_are_set_first(made):
     """Without a delay outputs depend on the voltage of their instant."""
     drive, voltage = Drive.preset("neutral").replace(Z12=0.01), command(400)
@@ -569,6 +576,7 @@ def test_damaged_files_make_no_instance(made, hoist, tmp_path):
     master.begin()
 
 
+@pytest.mark.slow
 def test_own_step_can_be_set_where_the_filter_is_an_equation(made, hoist):
     drive = hoist.at_every_rate()
     voltage = command(400)

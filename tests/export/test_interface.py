@@ -228,6 +228,7 @@ def test_a_copy_with_a_place_or_a_flag_that_cannot_be_is_not_valid(hoist: Drive,
     )  # of a place up to 1,023 all bits above the tenth, of flags all but one
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "changes",
     [

@@ -12,6 +12,7 @@ from tests.drive.test_own_equation import DRAGGED
 from tests.equations.test_own_model import COMMAND, STROKE, P, valve
 from tests.export.conftest import InC
 from tests.export.webassembly import Page
+from tests.marks import rest_slow
 
 from swashplate import Drive
 from swashplate.equations import (
@@ -317,7 +318,7 @@ def machine() -> list[str]:
     return [name for name, each in libraries.PLATFORMS.items() if each is own]
 
 
-@pytest.mark.parametrize("fmi", ["2.0", "3.0"])
+@pytest.mark.parametrize("fmi", rest_slow(["3.0", "2.0"]))
 def test_an_fmu_of_a_model_has_the_bits_of_its_march(
     fmi: Any, tmp_path: Path, machine: list[str]
 ) -> None:

@@ -58,6 +58,7 @@ def dense(size: int, shared: np.ndarray, blocks: list[RunRows]) -> np.ndarray:
     return np.vstack(parts)
 
 
+@pytest.mark.slow
 @given(campaigns(), st.integers(0, 2**32 - 1))
 @settings(max_examples=300)
 def test_the_inverse_is_that_of_dense_algebra(campaign, seed: int) -> None:

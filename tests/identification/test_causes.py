@@ -203,6 +203,7 @@ def test_a_slow_instrument_is_found_among_what_it_looks_like(tmp_path: Path) -> 
     assert len(found.causes) <= 3
 
 
+@pytest.mark.slow
 def test_what_is_known_of_the_noise_changes_no_answer(sound) -> None:
     """Each channel has one noise: a line noise = ... in the campaign file changes no weight."""
     result, found = sound

@@ -122,6 +122,7 @@ def test_the_variance_function_finds_how_the_error_grows_with_the_signal() -> No
     assert by_signal == pytest.approx(9.0 * 0.7e-4, rel=0.3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [4, pytest.param(12, marks=pytest.mark.slow)])
 def test_nine_of_ten_new_maneuvers_stay_below_the_stated_error(count: int) -> None:
     rng, held = np.random.default_rng(count), 0
@@ -158,6 +159,7 @@ def test_what_is_known_of_the_noise_changes_nothing(seed: int, noise: float) -> 
     assert stated(qualities(errors)) == stated(qualities(errors, noise))
 
 
+@pytest.mark.slow
 def test_another_run_narrows_what_is_stated_in_the_median() -> None:
     rng, ratios, required, turned = np.random.default_rng(4), [], 0.05, 0
     for _ in range(100):

@@ -706,6 +706,7 @@ def documented_valve(tmp_path: Path, monkeypatch) -> Path:
     sys.modules.pop(path.stem, None)
 
 
+@pytest.mark.slow
 def test_the_documented_model_file_finds_a_lag_in_several_processes(documented_valve: Path) -> None:
     """Workers find the model, which has no name of its own, as an attribute of the `UserModel`."""
     setup = ModelSetup.from_file(documented_valve)

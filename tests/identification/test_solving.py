@@ -171,6 +171,7 @@ def test_starts_are_spread_seeded_and_inside(problem: Problem) -> None:
     assert not np.array_equal(starts[0], next(iter(sobol_starts(problem, 1, seed=6))))
 
 
+@pytest.mark.slow
 def test_threads_and_processes_give_the_same_as_one_after_another(short_campaign: Campaign) -> None:
     free = {name: Free(relative=(0.5, 2.0)) for name in ("J_plus", "G1_plus")}
     stage = Stage(name="card", part="card", free=free)

@@ -81,6 +81,7 @@ def test_the_truth_is_recovered(axis: str, seed: int, joint: bool, tmp_path: Pat
     assert all(each.solution.converged for each in result.stages)
 
 
+@pytest.mark.slow
 def test_counts_and_noise_leave_small_errors(tmp_path: Path) -> None:
     setup = load_setup("hoist")
     truth = drawn_drive(Drive.preset("hoist"), setup, seed=5)
@@ -91,6 +92,7 @@ def test_counts_and_noise_leave_small_errors(tmp_path: Path) -> None:
         assert fitted.steady_speed(volts) == pytest.approx(true.steady_speed(volts), rel=2e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [1, *(pytest.param(n, marks=pytest.mark.slow) for n in (39, 77))])
 def test_a_stop_that_the_search_loses_is_found_again(seed: int, tmp_path: Path) -> None:
     """From the published values a descent leaves these machines' stop, and finds none back."""

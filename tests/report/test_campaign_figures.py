@@ -102,6 +102,7 @@ def test_marks_say_what_is_left_out_weighted_clipped_or_missing(assert_legible) 
     assert_legible(figure)
 
 
+@pytest.mark.slow
 def test_pages_of_eight_runs_and_axes_apart(assert_legible: Callable[[Figure], None]) -> None:
     runs = [experiment(name=f"r{k}", run=f"r{k}") for k in range(9)]
     runs.append(experiment(name="s", run="s", axis="slew"))
@@ -134,6 +135,7 @@ def position(time: np.ndarray = FINE, noise: float | None = None) -> Channel:
     return Channel("boom", "position", "m", time, values, weight, SOURCE, noise=noise)
 
 
+@pytest.mark.slow
 def test_a_position_and_its_speed(assert_legible: Callable[[Figure], None]) -> None:
     figure = plot_channel(encoder(), title="Counts of 1 degree")
     upper, lower = figure.axes

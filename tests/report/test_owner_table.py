@@ -158,6 +158,7 @@ def test_an_estimate_at_its_bound_gives_no_interval(
     assert (share < 1.02).all()
 
 
+@pytest.mark.slow
 def test_a_way_that_no_run_goes_has_no_interval(runs: list[Experiment]) -> None:
     shown = cells(fitted([run for run in runs if "up" in run.name]))
     assert "±" in shown[ROWS["lag"]][0]
@@ -165,6 +166,7 @@ def test_a_way_that_no_run_goes_has_no_interval(runs: list[Experiment]) -> None:
         assert shown[ROWS[name]][1].endswith("(not tested)")
 
 
+@pytest.mark.slow
 def test_a_limit_that_the_model_has_not_is_not_called_unreached(found: Fit) -> None:
     said = assess_fit(found.stages, predict(found.parameters, found.runs)).validity
     reached, _, lacking = said.partition("not in the model")
