@@ -151,8 +151,8 @@ def conversion(kind: str, unit: str | None, what: str) -> tuple[str, float, floa
 MAGNITUDES = (1e-30, 1e30)
 """Of a number that is not 0, in whatever unit: the prefixes of the SI end there."""
 RATIOS = (1e-6, 1e12)
-"""Of rates, from a sample in 12 days to one in a ps [Hz], and of counts and gears per turn: encoders
-of 40 bits are yet to be built."""
+"""Of rates, from a sample in 12 days to one in a ps [Hz], and of counts and gears per turn: no
+encoder has 40 bits."""
 
 
 def _in_range(low: float, high: float) -> AfterValidator:
