@@ -23,6 +23,7 @@ from swashplate.cli.options import (
     SeedOption,
     SetupOption,
     new_file,
+    new_folder,
 )
 from swashplate.cli.terminal import (
     bullets,
@@ -336,7 +337,10 @@ def rig(
     drive: DriveChoice,
     *,
     out: Annotated[
-        Path, typer.Option(metavar="DIR", help="New or empty folder for logs and campaign.")
+        Path,
+        new_folder(
+            "New or empty folder for logs and campaign.", "campaign.toml", "*.csv", "truth/*"
+        ),
     ],
     seed: SeedOption = 1,
     severity: Annotated[
@@ -412,9 +416,10 @@ def guess(
     axis: AxisOption = None,
     out: Annotated[
         Path | None,
-        typer.Option(
-            metavar="DIR",
-            help="Folder for start.toml and setup.toml (default: the campaign's).",
+        new_folder(
+            "Folder for start.toml and setup.toml (default: the campaign's).",
+            *("start.toml", "setup.toml"),
+            beside="path",
         ),
     ] = None,
     force: Force = False,
