@@ -83,8 +83,9 @@ class Verdict(Result):
     """Highest frequency of the sines that it was fitted to or tested with; 0 without sines. [Hz]"""
     commands: CommandRange | None = None
     """Of the runs that it was fitted to; None for a drive that was not fitted."""
-    judged: JudgedRuns = JudgedRuns()
-    """Which runs the soundness of the data rests on."""
+    judged: JudgedRuns | None = None
+    """Which runs the soundness of the data rests on; None in a file of a version that did not
+    store it."""
     assumed: tuple[str, ...] = ()
     """What these logs cannot show, and what is assumed of it."""
     remarks: tuple[str, ...] = ()
@@ -146,19 +147,20 @@ class Verdict(Result):
             return f"Not sound: {' '.join(finding.sentence for finding in self.unsound)}"
         if not self.fitted:
             return "Not assessed: a drive that was not fitted to these runs says little about them."
+        judged = self.judged or JudgedRuns()
         clauses = ["no fitted run stands out from the others"]
-        if not self.judged.compared:
+        if not judged.compared:
             clauses = ["too few runs were fitted to compare them with each other"]
-        if self.judged.held_out:
-            predicted = count(self.judged.held_out, "held-out run is", "held-out runs are")
+        if judged.held_out:
+            predicted = count(judged.held_out, "held-out run is", "held-out runs are")
             clauses.append(f"{predicted} predicted as the fitted ones lead one to expect")
         sentence = f"Sound: {', '.join(clauses)}, none is clipped."
-        if self.judged.beyond:
+        if judged.beyond:
             return (
                 f"{sentence} Not judged, as the command goes beyond the fitted ones: "
-                f"{listed(self.judged.beyond)}."
+                f"{listed(judged.beyond)}."
             )
-        return sentence if self.judged.held_out else f"{sentence} No held-out run was judged."
+        return sentence if judged.held_out else f"{sentence} No held-out run was judged."
 
     @property
     def prediction(self) -> str:
