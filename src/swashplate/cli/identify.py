@@ -186,8 +186,8 @@ def fit(
     fitted drive as a parameter file, the fit setup, the estimates with
     their intervals, and the data that 'report' needs. Exit code 1: the result is
     not usable. Ctrl-C (exit code 130) and SIGTERM (143) end it within 5 s
-    and leave no result; of several starts, those that have ended are kept for
-    --resume.
+    and leave no result, or the whole one without its report; of several starts,
+    those that have ended are kept for --resume.
     """
     clock = StageClock()
     check_folder(out)
