@@ -286,4 +286,5 @@ def test_advice_on_a_fit_knows_the_largest_commands(
     volts = [float(word) for name in names for word in re.findall(r"-?[\d.]+(?=[/ ].*V)", name)]
     steps = [float(name.split()[1]) for name in names if name.startswith("step")]
     assert (min(steps), max(steps)) == (-5.0, 4.0)
-    assert -5.0 <= min(volts) and max(volts) <= 4.0
+    assert min(volts) >= -5.0
+    assert max(volts) <= 4.0

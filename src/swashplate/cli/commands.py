@@ -109,12 +109,11 @@ class Output(NamedTuple):
 
 def _output_of(parameter: inspect.Parameter) -> Output | None:
     """What an option has the command write; None if nothing."""
-    options = getattr(parameter.annotation, "__metadata__", ())
-    callbacks = [getattr(option, "callback", None) for option in options]
-    stated = [each.writes for each in callbacks if hasattr(each, "writes")]
-    if not stated and parameter.name == "out":
-        return Output()
-    return stated[0] if stated else None
+    for option in getattr(parameter.annotation, "__metadata__", ()):
+        output = getattr(getattr(option, "callback", None), "writes", None)
+        if isinstance(output, Output):
+            return output
+    return Output() if parameter.name == "out" else None
 
 
 def _refuse_inputs_as_outputs(
