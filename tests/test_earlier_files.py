@@ -199,3 +199,21 @@ def test_whatever_is_written_states_its_layout(kept: Path) -> None:
         assert tomllib.loads(Path(file).read_text("utf-8"))["schema"] == 1, file
     assert json.loads(Path("saved/fit.json").read_text("utf-8"))["schema"] == 1
     assert Identification.load("saved").drive == Identification.load("fitted").drive
+
+
+@pytest.mark.parametrize(
+    ("stages", "setup", "said"),
+    [(0, 2, "0 stages of the 2"), (0, 0, "setup.stages is []"), (2, 1, "2 stages of the 1")],
+)
+def test_a_fit_without_its_stages_is_one_sentence(
+    kept: Path, stages: int, setup: int, said: str
+) -> None:
+    file = kept / "fitted" / "fit.json"
+    content = json.loads(file.read_text("utf-8"))
+    del content["stages"][stages:], content["setup"]["stages"][setup:]
+    file.write_text(json.dumps(content), "utf-8")
+    result = CliRunner().invoke(app, ["report", "fitted", "campaign/campaign.toml"])
+    assert result.exit_code == 2
+    assert said in result.stderr
+    assert result.stderr.startswith("Error: fitted/fit.json: ")
+    assert result.stderr.count("\n") == 1

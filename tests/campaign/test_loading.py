@@ -143,8 +143,25 @@ def test_missing_samples_are_refused_or_dropped_and_counted(edited: Edit) -> Non
         ("[[runs]]", "[[runs]", "TOML"),
         ('role = "validate"', "axes.winch.channels.count.sign = 1", "channel 'count'"),
         ('unit = "mV"', 'unit = "V/0"', "unreadable unit 'V/0'"),
-        ('unit = "mV"', 'unit = "V", offset = 1e308', "unit, scale and offset"),
-        ('column = "time", unit = "ms"', "rate = 5e-324", "inf s ... rate"),
+        ('unit = "mV"', 'unit = "V", offset = 1e30', "unit, scale and offset"),
+        *(
+            ("counts_per_turn = 1000", f"counts_per_turn = {value}", f"{value} ...1e-06 to 1e+12")
+            for value in ("5e-324", "1e-300", "1e+300")
+        ),
+        ("gear_ratio = 2.0", "gear_ratio = 5e-324", "gear_ratio: 5e-324 ... 1e-06 to 1e+12"),
+        ('column = "time", unit = "ms"', "rate = 5e-324", "rate: 5e-324 ... 1e-06 to 1e+12"),
+        *(
+            ('unit = "mA"', f'unit = "mA"\n{entry}', f"{value} ... {low} to {high}")
+            for entry, value, low, high in (
+                ("scale = 5e-324", "5e-324", "1e-30", "1e+30"),
+                ("scale = -1e308", "-1e+308", "-1e+30", "-1e-30"),
+                ("offset = 1e308", "1e+308", "1e-30", "1e+30"),
+                ("noise = 5e-324", "5e-324", "1e-30", "1e+30"),
+                ("weight = 1e308", "1e+308", "1e-30", "1e+30"),
+                ("limits = [0.0, 1e308]", "1e+308", "1e-30", "1e+30"),
+                ("accuracy = { zero = 1e308 }", "1e+308", "1e-30", "1e+30"),
+            )
+        ),
         # they go down to -2040
         (
             "gear_ratio = 2.0",

@@ -1,6 +1,8 @@
 """``campaign``, ``rig`` and ``advise``: tests, and what they are worth."""
 
+import json
 import re
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -265,3 +267,24 @@ def test_a_guess_looks_for_its_folder_first(refused, virtual, tmp_path, monkeypa
     (tmp_path / "file").write_text("")
     sentence = refused("guess", "virtual/campaign.toml", "--out", "file/guessed")
     assert "file/guessed cannot be created" in sentence
+
+
+@pytest.mark.parametrize("subject", ["fitted", "fitted/drive.toml"])
+def test_advice_on_a_fit_knows_the_largest_commands(
+    done: Words, tmp_path: Path, subject: str
+) -> None:
+    """Without its campaign, too: a stick that ends at 4 and -5 V gives no more."""
+    kept = Path(__file__).parents[1] / "fixtures" / "f206f7e8" / "fitted"
+    shutil.copytree(kept, tmp_path / "fitted")
+    file = tmp_path / "fitted" / "fit.json"
+    content = json.loads(file.read_text("utf-8"))
+    content["verdict"]["verdict"]["commands"] = ["voltage", -5.0, 4.0]
+    file.write_text(json.dumps(content), "utf-8")
+
+    done("advise", subject, "--tests", "0", "--out", "tests.csv")
+    names = pl.read_csv(tmp_path / "tests.csv")["test"].to_list()
+    volts = [float(word) for name in names for word in re.findall(r"-?[\d.]+(?=[/ ].*V)", name)]
+    steps = [float(name.split()[1]) for name in names if name.startswith("step")]
+    assert (min(steps), max(steps)) == (-5.0, 4.0)
+    assert min(volts) >= -5.0
+    assert max(volts) <= 4.0

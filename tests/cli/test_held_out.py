@@ -1,6 +1,7 @@
 """A held-out log that the fit does not predict is named by fit, validate and report."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,8 @@ from scipy.signal import lfilter
 from typer.testing import CliRunner
 
 from swashplate.cli import app
+from swashplate.identification import Identification, assess_fit, predict
+from swashplate.identification.validation import RunQuality
 
 MODEL = """
 from typing import NamedTuple
@@ -112,6 +115,30 @@ def test_sound_logs_are_not_refused(run: Callable, sound: Path, model: str) -> N
     found = run("validate", str(sound.parent / "fitted"), str(sound), "--model", model)
     assert found.exit_code == 0, found.output
     assert "Usable: " in found.stdout
+
+
+def test_soundness_claims_no_more_than_was_judged(sound: Path, model: str) -> None:
+    fit = Identification.load(sound.parent / "fitted", sound, model=model)
+    predicted = predict(fit.fit.parameters, fit.held_out)
+    assert "2 held-out runs are predicted as the fitted ones lead one to expect" in fit.verdict.data
+    assert "udged" not in fit.verdict.data
+
+    none = assess_fit(fit.fit.stages, ()).data
+    assert none.endswith("none is clipped. No held-out run was judged.")
+    assert "predicted" not in none
+
+    def twice(quality: RunQuality) -> RunQuality:
+        run = quality.experiment
+        command = replace(run.input, values=2.0 * run.input.values)
+        return replace(quality, experiment=replace(run, input=command))
+
+    # the fitted commands go to 4 V, these to 3.5 V and 2.5 V
+    beyond = [
+        twice(quality) if quality.experiment.name == "mixed" else quality for quality in predicted
+    ]
+    some = assess_fit(fit.fit.stages, beyond).data
+    assert "1 held-out run is predicted" in some
+    assert some.endswith("Not judged, as the command goes beyond the fitted ones: mixed.")
 
 
 @pytest.mark.parametrize("damaged", [HELD_OUT[:1], HELD_OUT], ids=["one", "all"])

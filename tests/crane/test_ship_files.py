@@ -72,6 +72,20 @@ def test_a_flipped_bit_ends_in_a_sentence_in_time(ship, monkeypatch, place, bit)
     assert time.monotonic() - begun < 20.0
 
 
+def test_the_first_file_ends_in_the_time_that_is_stated(ship, monkeypatch):
+    """30 s, here 3 s, and 1 s for each MB, the start of the process included."""
+    assert subprocess_reader._PATIENCE == 30.0
+    monkeypatch.setattr(subprocess_reader, "_PATIENCE", 3.0)
+    monkeypatch.setattr(subprocess_reader._ReaderProcess, "running", None)
+    content = bytearray(ship.read_bytes() + bytes(2_000_000))
+    content[2408] ^= 0x80  # goes round in circles
+    ship.write_bytes(content)
+    begun = time.monotonic()
+    with pytest.raises(FileError, match="could not be read within 5 s"):
+        read_ship(ship)
+    assert 4.5 < time.monotonic() - begun < 8.0
+
+
 def test_flipped_bits_end_in_a_sentence_or_in_numbers(ship, monkeypatch):
     read_ship(ship)
     monkeypatch.setattr(subprocess_reader, "_PATIENCE", 2.0)

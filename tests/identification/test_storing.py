@@ -204,6 +204,8 @@ POISON = {
     "another kind": (put('"kind": "parameter"', '"kind": "force"', 1), "stage card"),
     "other version": (put('"swashplate": "[^"]*"', '"swashplate": "9.9"'), "9.9"),
     "text for a vector": (put(r'"vector": \[[^]]+\]', '"vector": "abc"'), "finite numbers"),
+    "far from its bounds": (put(r'"vector": \[[^]]+\]', '"vector": [1e308, 1e308]', 1), "bounds"),
+    "no run": (put(r'"runs": {[^}]+}', '"runs": {}'), "no run .* fit again"),
     "wrong length": (put(r'"vector": \[[^]]+\]', '"vector": [1.0]', 1), "stage card"),
     "too few intervals": (put(r'("intervals": \[)[^]]+\],', r"\1", 1), "stage card"),
     "a number for the drive": (put('"nominal": ', '"nominal": 3, "was": '), "nominal"),

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from datetime import datetime
 from fnmatch import fnmatchcase
-from typing import Any, Literal, NamedTuple, TypeVar, get_args
+from typing import Annotated, Any, Literal, NamedTuple, TypeVar, get_args
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, field_validator, model_validator
+from pydantic import AfterValidator, Field, field_validator, model_validator
 
-from swashplate.entries import Document, FileTable, Finite, Flag, NotNegative, Positive, Sign
+from swashplate import entries
+from swashplate.entries import Document, FileTable, Flag, Sign
 from swashplate.errors import InputError
 from swashplate.logs import TextOptions
 from swashplate.units import of_shaft, scaling, speed_unit
@@ -147,6 +148,29 @@ def conversion(kind: str, unit: str | None, what: str) -> tuple[str, float, floa
     return units[0], *scaling(unit, units[0], what)
 
 
+MAGNITUDES = (1e-30, 1e30)
+"""Of a number that is not 0, in whatever unit: the prefixes of the SI end there."""
+RATIOS = (1e-6, 1e12)
+"""Of rates, from a sample in 12 days to one in a ps [Hz], and of counts and gears per turn: no
+encoder has 40 bits."""
+
+
+def _in_range(low: float, high: float) -> AfterValidator:
+    """Refuse numbers that nobody means, whose products overflow or vanish."""
+
+    def check(value: float) -> float:
+        if value != 0.0 and not low <= abs(value) <= high:
+            first, last = (low, high) if value > 0.0 else (-high, -low)
+            raise ValueError(f"{value!r} is out of range, which is {first:g} to {last:g}")
+        return value
+
+    return AfterValidator(check)
+
+
+Finite = Annotated[entries.Finite, _in_range(*MAGNITUDES)]
+Positive = Annotated[entries.Positive, _in_range(*MAGNITUDES)]
+NotNegative = Annotated[entries.NotNegative, _in_range(*MAGNITUDES)]
+Ratio = Annotated[entries.Positive, _in_range(*RATIOS)]
 LARGEST_PRESSURE = 1e10
 """At the stroking piston: the plausible sizes of Z15 end here. [Pa]"""
 Between = Literal["previous", "linear", "jumps"]
@@ -210,7 +234,7 @@ class ClockEntry(FileTable):
 
     column: str | None = Field(None, description="Column of the time stamps.")
     unit: str | None = Field(None, description="Unit (default: the header's, or s).")
-    rate: Positive | None = Field(None, description="Sampling rate, instead of a column [Hz].")
+    rate: Ratio | None = Field(None, description="Sampling rate, instead of a column [Hz].")
     offset: Finite = Field(0.0, description="Offset added to the time stamps [s].")
 
     @model_validator(mode="after")
@@ -303,12 +327,10 @@ class ChannelEntry(SignalEntry):
     """A signal that was measured."""
 
     kind: ChannelKind = Field(description="What it measures.")
-    counts_per_turn: Positive | None = Field(
+    counts_per_turn: Ratio | None = Field(
         None, description="Counts per turn of the encoder's shaft, quadrature included."
     )
-    gear_ratio: Positive = Field(
-        1.0, description="Turns of the encoder per turn of the axis's shaft."
-    )
+    gear_ratio: Ratio = Field(1.0, description="Turns of the encoder per turn of the axis's shaft.")
     rolls_over_at: Positive | None = Field(
         None,
         description="Counts at which the counter wraps, 65536 for 16 bits; for a position "
@@ -372,7 +394,7 @@ class RunEntry(FileTable):
         "fit", description="fit, validate or ignore: the log of an ignored run is not opened."
     )
     start: InitialState | None = Field(None, description="State at the first sample.")
-    start_pressure: Finite | None = Field(
+    start_pressure: entries.Finite | None = Field(
         None,
         ge=-LARGEST_PRESSURE,
         le=LARGEST_PRESSURE,

@@ -23,6 +23,7 @@ from swashplate.cli.options import (
     SeedOption,
     SetupOption,
     new_file,
+    new_folder,
 )
 from swashplate.cli.terminal import (
     bullets,
@@ -336,7 +337,10 @@ def rig(
     drive: DriveChoice,
     *,
     out: Annotated[
-        Path, typer.Option(metavar="DIR", help="New or empty folder for logs and campaign.")
+        Path,
+        new_folder(
+            "New or empty folder for logs and campaign.", "campaign.toml", "*.csv", "truth/*"
+        ),
     ],
     seed: SeedOption = 1,
     severity: Annotated[
@@ -412,9 +416,10 @@ def guess(
     axis: AxisOption = None,
     out: Annotated[
         Path | None,
-        typer.Option(
-            metavar="DIR",
-            help="Folder for start.toml and setup.toml (default: the campaign's).",
+        new_folder(
+            "Folder for start.toml and setup.toml (default: the campaign's).",
+            *("start.toml", "setup.toml"),
+            beside="path",
         ),
     ] = None,
     force: Force = False,
@@ -513,7 +518,7 @@ def advise(
             max=10.0,
             help=(
                 "Largest command that the usual tests may have (default: the range of the input "
-                "that the campaign states, or the largest command of its runs)."
+                "that the campaign states, or the largest command of its runs, or of the fit)."
             ),
         ),
     ] = None,
@@ -555,6 +560,7 @@ def advise(
         best_tests_table,
         default_maneuvers,
         largest_of_machine,
+        ranges_of_input,
         sequential_plan,
     )
 
@@ -572,6 +578,7 @@ def advise(
     run_informations = list[RunInformation]()
     doubts = tuple[str, ...]()
     run_names = list[str]()
+    commanded = list[tuple[float, float]]()
     with spinner("Evaluating the tests"):
         if tested:
             basis = parsing.fit_basis(Path(subject), axis, setup, drive or begin)
@@ -583,14 +590,15 @@ def advise(
             ]
             run_names = [experiment.name for experiment in experiments]
             prior = prior_information(start, basis.setup, experiments, fitted=drive is not None)
+            commanded = ranges_of_input(experiments)
         else:
-            experiments = ()
             untested = parsing.parameters_of(subject)
+            of_fit = parsing.verdict_of_fit(subject, untested.numbers)
+            if of_fit and of_fit.commands and of_fit.commands.kind == "voltage":
+                commanded = [(of_fit.commands.low, of_fit.commands.high)]
             prior = prior_information(smooth(untested), load_setup(setup or untested.name))
         machine = Drive(prior.parameters)
-        most = largest_of_machine(experiments)
-        if largest is not None:
-            most = (largest, largest)
+        most = largest_of_machine(commanded) if largest is None else (largest, largest)
         requested = [trials.named_maneuver(word, machine) for word in maneuver or ()]
         maneuvers = {test.name: test for test in requested or default_maneuvers(most)}
         candidates = [prior.candidate(test) for test in maneuvers.values()]

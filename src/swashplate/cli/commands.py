@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import inspect
+import json
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack, suppress
 from dataclasses import MISSING, dataclass, fields, is_dataclass
 from functools import wraps
 from pathlib import Path
-from typing import Annotated, Any, get_type_hints
+from typing import Annotated, Any, NamedTuple, get_type_hints
 
 import typer
 
 from swashplate.cli.terminal import RESOURCES, SAVED, say_saved
+from swashplate.documents import LARGEST, LARGEST_TOML
 from swashplate.errors import InputError
 from swashplate.units import shown_in
 
@@ -63,7 +65,7 @@ def command(
         if units:
             parameters += _spread(DisplayUnits)
 
-        outputs = {parameter.name for parameter in parameters if _is_output(parameter)}
+        outputs = {each.name: _output_of(each) for each in parameters}
 
         @wraps(function)
         def run(**arguments: Any) -> None:
@@ -87,47 +89,91 @@ def command(
     return register
 
 
-def _is_output(parameter: inspect.Parameter) -> bool:
-    """Whether an option names a file that the command writes."""
-    options = getattr(parameter.annotation, "__metadata__", ())
-    callbacks = [getattr(option, "callback", None) for option in options]
-    return parameter.name == "out" or any(hasattr(each, "writes") for each in callbacks)
+class Output(NamedTuple):
+    """What a command writes at the path that an option gives."""
+
+    files: tuple[str, ...] = ()
+    """Names or patterns of the files in that folder; none if the path is the file."""
+    beside: str = ""
+    """Argument whose folder it is unless one is given."""
+
+    def written(self, path: Path | None, arguments: Mapping[str, object]) -> list[Path]:
+        """Files that are there and would be replaced."""
+        if path is None and self.beside:
+            path = Path(str(arguments[self.beside])).parent
+        if path is None:
+            return []
+        files = [found for name in self.files for found in path.glob(name)]
+        return [file for file in (files if self.files else [path]) if file.is_file()]
 
 
-def _refuse_inputs_as_outputs(arguments: dict[str, Any], outputs: set[str]) -> None:
+def _output_of(parameter: inspect.Parameter) -> Output | None:
+    """What an option has the command write; None if nothing."""
+    for option in getattr(parameter.annotation, "__metadata__", ()):
+        output = getattr(getattr(option, "callback", None), "writes", None)
+        if isinstance(output, Output):
+            return output
+    return Output() if parameter.name == "out" else None
+
+
+def _refuse_inputs_as_outputs(
+    arguments: Mapping[str, object], outputs: Mapping[str, Output | None]
+) -> None:
     """Refuse to write a file onto one that the same command reads, --force or not."""
+    written = dict[Path, str]()
+    for name, output in outputs.items():
+        path = arguments.get(name)
+        if output is not None and (path is None or isinstance(path, Path)):
+            written |= dict.fromkeys(output.written(path, arguments), name)
+    if not written:
+        return
     read = list[Path]()
     for name, value in arguments.items():
-        if name not in outputs:
+        if outputs.get(name) is None:
             for each in value if isinstance(value, list) else [value]:
                 read += _files_named(each)
-    for name in outputs:
-        path = arguments.get(name)
-        if isinstance(path, Path) and path.is_file():
-            same = next((each for each in read if path.samefile(each)), None)
-            if same is not None:
-                raise InputError(
-                    f"{path} is read by this command as {same}, so it cannot be its "
-                    f"--{name.replace('_', '-')}, with --force or without: choose another path."
-                )
+    for path, name in written.items():
+        same = next((each for each in read if path.samefile(each)), None)
+        if same is not None:
+            raise InputError(
+                f"{path} is read by this command as {same}, so --{name.replace('_', '-')} cannot "
+                "replace it, with --force or without: choose another path."
+            )
+
+
+FIT = "fit.json"
+OF_FOLDER = ("drive.toml", "parameters.toml", "setup.toml", FIT)
+"""Files that are read of the folder of a fit, or of the truth of virtual tests."""
 
 
 def _files_named(value: object) -> list[Path]:
-    """Files that an argument names: itself, behind NAME=, and those that a campaign names."""
+    """Files that an argument names: itself, behind NAME=, those of a fit and of a campaign."""
     if not isinstance(value, str | Path):
         return []
-    from swashplate.documents import LARGEST_TOML
-
     files = list[Path]()
     for text in {str(value), str(value).partition("=")[2]}:
         with suppress(OSError, ValueError):
-            if text and Path(text).is_file():
-                files.append(Path(text))
+            path = Path(text)
+            if text and path.is_dir():
+                files += [path / name for name in OF_FOLDER if (path / name).is_file()]
+            elif text and path.is_file():
+                files += [path, *([path.with_name(FIT)] if path.with_name(FIT).is_file() else [])]
+    for file in [each for each in files if each.name == FIT]:
+        files += _campaign_of_fit(file)
     for file in [each for each in files if each.suffix.lower() == ".toml"]:
         with suppress(OSError, ValueError, RecursionError):  # the command says what is wrong
             if file.stat().st_size <= LARGEST_TOML:
                 files += _files_within(tomllib.loads(file.read_text("utf-8")), file.parent)
     return files
+
+
+def _campaign_of_fit(file: Path) -> list[Path]:
+    """The campaign that a stored fit names, if it is still there."""
+    with suppress(OSError, ValueError, RecursionError):  # the command says what is wrong
+        if file.stat().st_size <= LARGEST:
+            content = json.loads(file.read_text("utf-8"))
+            return _files_within([content.get("campaign")], file.parent)
+    return []
 
 
 def _files_within(entry: object, folder: Path) -> list[Path]:

@@ -17,6 +17,7 @@ from swashplate.cli.options import (
     DriveChoice,
     Force,
     new_file,
+    new_folder,
 )
 from swashplate.cli.parsing import campaign_of, drive_file
 from swashplate.cli.terminal import check_free, note, save, spinner
@@ -51,9 +52,7 @@ def export(
     fmu: Annotated[Path | None, new_file(FMU, "FMU for co-simulation.", metavar="FILE.fmu")] = None,
     c: Annotated[
         Path | None,
-        typer.Option(
-            metavar="DIR", help="New or empty folder for C source with the drive's numbers."
-        ),
+        new_folder("New or empty folder for C source with the drive's numbers.", "*"),
     ] = None,
     wasm: Annotated[
         Path | None,

@@ -26,6 +26,7 @@ from swashplate.cli.options import (
     SeedOption,
     SetupOption,
     new_file,
+    new_folder,
 )
 from swashplate.cli.terminal import (
     bullets,
@@ -58,6 +59,7 @@ FILES = {
     "fit.json": "Fit",
 }
 """Files that `Identification.save` writes, of a drive or of a user-defined model."""
+PAGE, MEASURES_FILE = "report.html", "measures.csv"
 MEASURES = (
     "NRMSE is the RMSE over the standard deviation of what was measured, fit % is 100 (1 - "
     "NRMSE); 'of range' below: over the range of the signal, its largest minus its smallest value."
@@ -107,7 +109,7 @@ def fit(
     path: CampaignArgument = CAMPAIGN,
     *,
     out: Annotated[
-        Path, typer.Option(metavar="DIR", help="Folder for the fitted drive and its tables.")
+        Path, new_folder("Folder for the fitted drive and its tables.", *FILES, PAGE)
     ] = Path("fitted"),
     axis: AxisOption = None,
     setup: SetupOption = None,
@@ -184,8 +186,8 @@ def fit(
     fitted drive as a parameter file, the fit setup, the estimates with
     their intervals, and the data that 'report' needs. Exit code 1: the result is
     not usable. Ctrl-C (exit code 130) and SIGTERM (143) end it within 5 s
-    and leave no result; of several starts, those that have ended are kept for
-    --resume.
+    and leave no result, or the whole one without its report; of several starts,
+    those that have ended are kept for --resume.
     """
     clock = StageClock()
     check_folder(out)
@@ -193,7 +195,7 @@ def fit(
     if not resume:
         check_free(*(out / name for name in FILES), force=force)
         if report:
-            check_free(out / "report.html", force=force)
+            check_free(out / PAGE, force=force)
     if model is not None and (setup is not None or begin is not None or joint):
         raise InputError(
             f"{model} defines its free parameters and their initial values: leave out --setup, "
@@ -270,7 +272,7 @@ def _written(result: Identification, out: Path) -> list[str]:
 def _reported(result: Identification, out: Path, truth: ParameterSet | None = None) -> str:
     """Write the report; a line that says so."""
     with spinner("Writing the report"):
-        result.report(out / "report.html", truth=truth)
+        result.report(out / PAGE, truth=truth)
     return f"Report:    {out / 'report.html'}"
 
 
@@ -312,7 +314,7 @@ def validate(
         Role, typer.Option(help="Runs to predict: those held out, those to fit, or both.")
     ] = "validate",
     out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Folder for report.html and measures.csv.")
+        Path | None, new_folder("Folder for report.html and measures.csv.", MEASURES_FILE, PAGE)
     ] = None,
     require: RequiredOption = 10.0,
     force: Force = False,
@@ -327,7 +329,7 @@ def validate(
 
     if out is not None:
         check_folder(out)
-        check_free(out / "measures.csv", out / "report.html", force=force)
+        check_free(out / MEASURES_FILE, out / PAGE, force=force)
     with spinner(f"Reading {path}"):
         parameters: Parameters | None = None if model else parsing.parameters_of(drive)
         campaign, axis_name = parsing.campaign_of(path, axis)
@@ -356,8 +358,8 @@ def validate(
         from swashplate.report.fit_report import write_validation_report
 
         with spinner("Writing the report"):
-            joined(measures).write(made_folder(out) / "measures.csv")
-            page = out / "report.html"
+            joined(measures).write(made_folder(out) / MEASURES_FILE)
+            page = out / PAGE
             notes = {**versions(), "drive from": drive}
             write_validation_report(
                 parameters, campaign, page, predicted, verdict=verdict, notes=notes
@@ -446,7 +448,7 @@ def report(
     with spinner("Assessing"):
         verdict = result.verdict
     note(_reported(result, folder, true))
-    save(pdf, "Printed", lambda to: print_report(folder / "report.html", to))
+    save(pdf, "Printed", lambda to: print_report(folder / PAGE, to))
     runs = shown_runs(result.fit.stages, result.predicted)
     save(data, "Samples, in SI", lambda to: write_samples(runs, to))
     say_saved()

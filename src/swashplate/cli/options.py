@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from swashplate.cli.commands import Output
 from swashplate.cli.terminal import check_writable, note
 from swashplate.tables import FIGURE, TABLE, Form
 from swashplate.units import show_rod
@@ -40,8 +41,21 @@ def new_file(form: Form, help: str, *, metavar: str = "FILE") -> Any:
         check_writable(path, form, force=context.params["force"])
         return path
 
-    check.writes = True  # type: ignore[attr-defined]  # see `commands`: never onto an input
+    check.writes = Output()  # type: ignore[attr-defined]  # see `commands`: never onto an input
     return typer.Option(metavar=metavar, help=help, callback=check)
+
+
+def new_folder(help: str, *files: str, beside: str = "") -> Any:
+    """Option for a folder that a command writes files into, by names or patterns.
+
+    Without one it is that of the argument `beside`.
+    """
+
+    def check(path: Path | None) -> Path | None:
+        return path
+
+    check.writes = Output(files, beside)  # type: ignore[attr-defined]  # as above
+    return typer.Option(metavar="DIR", help=help, callback=check)
 
 
 def force_option(help: str) -> Any:

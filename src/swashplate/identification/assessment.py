@@ -13,7 +13,8 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pydantic import Field
+import numpy as np
+from pydantic import Field, model_validator
 from tomlkit import dumps
 
 from swashplate.__about__ import __version__
@@ -60,7 +61,7 @@ from swashplate.parameters import (
 )
 from swashplate.progress import working
 from swashplate.results import folded
-from swashplate.tables import Table, write_text
+from swashplate.tables import Table, count, write_text
 
 if TYPE_CHECKING:
     import polars
@@ -497,13 +498,26 @@ class FitFile(Document):
     nominal: str | dict[str, float]
     """What the fit began from: a drive's parameter file, or the numbers of a user-defined model."""
     setup: FitSetup
-    stages: tuple[StoredStage, ...] = Field(min_length=1)
+    stages: tuple[StoredStage, ...]
+    """Fewer than the fit setup has if the fit was interrupted."""
     profiles: tuple[Profile | tuple[str, Profile], ...]
     """Behind the name of their stage in older files, which do not name the unknown."""
     folds: CrossValidation | None
     notes: dict[str, str]
     verdict: StoredVerdict | None = None
     """None in a file of a version that did not store it."""
+
+    @model_validator(mode="after")
+    def _fitted(self) -> FitFile:
+        planned = len(self.setup.stages)
+        if not 1 <= len(self.stages) <= planned:
+            raise ValueError(
+                f"it holds {count(len(self.stages), 'stage')} of the {planned} in its fit setup: "
+                "fit again"
+            )
+        if not self.runs:
+            raise ValueError("it names no run that was fitted: fit again")
+        return self
 
 
 def read_verdict(path: str | Path) -> StoredVerdict | None:
@@ -607,8 +621,14 @@ def _stored_stage(path: Path, stored: StoredStage, stage: Stage, problem: Proble
         raise FileError(
             f"{path}: stage {stored.name} has other parameters than its fit setup: fit again."
         )
+    unknowns = Unknowns(stored.unknowns)
+    low, high = unknowns.bounds
+    rounding = 1e-6 * (high - low)
+    vector = stored.solution.vector
+    if np.any(vector < low - rounding) or np.any(vector > high + rounding):
+        raise FileError(f"{path}: stage {stored.name} ends outside its bounds: fit again.")
     return SolvedStage(
-        problem=replace(problem, unknowns=Unknowns(stored.unknowns)),
+        problem=replace(problem, unknowns=unknowns),
         solution=stored.solution,
         starts=stored.starts,
         intervals=stored.intervals,
@@ -624,6 +644,8 @@ def _profiles_of(path: Path, file: FitFile, result: Fit) -> list[Profile]:
     profiles = list[Profile]()
     for entry in file.profiles:
         stage, profile = (entry.stage, entry) if isinstance(entry, Profile) else entry
+        if stage not in {each.stage.name for each in result.stages}:
+            raise FileError(f"{path}: it has a profile of a stage '{stage}', which was not fitted.")
         unknowns = result.stage(stage).problem.unknowns
         if not 0 <= profile.index < len(unknowns.names):
             raise FileError(f"{path}: stage {stage} has no parameter {profile.index + 1}.")

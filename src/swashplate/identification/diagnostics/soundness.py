@@ -96,6 +96,34 @@ def unsound_data(
     return findings
 
 
+class JudgedRuns(NamedTuple):
+    """Runs of a fit that `unsound_data` can say something of."""
+
+    compared: bool = True
+    """Whether the fitted ones are enough to tell that one stands out."""
+    held_out: int = 0
+    """Those that were held out and are compared with the fitted ones."""
+    beyond: tuple[str, ...] = ()
+    """Those whose command goes beyond the fitted ones, so that they are not compared."""
+
+
+def judged_runs(stages: Sequence[StageFit], predicted: Sequence[RunQuality]) -> JudgedRuns:
+    """The runs of a fit that are judged: those that move long enough to have an error."""
+    commands = commands_of([run for stage in stages for run in stage.problem.experiments])
+    beyond = [q.experiment.name for q in predicted if not commands.holds(q.experiment)]
+    compared, held_out = 0, set[str]()
+    for stage in stages:
+        for channel in stage.problem.channels:
+            fitted, _ = cells_of(_records(stage, channel, (), ()))
+            compared = max(compared, len({cell.run for cell in fitted}))
+            if fitted:
+                cells, _ = cells_of(_records(None, channel, predicted, ()))
+                held_out |= {cell.run for cell in cells}
+    return JudgedRuns(
+        compared >= FEWEST_RUNS, len(held_out.difference(beyond)), tuple(dict.fromkeys(beyond))
+    )
+
+
 def unexplained_runs(
     stages: Sequence[StageFit],
     predicted: Sequence[RunQuality],

@@ -20,7 +20,9 @@ from swashplate.identification.diagnostics.discrepancy import (
 )
 from swashplate.identification.diagnostics.soundness import (
     CommandRange,
+    JudgedRuns,
     commands_of,
+    judged_runs,
     unsound_data,
 )
 from swashplate.identification.estimation.drive_model import (
@@ -35,7 +37,7 @@ from swashplate.identification.statistics.determination import WIDE, weak_unknow
 from swashplate.identification.validation import RunQuality, percent
 from swashplate.parameters import COLUMNS
 from swashplate.results import Result, listing
-from swashplate.tables import UNIT, Column, Table, listed
+from swashplate.tables import UNIT, Column, Table, count, listed
 
 REQUIRED = 0.10
 """Largest error of a prediction over the range, if the user requires nothing else."""
@@ -81,6 +83,9 @@ class Verdict(Result):
     """Highest frequency of the sines that it was fitted to or tested with; 0 without sines. [Hz]"""
     commands: CommandRange | None = None
     """Of the runs that it was fitted to; None for a drive that was not fitted."""
+    judged: JudgedRuns | None = None
+    """Which runs the soundness of the data rests on; None in a file of a version that did not
+    store it."""
     assumed: tuple[str, ...] = ()
     """What these logs cannot show, and what is assumed of it."""
     remarks: tuple[str, ...] = ()
@@ -142,10 +147,20 @@ class Verdict(Result):
             return f"Not sound: {' '.join(finding.sentence for finding in self.unsound)}"
         if not self.fitted:
             return "Not assessed: a drive that was not fitted to these runs says little about them."
-        return (
-            "Sound: no fitted run stands out from the others, every held-out run is predicted as "
-            "they lead one to expect, none is clipped."
-        )
+        judged = self.judged or JudgedRuns()
+        clauses = ["no fitted run stands out from the others"]
+        if not judged.compared:
+            clauses = ["too few runs were fitted to compare them with each other"]
+        if judged.held_out:
+            predicted = count(judged.held_out, "held-out run is", "held-out runs are")
+            clauses.append(f"{predicted} predicted as the fitted ones lead one to expect")
+        sentence = f"Sound: {', '.join(clauses)}, none is clipped."
+        if judged.beyond:
+            return (
+                f"{sentence} Not judged, as the command goes beyond the fitted ones: "
+                f"{listed(judged.beyond)}."
+            )
+        return sentence if judged.held_out else f"{sentence} No held-out run was judged."
 
     @property
     def prediction(self) -> str:
@@ -333,6 +348,7 @@ def assess_fit(
         validity=_validity(stages, tested),
         fastest_sine=_fastest_sine(tested),
         commands=commands_of(_fitted_runs(stages)),
+        judged=judged_runs(stages, predicted),
         assumed=tuple(_assumed(stages)),
         remarks=tuple(_starts(stages)),
     )

@@ -7,7 +7,7 @@ what they would add.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import inf
@@ -422,8 +422,10 @@ def _machine_rows(problem: Problem) -> Array:
 KNOWN, WORTH = 1.0, 1e-3
 """Standard error of a solver's number, 100 %, up to which an unknown counts as determined; relative
 gain below which nothing is said of it."""
-FULL = (FULL_VOLTAGE, FULL_VOLTAGE)
-"""Largest commands of a machine of which nothing is known, plus and minus. [V]"""
+Commands = tuple[float, float]
+"""Largest command each way, positive and negative, as magnitudes. [V]"""
+FULL: Commands = (FULL_VOLTAGE, FULL_VOLTAGE)
+"""Of a machine of which nothing is known."""
 NO_COMMAND = 0.05
 """Share of the largest command up to which one the other way is none. [1]"""
 NAMED = 4
@@ -579,26 +581,39 @@ def default_maneuvers(largest: tuple[float, float] = FULL) -> tuple[Maneuver, ..
     )
 
 
-def largest_of_machine(experiments: Sequence[Experiment]) -> tuple[float, float]:
-    """Largest commands plus and minus, magnitudes: the stick's stated range, or what was tested.
+def commands_each_way(ranges: Iterable[tuple[float, float]]) -> Commands:
+    """Largest command each way of commands from low to high, 0 for a way that none goes.
 
-    Of a way that no test goes the other's; never beyond what a card takes. [V]
+    Never beyond what a card takes.
     """
-    ends = list[tuple[float, float]]()
-    for run in experiments:
-        if run.input.kind == "voltage":
-            values = run.input.values
-            low, high = run.input.limits or (float(values.min()), float(values.max()))
-            ends.append((high, -low))
-    if not ends:
-        return FULL
-    # to more than two digits it is noise of the log
-    plus, minus = (min(float(f"{max(each):.2g}"), FULL_VOLTAGE) for each in zip(*ends, strict=True))
+    plus = minus = 0.0
+    for low, high in ranges:
+        plus, minus = max(plus, float(high)), max(minus, -float(low))
     # noise about 0 V is not a command
-    least = NO_COMMAND * max(plus, minus)
-    if max(plus, minus) <= 0.0:
-        return FULL
-    return (plus if plus > least else minus, minus if minus > least else plus)
+    noise = NO_COMMAND * max(plus, minus)
+    return (
+        min(plus, FULL_VOLTAGE) if plus > noise else 0.0,
+        min(minus, FULL_VOLTAGE) if minus > noise else 0.0,
+    )
+
+
+def ranges_of_input(runs: Iterable[Experiment]) -> list[tuple[float, float]]:
+    """Of the voltage of each run the stick's stated range, or what it commands. [V]"""
+    return [
+        run.input.limits or (float(run.input.values.min()), float(run.input.values.max()))
+        for run in runs
+        if run.input.kind == "voltage"
+    ]
+
+
+def largest_of_machine(ranges: Iterable[tuple[float, float]]) -> Commands:
+    """Largest commands of a machine whose commands go from low to high in volts.
+
+    Of a way that none goes the other's; ±10 V of a machine of which nothing is known.
+    """
+    # to more than two digits it is noise of the log
+    plus, minus = (float(f"{volts:.2g}") for volts in commands_each_way(ranges))
+    return (plus or minus, minus or plus) if plus or minus else FULL
 
 
 def advice_table(title: str, judged: Sequence[Advice]) -> Table:

@@ -34,7 +34,13 @@ from swashplate.identification import (
     pooled_measures,
     range_of,
 )
-from swashplate.identification.statistics import unseen_limits, weak_unknowns
+from swashplate.identification.statistics import (
+    FULL,
+    Commands,
+    commands_each_way,
+    unseen_limits,
+    weak_unknowns,
+)
 from swashplate.parameters import FITTED_DRIVE, FULL_VOLTAGE
 from swashplate.report.fit_report.html_page import PageBlock, Section, listed_block, text
 from swashplate.report.fit_report.runs import ShownRun
@@ -56,8 +62,6 @@ alone; what moves it by less is taken into its interval. [1]"""
 LEANS = 0.1
 """Share of a number's variance that goes with an estimate at its bound, from which it has no
 interval: 5 % of its width. [1]"""
-NO_COMMAND = 0.05
-"""Share of the largest command up to which one the other way is none. [1]"""
 FOLLOWS = 0.01
 """Share of a number by which 5 % of what the tests do not determine can move it, from which it has
 no interval. [1]"""
@@ -65,11 +69,8 @@ no interval. [1]"""
 
 # --- numbers --------------------------------------------------------------------------------------
 
-Commands = tuple[float, float]
-"""Largest command each way, positive and negative, as magnitudes. [V]"""
 DEAD_ZONE, TOP_SPEED, ACCELERATION, DELAY, LAG, CREEP = range(6)
 """Rows of the numbers."""
-FULL: Commands = (FULL_VOLTAGE, FULL_VOLTAGE)
 
 
 def machine_numbers_of(drive: Drive, largest: Commands = FULL) -> Array:
@@ -114,18 +115,11 @@ def largest_commands(stages: Sequence[StageFit]) -> Commands:
 
 def tested_commands(stages: Sequence[StageFit]) -> Commands:
     """Largest command each way of the runs that a fit is of, 0 for a way that none goes."""
-    commands = list[Array]()
-    for stage in stages:
-        runs = stage.problem.experiments
-        commands += [run.input.values for run in runs if run.input.kind == "voltage"]
-    size = max((float(np.abs(values).max()) for values in commands), default=0.0)
-    plus = max((float(values.max()) for values in commands), default=0.0)
-    minus = max((float(-values.min()) for values in commands), default=0.0)
-    # noise about 0 V is not a command
-    noise = NO_COMMAND * size
-    return (
-        min(plus, FULL_VOLTAGE) if plus > noise else 0.0,
-        min(minus, FULL_VOLTAGE) if minus > noise else 0.0,
+    runs = [run for stage in stages for run in stage.problem.experiments]
+    return commands_each_way(
+        (float(run.input.values.min()), float(run.input.values.max()))
+        for run in runs
+        if run.input.kind == "voltage"
     )
 
 
