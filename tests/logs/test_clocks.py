@@ -77,9 +77,17 @@ def test_each_waveform_of_a_group_has_its_clock_if_they_differ(tmp_path):
 
 def test_a_start_that_labview_leaves_at_its_zero_is_none(tmp_path):
     unset = datetime.datetime(1904, 1, 1)
-    channels = {("cmd", "u"): waveform(BEGIN), ("enc", "n"): waveform(unset)}
+    channels = {("cmd", "u"): waveform(unset), ("enc", "n"): waveform(unset, wf_start_offset=0.5)}
     path = write_tdms(tmp_path / "log.tdms", channels)
-    assert first_stamps(path, "cmd/time", "enc/time") == [0.0, 0.0]
+    assert first_stamps(path, "cmd/time", "enc/time") == [0.0, 0.5]
+
+
+@pytest.mark.parametrize("unset", [None, datetime.datetime(1904, 1, 1)])
+def test_a_waveform_without_a_start_beside_dated_ones_has_no_clock(tmp_path, unset):
+    channels = {("cmd", "u"): waveform(BEGIN), ("enc", "n"): waveform(unset)}
+    log = open_log(write_tdms(tmp_path / "log.tdms", channels))
+    assert "enc/time" not in [column.name for column in log.columns]
+    assert "no wf_start_time as others have" in log.left_out["enc/time"]
 
 
 @pytest.mark.parametrize(
@@ -205,7 +213,7 @@ def test_calendars_are_told_by_the_number(tmp_path, calendar, header):
         (1_200_000_000, 1_000_000, 100, "us"),  # 20 minutes since a start
         (1_710_151_200_000_000_000, 1_000_000_000, 1000, "ns"),
         (40_000.0, 1.0, 100, "s"),  # of a day
-        (40_000.0, 1.0, 10_000, "s"),
+        (40_000.0, 1.0, 900, "s"),
     ],
 )
 def test_other_stamps_are_as_they_were(tmp_path, first, second, rate, unit):

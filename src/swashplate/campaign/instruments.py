@@ -69,18 +69,22 @@ def instrument_sentences(experiment: Experiment, signal: Channel | InputSignal) 
             f"{signal.source.column}' as int{bits}, or subtract {whole} from them"
         )
         return
-    bound = BOUNDS.get((signal.kind, signal.unit))
     largest = float(values[np.abs(values).argmax()])
-    if bound is not None and abs(largest) > bound.largest:
-        display = display_unit(shown_unit(signal.kind, signal.unit), abs(largest))
-        yield (
-            f"reaches {display.factor * largest:.4g} {display.name}, but {bound.reason}: check "
-            "unit, scale and offset"
-        )
+    if beyond := beyond_any_machine(signal.kind, signal.unit, largest):
+        yield f"reaches {beyond}: check unit, scale and offset"
     lost = {dropout.value for dropout in find_dropouts(experiment, signal)}
     for level in clipping_levels(signal):
         if level not in lost:
             yield _clipped(experiment, signal, level)
+
+
+def beyond_any_machine(kind: str, unit: str, value: float) -> str:
+    """A value of a kind [SI] and why no machine has it, "100 A, but ..."; empty if one may."""
+    bound = BOUNDS.get((kind, unit))
+    if bound is None or abs(value) <= bound.largest:
+        return ""
+    display = display_unit(shown_unit(kind, unit), abs(value))
+    return f"{display.factor * value:.4g} {display.name}, but {bound.reason}"
 
 
 def _clipped(experiment: Experiment, signal: Channel | InputSignal, level: float) -> str:

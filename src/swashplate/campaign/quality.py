@@ -49,6 +49,11 @@ LONG_GAP = 5.0
 """An interval of more than this many usual ones is worth a look; single lost rows are not."""
 LOST_SHARE = 0.01
 """Nor are they worth one until they are more than this share."""
+SLOWEST_LOG = 1.0
+"""Rate from which a log of a drive's motion is plausible: it reaches its speed within some tenths
+of a second. [Hz]"""
+SHORTEST_LOG, MANY_ROWS = 0.2, 100
+"""Time that so many rows of a log last at least: a pump takes about as long to swing out. [s]"""
 AT_REST = 0.25
 """An input within this share of its largest excursion may be at rest, or in a dead zone."""
 NEGATIVE = 0.05
@@ -154,6 +159,7 @@ def _quality(
         if signal.counts is not None:
             lost = int(find_lost_counts(signal.time[used], signal.counts[used]).size)
     else:
+        findings += _of_clocks(experiment)
         findings += _of_input(signal, low, high, limits)
         findings += spike_sentences(experiment, signal)
         findings += dropout_sentences(experiment, signal)
@@ -181,6 +187,27 @@ def _of_input(
         yield (
             f"goes from {low:g} to {high:g} {drive.unit}, beyond its range of "
             f"{limits[0]:g} to {limits[1]:g}: check unit, scale and offset"
+        )
+
+
+def _of_clocks(experiment: Experiment) -> Iterator[str]:
+    """A sentence on a run that is too slow or too short for a motion, as in another unit of time.
+
+    What is left of a run after a gap may be short.
+    """
+    signals = (experiment.input, *experiment.channels.values())
+    period = min(float(np.median(np.diff(signal.time))) for signal in signals)
+    if period > 1.0 / SLOWEST_LOG:
+        yield (
+            f"has a sample every {period:.3g} s, too few for any motion of a drive: check the unit "
+            "of the time stamps"
+        )
+    rows = max(signal.time.size for signal in signals)
+    too_short = experiment.duration < SHORTEST_LOG and rows >= MANY_ROWS
+    if too_short and experiment.start != "estimated":
+        yield (
+            f"has {rows} samples in {experiment.duration:.3g} s, too short for any motion of a "
+            "drive: check the unit of the time stamps"
         )
 
 

@@ -24,13 +24,17 @@ from swashplate.campaign import (
     ESTIMATED_START,
     FIXME,
     KINDS,
+    MANY_ROWS,
     ROD,
+    SHORTEST_LOG,
+    SLOWEST_LOG,
     TURNS,
     Accuracy,
     CampaignFile,
     Experiment,
     InputKind,
     Overview,
+    beyond_any_machine,
     conversion,
     has_sign,
     moves_at_first,
@@ -107,13 +111,15 @@ SIMATIC, SIMATIC_OVERRANGE = 27_648, 32_511
 """Full scale of a SIMATIC's word, and the largest one that it gives (Siemens, analog values)."""
 OPEN_UNITS = ("stroker_pressure", "swash_angle", "spool_position")
 """Kinds whose unit stays open, as hardly a logger writes them in SI."""
+TIME_UNITS = ("s", "sec", "ms", "us", "ns", "min", "h")
+"""Units, in lower case, that a clock's name may end with."""
 TICKS = {"ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 """Units of whole numbers that count the time, and their size. [s]"""
+COMMON = 0.9
+"""Share of a log's numbers above which the others are not marks for no value. [1]"""
 SLOW_LOG = 20.0
 """Rate up to which microseconds may well be ticks of 100 ns: ten samples in half a second, in which
 a drive has reached its speed, are few. [Hz]"""
-SLOWEST_LOG = 1.0
-"""Rate from which a log of a drive's motion is plausible. [Hz]"""
 OVERLAP = 0.1
 """Share of a log's length by which it may seem to begin before the one before it ended: file
 systems round the time of writing to as much as 2 s. [1]"""
@@ -411,6 +417,21 @@ def _signal_of_clock(name: str) -> str:
     return match[1] or match[2] if match else ""
 
 
+def _is_clock(column: LogColumn, blocks: Sequence[Array]) -> bool:
+    """Whether a column is called like a clock of something, "t_cmd", and its numbers increase."""
+    if not _signal_of_clock(column.name) or not _is_unit_of(column.unit or "s", "time"):
+        return False
+    finite = [part[np.isfinite(part)] for part in blocks]
+    return all(part.size > 1 and bool(np.all(np.diff(part) > 0.0)) for part in finite)
+
+
+def _clock_by_header(column: LogColumn) -> _Guess:
+    """Guess of a clock called like something else; of "TimeMs" that is its unit."""
+    ending = _signal_of_clock(column.name)
+    unit = ending if column.unit is None and ending in TIME_UNITS else column.unit
+    return _Guess(column.name, "time", "", unit, in_header=column.unit is not None)
+
+
 def _guesses(
     headers: Mapping[str, LogColumn],
     blocks: Mapping[str, list[Array]],
@@ -434,8 +455,8 @@ def _guesses(
     unnamed = _unnamed_clock(headers, blocks, kinds)
     for name, column in headers.items():
         guess = _by_header(column, kinds.get(name))
-        if _signal_of_clock(name) in names:
-            guess = _Guess(name, "time", "", column.unit)
+        if _signal_of_clock(name) in names or _is_clock(column, blocks[name]):
+            guess = _clock_by_header(column)
         guess = guess._replace(seems_input=guess.kind in INPUTS)
         if name in kinds:
             guess = guess._replace(kind=kinds[name], is_stated=True)
@@ -566,10 +587,16 @@ def _time_unit(blocks: Sequence[Array]) -> tuple[str, str]:
     """Unit of stamps without one, and the comment that gives the reason.
 
     Seconds, unless they are whole numbers of which a step of one second or more would make a log
-    too slow for any motion: then the largest unit in which it is fast enough.
+    too slow for any motion: then the largest unit in which it is fast enough. Open if seconds make
+    a log too slow, or too short, for any motion.
     """
     steps = [float(np.median(np.diff(part))) for part in blocks if part.size > 1]
     step = float(np.median(steps)) if steps else 0.0
+    spans = [float(np.ptp(part)) for part in blocks if part.size >= MANY_ROWS]
+    if step > 1.0 / SLOWEST_LOG and not _are_whole_numbers(blocks):
+        return "s", f"{FIXME}: the header gives none, and in s it has {1.0 / step:.3g} Hz"
+    if spans and max(spans) < SHORTEST_LOG:
+        return "s", f"{FIXME}: the header gives none, and in s it lasts {max(spans):.3g} s"
     if step < 1.0 / SLOWEST_LOG or not _are_whole_numbers(blocks):
         return "s", "guessed: the header gives none"
     fast = (unit for unit, size in TICKS.items() if step * size <= 1.0 / SLOWEST_LOG)
@@ -670,7 +697,7 @@ def _axis_lines(
     drive_line = '# drive = "hoist"    # a packaged drive or a parameter file, to be fitted'
     if drive is not None:
         drive_line = f"drive = {toml_string(name if name in preset_names() else drive)}"
-    clocks = {guess.name: _clock(guess, guesses) for guess in guesses}
+    clocks = {guess.name: _clock(guess, guesses, blocks) for guess in guesses}
     main = next((clocks[guess.name] for guess in (*axis.inputs, *guesses)), "")
     if not main:
         main = f"{NO_TIME}    # {FIXME}: no column of time found; samples a second"
@@ -697,8 +724,12 @@ def _axis_lines(
     return lines
 
 
-def _clock(signal: _Guess, guesses: Sequence[_Guess]) -> str:
-    """A signal's line of time: its own column of time, or the first of its group, or of all."""
+def _clock(signal: _Guess, guesses: Sequence[_Guess], blocks: Mapping[str, Sequence[Array]]) -> str:
+    """A signal's line of time: its own column of time, or the first of its group, or of all.
+
+    Of several clocks that are called like something else it is the only one of its length; it is
+    open if there are more.
+    """
     times = [guess for guess in guesses if guess.kind == "time"]
     if not times:
         return ""
@@ -706,9 +737,16 @@ def _clock(signal: _Guess, guesses: Sequence[_Guess]) -> str:
     own = [guess for guess in times if _signal_of_clock(guess.name) == words]
     # the clock of another signal is no clock of all
     common = [guess for guess in times if not _signal_of_clock(guess.name)] or times
+    rows = [part.size for part in blocks[signal.name]]
+    if common == times:
+        common = [guess for guess in times if [p.size for p in blocks[guess.name]] == rows] or times
     of_group = [guess for guess in common if guess.name.rpartition("/")[0] == group]
     time = [*own, *of_group, *common][0]
     column = f"column = {toml_string(time.name)}"
+    if not own and len(common) > 1 and all(_signal_of_clock(guess.name) for guess in common):
+        choices = " or ".join(repr(guess.name) for guess in common)
+        reason = f"the clock of '{signal.name}' is {choices}"
+        return f"# time = {{ {column} }}    # {FIXME}: {reason}"
     if time.in_header:
         return f"time = {{ {column} }}"
     return f"time = {{ {column}, unit = {toml_string(time.unit or 's')} }}    # {time.unit_comment}"
@@ -739,7 +777,7 @@ def _signal_lines(
     elif kind == "encoder_counts":
         lines += _encoder_lines(counts_per_turn)
     else:
-        lines += _unit_lines(guess)
+        lines += _unit_lines(guess, blocks)
     if guess.full_scale and not is_scaled_command:
         reason = (
             f"range of the instrument over {guess.full_scale}, as of a PLC's word at full scale"
@@ -792,8 +830,8 @@ def _accuracy_lines(kind: str, unit: str | None) -> list[str]:
     return [f"# accuracy = {{ {stated} }}    # {meaning}"]
 
 
-def _unit_lines(signal: _Guess) -> list[str]:
-    """The entry of a signal's unit, none if the header has it."""
+def _unit_lines(signal: _Guess, blocks: Sequence[Array]) -> list[str]:
+    """The entry of a signal's unit, none if the header has it, open if no guess fits it."""
     units = KINDS[signal.kind].units
     usual = units[0] if units else "1"
     if signal.unit is not None and units and not _is_unit_of(signal.unit, signal.kind):
@@ -812,7 +850,27 @@ def _unit_lines(signal: _Guess) -> list[str]:
         usual = "mm"
     if signal.kind in OPEN_UNITS:
         return [f"# unit = {toml_string(usual)}    # {FIXME}: the header gives none"]
+    if beyond := _beyond_guessed_unit(signal.kind, usual, blocks):
+        reason = f"the header gives none, and in {usual} it would reach {beyond}"
+        return [f"# unit = {toml_string(usual)}    # {FIXME}: {reason}"]
     return [f"unit = {toml_string(usual)}    # guessed: the header gives none"]
+
+
+def _beyond_guessed_unit(kind: str, unit: str, blocks: Sequence[Array]) -> str:
+    """A value that a signal would have in a guessed unit, and why it cannot; empty if it can.
+
+    It is one that a tenth of the numbers of a log go beyond: a few may be marks for no value.
+    """
+    finite = [part[np.isfinite(part)] for part in blocks]
+    usual_peaks = [float(np.quantile(np.abs(part), COMMON)) for part in finite if part.size]
+    peak = max(usual_peaks, default=0.0)
+    if kind == "voltage":
+        beyond_card = f"{peak:.4g} V, but a card takes 10 V"
+        return beyond_card if peak > 10.0 * SIMATIC_OVERRANGE / SIMATIC else ""
+    if not KINDS[kind].units:
+        return ""
+    si, factor, zero = conversion(kind, unit, "")
+    return beyond_any_machine(kind, si, factor * peak + zero)
 
 
 def _is_rod(name: str) -> bool:

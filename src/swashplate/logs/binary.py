@@ -530,7 +530,14 @@ def _tdms_items(file: Any) -> Iterator[_Item]:
 
     If the waveforms of a group differ in start, increment or length, each channel has a column of
     its own, ``channel time``. In a file of several groups, a column is called ``group/channel``.
+    Beside waveforms that begin at a date, one without is left out: nobody knows when it begins.
     """
+    waveforms = [
+        _waveform(channel.properties, len(channel))
+        for group in file.groups()
+        for channel in group.channels()
+    ]
+    some_have_dates = any(isinstance(each, _Waveform) and each.date for each in waveforms)
     for group in file.groups():
         prefix = f"{group.name}/" if len(file.groups()) > 1 else ""
         clocks, names = dict[str, _Waveform | str](), set[str]()
@@ -548,6 +555,8 @@ def _tdms_items(file: Any) -> Iterator[_Item]:
             read = partial(_tdms_rows, channel)
             yield _Item(name, "", str(unit) if unit else None, rows, read, begin)
             clock = _waveform(properties, rows)
+            if some_have_dates and isinstance(clock, _Waveform) and clock.date is None:
+                clock = "it has no wf_start_time as others have, so nobody knows when it begins"
             if clock is not None:
                 clocks[channel.name] = clock
         differ = len({*clocks.values()}) > 1
