@@ -115,8 +115,9 @@ TIME_UNITS = ("s", "sec", "ms", "us", "ns", "min", "h")
 """Units, in lower case, that a clock's name may end with."""
 TICKS = {"ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 """Units of whole numbers that count the time, and their size. [s]"""
-COMMON = 0.9
-"""Share of a log's numbers above which the others are not marks for no value. [1]"""
+COMMON, COMMON_LEVELS = 0.9, 0.98
+"""Shares of a log's numbers, and of their different values, beyond which some may be marks for no
+value: these last for up to a tenth of a log, and repeat themselves. [1]"""
 SLOW_LOG = 20.0
 """Rate up to which microseconds may well be ticks of 100 ns: ten samples in half a second, in which
 a drive has reached its speed, are few. [Hz]"""
@@ -804,6 +805,12 @@ def _first_number(blocks: Sequence[Array]) -> float:
     return 0.0
 
 
+def _common_peak(sizes: Array) -> float:
+    """What many of some numbers (n,), or of their different values, go beyond."""
+    levels = np.quantile(np.unique(sizes), COMMON_LEVELS, method="lower")
+    return max(float(np.quantile(sizes, COMMON)), float(levels))
+
+
 def _encoder_lines(counts_per_turn: float | None) -> list[str]:
     """Entries of an encoder, whose counts for a turn stay open if they are not stated."""
     counts = f"# counts_per_turn = 1000    # {FIXME}: per turn, quadrature included"
@@ -859,11 +866,10 @@ def _unit_lines(signal: _Guess, blocks: Sequence[Array]) -> list[str]:
 def _beyond_guessed_unit(kind: str, unit: str, blocks: Sequence[Array]) -> str:
     """A value that a signal would have in a guessed unit, and why it cannot; empty if it can.
 
-    It is one that a tenth of the numbers of a log go beyond: a few may be marks for no value.
+    A few numbers far beyond all others may be marks for no value.
     """
-    finite = [part[np.isfinite(part)] for part in blocks]
-    usual_peaks = [float(np.quantile(np.abs(part), COMMON)) for part in finite if part.size]
-    peak = max(usual_peaks, default=0.0)
+    finite = [np.abs(part[np.isfinite(part)]) for part in blocks]
+    peak = max((_common_peak(part) for part in finite if part.size), default=0.0)
     if kind == "voltage":
         beyond_card = f"{peak:.4g} V, but a card takes 10 V"
         return beyond_card if peak > 10.0 * SIMATIC_OVERRANGE / SIMATIC else ""
