@@ -827,3 +827,19 @@ def test_a_clock_of_one_length_is_that_of_the_signals_of_its_length(tmp_path: Pa
 def test_the_unit_of_a_clock_at_the_end_of_its_name(drafted: Drafted) -> None:
     columns = {"TimeMs": 1000.0 * TIME, "u [V]": BOTH, "n [rpm]": lagged(BOTH)}
     assert drafted({"log.csv": columns})[0].duration == pytest.approx(TIME[-1])
+
+
+@pytest.mark.parametrize(
+    ("header", "unit"),
+    [
+        ("speed_deg_s", "deg/s"),
+        ("Drehzahl_Grad_s", "Grad/s"),
+        ("Drehzahl in Grad/s", "Grad/s"),
+        ("speed deg per s", "deg/s"),
+        ("n_U_min", "U/min"),
+        ("rod_speed_mm_s", "mm/s"),
+    ],
+)
+def test_a_fraction_at_the_end_of_a_name(tmp_path: Path, header: str, unit: str) -> None:
+    _, axis, _ = drafted_entries(tmp_path, {"t [s]": TIME, "u [V]": BOTH, header: BOTH})
+    assert axis["channels"]["shaft_speed"]["unit"] == unit

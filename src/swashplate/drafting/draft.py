@@ -8,7 +8,7 @@ The kind of a column follows from its name and unit by the table of kinds,
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
 from itertools import pairwise
@@ -86,6 +86,8 @@ TIME = (
     r"datetime|date time|clock|t|seconds?|exp time|datenum|filetime"
 )
 """Names of columns of time stamps; those of signals are in `KINDS`."""
+PER = r"[_\s]+(?:(?:per|pro|je|par|por)[_\s]+)?(s|sec|sek|min)"
+"""End of a unit whose fraction is written in words or without its bar: "deg_s", "deg per s"."""
 COMPLEMENT = "(?: (?:of|der|des|du|de|del|della|do|da|van|av) .*)?"
 """Complement that may follow in such a name: "Drehzahl der Trommel"."""
 DEGREES_AS_GRAD = re.compile(
@@ -363,26 +365,40 @@ def _by_header(column: LogColumn, kind: str | None) -> _Guess:
         name = plc_name["after"] or plc_name["before"]
     unit = column.unit or ("rpm" if re.search(TURNS, name.lower()) else None)
     by_name = _by_words(column, name, unit)
-    split = re.fullmatch(r"(.*)[_\s]+([^_\s]+)", name)
-    stem, ending = split.groups() if split else ("", name)
-    by_last_word = _by_words(column, stem, None)
-    if by_last_word.kind == "other" and ending in ("V", "mV"):
-        by_last_word = by_last_word._replace(kind="voltage")
     if kind is not None:
         by_name = by_name._replace(kind=kind)
-        by_last_word = by_last_word._replace(kind=kind)
-    if (
-        column.unit is None
-        and by_name.kind not in HALVES
-        and not ending.isdigit()
-        and (_is_unit_of(ending, by_last_word.kind) or _counts_in_grad(by_last_word.kind, ending))
-    ):
-        return by_last_word._replace(unit=ending, in_header=False)
+    for stem, ending in _units_behind(name) if column.unit is None else ():
+        by_stem = _by_words(column, stem, None)
+        if by_stem.kind == "other" and ending in ("V", "mV"):
+            by_stem = by_stem._replace(kind="voltage")
+        if kind is not None:
+            by_stem = by_stem._replace(kind=kind)
+        is_unit = _is_unit_of(ending, by_stem.kind) or _counts_in_grad(by_stem.kind, ending)
+        if is_unit and by_name.kind not in HALVES and not ending.isdigit():
+            return by_stem._replace(unit=ending, in_header=False)
     return by_name._replace(
         unit=unit if by_name.kind == "shaft_speed" else column.unit,
         in_header=column.unit is not None,
         has_plc_name=plc_name is not None,
     )
+
+
+def _units_behind(name: str) -> Iterator[tuple[str, str]]:
+    """What may be units at the end of a name, longest first, each with the name before it.
+
+    "speed_deg_s", "speed deg per s" and "speed in deg/s" are in deg/s; without the words of a
+    signal before it, the last word is the unit.
+    """
+    quotient = re.fullmatch(rf"(.+?)[_\s]+([^_\s]+){PER}", name)
+    if quotient:
+        yield _without_in(quotient[1]), f"{quotient[2]}/{quotient[3]}"
+    stem, _, ending = re.sub(r"[_\s]+", " ", name).rpartition(" ")
+    yield _without_in(stem), ending
+
+
+def _without_in(name: str) -> str:
+    """A name without the "in" that leads to its unit."""
+    return re.sub(r"[_\s]+in$", "", name)
 
 
 def _check_unit(kind: str, unit: str, what: str) -> None:

@@ -223,12 +223,17 @@ def unit_of(column: LogColumn, requested: str, si: str) -> str:
     suffixed = re.fullmatch(rf"{re.escape(requested)}_(\w+)", column.name)
     if suffixed:
         return suffixed[1]
-    _, underscore, ending = column.name.rpartition("_")
-    try:
-        to_si(1.0, ending if underscore else si, si, "")
-    except InputError:
-        return si
-    return ending if underscore else si
+    words = column.name.split("_")
+    # "speed_deg_s" has a fraction at its end, "time_ms" a single word
+    endings = ["/".join(words[-2:])] if len(words) > 2 else []
+    endings += words[-1:] if len(words) > 1 else []
+    for ending in endings:
+        try:
+            to_si(1.0, ending, si, "")
+        except InputError:
+            continue
+        return ending
+    return si
 
 
 def _without_unit(column: LogColumn) -> str:
