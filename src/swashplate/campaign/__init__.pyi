@@ -16,6 +16,7 @@ from .experiment import InputSignal as InputSignal
 from .experiment import SignalOrigin as SignalOrigin
 from .experiment import resolution_of_inputs as resolution_of_inputs
 from .instruments import beyond_any_machine as beyond_any_machine
+from .instruments import unsigned_word_sentence as unsigned_word_sentence
 from .overview import BlockRanges as BlockRanges
 from .overview import LogWindow as LogWindow
 from .overview import Overview as Overview

@@ -160,7 +160,8 @@ def _quality(
             lost = int(find_lost_counts(signal.time[used], signal.counts[used]).size)
     else:
         findings += _of_clocks(experiment)
-        findings += _of_input(signal, low, high, limits)
+        if not unsigned_word(signal):
+            findings += _of_input(signal, low, high, limits)
         findings += spike_sentences(experiment, signal)
         findings += dropout_sentences(experiment, signal)
         findings += instrument_sentences(experiment, signal)
@@ -236,7 +237,7 @@ def _of_channel(experiment: Experiment, channel: Channel, signed: bool) -> Itera
         return
     if np.ptp(values) == 0.0 and np.ptp(drive.values) > 0.0:
         yield "never changes although the input does: is it connected?"
-    if unsigned_word(values):
+    if unsigned_word(channel):
         # its jumps are those of the words, and say nothing else
         yield from instrument_sentences(experiment, channel)
         return
