@@ -82,6 +82,20 @@ def test_the_printed_line_leaves_the_dropout_out(drafted: Drafted, tmp_path) -> 
     assert mended[-1].low > -1.0
 
 
+@pytest.mark.parametrize(
+    ("column", "values", "reading"),
+    [
+        ("speed [rpm]", SPEED, -999.0),
+        ("speed [rpm]", SPEED, -60.0),
+        ("position [mm]", POSITION, 0.0),
+    ],
+)
+def test_a_lost_signal_is_no_motion(drafted: Drafted, column, values, reading) -> None:
+    """Its mark is not taken for a motion both ways under a command of one sign."""
+    tests = drafted(voltage=COMMAND, **{column: lost(values, 3.0, 0.3, reading)})
+    assert campaign_findings(tests) == ()
+
+
 def test_a_command_that_drops_while_the_current_flows_on(drafted: Drafted) -> None:
     tests = drafted(voltage=lost(COMMAND, 4.0, 0.3, 0.0), **{"current [A]": AMPERES})
     assert any("axes.drive.input.ignore" in text for text in findings(tests)["input"])

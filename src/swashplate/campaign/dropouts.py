@@ -192,7 +192,7 @@ def dropout_sentences(experiment: Experiment, signal: Channel | InputSignal) -> 
         reading = f"{display.factor * lost[0].value:.4g} {display.name}"
         when = f"from {lost[0].begin:.6g} to {lost[0].end:.6g} s"
         if len(lost) > 1:
-            when += f" and {len(lost) - 1} times more"
+            when += " and once more" if len(lost) == 2 else f" and {len(lost) - 1} times more"
         said = {
             "mark": f"reads {reading} {when}, far off all else, as a mark for no value",
             "fallen": f"reads {reading} {when} and jumps there and back, which no motion does",

@@ -22,7 +22,7 @@ from swashplate.campaign.directions import (
     swapped_currents,
     turned_channels,
 )
-from swashplate.campaign.dropouts import dropout_sentences
+from swashplate.campaign.dropouts import dropout_sentences, find_dropouts
 from swashplate.campaign.experiment import Channel, Experiment, InputSignal
 from swashplate.campaign.instruments import instrument_sentences, unsigned_word
 from swashplate.campaign.samples import (
@@ -462,10 +462,13 @@ def _one_sided(axis: str, runs: Sequence[Experiment]) -> Iterator[str]:
 def _mean_speeds(experiment: Experiment) -> Iterator[tuple[Channel, Array, Array]]:
     """Each channel that moves, with instants (m,) [s] and its mean speeds (m,) over 0.5 s before.
 
-    [unit, or unit/s of a position]
+    [unit, or unit/s of a position] Of dropouts nothing is said here.
     """
     for channel in experiment.of_kind("shaft_speed", "position", "encoder_counts"):
-        time, values = channel.time[channel.used], channel.values[channel.used]
+        kept = channel.used
+        for lost in find_dropouts(experiment, channel):
+            kept = kept & ((channel.time < lost.begin) | (channel.time > lost.end))
+        time, values = channel.time[kept], channel.values[kept]
         width = 1
         if time.size > 1:
             width = max(round(AVERAGED / float(np.median(np.diff(time)))), 1)
