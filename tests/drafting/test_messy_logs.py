@@ -706,6 +706,15 @@ def test_logs_of_a_logger_that_scales_itself(drafted: Drafted) -> None:
         assert run["shaft_speed"].values == pytest.approx(MINUTE * speed)
 
 
+def test_logs_of_a_logger_that_scales_itself_in_names(drafted: Drafted) -> None:
+    first = {"Time_s": TIME, "Voltage_V": BOTH, "Speed_rpm": lagged(BOTH)}
+    second = {"Time_ms": 1e3 * TIME, "Voltage_mV": 10.0 * BOTH, "Speed_rpm": lagged(BOTH)}
+    tests = drafted({"large.csv": first, "small.csv": second})
+    assert tests["large"].input.values == pytest.approx(BOTH)
+    assert tests["small"].input.values == pytest.approx(0.01 * BOTH)
+    assert tests["small"].input.time == pytest.approx(TIME, abs=1e-9)
+
+
 def test_columns_of_one_name_and_several_quantities_are_told_apart(drafted: Drafted) -> None:
     first = {"time": TIME, "voltage": BOTH, "Speed [rpm]": BOTH}
     tests = drafted({"a.csv": first, "b.csv": {**first, "Speed [mm/s]": BOTH}})
@@ -753,6 +762,19 @@ def test_several_axes_in_a_log_are_said(tmp_path: Path) -> None:
     columns = {"Time [s]": TIME, "u links": BOTH, "n links [rpm]": BOTH, "u rechts": BOTH}
     text, *_ = drafted_entries(tmp_path, columns | {"n rechts [rpm]": BOTH})
     assert "Inputs: u links, u rechts" in line_of(text, "# Several axes?")
+
+
+def test_letters_behind_names_tell_axes(tmp_path: Path) -> None:
+    logged = ("voltage_A [V]", "speed_A [rpm]", "voltage_B [V]", "speed_B [rpm]")
+    text, *_ = drafted_entries(tmp_path, {"Time [s]": TIME} | dict.fromkeys(logged, BOTH))
+    assert "# Several axes, by the beginnings of the columns' names: a, b" in text
+
+
+def test_channels_alike_of_one_command_are_said(tmp_path: Path) -> None:
+    columns = {"u [V]": BOTH, "boom position [mm]": BOTH, "stick position [mm]": BOTH}
+    text, *_ = drafted_entries(tmp_path, {"Time [s]": TIME, **columns})
+    said = line_of(text, "# Several axes?")
+    assert "Channels alike: boom position [mm], stick position [mm]" in said
 
 
 # --- guesses that no machine fits -----------------------------------------------------------------

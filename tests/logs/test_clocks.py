@@ -287,3 +287,11 @@ def test_single_floats_of_a_late_clock_are_rounded_stamps(tmp_path):
     findings = " ".join(sentence for signal in examine(run) for sentence in signal.findings)
     assert "rounded to 7.8 ms, of an even 100 Hz" in findings
     assert "missing" not in findings
+
+
+def test_stamps_rounded_until_they_repeat_are_to_be_left_out(tmp_path):
+    stamps = np.float32(2e5 + np.arange(801) / 100.0)
+    with h5py.File(tmp_path / "log.h5", "w") as file:
+        for name, values in (("time", stamps), ("voltage", np.ones(801)), ("speed", np.ones(801))):
+            file[name] = values
+    assert "write time = { rate = ... }" in draft_campaign([tmp_path / "log.h5"], tmp_path)

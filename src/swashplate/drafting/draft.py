@@ -8,7 +8,8 @@ The kind of a column follows from its name and unit by the table of kinds,
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
 from itertools import pairwise
@@ -53,6 +54,7 @@ from swashplate.logs import (
     Log,
     LogColumn,
     Stamps,
+    TextOptions,
     calendar_of,
     open_log,
     second_of,
@@ -175,6 +177,7 @@ def draft_campaign(
     columns: Mapping[str, str] | None = None,
     units: Mapping[str, str] | None = None,
     title: str | None = None,
+    options: TextOptions | None = None,
 ) -> str:
     """Text of a campaign file for some logs.
 
@@ -193,6 +196,8 @@ def draft_campaign(
         Kinds of some columns, ``"time"`` or one such as ``"voltage"``, and their units.
     title : str, optional
         Heading of the report; by default the folder's name, marked as guessed.
+    options : TextOptions, optional
+        Layout of text logs where it is ambiguous, such as the separator of thousands.
 
     Returns
     -------
@@ -222,7 +227,9 @@ def draft_campaign(
     if not logs:
         raise InputError("A draft needs at least one log.")
     kinds, units, folder = dict(columns or {}), dict(units or {}), Path(folder).resolve()
-    opened = _with_common_names([open_log(path) for path in logs], {*kinds, *units})
+    opened = _with_common_names(
+        [open_log(path, options=options) for path in logs], {*kinds, *units}
+    )
     headers = dict[str, LogColumn]()
     for log in opened:
         for column in log.columns:
@@ -236,13 +243,25 @@ def draft_campaign(
     heading = f"schema = {SCHEMA}\ntitle = {toml_string(title or folder.name)}"
     if title is None:
         heading += "    # guessed, the folder's name: the report's heading; machine, place, author"
-    lines = [HEADER, heading, ""]
+    lines = [HEADER, heading, "", *_format_lines(options)]
     for name, axis in axes.items():
         lines += _axis_lines(name, axis, guesses, blocks, opened[0], drive, counts_per_turn)
     lines += _several_lines(axes)
     lines += _unused_lines(guesses, axes, opened, numbers, counts_per_turn)
     lines += _run_lines(opened, numbers, axes, folder, text="\n".join(lines))
     return "\n".join(lines).rstrip() + "\n"
+
+
+def _format_lines(options: TextOptions | None) -> list[str]:
+    """The table of a text log's layout, none if it is recognised."""
+    stated = {} if options is None else {k: v for k, v in vars(options).items() if v is not None}
+    if not stated:
+        return []
+    entries = [
+        f"{key} = {toml_string(value) if isinstance(value, str) else value}"
+        for key, value in stated.items()
+    ]
+    return ["[format]", *entries, ""]
 
 
 def _check_stated(
@@ -263,31 +282,37 @@ def _check_stated(
 def _with_common_names(logs: Sequence[Log], stated: set[str]) -> list[Log]:
     """Logs in which a column whose unit changes from log to log is called without its unit.
 
-    A logger that scales itself writes "Voltage [V]" in one log and "Voltage [mV]" in the next.
-    Columns that the caller states keep their names.
+    A logger that scales itself writes "Voltage [V]" in one log and "Voltage [mV]" in the next, or
+    "Voltage_V" and "Voltage_mV". Columns that the caller states keep their names.
     """
     units = dict[str, dict[str, LogColumn]]()
     for log in logs:
         for column in log.columns:
-            if column.unit is not None and column.name not in stated:
-                units.setdefault(_without_brackets(column.name), {})[column.name] = column
-    names = {
-        column.name: bare
-        for bare, columns in units.items()
+            bare = _without_unit(column)
+            if bare.unit is not None and column.name not in stated:
+                units.setdefault(bare.name, {})[column.name] = bare
+    renamed = {
+        name: column
+        for columns in units.values()
         if len(columns) > 1
-        and all(_has_one(log, bare, columns) for log in logs)
+        and all(_has_one(log, columns) for log in logs)
         and _is_one_quantity(list(columns.values()))
-        for column in columns.values()
+        for name, column in columns.items()
     }
     return [
-        replace(
-            log,
-            columns=tuple(
-                column._replace(name=names.get(column.name, column.name)) for column in log.columns
-            ),
-        )
+        replace(log, columns=tuple(renamed.get(column.name, column) for column in log.columns))
         for log in logs
     ]
+
+
+def _without_unit(column: LogColumn) -> LogColumn:
+    """A column called without its unit, which stands in brackets or behind an underline."""
+    if column.unit is not None:
+        return column._replace(name=_without_brackets(column.name))
+    stem, _, ending = column.name.rpartition("_")
+    if stem and _by_header(column, None).unit == ending:
+        return LogColumn(stem, ending)
+    return column
 
 
 def _without_brackets(name: str) -> str:
@@ -295,9 +320,10 @@ def _without_brackets(name: str) -> str:
     return re.sub(r"[\[(].*[\])]", "", name).strip()
 
 
-def _has_one(log: Log, bare: str, columns: Mapping[str, LogColumn]) -> bool:
-    """Whether a name without unit means one of some columns of a log, or the log has none."""
-    if not any(_without_brackets(column.name) == bare for column in log.columns):
+def _has_one(log: Log, columns: Mapping[str, LogColumn]) -> bool:
+    """Whether the common name of some columns means one of them in a log, or the log has none."""
+    bare = next(iter(columns.values())).name
+    if not any(_without_unit(column).name == bare for column in log.columns):
         return True
     try:
         return log.find(bare).name in columns
@@ -350,7 +376,7 @@ def _by_words(column: LogColumn, name: str, unit: str | None) -> _Guess:
             axis = match[1] or ""
         if not first_kind and (match is not None or rotational_unit in entry.marks):
             first_kind = kind
-    numbered = re.fullmatch(r"(.+) (\d+|left|right|links|rechts)", words)
+    numbered = re.fullmatch(r"(.+) (\d+|[ab]|left|right|links|rechts)", words)
     if axis is None and numbered is not None:
         of_name = _by_words(column, numbered[1], unit)
         return of_name._replace(axis=f"{of_name.axis} {numbered[2]}".strip())
@@ -905,18 +931,24 @@ def _several_lines(axes: Mapping[str, _Axis]) -> list[str]:
     if len(axes) > 1:
         return [f"{SEVERAL}, by the beginnings of the columns' names: {', '.join(axes)}", ""]
     (axis,) = axes.values()
-    kinds = [guess.kind for guess in axis.channels.values()]
-    if len(axis.inputs) > 1 and len(set(kinds)) < len(kinds):
-        inputs, channels = (
-            ", ".join(guess.name for guess in guesses)
-            for guesses in (axis.inputs, axis.channels.values())
-        )
-        return [
-            f"{SEVERAL}? Inputs: {inputs}; channels: {channels}: keep those of one axis here, and "
-            "write another [axes.NAME] for each other one",
-            "",
-        ]
-    return []
+    kinds = Counter(guess.kind for guess in axis.channels.values())
+    alike = [guess for guess in axis.channels.values() if kinds[guess.kind] > 1]
+    if len(axis.inputs) > 1 and alike:
+        listed = f"Inputs: {_names(axis.inputs)}; channels: {_names(axis.channels.values())}"
+    elif len({guess.axis for guess in alike}) > 1:
+        listed = f"Channels alike: {_names(alike)}"
+    else:
+        return []
+    return [
+        f"{SEVERAL}? {listed}: keep those of one axis here, and write another [axes.NAME] for each "
+        "other one",
+        "",
+    ]
+
+
+def _names(guesses: Iterable[_Guess]) -> str:
+    """Names of columns in a row."""
+    return ", ".join(guess.name for guess in guesses)
 
 
 def _unused_lines(

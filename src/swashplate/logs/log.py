@@ -265,9 +265,19 @@ def check_stamps(log: Log, column: str, stamps: Array) -> None:
     if earlier == later:
         what = f"has {earlier!r} twice, in data rows {row + 1} and {row + 2}"
     others = f", the first of {late.size} such rows" if late.size > 1 else ""
-    raise FileError(f"{log.path}: column '{column}' {what}{others}; time stamps must increase.")
+    remedy = ""
+    if late.size > ROUNDED * stamps.size and np.all(np.diff(stamps) >= 0.0):
+        remedy = (
+            "; so coarsely rounded stamps of an even log are better left out: write time = { rate "
+            "= ... } with its samples a second instead of their column"
+        )
+    raise FileError(
+        f"{log.path}: column '{column}' {what}{others}; time stamps must increase{remedy}."
+    )
 
 
+ROUNDED = 0.05
+"""Share of stamps that are there twice from which all are rounded: events are few. [1]"""
 SHORTEST = 1e-6
 """A record lasts longer: below it the unit of its stamps is wrong. [s]"""
 LONGEST = 1e10
