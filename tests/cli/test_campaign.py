@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Callable
+from math import pi
 from pathlib import Path
 
 import polars as pl
@@ -279,5 +280,5 @@ def test_a_draft_of_logs_with_thousands(done, refused, tmp_path: Path) -> None:
     )
     done("campaign", "init", "log.csv", "--format", "thousands=,")
     (run,) = Campaign.from_toml(tmp_path / "campaign.toml")
-    rpm = run["shaft_speed"].values * 30.0 / np.pi
+    rpm = run["shaft_speed"].values * 30.0 / pi
     assert rpm[[0, 199]] == pytest.approx([999.0, 1198.0])
