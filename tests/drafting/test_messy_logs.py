@@ -342,6 +342,13 @@ def test_each_group_has_its_own_clock(tmp_path: Path, suffix: str) -> None:
         assert tests["log"]["shaft_speed"].values == pytest.approx(speed)
 
 
+def test_groups_of_one_length_have_their_clocks(tmp_path: Path) -> None:
+    groups = {"cmd": {"time": TIME, "voltage": BOTH}, "meas": {"time": TIME + 0.5, "speed": BOTH}}
+    write_log(tmp_path / "log.h5", groups, units={"voltage": "V", "speed": "rad/s"})
+    run = read_draft(tmp_path, [tmp_path / "log.h5"])["log"]
+    assert (run.input.time[0], run["shaft_speed"].time[0]) == (0.0, 0.5)
+
+
 # --- runs that lack a channel ---------------------------------------------------------------------
 
 

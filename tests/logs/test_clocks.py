@@ -90,6 +90,13 @@ def test_a_waveform_without_a_start_beside_dated_ones_has_no_clock(tmp_path, uns
     assert "no wf_start_time as others have" in log.left_out["enc/time"]
 
 
+def test_a_channel_whose_clock_is_left_out_has_no_other_s(tmp_path):
+    channels = {("cmd", "voltage"): waveform(BEGIN), ("enc", "speed"): waveform(None)}
+    path = write_tdms(tmp_path / "log.tdms", channels)
+    text = draft_campaign([path], tmp_path)
+    assert "# FIXME: 'enc/time': it has no wf_start_time as others have" in text
+
+
 @pytest.mark.parametrize(
     ("changed", "end"),
     [

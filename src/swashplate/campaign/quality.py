@@ -196,7 +196,7 @@ def _of_clocks(experiment: Experiment) -> Iterator[str]:
 
     What is left of a run after a gap may be short.
     """
-    signals = (experiment.input, *experiment.channels.values())
+    signals: tuple[InputSignal | Channel, ...] = (experiment.input, *experiment.channels.values())
     period = min(float(np.median(np.diff(signal.time))) for signal in signals)
     if period > 1.0 / SLOWEST_LOG:
         yield (

@@ -455,6 +455,8 @@ def _counts_in_grad(kind: str, unit: str | None) -> bool:
 
 def _signal_of_clock(name: str) -> str:
     """The signal, in words, whose clock a column such as "Speed time" or "t_speed" is, or empty."""
+    if re.fullmatch(TIME, _words(name.rpartition("/")[2])):
+        return ""  # the clock of a group
     clock = "(?:time|zeit|timestamp|time stamp|stamp|t)"
     match = re.fullmatch(rf"{clock} (.+)|(.+) {clock}", _words(split_unit(name)[0]))
     return match[1] or match[2] if match else ""
@@ -740,7 +742,7 @@ def _axis_lines(
     drive_line = '# drive = "hoist"    # a packaged drive or a parameter file, to be fitted'
     if drive is not None:
         drive_line = f"drive = {toml_string(name if name in preset_names() else drive)}"
-    clocks = {guess.name: _clock(guess, guesses, blocks) for guess in guesses}
+    clocks = {guess.name: _clock(guess, guesses, blocks, log.left_out) for guess in guesses}
     main = next((clocks[guess.name] for guess in (*axis.inputs, *guesses)), "")
     if not main:
         main = f"{NO_TIME}    # {FIXME}: no column of time found; samples a second"
@@ -767,16 +769,24 @@ def _axis_lines(
     return lines
 
 
-def _clock(signal: _Guess, guesses: Sequence[_Guess], blocks: Mapping[str, Sequence[Array]]) -> str:
+def _clock(
+    signal: _Guess,
+    guesses: Sequence[_Guess],
+    blocks: Mapping[str, Sequence[Array]],
+    left_out: Mapping[str, str],
+) -> str:
     """A signal's line of time: its own column of time, or the first of its group, or of all.
 
     Of several clocks that are called like something else it is the only one of its length; it is
-    open if there are more.
+    open if there are more, or if its own is left out of the log, by its name in `left_out`.
     """
     times = [guess for guess in guesses if guess.kind == "time"]
     if not times:
         return ""
     words, group = _words(split_unit(signal.name)[0]), signal.name.rpartition("/")[0]
+    for name in (f"{signal.name} time", f"{group}/time"):
+        if name in left_out:
+            return f"{NO_TIME}    # {FIXME}: '{name}': {left_out[name]}"
     own = [guess for guess in times if _signal_of_clock(guess.name) == words]
     # the clock of another signal is no clock of all
     common = [guess for guess in times if not _signal_of_clock(guess.name)] or times
