@@ -772,8 +772,9 @@ def test_several_axes_in_a_log_are_said(tmp_path: Path) -> None:
 
 
 def test_letters_behind_names_tell_axes(tmp_path: Path) -> None:
-    logged = ("voltage_A [V]", "speed_A [rpm]", "voltage_B [V]", "speed_B [rpm]")
-    text, *_ = drafted_entries(tmp_path, {"Time [s]": TIME} | dict.fromkeys(logged, BOTH))
+    columns = {"voltage_A [V]": BOTH, "speed_A [rpm]": BOTH}
+    columns |= {"voltage_B [V]": BOTH, "speed_B [rpm]": BOTH}
+    text = draft_campaign([write(tmp_path, "log.csv", {"t [s]": TIME, **columns})], tmp_path)
     assert "# Several axes, by the beginnings of the columns' names: a, b" in text
 
 

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from swashplate.campaign import (
     ASSUMED_ACCURACY,
+    CURRENTS,
     ESTIMATED_START,
     FIXME,
     KINDS,
@@ -379,6 +380,9 @@ def _by_words(column: LogColumn, name: str, unit: str | None) -> _Guess:
     numbered = re.fullmatch(r"(.+) (\d+|[ab]|left|right|links|rechts)", words)
     if axis is None and numbered is not None:
         of_name = _by_words(column, numbered[1], unit)
+        if numbered[2] in ("a", "b") and of_name.kind in CURRENTS:
+            # the solenoids of one card
+            return _Guess(column.name, first_kind, "", column.unit)
         return of_name._replace(axis=f"{of_name.axis} {numbered[2]}".strip())
     return _Guess(column.name, first_kind, axis or "", column.unit)
 
