@@ -27,6 +27,9 @@ BESIDE = 20
 SUDDEN = 5.0
 """Factor by which a jump exceeds the steps beside it. An acceleration doubles them at most from one
 sample to the next, a lag of three samples takes two thirds of a jump in its first."""
+STARTS = 2.0
+"""Factor by which a jump from zero exceeds the steps after it: a machine that stopped starts by a
+step that is no larger than those that follow."""
 LARGE = 0.05
 """Part of a signal's range below which a jump is no dropout. [1]"""
 MOVES = 0.2
@@ -127,6 +130,11 @@ def _loss(
     least_jump = max(SUDDEN * largest_step, LARGE * float(np.ptp(values)))
     comes_back = arrives * leaves < 0.0 and abs(arrives + leaves) < 0.5 * abs(arrives)
     if unexplained and comes_back and min(abs(arrives), abs(leaves)) > least_jump:
+        return "fallen"
+    # a motion that passes zero meanwhile does not come back to the side that it left
+    falls = abs(arrives) > max(least_jump, MOVES * max(abs(low), abs(high)))
+    starts_suddenly = abs(leaves) > STARTS * largest_step
+    if unexplained and value == 0.0 and not is_input and falls and starts_suddenly:
         return "fallen"
     if by_chance > CHANCE or (is_input and not noisy):
         return None
