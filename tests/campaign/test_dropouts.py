@@ -82,6 +82,37 @@ def test_the_printed_line_leaves_the_dropout_out(drafted: Drafted, tmp_path) -> 
     assert mended[-1].low > -1.0
 
 
+@pytest.mark.parametrize(
+    ("column", "values", "reading"),
+    [
+        ("speed [rpm]", SPEED, -999.0),
+        ("speed [rpm]", SPEED, -60.0),
+        ("position [mm]", POSITION, 0.0),
+    ],
+)
+def test_a_lost_signal_is_no_motion(drafted: Drafted, column, values, reading) -> None:
+    """Its mark is not taken for a motion both ways under a command of one sign."""
+    tests = drafted(voltage=COMMAND, **{column: lost(values, 3.0, 0.3, reading)})
+    assert campaign_findings(tests) == ()
+
+
+@pytest.mark.parametrize("length", [0.2, 0.3, 0.4])
+def test_zeros_while_a_motion_turns_are_named(drafted: Drafted, length: float) -> None:
+    phase = np.pi * TIME
+    speed = lost(np.round(150.0 * np.sin(phase - 0.8), 3), 3.0, length, 0.0)
+    tests = drafted(voltage=6.0 * np.sin(phase), **{"speed [deg/s]": speed})
+    assert any("jumps there and back" in said for said in findings(tests)["shaft_speed"])
+
+
+def test_a_stop_at_a_cylinder_s_end_is_no_dropout(drafted: Drafted) -> None:
+    """It stands until the command has turned, and starts as it would."""
+    phase = np.pi * TIME
+    speed = np.round(150.0 * np.sin(phase), 3)
+    speed[(TIME % 2.0 > 0.6) & (TIME % 2.0 < 1.0)] = 0.0
+    tests = drafted(voltage=6.0 * np.sin(phase), **{"speed [deg/s]": speed})
+    assert not any("dropout" in said for said in findings(tests)["shaft_speed"])
+
+
 def test_a_command_that_drops_while_the_current_flows_on(drafted: Drafted) -> None:
     tests = drafted(voltage=lost(COMMAND, 4.0, 0.3, 0.0), **{"current [A]": AMPERES})
     assert any("axes.drive.input.ignore" in text for text in findings(tests)["input"])

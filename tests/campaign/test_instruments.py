@@ -8,8 +8,10 @@ from tests.campaign.test_dropouts import AMPERES, COMMAND, NOISE, SPEED, finding
 from tests.drafting.conftest import TIME, Drafted, write
 from tests.drafting.conftest import drafted as drafted
 
+from swashplate import Drive
 from swashplate.campaign import campaign_findings
 from swashplate.drafting import draft_campaign
+from swashplate.identification.diagnostics import check_runs
 
 
 @pytest.mark.parametrize(
@@ -42,6 +44,34 @@ def test_words_read_without_their_sign_are_named_so(
     (found,) = findings(tests)["shaft_speed"]
     assert f"values above {2 ** (bits - 1) - 1} are negative words of {bits} bits" in found
     assert f"subtract {2**bits}" in found
+
+
+@pytest.mark.parametrize(("bits", "largest"), [(16, 22000.0), (32, 15000.0)])
+def test_large_words_without_their_sign_and_few_of_their_steps(drafted, bits, largest) -> None:
+    """A sine that reaches into the middle of the word, in which single steps are rare."""
+    phase = np.pi * TIME
+    words = np.round(largest * np.sin(phase - 0.8))
+    words[words < 0.0] += 2.0**bits
+    tests = drafted(voltage=6.0 * np.sin(phase), **{"speed [rpm]": [f"{w:.12g}" for w in words]})
+    assert any(f"negative words of {bits} bits" in said for said in findings(tests)["shaft_speed"])
+    (refused, *_) = check_runs([*tests], Drive.preset("neutral").parameters)
+    assert refused.severity == "refuse"
+    assert "negative words" in refused.sentence
+
+
+def test_words_of_a_command_without_their_sign(drafted: Drafted) -> None:
+    words = np.round(1000.0 * COMMAND * np.sin(TIME))
+    words[words < 0.0] += 65536.0
+    tests = drafted({"log.csv": {"t [s]": TIME, "u [mV]": words, "n [rpm]": SPEED}})
+    (said,) = findings(tests)["input"]
+    assert "negative words of 16 bits" in said
+
+
+@pytest.mark.parametrize("largest", [20000.0, 50000.0])
+def test_large_steps_in_whole_numbers_are_no_words(drafted: Drafted, largest: float) -> None:
+    speed = np.where(COMMAND > 0.0, largest, 0.0)
+    tests = drafted(voltage=COMMAND, **{"speed [deg/s]": speed})
+    assert not any("words" in said for said in findings(tests)["shaft_speed"])
 
 
 def test_a_still_sensor_that_toggles_has_steps_and_no_spikes(drafted: Drafted) -> None:

@@ -4,6 +4,7 @@ import json
 import re
 import shutil
 from collections.abc import Callable
+from math import pi
 from pathlib import Path
 
 import polars as pl
@@ -288,3 +289,19 @@ def test_advice_on_a_fit_knows_the_largest_commands(
     assert (min(steps), max(steps)) == (-5.0, 4.0)
     assert min(volts) >= -5.0
     assert max(volts) <= 4.0
+
+
+def test_a_draft_of_logs_with_thousands(done, refused, tmp_path: Path) -> None:
+    """The way out that the refusal names is an option of init, and stands in the draft."""
+    rows = [f'{10 * k},{3 * (k > 50)},"{999 + k:,}"' for k in range(200)]
+    text = "\n".join(["time_ms,voltage_V,speed_rpm", *rows])
+    (tmp_path / "log.csv").write_text(text, "utf-8")
+    assert "thousands" in refused("campaign", "init", "log.csv")
+    assert "it is delimiter, decimal" in refused("campaign", "init", "log.csv", "--format", "a=b")
+    assert "number of a line" in refused(
+        "campaign", "init", "log.csv", "--format", "header_row=first"
+    )
+    done("campaign", "init", "log.csv", "--format", "thousands=,")
+    (run,) = Campaign.from_toml(tmp_path / "campaign.toml")
+    rpm = run["shaft_speed"].values * 30.0 / pi
+    assert rpm[[0, 199]] == pytest.approx([999.0, 1198.0])

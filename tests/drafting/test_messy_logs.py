@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.io import savemat
 from tests.drafting.conftest import BOTH, RATE, TIME, Columns, Drafted, read_draft, write
 from tests.logs.writing import write_log
 
@@ -339,6 +340,13 @@ def test_each_group_has_its_own_clock(tmp_path: Path, suffix: str) -> None:
     if suffix == ".h5":  # as the handbook names it
         tests = edit(tests, '"/meas/speed"', '"meas/speed"')
         assert tests["log"]["shaft_speed"].values == pytest.approx(speed)
+
+
+def test_groups_of_one_length_have_their_clocks(tmp_path: Path) -> None:
+    groups = {"cmd": {"time": TIME, "voltage": BOTH}, "meas": {"time": TIME + 0.5, "speed": BOTH}}
+    write_log(tmp_path / "log.h5", groups, units={"voltage": "V", "speed": "rad/s"})
+    run = read_draft(tmp_path, [tmp_path / "log.h5"])["log"]
+    assert (run.input.time[0], run["shaft_speed"].time[0]) == (0.0, 0.5)
 
 
 # --- runs that lack a channel ---------------------------------------------------------------------
@@ -705,6 +713,15 @@ def test_logs_of_a_logger_that_scales_itself(drafted: Drafted) -> None:
         assert run["shaft_speed"].values == pytest.approx(MINUTE * speed)
 
 
+def test_logs_of_a_logger_that_scales_itself_in_names(drafted: Drafted) -> None:
+    first = {"Time_s": TIME, "Voltage_V": BOTH, "Speed_rpm": lagged(BOTH)}
+    second = {"Time_ms": 1e3 * TIME, "Voltage_mV": 10.0 * BOTH, "Speed_rpm": lagged(BOTH)}
+    tests = drafted({"large.csv": first, "small.csv": second})
+    assert tests["large"].input.values == pytest.approx(BOTH)
+    assert tests["small"].input.values == pytest.approx(0.01 * BOTH)
+    assert tests["small"].input.time == pytest.approx(TIME, abs=1e-9)
+
+
 def test_columns_of_one_name_and_several_quantities_are_told_apart(drafted: Drafted) -> None:
     first = {"time": TIME, "voltage": BOTH, "Speed [rpm]": BOTH}
     tests = drafted({"a.csv": first, "b.csv": {**first, "Speed [mm/s]": BOTH}})
@@ -752,3 +769,107 @@ def test_several_axes_in_a_log_are_said(tmp_path: Path) -> None:
     columns = {"Time [s]": TIME, "u links": BOTH, "n links [rpm]": BOTH, "u rechts": BOTH}
     text, *_ = drafted_entries(tmp_path, columns | {"n rechts [rpm]": BOTH})
     assert "Inputs: u links, u rechts" in line_of(text, "# Several axes?")
+
+
+def test_letters_behind_names_tell_axes(tmp_path: Path) -> None:
+    columns = {"voltage_A [V]": BOTH, "speed_A [rpm]": BOTH}
+    columns |= {"voltage_B [V]": BOTH, "speed_B [rpm]": BOTH}
+    text = draft_campaign([write(tmp_path, "log.csv", {"t [s]": TIME, **columns})], tmp_path)
+    assert "# Several axes, by the beginnings of the columns' names: a, b" in text
+
+
+def test_channels_alike_of_one_command_are_said(tmp_path: Path) -> None:
+    columns = {"u [V]": BOTH, "boom position [mm]": BOTH, "stick position [mm]": BOTH}
+    text, *_ = drafted_entries(tmp_path, {"Time [s]": TIME, **columns})
+    said = line_of(text, "# Several axes?")
+    assert "Channels alike: boom position [mm], stick position [mm]" in said
+
+
+# --- guesses that no machine fits -----------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "said"),
+    [
+        ("current", 150.0 * np.abs(BOTH), "in A it would reach 600 A"),
+        ("speed", 1000.0 * BOTH, "the fastest hydraulic motors turn at 11,000 rpm"),
+        ("spool position", 20.0 * BOTH, "the header gives none"),
+    ],
+)
+def test_a_unit_that_no_machine_fits_stays_open(tmp_path, name, values, said) -> None:
+    log = write(
+        tmp_path, "log.csv", {"time [s]": TIME, "u [V]": BOTH, name: values, "n [rpm]": BOTH}
+    )
+    text = draft_campaign([log], tmp_path)
+    (line,) = [each for each in text.splitlines() if each.startswith("# unit")]
+    assert "FIXME" in line
+    assert said in line
+    (tmp_path / "campaign.toml").write_text(text, "utf-8")
+    with pytest.raises(ParameterError, match="is marked FIXME"):
+        Campaign.from_toml(tmp_path / "campaign.toml")
+
+
+def test_a_voltage_that_no_card_takes_stays_open(tmp_path: Path) -> None:
+    log = write(tmp_path, "log.csv", {"t [s]": TIME, "voltage": 12.3 * BOTH, "n [rpm]": BOTH})
+    assert "in V it would reach 49.2 V, but a card takes 10 V" in draft_campaign([log], tmp_path)
+
+
+def test_marks_for_no_value_leave_the_guessed_unit(drafted: Drafted) -> None:
+    current = np.where((TIME > 2.0) & (TIME < 2.4), -999.0, np.abs(BOTH) / 5.0)
+    tests = drafted(current=current, **{"n [rpm]": BOTH})
+    assert 'unit = "A"    # guessed: the header gives none' in text_of(tests)
+
+
+@pytest.mark.parametrize(
+    ("stamps", "said"),
+    [
+        (TIME / 3600.0, "in s it lasts 0.00222 s"),
+        (TIME / 86400.0, "in s it lasts 9.25e-05 s"),
+        (1000.0 * TIME + 0.25, "in s it has 0.2 Hz"),
+    ],
+)
+def test_a_clock_that_no_motion_fits_stays_open_and_is_a_finding(tmp_path, stamps, said) -> None:
+    columns = {"u [V]": BOTH, "n [rpm]": lagged(BOTH)}
+    log = write(tmp_path, "log.csv", {"time": np.round(stamps, 12), **columns})
+    (line,) = [each for each in draft_campaign([log], tmp_path).splitlines() if "time =" in each]
+    assert "FIXME" in line
+    assert said in line
+    tests = read_draft(tmp_path, [write(tmp_path, "log.csv", {"t [s]": stamps, **columns})])
+    assert any("check the unit of the time stamps" in each for each in findings(tests))
+
+
+def test_clocks_of_signals_that_they_do_not_name_stay_open(tmp_path: Path) -> None:
+    columns = {"t_cmd": TIME, "u [V]": BOTH, "t_enc": TIME + 0.5, "n [rpm]": lagged(BOTH)}
+    text = draft_campaign([write(tmp_path, "log.csv", columns)], tmp_path)
+    for name in ("u [V]", "n [rpm]"):
+        assert f"FIXME: the clock of '{name}' is 't_cmd' or 't_enc'" in text
+    assert 'column = "u [V]"' in text
+
+
+def test_a_clock_of_one_length_is_that_of_the_signals_of_its_length(tmp_path: Path) -> None:
+    log = tmp_path / "log.mat"
+    later = {"t_enc": TIME[100:], "speed": lagged(BOTH)[100:]}
+    savemat(log, {"t_cmd": TIME, "voltage": BOTH, **later})
+    run = read_draft(tmp_path, [log])[0]
+    assert (run.input.time[0], run.channels["shaft_speed"].time[0]) == (0.0, 0.5)
+
+
+def test_the_unit_of_a_clock_at_the_end_of_its_name(drafted: Drafted) -> None:
+    columns = {"TimeMs": 1000.0 * TIME, "u [V]": BOTH, "n [rpm]": lagged(BOTH)}
+    assert drafted({"log.csv": columns})[0].duration == pytest.approx(TIME[-1])
+
+
+@pytest.mark.parametrize(
+    ("header", "unit"),
+    [
+        ("speed_deg_s", "deg/s"),
+        ("Drehzahl_Grad_s", "Grad/s"),
+        ("Drehzahl in Grad/s", "Grad/s"),
+        ("speed deg per s", "deg/s"),
+        ("n_U_min", "U/min"),
+        ("rod_speed_mm_s", "mm/s"),
+    ],
+)
+def test_a_fraction_at_the_end_of_a_name(tmp_path: Path, header: str, unit: str) -> None:
+    _, axis, _ = drafted_entries(tmp_path, {"t [s]": TIME, "u [V]": BOTH, header: BOTH})
+    assert axis["channels"]["shaft_speed"]["unit"] == unit

@@ -79,3 +79,34 @@ def test_times_since_dates_count_from_one_zero(tmp_path):
         np.testing.assert_allclose(read[name], begin + 0.01 * np.arange(5), atol=tolerance)
     # a date that there is not stays as it is written
     assert {column.name: column.unit for column in log.columns}["/gps"] == numbers["gps"][1]
+
+
+@pytest.mark.parametrize(
+    "attributes",
+    [
+        {"scale": 0.02},
+        {"gain": np.float32(0.02), "offset": 1.0},
+        {"Slope": np.array([0.02]), "Intercept": 1.0},
+        {"ScaleFactor": 0.02},
+        {"offset": 3},
+    ],
+)
+def test_integers_packed_by_no_convention_are_left_out(tmp_path, attributes):
+    with h5py.File(tmp_path / "log.h5", "w") as file:
+        file.create_dataset("u", data=[1.0, 2.0])
+        file.create_dataset("speed", data=STORED).attrs.update({"units": "deg/s", **attributes})
+    log = open_log(tmp_path / "log.h5")
+    assert [column.name for column in log.columns] == ["/u"]
+    assert f"its attribute {next(iter(attributes))} says" in log.left_out["/speed"]
+
+
+@pytest.mark.parametrize(
+    ("stored", "attributes"),
+    [
+        (STORED, {"units": "deg/s", "scale": 1.0, "offset": 0}),
+        (STORED, {"scale": 0.02}),  # counts of an encoder, say
+        (np.array([0.5, 1.5]), {"units": "V", "gain": 10.0}),  # of the amplifier before it
+    ],
+)
+def test_attributes_that_pack_nothing_are_passed_over(tmp_path, stored, attributes):
+    np.testing.assert_array_equal(read_back(tmp_path / "log.h5", stored, attributes), stored)

@@ -15,10 +15,15 @@ from .experiment import Experiment as Experiment
 from .experiment import InputSignal as InputSignal
 from .experiment import SignalOrigin as SignalOrigin
 from .experiment import resolution_of_inputs as resolution_of_inputs
+from .instruments import beyond_any_machine as beyond_any_machine
+from .instruments import unsigned_word_sentence as unsigned_word_sentence
 from .overview import BlockRanges as BlockRanges
 from .overview import LogWindow as LogWindow
 from .overview import Overview as Overview
 from .quality import ESTIMATED_START as ESTIMATED_START
+from .quality import MANY_ROWS as MANY_ROWS
+from .quality import SHORTEST_LOG as SHORTEST_LOG
+from .quality import SLOWEST_LOG as SLOWEST_LOG
 from .quality import Quality as Quality
 from .quality import beyond_the_card as beyond_the_card
 from .quality import campaign_findings as campaign_findings

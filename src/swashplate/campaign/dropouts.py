@@ -27,6 +27,9 @@ BESIDE = 20
 SUDDEN = 5.0
 """Factor by which a jump exceeds the steps beside it. An acceleration doubles them at most from one
 sample to the next, a lag of three samples takes two thirds of a jump in its first."""
+STARTS = 2.0
+"""Factor by which a jump from zero exceeds the steps after it: a machine that stopped starts by a
+step that is no larger than those that follow."""
 LARGE = 0.05
 """Part of a signal's range below which a jump is no dropout. [1]"""
 MOVES = 0.2
@@ -128,6 +131,11 @@ def _loss(
     comes_back = arrives * leaves < 0.0 and abs(arrives + leaves) < 0.5 * abs(arrives)
     if unexplained and comes_back and min(abs(arrives), abs(leaves)) > least_jump:
         return "fallen"
+    # a motion that passes zero meanwhile does not come back to the side that it left
+    falls = abs(arrives) > max(least_jump, MOVES * max(abs(low), abs(high)))
+    starts_suddenly = abs(leaves) > STARTS * largest_step
+    if unexplained and value == 0.0 and not is_input and falls and starts_suddenly:
+        return "fallen"
     if by_chance > CHANCE or (is_input and not noisy):
         return None
     if isinstance(signal, Channel) and signal.is_position:
@@ -192,7 +200,7 @@ def dropout_sentences(experiment: Experiment, signal: Channel | InputSignal) -> 
         reading = f"{display.factor * lost[0].value:.4g} {display.name}"
         when = f"from {lost[0].begin:.6g} to {lost[0].end:.6g} s"
         if len(lost) > 1:
-            when += f" and {len(lost) - 1} times more"
+            when += " and once more" if len(lost) == 2 else f" and {len(lost) - 1} times more"
         said = {
             "mark": f"reads {reading} {when}, far off all else, as a mark for no value",
             "fallen": f"reads {reading} {when} and jumps there and back, which no motion does",

@@ -49,6 +49,10 @@ FEWEST = 10
 """Turns that show noise."""
 WORDS = (16, 32)
 """Bits of a controller's words."""
+CONTINUOUS = 0.25
+"""Part of the jumps of words without a sign that is left with it: a motion is continuous. [1]"""
+PLACES, EXACT = 7, 1e15
+"""Places of decimal numbers that are looked at, and whole numbers that a double holds exactly."""
 STANDS = 0.3
 """Time for which a reading stands at its very end only if it is clipped there. [s]"""
 TO_AND_FRO = 0.2
@@ -61,26 +65,37 @@ def instrument_sentences(experiment: Experiment, signal: Channel | InputSignal) 
     values = signal.values[signal.used]
     if values.size < 2:
         return
-    bits = unsigned_word(values)
-    if bits:
-        half, whole = 1 << (bits - 1), 1 << bits
-        yield (
-            f"values above {half - 1} are negative words of {bits} bits: read '"
-            f"{signal.source.column}' as int{bits}, or subtract {whole} from them"
-        )
+    if word := unsigned_word_sentence(signal):
+        yield word
         return
-    bound = BOUNDS.get((signal.kind, signal.unit))
     largest = float(values[np.abs(values).argmax()])
-    if bound is not None and abs(largest) > bound.largest:
-        display = display_unit(shown_unit(signal.kind, signal.unit), abs(largest))
-        yield (
-            f"reaches {display.factor * largest:.4g} {display.name}, but {bound.reason}: check "
-            "unit, scale and offset"
-        )
+    if beyond := beyond_any_machine(signal.kind, signal.unit, largest):
+        yield f"reaches {beyond}: check unit, scale and offset"
     lost = {dropout.value for dropout in find_dropouts(experiment, signal)}
     for level in clipping_levels(signal):
         if level not in lost:
             yield _clipped(experiment, signal, level)
+
+
+def unsigned_word_sentence(signal: Channel | InputSignal) -> str:
+    """What to do about a signal of words whose sign was not read; empty if it is none."""
+    bits = unsigned_word(signal)
+    if not bits:
+        return ""
+    half, whole = 1 << (bits - 1), 1 << bits
+    return (
+        f"values above {half - 1} are negative words of {bits} bits: read '"
+        f"{signal.source.column}' as int{bits}, or subtract {whole} from them"
+    )
+
+
+def beyond_any_machine(kind: str, unit: str, value: float) -> str:
+    """A value of a kind [SI] and why no machine has it, "100 A, but ..."; empty if one may."""
+    bound = BOUNDS.get((kind, unit))
+    if bound is None or abs(value) <= bound.largest:
+        return ""
+    display = display_unit(shown_unit(kind, unit), abs(value))
+    return f"{display.factor * value:.4g} {display.name}, but {bound.reason}"
 
 
 def _clipped(experiment: Experiment, signal: Channel | InputSignal, level: float) -> str:
@@ -109,27 +124,38 @@ def _clipped(experiment: Experiment, signal: Channel | InputSignal, level: float
     )
 
 
-def unsigned_word(values: Array) -> int:
-    """Bits of the words that readings (n,) are if their sign was not read, 0 if they are none.
+def unsigned_word(signal: Channel | InputSignal) -> int:
+    """Bits of the words that a signal's readings are if their sign was not read, 0 if they are not.
 
-    Such readings are small or close to the end of the word, with nothing in its middle half. A
-    scale is allowed for: the smallest step between them is that of a word.
+    Such readings jump by most of a word, and hardly if those of its upper half are taken as
+    negative. A decimal scale in the log is allowed for, and any other if single steps of the word
+    are among its small readings.
     """
-    sizes = np.abs(values)
-    # the differences of small numbers are exact
-    small_ones = sizes[sizes < 0.25 * sizes.max()]
-    step = step_of_reading(small_ones) or step_of_reading(sizes)
-    if step == 0.0 or (values.min() < 0.0 < values.max()):
+    values = signal.values[signal.used]
+    if values.size < 2 or values.min() < 0.0 < values.max():
         return 0
-    numbers = sizes / step
-    if np.abs(numbers - np.rint(numbers)).max() > 1e-3:
-        return 0
-    for bits in WORDS:
-        quarter = float(1 << (bits - 2))
-        small, large = numbers < quarter, numbers > 3.0 * quarter - 0.5
-        if numbers.max() < 4.0 * quarter and small.any() and large.any() and (small | large).all():
-            return bits
+    size = signal.stated if isinstance(signal, Channel) else 1.0
+    numbers = np.abs(values) / size
+    small_ones = numbers[numbers < 0.25 * numbers.max()]
+    for step in (_decimal_step(numbers), step_of_reading(small_ones), step_of_reading(numbers)):
+        for bits in WORDS if step > 0.0 else ():
+            word = step * float(1 << bits)
+            as_signed = np.where(numbers > 0.5 * word, numbers - word, numbers)
+            jump, signed_jump = (np.abs(np.diff(each)).max() for each in (numbers, as_signed))
+            within = 0.5 * word < numbers.max() < word
+            if within and jump > 0.5 * word and signed_jump < CONTINUOUS * jump:
+                return bits
     return 0
+
+
+def _decimal_step(numbers: Array) -> float:
+    """Largest step of which all numbers (n,) are multiples and that a decimal number has, or 0."""
+    for places in range(PLACES):
+        scaled = numbers * 10.0**places
+        whole = np.rint(scaled)
+        if whole.max() < EXACT and np.abs(scaled - whole).max() < 1e-3:
+            return float(np.gcd.reduce(whole.astype(np.int64))) / 10.0**places
+    return 0.0
 
 
 def clipping_levels(signal: Channel | InputSignal) -> Iterator[float]:

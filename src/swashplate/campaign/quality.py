@@ -22,7 +22,7 @@ from swashplate.campaign.directions import (
     swapped_currents,
     turned_channels,
 )
-from swashplate.campaign.dropouts import dropout_sentences
+from swashplate.campaign.dropouts import dropout_sentences, find_dropouts
 from swashplate.campaign.experiment import Channel, Experiment, InputSignal
 from swashplate.campaign.instruments import instrument_sentences, unsigned_word
 from swashplate.campaign.samples import (
@@ -49,6 +49,11 @@ LONG_GAP = 5.0
 """An interval of more than this many usual ones is worth a look; single lost rows are not."""
 LOST_SHARE = 0.01
 """Nor are they worth one until they are more than this share."""
+SLOWEST_LOG = 1.0
+"""Rate from which a log of a drive's motion is plausible: it reaches its speed within some tenths
+of a second. [Hz]"""
+SHORTEST_LOG, MANY_ROWS = 0.2, 100
+"""Time that so many rows of a log last at least: a pump takes about as long to swing out. [s]"""
 AT_REST = 0.25
 """An input within this share of its largest excursion may be at rest, or in a dead zone."""
 NEGATIVE = 0.05
@@ -154,7 +159,9 @@ def _quality(
         if signal.counts is not None:
             lost = int(find_lost_counts(signal.time[used], signal.counts[used]).size)
     else:
-        findings += _of_input(signal, low, high, limits)
+        findings += _of_clocks(experiment)
+        if not unsigned_word(signal):
+            findings += _of_input(signal, low, high, limits)
         findings += spike_sentences(experiment, signal)
         findings += dropout_sentences(experiment, signal)
         findings += instrument_sentences(experiment, signal)
@@ -184,6 +191,27 @@ def _of_input(
         )
 
 
+def _of_clocks(experiment: Experiment) -> Iterator[str]:
+    """A sentence on a run that is too slow or too short for a motion, as in another unit of time.
+
+    What is left of a run after a gap may be short.
+    """
+    signals: tuple[InputSignal | Channel, ...] = (experiment.input, *experiment.channels.values())
+    period = min(float(np.median(np.diff(signal.time))) for signal in signals)
+    if period > 1.0 / SLOWEST_LOG:
+        yield (
+            f"has a sample every {period:.3g} s, too few for any motion of a drive: check the unit "
+            "of the time stamps"
+        )
+    rows = max(signal.time.size for signal in signals)
+    too_short = experiment.duration < SHORTEST_LOG and rows >= MANY_ROWS
+    if too_short and experiment.start != "estimated":
+        yield (
+            f"has {rows} samples in {experiment.duration:.3g} s, too short for any motion of a "
+            "drive: check the unit of the time stamps"
+        )
+
+
 def _of_stamps(stamps: StampStatistics) -> Iterator[str]:
     if stamps.longest > LONG_GAP * stamps.period or stamps.missing > LOST_SHARE * stamps.rows:
         yield (
@@ -209,7 +237,7 @@ def _of_channel(experiment: Experiment, channel: Channel, signed: bool) -> Itera
         return
     if np.ptp(values) == 0.0 and np.ptp(drive.values) > 0.0:
         yield "never changes although the input does: is it connected?"
-    if unsigned_word(values):
+    if unsigned_word(channel):
         # its jumps are those of the words, and say nothing else
         yield from instrument_sentences(experiment, channel)
         return
@@ -434,10 +462,13 @@ def _one_sided(axis: str, runs: Sequence[Experiment]) -> Iterator[str]:
 def _mean_speeds(experiment: Experiment) -> Iterator[tuple[Channel, Array, Array]]:
     """Each channel that moves, with instants (m,) [s] and its mean speeds (m,) over 0.5 s before.
 
-    [unit, or unit/s of a position]
+    [unit, or unit/s of a position] Of dropouts nothing is said here.
     """
     for channel in experiment.of_kind("shaft_speed", "position", "encoder_counts"):
-        time, values = channel.time[channel.used], channel.values[channel.used]
+        kept = channel.used
+        for lost in find_dropouts(experiment, channel):
+            kept = kept & ((channel.time < lost.begin) | (channel.time > lost.end))
+        time, values = channel.time[kept], channel.values[kept]
         width = 1
         if time.size > 1:
             width = max(round(AVERAGED / float(np.median(np.diff(time)))), 1)

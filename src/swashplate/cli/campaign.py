@@ -123,6 +123,15 @@ def init(
         list[str] | None,
         typer.Option(metavar="COLUMN=UNIT", help="Unit of a column; may be repeated."),
     ] = None,
+    layout: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--format",
+            metavar="KEY=VALUE",
+            help="Layout of text logs: delimiter, decimal, thousands, comment, header_row or "
+            "encoding; may be repeated.",
+        ),
+    ] = None,
     title: Annotated[
         str | None,
         typer.Option(
@@ -155,6 +164,7 @@ def init(
         name: kind for kind, name in parsing.pairs_of("--column", column, "voltage=u", often=True)
     }
     units = dict(parsing.pairs_of("--unit", unit, "u=mV"))
+    options = parsing.text_options(layout)
     with spinner("Reading"):
         text = draft_campaign(
             logs,
@@ -164,6 +174,7 @@ def init(
             columns=kinds,
             units=units,
             title=title,
+            options=options,
         )
     write_text(text, target)
     note(f"Draft: {target}")

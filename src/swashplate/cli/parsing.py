@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from swashplate.campaign import Campaign, Experiment
     from swashplate.drive import Drive
     from swashplate.identification import FitSetup, ModelSetup, Verdict
+    from swashplate.logs import TextOptions
     from swashplate.parameters import Change, Parameter, ParameterSet
 
 _NUMBER = r"[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|inf\b|nan\b)"
@@ -320,6 +321,25 @@ def pairs_of(
             raise InputError(f"{option} {name}=... is given twice; give it once.")
         pairs.append((name, value))
     return pairs
+
+
+def text_options(assignments: Sequence[str] | None) -> TextOptions | None:
+    """Layout of text logs by the assignments of ``--format``; None without any."""
+    from swashplate.logs import TextOptions
+
+    pairs: dict[str, Any] = dict(pairs_of("--format", assignments, "thousands=,"))
+    if not pairs:
+        return None
+    known = [field.name for field in fields(TextOptions)]
+    for key in pairs:
+        if key not in known:
+            raise InputError(f"--format has no '{key}': it is {', '.join(known)}.")
+    row = pairs.get("header_row", "0")
+    if not row.isdigit():
+        raise InputError(f"--format header_row={row} must be the number of a line.")
+    if "header_row" in pairs:
+        pairs["header_row"] = int(row)
+    return TextOptions(**pairs)
 
 
 def changes_between(old_set: ParameterSet, new_set: ParameterSet) -> list[str]:

@@ -8,7 +8,8 @@ The kind of a column follows from its name and unit by the table of kinds,
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
 from itertools import pairwise
@@ -21,16 +22,21 @@ from numpy.typing import NDArray
 
 from swashplate.campaign import (
     ASSUMED_ACCURACY,
+    CURRENTS,
     ESTIMATED_START,
     FIXME,
     KINDS,
+    MANY_ROWS,
     ROD,
+    SHORTEST_LOG,
+    SLOWEST_LOG,
     TURNS,
     Accuracy,
     CampaignFile,
     Experiment,
     InputKind,
     Overview,
+    beyond_any_machine,
     conversion,
     has_sign,
     moves_at_first,
@@ -49,6 +55,7 @@ from swashplate.logs import (
     Log,
     LogColumn,
     Stamps,
+    TextOptions,
     calendar_of,
     open_log,
     second_of,
@@ -82,6 +89,8 @@ TIME = (
     r"datetime|date time|clock|t|seconds?|exp time|datenum|filetime"
 )
 """Names of columns of time stamps; those of signals are in `KINDS`."""
+PER = r"[_\s]+(?:(?:per|pro|je|par|por)[_\s]+)?(s|sec|sek|min)"
+"""End of a unit whose fraction is written in words or without its bar: "deg_s", "deg per s"."""
 COMPLEMENT = "(?: (?:of|der|des|du|de|del|della|do|da|van|av) .*)?"
 """Complement that may follow in such a name: "Drehzahl der Trommel"."""
 DEGREES_AS_GRAD = re.compile(
@@ -107,13 +116,16 @@ SIMATIC, SIMATIC_OVERRANGE = 27_648, 32_511
 """Full scale of a SIMATIC's word, and the largest one that it gives (Siemens, analog values)."""
 OPEN_UNITS = ("stroker_pressure", "swash_angle", "spool_position")
 """Kinds whose unit stays open, as hardly a logger writes them in SI."""
+TIME_UNITS = ("s", "sec", "ms", "us", "ns", "min", "h")
+"""Units, in lower case, that a clock's name may end with."""
 TICKS = {"ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 """Units of whole numbers that count the time, and their size. [s]"""
+COMMON, COMMON_LEVELS = 0.9, 0.98
+"""Shares of a log's numbers, and of their different values, beyond which some may be marks for no
+value: these last for up to a tenth of a log, and repeat themselves. [1]"""
 SLOW_LOG = 20.0
 """Rate up to which microseconds may well be ticks of 100 ns: ten samples in half a second, in which
 a drive has reached its speed, are few. [Hz]"""
-SLOWEST_LOG = 1.0
-"""Rate from which a log of a drive's motion is plausible. [Hz]"""
 OVERLAP = 0.1
 """Share of a log's length by which it may seem to begin before the one before it ended: file
 systems round the time of writing to as much as 2 s. [1]"""
@@ -166,6 +178,7 @@ def draft_campaign(
     columns: Mapping[str, str] | None = None,
     units: Mapping[str, str] | None = None,
     title: str | None = None,
+    options: TextOptions | None = None,
 ) -> str:
     """Text of a campaign file for some logs.
 
@@ -184,6 +197,8 @@ def draft_campaign(
         Kinds of some columns, ``"time"`` or one such as ``"voltage"``, and their units.
     title : str, optional
         Heading of the report; by default the folder's name, marked as guessed.
+    options : TextOptions, optional
+        Layout of text logs where it is ambiguous, such as the separator of thousands.
 
     Returns
     -------
@@ -213,7 +228,9 @@ def draft_campaign(
     if not logs:
         raise InputError("A draft needs at least one log.")
     kinds, units, folder = dict(columns or {}), dict(units or {}), Path(folder).resolve()
-    opened = _with_common_names([open_log(path) for path in logs], {*kinds, *units})
+    opened = _with_common_names(
+        [open_log(path, options=options) for path in logs], {*kinds, *units}
+    )
     headers = dict[str, LogColumn]()
     for log in opened:
         for column in log.columns:
@@ -227,13 +244,25 @@ def draft_campaign(
     heading = f"schema = {SCHEMA}\ntitle = {toml_string(title or folder.name)}"
     if title is None:
         heading += "    # guessed, the folder's name: the report's heading; machine, place, author"
-    lines = [HEADER, heading, ""]
+    lines = [HEADER, heading, "", *_format_lines(options)]
     for name, axis in axes.items():
         lines += _axis_lines(name, axis, guesses, blocks, opened[0], drive, counts_per_turn)
     lines += _several_lines(axes)
     lines += _unused_lines(guesses, axes, opened, numbers, counts_per_turn)
     lines += _run_lines(opened, numbers, axes, folder, text="\n".join(lines))
     return "\n".join(lines).rstrip() + "\n"
+
+
+def _format_lines(options: TextOptions | None) -> list[str]:
+    """The table of a text log's layout, none if it is recognised."""
+    stated = {} if options is None else {k: v for k, v in vars(options).items() if v is not None}
+    if not stated:
+        return []
+    entries = [
+        f"{key} = {toml_string(value) if isinstance(value, str) else value}"
+        for key, value in stated.items()
+    ]
+    return ["[format]", *entries, ""]
 
 
 def _check_stated(
@@ -254,31 +283,37 @@ def _check_stated(
 def _with_common_names(logs: Sequence[Log], stated: set[str]) -> list[Log]:
     """Logs in which a column whose unit changes from log to log is called without its unit.
 
-    A logger that scales itself writes "Voltage [V]" in one log and "Voltage [mV]" in the next.
-    Columns that the caller states keep their names.
+    A logger that scales itself writes "Voltage [V]" in one log and "Voltage [mV]" in the next, or
+    "Voltage_V" and "Voltage_mV". Columns that the caller states keep their names.
     """
     units = dict[str, dict[str, LogColumn]]()
     for log in logs:
         for column in log.columns:
-            if column.unit is not None and column.name not in stated:
-                units.setdefault(_without_brackets(column.name), {})[column.name] = column
-    names = {
-        column.name: bare
-        for bare, columns in units.items()
+            bare = _without_unit(column)
+            if bare.unit is not None and column.name not in stated:
+                units.setdefault(bare.name, {})[column.name] = bare
+    renamed = {
+        name: column
+        for columns in units.values()
         if len(columns) > 1
-        and all(_has_one(log, bare, columns) for log in logs)
+        and all(_has_one(log, columns) for log in logs)
         and _is_one_quantity(list(columns.values()))
-        for column in columns.values()
+        for name, column in columns.items()
     }
     return [
-        replace(
-            log,
-            columns=tuple(
-                column._replace(name=names.get(column.name, column.name)) for column in log.columns
-            ),
-        )
+        replace(log, columns=tuple(renamed.get(column.name, column) for column in log.columns))
         for log in logs
     ]
+
+
+def _without_unit(column: LogColumn) -> LogColumn:
+    """A column called without its unit, which stands in brackets or behind an underline."""
+    if column.unit is not None:
+        return column._replace(name=_without_brackets(column.name))
+    stem, _, ending = column.name.rpartition("_")
+    if stem and _by_header(column, None).unit == ending:
+        return LogColumn(stem, ending)
+    return column
 
 
 def _without_brackets(name: str) -> str:
@@ -286,9 +321,10 @@ def _without_brackets(name: str) -> str:
     return re.sub(r"[\[(].*[\])]", "", name).strip()
 
 
-def _has_one(log: Log, bare: str, columns: Mapping[str, LogColumn]) -> bool:
-    """Whether a name without unit means one of some columns of a log, or the log has none."""
-    if not any(_without_brackets(column.name) == bare for column in log.columns):
+def _has_one(log: Log, columns: Mapping[str, LogColumn]) -> bool:
+    """Whether the common name of some columns means one of them in a log, or the log has none."""
+    bare = next(iter(columns.values())).name
+    if not any(_without_unit(column).name == bare for column in log.columns):
         return True
     try:
         return log.find(bare).name in columns
@@ -341,9 +377,12 @@ def _by_words(column: LogColumn, name: str, unit: str | None) -> _Guess:
             axis = match[1] or ""
         if not first_kind and (match is not None or rotational_unit in entry.marks):
             first_kind = kind
-    numbered = re.fullmatch(r"(.+) (\d+|left|right|links|rechts)", words)
+    numbered = re.fullmatch(r"(.+) (\d+|[ab]|left|right|links|rechts)", words)
     if axis is None and numbered is not None:
         of_name = _by_words(column, numbered[1], unit)
+        if numbered[2] in ("a", "b") and of_name.kind in CURRENTS:
+            # the solenoids of one card
+            return _Guess(column.name, first_kind, "", column.unit)
         return of_name._replace(axis=f"{of_name.axis} {numbered[2]}".strip())
     return _Guess(column.name, first_kind, axis or "", column.unit)
 
@@ -356,26 +395,40 @@ def _by_header(column: LogColumn, kind: str | None) -> _Guess:
         name = plc_name["after"] or plc_name["before"]
     unit = column.unit or ("rpm" if re.search(TURNS, name.lower()) else None)
     by_name = _by_words(column, name, unit)
-    split = re.fullmatch(r"(.*)[_\s]+([^_\s]+)", name)
-    stem, ending = split.groups() if split else ("", name)
-    by_last_word = _by_words(column, stem, None)
-    if by_last_word.kind == "other" and ending in ("V", "mV"):
-        by_last_word = by_last_word._replace(kind="voltage")
     if kind is not None:
         by_name = by_name._replace(kind=kind)
-        by_last_word = by_last_word._replace(kind=kind)
-    if (
-        column.unit is None
-        and by_name.kind not in HALVES
-        and not ending.isdigit()
-        and (_is_unit_of(ending, by_last_word.kind) or _counts_in_grad(by_last_word.kind, ending))
-    ):
-        return by_last_word._replace(unit=ending, in_header=False)
+    for stem, ending in _units_behind(name) if column.unit is None else ():
+        by_stem = _by_words(column, stem, None)
+        if by_stem.kind == "other" and ending in ("V", "mV"):
+            by_stem = by_stem._replace(kind="voltage")
+        if kind is not None:
+            by_stem = by_stem._replace(kind=kind)
+        is_unit = _is_unit_of(ending, by_stem.kind) or _counts_in_grad(by_stem.kind, ending)
+        if is_unit and by_name.kind not in HALVES and not ending.isdigit():
+            return by_stem._replace(unit=ending, in_header=False)
     return by_name._replace(
         unit=unit if by_name.kind == "shaft_speed" else column.unit,
         in_header=column.unit is not None,
         has_plc_name=plc_name is not None,
     )
+
+
+def _units_behind(name: str) -> Iterator[tuple[str, str]]:
+    """What may be units at the end of a name, longest first, each with the name before it.
+
+    "speed_deg_s", "speed deg per s" and "speed in deg/s" are in deg/s; without the words of a
+    signal before it, the last word is the unit.
+    """
+    quotient = re.fullmatch(rf"(.+?)[_\s]+([^_\s]+){PER}", name)
+    if quotient:
+        yield _without_in(quotient[1]), f"{quotient[2]}/{quotient[3]}"
+    stem, _, ending = re.sub(r"[_\s]+", " ", name).rpartition(" ")
+    yield _without_in(stem), ending
+
+
+def _without_in(name: str) -> str:
+    """A name without the "in" that leads to its unit."""
+    return re.sub(r"[_\s]+in$", "", name)
 
 
 def _check_unit(kind: str, unit: str, what: str) -> None:
@@ -406,9 +459,26 @@ def _counts_in_grad(kind: str, unit: str | None) -> bool:
 
 def _signal_of_clock(name: str) -> str:
     """The signal, in words, whose clock a column such as "Speed time" or "t_speed" is, or empty."""
+    if re.fullmatch(TIME, _words(name.rpartition("/")[2])):
+        return ""  # the clock of a group
     clock = "(?:time|zeit|timestamp|time stamp|stamp|t)"
     match = re.fullmatch(rf"{clock} (.+)|(.+) {clock}", _words(split_unit(name)[0]))
     return match[1] or match[2] if match else ""
+
+
+def _is_clock(column: LogColumn, blocks: Sequence[Array]) -> bool:
+    """Whether a column is called like a clock of something, "t_cmd", and its numbers increase."""
+    if not _signal_of_clock(column.name) or not _is_unit_of(column.unit or "s", "time"):
+        return False
+    finite = [part[np.isfinite(part)] for part in blocks]
+    return all(part.size > 1 and bool(np.all(np.diff(part) > 0.0)) for part in finite)
+
+
+def _clock_by_header(column: LogColumn) -> _Guess:
+    """Guess of a clock called like something else; of "TimeMs" that is its unit."""
+    ending = _signal_of_clock(column.name)
+    unit = ending if column.unit is None and ending in TIME_UNITS else column.unit
+    return _Guess(column.name, "time", "", unit, in_header=column.unit is not None)
 
 
 def _guesses(
@@ -434,8 +504,8 @@ def _guesses(
     unnamed = _unnamed_clock(headers, blocks, kinds)
     for name, column in headers.items():
         guess = _by_header(column, kinds.get(name))
-        if _signal_of_clock(name) in names:
-            guess = _Guess(name, "time", "", column.unit)
+        if _signal_of_clock(name) in names or _is_clock(column, blocks[name]):
+            guess = _clock_by_header(column)
         guess = guess._replace(seems_input=guess.kind in INPUTS)
         if name in kinds:
             guess = guess._replace(kind=kinds[name], is_stated=True)
@@ -566,10 +636,16 @@ def _time_unit(blocks: Sequence[Array]) -> tuple[str, str]:
     """Unit of stamps without one, and the comment that gives the reason.
 
     Seconds, unless they are whole numbers of which a step of one second or more would make a log
-    too slow for any motion: then the largest unit in which it is fast enough.
+    too slow for any motion: then the largest unit in which it is fast enough. Open if seconds make
+    a log too slow, or too short, for any motion.
     """
     steps = [float(np.median(np.diff(part))) for part in blocks if part.size > 1]
     step = float(np.median(steps)) if steps else 0.0
+    spans = [float(np.ptp(part)) for part in blocks if part.size >= MANY_ROWS]
+    if step > 1.0 / SLOWEST_LOG and not _are_whole_numbers(blocks):
+        return "s", f"{FIXME}: the header gives none, and in s it has {1.0 / step:.3g} Hz"
+    if spans and max(spans) < SHORTEST_LOG:
+        return "s", f"{FIXME}: the header gives none, and in s it lasts {max(spans):.3g} s"
     if step < 1.0 / SLOWEST_LOG or not _are_whole_numbers(blocks):
         return "s", "guessed: the header gives none"
     fast = (unit for unit, size in TICKS.items() if step * size <= 1.0 / SLOWEST_LOG)
@@ -670,7 +746,7 @@ def _axis_lines(
     drive_line = '# drive = "hoist"    # a packaged drive or a parameter file, to be fitted'
     if drive is not None:
         drive_line = f"drive = {toml_string(name if name in preset_names() else drive)}"
-    clocks = {guess.name: _clock(guess, guesses) for guess in guesses}
+    clocks = {guess.name: _clock(guess, guesses, blocks, log.left_out) for guess in guesses}
     main = next((clocks[guess.name] for guess in (*axis.inputs, *guesses)), "")
     if not main:
         main = f"{NO_TIME}    # {FIXME}: no column of time found; samples a second"
@@ -697,18 +773,37 @@ def _axis_lines(
     return lines
 
 
-def _clock(signal: _Guess, guesses: Sequence[_Guess]) -> str:
-    """A signal's line of time: its own column of time, or the first of its group, or of all."""
+def _clock(
+    signal: _Guess,
+    guesses: Sequence[_Guess],
+    blocks: Mapping[str, Sequence[Array]],
+    left_out: Mapping[str, str],
+) -> str:
+    """A signal's line of time: its own column of time, or the first of its group, or of all.
+
+    Of several clocks that are called like something else it is the only one of its length; it is
+    open if there are more, or if its own is left out of the log, by its name in `left_out`.
+    """
     times = [guess for guess in guesses if guess.kind == "time"]
     if not times:
         return ""
     words, group = _words(split_unit(signal.name)[0]), signal.name.rpartition("/")[0]
+    for name in (f"{signal.name} time", f"{group}/time"):
+        if name in left_out:
+            return f"{NO_TIME}    # {FIXME}: '{name}': {left_out[name]}"
     own = [guess for guess in times if _signal_of_clock(guess.name) == words]
     # the clock of another signal is no clock of all
     common = [guess for guess in times if not _signal_of_clock(guess.name)] or times
+    rows = [part.size for part in blocks[signal.name]]
+    if common == times:
+        common = [guess for guess in times if [p.size for p in blocks[guess.name]] == rows] or times
     of_group = [guess for guess in common if guess.name.rpartition("/")[0] == group]
     time = [*own, *of_group, *common][0]
     column = f"column = {toml_string(time.name)}"
+    if not own and len(common) > 1 and all(_signal_of_clock(guess.name) for guess in common):
+        choices = " or ".join(repr(guess.name) for guess in common)
+        reason = f"the clock of '{signal.name}' is {choices}"
+        return f"# time = {{ {column} }}    # {FIXME}: {reason}"
     if time.in_header:
         return f"time = {{ {column} }}"
     return f"time = {{ {column}, unit = {toml_string(time.unit or 's')} }}    # {time.unit_comment}"
@@ -739,7 +834,7 @@ def _signal_lines(
     elif kind == "encoder_counts":
         lines += _encoder_lines(counts_per_turn)
     else:
-        lines += _unit_lines(guess)
+        lines += _unit_lines(guess, blocks)
     if guess.full_scale and not is_scaled_command:
         reason = (
             f"range of the instrument over {guess.full_scale}, as of a PLC's word at full scale"
@@ -764,6 +859,12 @@ def _first_number(blocks: Sequence[Array]) -> float:
         if finite.size:
             return float(finite[0])
     return 0.0
+
+
+def _common_peak(sizes: Array) -> float:
+    """What many of some numbers (n,), or of their different values, go beyond."""
+    levels = np.quantile(np.unique(sizes), COMMON_LEVELS, method="lower")
+    return max(float(np.quantile(sizes, COMMON)), float(levels))
 
 
 def _encoder_lines(counts_per_turn: float | None) -> list[str]:
@@ -792,8 +893,8 @@ def _accuracy_lines(kind: str, unit: str | None) -> list[str]:
     return [f"# accuracy = {{ {stated} }}    # {meaning}"]
 
 
-def _unit_lines(signal: _Guess) -> list[str]:
-    """The entry of a signal's unit, none if the header has it."""
+def _unit_lines(signal: _Guess, blocks: Sequence[Array]) -> list[str]:
+    """The entry of a signal's unit, none if the header has it, open if no guess fits it."""
     units = KINDS[signal.kind].units
     usual = units[0] if units else "1"
     if signal.unit is not None and units and not _is_unit_of(signal.unit, signal.kind):
@@ -812,7 +913,26 @@ def _unit_lines(signal: _Guess) -> list[str]:
         usual = "mm"
     if signal.kind in OPEN_UNITS:
         return [f"# unit = {toml_string(usual)}    # {FIXME}: the header gives none"]
+    if beyond := _beyond_guessed_unit(signal.kind, usual, blocks):
+        reason = f"the header gives none, and in {usual} it would reach {beyond}"
+        return [f"# unit = {toml_string(usual)}    # {FIXME}: {reason}"]
     return [f"unit = {toml_string(usual)}    # guessed: the header gives none"]
+
+
+def _beyond_guessed_unit(kind: str, unit: str, blocks: Sequence[Array]) -> str:
+    """A value that a signal would have in a guessed unit, and why it cannot; empty if it can.
+
+    A few numbers far beyond all others may be marks for no value.
+    """
+    finite = [np.abs(part[np.isfinite(part)]) for part in blocks]
+    peak = max((_common_peak(part) for part in finite if part.size), default=0.0)
+    if kind == "voltage":
+        beyond_card = f"{peak:.4g} V, but a card takes 10 V"
+        return beyond_card if peak > 10.0 * SIMATIC_OVERRANGE / SIMATIC else ""
+    if not KINDS[kind].units:
+        return ""
+    si, factor, zero = conversion(kind, unit, "")
+    return beyond_any_machine(kind, si, factor * peak + zero)
 
 
 def _is_rod(name: str) -> bool:
@@ -825,18 +945,24 @@ def _several_lines(axes: Mapping[str, _Axis]) -> list[str]:
     if len(axes) > 1:
         return [f"{SEVERAL}, by the beginnings of the columns' names: {', '.join(axes)}", ""]
     (axis,) = axes.values()
-    kinds = [guess.kind for guess in axis.channels.values()]
-    if len(axis.inputs) > 1 and len(set(kinds)) < len(kinds):
-        inputs, channels = (
-            ", ".join(guess.name for guess in guesses)
-            for guesses in (axis.inputs, axis.channels.values())
-        )
-        return [
-            f"{SEVERAL}? Inputs: {inputs}; channels: {channels}: keep those of one axis here, and "
-            "write another [axes.NAME] for each other one",
-            "",
-        ]
-    return []
+    kinds = Counter(guess.kind for guess in axis.channels.values())
+    alike = [guess for guess in axis.channels.values() if kinds[guess.kind] > 1]
+    if len(axis.inputs) > 1 and alike:
+        listed = f"Inputs: {_names(axis.inputs)}; channels: {_names(axis.channels.values())}"
+    elif len({guess.axis for guess in alike}) > 1:
+        listed = f"Channels alike: {_names(alike)}"
+    else:
+        return []
+    return [
+        f"{SEVERAL}? {listed}: keep those of one axis here, and write another [axes.NAME] for each "
+        "other one",
+        "",
+    ]
+
+
+def _names(guesses: Iterable[_Guess]) -> str:
+    """Names of columns in a row."""
+    return ", ".join(guess.name for guess in guesses)
 
 
 def _unused_lines(

@@ -300,6 +300,14 @@ class _Packing(NamedTuple):
     """Whether what is stored as a signed integer is meant without a sign."""
 
 
+_OTHER_SCALES = re.compile(
+    r"(?:scale|scaling|gain|slope|factor|lsb|conversion|resolution)[_ ]?(?:factor|value)?",
+    re.IGNORECASE,
+)
+_OTHER_OFFSETS = re.compile(r"(?:add[_ ]?)?offset|intercept|bias", re.IGNORECASE)
+"""Attributes by which programs that keep to no convention say how integers are packed."""
+_COUNTED = frozenset({"", "1", "count", "counts", "pulses", "ticks"})
+"""Units of integers that are what they are."""
 _PACKED = ("scale_factor", "add_offset", "_FillValue", "missing_value", "valid_min", "valid_max")
 
 
@@ -310,6 +318,12 @@ def _packing(dataset: Any) -> _Packing | str | None:
         limits = np.ravel(dataset.attrs["valid_range"])
         stated |= {"valid_min": limits[:1], "valid_max": limits[-1:]}
     is_unsigned = _decoded(dataset.attrs.get("_Unsigned", "")).lower() == "true"
+    other_name = _packed_by_another_name(dataset)
+    if other_name and not {"scale_factor", "add_offset"} & stated.keys():
+        return (
+            f"its integers may be packed, as its attribute {other_name} says: call it scale_factor "
+            "or add_offset if number = scale_factor * stored + add_offset"
+        )
     if not stated and not is_unsigned:
         return None
     numbers = dict[str, list[float]]()
@@ -328,6 +342,20 @@ def _packing(dataset: Any) -> _Packing | str | None:
         most=numbers.get("valid_max", [np.inf])[0],
         is_unsigned=is_unsigned,
     )
+
+
+def _packed_by_another_name(dataset: Any) -> str:
+    """An attribute like a scale or an offset of integers with a unit, if it changes them."""
+    units = {_decoded(dataset.attrs[key]).lower() for key in _UNITS if key in dataset.attrs}
+    if dataset.dtype.kind not in "iu" or units <= _COUNTED:
+        return ""
+    for pattern, neutral in ((_OTHER_SCALES, 1.0), (_OTHER_OFFSETS, 0.0)):
+        for name, value in dataset.attrs.items():
+            numbers = np.ravel(value)
+            is_number = numbers.dtype.kind in "iuf" and numbers.size == 1
+            if pattern.fullmatch(name) and is_number and float(numbers[0]) != neutral:
+                return str(name)
+    return ""
 
 
 def _as_stored(numbers: Any, *, is_unsigned: bool) -> Any:
@@ -530,7 +558,14 @@ def _tdms_items(file: Any) -> Iterator[_Item]:
 
     If the waveforms of a group differ in start, increment or length, each channel has a column of
     its own, ``channel time``. In a file of several groups, a column is called ``group/channel``.
+    Beside waveforms that begin at a date, one without is left out: nobody knows when it begins.
     """
+    waveforms = [
+        _waveform(channel.properties, len(channel))
+        for group in file.groups()
+        for channel in group.channels()
+    ]
+    some_have_dates = any(isinstance(each, _Waveform) and each.date for each in waveforms)
     for group in file.groups():
         prefix = f"{group.name}/" if len(file.groups()) > 1 else ""
         clocks, names = dict[str, _Waveform | str](), set[str]()
@@ -548,6 +583,8 @@ def _tdms_items(file: Any) -> Iterator[_Item]:
             read = partial(_tdms_rows, channel)
             yield _Item(name, "", str(unit) if unit else None, rows, read, begin)
             clock = _waveform(properties, rows)
+            if some_have_dates and isinstance(clock, _Waveform) and clock.date is None:
+                clock = "it has no wf_start_time as others have, so nobody knows when it begins"
             if clock is not None:
                 clocks[channel.name] = clock
         differ = len({*clocks.values()}) > 1

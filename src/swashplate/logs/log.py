@@ -223,12 +223,17 @@ def unit_of(column: LogColumn, requested: str, si: str) -> str:
     suffixed = re.fullmatch(rf"{re.escape(requested)}_(\w+)", column.name)
     if suffixed:
         return suffixed[1]
-    _, underscore, ending = column.name.rpartition("_")
-    try:
-        to_si(1.0, ending if underscore else si, si, "")
-    except InputError:
-        return si
-    return ending if underscore else si
+    words = column.name.split("_")
+    # "speed_deg_s" has a fraction at its end, "time_ms" a single word
+    endings = ["/".join(words[-2:])] if len(words) > 2 else []
+    endings += words[-1:] if len(words) > 1 else []
+    for ending in endings:
+        try:
+            to_si(1.0, ending, si, "")
+        except InputError:
+            continue
+        return ending
+    return si
 
 
 def _without_unit(column: LogColumn) -> str:
@@ -260,9 +265,19 @@ def check_stamps(log: Log, column: str, stamps: Array) -> None:
     if earlier == later:
         what = f"has {earlier!r} twice, in data rows {row + 1} and {row + 2}"
     others = f", the first of {late.size} such rows" if late.size > 1 else ""
-    raise FileError(f"{log.path}: column '{column}' {what}{others}; time stamps must increase.")
+    remedy = ""
+    if late.size > ROUNDED * stamps.size and np.all(np.diff(stamps) >= 0.0):
+        remedy = (
+            "; so coarsely rounded stamps of an even log are better left out: write time = { rate "
+            "= ... } with its samples a second instead of their column"
+        )
+    raise FileError(
+        f"{log.path}: column '{column}' {what}{others}; time stamps must increase{remedy}."
+    )
 
 
+ROUNDED = 0.05
+"""Share of stamps that are there twice from which all are rounded: events are few. [1]"""
 SHORTEST = 1e-6
 """A record lasts longer: below it the unit of its stamps is wrong. [s]"""
 LONGEST = 1e10

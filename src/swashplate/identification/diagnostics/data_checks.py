@@ -19,6 +19,7 @@ from swashplate.campaign import (
     spiked,
     turned,
     unsigned_currents,
+    unsigned_word_sentence,
     wrapped_positions,
 )
 from swashplate.drive import Simulation
@@ -259,6 +260,9 @@ def _samples(experiment: Experiment, fitted: Collection[str]) -> Iterator[Findin
     for name, channel in experiment.channels.items():
         used = int(np.count_nonzero(channel.used))
         if name not in fitted or (channel.values.size and not used):
+            continue
+        if word := unsigned_word_sentence(channel):
+            yield refusal(run, name, f"{run}: of '{name}', {word}.")
             continue
         bad = channel.used & ~(np.isfinite(channel.values) & np.isfinite(channel.time))
         if bad.any():
@@ -592,7 +596,8 @@ def beside_the_drives(campaign: Campaign) -> list[str]:
             beyond = beyond_the_card(run)
             for sentence in beyond:
                 sentences.append(f"{sentence}; this run is not compared with the drive")
-            if not beyond:
+            # words without a sign are findings of their channel
+            if not beyond and not any(map(unsigned_word_sentence, run.channels.values())):
                 runs.append(run)
         # a drive of assumed numbers says nothing of what a machine does
         assumed = all(parameter.status == "assumed" for parameter in nominal.values())
