@@ -75,7 +75,7 @@ def fit(tmp_path):
             swashplate="1",
             axis="hoist",
             campaign="campaign.toml",
-            runs={},
+            runs={"step": ""},
             nominal="",
             setup=load_setup("hoist"),
             stages=(STAGE,),
