@@ -574,17 +574,18 @@ def _by_simulation(
         numbers = range(len(outcomes), number)
         outcomes += [outcome for (outcome,) in in_sea.outcomes([case], numbers)]
         judgement = judge(outcomes, limits, length=study.length)
-        if judgement.sufficient != "not decided" or number == len(study.seeds):
+        left = any(map(has_left, outcomes))
+        # once a run has left the model, longer ones say no more than short ones, how often it does
+        if judgement.sufficient != "not decided" or left or number == len(study.seeds):
             break
         number = min(2 * number, len(study.seeds))
-    if judgement.sufficient == "yes":
+    if judgement.sufficient == "yes" or (judgement.sufficient == "not decided" and left):
         others = _failed_starts(in_sea, case, len(outcomes))
         judgement = judge(outcomes, limits, length=study.length, other_starts=others)
     ratios = {
         quantity.name: quantity.largest.value / quantity.limit for quantity in judgement.limited
     }
     worst = max(ratios, key=lambda name: float(np.nan_to_num(ratios[name])), default=LEFT)
-    left = any(outcome.departure_reason for outcome in outcomes)
     cause = _drive_limit(outcomes) or (LEFT if left else worst)
     return _Simulated(judgement.sufficient, np.nan if left else ratios.get(worst, np.nan), cause)
 
