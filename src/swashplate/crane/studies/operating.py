@@ -479,7 +479,7 @@ def _demand_at_start(case: Case, sea: Seaway) -> float:
     rope = case.pose["rope_m"]
     swing = linear_response(crane, sea, **case.pose, **case.hangs).values["swing"].largest
     followable = follow(crane, [2.0 * pi * sqrt(rope / GRAVITY)], seas=(), **case.pose)
-    return settings.feedback * swing * rope / float(followable.amplitude[0, 1:].min())
+    return float(settings.feedback * swing * rope / followable.amplitude[0, 1:].min())
 
 
 class _Simulated(NamedTuple):
