@@ -30,7 +30,7 @@ from swashplate.crane.sea.scatter import Scatter
 from swashplate.crane.sea.seaway import Seaway, Spectrum
 from swashplate.crane.sea.transfer_functions import TransferFunctions
 from swashplate.crane.studies.following import follow
-from swashplate.crane.studies.judging import TAKEOVER, Decision, has_left, judge
+from swashplate.crane.studies.judging import TAKEOVER, Decision, Judgement, has_left, judge
 from swashplate.crane.studies.run_outcome import RunOutcome
 from swashplate.crane.studies.spectral import DEMANDS, linear_response
 from swashplate.crane.studies.study import (
@@ -580,8 +580,7 @@ def _by_simulation(
             break
         number = min(2 * number, len(study.seeds))
     if judgement.sufficient == "yes" or (judgement.sufficient == "not decided" and left):
-        others = _failed_starts(in_sea, case, len(outcomes))
-        judgement = judge(outcomes, limits, length=study.length, other_starts=others)
+        judgement = _with_other_starts(in_sea, case, outcomes, limits)
     ratios = {
         quantity.name: quantity.largest.value / quantity.limit for quantity in judgement.limited
     }
@@ -590,28 +589,30 @@ def _by_simulation(
     return _Simulated(judgement.sufficient, np.nan if left else ratios.get(worst, np.nan), cause)
 
 
-def _failed_starts(study: Study, case: Case, done: int) -> list[bool]:
-    """Whether control fails after it is switched on in each seaway from a number on.
+def _with_other_starts(
+    study: Study, case: Case, outcomes: Sequence[RunOutcome], limits: Mapping[str, float]
+) -> Judgement:
+    """Judge runs together with short ones, of which only that counts: whether control takes over.
 
-    Those that begin in the largest swing are tried first, by the dozen, until it takes over all of
-    a dozen; it is taken to do so in the rest, which begin in less.
+    Those that begin in the largest swing are tried first, by the dozen. If control takes over all
+    of the first dozen, it is taken to do so in the rest, which begin in less.
     """
-    if case.swing_damping <= 0.0:  # it begins at rest
-        return []
     swings = {
         number: case.swing_at_start(replace(study.seaway, seed=study.seeds[number]))
-        for number in range(done, len(study.seeds))
+        for number in range(len(outcomes), len(study.seeds))
     }
     numbers = sorted(swings, key=lambda number: -swings[number])
     short = case._replace(command=OperatorCommand.rest(study.run_in + TAKEOVER))
     failed = [False] * len(numbers)
+    judgement = judge(outcomes, limits, length=study.length, other_starts=failed)
     for first in range(0, len(numbers), LARGEST_STARTS):
         tried = numbers[first : first + LARGEST_STARTS]
-        outcomes = [outcome for (outcome,) in study.outcomes([short], tried)]
-        failed[first : first + len(tried)] = map(has_left, outcomes)
-        if not any(map(has_left, outcomes)):
+        of_tried = study.outcomes([short], tried)
+        failed[first : first + len(tried)] = [has_left(outcome) for (outcome,) in of_tried]
+        judgement = judge(outcomes, limits, length=study.length, other_starts=failed)
+        if judgement.sufficient != "not decided":
             break
-    return failed
+    return judgement
 
 
 def _drive_limit(outcomes: Sequence[RunOutcome]) -> str:
