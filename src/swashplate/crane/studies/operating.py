@@ -26,11 +26,20 @@ from swashplate.crane.control import Control, stages_of
 from swashplate.crane.crane import Crane
 from swashplate.crane.limits import LIMITED
 from swashplate.crane.rope import GRAVITY
+from swashplate.crane.sea.confidence import rms_of
 from swashplate.crane.sea.scatter import Scatter
 from swashplate.crane.sea.seaway import Seaway, Spectrum
 from swashplate.crane.sea.transfer_functions import TransferFunctions
+from swashplate.crane.studies.crane_assessment import share_worse_of
 from swashplate.crane.studies.following import follow
-from swashplate.crane.studies.judging import TAKEOVER, Decision, Judgement, has_left, judge
+from swashplate.crane.studies.judging import (
+    ALLOWED_SHARE,
+    TAKEOVER,
+    Decision,
+    Judgement,
+    has_left,
+    judge,
+)
 from swashplate.crane.studies.run_outcome import RunOutcome
 from swashplate.crane.studies.spectral import DEMANDS, linear_response
 from swashplate.crane.studies.study import (
@@ -92,6 +101,9 @@ UNDECIDED = "undecided"
 """In place of a limit, for a cell that all seaways together do not decide."""
 LEFT = "leaves the model"
 """In place of a limit, for a cell in which a run is not a valid operation to its end."""
+HARM = "control harms"
+"""In place of a limit, for a cell in which control makes more swing than none, at no limit of a
+drive."""
 DRIVES_LIMITS: Mapping[Limit, str] = {
     Limit.ORIFICE: "orifice",
     Limit.SWASH_STOP: "swash stop",
@@ -586,7 +598,40 @@ def _by_simulation(
     }
     worst = max(ratios, key=lambda name: float(np.nan_to_num(ratios[name])), default=LEFT)
     cause = _drive_limit(outcomes) or (LEFT if left else worst)
-    return _Simulated(judgement.sufficient, np.nan if left else ratios.get(worst, np.nan), cause)
+    decision = judgement.sufficient
+    if decision == "yes":
+        decision = _harmless(in_sea, case, outcomes)
+        cause = _drive_limit(outcomes) or HARM
+    return _Simulated(decision, np.nan if left else ratios.get(worst, np.nan), cause)
+
+
+def _harmless(study: Study, case: Case, outcomes: Sequence[RunOutcome]) -> Decision:
+    """Whether control makes more swing than none at most as often as is allowed.
+
+    If its swing is far less than without it, the first seaways decide; else they are doubled, and
+    if all together do not show that it harms, the value of the share does not exceed the allowed.
+    """
+    controlled: list[RunOutcome] = []
+    uncontrolled: list[RunOutcome] = []
+    number = len(outcomes)
+    while True:
+        numbers = range(len(controlled), number)
+        cases = [case, study.cases[NO_CONTROL]]
+        for with_control, without in study.outcomes(cases, numbers):
+            controlled.append(with_control)
+            uncontrolled.append(without)
+        swings = [
+            rms_of(np.array([outcome.rms_swing for outcome in of_case])).value
+            for of_case in (controlled, uncontrolled)
+        ]
+        share = share_worse_of(controlled, uncontrolled)
+        if share.low > ALLOWED_SHARE:
+            return "no"
+        if share.value == 0.0 and swings[0] < swings[1] / NEAR:
+            return "yes"
+        if number == len(study.seeds):
+            return "yes" if share.value <= ALLOWED_SHARE else "not decided"
+        number = min(2 * number, len(study.seeds))
 
 
 def _with_other_starts(
