@@ -37,7 +37,7 @@ from swashplate.crane import (
     read_ship,
 )
 from swashplate.crane.sea import rms_of
-from swashplate.crane.studies.crane_assessment import largest_of
+from swashplate.crane.studies.judging import largest_of
 
 IDEAL_DESIGN = (
     control.DelayedFeedback(0.2, 0.2) | control.ShipCompensation() | control.PositionLoop(1.5)

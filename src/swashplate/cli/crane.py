@@ -439,6 +439,7 @@ def sweep(
     "damping",
     examples="""
         swashplate crane damping swing.csv --column swing --start 12 --stop 90 --rope 20
+        swashplate crane damping swing.csv --column swing --across sway --rope 20
     """,
     units=False,
 )
@@ -452,6 +453,13 @@ def damping(
             help="Column of the angle, with its unit in the header: 'swing \\[deg]'.",
         ),
     ] = "swing",
+    across: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="Column of the angle across, to see whether the plane of swing turns.",
+        ),
+    ] = None,
     time_column: Annotated[
         str, typer.Option(metavar="NAME", help="Column of the time in LOG.")
     ] = "time",
@@ -469,8 +477,11 @@ def damping(
     """Estimate the damping ratio of a freely swinging load from a log of its angle.
 
     A decaying sine is fitted to the signed angle in one plane, with the crane at
-    rest and at least five swings.
+    rest and at least five swings. Halves or planes of the log that do not agree
+    on the damping are refused.
     """
+    import numpy as np
+
     from swashplate.crane import swing_damping
     from swashplate.logs import read_series
 
@@ -484,8 +495,19 @@ def damping(
             f"{log} lasts from {first:g} to {last:g} s, but {begins:g} to {ends:g} s are requested."
         )
     within = (begins <= series.time) & (series.time <= ends)
+    angle_across = None
+    if across is not None:
+        other = read_series(log, across, "rad", time_column=time_column)
+        if not np.array_equal(other.time, series.time):
+            raise InputError(
+                f"{log}: columns {column} and {across} have values at different times, but must "
+                "have them at the same."
+            )
+        angle_across = other.values[within]
     try:
-        free_swing = swing_damping(series.time[within], series.values[within], rope=rope)
+        free_swing = swing_damping(
+            series.time[within], series.values[within], across=angle_across, rope=rope
+        )
     except InputError as error:
         raise InputError(f"{log}, {column}: {error}") from None
     ratio = Column("damping ratio", ".3%")
@@ -493,6 +515,8 @@ def damping(
     table = Table("Free swing, 95 % interval", (ratio, *interval, Column("period", ".2f", "s")))
     table.add(free_swing.value, free_swing.low, free_swing.high, free_swing.period)
     show(table)
+    for sentence in free_swing.sentences():
+        say(sentence)
 
 
 def _print_result(crane: Crane, tables: Iterable[Table], sentences: Iterable[str]) -> None:

@@ -288,7 +288,10 @@ class Studied(Operated):
     ] = "feedback=0.2/0.2+ship+loop=1.5"
     seeds: Annotated[
         int | None,
-        typer.Option(metavar="N", help="Number of seaways (assess: 120 by default)."),
+        typer.Option(
+            metavar="N",
+            help="Number of seaways (assess: 120 by default; operability: at most 60 for a cell).",
+        ),
     ] = None
     length: Annotated[
         float | None,

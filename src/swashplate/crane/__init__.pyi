@@ -33,12 +33,12 @@ from .studies.assessing import assess as assess
 from .studies.assumptions import TippingPoint as TippingPoint
 from .studies.changed_drives import drawn_cranes as drawn_cranes
 from .studies.changed_drives import with_design_change as with_design_change
-from .studies.crane_assessment import AssessedQuantity as AssessedQuantity
 from .studies.crane_assessment import Assessment as Assessment
 from .studies.crane_assessment import Remedy as Remedy
 from .studies.following import Demand as Demand
 from .studies.following import Followable as Followable
 from .studies.following import follow as follow
+from .studies.judging import AssessedQuantity as AssessedQuantity
 from .studies.operating import Operability as Operability
 from .studies.operating import operability as operability
 from .studies.run_outcome import RunOutcome as RunOutcome

@@ -1,6 +1,7 @@
 from .assessing import SEAWAYS as SEAWAYS
 from .assessing import seaways_needed as seaways_needed
-from .crane_assessment import Decision as Decision
+from .judging import Decision as Decision
+from .operating import UNDECIDED as UNDECIDED
 from .operating import WORKABLE as WORKABLE
 from .operating import label_of as label_of
 from .study import EVALUATED_TIME as EVALUATED_TIME

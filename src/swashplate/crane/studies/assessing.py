@@ -22,11 +22,10 @@ from swashplate.crane.studies.crane_assessment import (
     Assessment,
     Question,
     Remedy,
-    all_of,
-    assessed_limits,
     share_worse_of,
 )
 from swashplate.crane.studies.following import follow
+from swashplate.crane.studies.judging import ALLOWED_SHARE, judge
 from swashplate.crane.studies.run_outcome import RunOutcome
 from swashplate.crane.studies.spectral import linear_response
 from swashplate.crane.studies.study import NO_CONTROL, Case, Controllers, Study
@@ -51,7 +50,7 @@ def assess(
     crane: Crane,
     control: Controllers,
     *,
-    allowed_share_worse: float = 0.05,
+    allowed_share_worse: float = ALLOWED_SHARE,
     questions: Sequence[Question] | None = None,
     remedies: bool = True,
     tipping_points: bool = True,
@@ -261,19 +260,25 @@ def _result(
         block = range(first, min(first + BLOCK, seaways))
         outcomes += [outcome for (outcome,) in assessment.study.outcomes([trial.case], block)]
         share_worse = share_worse_of(outcomes, uncontrolled[: len(outcomes)])
-        limited = assessed_limits(outcomes, limits)
-        decisions = [quantity.within for quantity in limited]
+        judgement = judge(
+            outcomes,
+            limits,
+            length=assessment.study.length,
+            allowed=assessment.allowed_share_worse,
+        )
         if share_worse.value * len(outcomes) > assessment.allowed_share_worse * seaways:
             return None
-        if only_if_sufficient and "no" in decisions:
+        if only_if_sufficient and judgement.sufficient == "no":
             return None
     swing = rms_of(np.array([outcome.rms_swing for outcome in outcomes]))
     return Remedy(
         change=trial.change,
         size=trial.size,
         harmless="yes" if share_worse.high <= assessment.allowed_share_worse else "not decided",
-        sufficient=all_of(decisions) if is_sufficiency_question else None,
+        sufficient=judgement.sufficient if is_sufficiency_question else None,
         share_worse=share_worse,
         swing=swing,
-        beyond=tuple(quantity.description() for quantity in limited if quantity.within == "no"),
+        beyond=tuple(
+            quantity.description() for quantity in judgement.limited if quantity.within == "no"
+        ),
     )

@@ -6,9 +6,9 @@ control? *Sufficiency*: does all that has a limit stay within it in a sea of thr
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from math import inf, isfinite, nan, pi, radians
+from math import inf, nan, radians
 from typing import TYPE_CHECKING, ClassVar, Literal, NamedTuple
 
 import numpy as np
@@ -31,16 +31,22 @@ from swashplate.crane.sea.confidence import (
     share_in_seaways,
     share_of,
 )
-from swashplate.crane.sea.extremes import THREE_HOURS, largest_of_peaks
 from swashplate.crane.sea.transfer_functions import CRANE_SHIP, Hull
 from swashplate.crane.studies.assumptions import TippingPoint
+from swashplate.crane.studies.judging import (
+    AssessedQuantity,
+    Decision,
+    Judgement,
+    assessed_limits,
+    judge,
+    largest_of,
+)
 from swashplate.crane.studies.run_outcome import RunOutcome
 from swashplate.crane.studies.spectral import LinearResponse
 from swashplate.crane.studies.study import NO_CONTROL, Study, assumed_sentences
 from swashplate.drive import Limit
 from swashplate.results import Drawn, Tabular
 from swashplate.tables import Column, Table, count, listed
-from swashplate.units import DisplayUnit
 
 if TYPE_CHECKING:
     import polars
@@ -48,7 +54,6 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Question = Literal["harm", "sufficiency"]
 QUESTIONS: tuple[Question, ...] = ("harm", "sufficiency")
-Decision = Literal["yes", "no", "not decided"]
 
 LOOP = PositionLoop()
 """Position loop with which clips are tried: a stiff one compensates for the motion clipped."""
@@ -56,59 +61,8 @@ NO_TIPPING_POINT = (
     "In short runs, no other value tried for damping, roll period, height, period, peak factor, "
     "heading or drum, each alone, clearly changes the answer."
 )
-TAKEOVER = 180.0
-"""Time after the run-in, of two minutes, in which a run that leaves the model has failed to take
-over the swing that it was switched on in: 5 min from the start, some thirty swings. Later ones are
-counted by the time that they ran. [s]"""
 IDLE = 1e-3
 """Relative difference of the swing below which control changes nothing."""
-
-
-class AssessedQuantity(NamedTuple):
-    """A quantity with a limit, of one variant."""
-
-    name: str
-    limit: float
-    largest: ConfidenceInterval
-    """Most probable largest value in three hours; of the saturation its mean. If a run left the
-    model it is not known: NaN, from what the other runs surely reach to inf."""
-    left: int = 0
-    """Runs that left the model."""
-    runs: int = 0
-
-    @property
-    def within(self) -> Decision:
-        """Whether it stays within the limit; not decided if its interval holds the limit."""
-        if self.largest.low > self.limit:
-            return "no"
-        return "yes" if self.largest.high <= self.limit else "not decided"
-
-    @property
-    def shown_unit(self) -> DisplayUnit:
-        """Unit in which it is shown."""
-        if self.name == "saturation":
-            return DisplayUnit("%", 100.0)
-        unit = LIMITED[self.name].unit
-        if unit == "rad":
-            return DisplayUnit("deg", 180.0 / pi)
-        return DisplayUnit(unit.replace("1", ""), 1.0)
-
-    def description(self) -> str:
-        """Its value and limit: ``"off-lead 9.1 deg (8.7 to 9.5), limit 8 deg"``."""
-        label = LIMITED[self.name].label
-        unit, factor = self.shown_unit
-        limit = f"limit {factor * self.limit:.3g} {unit}".rstrip()
-        if self.largest.high == inf:
-            left = f" (left the model in {self.left} of {count(self.runs, 'seaway')})"
-            known = f"> {FARTHEST_SWING:g} deg" if self.name == "swing" else "unknown"
-            if self.name != "swing" and self.within == "no":
-                known = "beyond its limit"
-            return f"{label} {known}{left if self.left else ''}, {limit}"
-        if not all(map(isfinite, self.largest)):
-            return f"{label} unknown: too few peaks"
-        value, low, high = (factor * number for number in self.largest)
-        largest = f"{label} {value:.3g} {unit}".rstrip()
-        return f"{largest} ({low:.3g} to {high:.3g}), {limit}"
 
 
 class Remedy(NamedTuple):
@@ -203,8 +157,7 @@ class Assessment(Tabular, Drawn):
 
     def limited(self, name: str) -> tuple[AssessedQuantity, ...]:
         """Quantities of a variant that have a limit."""
-        outcomes = self.of(name)
-        return assessed_limits(outcomes, self.study.crane.limits_si)
+        return assessed_limits(self.of(name), self.study.crane.limits_si)
 
     def acting(self, name: str, axis: str, limit: Limit) -> float:
         """Mean share of time for which a limit of a drive acts; NaN if every run was stopped."""
@@ -222,38 +175,32 @@ class Assessment(Tabular, Drawn):
         return "yes" if share.high <= self.allowed_share_worse else "not decided"
 
     @property
+    def judgement(self) -> Judgement:
+        """The assessed variant held against its limits, and against leaving the model."""
+        return judge(
+            self.of(self.assessed_variant),
+            self.study.crane.limits_si,
+            length=self.study.length,
+            allowed=self.allowed_share_worse,
+        )
+
+    @property
     def sufficient(self) -> Decision | None:
         """Whether all stays within its limits in three hours; None if the crane has no limits.
 
-        With a run that left the model it is never yes; see `stays`.
+        With a run that left the model it is never yes; see `Judgement.stays`.
         """
-        if not self.study.crane.limits:
-            return None
-        decisions = [quantity.within for quantity in self.limited(self.assessed_variant)]
-        return all_of([*decisions, self.stays])
+        return self.judgement.sufficient if self.study.crane.limits else None
 
     @property
     def stays(self) -> Decision:
-        """Whether the assessed variant stays in the model, however long its runs are.
-
-        No, if it fails to take over the swing that it is switched on in more often than is allowed,
-        by the interval of `share_of_failed_starts`, or leaves the model after that once in three
-        hours or more often. Not decided if it left the model more seldom.
-        """
-        times = [run.evaluated_time for run in self.of(self.assessed_variant) if has_left(run)]
-        late = sum(time > TAKEOVER for time in times)
-        time_after = len(self.study.seeds) * (self.study.length - TAKEOVER)
-        leaves_often = late > 0 and late * THREE_HOURS >= time_after
-        if leaves_often or self.share_of_failed_starts.low > self.allowed_share_worse:
-            return "no"
-        return "not decided" if times else "yes"
+        """Whether the assessed variant stays in the model: `Judgement.stays`."""
+        return self.judgement.stays
 
     @property
     def share_of_failed_starts(self) -> ConfidenceInterval:
         """Share of switchings-on after which the assessed variant leaves the model."""
-        runs = self.of(self.assessed_variant)
-        failed = sum(has_left(run) and run.evaluated_time <= TAKEOVER for run in runs)
-        return share_of(failed, len(runs))
+        return self.judgement.share_of_failed_starts
 
     @property
     def idle(self) -> bool:
@@ -662,59 +609,6 @@ def _is_worse(run: RunOutcome, uncontrolled: RunOutcome) -> bool:
     return run.rms_swing > uncontrolled.rms_swing
 
 
-def has_left(outcome: RunOutcome) -> bool:
-    """Whether a run left the model, or was stopped."""
-    return bool(outcome.departure_reason)
-
-
 def _in_model(swing: float) -> float:
     """A swing [rad], NaN beyond the model's edge."""
     return swing if swing <= radians(FARTHEST_SWING) else nan
-
-
-def largest_of(outcomes: Sequence[RunOutcome], name: str) -> ConfidenceInterval:
-    """Most probable largest value of a quantity in three hours, from its peaks in many runs.
-
-    Peaks of a run that left the model are cut off at its edge, and tell nothing of what lies
-    beyond. If there is such a run, or three hours would have a swing beyond that edge, the value is
-    NaN, from what the other runs surely reach to inf.
-    """
-    stayed = [outcome for outcome in outcomes if not has_left(outcome)]
-    largest = _largest_in(stayed, name)
-    swing = largest if name == "swing" else _largest_in(stayed, "swing")
-    if len(stayed) == len(outcomes) and not swing.value > radians(FARTHEST_SWING):
-        return largest
-    return ConfidenceInterval(nan, largest.low, inf)
-
-
-def _largest_in(outcomes: Sequence[RunOutcome], name: str) -> ConfidenceInterval:
-    runs = [outcome.peaks[name] for outcome in outcomes if name in outcome.peaks]
-    evaluated_time = sum(outcome.evaluated_time for outcome in outcomes)
-    return largest_of_peaks(runs, max(evaluated_time, 1.0))
-
-
-def assessed_limits(
-    outcomes: Sequence[RunOutcome], limits: Mapping[str, float]
-) -> tuple[AssessedQuantity, ...]:
-    """Quantities that have a limit and that the runs have.
-
-    Limits of quantities that the runs lack, such as a place if the operator moves, are left out.
-    """
-    quantities = []
-    for name, limit in limits.items():
-        if name == "saturation":
-            shares = np.array([outcome.saturation for outcome in outcomes])
-            if np.isfinite(shares).any():
-                quantities.append(AssessedQuantity(name, limit, mean_of(shares, 0.0)))
-        elif any(name in outcome.peaks for outcome in outcomes):
-            left = sum(map(has_left, outcomes))
-            largest = largest_of(outcomes, name)
-            quantities.append(AssessedQuantity(name, limit, largest, left, len(outcomes)))
-    return tuple(quantities)
-
-
-def all_of(decisions: Sequence[Decision]) -> Decision:
-    """Whether all are yes; no if one is no."""
-    if "no" in decisions:
-        return "no"
-    return "not decided" if "not decided" in decisions else "yes"

@@ -3,28 +3,43 @@
 A scatter diagram says how often each significant height comes with each peak period. For each of
 its cells and each heading the frequency domain gives what is linear: the crane without control, and
 with control as long as no drive is at a limit. A cell is simulated if that is near a limit, or asks
-of a drive what it cannot do. At one period and heading, what is beyond a limit stays beyond it in
-higher waves, so that only the boundary is looked for.
+of a drive what it cannot do, and judged as a verdict is. At one period and heading, what is beyond
+a limit stays beyond it in higher waves, so that only the boundary is looked for, and what limits
+first, as the sea rises, is what limits all seas above.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache
+from math import pi, sqrt
 from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.crane.axes import AXES
+from swashplate.crane.closed_loop.operator_command import OperatorCommand
 from swashplate.crane.closed_loop.result import PUMPS
-from swashplate.crane.control import Control
+from swashplate.crane.control import Control, stages_of
 from swashplate.crane.crane import Crane
 from swashplate.crane.limits import LIMITED
-from swashplate.crane.sea.extremes import largest_of_peaks
+from swashplate.crane.rope import GRAVITY
+from swashplate.crane.sea.confidence import rms_of
 from swashplate.crane.sea.scatter import Scatter
 from swashplate.crane.sea.seaway import Seaway, Spectrum
 from swashplate.crane.sea.transfer_functions import TransferFunctions
+from swashplate.crane.studies.crane_assessment import share_worse_of
+from swashplate.crane.studies.following import follow
+from swashplate.crane.studies.judging import (
+    ALLOWED_SHARE,
+    TAKEOVER,
+    Decision,
+    Judgement,
+    has_left,
+    judge,
+)
 from swashplate.crane.studies.run_outcome import RunOutcome
 from swashplate.crane.studies.spectral import DEMANDS, linear_response
 from swashplate.crane.studies.study import (
@@ -60,8 +75,15 @@ MOST_PERIODS = 100
 """Periods of a scatter diagram; classes of 0.25 s between 2 and 25 s are 92."""
 NEAR = 1.3
 """Factor on a limit, and from it, within which the frequency domain is not relied on."""
-SEEDS = (0, 1)
-"""Seaways in which a cell is simulated, ten minutes each."""
+SEEDS = tuple(range(60))
+"""Seaways in which a cell is simulated at most, ten minutes each."""
+FIRST = 4
+"""Seaways in which it is simulated at first: the least whose interval is of use, as Student's for
+four groups is 3.2 standard errors wide, and for three 4.3. As long as that decides nothing, they
+are doubled."""
+LARGEST_STARTS = 12
+"""Starts with the largest swing of all seaways that are tried together: control fails to take over
+large swings first."""
 SHORTEST = 300.0
 """Least time for which each of them counts: some fifty peaks of a swing. [s]"""
 ACTS = 0.05
@@ -73,12 +95,15 @@ NOT_MODELLED = (
     "Not modelled is what a crew does: it damps the swing by moving the boom and with tag lines, "
     "so that without control a crane may work in more of the year than is shown."
 )
-LEFT_OUT = "saturation"
-"""Limit that is not assessed: a drive's limits are found by what they do."""
 WORKABLE = ""
 """In place of a limit, for a cell that can be worked."""
+UNDECIDED = "undecided"
+"""In place of a limit, for a cell that all seaways together do not decide."""
 LEFT = "leaves the model"
 """In place of a limit, for a cell in which a run is not a valid operation to its end."""
+HARM = "control harms"
+"""In place of a limit, for a cell in which control makes more swing than none, at no limit of a
+drive."""
 DRIVES_LIMITS: Mapping[Limit, str] = {
     Limit.ORIFICE: "orifice",
     Limit.SWASH_STOP: "swash stop",
@@ -90,10 +115,11 @@ class SeaCell(NamedTuple):
     """A sea of one height, period and heading, for one variant."""
 
     limited_by: str
-    """A name of `LIMITED`, or drive and its limit, ``"luff orifice"``; empty if workable."""
+    """What limits first as the sea rises at this period and heading, a name of `LIMITED` or drive
+    and its limit, ``"luff orifice"``; `WORKABLE` or `UNDECIDED`."""
     ratio: float
-    """Largest ratio of a value to its limit; inf if the run left the model; NaN if it was not
-    computed, as a higher sea is workable."""
+    """Largest ratio of a value to its limit; NaN if it is not known: a run left the model, or the
+    cell follows from another one."""
     simulated: bool
     """Whether it was simulated, or follows from a cell that was."""
 
@@ -126,8 +152,15 @@ class Operability(Tabular):
         """Share of the year that a variant can work, 0 to 1, headings as likely as each other."""
         return self.shares(name).get(WORKABLE, 0.0)
 
+    def undecided(self, name: str) -> float:
+        """Share of the year of which it is not decided whether a variant can work."""
+        return self.shares(name).get(UNDECIDED, 0.0)
+
     def shares(self, name: str) -> dict[str, float]:
-        """Share of the year by what limits it, the largest first; `WORKABLE` is workable."""
+        """Share of the year by what limits it, the largest first.
+
+        `WORKABLE` is workable, `UNDECIDED` not decided.
+        """
         shares: dict[str, float] = {}
         for (row, _), cell in self.cells[name].items():
             share = float(self.scatter.share[row]) / len(self.headings)
@@ -143,8 +176,10 @@ class Operability(Tabular):
         limits = list[str]()
         for name in self.names:
             for limit in self.shares(name):
-                if limit != WORKABLE and limit not in limits:
+                if limit not in (WORKABLE, UNDECIDED, *limits):
                     limits.append(limit)
+        if any(self.undecided(name) for name in self.names):
+            limits.insert(0, UNDECIDED)
         limit_columns = [Column(label_of(limit), ".1%", wrap=True) for limit in limits]
         columns = (Column("variant", wrap=True), Column("workable", ".1%"), *limit_columns)
         table = Table("Share of the year, and what limits the rest first", columns)
@@ -205,10 +240,20 @@ class Operability(Tabular):
             sentences.append(self.scatter.note)
         if isinstance(self.seaway.ship, TransferFunctions) and self.seaway.ship.unchecked:
             sentences.append(self.seaway.ship.unchecked)
+        undecided = [
+            f"{100.0 * self.undecided(name):.1f} % with '{name}'"
+            for name in self.names
+            if self.undecided(name)
+        ]
+        if undecided:
+            sentences.append(
+                f"Undecided is {listed(undecided)}: there, after all seaways, the interval of a "
+                "value holds its limit, or control sometimes fails to take over the swing that it "
+                "is switched on in."
+            )
         if self._lowest_unworkable() <= CALM:
             sentences.append(NOT_MODELLED)
-        assessed = {name: limit for name, limit in self.crane.limits.items() if name != LEFT_OUT}
-        return (*sentences, *assumed_sentences(replace(self.crane, limits=assessed)))
+        return (*sentences, *assumed_sentences(self.crane))
 
 
 def label_of(limit: str) -> str:
@@ -232,7 +277,7 @@ def operability(
     Parameters
     ----------
     crane : Crane
-        With limits, see `limits.LIMITED`; the saturation is left out.
+        With limits, see `limits.LIMITED`.
     control : Control
         One controller; the crane without control is always a variant.
     scatter : Scatter
@@ -246,7 +291,8 @@ def operability(
     executor : Executor, optional
         Threads by default; the numbers do not depend on it.
     **options
-        As of `Study.of`, without a command.
+        As of `Study.of`, without a command. `seeds` are the seaways in which a cell is simulated at
+        most, 60 by default.
 
     Raises
     ------
@@ -254,7 +300,7 @@ def operability(
         For a crane without limits, no heading, one that is given twice, and seas or headings that
         `Seaway` refuses: all before the first is computed.
     """
-    limits = {name: limit for name, limit in crane.limits_si.items() if name != LEFT_OUT}
+    limits = crane.limits_si
     if not limits:
         raise InputError(
             f"{crane.name} has no limits: give its file a table [limits], as [limits] with "
@@ -299,6 +345,8 @@ def operability(
             hoist = (too_slow, column.period, column.heading)
     ordered = {name: dict(sorted(of_name.items())) for name, of_name in cells.items()}
     seaways = count(len(study.seeds), "seaway")
+    if len(study.seeds) > FIRST:
+        seaways = f"{FIRST} to {seaways}, as many as decide,"
     simulated = f"A cell is simulated in {seaways} of {study.length / 60.0:g} min."
     case = f"{study.cases[list(study.cases)[-1]].sentence()} {simulated}"
     return Operability(
@@ -358,40 +406,18 @@ def _of_column(
         heading_deg=column.heading,
     )
     linear = _linear(case, low, limits)
-    cells = {
-        int(row): _by_spectrum(float(scatter.height[row]), linear, limits) for row in column.rows
-    }
+    heights = {int(row): float(scatter.height[row]) for row in column.rows}
 
-    def simulated(row: int) -> SeaCell:
-        sea = Spectrum(float(scatter.height[row]), column.period, factor)
+    @cache
+    def simulated(height: float) -> _Simulated:
+        sea = Spectrum(height, column.period, factor)
         return _by_simulation(study, case, replace(low, sea=sea), limits)
 
-    open_rows = [row for row, cell in cells.items() if cell is None]
-    complete = cells | _boundary(open_rows, simulated)
+    border = _border(linear, list(heights.values()), simulated)
+    cells = {row: _cell(height, linear, border, simulated) for row, height in heights.items()}
     slope = linear.slope["hoist_demand"]
     too_slow = limits.get("hoist_demand", np.inf) / slope if slope > 0.0 else np.inf
-    return {row: cell for row, cell in complete.items() if cell is not None}, too_slow
-
-
-def _boundary(rows: Sequence[int], simulated: Callable[[int], SeaCell]) -> dict[int, SeaCell]:
-    """Cells of rows, the lowest waves first: each that is simulated decides half of the others."""
-    cells: dict[int, SeaCell] = {}
-    low = 0
-    high = len(rows)
-    limiting = SeaCell(LEFT, np.inf, True)
-    while low < high:
-        middle = (low + high) // 2
-        cell = simulated(rows[middle])
-        cells[rows[middle]] = cell
-        if cell.limited_by == WORKABLE:
-            low = middle + 1
-        else:
-            high = middle
-            limiting = cell
-    for position, row in enumerate(rows):
-        if row not in cells:
-            cells[row] = SeaCell(WORKABLE, np.nan, True) if position < low else limiting
-    return cells
+    return cells, too_slow
 
 
 class _Linear(NamedTuple):
@@ -403,6 +429,37 @@ class _Linear(NamedTuple):
     """What they are without waves."""
     demand: float
     """Largest part for each metre of what drives and clip can do that control asks for."""
+    limits: Mapping[str, float]
+    """Of quantities that the frequency domain has."""
+
+    def ratio(self, height: float) -> float:
+        """Largest ratio of a value to its limit in waves of a height."""
+        ratios = [
+            (self.mean[name] + height * self.slope[name]) / limit
+            for name, limit in self.limits.items()
+        ]
+        return max(ratios, default=0.0)
+
+    def first(self) -> tuple[float, str]:
+        """Height at which the first limit is met, and that limit; inf if none is. [m]"""
+        met = {
+            name: max((limit - self.mean[name]) / self.slope[name], 0.0)
+            if self.slope[name] > 0.0
+            else (0.0 if self.mean[name] > limit else np.inf)
+            for name, limit in self.limits.items()
+        }
+        name = min(met, key=lambda limit: met[limit], default=LEFT)
+        return met.get(name, np.inf), name
+
+    def decision(self, height: float) -> Decision:
+        """Whether the crane works; not decided if too near a limit, of a drive as well."""
+        ratio = self.ratio(height)
+        if self.demand == 0.0:  # no drive moves
+            return "no" if ratio > 1.0 else "yes"
+        if ratio > NEAR:  # drives that are at their limits do not make it better
+            return "no"
+        far = ratio < 1.0 / NEAR and self.demand * height < 1.0 / NEAR
+        return "yes" if far else "not decided"
 
 
 def _linear(case: Case, sea: Seaway, limits: Mapping[str, float]) -> _Linear:
@@ -410,50 +467,197 @@ def _linear(case: Case, sea: Seaway, limits: Mapping[str, float]) -> _Linear:
     control = case.options["control"]
     response = linear_response(case.cranes[0], sea, control, **case.pose, **case.hangs)
     values = response.values
-    named = {*limits, "hoist_demand"}
+    known = {name: limit for name, limit in limits.items() if name in values}
+    named = {*known, "hoist_demand"}
     mean = {name: abs(values[name].mean) for name in named}
     slope = {name: (values[name].largest - mean[name]) / LOW_SEA for name in named}
+    if control is None:
+        return _Linear(slope, mean, 0.0, known)
     demands = [name for name in DEMANDS if name in values and (case.driven or name == "clip")]
-    demand = max((values[name].largest for name in demands), default=0.0) / LOW_SEA
-    return _Linear(slope, mean, demand if control is not None else 0.0)
+    demand = max((values[name].largest for name in demands), default=0.0)
+    return _Linear(slope, mean, max(demand, _demand_at_start(case, sea)) / LOW_SEA, known)
 
 
-def _by_spectrum(height: float, linear: _Linear, limits: Mapping[str, float]) -> SeaCell | None:
-    """A cell by the frequency domain; None if it is too near a limit, of a drive as well."""
-    ratios = {
-        name: (linear.mean[name] + height * linear.slope[name]) / limit
-        for name, limit in limits.items()
-    }
-    worst = max(ratios, key=lambda name: ratios[name])
-    ratio = ratios[worst]
-    if linear.demand == 0.0:  # no drive moves
-        return SeaCell(worst if ratio > 1.0 else WORKABLE, ratio, False)
-    if ratio > NEAR:  # drives that are at their limits do not make it better
-        return SeaCell(worst, ratio, False)
-    if ratio < 1.0 / NEAR and linear.demand * height < 1.0 / NEAR:
-        return SeaCell(WORKABLE, ratio, False)
-    return None
+def _demand_at_start(case: Case, sea: Seaway) -> float:
+    """Part of what slew or luff can follow that the feedback of a swing without control asks for.
+
+    A clip keeps that within what they can follow.
+    """
+    settings = stages_of(case.options["control"])[0]
+    clipped = settings.clip > 0.0 or settings.share > 0.0
+    if not case.driven or clipped or not settings.feedback or case.swing_damping <= 0.0:
+        return 0.0
+    crane = case.cranes[0]
+    rope = case.pose["rope_m"]
+    swing = linear_response(crane, sea, **case.pose, **case.hangs).values["swing"].largest
+    followable = follow(crane, [2.0 * pi * sqrt(rope / GRAVITY)], seas=(), **case.pose)
+    return float(settings.feedback * swing * rope / followable.amplitude[0, 1:].min())
+
+
+class _Simulated(NamedTuple):
+    """A sea by simulated seaways."""
+
+    decision: Decision
+    ratio: float
+    """Largest ratio of a value to its limit; NaN if a run left the model."""
+    cause: str
+    """Drive and limit that act for the longest time, or else the worst quantity."""
+
+
+class _Border(NamedTuple):
+    """Heights between which the crane ceases to work, at one period and heading. [m]"""
+
+    workable: float
+    """Highest waves that are certainly workable."""
+    unworkable: float
+    """Lowest waves that are certainly not."""
+    limited_by: str
+    """What limits first as the sea rises."""
+    by_simulation: bool
+    """Whether simulated seaways have drawn it."""
+
+
+def _border(
+    linear: _Linear, heights: Sequence[float], simulated: Callable[[float], _Simulated]
+) -> _Border:
+    """Look for the border among heights, the lowest first, by halving those that are open.
+
+    Beside them, a sea is tried in which the first limit of the linear crane is still far: if the
+    crane does not work there, its drives are what limits first.
+    """
+    decisions = {height: linear.decision(height) for height in heights}
+    first_height, first_limit = linear.first()
+    workable = max((height for height in heights if decisions[height] == "yes"), default=0.0)
+    beyond = min((height for height in heights if decisions[height] == "no"), default=np.inf)
+    trial = first_height / NEAR
+    tries = {height for height in heights if decisions[height] == "not decided"}
+    if workable < trial < heights[-1] and linear.decision(trial) == "not decided":
+        tries.add(trial)
+    if not tries:
+        return _Border(workable, beyond, first_limit, False)
+    ordered = sorted(tries)
+    failing = _first_of(ordered, lambda height: simulated(height).decision != "yes")
+    certain = _first_of(ordered[failing:], lambda height: simulated(height).decision == "no")
+    workable = ordered[failing - 1] if failing else workable
+    if failing + certain == len(ordered):
+        return _Border(workable, beyond, first_limit, True)
+    lowest = ordered[failing + certain]
+    cause = simulated(lowest).cause if lowest < first_height else first_limit
+    return _Border(workable, lowest, cause, True)
+
+
+def _first_of(heights: Sequence[float], beyond: Callable[[float], bool]) -> int:
+    """Position of the first of rising heights that is beyond a border, by halving."""
+    low = 0
+    high = len(heights)
+    while low < high:
+        middle = (low + high) // 2
+        if beyond(heights[middle]):
+            high = middle
+        else:
+            low = middle + 1
+    return low
+
+
+def _cell(
+    height: float, linear: _Linear, border: _Border, simulated: Callable[[float], _Simulated]
+) -> SeaCell:
+    """The cell of a height in its column."""
+    by_spectrum = linear.decision(height)
+    limited_by = UNDECIDED
+    if by_spectrum == "yes" or height <= border.workable:
+        limited_by = WORKABLE
+    elif by_spectrum == "no" or height >= border.unworkable:
+        limited_by = border.limited_by
+    if by_spectrum != "not decided":
+        return SeaCell(limited_by, linear.ratio(height), False)
+    tried = height in (border.workable, border.unworkable) or limited_by == UNDECIDED
+    return SeaCell(limited_by, simulated(height).ratio if tried else np.nan, True)
 
 
 def _by_simulation(
     study: Study, case: Case, seaway: Seaway, limits: Mapping[str, float]
-) -> SeaCell:
-    """A cell by simulated seaways."""
+) -> _Simulated:
+    """A sea by simulated seaways: as many as decide, or all."""
     in_sea = replace(study, seaway=seaway, executor=Serial(), progress=None)
-    outcomes = [outcome for (outcome,) in in_sea.outcomes([case])]
-    if any(outcome.departure_reason for outcome in outcomes):
-        return SeaCell(_drive_limit(outcomes) or LEFT, np.inf, True)
-    evaluated_time = sum(outcome.evaluated_time for outcome in outcomes)
+    outcomes: list[RunOutcome] = []
+    number = min(FIRST, len(study.seeds))
+    while True:
+        numbers = range(len(outcomes), number)
+        outcomes += [outcome for (outcome,) in in_sea.outcomes([case], numbers)]
+        judgement = judge(outcomes, limits, length=study.length)
+        left = any(map(has_left, outcomes))
+        # once a run has left the model, longer ones say no more than short ones, how often it does
+        if judgement.sufficient != "not decided" or left or number == len(study.seeds):
+            break
+        number = min(2 * number, len(study.seeds))
+    if judgement.sufficient == "yes" or (judgement.sufficient == "not decided" and left):
+        judgement = _with_other_starts(in_sea, case, outcomes, limits)
     ratios = {
-        name: largest_of_peaks([outcome.peaks[name] for outcome in outcomes], evaluated_time).value
-        / limit
-        for name, limit in limits.items()
-        if all(name in outcome.peaks for outcome in outcomes)
+        quantity.name: quantity.largest.value / quantity.limit for quantity in judgement.limited
     }
-    worst = max(ratios, key=lambda name: ratios[name])
-    if ratios[worst] <= 1.0:
-        return SeaCell(WORKABLE, ratios[worst], True)
-    return SeaCell(_drive_limit(outcomes) or worst, ratios[worst], True)
+    worst = max(ratios, key=lambda name: float(np.nan_to_num(ratios[name])), default=LEFT)
+    cause = _drive_limit(outcomes) or (LEFT if left else worst)
+    decision = judgement.sufficient
+    if decision == "yes":
+        decision = _harmless(in_sea, case, outcomes)
+        cause = _drive_limit(outcomes) or HARM
+    return _Simulated(decision, np.nan if left else ratios.get(worst, np.nan), cause)
+
+
+def _harmless(study: Study, case: Case, outcomes: Sequence[RunOutcome]) -> Decision:
+    """Whether control makes more swing than none at most as often as is allowed.
+
+    If its swing is far less than without it, the first seaways decide; else they are doubled, and
+    if all together do not show that it harms, the value of the share does not exceed the allowed.
+    """
+    controlled: list[RunOutcome] = []
+    uncontrolled: list[RunOutcome] = []
+    number = len(outcomes)
+    while True:
+        numbers = range(len(controlled), number)
+        cases = [case, study.cases[NO_CONTROL]]
+        for with_control, without in study.outcomes(cases, numbers):
+            controlled.append(with_control)
+            uncontrolled.append(without)
+        swings = [
+            rms_of(np.array([outcome.rms_swing for outcome in of_case])).value
+            for of_case in (controlled, uncontrolled)
+        ]
+        share = share_worse_of(controlled, uncontrolled)
+        if share.low > ALLOWED_SHARE:
+            return "no"
+        if share.value == 0.0 and swings[0] < swings[1] / NEAR:
+            return "yes"
+        if number == len(study.seeds):
+            return "yes" if share.value <= ALLOWED_SHARE else "not decided"
+        number = min(2 * number, len(study.seeds))
+
+
+def _with_other_starts(
+    study: Study, case: Case, outcomes: Sequence[RunOutcome], limits: Mapping[str, float]
+) -> Judgement:
+    """Judge runs together with short ones, of which only that counts: whether control takes over.
+
+    Those that begin in the largest swing are tried first, by the dozen. If control takes over all
+    of the first dozen, it is taken to do so in the rest, which begin in less.
+    """
+    swings = {
+        number: case.swing_at_start(replace(study.seaway, seed=study.seeds[number]))
+        for number in range(len(outcomes), len(study.seeds))
+    }
+    numbers = sorted(swings, key=lambda number: -swings[number])
+    short = case._replace(command=OperatorCommand.rest(study.run_in + TAKEOVER))
+    failed = [False] * len(numbers)
+    judgement = judge(outcomes, limits, length=study.length, other_starts=failed)
+    for first in range(0, len(numbers), LARGEST_STARTS):
+        tried = numbers[first : first + LARGEST_STARTS]
+        of_tried = study.outcomes([short], tried)
+        failed[first : first + len(tried)] = [has_left(outcome) for (outcome,) in of_tried]
+        judgement = judge(outcomes, limits, length=study.length, other_starts=failed)
+        if judgement.sufficient != "not decided":
+            break
+    return judgement
 
 
 def _drive_limit(outcomes: Sequence[RunOutcome]) -> str:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import pi, radians, sin, sqrt
+from math import hypot, pi, radians, sin, sqrt
 from typing import Any, NamedTuple, Unpack
 
 import numpy as np
@@ -101,6 +101,14 @@ class Case(NamedTuple):
             motion = seaway.motion(round(self.command.length * RATE) + 1, RATE)
         options = self.options | self._start(seaway)
         return simulate(crane, self.command, sea=motion, **options)
+
+    def swing_at_start(self, seaway: Seaway) -> float:
+        """Amplitude of the swing that its run in a seaway begins in. [m]"""
+        start = self._start(seaway)
+        if not start:
+            return 0.0
+        omega = sqrt(GRAVITY / self.options["rope_m"])
+        return hypot(*start["load_offset"], *(rate / omega for rate in start["load_velocity"]))
 
     def _start(self, seaway: Seaway) -> RunOptions:
         """The stationary swing without control at time 0, at most a part of the model's edge."""
@@ -281,7 +289,7 @@ class Study(Result):
         return self.cases[name].run(self.seeds.index(seed), replace(self.seaway, seed=seed))
 
     def outcomes(
-        self, cases: Sequence[Case], numbers: range | None = None
+        self, cases: Sequence[Case], numbers: Sequence[int] | None = None
     ) -> list[tuple[RunOutcome, ...]]:
         """Outcomes of all cases, a tuple for each seaway, or for some by their numbers.
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from swashplate.crane import LIMITED, AssessedQuantity, Assessment, Hull, Operability
 from swashplate.crane.sea import rms_of
-from swashplate.crane.studies import NO_CONTROL, WORKABLE, label_of
+from swashplate.crane.studies import NO_CONTROL, UNDECIDED, WORKABLE, label_of
 from swashplate.report import style
 from swashplate.report.figures.crane import assumed, remark, remarks, seaway_label
 from swashplate.results import GivenAxes
@@ -317,13 +317,16 @@ def plot_operability(result: Operability, *, title: str | None = None) -> Figure
     headings cannot be worked; it is white if all can.
     """
     weights = _weights(result)
-    limits = [limit for limit in weights if limit != WORKABLE]
+    limits = [limit for limit in weights if limit not in (WORKABLE, UNDECIDED)]
     colors = dict(zip(limits, LIMIT_COLORS, strict=False))
     legend: list[Any] = [
         Patch(facecolor=color, label=label_of(limit)) for limit, color in colors.items()
     ]
-    if len(limits) > len(colors):
+    if len(limits) > len(LIMIT_COLORS):
         legend.append(Patch(facecolor=style.FAINT, label="others"))
+    if UNDECIDED in weights:
+        colors[UNDECIDED] = style.GREY
+        legend.append(Patch(facecolor=style.GREY, label="not decided"))
     legend.append(Patch(facecolor="white", edgecolor=style.FAINT, label="can be worked"))
     names = result.names
     columns = min(len(names), ABREAST)

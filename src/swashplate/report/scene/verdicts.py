@@ -11,7 +11,7 @@ import numpy as np
 from markupsafe import Markup
 
 from swashplate.crane import AXES, UNUSABLE, Assessment, Crane, Hull, Operability, Seaway, follow
-from swashplate.crane.studies import NO_CONTROL, WORKABLE, Decision, label_of
+from swashplate.crane.studies import NO_CONTROL, UNDECIDED, WORKABLE, Decision, label_of
 from swashplate.errors import DomainError, InputError
 from swashplate.report.fit_report.html_page import (
     PageBlock,
@@ -283,7 +283,9 @@ def _summary_sentence(operability: Operability) -> str:
         f"{without:.0f} %."
     )
     shares = operability.shares(name)
-    limits = [limit for limit in shares if limit != WORKABLE]
+    if operability.undecided(name):
+        sentence += f" {100.0 * operability.undecided(name):.0f} % are not decided."
+    limits = [limit for limit in shares if limit not in (WORKABLE, UNDECIDED)]
     if not limits:
         return sentence
     share = 100.0 * shares[limits[0]]
