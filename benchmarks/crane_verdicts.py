@@ -1,12 +1,14 @@
 """How far the answers on the packaged crane depend on what they should not depend on.
 
     .venv/bin/python benchmarks/crane_verdicts.py stability [--sets 10] [--hours 3]
-    .venv/bin/python benchmarks/crane_verdicts.py cells [--cells 20]
+    .venv/bin/python benchmarks/crane_verdicts.py cells [--cells 10]
+    .venv/bin/python benchmarks/crane_verdicts.py borders [--cells 10]
     .venv/bin/python benchmarks/crane_verdicts.py spectrum
     .venv/bin/python benchmarks/crane_verdicts.py controllers [--seaways 80]
 
 stability: the verdicts of sets of other seaways, which count for 10 min, 20 min and hours.
 cells: cells of the made-up year, drawn at random, against a run of three hours each.
+borders: such cells near a limit, drawn at random, against the verdict in other seaways.
 spectrum: swing without control by simulation over that by its spectrum, for ships, headings and
 damping ratios; small waves, so that the crane is linear.
 controllers: those that the package has, on the packaged crane's own drives in sea state 3 abeam.
@@ -15,6 +17,7 @@ controllers: those that the package has, on the packaged crane's own drives in s
 from __future__ import annotations
 
 import argparse
+import time
 from dataclasses import replace
 from math import sqrt
 from pathlib import Path
@@ -136,6 +139,40 @@ def cells(count: int) -> None:
     print(f"{right} of {count} the same")
 
 
+def borders(count: int) -> None:
+    """Print simulated cells between 0.7 and 1.3 of a limit, and the verdict by other seaways."""
+    crane, scatter = Crane.preset("tg3637"), Scatter.packaged()
+    begin = time.perf_counter()
+    year = operability(crane, CLIPPED, scatter)
+    undecided = ", ".join(f"{name} {year.undecided(name):.1%}" for name in year.names)
+    print(f"Year in {time.perf_counter() - begin:.0f} s; undecided: {undecided}")
+    near = [
+        (name, key)
+        for name in ("identified", "ideal")
+        for key, cell in year.cells[name].items()
+        if cell.simulated and 0.7 <= cell.ratio <= 1.3
+    ]
+    print(f"{len(near)} cells between 0.7 and 1.3 of a limit")
+    for index in np.random.default_rng(0).permutation(len(near))[:count]:
+        name, (row, heading) = near[index]
+        cell = year.cells[name][row, heading]
+        height, period = float(scatter.height[row]), float(scatter.period[row])
+        assessed = assess(
+            crane,
+            CLIPPED,
+            seeds=range(1000, 1120),
+            sea=Seaway(Spectrum(height, period), heading_deg=heading),
+            drives=(name,),
+            remedies=False,
+            tipping_points=False,
+        )
+        print(
+            f"| {name} | {height:g} m, {period:g} s, {heading:g}° | {cell.ratio:.2f} | "
+            f"{cell.limited_by or 'workable'} | {assessed.sufficient} | {assessed.harmless} |",
+            flush=True,
+        )
+
+
 def spectrum() -> None:
     """Print simulated swing over that of the spectrum."""
     crane = Crane.preset("tg3637")
@@ -209,16 +246,18 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("what", choices=("stability", "cells", "spectrum", "controllers"))
+    parser.add_argument("what", choices=("stability", "cells", "borders", "spectrum", "controllers"))
     parser.add_argument("--seaways", type=int, default=80)
     parser.add_argument("--sets", type=int, default=10)
     parser.add_argument("--hours", type=float, default=3.0)
-    parser.add_argument("--cells", type=int, default=20)
+    parser.add_argument("--cells", type=int, default=10)
     given = parser.parse_args()
     if given.what == "stability":
         stability(given.sets, given.hours)
     elif given.what == "cells":
         cells(given.cells)
+    elif given.what == "borders":
+        borders(given.cells)
     elif given.what == "controllers":
         controllers(given.seaways)
     else:

@@ -135,6 +135,7 @@ def test_what_verdicts_say_is_counted(bench: ModuleType) -> None:
     }
 
 
+@pytest.mark.slow
 def test_errors_are_stated_by_class_under_the_days_conditions(
     bench: ModuleType, tmp_path: Path
 ) -> None:

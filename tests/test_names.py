@@ -36,6 +36,7 @@ def lines_of(stub: Path) -> list[tuple[str, str]]:
     ]
 
 
+@pytest.mark.slow
 def test_no_module_defines_what_it_is_called() -> None:
     same = [
         module_name(path)
@@ -47,6 +48,7 @@ def test_no_module_defines_what_it_is_called() -> None:
     assert same == []
 
 
+@pytest.mark.slow
 def test_no_class_name_stands_for_two_things() -> None:
     modules: dict[str, list[str]] = {}
     for path in FILES:
@@ -80,6 +82,7 @@ def test_a_lazy_package_gives_what_its_stub_names(stub: Path) -> None:
         assert given is getattr(importlib.import_module(f"{package.__name__}.{module}"), name)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("first", ["modules", "names"])
 def test_the_order_of_imports_does_not_matter(first: str) -> None:
     """In a process of its own: modules before names, names before modules."""

@@ -44,6 +44,7 @@ def test_submodules_are_attributes(name: str) -> None:
     assert fresh(f"import swashplate; print(swashplate.{name}.__name__)") == f"swashplate.{name}"
 
 
+@pytest.mark.slow
 def test_figures_and_reports_are_attributes_of_report() -> None:
     program = "import swashplate as sp; print(sp.report.figures.plot_bode.__name__)"
     assert fresh(program) == "plot_bode"
@@ -66,6 +67,7 @@ def test_the_import_loads_no_library() -> None:
     assert loaded <= {"swashplate", "lazy_loader", *sys.stdlib_module_names}
 
 
+@pytest.mark.slow
 def test_nobody_pays_for_plotting_who_does_not_plot() -> None:
     """Results name matplotlib's types; only figures import it."""
     program = """

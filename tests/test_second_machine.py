@@ -65,6 +65,7 @@ def test_march_ends_at_the_published_static_levels(
     assert np.rad2deg(end[5]) == pytest.approx(speed, abs=0.05 if axis == "hoist" else 0.017)
 
 
+@pytest.mark.slow
 def test_gain_of_an_ammeter_is_equal_to_other_numbers(machine: ModuleType) -> None:
     """The machine in an ammeter's amperes reads as the gain says and turns the same."""
     numbers = machine.draws.drawn_parameters("slew", 1005)

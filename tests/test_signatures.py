@@ -24,6 +24,7 @@ MOST = 8
 """Arguments by position; the options of a command are none, they are given by name."""
 
 
+@pytest.mark.slow
 def test_no_function_takes_many_arguments_by_position() -> None:
     package = Path(swashplate.__file__).parent
     found_commands = [*typer.main.get_group(app).commands.values()]

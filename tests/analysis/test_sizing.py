@@ -60,6 +60,7 @@ def test_an_acceleration_is_shared_by_orifice_and_pump(hoist):
     assert found.after.acceleration >= required.acceleration
 
 
+@pytest.mark.slow
 def test_a_tracking_error(hoist):
     volts = maneuvers.sine(9.0, 0.1).sample()
     follow = trial_of(hoist, volts, reference=proportional_speed(hoist, volts, limited=False))

@@ -61,6 +61,7 @@ def test_what_has_the_wrong_sign_is_named(
         assert re.search(pattern, text)
 
 
+@pytest.mark.slow
 def test_guess_and_fit_reverse_a_command_that_all_logs_have_reversed(
     drafted: Drafted, tmp_path: Path
 ) -> None:

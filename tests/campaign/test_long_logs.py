@@ -261,6 +261,7 @@ def test_a_log_that_is_held_needs_no_table_beside_it(campaign, folder):
     assert {each.name for each in folder.iterdir()} == {"log.csv", "campaign.toml"}
 
 
+@pytest.mark.slow
 def test_ignored_windows_of_a_long_log_may_lie_where_no_run_is(folder):
     toml = folder / "ignoring.toml"
     lines = ['ignore = [{ from = 1000.0, to = 1001.0, why = "hook caught" }]']
@@ -272,6 +273,7 @@ def test_ignored_windows_of_a_long_log_may_lie_where_no_run_is(folder):
     toml.unlink()
 
 
+@pytest.mark.slow
 def test_the_figure_of_a_whole_log_shades_its_windows(campaign):
     first, second = campaign.plot()
     assert first.get_suptitle() == "Harbour: log, the whole log"

@@ -52,6 +52,7 @@ def test_from_logs_to_a_check(run: Callable[..., Result], done: Words, logs: lis
     assert run("campaign", "check", "--strict").exit_code == 1
 
 
+@pytest.mark.slow
 def test_check_plot_and_report_show_the_whole_of_a_long_log(
     run: Callable[..., Result], done: Words, tmp_path: Path
 ) -> None:

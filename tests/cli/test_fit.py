@@ -184,6 +184,7 @@ def test_all_that_can_be_asked_for_besides(done: Words, campaign: Path, tmp_path
     assert all(title in text for title in titles for text in (summary, printed))
 
 
+@pytest.mark.slow
 def test_a_result_that_is_of_no_use_ends_with_1(run, campaign, tmp_path) -> None:
     narrow = SETUP.replace("relative = [0.5, 2.0]", "relative = [0.99, 1.01]")
     (tmp_path / "narrow.toml").write_text(narrow, "utf-8")
@@ -203,6 +204,7 @@ def test_a_result_that_is_of_no_use_ends_with_1(run, campaign, tmp_path) -> None
     assert "Not usable: " in values.read_text("utf-8")
 
 
+@pytest.mark.slow
 def test_fits_that_are_refused(refused: Words, virtual: Path, tmp_path: Path) -> None:
     (tmp_path / "setup.toml").write_text(SETUP, "utf-8")
     for words, said in (

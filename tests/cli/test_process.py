@@ -14,6 +14,7 @@ import pytest
 import scipy.io
 import typer
 from tests.cli.conftest import stages
+from tests.marks import rest_slow
 from typer.testing import CliRunner
 
 from swashplate import Drive, __version__, maneuvers, rig
@@ -55,11 +56,13 @@ def test_help_is_a_page_with_examples(tmp_path):
 
 @pytest.mark.parametrize(
     ("typed", "without"),
-    [
-        ("--help", HEAVY),
-        ("simulate --help", {*HEAVY, "swashplate.cli.identify"}),
-        ("simulate hoist step:9", {"matplotlib", "pint", "polars", "swashplate.cli.identify"}),
-    ],
+    rest_slow(
+        [
+            ("--help", HEAVY),
+            ("simulate --help", {*HEAVY, "swashplate.cli.identify"}),
+            ("simulate hoist step:9", {"matplotlib", "pint", "polars", "swashplate.cli.identify"}),
+        ]
+    ),
 )
 def test_what_a_command_does_not_import(tmp_path, typed, without):
     """Nobody waits for libraries that a command does not use."""
@@ -74,16 +77,22 @@ def test_what_a_command_does_not_import(tmp_path, typed, without):
 
 @pytest.mark.parametrize(
     ("name", "value", "said"),
-    [
-        (
-            "SOURCE_DATE_EPOCH",
-            "yesterday",
-            "SOURCE_DATE_EPOCH is 'yesterday', which is not a number",
-        ),
-        ("NUMBA_NUM_THREADS", "abc", "Error: NUMBA_NUM_THREADS is 'abc', which is not a number"),
-        ("NUMBA_NUM_THREADS", "0", "Error: NUMBA_NUM_THREADS is '0', which is not a number"),
-        ("MPLBACKEND", "no_such_backend", None),
-    ],
+    rest_slow(
+        [
+            (
+                "SOURCE_DATE_EPOCH",
+                "yesterday",
+                "SOURCE_DATE_EPOCH is 'yesterday', which is not a number",
+            ),
+            (
+                "NUMBA_NUM_THREADS",
+                "abc",
+                "Error: NUMBA_NUM_THREADS is 'abc', which is not a number",
+            ),
+            ("NUMBA_NUM_THREADS", "0", "Error: NUMBA_NUM_THREADS is '0', which is not a number"),
+            ("MPLBACKEND", "no_such_backend", None),
+        ]
+    ),
 )
 def test_the_surroundings(tmp_path, name, value, said):
     """A wrong date of files is refused; what notebooks draw with is of no concern here."""
@@ -107,14 +116,16 @@ def test_a_folder_that_is_gone(tmp_path):
 
 @pytest.mark.parametrize(
     "typed",
-    [
-        "show",
-        "show hoist --toml",
-        "simulate hoist step:9",
-        "--help",
-        "crane run --help",
-        "--version",
-    ],
+    rest_slow(
+        [
+            "show",
+            "show hoist --toml",
+            "simulate hoist step:9",
+            "--help",
+            "crane run --help",
+            "--version",
+        ]
+    ),
 )
 def test_a_closed_pipe_is_silent(tmp_path, typed):
     """Whoever prints: rich, typer's help, or the command itself."""
@@ -135,10 +146,12 @@ def test_a_closed_pipe_is_silent(tmp_path, typed):
 @pytest.mark.skipif(shutil.which("bash") is None, reason="there is no bash here")
 @pytest.mark.parametrize(
     ("typed", "codes"),
-    [
-        ("simulate hoist step:9 | head -1", {0, 141}),  # 0 if all was written before it stopped
-        ("simulate hoist hop 2>&1 | true", {141}),
-    ],
+    rest_slow(
+        [
+            ("simulate hoist step:9 | head -1", {0, 141}),  # 0 if all was written before it stopped
+            ("simulate hoist hop 2>&1 | true", {141}),
+        ]
+    ),
 )
 def test_a_reader_that_stops_early(tmp_path, typed, codes):
     """The error of a command, too, may have nobody who reads it."""
@@ -162,6 +175,7 @@ def test_a_full_disk_is_an_error(tmp_path):
     assert done.stderr == b"Error: The output cannot be written: No space left on device.\n"
 
 
+@pytest.mark.slow
 def test_ctrl_c_leaves_whole_files_only(tmp_path):
     process = subprocess.Popen(
         [sys.executable, "-m", "swashplate", "rig", "hoist", "--out", "virtual"],
@@ -187,7 +201,7 @@ def test_ctrl_c_leaves_whole_files_only(tmp_path):
     assert all(path.read_bytes().endswith(b"\n") for path in files)
 
 
-@pytest.mark.parametrize("maneuver", ["step:1e308", "sine:1e308,0.1", "stairs:1e308/0"])
+@pytest.mark.parametrize("maneuver", rest_slow(["step:1e308", "sine:1e308,0.1", "stairs:1e308/0"]))
 def test_a_number_beyond_any_use_is_one_sentence(tmp_path, maneuver):
     """NumPy's warnings of an overflow do not come before it."""
     done = swashplate("simulate", "hoist", maneuver, cwd=tmp_path)

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from tests.cli.conftest import STEPS, stages
+from tests.marks import rest_slow
 
 from swashplate.stopping import GRACE
 
@@ -100,7 +101,7 @@ def virtual_tests(done, tmp_path: Path) -> Path:
     return tmp_path
 
 
-@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("how", rest_slow([signal.SIGINT, signal.SIGTERM]))
 def test_a_fit_ends_when_told(virtual_tests: Path, how: signal.Signals) -> None:
     words = COMMANDS["starts"].format(jobs=2).split()
     check_stopped([*COMMAND, *words], virtual_tests, 2.5, how)
@@ -122,7 +123,7 @@ def test_every_phase_ends_when_told(
     check_stopped([*COMMAND, *words], virtual_tests, after, how)
 
 
-@pytest.mark.parametrize("program", DEAF.values(), ids=DEAF)
+@pytest.mark.parametrize("program", rest_slow([*DEAF.values()]), ids=DEAF)
 def test_a_program_that_does_not_hear_is_ended_from_outside(tmp_path: Path, program: str) -> None:
     """With what it leaves half written."""
     half = tmp_path / ".half"

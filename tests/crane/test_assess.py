@@ -151,6 +151,15 @@ def test_two_questions_have_two_answers(crane, assessed):
     assert "It suffices: in 3 h all quantities stay within their limits." in passed.verdict()
 
 
+@pytest.mark.parametrize(("height", "said"), [(0.1, True), (1.0, False)])
+def test_a_crew_that_damps_is_named_where_a_calm_sea_is_unworkable(crane, height, said):
+    sea = Spectrum(height, 10.4)
+    # long enough for peaks of which something is certain
+    long = {**QUICK, "length": 300.0}
+    found = assess(crane, CLIPPED, seeds=range(4), drives=("ideal",), sea=sea, **long)
+    assert any("a crew does" in sentence for sentence in found.sentences()) is said
+
+
 def test_a_crane_without_limits_is_asked_for_harm_alone(crane):
     bare = replace(crane, limits={})
     found = assess(bare, CLIPPED, seeds=range(3), drives=("identified",), **QUICK)

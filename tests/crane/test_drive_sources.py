@@ -200,6 +200,7 @@ def test_in_python_the_verdict_is_data_of_the_crane(fit):
     assert bad.with_drive(luff=crane.luff).sources == bad.sources
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("usable", "look"), rest_slow([(False, "bad"), (True, "good"), (None, "look")]), ids=str
 )

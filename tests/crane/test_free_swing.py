@@ -40,6 +40,7 @@ def test_a_swing_without_noise_gives_its_own_ratio_and_period(ratio):
 
 
 # of 300 seeds each: 95 % with white noise, 98 % with noise that lasts for a second
+@pytest.mark.slow
 @pytest.mark.parametrize(("memory", "fewest", "most"), [(0.0, 88, 100), (0.9, 92, 100)])
 def test_intervals_hold_the_ratio(memory, fewest, most):
     hits = 0

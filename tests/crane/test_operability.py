@@ -42,6 +42,7 @@ def found(crane, scatter):
     return operability(crane, CLIPPED, scatter, headings=(90.0,), **SHORT)
 
 
+@pytest.mark.slow
 def test_without_control_the_frequency_domain_decides(crane, scatter, found):
     """Each cell against the limits by hand: the largest of value over limit."""
     for row, (height, period) in enumerate(zip(scatter.height, scatter.period, strict=True)):
@@ -59,6 +60,7 @@ def test_without_control_the_frequency_domain_decides(crane, scatter, found):
         assert not cell.simulated
 
 
+@pytest.mark.slow
 def test_shares_are_those_of_the_cells_and_add_up_to_a_year(scatter, found):
     for name in found.names:
         assert sum(found.shares(name).values()) == pytest.approx(1.0)
@@ -70,6 +72,7 @@ def test_shares_are_those_of_the_cells_and_add_up_to_a_year(scatter, found):
         assert found.workable(name) == pytest.approx(workable)
 
 
+@pytest.mark.slow
 def test_what_is_beyond_a_limit_stays_so_in_higher_waves(scatter, found):
     heights = np.flatnonzero(scatter.period == 6.0)
     for name in found.names:
@@ -80,6 +83,7 @@ def test_what_is_beyond_a_limit_stays_so_in_higher_waves(scatter, found):
         assert workable == sorted(workable, reverse=True)
 
 
+@pytest.mark.slow
 def test_cells_near_a_limit_are_simulated_as_a_study_is(crane, scatter, found):
     """A cell that was simulated has what a study of the same seaways says."""
     simulated = [
@@ -105,6 +109,16 @@ def test_small_waves_are_not_simulated(crane):
     assert NEAR > 1.0
 
 
+@pytest.mark.parametrize(("period", "said"), [(10.4, True), (6.0, False)])
+def test_a_crew_that_damps_is_named_where_calm_seas_are_unworkable(crane, period, said):
+    """27 m of rope swing in 10.4 s, and waves of 0.1 m with that peak make more than is allowed."""
+    calm = Scatter.of([0.1], [period], [1.0])
+    found = operability(crane, CLIPPED, calm, headings=(90.0,), drives=("ideal",), **SHORT)
+    assert (found.workable("no control") == 0.0) is said
+    assert any("a crew does" in sentence for sentence in found.sentences()) is said
+
+
+@pytest.mark.slow
 def test_huge_waves_leave_the_model_and_say_so(crane):
     storm = Scatter.of([9.0], [12.0], [1.0])
     found = operability(crane, CLIPPED, storm, headings=(90.0,), drives=("identified",),
@@ -115,6 +129,7 @@ def test_huge_waves_leave_the_model_and_say_so(crane):
     assert LEFT != WORKABLE
 
 
+@pytest.mark.slow
 def test_the_hoist_is_too_slow_from_a_height_on(crane, scatter, found):
     height, period, heading = found.hoist_limit
     values = linear_response(crane, Seaway(Spectrum(height, period), heading_deg=heading)).values
@@ -131,6 +146,7 @@ def test_numbers_do_not_depend_on_who_runs_them(crane, scatter, found):
     assert all(again.shares(name) == found.shares(name) for name in found.names)
 
 
+@pytest.mark.slow
 def test_table_has_a_row_for_each_variant(found):
     (table,) = found.tables()
     assert [row.cells[0] for row in table.rows] == ["no control", "ideal", "identified"]
@@ -143,6 +159,7 @@ def test_seaways_of_a_cell_are_as_many_as_asked_for(crane):
     assert "in 1 seaway of 5 min" in " ".join(one.sentences())
 
 
+@pytest.mark.slow
 def test_each_cell_is_a_row(scatter, found):
     frame = found.to_polars()
     assert frame.height == 3 * len(scatter.height)
@@ -152,6 +169,7 @@ def test_each_cell_is_a_row(scatter, found):
     assert calm["heading"].to_list() == [pytest.approx(np.pi / 2.0)]
 
 
+@pytest.mark.slow
 def test_what_was_computed_is_said(found):
     words = " ".join(found.sentences())
     parts = (
@@ -284,6 +302,7 @@ def test_what_is_undecided_is_a_share_of_the_year(crane, monkeypatch):
 # --- what limits first ----------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_without_control_the_first_limit_is_that_met_in_the_lowest_waves(crane, found, scatter):
     """By hand: each limit is met at a height, as all is linear in it."""
     for period in (6.0, 10.0):

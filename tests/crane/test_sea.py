@@ -163,6 +163,7 @@ def test_motions_are_those_of_the_cranes_origin():
     np.testing.assert_allclose(moved[2], own[2] + roll * y - pitch * x)
 
 
+@pytest.mark.slow
 def test_a_listed_ship_carries_the_boom_to_the_side_that_is_down():
     crane = Crane.preset("tg3637")
     lists = [Seaway(Spectrum(1e-6, 7.5), list_deg=angle) for angle in (0.0, 5.0)]

@@ -60,6 +60,7 @@ def ship(tmp_path):
 FLIPS = [(2408, 0x80), (2432, 0x20), (2480, 0x20), (1160, 0x20), (1208, 0x08), (6600, 0x08)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("place", "bit"), FLIPS)
 def test_a_flipped_bit_ends_in_a_sentence_in_time(ship, monkeypatch, place, bit):
     read_ship(ship)  # starts the process, which takes its time on a busy machine
@@ -72,6 +73,7 @@ def test_a_flipped_bit_ends_in_a_sentence_in_time(ship, monkeypatch, place, bit)
     assert time.monotonic() - begun < 20.0
 
 
+@pytest.mark.slow
 def test_the_first_file_ends_in_the_time_that_is_stated(ship, monkeypatch):
     """30 s, here 3 s, and 1 s for each MB, the start of the process included."""
     assert subprocess_reader._PATIENCE == 30.0
@@ -86,6 +88,7 @@ def test_the_first_file_ends_in_the_time_that_is_stated(ship, monkeypatch):
     assert 4.5 < time.monotonic() - begun < 8.0
 
 
+@pytest.mark.slow
 def test_flipped_bits_end_in_a_sentence_or_in_numbers(ship, monkeypatch):
     read_ship(ship)
     monkeypatch.setattr(subprocess_reader, "_PATIENCE", 2.0)

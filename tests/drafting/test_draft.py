@@ -167,6 +167,7 @@ def runs(
     return made
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", rest_slow(["shaft_speed", "position"]))
 def test_dead_zones_gains_lag_and_delay_are_found_again(kind: str) -> None:
     found = guess_drive(runs(kind))
@@ -241,6 +242,7 @@ def test_an_encoder_of_few_pulses_shows_no_jump(pulses: float) -> None:
     assert found.top_speed == found.acceleration == (np.inf, np.inf)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("pulses", rest_slow([60.0, 240.0]))
 def test_an_encoder_of_few_pulses_shows_a_jump(pulses: float) -> None:
     found = guess_drive(encoder_runs(pulses, jump=0.3))
@@ -316,6 +318,7 @@ def rig_runs(drive: Drive, folder: Path, channel: str, **how: object) -> Campaig
     return Campaign.from_toml(rig.write(logs, folder))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("offset", "seed", "channel", "counts"),
     rest_slow([(2e-5, 23, "encoder_counts", 2500.0), (-2e-5, 24, "shaft_speed", None)]),
@@ -339,6 +342,7 @@ def test_a_creep_at_rest_is_found(
     assert "rad/s" in row or "deg/s" in row
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("channel", "counts", "severity"),
     rest_slow(

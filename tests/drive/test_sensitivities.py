@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pytest
 from tests.drive.experiments import ALL, HARD, RATE, SWING
+from tests.marks import rest_slow
 
 from swashplate import Drive, InputError, Limit, Simulation, maneuvers
 from swashplate.drive import ALL_COLUMNS
@@ -92,25 +93,7 @@ def differences(scene: Scene, drive: Drive, name: str) -> list[np.ndarray]:
     return found
 
 
-COMPILED_LONG = (
-    "the filter's equation",
-    "all refinements",
-    "all without the line",
-    "physical root, leaking",
-    "decay from within a step",
-    "steep",
-    "steady start, leaking",
-    "load",
-)
-
-
-@pytest.mark.parametrize(
-    "scene",
-    [
-        pytest.param(scene, id=name, marks=[pytest.mark.slow] if name in COMPILED_LONG else [])
-        for name, scene in SCENES.items()
-    ],
-)
+@pytest.mark.parametrize("scene", rest_slow([*SCENES.values()], 2), ids=SCENES)
 def test_every_parameter(scene: Scene) -> None:
     drive = scene.drive()
     by = drive.sensitivities(scene.voltage, start=scene.start, parameters=scene.columns)

@@ -287,6 +287,7 @@ def test_the_equation_of_a_link_is_replaced() -> None:
 MODEL = replaced(replaced(tank, twice, ten_times), one_more, three_times)
 
 
+@pytest.mark.slow
 def test_another_process_makes_the_model_again() -> None:
     again = pickle.loads(pickle.dumps(MODEL))
     assert level_of(again).tolist() == level_of(MODEL).tolist()

@@ -72,6 +72,7 @@ print(sorted({t for each in texts for t in each.values()}))
 """
 
 
+@pytest.mark.slow
 def test_texts_are_the_same_in_every_order() -> None:
     first, second = (
         subprocess.run(

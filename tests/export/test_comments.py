@@ -82,6 +82,7 @@ def lagged(state: Output, command: float, p: Lag, h: float) -> Output:
     return Output(state.value + h / p.time * (p.gain * command - state.value))
 
 
+@pytest.mark.slow
 @needs_gcc
 @pytest.mark.parametrize("standard", rest_slow(["c99", "gnu11"]))
 def test_no_text_of_a_model_or_a_drive_becomes_code(

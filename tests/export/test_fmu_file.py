@@ -223,6 +223,7 @@ def test_sources_inside_make_the_same_library(files, fmi, hoist, tmp_path):
     assert export.compare(packed, hoist, voltage).equal
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not (shutil.which("cc") and shutil.which("nm")), reason="there is no compiler")
 def test_functions_of_several_sources_have_names_of_their_own(hoist, fmi, tmp_path):
     """So that a program can link the sources of several drives."""

@@ -30,6 +30,7 @@ def outputs(model: Any) -> list[float]:
 # --- refusals -------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_what_is_refused_leaves_the_drive_as_it_was(hoist: Drive, in_c: Any) -> None:
     model, values = in_c(hoist), values_of(hoist)
     for value in (4.0, 5.0, 6.0):
@@ -190,6 +191,7 @@ int main(void)
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="feenableexcept is glibc's")
 def test_a_valid_run_raises_no_floating_point_exception(
     hoist: Drive, compiled: Callable[..., Path]
@@ -390,6 +392,7 @@ def test_a_controller_has_room_for_the_equations(tmp_path: Path) -> None:
     assert int(said.splitlines()[1].split()[3]) <= 16_000
 
 
+@pytest.mark.slow
 def test_fast_mathematics_does_not_compile(compiled: Callable[..., Path]) -> None:
     with pytest.raises(AssertionError, match="fast-math"):
         compiled(drive_sources(), ["-ffast-math"])

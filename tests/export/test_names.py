@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from tests.export.conftest import InC
+from tests.marks import rest_slow
 
 from swashplate.equations import Model, Tap, join, simulate
 from swashplate.export import c, content_of
@@ -172,7 +173,7 @@ def check(model: Model, inputs: dict[str, Any], parameters: Any, compiled: Any, 
 
 
 @pytest.mark.parametrize(
-    "kind", ["input", "parameter", "state", "signal", "option", "limit", "local"]
+    "kind", rest_slow(["input", "parameter", "state", "signal", "option", "limit", "local"])
 )
 def test_names_of_numbers(kind: str, compiled: Any, tmp_path: Path) -> None:
     names = [name for name in NAMES if name not in LEFT_OUT.get(kind, ())]
@@ -199,7 +200,7 @@ def test_names_of_parts_and_integrals(compiled: Any, tmp_path: Path) -> None:
     check(model, {"drive": np.sin(np.arange(SAMPLES) / 3.0)}, values, compiled, tmp_path)
 
 
-@pytest.mark.parametrize("name", MODELS)
+@pytest.mark.parametrize("name", rest_slow(MODELS, 3))
 def test_names_of_models(name: str, compiled: Any, tmp_path: Path) -> None:
     module = module_of("signal", ["step", "sample", "OK"], tmp_path)
     model = model_of(module, name, integrals={"grown": "filled"})

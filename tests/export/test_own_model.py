@@ -410,6 +410,7 @@ def register_step(state: Register, double: float, short: float, p: Lag, h: float
     return Register(switch, state.register + h * short)
 
 
+@pytest.mark.slow
 def test_names_that_c_keeps_for_itself(compiled: Any, tmp_path: Path) -> None:
     model = Model("volatile", Lag, Register, register_step)
     files = c(model, tmp_path, 0.01, parameters=Lag(0.5))
@@ -429,6 +430,7 @@ SLOWER = Drive.preset("hoist").with_equation(displacement_control.head_root, slo
 
 
 # of the sealed drive the equation calls the one whose place it takes
+@pytest.mark.slow
 @pytest.mark.parametrize("own", [SLOWER, DRAGGED], ids=["another", "on top"])
 def test_a_drive_with_an_equation_of_its_own_has_it_in_c(
     own: Drive, compiled: Any, hoist: Drive

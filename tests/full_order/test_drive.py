@@ -236,6 +236,7 @@ def test_without_damping_the_spool_rings() -> None:
     assert 30.0 < off < 60.0
 
 
+@pytest.mark.slow
 def test_documented_table_is_what_the_function_gives() -> None:
     table = pl.concat([validity(FullOrderDrive.preset(name)).to_polars() for name in AXES])
     assert table.height == 3 * len(TABLE_MANEUVERS)

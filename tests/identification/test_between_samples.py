@@ -33,6 +33,7 @@ def runs_of(way: str) -> list[Experiment]:
     return runs
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("way", ["linear", "previous"])
 def test_a_fit_takes_the_way_that_was_simulated(way: str) -> None:
     found = fit(NOMINAL, runs_of(way), FREE)

@@ -179,6 +179,7 @@ def test_a_chain_that_begins_with_a_current_has_intervals() -> None:
     assert found["Z10"].status == "estimated"
 
 
+@pytest.mark.slow
 def test_a_bound_that_was_reached_is_said_with_the_entry_that_states_it(campaign: Campaign) -> None:
     drive = Drive(smooth(campaign.drive("hoist").parameters)).scale(lim1=0.6)
     runs = campaign.select(role="fit")
@@ -271,6 +272,7 @@ def thinned(run: Experiment, first: int) -> Experiment:
     return replace(run, input=signal, channels=channels)
 
 
+@pytest.mark.slow
 def test_a_slow_log_of_steps_is_fitted_as_well_as_a_fast_one(short_campaign: Campaign) -> None:
     """At 102 Hz; without the instants Z10 would be 0.07 % off, and J 0.1 %."""
     runs = [thinned(each, k) for k, each in enumerate(short_campaign.select(role="fit"))]

@@ -243,6 +243,7 @@ def test_the_scale_of_runs_is_found_and_intervals_hold() -> None:
     assert estimated(4, 0.02, 1, 3, deviation) == [0.0]
 
 
+@pytest.mark.slow
 def test_runs_that_do_not_differ_are_not_said_to() -> None:
     def deviation(stage: StageFit) -> float:
         runs = uncertainty_of(stage).runs

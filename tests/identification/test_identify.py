@@ -427,6 +427,7 @@ def spoiled(campaign: Campaign, name: str, change: Callable[..., np.ndarray]) ->
     return made
 
 
+@pytest.mark.slow
 def test_runs_that_no_drive_fits_are_refused_after_a_few_evaluations(tmp_path: Path) -> None:
     """The encoder of each run saw another run's command."""
     tests = virtual(tmp_path, "hoist", SINES)
@@ -439,6 +440,7 @@ def test_runs_that_no_drive_fits_are_refused_after_a_few_evaluations(tmp_path: P
     assert fit(Drive.preset("hoist"), strange, PUMP, search=Search(0), max_evaluations=40)
 
 
+@pytest.mark.slow
 def test_a_gross_fault_that_leaves_something_to_see_is_fitted(tmp_path: Path) -> None:
     """An ammeter that ends at half of its range: 30 evaluations do, but are not the end."""
     tests = virtual(tmp_path, "hoist", SINES)

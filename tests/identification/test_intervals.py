@@ -365,6 +365,7 @@ def test_the_influence_is_the_gradient_that_scipy_searches_with(loss: Loss) -> N
     np.testing.assert_allclose(((above - below) / (2 * step))[smooth], slopes[smooth], atol=1e-7)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("loss", ["soft_l1", "cauchy"])
 def test_intervals_hold_the_truth_among_outliers(loss: Loss) -> None:
     held, widths = 0, []

@@ -149,6 +149,7 @@ def test_errors_are_those_of_the_true_noise(rho: float, weighted: bool) -> None:
     np.testing.assert_allclose(found, expected, rtol=0.15)
 
 
+@pytest.mark.slow
 def test_intervals_under_coloured_noise_cover_the_truth() -> None:
     """120 campaigns of ρ = 0.98: 95 % within three standard deviations of 360 cases."""
     rng, inside = np.random.default_rng(10), []
@@ -176,6 +177,7 @@ def test_runs_have_levels_of_their_own() -> None:
     np.testing.assert_allclose(errors[0] / errors[1], np.sqrt(7.0), rtol=0.35)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "width"), [("ripple", 0.02), ("with every pulse", 0.15)])
 def test_noise_that_differs_along_the_runs(kind: str, width: float) -> None:
     """12 Hz come to the same phase every second: the pulses' errors add up, not their squares."""

@@ -638,6 +638,7 @@ def limited(seed: int) -> Experiment:
     return moved(test, np.array(rows) + 1e-3 * np.random.default_rng(seed).normal(size=COUNT))
 
 
+@pytest.mark.slow
 def test_what_a_model_leaves_out_is_an_error_of_its_prediction() -> None:
     slow = Model("slow", parameters=Slow, state=State, step=slow_step)
     made = fit(slow, campaign(*map(limited, range(40))), {"lag": (0.01, 0.1, 3.0)})

@@ -102,6 +102,7 @@ def found(short_campaign: Campaign) -> CrossValidation:
     return cross_validate(short_campaign.experiments, nominal.parameters, TWO_STAGES, **how)
 
 
+@pytest.mark.slow
 def test_each_fold_is_predicted_by_a_fit_to_the_others(short_campaign, found) -> None:
     assert [fold.number for fold in found.folds] == [0, 1, 2, 3]
     held = [name for fold in found.folds for name in fold.held]

@@ -109,6 +109,7 @@ def test_what_is_not_stored_is_computed_when_it_is_asked_for(path, campaign, fit
     assert older.verdict == before.verdict
 
 
+@pytest.mark.slow
 def test_a_verdict_is_of_its_requirement_and_its_held_out_runs(short_campaign, tmp_path) -> None:
     *fitted_to, held_out = short_campaign.experiments
     held_out = replace(held_out, role="validate")

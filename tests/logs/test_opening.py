@@ -65,6 +65,7 @@ def table(tmp_path):
     return path
 
 
+@pytest.mark.slow
 def test_a_process_that_ends_or_hangs_is_replaced(table, monkeypatch):
     log = open_log(table)
     other = subprocess_reader._ReaderProcess.running
@@ -82,6 +83,7 @@ def test_a_process_that_ends_or_hangs_is_replaced(table, monkeypatch):
     assert log.read(["time"])["time"].tolist() == [0.0, 1.0]
 
 
+@pytest.mark.slow
 def test_an_interrupt_leaves_no_clock_that_python_waits_for(table):
     log = open_log(table)
     other = subprocess_reader._ReaderProcess.running

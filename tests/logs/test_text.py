@@ -144,6 +144,7 @@ def test_options_that_make_no_sense(option):
         TextOptions(**dict([option]))
 
 
+@pytest.mark.slow
 def test_a_large_file_is_read_in_pieces(tmp_path, text, all_of, monkeypatch):
     monkeypatch.setattr("swashplate.logs.text.PIECE", 64)
     rows = "".join(f"{i},{i}.5\r\n" for i in range(200))

@@ -100,6 +100,7 @@ def test_toml_gives_an_equal_drive_back(name: str, tmp_path: Path) -> None:
     assert Drive.from_toml(tmp_path / "set.toml") == drive
 
 
+@pytest.mark.slow
 @given(st.floats(1e-8, 0.1), st.floats(1e-8, 0.1))
 def test_toml_keeps_every_bit(plus: float, minus: float) -> None:
 

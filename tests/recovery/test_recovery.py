@@ -50,6 +50,7 @@ def determined(stage: StageFit) -> list[str]:
     return list(names[stage.linearised.determined])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "joint", [False, pytest.param(True, marks=pytest.mark.slow)], ids=["staged", "joint"]
 )

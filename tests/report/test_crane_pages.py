@@ -181,12 +181,14 @@ def test_verdicts_page_says_what_the_answer_hangs_on(tmp_path, assessed):
     assert "roll period 13 s with a damping of 6 %" in text
 
 
+@pytest.mark.slow
 def test_verdicts_page_of_harm_alone_says_what_was_not_asked(tmp_path, assessed):
     text = written(write_assessment, replace(assessed, questions=("harm",)), tmp_path)
     assert text.count("This was not requested") == 1
     assert "suffice" not in text.partition('<div class="headline')[2].partition("</div>")[0]
 
 
+@pytest.mark.slow
 def test_pages_are_one_file_each_without_an_outside_link(tmp_path, assessed, year):
     for write, result in ((write_assessment, assessed), (write_operability, year)):
         text = written(write, result, tmp_path)

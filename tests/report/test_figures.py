@@ -15,6 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from tests.marks import rest_slow
 
 from swashplate import Drive, FileError, FullOrderDrive, InputError, Limit, Simulation, maneuvers
 from swashplate.analysis import (
@@ -80,7 +81,7 @@ def test_a_line_is_broken_where_samples_are_missing_and_a_lonely_one_is_a_dot() 
 SIGNATURES = {".PNG": b"\x89PNG", ".svg": b"<?xml", ".pdf": b"%PDF"}
 
 
-@pytest.mark.parametrize("suffix", SIGNATURES)
+@pytest.mark.parametrize("suffix", rest_slow([*SIGNATURES]))
 def test_a_figure_is_written_whole_and_the_same_each_time(step, tmp_path, suffix) -> None:
     first, second = tmp_path / f"first{suffix}", tmp_path / f"second{suffix}"
     save_figure(plot_simulation(step), first)
@@ -98,6 +99,7 @@ def test_a_figure_of_another_ending_is_refused(tmp_path: Path, name: str) -> Non
         save_figure(Figure(), tmp_path / name)
 
 
+@pytest.mark.slow
 def test_plotting_touches_no_global_state() -> None:
     code = """
 import sys
@@ -202,6 +204,7 @@ def shades(figure: Figure, panel: int) -> dict[str, np.ndarray]:
     }
 
 
+@pytest.mark.slow
 def test_the_chain_from_command_to_speed(made: dict[str, Figure], step: Simulation) -> None:
     expected = {
         "voltage (V)": [step.voltage],

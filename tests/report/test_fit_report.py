@@ -319,6 +319,7 @@ def test_the_page_needs_no_network(read: Page) -> None:
     assert "url(" not in read.scripts["style"]
 
 
+@pytest.mark.slow
 def test_hostile_names_stay_text(write, campaign: Campaign) -> None:
     *others, last = campaign.experiments
     runs = (*others, replace(last, name=HOSTILE))
@@ -334,6 +335,7 @@ def test_the_panel_offers_first_what_was_fitted(read: Page) -> None:
     assert {each["symbol"] for each in values if each["main"]} == {"G1", "Z10", "omega"}
 
 
+@pytest.mark.slow
 def test_truth_stands_beside_the_estimates(write, judged: Identification, read: Page) -> None:
     truth = Drive.preset("hoist").replace(omega=(75.0, 80.0), G1=(0.051, 0.056)).parameters
     page = write(truth=truth)
@@ -348,6 +350,7 @@ def test_truth_stands_beside_the_estimates(write, judged: Identification, read: 
     assert number(fixed["Z4"]["truth"]) == pytest.approx(truth.numbers["Z4"], rel=1e-4)
 
 
+@pytest.mark.slow
 def test_a_number_of_fixed_parameters_alone_says_so(campaign: Campaign) -> None:
     still = Drive.preset("hoist").replace(Z11=0.0, Z18=0.0)
     found = fit(still, campaign.select(role="fit"), SETUP)
@@ -424,6 +427,7 @@ def test_the_first_screen_says_what_would_explain_the_error(
     assert "Use the drive" not in page.words
 
 
+@pytest.mark.slow
 def test_cross_validation_has_a_section(write) -> None:
     held = {"current": Measures(10, 0.05, 0.5)}
     folds = tuple(Fold(number, ("a",), (), held, True) for number in range(2))
@@ -434,6 +438,7 @@ def test_cross_validation_has_a_section(write) -> None:
     assert "Cross-validation" in page.words
 
 
+@pytest.mark.slow
 def test_starts_of_each_stage_are_listed(write, fitted: Fit) -> None:
     first, second = fitted.stages
     page = write(fit=replace(fitted, stages=(replace(first, starts=STARTS), second)))
@@ -487,6 +492,7 @@ addEventListener("load", () => {
 """
 
 
+@pytest.mark.slow
 def test_the_page_renders_and_zooms_in_a_browser_without_errors(
     page: Path, validated: Path, tmp_path: Path, fitted: Fit, browsed
 ) -> None:
@@ -509,6 +515,7 @@ def test_the_page_renders_and_zooms_in_a_browser_without_errors(
     assert len(ticks) > 4
 
 
+@pytest.mark.slow
 def test_nothing_runs_in_a_report_but_its_own_scripts(
     page: Path, validated: Path, tmp_path: Path, browsed
 ) -> None:
@@ -531,6 +538,7 @@ const wait = setInterval(() => {
 """
 
 
+@pytest.mark.slow
 def test_nothing_runs_in_a_live_page_but_its_own_scripts(tmp_path: Path, browsed) -> None:
     page = tmp_path / "live.html"
     write_live_page(Drive.preset("hoist"), page, command=parse("step:9"))
@@ -538,6 +546,7 @@ def test_nothing_runs_in_a_live_page_but_its_own_scripts(tmp_path: Path, browsed
     assert 'data-ready="yes"' in injected(page, tmp_path, browsed)
 
 
+@pytest.mark.slow
 def test_a_report_is_printed(page: Path, tmp_path: Path, browsed) -> None:
     printed = tmp_path / "fit.pdf"
     print_report(page, printed)
@@ -590,6 +599,7 @@ def acted(page: Path, tmp_path: Path, browsed, lever: str = "orifice") -> dict:
     return json.loads(html.unescape(found[1]))
 
 
+@pytest.mark.slow
 def test_a_slider_gives_what_python_gives(tmp_path: Path, browsed) -> None:
     drive, command = Drive.preset("hoist"), parse("step:9")
     page = tmp_path / "live.html"
@@ -623,6 +633,7 @@ def tests(tmp_path_factory: pytest.TempPathFactory) -> Campaign:
     return virtual(tmp_path_factory.mktemp("tests"), "hoist", maneuvers, seed=4)
 
 
+@pytest.mark.slow
 def test_errors_are_those_of_the_prediction(tests: Campaign, tmp_path: Path, browsed) -> None:
     page, drive = tmp_path / "live.html", Drive.preset("hoist").scale(Z10=1.02)
     assert write_live_page(drive, page, campaign=tests) == ()
@@ -646,6 +657,7 @@ def test_what_cannot_be_shown_is_refused(tests: Campaign, tmp_path: Path) -> Non
     assert not page.exists()
 
 
+@pytest.mark.slow
 def test_a_lever_of_a_parameter_without_directions_counts_once(tmp_path: Path, browsed) -> None:
     drive, command, page = Drive.preset("hoist"), parse("step:9"), tmp_path / "live.html"
     write_live_page(drive, page, command=command)

@@ -88,6 +88,7 @@ def found(runs: list[Experiment]) -> Fit:
     return fitted(runs)
 
 
+@pytest.mark.slow
 def test_numbers_of_what_was_tested_hold(found: Fit) -> None:
     shown, largest = cells(found), largest_commands(found.stages)
     assert largest == (8.0, 7.0)
@@ -178,6 +179,7 @@ def test_a_limit_that_the_model_has_not_is_not_called_unreached(found: Fit) -> N
     assert "Z13" in reached
 
 
+@pytest.mark.slow
 def test_what_a_guess_did_not_see_is_looked_for(runs: list[Experiment], tmp_path: Path) -> None:
     guess = guess_drive(runs)._replace(top_speed=(inf, 6.4), acceleration=(inf, 20.0))
     start = guessed_set(guess, "campaign.toml")

@@ -43,7 +43,13 @@ from swashplate.crane.studies.judging import (
 )
 from swashplate.crane.studies.run_outcome import RunOutcome
 from swashplate.crane.studies.spectral import LinearResponse
-from swashplate.crane.studies.study import NO_CONTROL, Study, assumed_sentences
+from swashplate.crane.studies.study import (
+    CALM,
+    CREW_NOT_MODELLED,
+    NO_CONTROL,
+    Study,
+    assumed_sentences,
+)
 from swashplate.drive import Limit
 from swashplate.results import Drawn, Tabular
 from swashplate.tables import Column, Table, count, listed
@@ -578,6 +584,9 @@ class Assessment(Tabular, Drawn):
                     f"The waves' peak is at {peak:.3g} Hz, but the {axis}'s drive was tested with "
                     f"sines of up to {source.fastest_sine:.3g} Hz: test it faster."
                 )
+        unworkable = any(quantity.within == "no" for quantity in self.limited(NO_CONTROL))
+        if unworkable and spectrum.height <= CALM:
+            sentences.append(CREW_NOT_MODELLED)
         return [*sentences, *assumed_sentences(crane)]
 
 

@@ -44,6 +44,8 @@ from swashplate.crane.studies.run_outcome import RunOutcome
 from swashplate.crane.studies.spectral import DEMANDS, linear_response
 from swashplate.crane.studies.study import (
     BUILT,
+    CALM,
+    CREW_NOT_MODELLED,
     IDEAL,
     NO_CONTROL,
     Case,
@@ -88,13 +90,6 @@ SHORTEST = 300.0
 """Least time for which each of them counts: some fifty peaks of a swing. [s]"""
 ACTS = 0.05
 """Share of time at a limit from which on a drive is what limits a cell."""
-CALM = 0.25
-"""Height of a sea in which people work with cranes; a crane that cannot, by the model, is damped by
-its crew. The lowest class of most scatter diagrams. [m]"""
-NOT_MODELLED = (
-    "Not modelled is what a crew does: it damps the swing by moving the boom and with tag lines, "
-    "so that without control a crane may work in more of the year than is shown."
-)
 WORKABLE = ""
 """In place of a limit, for a cell that can be worked."""
 UNDECIDED = "undecided"
@@ -252,7 +247,7 @@ class Operability(Tabular):
                 "is switched on in."
             )
         if self._lowest_unworkable() <= CALM:
-            sentences.append(NOT_MODELLED)
+            sentences.append(CREW_NOT_MODELLED)
         return (*sentences, *assumed_sentences(self.crane))
 
 

@@ -49,6 +49,13 @@ NO_CONTROL = "no control"
 EVALUATED_TIME, RUN_IN = 600.0, 120.0
 """Time for which a run counts, and that of its run-in: seven decay times of a swing that control
 damps by 10 %. [s]"""
+CALM = 0.25
+"""Height of a sea in which people work with cranes; a crane that cannot, by the model, is damped by
+its crew. The lowest class of most scatter diagrams. [m]"""
+CREW_NOT_MODELLED = (
+    "Not modelled is what a crew does: it damps the swing by moving the boom and with tag lines, "
+    "so that a crane without control may work where it is not shown to."
+)
 SHORTEST = 60.0
 """Least time for which a run counts. [s]"""
 LARGEST_START = 0.5
