@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import inf, pi, sqrt
 from typing import TYPE_CHECKING, NamedTuple, cast
@@ -249,7 +249,8 @@ class CraneRun(Tabular):
         ship = self.ship[looked_at]
         slew = self.fixed.home.slew + self["shaft_slew"][looked_at]
         inboard = -rope_leads(hook - tip, slew, ship)[:, 0]
-        boom = np.arctan2(self["boom_sin"][looked_at], self["boom_cos"][looked_at])
+        seen = replace(self._signals, stored=self.stored[looked_at])
+        boom = np.arctan2(seen["boom_sin"], seen["boom_cos"])
         beyond = np.degrees(swing_of(load, tip)) > FARTHEST_SWING
         times = {
             f"the load swings beyond {FARTHEST_SWING:g} deg": _first(beyond, LOOK),

@@ -543,7 +543,7 @@ def _curve(series: Series, grid: Array, column: str, of: str) -> Array:
 def _check_sizes(motions: Mapping[str, Array], of: str) -> None:
     """Refuse rotations beyond `STEEPEST`, and distances beyond `FARTHEST`."""
     for motion, values in motions.items():
-        largest = float(np.abs(values).max(initial=0.0))
+        largest = max(float(values.max(initial=0.0)), -float(values.min(initial=0.0)))
         if motion in MOTIONS[3:] and largest > STEEPEST:
             raise InputError(
                 f"{of}: {motion} reaches {largest:.3g} rad, which no ship does. If it is in "

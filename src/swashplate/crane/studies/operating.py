@@ -508,8 +508,6 @@ class _Border(NamedTuple):
     """Lowest waves that are certainly not."""
     limited_by: str
     """What limits first as the sea rises."""
-    by_simulation: bool
-    """Whether simulated seaways have drawn it."""
 
 
 def _border(
@@ -517,28 +515,31 @@ def _border(
 ) -> _Border:
     """Look for the border among heights, the lowest first, by halving those that are open.
 
-    Beside them, a sea is tried in which the first limit of the linear crane is still far: if the
-    crane does not work there, its drives are what limits first.
+    What limits first is known but for the limits of drives and clip, as all else is linear in the
+    height. These are first if the crane ceases to work in lower waves: if no height tells, 1/1.3 of
+    that of the linear crane is tried.
     """
     decisions = {height: linear.decision(height) for height in heights}
-    first_height, first_limit = linear.first()
     workable = max((height for height in heights if decisions[height] == "yes"), default=0.0)
-    beyond = min((height for height in heights if decisions[height] == "no"), default=np.inf)
+    unworkable = min((height for height in heights if decisions[height] == "no"), default=np.inf)
+    tries = sorted(height for height in heights if decisions[height] == "not decided")
+    failing = _first_of(tries, lambda height: simulated(height).decision != "yes")
+    certain = failing + _first_of(
+        tries[failing:], lambda height: simulated(height).decision == "no"
+    )
+    if failing > 0:
+        workable = tries[failing - 1]
+    if certain < len(tries):
+        unworkable = tries[certain]
+    first_height, first_limit = linear.first()
+    if unworkable < first_height:
+        return _Border(workable, unworkable, simulated(unworkable).cause)
     trial = first_height / NEAR
-    tries = {height for height in heights if decisions[height] == "not decided"}
-    if workable < trial < heights[-1] and linear.decision(trial) == "not decided":
-        tries.add(trial)
-    if not tries:
-        return _Border(workable, beyond, first_limit, False)
-    ordered = sorted(tries)
-    failing = _first_of(ordered, lambda height: simulated(height).decision != "yes")
-    certain = _first_of(ordered[failing:], lambda height: simulated(height).decision == "no")
-    workable = ordered[failing - 1] if failing else workable
-    if failing + certain == len(ordered):
-        return _Border(workable, beyond, first_limit, True)
-    lowest = ordered[failing + certain]
-    cause = simulated(lowest).cause if lowest < first_height else first_limit
-    return _Border(workable, lowest, cause, True)
+    if workable < trial and unworkable < np.inf and linear.demand * trial > 1.0 / NEAR:
+        in_trial = simulated(trial)
+        if in_trial.decision == "no":
+            return _Border(workable, unworkable, in_trial.cause)
+    return _Border(workable, unworkable, first_limit)
 
 
 def _first_of(heights: Sequence[float], beyond: Callable[[float], bool]) -> int:
@@ -606,15 +607,15 @@ def _harmless(study: Study, case: Case, outcomes: Sequence[RunOutcome]) -> Decis
     If its swing is far less than without it, the first seaways decide; else they are doubled, and
     if all together do not show that it harms, the value of the share does not exceed the allowed.
     """
-    controlled: list[RunOutcome] = []
+    controlled = list(outcomes)
     uncontrolled: list[RunOutcome] = []
     number = len(outcomes)
+    without = study.cases[NO_CONTROL]
     while True:
-        numbers = range(len(controlled), number)
-        cases = [case, study.cases[NO_CONTROL]]
-        for with_control, without in study.outcomes(cases, numbers):
-            controlled.append(with_control)
-            uncontrolled.append(without)
+        controlled += [run for (run,) in study.outcomes([case], range(len(controlled), number))]
+        uncontrolled += [
+            run for (run,) in study.outcomes([without], range(len(uncontrolled), number))
+        ]
         swings = [
             rms_of(np.array([outcome.rms_swing for outcome in of_case])).value
             for of_case in (controlled, uncontrolled)
@@ -635,7 +636,7 @@ def _with_other_starts(
     """Judge runs together with short ones, of which only that counts: whether control takes over.
 
     Those that begin in the largest swing are tried first, by the dozen. If control takes over all
-    of the first dozen, it is taken to do so in the rest, which begin in less.
+    of a dozen, it is taken to do so in the rest, which begin in less.
     """
     swings = {
         number: case.swing_at_start(replace(study.seaway, seed=study.seeds[number]))
@@ -650,7 +651,7 @@ def _with_other_starts(
         of_tried = study.outcomes([short], tried)
         failed[first : first + len(tried)] = [has_left(outcome) for (outcome,) in of_tried]
         judgement = judge(outcomes, limits, length=study.length, other_starts=failed)
-        if judgement.sufficient != "not decided":
+        if judgement.sufficient == "no" or not any(failed[first : first + len(tried)]):
             break
     return judgement
 

@@ -22,8 +22,8 @@ ELASTIC_EVERY = 4
 """The same for the tension of an elastic rope, whose bounce has a few hertz."""
 BITS = np.arange(2 ** len(PUMPS))[:, None] >> np.arange(len(PUMPS)) & 1
 """Which of `PUMPS` act, a row for each sum of the loop's bits."""
-SATURATED = (1 << PUMPS.index(Limit.ORIFICE)) | (1 << PUMPS.index(Limit.SWASH_STOP))
-"""Bits of the limits at which a drive does not follow its command: acceleration and speed."""
+SATURATED = BITS[:, [PUMPS.index(Limit.ORIFICE), PUMPS.index(Limit.SWASH_STOP)]].any(axis=1)
+"""Sums of bits with a limit at which a drive does not follow its command: acceleration, speed."""
 
 
 class RunOutcome(NamedTuple):
@@ -101,29 +101,22 @@ def outcome_of(run: CraneRun, start: float, target: tuple[float, float] | None) 
         away = load[:, :2] - np.array(target)
         peaks["placement"] = peaks_of(np.hypot(away[:, 0], away[:, 1]))
     completed = departure is None
+    limits, saturation = _shares(run, slice(first, end))
     return RunOutcome(
         rms_swing=float(np.sqrt(np.mean(swing**2))) if completed else np.nan,
         largest_swing=float(swing.max()) if completed else np.nan,
-        limits=_acting(run, slice(first, end)),
-        saturation=_saturated(run, slice(first, end)),
+        limits=limits,
+        saturation=saturation,
         peaks=peaks,
         evaluated_time=evaluated_time,
         departure_reason=reason,
     )
 
 
-def _acting(run: CraneRun, samples: slice) -> Array:
-    """(3, 5) shares of time for which `PUMPS` act on the drives."""
-    shares = np.zeros((len(AXES), len(PUMPS)))
-    for row, axis in zip(shares, AXES, strict=True):
-        bits = run[f"limits_{axis}"][samples].astype(np.uint8)
-        row[:] = np.bincount(bits, minlength=len(BITS)) @ BITS / len(bits)
-    return shares
-
-
-def _saturated(run: CraneRun, samples: slice) -> float:
-    """Largest share of time, over the drives, at the acceleration or the speed limit."""
-    return max(
-        float(np.mean((run[f"limits_{axis}"][samples].astype(np.uint8) & SATURATED) > 0))
-        for axis in AXES
-    )
+def _shares(run: CraneRun, samples: slice) -> tuple[Array, float]:
+    """(3, 5) shares of time for which `PUMPS` act on the drives, and the largest at `SATURATED`."""
+    sums = np.empty((len(AXES), len(BITS)))  # shares of each sum of the loop's bits
+    for row, axis in zip(sums, AXES, strict=True):
+        bits = run[f"limits_{axis}"][samples].astype(np.intp)
+        row[:] = np.bincount(bits, minlength=len(BITS)) / len(bits)
+    return sums @ BITS, float(sums[:, SATURATED].sum(axis=1).max())
