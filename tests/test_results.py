@@ -253,6 +253,7 @@ def test_a_figure_of_chosen_signals() -> None:
         run.plot(["current", "shaft_speed"], ax=axes)
 
 
+@pytest.mark.slow
 def test_summaries_and_tables_of_a_notebook(work: Work) -> None:
     said = work.fitted.summary()
     for words in ("Stage card", "Stage pump", "lower 95 %", "Fixed at their nominal values: V_dz"):

@@ -8,6 +8,7 @@ from types import ModuleType
 
 import numpy as np
 import pytest
+from tests.marks import rest_slow
 
 BENCHMARKS = Path(__file__).parents[1] / "benchmarks"
 FOLDER = BENCHMARKS / "second_machine"
@@ -163,7 +164,7 @@ SIGNALS = {
 """What a fault changes in the log of a step of 9 V."""
 
 
-@pytest.mark.parametrize("fault", SIGNALS)
+@pytest.mark.parametrize("fault", rest_slow([*SIGNALS], 3))
 def test_fault_changes_what_it_says_and_nothing_else(machine: ModuleType, fault: str) -> None:
     run = "step +9 V"
     sound = machine.draws.drawn_equipment("hoist", 1000)

@@ -49,6 +49,7 @@ def test_a_speed_is_met_by_the_pump_in_proportion(hoist):
     assert (found.factors, found.change) == ({"pump": 1.0}, 0.0)
 
 
+@pytest.mark.slow
 def test_an_acceleration_is_shared_by_orifice_and_pump(hoist):
     """It goes with their product: equal factors, the root of the ratio."""
     required = Requirements(acceleration=np.radians(200.0))

@@ -76,6 +76,7 @@ def test_bands(done, tmp_path, monkeypatch):
     assert (tmp_path / "w.svg").exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("levers", [("orifice",), ("orifice", "pump")])
 def test_the_change_that_is_proposed_is_enough(done, number, tmp_path, levers):
     words = [word for lever in levers for word in ("--variable", lever)]

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.signal import lfilter
+from tests.marks import rest_slow
 from typer.testing import CliRunner
 
 from swashplate.cli import app
@@ -142,7 +143,7 @@ def test_soundness_claims_no_more_than_was_judged(sound: Path, model: str) -> No
 
 
 @pytest.mark.parametrize("damaged", [HELD_OUT[:1], HELD_OUT], ids=["one", "all"])
-@pytest.mark.parametrize("damage", DAMAGES)
+@pytest.mark.parametrize("damage", rest_slow([*DAMAGES], 2))
 def test_damaged_logs_are_named(
     run: Callable,
     sound: Path,

@@ -51,6 +51,7 @@ def assessed(crane):
     return assess(crane, CLIPPED, seeds=range(12), allowed_share_worse=0.3, **QUICK)
 
 
+@pytest.mark.slow
 def test_numbers_are_those_of_whole_runs(assessed):
     run = assessed.run("identified", 3)
     outcome = assessed.of("identified")[3]

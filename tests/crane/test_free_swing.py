@@ -5,6 +5,7 @@ from math import pi, sqrt
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from tests.marks import rest_slow
 from typer.testing import CliRunner
 
 from swashplate.cli import app
@@ -102,8 +103,8 @@ def rope_swing(ratio, *, drag=0.0, sideways=0.0, length=120.0, angle=0.2):
     return time, np.arctan2(x, -z), np.arctan2(y, -z)
 
 
-@pytest.mark.parametrize("seed", range(3))
-@pytest.mark.parametrize(("angle", "length"), [(0.05, 60.0), (0.2, 120.0), (0.4, 200.0)])
+@pytest.mark.parametrize("seed", rest_slow(range(3)))
+@pytest.mark.parametrize(("angle", "length"), rest_slow([(0.05, 60.0), (0.2, 120.0), (0.4, 200.0)]))
 def test_a_rope_of_known_damping_passes_and_its_interval_holds_it(angle, length, seed):
     time, along, across = rope_swing(0.005, angle=angle, length=length)
     noise_along, noise_across = 0.001 * np.random.default_rng(seed).standard_normal((2, time.size))

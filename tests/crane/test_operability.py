@@ -109,6 +109,7 @@ def test_small_waves_are_not_simulated(crane):
     assert NEAR > 1.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("period", "said"), [(10.4, True), (6.0, False)])
 def test_a_crew_that_damps_is_named_where_calm_seas_are_unworkable(crane, period, said):
     """27 m of rope swing in 10.4 s, and waves of 0.1 m with that peak make more than is allowed."""

@@ -134,6 +134,7 @@ def test_a_quotation_mark_that_is_never_closed_is_refused(refused):
     assert "quotation mark" in refused(long)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("suffix", [".csv", ".4"])
 def test_waves_on_no_grid_are_refused_before_it_is_made(refused, suffix):
     count = 9000

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 from tests.identification.given import run_of
+from tests.marks import rest_slow
 
 from swashplate import Drive, InputError
 from swashplate.campaign import Experiment
@@ -64,7 +65,7 @@ def runs(kind: str, commands: Mapping[str, np.ndarray] = COMMANDS) -> list[Exper
     return made
 
 
-@pytest.mark.parametrize("kind", ["signed_current", "rectified_current", "both"])
+@pytest.mark.parametrize("kind", rest_slow(["signed_current", "rectified_current", "both"]))
 def test_a_plain_amplifier_is_read_off_its_current(kind: str) -> None:
     found = guess_amplifier(runs(kind))
     assert found is not None

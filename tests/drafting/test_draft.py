@@ -233,6 +233,7 @@ def encoder_runs(pulses: float, **numbers: float) -> list[Experiment]:
     return made
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("pulses", rest_slow([60.0, 240.0]))
 def test_an_encoder_of_few_pulses_shows_no_jump(pulses: float) -> None:
     found = guess_drive(encoder_runs(pulses))
@@ -274,6 +275,7 @@ def test_a_lag_that_is_not_seen_stays_fixed() -> None:
     assert "Z8 =" not in text
 
 
+@pytest.mark.slow
 def test_a_guess_becomes_a_drive_and_a_fit_configuration() -> None:
     """The drive's speeds are those that were guessed: steady ones, and the lag of a small step."""
     found = guess_drive(runs(top=2.0, pull=4.0))

@@ -14,6 +14,7 @@ from typing import Any, get_type_hints
 
 import pytest
 from tests.equations.differences import compared, leaves
+from tests.marks import rest_slow
 
 import swashplate.equations
 import swashplate.models
@@ -272,7 +273,7 @@ def derived_of(function: Any, by: Any, options: Any, lengths: Any) -> Any:
     return derive(function, by, options=dict(options), lengths=dict(lengths))
 
 
-@pytest.mark.parametrize("name", EQUATIONS)
+@pytest.mark.parametrize("name", rest_slow([*EQUATIONS], 40))
 def test_partials_are_those_of_differences(name: str) -> None:
     function = EQUATIONS[name]
     hints = get_type_hints(plain(function))

@@ -352,6 +352,7 @@ def test_kernels_around_compiled_functions_are_kept_apart(tmp_path: Path) -> Non
     assert [int(each[1]) for each in said] == [0, 2]
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name == "nt", reason="a file is not a folder anywhere, but said otherwise")
 def test_without_a_place_it_works_with_a_warning(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")

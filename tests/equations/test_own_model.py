@@ -550,6 +550,7 @@ def test_of_two_models_in_series_both_say_what_may_have_happened() -> None:
         simulate(both, p, {"flow": np.ones(5)}, 1.0)
 
 
+@pytest.mark.slow
 def test_a_model_goes_to_other_processes_by_its_name() -> None:
     assert pickle.loads(pickle.dumps(pump_drive)) is pump_drive
     with pytest.raises(InputError, match=r"tank .* module .*--jobs 1"):

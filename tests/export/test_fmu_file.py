@@ -17,6 +17,7 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
+from tests.marks import rest_slow
 
 from swashplate import DomainError, Drive, FileError, InputError, export
 from swashplate.equations import Definition, equation
@@ -71,7 +72,7 @@ def start_of(root: ET.Element, name: str) -> str | None:
     return (found if found.get("start") else found[0]).get("start")
 
 
-@pytest.mark.parametrize("axis", ["hoist", "slew", "luff", "neutral"])
+@pytest.mark.parametrize("axis", rest_slow(["hoist", "slew", "luff", "neutral"]))
 @pytest.mark.filterwarnings("ignore:neutral")  # it has no delay
 def test_validators_find_nothing(axis, fmi, tmp_path):
     path = export.fmu(Drive.preset(axis), tmp_path / "a.fmu", fmi=fmi, platforms=["linux64"])
@@ -200,6 +201,7 @@ def test_carries_every_platform_under_every_name(files, fmi):
         assert found == machines | {"x86_64-darwin", "aarch64-darwin"}
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not shutil.which("cc"), reason="there is no C compiler")
 @pytest.mark.skipif(not LINUX, reason="the importer would take another folder")
 def test_sources_inside_make_the_same_library(files, fmi, hoist, tmp_path):

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.marks import rest_slow
 
 from swashplate import Drive, InputError
 from swashplate.drive import Sample, models_of
@@ -398,7 +399,7 @@ def test_fast_mathematics_does_not_compile(compiled: Callable[..., Path]) -> Non
         compiled(drive_sources(), ["-ffast-math"])
 
 
-@pytest.mark.parametrize("flags", ["-O0", "-O3", "-O3 -march=native -fno-math-errno"])
+@pytest.mark.parametrize("flags", rest_slow(["-O0", "-O3", "-O3 -march=native -fno-math-errno"]))
 def test_other_flags_leave_the_bits_alone(
     hoist: Drive, in_c: Any, compiled: Callable[..., Path], flags: str
 ) -> None:

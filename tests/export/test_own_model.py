@@ -136,7 +136,7 @@ def exported(model: Model, compiled: Any, rate: float, **numbers: Any) -> InC:
 
 
 @pytest.mark.parametrize(
-    "options", [Ways(), Ways(rough=True), Ways(stepped=True), Ways(True, True)]
+    "options", rest_slow([Ways(), Ways(rough=True), Ways(stepped=True), Ways(True, True)])
 )
 def test_roots_tables_loops_and_options_have_the_bits_of_the_march(
     options: Ways, compiled: Any

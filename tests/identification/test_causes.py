@@ -73,6 +73,7 @@ def names_of(found: Verdict) -> list[str]:
     return [each.name for each in found.causes]
 
 
+@pytest.mark.slow
 def test_a_sound_campaign_is_usable_and_has_nothing_to_explain(sound) -> None:
     found = sound[1]
     assert found.usable, found.headline

@@ -200,6 +200,7 @@ PARTS: Mapping[str, tuple[Mapping[str, Any], str]] = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("free", "part"), PARTS.values(), ids=PARTS)
 def test_a_mapping_names_what_is_free(campaign: Campaign, free, part: str) -> None:
     found = swashplate.identify(campaign, free=free)

@@ -118,6 +118,7 @@ def test_each_fold_is_predicted_by_a_fit_to_the_others(short_campaign, found) ->
     assert found.measures["current"].fit_percent > 90.0
 
 
+@pytest.mark.slow
 def test_a_fold_that_loses_an_unknown_says_so(found: CrossValidation) -> None:
     losing = [fold for fold in found.folds if fold.lost]
     (fold,) = losing
@@ -136,6 +137,7 @@ def test_folds_that_are_done_survive_ctrl_c(short_campaign: Campaign) -> None:
     assert kept.planned == 4
 
 
+@pytest.mark.slow
 def test_a_fold_that_cannot_be_fitted_says_why(short_campaign: Campaign) -> None:
     first, *others = short_campaign.experiments
     bare = [replace(each, channels={"counts": each["counts"]}) for each in others]

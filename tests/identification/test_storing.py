@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from tests.identification.given import TWO_STAGES, put
+from tests.marks import rest_slow
 
 from swashplate import Campaign, Drive, FileError, InputError, ParameterError
 from swashplate.identification import CrossValidation, Fit, Identification, Profile, Solution, fit
@@ -213,7 +214,7 @@ POISON = {
 }
 
 
-@pytest.mark.parametrize(("poison", "sentence"), POISON.values(), ids=POISON)
+@pytest.mark.parametrize(("poison", "sentence"), rest_slow([*POISON.values()], 3), ids=POISON)
 def test_a_poisoned_file_ends_in_a_sentence(path, campaign, poison, sentence) -> None:
     path.write_text(poison(path.read_text("utf-8")), "utf-8")
     with pytest.raises((FileError, ParameterError), match=f"fit.json.*{sentence}") as caught:

@@ -4,6 +4,7 @@ from math import log, tan
 from typing import Any
 
 import pytest
+from tests.marks import rest_slow
 
 from swashplate.equations import derive, faded, small_arctangent, soft_threshold
 from swashplate.models import amplifier
@@ -117,7 +118,7 @@ TIES: list[tuple[tuple[Any, tuple[str, ...]], tuple, dict, tuple[float, ...]]] =
 
 @pytest.mark.parametrize(
     ("of", "arguments", "options", "expected"),
-    TIES,
+    rest_slow(TIES, 10),
     ids=lambda each: getattr(each[0], "__name__", "") if isinstance(each, tuple) else "",
 )
 def test_where_branches_meet_the_declared_side_counts(of, arguments, options, expected) -> None:

@@ -230,6 +230,7 @@ def test_units_of_choice_hold_for_figures(step: Simulation) -> None:
     assert labels(figures.plot_simulation(step))[5] == "shaft speed (deg/s)"
 
 
+@pytest.mark.slow
 def test_every_limit_is_shaded_where_it_acts(made, all_limits: Simulation) -> None:
     figure, time = made["all limits"], all_limits.time
     panels = {Limit.DEAD_ZONE: [1], Limit.CURRENT_RATE: [1], Limit.ORIFICE: [2], Limit.SPOOL: [2]}
@@ -259,6 +260,7 @@ def test_orifices_and_stops_are_marked_where_the_signal_comes_near(hoist: Drive)
     assert levels(4, low) == []
 
 
+@pytest.mark.slow
 def test_a_long_run_is_drawn_by_few_points_and_few_spans(hoist: Drive) -> None:
     time = np.arange(900 * 512) / 512.0
     run = hoist.simulate(8.0 * np.sin(0.2 * time) + 1.5 * np.sin(20.0 * time))

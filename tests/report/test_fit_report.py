@@ -185,6 +185,7 @@ def number(text: str) -> float:
     return float(found[1]) * 10.0 ** int((found[2] or "0").translate(raised))
 
 
+@pytest.mark.slow
 def test_estimates_and_intervals_are_those_of_the_fit(read: Page, judged: Identification) -> None:
     rows = {row["name"]: row for row in read.rows("parameters")}
     for stage in judged.fit.stages:
@@ -409,6 +410,7 @@ def test_each_run_has_a_light_and_links(
     assert all(each.removeprefix("#") in targets for each in links)
 
 
+@pytest.mark.slow
 def test_the_first_screen_says_what_would_explain_the_error(
     tmp_path: Path, judged: Identification
 ) -> None:
@@ -470,6 +472,7 @@ def test_a_validation_has_no_fit(validated: Path, campaign: Campaign, fitted: Fi
     assert assess_fit((), predicted).headline in page.words.replace("\N{NO-BREAK SPACE}", " ")
 
 
+@pytest.mark.slow
 def test_a_page_that_cannot_be_written_leaves_the_old_one(tmp_path, write, judged) -> None:
     with pytest.raises(FileError, match=r"fit\.html"):
         write_fit_report(judged, tmp_path / "none" / "fit.html")
@@ -648,6 +651,7 @@ def test_errors_are_those_of_the_prediction(tests: Campaign, tmp_path: Path, bro
     assert made["errors"][-1]["rmse"] > 1.5 * made["before"][-1]["rmse"]
 
 
+@pytest.mark.slow
 def test_what_cannot_be_shown_is_refused(tests: Campaign, tmp_path: Path) -> None:
     drive, page = Drive.preset("hoist"), tmp_path / "live.html"
     with pytest.raises(InputError, match="campaign, or a command"):
@@ -668,6 +672,7 @@ def test_a_lever_of_a_parameter_without_directions_counts_once(tmp_path: Path, b
     np.testing.assert_allclose(made["moved"], moved, rtol=0.0, atol=1e-11)
 
 
+@pytest.mark.slow
 def test_the_page_is_small_and_asks_for_nothing(tests: Campaign, tmp_path: Path) -> None:
     page = tmp_path / "live.html"
     write_live_page(Drive.preset("hoist"), page, command=parse("step:9"))

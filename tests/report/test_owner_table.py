@@ -103,6 +103,7 @@ def test_numbers_of_what_was_tested_hold(found: Fit) -> None:
             assert low - slack <= degrees.get(name, 1.0) * truth[row, way] <= high + slack, name
 
 
+@pytest.mark.slow
 def test_the_top_speed_is_that_of_the_largest_command_that_was_tested(found: Fit) -> None:
     """Of a stick that ends there, one at 10 V would be nobody's."""
     shown = cells(found)[ROWS["top speed"]]

@@ -609,7 +609,7 @@ def _harmless(study: Study, case: Case, outcomes: Sequence[RunOutcome]) -> Decis
     """
     controlled = list(outcomes)
     uncontrolled: list[RunOutcome] = []
-    number = len(outcomes)
+    number = min(FIRST, len(study.seeds))
     without = study.cases[NO_CONTROL]
     while True:
         controlled += [run for (run,) in study.outcomes([case], range(len(controlled), number))]
@@ -618,9 +618,9 @@ def _harmless(study: Study, case: Case, outcomes: Sequence[RunOutcome]) -> Decis
         ]
         swings = [
             rms_of(np.array([outcome.rms_swing for outcome in of_case])).value
-            for of_case in (controlled, uncontrolled)
+            for of_case in (controlled[:number], uncontrolled)
         ]
-        share = share_worse_of(controlled, uncontrolled)
+        share = share_worse_of(controlled[:number], uncontrolled)
         if share.low > ALLOWED_SHARE:
             return "no"
         if share.value == 0.0 and swings[0] < swings[1] / NEAR:
