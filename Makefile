@@ -37,7 +37,7 @@ demo: $(STAMP) ## identify a virtual hoist from its tests, with a report, into d
 
 test: lint ## lint, then the quick tests
 	@echo; echo "== Tests"
-	@$(BIN)/pytest -n 2 --dist loadfile --durations=40 -m "not slow"
+	@$(BIN)/pytest -n 2 --dist loadgroup --durations=40 -m "not slow"
 
 test-slow: $(STAMP) ## the slow tests: pages, examples, reproduction, searches, without the JIT
 	@echo "== Slow tests"
@@ -57,7 +57,7 @@ TESTS ?= tests
 test-kernels: $(STAMP) ## the quick tests with other kernels of the linear algebra, and compiled for any processor
 	@for kernel in $(KERNELS); do \
 	  echo; echo "== Linear algebra for $$kernel, compiled for any processor"; \
-	  OPENBLAS_CORETYPE=$$kernel NUMBA_CPU_NAME=generic $(BIN)/pytest -n 2 --dist loadfile -m "not slow" $(TESTS) || exit 1; \
+	  OPENBLAS_CORETYPE=$$kernel NUMBA_CPU_NAME=generic $(BIN)/pytest -n 2 --dist loadgroup -m "not slow" $(TESTS) || exit 1; \
 	done
 
 lint: $(STAMP) ## style, format, types and the direction of imports

@@ -30,6 +30,10 @@ SLOW = {"docs", "examples", "reproduction"}
 """Folders whose tests run whole pages, notebooks and figures: `make test-slow`."""
 
 
+CRANE_FILES = {"test_crane_pages.py", "test_earlier_files.py"}
+"""Files of other folders that simulate a crane."""
+
+
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
     """Leave slow folders out of a quick run: to collect them takes seconds of each worker."""
     named = any(Path(each).resolve().is_relative_to(collection_path) for each in config.args)
@@ -38,11 +42,20 @@ def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool 
     return None
 
 
+@pytest.hookimpl(tryfirst=True)  # before the groups are read
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark what lies in a slow folder as slow."""
+    """Mark what lies in a slow folder as slow, and group what needs the same kernels.
+
+    With ``--dist loadgroup`` a group is one worker's, so that no kernel is compiled twice.
+    """
     for item in items:
-        if item.path.parent.name in SLOW:
+        folder, file = item.path.parent.name, item.path.name
+        if folder in SLOW:
             item.add_marker(pytest.mark.slow)
+        closes_loops = folder == "crane" or file in CRANE_FILES
+        steps = folder in ("drive", "linear") or file == "test_stepping.py"
+        group = "crane" if closes_loops else "steppers" if steps else file
+        item.add_marker(pytest.mark.xdist_group(group))
 
 
 def richardson(function: Callable[..., float], at: Sequence[float], index: int, h: float) -> float:

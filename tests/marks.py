@@ -11,5 +11,5 @@ def rest_slow(cases: Sequence[Any], quick: int = 1) -> list[Any]:
 
     A case of several arguments is a tuple, as for ``parametrize``.
     """
-    others = [case if isinstance(case, tuple) else (case,) for case in cases[quick:]]
+    others = [case if type(case) is tuple else (case,) for case in cases[quick:]]
     return [*cases[:quick], *(pytest.param(*case, marks=pytest.mark.slow) for case in others)]

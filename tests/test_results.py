@@ -305,6 +305,7 @@ def test_a_verdict_is_the_first_that_is_read(work: Work) -> None:
     assert set(zeros) <= set(work.judged.to_polars()["parameter"])
 
 
+@pytest.mark.slow
 def test_profiles_and_folds_show_tables(work: Work) -> None:
     result = swashplate.identify(
         work.campaign, Drive.preset("hoist"), TWO_STAGES, folds=3, profiles=["Z10"]
@@ -356,6 +357,7 @@ def test_analyses_show_their_tables_and_figures() -> None:
     assert all(isinstance(each.plot(), Figure) for each in drawn)
 
 
+@pytest.mark.slow
 def test_only_what_can_be_drawn_has_a_plot(work: Work) -> None:
     hoist = Drive.preset("hoist")
     linear = hoist.linearize(4.0)
@@ -447,6 +449,7 @@ def test_a_bode_plot_takes_axes_for_gain_and_phase(count: int, good: bool) -> No
     assert np.allclose(phase.lines[0].get_ydata(), np.degrees(response.phase[0]))
 
 
+@pytest.mark.slow
 def test_figures_of_one_panel_draw_in_given_axes() -> None:
     whole, _, _, _, inverse, tornado = analyses(Drive.preset("hoist"))
     for result in (whole, inverse, TESTS[0]):

@@ -193,6 +193,7 @@ def logged(machine: ModuleType, fault: str) -> dict[str, np.ndarray]:
     return {name.split()[0]: np.array(column, dtype=float) for name, column in texts.items()}
 
 
+@pytest.mark.slow
 def test_sizes_of_faults_of_instruments(machine: ModuleType) -> None:
     before = logged(machine, "none")
     late = np.interp(before["time"] - 0.02, before["time"], before["encoder"])

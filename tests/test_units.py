@@ -17,6 +17,7 @@ PIECES = (
 )
 
 
+@pytest.mark.slow
 @settings(max_examples=300, deadline=2000)
 @given(st.lists(st.sampled_from(PIECES), min_size=1, max_size=7).map("".join))
 @example("V**-0")

@@ -43,6 +43,7 @@ def given_uncertainty(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("swashplate.analysis.monte_carlo.uncertainty_of", attrgetter("uncertainty"))
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("given_uncertainty")
 def test_draws_outside_the_bounds_are_drawn_again(hoist):
     """A normal deviation of 2 % above a bound 2 % away: one in six is outside."""

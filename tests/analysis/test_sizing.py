@@ -72,6 +72,7 @@ def test_a_tracking_error(hoist):
     assert performance(less, follow).tracking_error > required.tracking_error
 
 
+@pytest.mark.slow
 def test_what_cannot_be_met_says_what_can(hoist, monkeypatch):
     required = Requirements(speed=np.radians(500.0))
     with pytest.raises(InputError) as error:

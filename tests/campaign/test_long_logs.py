@@ -72,6 +72,7 @@ def test_windows_with_motion_are_runs_of_their_own(long, tmp_path, layout):
     assert not any(each.notes for each in campaign)
 
 
+@pytest.mark.slow
 def test_the_table_serves_until_the_log_changes(long, tmp_path):
     long(table())
     beside = tmp_path / "log.csv.parquet"

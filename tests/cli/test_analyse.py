@@ -43,6 +43,7 @@ def test_what_to_change_first(done, number):
     assert "Change first: in-line orifice: larger bore (Z16)." in text
 
 
+@pytest.mark.slow
 def test_figure_9_1(done, number, tmp_path):
     both = ("--scale", "orifice=1.5", "--scale", "pump=1.5", "--maneuver", "sine:9,0.1")
     text = done("whatif", "hoist", *both, "--plot", "w.png", "--out", "larger.toml")
@@ -59,6 +60,7 @@ def test_figure_9_1(done, number, tmp_path):
         assert word in text
 
 
+@pytest.mark.slow
 def test_bands(done, tmp_path, monkeypatch):
     pumps = 12.396 + 0.12396 * np.random.default_rng(0).normal(size=50)
     hoist = Drive.preset("hoist")
@@ -178,6 +180,7 @@ def test_five_states_over_a_run(done, number, tmp_path):
     assert (tmp_path / "run.png").read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.slow
 def test_five_states_over_the_documented_maneuvers(done):
     text = done("full-order", "luff", "--out", "table.csv")
     documented = re.findall(r"^\| luff \| (.*?) \|$", FULL_ORDER.read_text("utf-8"), re.MULTILINE)

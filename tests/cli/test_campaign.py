@@ -94,6 +94,7 @@ file = "log.csv"
 """
 
 
+@pytest.mark.slow
 def test_a_tacho_beside_the_drive_before_any_fit(done, refused, tmp_path) -> None:
     rows = [f"{k / 100},{4 if k > 20 else 0},{98 if k > 40 else 0}" for k in range(300)]
     (tmp_path / "log.csv").write_text("\n".join(["time,u,n", *rows]) + "\n", "utf-8")

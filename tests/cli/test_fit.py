@@ -296,6 +296,7 @@ def test_validations_that_are_refused(refused: Words, held_out: Path) -> None:
     assert "axis 'hoist' has the role 'validate'" in said
 
 
+@pytest.mark.slow
 def test_the_command_and_python_write_the_same(done: Words, held_out: Path, tmp_path: Path) -> None:
     (tmp_path / "setup.toml").write_text(stages(card="J_plus", pump="Z10"), "utf-8")
     words = ("--setup", "setup.toml", "--profile", "Z10", "--starts", "1", "--seed", "4")

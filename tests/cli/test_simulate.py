@@ -168,6 +168,7 @@ def test_a_load_that_nothing_feels_is_said(done):
     assert next(line for line in text.splitlines() if "dead zone" in line).endswith("never")
 
 
+@pytest.mark.slow
 def test_a_part_of_a_run_is_drawn(done, refused, tmp_path):
     done("simulate", "hoist", "step:9", "--plot", "part.svg", "--from", "1", "--to", "2")
     ticks = re.findall(r"<!-- ([\d.]+) -->", (tmp_path / "part.svg").read_text("utf-8"))

@@ -152,6 +152,7 @@ def test_two_questions_have_two_answers(crane, assessed):
     assert "It suffices: in 3 h all quantities stay within their limits." in passed.verdict()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("height", "said"), [(0.1, True), (1.0, False)])
 def test_a_crew_that_damps_is_named_where_a_calm_sea_is_unworkable(crane, height, said):
     sea = Spectrum(height, 10.4)
@@ -438,6 +439,7 @@ def test_swing_without_control_is_proportional_to_small_waves(crane):
     np.testing.assert_allclose(swing[:, 1] / swing[:, 0], 2.0, rtol=1e-2)
 
 
+@pytest.mark.slow
 def test_orifice_is_that_of_another_luff_drive(crane):
     found = sweep(crane, "orifice", CLIPPED, points=[1.0, 3.0], seeds=[1], **SHORT)
     larger = crane.with_drive(luff=crane.luff.scale(Z16=3.0))

@@ -126,6 +126,7 @@ def stressed(rate):
     return load_motion(tip, rope, rate, start=tip[0] + 20.0 * u, velocity=velocity)
 
 
+@pytest.mark.slow
 def test_crane_on_a_moving_ship_agrees_with_dop853_by_order_two():
     error = {rate: stressed(rate).position[-1] - STRESS for rate in (64.0, 128.0, 512.0)}
     size = {rate: np.abs(each).max() for rate, each in error.items()}

@@ -271,6 +271,7 @@ def test_stepper_takes_the_samples_of_a_run(crane):
     same_by_steps(crane, command, ship, control=controller)
 
 
+@pytest.mark.slow
 def test_drives_in_the_loop_are_those_that_are_simulated_alone(crane, slewed):
     run = simulate(crane, slewed, control=TIP, brake=False)
     for i, axis in enumerate(("hoist", "slew", "luff")):
@@ -523,6 +524,7 @@ def test_noise_of_the_ropes_direction_is_white_and_held_between_measurements(cra
     assert not np.array_equal(run(4, 5.0).out, found.out[: 5 * 512 + 1])
 
 
+@pytest.mark.slow
 def test_noise_is_the_same_on_any_number_of_cores(crane):
     controller = control.DelayedFeedback() | control.Clip() | control.Sensors(seed=2)
     how = {
@@ -584,6 +586,7 @@ def dropping():
     return ship
 
 
+@pytest.mark.slow
 def test_snap_of_an_elastic_rope_is_that_of_an_independent_integration(crane):
     suspension = Suspension(6e7, bounce_damping=0.05)
     run = simulate(

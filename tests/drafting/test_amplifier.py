@@ -80,6 +80,7 @@ def test_a_plain_amplifier_is_read_off_its_current(kind: str) -> None:
     assert f"{found.jump[0]:.4g}" in str(amplifier_table(found))
 
 
+@pytest.mark.slow
 def test_a_packaged_card_is_recognised(hoist: Drive) -> None:
     """By its limited rate, though its currents are half as large again."""
     card = hoist.at_every_rate().replace(Z19=5.0, Z20=0.0, Z21=0.0, Z22=0.0)

@@ -209,6 +209,7 @@ def test_splitting_the_cards_steps_differs_by_little(axis: Drive) -> None:
     assert 0.0 < difference.max() <= rise < 6e-3
 
 
+@pytest.mark.slow
 def test_only_a_split_step_lets_the_decays_threshold_count(hoist: Drive) -> None:
     voltage, I_t2 = command(), hoist["I_t2"].value.plus
     thresholds = I_t2 * (1.0 + np.linspace(-0.02, 0.02, 201))

@@ -45,6 +45,7 @@ def preprocessed(text: str, standard: str) -> str:
     return done.stdout.decode()
 
 
+@pytest.mark.slow
 @needs_gcc
 @pytest.mark.parametrize("standard", ["c99", "gnu11"])
 @given(texts=st.lists(TEXTS, min_size=1, max_size=20))

@@ -249,6 +249,7 @@ def test_loses_no_sample_in_an_hour_of_times_that_are_summed_up(made, hoist, fmi
     assert master.get("shaft_position") == [run.shaft_position[-1]]
 
 
+@pytest.mark.slow
 def test_ramps_by_the_derivative_of_the_input(made, hoist, fmi):
     if fmi == "3.0":
         pytest.skip("FMI 3.0 has no derivatives of inputs")

@@ -280,6 +280,7 @@ def test_the_difference_is_that_of_the_speeds(tmp_path: Path) -> None:
     assert validity_verdict(made) == "One state is enough, to 1 % of the top speed."
 
 
+@pytest.mark.slow
 def test_without_motion_there_is_nothing_to_tell() -> None:
     full = FullOrderDrive.from_drive(Drive.preset("slew").replace(Z17=5.0))  # never leaves it
     made = validity(full)

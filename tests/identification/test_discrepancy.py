@@ -151,6 +151,7 @@ def stated(runs: Sequence[RunQuality]) -> PredictionError:
     return found
 
 
+@pytest.mark.slow
 @settings(max_examples=25, deadline=None)
 @given(st.integers(0, 10_000), st.floats(1e-4, 10.0))
 def test_what_is_known_of_the_noise_changes_nothing(seed: int, noise: float) -> None:

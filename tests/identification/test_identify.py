@@ -129,6 +129,7 @@ def test_a_table_of_what_was_estimated(result: Identification, tmp_path: Path) -
     assert stored == {name: row["value"] for name, row in rows.items()}
 
 
+@pytest.mark.slow
 def test_a_folder_comes_back_with_the_same_interface(
     result: Identification, tmp_path: Path
 ) -> None:
@@ -149,6 +150,7 @@ def test_a_folder_comes_back_with_the_same_interface(
     assert went_on["Z10"].status == "fixed"
 
 
+@pytest.mark.slow
 def test_a_report_is_written(result: Identification, tmp_path: Path) -> None:
     page = tmp_path / "report.html"
     assert result.report(page, truth=Drive.preset("hoist")) == page
@@ -453,6 +455,7 @@ def test_a_gross_fault_that_leaves_something_to_see_is_fitted(tmp_path: Path) ->
     assert found.stages[0].solution.evaluations > 30
 
 
+@pytest.mark.slow
 def test_more_than_a_fit_is_asked_for_by_keywords(
     campaign: Campaign, caplog: pytest.LogCaptureFixture
 ) -> None:

@@ -114,6 +114,7 @@ def ripple(rng: np.random.Generator, level: np.ndarray | float = 1.0) -> np.ndar
     return 8.0 * level * np.sin(2.0 * np.pi * 100.03 * TIME + phase)
 
 
+@pytest.mark.slow
 def test_errors_are_those_of_the_noise_under_a_ripple() -> None:
     """Estimates scatter by the noise alone, as the ripple averages out; errors say so."""
     rng = np.random.default_rng(2)

@@ -98,6 +98,7 @@ def test_what_is_stored_is_not_computed_again(path, campaign, fitted, monkeypatc
     assert path.read_text("utf-8") == first
 
 
+@pytest.mark.slow
 def test_what_is_not_stored_is_computed_when_it_is_asked_for(path, campaign, fitted) -> None:
     before = Identification(campaign, fitted)
     content = json.loads(path.read_text("utf-8"))

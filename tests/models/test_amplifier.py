@@ -122,6 +122,7 @@ def test_friction_takes_the_rate_and_stops_at_zero(channel: CardChannel) -> None
     assert found[1] == pytest.approx((0.16, 0.0))
 
 
+@pytest.mark.slow
 @pytest.mark.interpreted
 @given(st.lists(st.floats(-3.0, 3.0), min_size=3, max_size=3), st.floats(0.0, 1.0))
 def test_the_course_over_a_step_keeps_integral_and_moment(samples: list[float], f: float) -> None:

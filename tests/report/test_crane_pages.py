@@ -164,6 +164,7 @@ def test_verdicts_page_has_both_answers_with_a_light_of_their_own(tmp_path, asse
     assert f"'identified' is not a valid operation in 2 of 3 seaways: {BEYOND}." in failed
 
 
+@pytest.mark.slow
 def test_verdicts_page_says_what_the_answer_hangs_on(tmp_path, assessed):
     point = TippingPoint("the ship's roll period", "13 s", "10.4 s", True, False)
     text = written(write_assessment, replace(assessed, tipping_points=(point,)), tmp_path)
@@ -389,6 +390,7 @@ def test_figure_of_operability_colours_each_sea_by_what_limits_it(year, assert_l
     assert "made for a test; 14 of 15 quantities of the crane are assumed" in words
 
 
+@pytest.mark.slow
 def test_figure_of_operability_has_rows_of_three_panels(year, assert_legible):
     more = {f"identified {number}": year.cells["identified"] for number in range(4)}
     figure = replace(year, cells={**year.cells, **more}).plot()

@@ -41,6 +41,7 @@ from swashplate.units import shown_in
 GAP = 0.1
 
 
+@pytest.mark.slow
 @given(
     st.lists(st.integers(-5, 5), min_size=25, max_size=150),
     st.lists(st.sampled_from([1.0, 1.3, 20.0]), min_size=150, max_size=150),
@@ -222,6 +223,7 @@ def test_the_chain_from_command_to_speed(made: dict[str, Figure], step: Simulati
     assert labels(made["by current"])[0] == "current (A)"
 
 
+@pytest.mark.slow
 def test_units_of_choice_hold_for_figures(step: Simulation) -> None:
     with shown_in(["rpm", "kPa"]):
         figure = figures.plot_simulation(step)
@@ -409,6 +411,7 @@ def levels(ax: Axes) -> list[float]:
     return [float(line.get_ydata()[0]) for line in ax.lines if line.get_linestyle() == "--"]
 
 
+@pytest.mark.slow
 def test_a_user_defined_model_is_shown_with_what_it_declares(assert_legible) -> None:
     run = shaken()
     figure = run.plot()

@@ -385,6 +385,7 @@ def test_the_first_screen_is_for_the_owner(read: Page, fitted: Fit, validated: P
     assert "Change first:" in read.words
 
 
+@pytest.mark.slow
 def test_each_run_has_a_light_and_links(
     read: Page, write, campaign, judged: Identification
 ) -> None:
