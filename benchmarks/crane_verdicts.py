@@ -246,7 +246,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("what", choices=("stability", "cells", "borders", "spectrum", "controllers"))
+    kinds = ("stability", "cells", "borders", "spectrum", "controllers")
+    parser.add_argument("what", choices=kinds)
     parser.add_argument("--seaways", type=int, default=80)
     parser.add_argument("--sets", type=int, default=10)
     parser.add_argument("--hours", type=float, default=3.0)

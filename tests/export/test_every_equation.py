@@ -14,7 +14,6 @@ import pytest
 from tests.equations import test_constructs
 from tests.equations.test_all_equations import EQUATIONS, equations_of
 from tests.export.twins import InC, flagged
-from tests.marks import rest_slow
 
 from swashplate.equations import equation, repeated, root
 from swashplate.equations.code_generation import Loops, helpers_in
@@ -134,7 +133,7 @@ def libraries(compiled: Any) -> dict[str, ctypes.CDLL]:
     return {word: ctypes.CDLL(str(compiled({"all.c": translated(word).text}))) for word in SETS}
 
 
-@pytest.mark.parametrize(("word", "key", "on"), rest_slow(CASES, 12))
+@pytest.mark.parametrize(("word", "key", "on"), CASES)
 def test_an_equation_in_c_has_the_bits_of_the_compiled_one(
     word: str, key: str, on: bool, libraries: dict[str, ctypes.CDLL]
 ) -> None:
