@@ -326,7 +326,7 @@ def plot_operability(result: Operability, *, title: str | None = None) -> Figure
         legend.append(Patch(facecolor=style.FAINT, label="others"))
     if UNDECIDED in weights:
         colors[UNDECIDED] = style.GREY
-        legend.append(Patch(facecolor=style.GREY, label="not decided"))
+        legend.append(Patch(facecolor=style.GREY, label="undecided"))
     legend.append(Patch(facecolor="white", edgecolor=style.FAINT, label="can be worked"))
     names = result.names
     columns = min(len(names), ABREAST)

@@ -284,7 +284,7 @@ def _summary_sentence(operability: Operability) -> str:
     )
     shares = operability.shares(name)
     if operability.undecided(name):
-        sentence += f" {100.0 * operability.undecided(name):.0f} % are not decided."
+        sentence += f" {100.0 * operability.undecided(name):.0f} % is undecided."
     limits = [limit for limit in shares if limit not in (WORKABLE, UNDECIDED)]
     if not limits:
         return sentence
