@@ -35,7 +35,8 @@ def address_of(array: NDArray[Any]) -> int:
         return 0
     try:
         # an array offers its buffer, which NumPy's types do not say on Python 3.11
-        return addressof(c_char.from_buffer(array))  # type: ignore[arg-type]
+        buffer: Any = array
+        return addressof(c_char.from_buffer(buffer))
     except TypeError:  # read-only
         return int(array.ctypes.data)
 

@@ -224,7 +224,9 @@ def _scores(stage: StageFit) -> Iterator[_Score]:
                     # a position has a free zero
                     motion = change - change.mean()
                     run_scale = _RunScale(
-                        position=number, product=motion @ run.residual, square=motion @ motion
+                        position=number,
+                        product=float(motion @ run.residual),
+                        square=float(motion @ motion),
                     )
                     scales.setdefault(run.channel, []).append(run_scale)
             along[name] = along.get(name, 0.0) + parts.along(changes)

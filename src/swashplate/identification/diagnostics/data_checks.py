@@ -558,7 +558,7 @@ def _is_noisy(values: Array, step: float) -> bool:
     within = inner[:-2] & inner[1:-1] & inner[2:]
     least = np.minimum(np.abs(first), np.abs(second))
     turns = within & (first * second < 0.0) & (least > 1.5 * step)
-    return bool(turns.sum() > TO_AND_FRO * max(within.sum(), 1))
+    return bool(turns.sum() > TO_AND_FRO * max(int(within.sum()), 1))
 
 
 # --- what the runs determine ----------------------------------------------------------------------
