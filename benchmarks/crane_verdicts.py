@@ -1,14 +1,13 @@
 """How far the answers on the packaged crane depend on what they should not depend on.
 
     .venv/bin/python benchmarks/crane_verdicts.py stability [--sets 10] [--hours 3]
-    .venv/bin/python benchmarks/crane_verdicts.py cells [--cells 10]
     .venv/bin/python benchmarks/crane_verdicts.py borders [--cells 10]
     .venv/bin/python benchmarks/crane_verdicts.py spectrum
     .venv/bin/python benchmarks/crane_verdicts.py controllers [--seaways 80]
 
 stability: the verdicts of sets of other seaways, which count for 10 min, 20 min and hours.
-cells: cells of the made-up year, drawn at random, against a run of three hours each.
-borders: such cells near a limit, drawn at random, against the verdict in other seaways.
+borders: cells of the made-up year near a limit, drawn at random, against the verdict in other
+seaways.
 spectrum: swing without control by simulation over that by its spectrum, for ships, headings and
 damping ratios; small waves, so that the crane is linear.
 controllers: those that the package has, on the packaged crane's own drives in sea state 3 abeam.
@@ -40,14 +39,12 @@ from swashplate.crane import (
     read_ship,
 )
 from swashplate.crane.sea import rms_of
-from swashplate.crane.studies.judging import largest_of
 
 IDEAL_DESIGN = (
     control.DelayedFeedback(0.2, 0.2) | control.ShipCompensation() | control.PositionLoop(1.5)
 )
 CLIPPED = control.DelayedFeedback(0.2, 0.2) | control.ShipCompensation() | control.Clip()
 S175 = Path(__file__).parents[2] / "shared" / "data" / "s175" / "input.re1"
-HOURS = 10_800.0
 
 
 def stability(sets: int, hours: float) -> None:
@@ -95,48 +92,6 @@ def half_width(swing: np.ndarray) -> float:
         return float("nan")
     squares = known**2
     return 0.99 * float(squares.std(ddof=1)) / sqrt(known.size) / float(squares.mean())
-
-
-def cells(count: int) -> None:
-    """Print cells against runs of three hours."""
-    crane, scatter = Crane.preset("tg3637"), Scatter.packaged()
-    year = operability(crane, CLIPPED, scatter)
-    random = np.random.default_rng(0)
-    keys = [
-        (name, key) for name in ("identified", "ideal", "no control") for key in year.cells[name]
-    ]
-    right = 0
-    for index in random.choice(len(keys), count, replace=False):
-        name, (row, heading) = keys[index]
-        cell = year.cells[name][row, heading]
-        sea = Seaway(
-            Spectrum(float(scatter.height[row]), float(scatter.period[row])), heading_deg=heading
-        )
-        drives = ("identified",) if name == "no control" else (name,)
-        study = Study.of(crane, CLIPPED, seeds=[77], sea=sea, drives=drives, length=HOURS)
-        case = list(study.cases.values())[0 if name == "no control" else 1]
-        outcomes = [one for (one,) in study.outcomes([case])]
-        if outcomes[0].departure_reason:
-            worst, ratio = outcomes[0].departure_reason, np.inf
-        else:
-            ratios = {
-                limited: largest_of(outcomes, limited).value / limit
-                for limited, limit in crane.limits_si.items()
-                if limited in outcomes[0].peaks
-            }
-            worst = max(ratios, key=lambda limited: ratios[limited])
-            ratio = ratios[worst]
-        same = (cell.limited_by == "") == (ratio <= 1.0)
-        right += same
-        height, period = scatter.height[row], scatter.period[row]
-        how = "simulated" if cell.simulated else "by spectrum"
-        print(
-            f"{name}, {height:g} m, {period:g} s, {heading:g} deg: "
-            f"{cell.limited_by or 'workable'} {cell.ratio:.2f} {how}; in 3 h {ratio:.2f} "
-            f"{worst if ratio > 1.0 else 'workable'}{'' if same else ' DIFFERS'}",
-            flush=True,
-        )
-    print(f"{right} of {count} the same")
 
 
 def borders(count: int) -> None:
@@ -246,7 +201,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    kinds = ("stability", "cells", "borders", "spectrum", "controllers")
+    kinds = ("stability", "borders", "spectrum", "controllers")
     parser.add_argument("what", choices=kinds)
     parser.add_argument("--seaways", type=int, default=80)
     parser.add_argument("--sets", type=int, default=10)
@@ -255,8 +210,6 @@ def main() -> None:
     given = parser.parse_args()
     if given.what == "stability":
         stability(given.sets, given.hours)
-    elif given.what == "cells":
-        cells(given.cells)
     elif given.what == "borders":
         borders(given.cells)
     elif given.what == "controllers":
