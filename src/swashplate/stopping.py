@@ -8,6 +8,7 @@ thread hears the signal too, and ends the process from outside if it lives longe
 
 from __future__ import annotations
 
+import atexit
 import os
 import signal
 import socket
@@ -64,6 +65,7 @@ def obeying() -> Iterator[None]:
     sys.unraisablehook = _unraisable
     for number in SIGNALS:
         signal.signal(number, _tell)
+    atexit.register(_ignore_signals)
     try:
         yield
     except (Stopped, KeyboardInterrupt):  # Polars raises one of its own at Ctrl-C
@@ -124,6 +126,12 @@ def _tell(number: int, frame: FrameType | None) -> None:
         _Told.told = number
         if not _Told.put_off:
             raise Stopped
+
+
+def _ignore_signals() -> None:
+    """Let the interpreter end as the command has: a signal now would end it without a word."""
+    for number in SIGNALS:
+        signal.signal(number, signal.SIG_IGN)
 
 
 def _watch(bell: socket.socket) -> None:

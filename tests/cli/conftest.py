@@ -1,3 +1,4 @@
+import os
 import re
 import shutil
 from collections.abc import Callable
@@ -26,6 +27,14 @@ def stages(**free: str) -> str:
         for name in names.split():
             text += f"free.{name} = {{ relative = [0.5, 2.0], log = true }}\n"
     return text
+
+
+def without_resource_warnings() -> dict[str, str]:
+    """Environment of a command that is to be interrupted.
+
+    Users are not warned of a file that is open at the signal, as all of these tests are.
+    """
+    return {**os.environ, "PYTHONWARNINGS": "ignore::ResourceWarning"}
 
 
 @pytest.fixture(autouse=True)

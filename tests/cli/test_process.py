@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 import scipy.io
 import typer
-from tests.cli.conftest import stages
+from tests.cli.conftest import stages, without_resource_warnings
 from tests.marks import rest_slow
 from typer.testing import CliRunner
 
@@ -183,6 +183,7 @@ def test_ctrl_c_leaves_whole_files_only(tmp_path):
     process = subprocess.Popen(
         [sys.executable, "-m", "swashplate", "rig", "hoist", "--out", "virtual"],
         cwd=tmp_path,
+        env=without_resource_warnings(),
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
     )
