@@ -14,7 +14,7 @@ from timing import Timing, cores_used, in_turns, one_core
 from swashplate import Drive, Serial, SquaredError, maneuvers
 from swashplate.drive import PUMP_COLUMNS, bound_drive, drive_instance
 from swashplate.equations.marching import Observation, ObservedRecord, SignalId, record_of
-from swashplate.equations.marching.run import arrays_of, planned_march
+from swashplate.equations.marching.run import PlannedMarch, arrays_of
 
 Array = NDArray[np.float64]
 
@@ -28,8 +28,8 @@ class Kernel:
         self.instance = drive_instance(drive.parameters, by_voltage=signal == "voltage")
         initial = self.instance.start({signal: float(values[0])}, STEP)
         self.at_rest, self.states = initial.flat, initial.flat.copy()
-        kept = (SignalId(1, "signals", "shaft_speed"),)
-        planned = planned_march(self.instance.model, (signal,), self.instance.options, kept)
+        kept = ((SignalId(1, "signals", "shaft_speed"), 0),)
+        planned = PlannedMarch(self.instance.model, (signal,), self.instance.options, kept)
         self.march = planned()
         self.out, self.worst_margin = np.empty((1, values.size)), np.empty(1)
         self.values = (values,)

@@ -26,9 +26,9 @@ from swashplate.drive import drive_instance
 from swashplate.equations import Model, Tap, equation, simulate
 from swashplate.equations.code_generation.lowering import definition_in, lowered
 from swashplate.equations.code_generation.machine_code import optimised
-from swashplate.equations.marching import LANES, lanes_of
+from swashplate.equations.marching import SampleCode, output_of
 from swashplate.equations.marching.kernels import KERNEL_KINDS
-from swashplate.equations.marching.lanes import MARCH_KINDS
+from swashplate.equations.marching.lanes import lanes_text
 from swashplate.equations.marching.run import LIBRARY
 from swashplate.equations.marching.structure import structure_of
 from swashplate.models.displacement_control import PumpOptions
@@ -334,8 +334,8 @@ def test_partial_derivatives_are_filled_as_vectors() -> None:
 @pytest.mark.skipif(bool(config.DISABLE_JIT), reason="nothing is compiled")
 @pytest.mark.skipif(config.CPU_NAME == "generic", reason="vectors of two do not pay")
 def test_the_sets_are_marched_as_vectors() -> None:
-    lanes = lanes_of(pump_drive, ("current",), (None, PumpOptions()), "shaft_speed")
-    march = definition_in(lanes.text, "march", {**LIBRARY, "LANES": LANES})
-    text = str(optimised(lowered(march, MARCH_KINDS, "march")))
+    signal, integral = output_of(pump_drive, "shaft_speed")
+    sample_code = SampleCode(pump_drive, ("current",), (None, PumpOptions()), [signal])
+    text = str(optimised(lanes_text(sample_code, signal, integral=integral)))
     assert re.search(r"<\d+ x double> @llvm\.sqrt", text)
     assert not re.search(r"gather|call double @llvm\.sqrt", text)

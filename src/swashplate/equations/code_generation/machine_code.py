@@ -97,6 +97,19 @@ def code_of_function(
     return _loaded[key]
 
 
+def code_of_text(name: str, text: str, kinds: tuple[str, ...]) -> Code:
+    """Machine code of a function in LLVM's language, see `code_of_function`."""
+    key = (name, text, kinds)
+    if key not in _loaded:
+        content = cached_on_disk(
+            f"{name}_code",
+            (*key, llvmlite_version, llvm.llvm_version_info, *_host()),
+            lambda: _compiled(name, text),
+        )
+        _loaded[key] = Code(content, kinds)
+    return _loaded[key]
+
+
 @cache
 def _host() -> tuple[str, str, str]:
     """The machine that code is made for: triple, processor, and what that can do."""
@@ -122,7 +135,7 @@ def _target_machine() -> Any:
 def _passes(machine: Any) -> Any:
     """What optimises: loops become vector instructions, and arithmetic stays as it is written."""
     options = llvm.create_pipeline_tuning_options(speed_level=OPTIMISATION_LEVEL)
-    options.loop_vectorization, options.slp_vectorization = True, False
+    options.loop_vectorization, options.slp_vectorization = True, True
     return llvm.create_pass_builder(machine, options)
 
 

@@ -4,8 +4,6 @@ from .derivatives import residuals as residuals
 from .lanes import LANES as LANES
 from .lanes import lanes_of as lanes_of
 from .layout import started_by as started_by
-from .march import SampleCode as SampleCode
-from .march import output_of as output_of
 from .observation import Observation as Observation
 from .observation import ObservedRecord as ObservedRecord
 from .observation import RunValues as RunValues
@@ -33,6 +31,8 @@ from .run import called as called
 from .run import marched as marched
 from .run import module as module
 from .run import outside as outside
+from .sample_code import SampleCode as SampleCode
+from .sample_code import output_of as output_of
 from .simulation import Command as Command
 from .simulation import inputs_of as inputs_of
 from .simulation import read_only as read_only

@@ -115,7 +115,7 @@ class JacobianLayout:
     @cached_property
     def kernels(self) -> Any:
         """What `rows.march_observed` is given of the kernels, which are compiled for that."""
-        return addresses(self.structure.facts.kernels, self._called)
+        return addresses(self.structure.kernels, self._called)
 
     def take_room(self) -> Struct[Room]:
         """Memory for a march, of an earlier one if it can be: new memory takes longer to get."""

@@ -1,519 +1,270 @@
-"""Marches: one model over its inputs, a sample after the other, for one set or many at once.
+"""Marches printed in LLVM's language: one model over its inputs, a sample after the other.
 
-Every march is generated as readable source, printed from the graph of the model's equations.
-`PartCode` has one sample of a part, and the functions below wrap it as
-
-- `march_source`: the march, over whole records or a block of them for the Jacobian,
-- `step_source`: one sample, for steppers and for kernels that close loops.
-
-Many sets side by side are in `lanes`.
-
-Arithmetic is strict and in the order of the equations, so that all of them give the same bits.
+A march is the same text for one set of numbers and for many side by side (`Code.wide`): of an array
+of numbers each has one for every lane, number k of lane l at k lanes + l. Arithmetic is strict and
+in the order of the equations, so that all marches, and steppers, give the same bits.
 """
 
 from __future__ import annotations
 
-import math
-import re
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from itertools import chain
+from collections.abc import Callable, Collection, Mapping, Sequence
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import Any
 
 from swashplate.equations import graph
-from swashplate.equations.code_generation.functions import Function, fresh_name
-from swashplate.equations.code_generation.printing import (
-    BRANCHING,
-    PYTHON,
-    CodeBlock,
-    assigned,
-    function_source,
-    indented,
-)
-from swashplate.equations.code_generation.scheduling import Flat
-from swashplate.equations.code_generation.values import Value, leaves
-from swashplate.equations.fields import floats_of
-from swashplate.equations.graph import Node, names_in
-from swashplate.equations.marching.kernels import KERNEL_ARGUMENTS
+from swashplate.equations.code_generation.llvm import Code
+from swashplate.equations.code_generation.values import leaves
+from swashplate.equations.graph import Node
+from swashplate.equations.marching.kernels import KERNEL_ARGUMENTS, KERNEL_KINDS
 from swashplate.equations.marching.part_code import PartCode, SignalId
-from swashplate.equations.model import Model, SignalSource
-from swashplate.errors import InputError
+from swashplate.equations.marching.sample_code import SampleCode
+from swashplate.equations.model import Model
 
-_OWN = """
-n m j c lane first last worst h half value error total count size used progress values lines
-delay_samples delay_fraction params given constants states out flags records before measured weight
-outputs flat inputs table kept tangent lanes columns program plan sink room block
-worst_margin lower context volts current speed at everything voltage target counts coming cost rate
-integral shown choose width length
-"""
-RESERVED = {*_OWN.split(), *(name for name in vars(math) if not name.startswith("_"))}
-"""Names that the kernels use themselves."""
-CONTEXT_FIELDS = [
-    "inputs",
-    "lines",
-    "delay_samples",
-    "delay_fraction",
-    "params",
-    "given",
-    "h",
-    "constants",
-    "states",
-    "outputs",
-]
-"""What a step takes from a `StepContext`."""
+TYPES = {"int": "i64", "float": "double"}
+"""LLVM's types of numbers; all else is a pointer."""
+ARGUMENTS = tuple(
+    (TYPES.get(kind, "ptr"), name)
+    for kind, name in zip(KERNEL_KINDS, KERNEL_ARGUMENTS.split(", "), strict=True)
+)
+"""Of a march of one set."""
+NOTHING: Mapping[Node, str] = MappingProxyType({})
+HALF, ZERO = "0x3FE0000000000000", "0x0000000000000000"
 
 
-class SampleCode:
-    """One sample of a whole model: the code of its parts, and what of it is needed.
+def numbers_known(
+    sample_code: SampleCode, code: Code, read: Callable[[PartCode], Collection[str]]
+) -> dict[Node, str]:
+    """The step, parameters and givens, as far as a part reads them by their names."""
+    known = {graph.name("h"): code.in_all_lanes("%h")}
+    for part in sample_code.used:
+        names = read(part)
+        for numbers, kind, array in (
+            (part.p, "parameters", "%params"),
+            (part.given, "given", "%given"),
+        ):
+            places = sample_code.model.places(kind)
+            for path, node in leaves(numbers):
+                if node.value in names:
+                    place = places.index((part.part, path)) * (code.wide or 1)
+                    known[node] = code.load(array, place)
+    return known
 
-    `outputs` are numbers that are kept at every sample; parts that none of them needs are left out.
+
+class March:
+    """The text of a march under way.
 
     Attributes
     ----------
-    parts, used : list of PartCode
-        All parts, and those that are needed.
-    ends, carried : list
-        Of each part the results that are needed, and the paths of the states.
-    sources : dict of SignalSource to Node
-        Signals that other parts or links need.
-    functions : dict of str to Function
-        Generated functions that what was printed calls.
-    records, before : dict of str to str
-        Names of a signal's record, and of its value before that.
+    code : Code
+        What is written.
+    known : dict of Node to str
+        What does not change over the march.
     """
 
-    def __init__(
-        self,
-        model: Model,
-        signals: Sequence[str],
-        options: Sequence[Any],
-        outputs: Sequence[SignalId],
-    ) -> None:
-        self.model = model
-        self.signals = tuple(signals)
-        used_names = {*RESERVED}
-        self.records = {signal: fresh_name(signal, used_names) for signal in self.signals}
-        self.before = {
-            signal: fresh_name(f"{signal}_before", used_names) for signal in self.signals
-        }
-        self.parts = [
-            PartCode(model, index, signals, options_of_part, used_names)
-            for index, options_of_part in enumerate(options)
-        ]
-        self.ends: list[list[Node]] = [[] for _ in self.parts]
-        self.carried: list[list[str]] = [[] for _ in self.parts]
-        self.sources: dict[SignalSource, Node] = {}
-        self.functions: dict[str, Function] = {}
-        for output in outputs:
-            part = self.parts[output.part]
-            if output.kind == "link":
-                self._need(model.links[output.path].sources)
-            elif output.kind == "limits":
-                self.ends[output.part] += part.limits
-            else:
-                self.ends[output.part].append(part.node(output))
-        for part in reversed(self.parts):
-            if self.ends[part.part]:
-                self._settle(part)
-        self.used = [part for part in self.parts if self.ends[part.part]]
-
-    def _settle(self, part: PartCode) -> None:
-        """Find out what a part's results follow from: its states, and signals of other parts."""
-        ends, carried = self.ends[part.part], set[str]()
-        ends += [] if part.margin is None else [part.margin]
-        state, following = dict(leaves(part.state)), dict(leaves(part.following))
-        while True:
-            read = names_in(ends)
-            new = {path for path, node in state.items() if node.value in read} - carried
-            if not new:
-                break
-            carried |= new
-            ends += [following[path] for path in state if path in new]
-        self.carried[part.part] = [path for path in state if path in carried]
-        for name in part.part_model.input_types:
-            link = self.model.link_of(part.part, name)
-            if link is not None and any(part.source(source) in read for source in link.sources):
-                self._need(link.sources)
-
-    def _need(self, sources: Sequence[SignalSource]) -> None:
-        for source in sources:
-            if source not in self.sources:
-                node = self.parts[source.part].signal(source.signal)
-                self.sources[source] = node
-                self.ends[source.part].append(node)
-
-    def outside(self) -> dict[str, SignalId]:
-        """What is known ahead of a sample, by name: numbers, the state, delays and records."""
-        ids = {"h": SignalId(0, "h")}
-        for part in self.used:
-            part_index = part.part
-            for kind, numbers in (("p", part.p), ("given", part.given), ("state", part.state)):
-                ids |= {
-                    node.value: SignalId(part_index, kind, path) for path, node in leaves(numbers)
-                }
-            ids |= part.outside
+    def __init__(self, sample_code: SampleCode, code: Code) -> None:
+        self.sample_code, self.code = sample_code, code
+        self._lanes = code.wide or 1
+        self.known = numbers_known(sample_code, code, sample_code.read)
+        for part in sample_code.used:
             for tap in part.taps:
-                ids[part.delay_fraction(tap)] = SignalId(part_index, "fraction", str(tap.number))
-        return ids
+                fraction = graph.name(part.delay_fraction(tap))
+                self.known[fraction] = code.load("%delay_fraction", tap.number * self._lanes)
+            ends = sample_code.ends[part.part]
+            code.values(part.ahead(ends, part.delay_fractions), self.known)
+        self._records = {
+            signal: code.load("%records", index, "ptr")
+            for index, signal in enumerate(sample_code.signals)
+        }
+        self._states = {
+            node: code.variable(code.load("%states", place * self._lanes))
+            for node, place, _ in self._carried()
+        }
+        self._worst = code.variable(code.constant(float("inf")))
+        self._total = code.variable(code.constant(0.0))
 
-    def module(self, *texts: str) -> str:
-        """Text of a module of some functions, with the generated ones that they call."""
-        called: dict[str, str] = {}
-        for function in self.functions.values():
-            if any(f"{function.name}(" in text for text in texts):
-                called |= function.texts
-        inlined = [f"@inlined\n{text}" for text in called.values()]
-        return "\n\n".join([*inlined, *texts])
+    def _carried(self, parts: Sequence[PartCode] | None = None) -> list[tuple[Node, int, Node]]:
+        """Each number of the state that is carried: its name, its place, what it becomes."""
+        places = self.sample_code.model.places("state")
+        carried = []
+        for part in self.sample_code.used if parts is None else parts:
+            names, following = dict(leaves(part.state)), dict(leaves(part.following))
+            carried += [
+                (names[path], places.index((part.part, path)), following[path])
+                for path in self.sample_code.carried[part.part]
+            ]
+        return carried
 
-    def read(self, part: PartCode) -> set[str]:
-        """Names from outside that a part needs."""
-        return names_in(self.ends[part.part])
+    def sample(
+        self, n: str, parts: Sequence[PartCode] | None = None, sources: Mapping[Node, str] = NOTHING
+    ) -> dict[Node, str]:
+        """All that is known at sample n: inputs, states, signals; margins are taken in.
 
-    def printed(
-        self,
-        part: PartCode,
-        results: Sequence[Node],
-        *,
-        available: Mapping[Node, str] | None = None,
-        hints: Mapping[Node, str] | None = None,
-        named: bool = False,
-        flat: Flat | None = None,
-        branches: bool = True,
-    ) -> CodeBlock:
-        """Lines that compute some nodes of a part; `hints` are names for some, see `CodeBlock`.
-
-        Choices are not branches with `flat`, for loops of vector instructions, or if there are to
-        be none but those that save work.
+        Of some parts only if they are given, with the signals of other parts, `sources`.
         """
-        labels = {**part.trace.labels, **(hints or {})}
-        language = BRANCHING if branches and flat is None else PYTHON
-        block = CodeBlock(
-            results,
-            labels,
-            part.used_names,
-            available=available,
-            named=named,
-            flat=flat,
-            language=language,
-        )
-        self.functions |= block.functions
-        return block
+        code, sample_code = self.code, self.sample_code
+        known = {**self.known, **sources}
+        for part in sample_code.used if parts is None else parts:
+            for node, _, _ in self._carried([part]):
+                known[node] = code.load(self._states[node])
+            known |= self._inputs(part, n)
+            for source, node in sample_code.sources.items():
+                if source.part == part.part:
+                    (text,) = code.floats([node], known)
+                    known[graph.name(part.source(source))] = text
+            code.values(sample_code.ends[part.part], known)
+            if part.margin is not None:
+                self._take_in(known[graph.plain_value(part.margin)])
+        return known
 
-    def ahead(
-        self, part: PartCode, ends: Sequence[Node], constant_names: Collection[str] = ()
-    ) -> tuple[list[str], dict[Node, str]]:
-        """Lines ahead of a loop that computes some nodes, and the names that they give.
-
-        They take the parameters and givens that are read, and compute what follows from these and
-        the step alone.
-        """
-        block = self.printed(part, part.ahead(ends, constant_names), named=True)
-        lines = [*self.given(part, names_in(ends)), *block.lines]
-        return lines, block.names
-
-    def given(self, part: PartCode, read: set[str]) -> list[str]:
-        """Lines that take a part's parameters and givens, as far as they are read, from arrays."""
-        return [
-            f"{node.value} = {array}[{paths.index((part.part, path))}]"
-            for names, array, paths in (
-                (part.p, "params", self.model.places("parameters")),
-                (part.given, "given", self.model.places("given")),
-            )
-            for path, node in leaves(names)
-            if node.value in read
-        ]
-
-    def delays(self, part: PartCode) -> list[str]:
-        """Lines that take the delays of a part's taps from arrays."""
-        return [
-            f"{name} = {array}[{tap.number}]"
-            for tap in part.taps
-            for name, array in (
-                (part.delay_samples(tap), "delay_samples"),
-                (part.delay_fraction(tap), "delay_fraction"),
-            )
-        ]
-
-    def fetched(
-        self, part: PartCode, past: Callable[[str, str], str], now: Callable[[str], str]
-    ) -> list[str]:
-        """Lines that read a part's inputs: what a signal was some samples ago, and what it is."""
-        lines = []
-        read = self.read(part)
+    def _inputs(self, part: PartCode, n: str) -> dict[Node, str]:
+        """What a part reads of records at sample n."""
+        code, sample_code = self.code, self.sample_code
+        known, read = dict[Node, str](), sample_code.read(part)
         for tap in part.taps:
             for age, name in enumerate(part.tap_samples(tap)):
                 if name in read:
-                    back = f"{part.delay_samples(tap)} + {age}" if age else part.delay_samples(tap)
-                    lines.append(f"{name} = {past(tap.tap.signal, back)}")
-        inputs = [part.part_model.tap(name).signal for name in part.part_model.input_types]
-        lines += [
-            f"x_{signal} = {now(signal)}"
-            for signal in dict.fromkeys(inputs)
-            if signal in self.signals and f"x_{signal}" in read
-        ]
-        return lines
+                    places = [
+                        self._past(tap.tap.signal, tap.number, lane, age, n)
+                        for lane in range(self._lanes)
+                    ]
+                    known[graph.name(name)] = code.side_by_side(places)
+        for name in part.part_model.input_types:
+            signal = part.part_model.tap(name).signal
+            if signal in sample_code.signals and f"x_{signal}" in read:
+                now = code.load(self._records[signal], n, "double")
+                known[graph.name(f"x_{signal}")] = code.in_all_lanes(now)
+        return known
 
-    def past(self, signal: str, back: str) -> str:
-        """A signal some samples before sample ``n`` of a march."""
-        return f"{self.records[signal]}[n - ({back})] if n >= {back} else {self.before[signal]}"
+    def _past(self, signal: str, tap: int, lane: int, age: int, n: str) -> str:
+        """What a signal was some samples before sample n, or before its record."""
+        code = self.code
+        delay = code.load("%delay_samples", tap * self._lanes + lane, "i64")
+        at = code.put(f"sub i64 {n}, {delay}")
+        at = code.put(f"sub i64 {at}, {age}") if age else at
+        inside = code.put(f"icmp sge i64 {at}, 0")
+        place = code.put(f"select i1 {inside}, i64 {at}, i64 0")
+        value = code.load(self._records[signal], place, "double")
+        before = ZERO
+        if not code.wide:
+            before = code.load("%before", self.sample_code.signals.index(signal), "double")
+        return code.put(f"select i1 {inside}, double {value}, double {before}")
 
-    def body(
-        self,
-        part: PartCode,
-        targets: Mapping[SignalId, str],
-        available: Mapping[Node, str],
-        further: Mapping[SignalId, str] = MappingProxyType({}),
-    ) -> Sampled:
-        """A part's sample, with signals that other parts need and what is kept.
+    def _take_in(self, margin: str) -> None:
+        """The lowest margin so far, and a sum that is not a number once a margin was none."""
+        code = self.code
+        worst = code.load(self._worst)
+        lower = code.put(f"fcmp olt {code.number} {margin}, {worst}")
+        code.store(code.select(lower, margin, worst), self._worst)
+        total = code.put(f"fadd {code.number} {code.load(self._total)}, {margin}")
+        code.store(total, self._total)
 
-        `targets` are the texts of where numbers are kept, and `further` of those that are kept if
-        ``everything`` is; limits are one number, a bit for each. `available` nodes have names
-        already.
-        """
-        sources = {
-            source: node for source, node in self.sources.items() if source.part == part.part
-        }
-        steps = dict(leaves(part.following))
-        margin = [] if part.margin is None else [part.margin]
-        outputs = [
-            output for output in targets if output.part == part.part and output.kind != "link"
-        ]
-        results = [*sources.values(), *margin]
-        results += [node for output in outputs for node in self.kept_nodes(part, output)]
-        results += [steps[path] for path in self.carried[part.part]]
-        block = self.printed(part, results, available=available)
-        texts = iter(block.texts)
-        lines = block.lines
-        lines += [f"{part.source(source)} = {next(texts)}" for source in sources]
-        margin_name = part.fresh("margin") if margin else ""
-        if margin:
-            lines += assigned(margin_name, next(texts))
-        for output in outputs:
-            lines += self.stored(part, output, targets[output], texts)
-        following = [*texts]
-        available = {**available, **block.names}
-        links = [output for output in targets if output.part == part.part and output.kind == "link"]
-        lines += self.kept_lines(part, links, targets, available)
-        later = [output for output in further if output.part == part.part]
-        if later:
-            lines += ["if everything:", *indented(self.kept_lines(part, later, further, available))]
-        return Sampled(lines, margin_name, following)
+    def observed(self, signal: SignalId, known: dict[Node, str]) -> str:
+        """A number of a sample that is kept: limits as a sum of a bit each."""
+        code, part = self.code, self.sample_code.parts[signal.part]
+        if signal.kind != "limits":
+            (text,) = code.floats([self.sample_code.observed(part, signal)], known)
+            return text
+        zero, total = code.constant(0.0), code.constant(0.0)
+        for bit, (limit, test) in enumerate(
+            zip(part.limits, code.values(part.limits, known), strict=True)
+        ):
+            is_set = code.select(code.as_test(limit, test), code.constant(float(1 << bit)), zero)
+            total = code.put(f"fadd {code.number} {total}, {is_set}") if bit else is_set
+        return total
 
-    def kept_lines(
-        self,
-        part: PartCode,
-        outputs: Sequence[SignalId],
-        targets: Mapping[SignalId, str],
-        available: Mapping[Node, str],
-    ) -> list[str]:
-        """Lines that keep some numbers of a part, after its sample."""
-        nodes = [node for output in outputs for node in self.kept_nodes(part, output)]
-        # nothing waits for these, and branches take long to compile
-        block = self.printed(part, nodes, available=available, branches=False)
-        lines = block.lines
-        texts = iter(block.texts)
-        for output in outputs:
-            lines += self.stored(part, output, targets[output], texts)
-        return lines
+    def step(self, known: dict[Node, str], parts: Sequence[PartCode] | None = None) -> None:
+        """Take the states to the next sample."""
+        carried = self._carried(parts)
+        following = self.code.floats([node for _, _, node in carried], known)
+        for (name, _, _), text in zip(carried, following, strict=True):
+            self.code.store(text, self._states[name])
 
-    def kept_nodes(self, part: PartCode, stored: SignalId) -> list[Node]:
-        """What a number that is kept is made of: limits of a bit each."""
-        return part.limits if stored.kind == "limits" else [self.observed(part, stored)]
-
-    def stored(
-        self, part: PartCode, stored: SignalId, target: str, texts: Iterator[str]
-    ) -> list[str]:
-        """Lines that keep a number, from the texts of what it is made of."""
-        if stored.kind != "limits":
-            return assigned(target, next(texts))
-        bits = [f"choose({next(texts)}, {1 << bit}, 0)" for bit in range(len(part.limits))]
-        return assigned(target, " | ".join(bits))
-
-    def observed(self, part: PartCode, stored: SignalId) -> Node:
-        """A number that is kept, of what is known at its part's end."""
-        if stored.kind != "link":
-            return part.node(stored)
-        link = self.model.links[stored.path]
-        sources: dict[str, Value] = {
-            source.signal: graph.name(part.source(source)) for source in link.sources
-        }
-        assert link.equation is not None
-        return part.link(link.equation, link.name, sources)
-
-    def states(self, part: PartCode, steps: Sequence[str]) -> States:
-        """How a part's state is taken out of a flat array, to the next sample, and back."""
-        carried = self.carried[part.part]
-        paths = self.model.places("state")
-        nodes = dict(leaves(part.state))
-        names = [nodes[path].value for path in carried]
-        flat = [f"states[{paths.index((part.part, path))}]" for path in carried]
-        pairs = [*zip(names, flat, strict=True)]
-        return States(
-            load=[f"{name} = {element}" for name, element in pairs],
-            step=assigned(", ".join(names), ", ".join(steps)) if carried else [],
-            save=[f"{element} = {name}" for name, element in pairs],
-        )
+    def end(self) -> str:
+        """Leave the states in their array; the worst margin, not a number if one was none."""
+        code = self.code
+        for node, place, _ in self._carried():
+            code.store(code.load(self._states[node]), "%states", place * self._lanes)
+        worst, total = code.load(self._worst), code.load(self._total)
+        counts = code.put(f"fcmp ord {code.number} {total}, {total}")
+        below = code.put(f"fcmp ole {code.number} {worst}, {code.constant(0.0)}")
+        keeps = code.put(f"or {code.bit} {counts}, {below}")
+        return code.select(keeps, worst, total)
 
 
-class Sampled(NamedTuple):
-    """Text of one sample of a part."""
-
-    lines: list[str]
-    margin: str
-    """Name of the margin of its domain; empty without one."""
-    following: list[str]
-    """What the states that are carried become."""
-
-
-class States(NamedTuple):
-    """Lines around the states of a part."""
-
-    load: list[str]
-    step: list[str]
-    save: list[str]
-
-
-def lower(first: Node, second: Node) -> Node:
-    """The lower of two margins; not a number if one of them is not."""
-    test = graph.either(graph.make("<=", first, second), graph.make("!=", first, first))
-    return graph.choose(test, first, second)
-
-
-def march_source(
+def march_text(
     model: Model,
     signals: Sequence[str],
     options: Sequence[Any],
-    targets: Mapping[SignalId, str],
-    further: Mapping[SignalId, str] = MappingProxyType({}),
+    targets: Mapping[SignalId, int],
+    further: Mapping[SignalId, int] = MappingProxyType({}),
+    *,
+    whole: bool = True,
 ) -> str:
-    """Text of a module with the march over samples as a `kernel`.
+    """Text of the march of one set.
 
-    `targets` says what is kept, and where it goes at sample ``n``; `further` what is kept, too, if
-    the second number of ``worst_margin`` is not zero.
+    Parameters
+    ----------
+    model, signals, options
+        What is marched, signals that are given as records, options of each part.
+    targets : mapping of SignalId to int
+        What is kept, and its row of the block.
+    further : mapping of SignalId to int
+        What is kept, too, if the second number of ``worst_margin`` is not zero.
+    whole : bool
+        Whether rows are as long as the march; else their numbers are places in the block.
     """
     sample_code = SampleCode(model, signals, options, [*targets, *further])
-    parts = sample_code.used
-    lines, saved, samples = ["last = first + count"], list[str](), list[list[str]]()
-    for index, signal in enumerate(sample_code.signals):
-        lines += [
-            f"{sample_code.records[signal]} = records[{index}]",
-            f"{sample_code.before[signal]} = before[{index}]",
+    code = Code(ARGUMENTS)
+    march = March(sample_code, code)
+
+    def keep(rows: Mapping[SignalId, int], known: dict[Node, str], at: str) -> None:
+        for signal, row in rows.items():
+            place = code.put(f"mul i64 %count, {row}") if whole else str(row)
+            place = code.put(f"add i64 {place}, {at}")
+            code.store(march.observed(signal, known), "%flat", place)
+
+    def advance(
+        at: str, parts: Sequence[PartCode], sources: Mapping[Node, str] = NOTHING
+    ) -> dict[Node, str]:
+        """A sample of some parts: what is known there."""
+        known = march.sample(code.put(f"add i64 %first, {at}"), parts, sources)
+        numbers = {part.part for part in parts}
+        of_parts = [
+            {signal: row for signal, row in rows.items() if signal.part in numbers}
+            for rows in (targets, further)
         ]
-    lines += ["everything = worst_margin[1] != 0.0"] if further else []
-    for part in parts:
-        ahead, available = sample_code.ahead(part, sample_code.ends[part.part])
-        sample = sample_code.body(part, targets, available, further)
-        states = sample_code.states(part, sample.following)
-        lines += [*sample_code.delays(part), *ahead, *states.load]
-        saved += states.save
-        fetched = sample_code.fetched(
-            part, sample_code.past, lambda signal: f"{sample_code.records[signal]}[n]"
-        )
-        inner = [*fetched, *sample.lines]
-        if sample.margin:
-            worst = f"worst = {sample.margin} if {sample.margin} < worst else worst"
-            inner += [worst, f"total += {sample.margin}"]
-        samples.append([*inner, *states.step])
-    margins = any(part.margin is not None for part in parts)
-    lines += ["worst, total = inf, 0.0"] if margins else []
-    last = parts[-1]
-    passed = [last.source(source) for source in sample_code.sources if source.part != last.part]
-    if passed and any(sample_code.carried[part.part] for part in parts[:-1]):
+        keep(of_parts[0], known, at)
+        if of_parts[1]:
+            everything = code.load("%worst_margin", 1)
+            with code.only_if(code.put(f"fcmp une double {everything}, 0.0")):
+                keep(of_parts[1], dict(known), at)
+        march.step(known, parts)
+        return known
+
+    *others, last = sample_code.used
+    passed = [
+        graph.name(sample_code.parts[source.part].source(source))
+        for source in sample_code.sources
+        if source.part != last.part
+    ]
+    if passed:
         # the last part is a sample later than the others, so that neither waits for the other
-        late = re.compile(rf"\b({'|'.join(passed)})\b")
-        lines += [*(f"{name} = 0.0" for name in passed), "for m in range(first, last + 1):"]
-        lines += indented([f"late_{name} = {name}" for name in passed])
-        lines += indented(["if m < last:", "    n = m", *indented(chain(*samples[:-1]))])
-        following = [late.sub(r"late_\1", line) for line in samples[-1]]
-        lines += indented(["if m > first:", "    n = m - 1", *indented(following)])
+        variables = {node: code.variable(code.constant(0.0)) for node in passed}
+        with code.loop("0", code.put("add i64 %count, 1")) as at:
+            late = {node: code.load(variable) for node, variable in variables.items()}
+            with code.only_if(code.put(f"icmp slt i64 {at}, %count")):
+                known = advance(at, others)
+                for node, variable in variables.items():
+                    code.store(known[node], variable)
+            with code.only_if(code.put(f"icmp sgt i64 {at}, 0")):
+                advance(code.put(f"sub i64 {at}, 1"), [last], late)
     else:
-        lines += ["for n in range(first, last):", *indented(chain(*samples))]
-    lines += saved
-    if margins:
-        # a sum is NaN once a margin was NaN
-        lines += [
-            "worst = worst if total == total or worst <= 0.0 else total",
-            "lower = worst < worst_margin[0] or worst != worst",
-            "worst_margin[0] = worst if lower else worst_margin[0]",
-        ]
-    docstring = f"March {model.name} over its inputs."
-    return sample_code.module(function_source(f"march({KERNEL_ARGUMENTS})", docstring, lines, ""))
-
-
-def step_source(
-    model: Model, signals: Sequence[str], options: Sequence[Any], stored: Sequence[SignalId]
-) -> tuple[str, int]:
-    """Text of a module of one sample, for steppers and loops, and how many constants it has.
-
-    ``prepare(params, given, h, constants)`` computes constants once. ``step(context)`` shifts the
-    newest inputs into the delay lines (a row for each signal, newest first), fills the outputs with
-    the numbers of this sample in the order of `stored`, takes the states to the next one, and
-    returns the margin of the domain.
-    """
-    sample_code = SampleCode(model, signals, options, stored)
-    row = sample_code.signals.index
-    tapped = sorted({row(tap.tap.signal) for part in sample_code.used for tap in part.taps})
-    lines = [f"{name} = context.{name}" for name in CONTEXT_FIELDS]
-    prepare, ends, count = list[str](), ["worst = inf"], 0
-    if tapped:
-        lines += ["for j in range(lines.shape[1] - 1, 0, -1):"]
-        lines += [f"    lines[{index}, j] = lines[{index}, j - 1]" for index in tapped]
-        lines += [f"lines[{index}, 0] = inputs[{index}]" for index in tapped]
-    targets = {signal: f"outputs[{index}]" for index, signal in enumerate(stored)}
-    for part in sample_code.used:
-        ends_of_part = sample_code.ends[part.part]
-        ahead, available = sample_code.ahead(part, ends_of_part)
-        prepare += ahead
-        for node in part.ahead(ends_of_part):
-            prepare.append(f"constants[{count}] = {available[node]}")
-            lines.append(f"{available[node]} = constants[{count}]")
-            count += 1
-        sample = sample_code.body(part, targets, available)
-        states = sample_code.states(part, sample.following)
-        lines += [
-            *sample_code.delays(part),
-            *sample_code.given(part, sample_code.read(part)),
-            *states.load,
-        ]
-        lines += sample_code.fetched(
-            part,
-            lambda signal, back: f"lines[{row(signal)}, {back}]",
-            lambda signal: f"inputs[{row(signal)}]",
-        )
-        lines += sample.lines
-        if sample.margin:
-            lowest = lower(graph.name("worst"), graph.name(sample.margin))
-            compared = sample_code.printed(part, [lowest])
-            ends += [*compared.lines, f"worst = {compared.texts[0]}"]
-        ends += [*states.step, *states.save]
-    prepared = function_source(
-        "prepare(params, given, h, constants)",
-        f"Constants of {model.name}.",
-        [*prepare, "return"],
-    )
-    stepped = function_source(
-        "step(context)",
-        f"One sample of {model.name}.",
-        [*lines, *ends, "return worst"],
-        "@inlined",
-    )
-    return sample_code.module(prepared, stepped), count
-
-
-def output_of(model: Model, output: str) -> tuple[SignalId, bool]:
-    """Where a signal comes from, and whether it is that signal's integral."""
-    integral = output in model.integrals
-    name = model.integrals[output] if integral else output
-    if name in model.links:
-        return SignalId(model.links[name].after, "link", name), integral
-    for index in range(len(model.parts) - 1, -1, -1):
-        part = model.parts[index]
-        if part.signals is not None and name in floats_of(part.signals):
-            return SignalId(index, "signals", name), integral
-        if name in floats_of(part.state):
-            return SignalId(index, "state", name), integral
-    signals = [name for part in model.parts for name in part.signal_names]
-    raise InputError(
-        f"{model.name} has no signal '{output}'; it has "
-        f"{', '.join([*signals, *model.links, *model.integrals])}."
-    )
+        with code.loop("0", "%count") as at:
+            advance(at, sample_code.used)
+    worst = march.end()
+    before = code.load("%worst_margin")
+    lower = code.put(f"fcmp olt double {worst}, {before}")
+    unordered = code.put(f"fcmp uno double {worst}, {worst}")
+    takes = code.put(f"or i1 {lower}, {unordered}")
+    code.store(code.select(takes, worst, before), "%worst_margin")
+    return code.text

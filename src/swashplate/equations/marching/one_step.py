@@ -10,8 +10,8 @@ from swashplate.equations.code_generation.gradients import Derived, derived_func
 from swashplate.equations.code_generation.values import leaves
 from swashplate.equations.graph import Node, names_in, rewritten
 from swashplate.equations.keeping import cached_on_disk, key_of
-from swashplate.equations.marching.march import SampleCode
 from swashplate.equations.marching.part_code import SignalId
+from swashplate.equations.marching.sample_code import SampleCode
 from swashplate.equations.model import Model
 
 

@@ -193,6 +193,11 @@ class PartCode:
         """Name of the fraction of a sample in a tap's delay."""
         return f"{self.prefix}{tap.input}_f"
 
+    @property
+    def delay_fractions(self) -> list[str]:
+        """Names of the fractions in the delays of all taps, which do not change during a march."""
+        return [self.delay_fraction(tap) for tap in self.taps]
+
     def delay_samples(self, tap: TapOf) -> str:
         """Name of the whole samples in a tap's delay."""
         return f"{self.prefix}{tap.input}_whole"

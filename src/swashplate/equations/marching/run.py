@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
+from itertools import count
 from types import MappingProxyType
 from typing import Any, Literal, NamedTuple, TypeVar
 
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 from swashplate.equations.cache import generated, kernel
 from swashplate.equations.code_generation.functions import FUNCTIONS, generating
 from swashplate.equations.code_generation.lowering import definition_in
-from swashplate.equations.code_generation.machine_code import code_of_function
+from swashplate.equations.code_generation.machine_code import code_of_function, code_of_text
 from swashplate.equations.declaration import JIT_OFF, Replacements, inlined, interpreted
 from swashplate.equations.fields import (
     check_mapping,
@@ -28,14 +29,15 @@ from swashplate.equations.fields import (
 )
 from swashplate.equations.keeping import cached_on_disk, key_of
 from swashplate.equations.language import plain
+from swashplate.equations.marching.interpreting import InterpretedMarch
 from swashplate.equations.marching.kernels import (
     KERNEL_KINDS,
     Kernel,
-    PlannedCode,
     pointers,
 )
-from swashplate.equations.marching.march import march_source
+from swashplate.equations.marching.march import march_text
 from swashplate.equations.marching.part_code import SignalId, taps_of
+from swashplate.equations.marching.sample_code import SampleCode
 from swashplate.equations.model import (
     Link,
     Model,
@@ -419,24 +421,40 @@ def compiled_kernel(
     return code_of_function(title, text, kinds, lambda: definition_in(text, member, library))
 
 
+@dataclass(frozen=True)
+class PlannedMarch:
+    """The march of one set, which is compiled when it is first called for."""
+
+    model: Model
+    signals: tuple[str, ...]
+    """External ones that are given as records."""
+    options: tuple[Any, ...]
+    targets: tuple[tuple[SignalId, int], ...]
+    """What is kept, and its row of the block."""
+    further: tuple[tuple[SignalId, int], ...] = ()
+    """What is kept if everything is wanted."""
+    whole: bool = True
+    """Whether rows are as long as the march; else they are places in the block."""
+
+    def __call__(self) -> Kernel:
+        """The march, compiled."""
+        return _march_of(self)
+
+
 @generating
-def planned_march(
-    model: Model,
-    signals: tuple[str, ...],
-    options: tuple[Any, ...],
-    stored: tuple[SignalId, ...],
-    further: tuple[SignalId, ...] = (),
-) -> PlannedCode:
-    """The march over whole records: rows for the numbers that are kept, then for `further` ones."""
-    rows = {signal: f"flat[{row} * count + n]" for row, signal in enumerate((*stored, *further))}
-    always = {signal: rows[signal] for signal in stored}
-    if_everything = {signal: rows[signal] for signal in further}
+def _march_of(planned: PlannedMarch) -> Kernel:
+    model, signals, options, targets, further, whole = (
+        getattr(planned, each.name) for each in fields(planned)
+    )
+    if JIT_OFF:
+        sample_code = SampleCode(model, signals, options, [each for each, _ in targets + further])
+        return InterpretedMarch(sample_code, dict(targets), dict(further), whole=whole)
     text = cached_on_disk(
         f"{model.name}_march",
-        (key_of(model), signals, options, stored, further),
-        lambda: march_source(model, signals, options, always, if_everything),
+        (key_of(model), signals, options, targets, further, whole),
+        lambda: march_text(model, signals, options, dict(targets), dict(further), whole=whole),
     )
-    return PlannedKernel(f"{model.name}_march", "march", text)
+    return code_of_text(f"{model.name}_march", text, KERNEL_KINDS)
 
 
 def marched(
@@ -459,7 +477,14 @@ def marched(
     """
     signals = tuple(records)
     size = next(iter(records.values())).size
-    planned = planned_march(instance.model, signals, instance.options, stored, further)
+    rows = [*zip((*stored, *further), count(), strict=False)]
+    planned = PlannedMarch(
+        instance.model,
+        signals,
+        instance.options,
+        tuple(rows[: len(stored)]),
+        tuple(rows[len(stored) :]),
+    )
     stored = (*stored, *further) if everything else stored
     table = np.empty((len(stored), size))
     worst_margin = np.array([np.inf, float(everything)])

@@ -30,7 +30,6 @@ from numpy.typing import ArrayLike, NDArray
 from swashplate.equations.cache import kernel
 from swashplate.equations.code_generation.functions import generating
 from swashplate.equations.fields import check_mapping
-from swashplate.equations.marching.march import output_of
 from swashplate.equations.marching.part_code import SignalId
 from swashplate.equations.marching.record import (
     Between,
@@ -47,6 +46,7 @@ from swashplate.equations.marching.run import (
     instance_of,
     marched,
 )
+from swashplate.equations.marching.sample_code import output_of
 from swashplate.equations.marching.stepping import CompiledStep, StepContext
 from swashplate.equations.model import Model
 from swashplate.errors import DomainError, InputError, UnknownNameError

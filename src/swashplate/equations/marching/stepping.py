@@ -26,7 +26,6 @@ from numpy.typing import NDArray
 
 from swashplate.equations.code_generation.functions import generating
 from swashplate.equations.keeping import cached_on_disk, key_of
-from swashplate.equations.marching.march import output_of, step_source
 from swashplate.equations.marching.part_code import SignalId
 from swashplate.equations.marching.record import check_rate
 from swashplate.equations.marching.run import (
@@ -37,6 +36,8 @@ from swashplate.equations.marching.run import (
     instance_of,
     module,
 )
+from swashplate.equations.marching.sample_code import output_of
+from swashplate.equations.marching.step_code import step_source
 from swashplate.equations.model import Model
 from swashplate.errors import InputError
 

@@ -25,11 +25,11 @@ from swashplate.equations.code_generation.values import leaves
 from swashplate.equations.declaration import JIT_OFF
 from swashplate.equations.graph import Node, names_in, rewritten
 from swashplate.equations.keeping import cached_on_disk, key_of
-from swashplate.equations.marching.kernels import KERNEL_ARGUMENTS
-from swashplate.equations.marching.march import SampleCode, march_source, output_of
+from swashplate.equations.marching.kernels import KERNEL_ARGUMENTS, PlannedCode
 from swashplate.equations.marching.part_code import PartCode, SignalId
 from swashplate.equations.marching.rows import STRIDE
-from swashplate.equations.marching.run import PlannedKernel
+from swashplate.equations.marching.run import PlannedKernel, PlannedMarch
+from swashplate.equations.marching.sample_code import SampleCode, output_of
 from swashplate.equations.model import Model, SignalSource
 from swashplate.errors import InputError
 
@@ -97,7 +97,7 @@ class Facts(NamedTuple):
     """Of each result (signal, or state at the next sample) its partial derivatives by parameters
     (``p``), constants (``k``), places of taps (``fraction``), states and signals."""
     kernels: list[PlannedKernel]
-    """The march comes first."""
+    """Those of parts; the march, which comes first, is not among them."""
     parts: list[PartStructure]
     """Parts that are needed."""
 
@@ -113,6 +113,13 @@ class Structure:
     outputs: tuple[str, ...]
     """Signals that are observed."""
     facts: Facts
+
+    @property
+    def kernels(self) -> list[PlannedCode]:
+        """The march over a block, and the kernels of parts."""
+        rows = tuple(self.facts.row_of.items())
+        march = PlannedMarch(self.model, self.signals, self.options, rows, whole=False)
+        return [march, *self.facts.kernels]
 
     @cached_property
     def observed(self) -> list[tuple[SignalId, bool]]:
@@ -189,9 +196,6 @@ class _Structuring:
             if signal.kind == "link":
                 self._keep(signal)
                 self.partials[signal] = self._link(signal)
-        outputs = {signal: f"flat[{row} + n - first]" for signal, row in self.row_of.items()}
-        text = march_source(model, signals, options, outputs)
-        self.kernels.insert(0, PlannedKernel(f"{model.name}_march", "march", text))
 
     @property
     def facts(self) -> Facts:
