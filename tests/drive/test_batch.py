@@ -24,13 +24,9 @@ from swashplate import (
 from swashplate import batch as batches
 from swashplate.drive import drive_instance
 from swashplate.equations import Model, Tap, equation, simulate
-from swashplate.equations.code_generation.lowering import definition_in, lowered
 from swashplate.equations.code_generation.machine_code import optimised
 from swashplate.equations.marching import SampleCode, output_of
-from swashplate.equations.marching.kernels import KERNEL_KINDS
 from swashplate.equations.marching.lanes import lanes_text
-from swashplate.equations.marching.run import LIBRARY
-from swashplate.equations.marching.structure import structure_of
 from swashplate.models.displacement_control import PumpOptions
 from swashplate.models.drive import pump_drive
 
@@ -319,16 +315,6 @@ def test_names_of_equations_are_not_those_of_the_march(hoist: Drive) -> None:
     batch = drive.simulate_many({"Z10": [12.0, 13.0]}, voltage=voltage)
     for Z10, speed in zip((12.0, 13.0), batch.output, strict=True):
         np.testing.assert_array_equal(speed, drive.replace(Z10=Z10).simulate(voltage).shaft_speed)
-
-
-@pytest.mark.skipif(bool(config.DISABLE_JIT), reason="nothing is compiled")
-def test_partial_derivatives_are_filled_as_vectors() -> None:
-    options = (None, PumpOptions())
-    kernels = structure_of(pump_drive, ("current",), options, ("shaft_speed",)).facts.kernels
-    (fill,) = (kernel for kernel in kernels if kernel.member == "fill_pump")
-    function = definition_in(fill.text, fill.member, LIBRARY)
-    text = str(optimised(lowered(function, KERNEL_KINDS, "fill")))
-    assert re.search(r"<\d+ x double> @llvm\.sqrt", text)
 
 
 @pytest.mark.skipif(bool(config.DISABLE_JIT), reason="nothing is compiled")

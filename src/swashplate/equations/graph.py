@@ -76,17 +76,18 @@ class DerivativeRule:
 class Call:
     """A generated function that is called, and how its derivatives are had.
 
-    `results` is how many numbers the function returns. `derivative` makes the function that returns
-    the same numbers and their derivatives by some of its arguments, which are given by their
-    indices; None if nothing flows through it. `loop` says what the function does, from which other
-    languages print theirs.
+    `results` is how many numbers the function returns. `derivative` takes a node that calls it and
+    indices of arguments that move; it gives a call that returns the same numbers first, and nodes
+    of their derivatives by the indices of result and argument. None if nothing flows through it.
+    `loop` says what the function does, from which other languages print theirs.
     """
 
     def __init__(
         self,
         function: Any,
         results: int,
-        derivative: Callable[[tuple[int, ...]], Any] | None = None,
+        derivative: Callable[[Node, tuple[int, ...]], tuple[Node, dict[tuple[int, int], Node]]]
+        | None = None,
         loop: Any = None,
     ) -> None:
         self.function, self.results, self.derivative = function, results, derivative

@@ -13,7 +13,6 @@ from typing import Any, ParamSpec, TypeVar
 from numba import types
 from numba.extending import intrinsic
 
-from swashplate.equations.code_generation.lowering import Lowering, Operand, lowers
 from swashplate.equations.declaration import JIT_OFF, inlined, interpreted, remember_text
 from swashplate.equations.language import CHOICES, MATH
 
@@ -50,11 +49,6 @@ choose: Any = _choose if JIT_OFF else intrinsic(_select_intrinsic)
 It is not written as ``a if test else b``: from that the compiler makes a branch, or a choice
 between two addresses to load from, and loops no longer become good vector code.
 """
-
-
-@lowers(choose)
-def _lowered_choice(code: Lowering, test: Operand, if_true: Operand, if_false: Operand) -> Operand:
-    return code.choice(test, if_true, if_false)
 
 
 FUNCTIONS: dict[str, Any] = {name: function for function, name in [*MATH.items(), *CHOICES.items()]}

@@ -38,17 +38,10 @@ class Code:
         Type in LLVM's words and name of each.
     wide : int
         How many numbers stand side by side; 0 for one.
-
-    Attributes
-    ----------
-    number, bit : str
-        LLVM's types of a number and of a test.
     """
 
     def __init__(self, arguments: Sequence[tuple[str, str]], wide: int = 0) -> None:
         self.wide = wide
-        self.number = f"<{wide} x double>" if wide else "double"
-        self.bit = f"<{wide} x i1>" if wide else "i1"
         self._arguments = arguments
         self._lines: list[str] = []
         self._slots: list[str] = []
@@ -75,6 +68,23 @@ class Code:
                 "",
             ]
         )
+
+    @property
+    def number(self) -> str:
+        """LLVM's type of a number."""
+        return f"<{self.wide} x double>" if self.wide else "double"
+
+    @property
+    def bit(self) -> str:
+        """LLVM's type of a test."""
+        return f"<{self.wide} x i1>" if self.wide else "i1"
+
+    @contextmanager
+    def side_by_side(self, wide: int) -> Iterator[None]:
+        """Write what follows for so many numbers at once."""
+        before, self.wide = self.wide, wide
+        yield
+        self.wide = before
 
     # -- instructions ------------------------------------------------------------------------------
 
@@ -109,7 +119,7 @@ class Code:
             return vector
         return self.put(f"extractelement {self.number} {vector}, i32 {lane}")
 
-    def side_by_side(self, numbers: Sequence[str]) -> str:
+    def joined(self, numbers: Sequence[str]) -> str:
         """Numbers of all lanes as one."""
         if not self.wide:
             return numbers[0]
@@ -120,31 +130,49 @@ class Code:
 
     def in_all_lanes(self, number: str) -> str:
         """One number for all lanes."""
-        if not self.wide:
-            return number
-        kind = self.number
+        return self.vector(number, self.wide) if self.wide else number
+
+    def vector(self, number: str, size: int) -> str:
+        """A vector of one number."""
+        kind = f"<{size} x double>"
         first = self.put(f"insertelement {kind} poison, double {number}, i32 0")
-        mask = f"<{self.wide} x i32> zeroinitializer"
-        return self.put(f"shufflevector {kind} {first}, {kind} poison, {mask}")
+        return self.put(
+            f"shufflevector {kind} {first}, {kind} poison, <{size} x i32> zeroinitializer"
+        )
+
+    def transposed(self, vectors: Sequence[str]) -> list[str]:
+        """As many vectors as each has numbers, rows as columns."""
+        size, result, apart = len(vectors), [*vectors], 1
+        kind, lanes = f"<{size} x double>", range(size)
+        while apart < size:  # halves of pairs are exchanged
+            low = [lane if not lane & apart else size + lane - apart for lane in lanes]
+            high = [lane + apart if not lane & apart else size + lane for lane in lanes]
+            for i in (i for i in lanes if not i & apart):
+                pair = f"{kind} {result[i]}, {kind} {result[i + apart]}"
+                for place, mask in ((i, low), (i + apart, high)):
+                    text = ", ".join(f"i32 {lane}" for lane in mask)
+                    result[place] = self.put(f"shufflevector {pair}, <{size} x i32> <{text}>")
+            apart *= 2
+        return result
 
     # -- memory ------------------------------------------------------------------------------------
 
     def address(self, pointer: str, index: str | int, kind: str = "double") -> str:
-        """Address of an element of an array."""
+        """Address of an element of an array; of a vector, of its first number among all."""
         if index == 0:
             return pointer
-        return self.put(f"getelementptr inbounds {kind}, ptr {pointer}, i64 {index}")
+        element = kind if kind in ("i64", "ptr") else "double"
+        return self.put(f"getelementptr inbounds {element}, ptr {pointer}, i64 {index}")
 
     def load(self, pointer: str, index: str | int = 0, kind: str | None = None) -> str:
         """A number from an array, by default as many side by side as there are lanes."""
         kind = kind or self.number
-        element = "double" if kind == self.number else kind
-        return self.put(f"load {kind}, ptr {self.address(pointer, index, element)}, align 8")
+        return self.put(f"load {kind}, ptr {self.address(pointer, index, kind)}, align 8")
 
     def store(self, value: str, pointer: str, index: str | int = 0, kind: str = "") -> None:
         """Put a number into an array, by default as many side by side as there are lanes."""
         kind = kind or self.number
-        self.do(f"store {kind} {value}, ptr {self.address(pointer, index)}, align 8")
+        self.do(f"store {kind} {value}, ptr {self.address(pointer, index, kind)}, align 8")
 
     def variable(self, value: str, kind: str | None = None) -> str:
         """Address of a number that loops change."""
@@ -155,26 +183,42 @@ class Code:
         self.do(f"store {kind} {value}, ptr {name}")
         return name
 
+    def pointer(self, address: str) -> str:
+        """A pointer to what is at an address."""
+        return self.put(f"inttoptr i64 {address} to ptr")
+
     # -- control -----------------------------------------------------------------------------------
 
     def _label(self, name: str) -> None:
         self._lines.append(f"{name}:")
 
     @contextmanager
-    def loop(self, start: str, stop: str) -> Iterator[str]:
-        """A loop over whole numbers, `stop` excluded; gives the counter."""
+    def as_long_as(self, test: Callable[[], str]) -> Iterator[None]:
+        """Instructions that are done again and again while a test, computed anew, is true."""
         self._count += 1
-        head, body, end = (f"{word}{self._count}" for word in ("loop", "body", "end"))
-        counter = self.variable(start, "i64")
+        head, body, end = (f"{word}{self._count}" for word in ("while", "do", "end"))
         self.do(f"br label %{head}")
         self._label(head)
-        at = self.put(f"load i64, ptr {counter}")
-        self.do(f"br i1 {self.put(f'icmp slt i64 {at}, {stop}')}, label %{body}, label %{end}")
+        self.do(f"br i1 {test()}, label %{body}, label %{end}")
         self._label(body)
-        yield at
-        self.do(f"store i64 {self.put(f'add nsw i64 {at}, 1')}, ptr {counter}")
+        yield
         self.do(f"br label %{head}")
         self._label(end)
+
+    @contextmanager
+    def loop(self, start: str, stop: str, step: str | int = 1) -> Iterator[str]:
+        """A loop over whole numbers, `stop` excluded; gives the counter."""
+        counter = self.variable(start, "i64")
+        at = ""
+
+        def goes_on() -> str:
+            nonlocal at
+            at = self.load(counter, 0, "i64")
+            return self.put(f"icmp slt i64 {at}, {stop}")
+
+        with self.as_long_as(goes_on):
+            yield at
+            self.store(self.put(f"add nsw i64 {at}, {step}"), counter, 0, "i64")
 
     @contextmanager
     def only_if(self, test: str) -> Iterator[None]:
@@ -200,19 +244,18 @@ class Code:
         with; `body` is given what is known, and returns what the states become.
         """
         variables = [self.variable(text) for text in states.values()]
-        self._count += 1
-        head, inside, end = (f"{word}{self._count}" for word in ("while", "do", "end"))
-        self.do(f"br label %{head}")
-        self._label(head)
-        before = [self.load(variable) for variable in variables]
-        within = {**known, **dict(zip(states, before, strict=True))}
-        (test,) = self.values([going], within)
-        self.do(f"br i1 {self._in_any_lane(test)}, label %{inside}, label %{end}")
-        self._label(inside)
-        for variable, old, new in zip(variables, before, body(within), strict=True):
-            self.store(self.select(test, new, old) if self.wide else new, variable)
-        self.do(f"br label %{head}")
-        self._label(end)
+        before, within = list[str](), dict[Node, str]()
+
+        def goes_on() -> str:
+            before[:] = [self.load(variable) for variable in variables]
+            within.update({**known, **dict(zip(states, before, strict=True))})
+            (test,) = self.values([going], within)
+            return self._in_any_lane(test)
+
+        with self.as_long_as(goes_on):
+            (test,) = self.values([going], within)
+            for variable, old, new in zip(variables, before, body(within), strict=True):
+                self.store(self.select(test, new, old) if self.wide else new, variable)
         return [self.load(variable) for variable in variables]
 
     def _in_any_lane(self, test: str) -> str:
@@ -319,7 +362,7 @@ class Code:
                 return self.select(beyond, second, first)
             case "**":
                 return self._power(floats[0], node.value)
-        return self._called({"abs": "fabs"}.get(node.op, node.op), floats)
+        return self.function({"abs": "fabs"}.get(node.op, node.op), *floats)
 
     def _power(self, base: str, exponent: int) -> str:
         """By squaring, as compilers do."""
@@ -333,7 +376,7 @@ class Code:
             return product
         return self.put(f"fdiv {self.number} {self.constant(1.0)}, {product}")
 
-    def _called(self, name: str, floats: Sequence[str]) -> str:
+    def function(self, name: str, *floats: str) -> str:
         """A function of LLVM, or of C lane by lane."""
         if name in OWN:
             symbol = f"llvm.{name}.{f'v{self.wide}' if self.wide else ''}f64"
@@ -346,7 +389,7 @@ class Code:
         for lane in range(self.wide or 1):
             given = ", ".join(f"double {self.element(text, lane)}" for text in floats)
             results.append(self.put(f"call double @{name}({given})"))
-        return self.side_by_side(results)
+        return self.joined(results)
 
     # -- equations that are called apart -----------------------------------------------------------
 
@@ -375,7 +418,7 @@ class Code:
         """`repeated`: states after a step has been done ``count`` times."""
         *state, number = self._leading(inner)
         formals = dict(zip(self._formals(inner), texts[1 + len(state) :], strict=True))
-        count = self._called("floor", [texts[0]])
+        count = self.function("floor", texts[0])
         limit = graph.name("repeated$count")
         counter = graph.name("repeated$number")
 

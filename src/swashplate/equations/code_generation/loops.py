@@ -2,22 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import reduce
 from math import inf
 from typing import Any, Literal, NamedTuple, TypeVar
 
-import numpy as np
-from numpy.typing import NDArray
-
 from swashplate.equations import graph
 from swashplate.equations.code_generation.functions import FUNCTIONS, RESERVED, Function, fresh_name
-from swashplate.equations.code_generation.gradients import (
-    Derived,
-    derived_function,
-    listed,
-    partials_of,
-)
-from swashplate.equations.code_generation.lowering import Lowering, Operand, lowers
+from swashplate.equations.code_generation.gradients import partials_of
 from swashplate.equations.code_generation.printing import (
     UNNAMED,
     function_source,
@@ -150,18 +142,7 @@ def repeated(step: Callable[..., S], count: float, state: S, *arguments: Any) ->
     return state
 
 
-@inlined
-def blank(size: int) -> NDArray[np.float64]:
-    """Derivatives that are carried along, all zero."""
-    return np.zeros(size)
-
-
-FUNCTIONS |= {"root": root, "blank": blank}
-
-
-@lowers(blank)
-def _blank(code: Lowering, size: Operand) -> Operand:
-    return code.room(int(size.text))
+FUNCTIONS["root"] = root
 
 
 # --- as they are traced ---------------------------------------------------------------------------
@@ -333,27 +314,8 @@ def repetition(
         what = f"repeated of {step.name}, which does not return a state"
         instead = "let it take and return the same named tuple of floats, or a float"
         trace.under_way[-1].source.refuse(None, what, instead)
-    *state_names, number = inner.leading
-    count_name = fresh_name("count", inner.used_names)
-    formals = [count_name, *state_names, *inner.formals]
-    states = ", ".join(state_names)
-    step_arguments = ", ".join([*state_names, f"float({number})", *inner.formals])
-    function = inner.function()
-    lines = [
-        f"for {number} in range(int({count_name})):",
-        f"    {states} = {function.name}({step_arguments})",
-        f"return {states},",
-    ]
-    name = f"repeated_{function.name}"
-    text = function_source(f"{name}({', '.join(formals)})", f"{step.name}, repeated.", lines, "")
-    loop = Function(name, text, {function.name: function})
-
-    def derivative(moving: tuple[int, ...]) -> Derived:
-        return _tangent_loop(inner, name, formals, step_arguments, moving)
-
     arguments = (count, *(node for _, node in leaves(state)), *inner.actuals)
-    called = Call(loop, len(names), derivative, Loop(name, "repeated", inner))
-    call = make("call", *arguments, value=called)
+    call = _repeated(inner, arguments, _derivatives)
     results = []
     for index, field in enumerate(names):
         results.append(trace.make("result", call, value=index))
@@ -361,96 +323,78 @@ def repetition(
     return rebuilt(state, iter(results))
 
 
-def _tangent_loop(
-    inner: Inner,
-    loop: str,
-    formals: list[str],
-    step_arguments: str,
-    moving: tuple[int, ...],
-) -> Derived:
-    """A loop with the derivatives of its state by some inputs, carried along step by step.
-
-    `formals` are the loop's arguments, `step_arguments` those of its step, and `moving` the indices
-    of the inputs among the first. Nothing follows the count, which is the argument 0.
-    """
-    inputs = [formals[index] for index in moving if index > 0]
+def _repeated(
+    inner: Inner, arguments: Sequence[Node], derivative: Callable[..., Any] | None = None
+) -> Node:
+    """A call of a generated function that repeats an equation: of count, states and formals."""
     *state_names, number = inner.leading
-    width = len(inputs)
-    used_names = {*inner.used_names}
-    differentiated_by = [*state_names, *(name for name in inputs if name not in state_names)]
-    step = derived_function(
-        f"{inner.name}_{UNNAMED}",
-        f"{inner.name} of scalars with its derivatives by {listed(differentiated_by)}.",
-        [*inner.leading, *inner.formals],
-        [*leaves(inner.result)],
-        [(name, name) for name in differentiated_by],
-        inner.labels,
-        chained=True,
-    )
-    slopes, column = fresh_name("slopes", used_names), fresh_name("c", used_names)
-    next_names = [fresh_name(f"new_{name}", used_names) for name in state_names]
-    slopes_before = [fresh_name(f"by_{name}", used_names) for name in state_names]
-    partials = [
-        fresh_name(f"d_{next_names[output]}_{differentiated_by[source]}", used_names)
-        for output, source in step.entries
-    ]
-    slope_of = {
-        (state, name): f"{slopes}[{state * width + index}]"
-        for state in range(len(state_names))
-        for index, name in enumerate(inputs)
-    }
-    carried: list[list[str]] = [[] for _ in state_names]
-    direct: list[str] = []
-    followed = [{name} for name in state_names]  # Inputs that a state follows, at first itself.
-    for partial, (output, source) in zip(partials, step.entries, strict=True):
-        name = differentiated_by[source]
-        if source < len(state_names):
-            carried[output].append(f"{partial} * {slopes_before[source]}")
-        else:
-            direct.append(f"{slope_of[output, name]} += {partial}")
-        followed[output].add(name)
-    for _ in state_names:
-        by_state = dict(zip(state_names, followed, strict=True))
-        followed = [
-            names.union(*(by_state[name] for name in names if name in by_state))
-            for names in followed
-        ]
-    entries = [
-        (state, name)
-        for state in range(len(state_names))
-        for name in inputs
-        if name in followed[state]
-    ]
-    started = [
-        f"{slope_of[state, name]} = 1.0" for state, name in enumerate(state_names) if name in inputs
-    ]
-    read = [
-        f"{name} = {slopes}[{state * width} + {column}]" for state, name in enumerate(slopes_before)
-    ]
-    stored = [
-        f"{slopes}[{state * width} + {column}] = {' + '.join(terms) or '0.0'}"
-        for state, terms in enumerate(carried)
-    ]
-    returned = [*state_names, *(slope_of[entry] for entry in entries)]
+    count = fresh_name("count", {*inner.used_names})
+    formals = [count, *state_names, *inner.formals]
+    function = inner.function(always_tuple=True)
+    given = ", ".join([*state_names, f"float({number})", *inner.formals])
     lines = [
-        f"{slopes} = blank({len(state_names) * width})",
-        *started,
-        f"for {number} in range(int({formals[0]})):",
-        f"    {', '.join([*next_names, *partials])}, = {step.name}({step_arguments})",
-        f"    for {column} in range({width}):",
-        *(f"        {line}" for line in [*read, *stored]),
-        *(f"    {line}" for line in direct),
-        f"    {', '.join(state_names)}, = {', '.join(next_names)},",
-        f"return {', '.join(returned)},",
+        f"for {number} in range(int({count})):",
+        f"    {', '.join(state_names)}, = {function.name}({given})",
+        f"return {', '.join(state_names)},",
     ]
-    moved = [formals[index] for index in moving]
-    docstring = f"{inner.name}, repeated, with its derivatives by {listed(moved)}."
-    name = f"{loop}_{UNNAMED}"
+    name = f"repeated_{function.name}"
+    docstring = f"{inner.name}, repeated."
     text = function_source(f"{name}({', '.join(formals)})", docstring, lines, "")
-    return Derived(
-        *named_by_text(name, text),
-        {step.name: step},
-        tuple(state_names),
-        tuple(moved),
-        tuple((state, moved.index(name)) for state, name in entries),
+    called = Function(name, text, {function.name: function})
+    loop = Loop(name, "repeated", inner)
+    return make("call", *arguments, value=Call(called, len(state_names), derivative, loop))
+
+
+def _derivatives(call: Node, moving: tuple[int, ...]) -> tuple[Node, dict[tuple[int, int], Node]]:
+    """A loop with the derivatives of its states, carried along step by step.
+
+    Nothing follows the count, which is the argument 0.
+    """
+    inner: Inner = call.value.loop.inner
+    *state_names, number = inner.leading
+    size = len(state_names)
+    states = [graph.name(name) for name in state_names]
+    formals = [graph.name(name, kind) for name, kind in inner.formals.items()]
+    following = [node for _, node in leaves(inner.result)]
+    partials = partials_of(following, [*states, *formals], chained=True)
+    used_names = {*inner.used_names}
+    tangents, begins, becomes = dict[tuple[int, int], Node](), list[Node](), list[Node]()
+    moving = tuple(index for index in moving if index > 0)
+    for index in moving:
+        moved = _moved_by(index - 1, size, partials)
+        stem = f"by_{[*state_names, *inner.formals][index - 1]}"
+        for state in moved:
+            name = fresh_name(f"{state_names[state]}_{stem}", used_names)
+            tangents[state, index] = graph.name(name)
+        for state in moved:
+            direct = ZERO if index <= size else partials.get((state, index - 1), ZERO)
+            terms = [
+                graph.times(partials[state, other], tangents[other, index])
+                for other in moved
+                if (state, other) in partials
+            ]
+            becomes.append(reduce(graph.plus, terms, direct))
+            begins.append(ONE if state == index - 1 else ZERO)
+    wide = inner._replace(
+        used_names=used_names,
+        leading={
+            **dict.fromkeys([*state_names, *(node.value for node in tangents.values())], "float"),
+            number: "float",
+        },
+        result=Tuple(None, (*following, *becomes)),
     )
+    given = call.args
+    again = _repeated(wide, (*given[: 1 + size], *begins, *given[1 + size :]))
+    slopes = {
+        entry: make("result", again, value=size + place) for place, entry in enumerate(tangents)
+    }
+    return again, slopes
+
+
+def _moved_by(argument: int, size: int, partials: Mapping[tuple[int, int], Node]) -> list[int]:
+    """States of a loop that an argument, itself a state if it is among the first, moves."""
+    moved = {argument} if argument < size else set[int]()
+    moved |= {state for state, by in partials if by == argument}
+    for _ in range(size):
+        moved |= {state for state, by in partials if by in moved and by < size}
+    return sorted(moved)

@@ -6,7 +6,7 @@ numbers are the same to the last bit wherever an equation is compiled.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from ctypes import CFUNCTYPE, addressof, c_char, c_double, c_int64, c_void_p
 from functools import cache
 from typing import Any
@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 
 from swashplate import progress
 from swashplate.equations.cache import COMPILING
-from swashplate.equations.code_generation.lowering import FunctionDefinition, lowered
 from swashplate.equations.keeping import cached_on_disk
 
 SYMBOL = "code"
@@ -70,9 +69,7 @@ class Code:
 _loaded: dict[tuple[str, str, tuple[str, ...]], Code] = {}
 
 
-def code_of_function(
-    name: str, text: str, kinds: tuple[str, ...], definition: Callable[[], FunctionDefinition]
-) -> Code:
+def code_of_text(name: str, text: str, kinds: tuple[str, ...]) -> Code:
     """Machine code of a function that returns nothing.
 
     Parameters
@@ -80,25 +77,10 @@ def code_of_function(
     name : str
         Of what is compiled, for a person who waits, and for the file.
     text : str
-        What the code follows from, the engine's source apart.
+        A module in LLVM's language, with the function by the name of `SYMBOL`.
     kinds : tuple of str
-        Of the arguments, see `lowered`.
-    definition : callable
-        Gives the function.
+        Of the arguments: ``int``, ``float``, and with ``*`` before them arrays of these.
     """
-    key = (name, text, kinds)
-    if key not in _loaded:
-        content = cached_on_disk(
-            f"{name}_code",
-            (*key, llvmlite_version, llvm.llvm_version_info, *_host()),
-            lambda: _compiled(name, lowered(definition(), kinds, SYMBOL)),
-        )
-        _loaded[key] = Code(content, kinds)
-    return _loaded[key]
-
-
-def code_of_text(name: str, text: str, kinds: tuple[str, ...]) -> Code:
-    """Machine code of a function in LLVM's language, see `code_of_function`."""
     key = (name, text, kinds)
     if key not in _loaded:
         content = cached_on_disk(

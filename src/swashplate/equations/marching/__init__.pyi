@@ -3,7 +3,6 @@ from .derivatives import jacobian as jacobian
 from .derivatives import residuals as residuals
 from .lanes import LANES as LANES
 from .lanes import lanes_of as lanes_of
-from .layout import started_by as started_by
 from .observation import Observation as Observation
 from .observation import ObservedRecord as ObservedRecord
 from .observation import RunValues as RunValues
@@ -36,4 +35,5 @@ from .sample_code import output_of as output_of
 from .simulation import Command as Command
 from .simulation import inputs_of as inputs_of
 from .simulation import read_only as read_only
+from .start_code import started_by as started_by
 from .stepping import stored_of as stored_of

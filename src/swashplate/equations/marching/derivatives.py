@@ -2,23 +2,29 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Collection, Mapping, Sequence
-from typing import NamedTuple
+from contextlib import suppress
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.equations.code_generation.functions import generating
-from swashplate.equations.marching.kernels import Struct, pointers
-from swashplate.equations.marching.layout import JacobianLayout, layout_of, started_by
+from swashplate.equations.code_generation.machine_code import code_of_text
+from swashplate.equations.declaration import JIT_OFF
+from swashplate.equations.keeping import cached_on_disk, key_of
+from swashplate.equations.marching.interpreting import InterpretedTangents, interpreted_rows
+from swashplate.equations.marching.kernels import FLOATS, KERNEL_KINDS, Struct, pointers
 from swashplate.equations.marching.observation import ObservedRecord, RunValues
+from swashplate.equations.marching.part_code import SignalId
 from swashplate.equations.marching.rows import (
     ROWS,
-    Program,
+    Room,
+    Run,
     Sink,
     aligned,
-    compiled_march,
-    march_struct,
+    routines,
     upright,
 )
 from swashplate.equations.marching.run import (
@@ -29,71 +35,145 @@ from swashplate.equations.marching.run import (
     check_domain,
     initial_states,
 )
-from swashplate.equations.marching.structure import Moved, Structure, structure_of
+from swashplate.equations.marching.sample_code import SampleCode, output_of
+from swashplate.equations.marching.start_code import Moved, start_code, started_by
+from swashplate.equations.marching.tangents import Tangents, padded, tangents_of
+from swashplate.equations.model import Model
 from swashplate.errors import DomainError, InputError
 
 Array = NDArray[np.float64]
 
-
-def _slopes(
-    structure: Structure, instance: Instance, first: Mapping[str, float], h: float, start: Start
-) -> dict[Moved, float]:
-    """Derivatives of constants and of states at the start by all parameters that move them."""
-    code = structure.start_code(start)
-    signals_before = dict.fromkeys(first, 0.0)
-    if start == "steady":
-        signals_before.update(first)
-    values = [instance.number_at(argument, signals_before, h) for argument in code.arguments]
-    try:
-        results = code.derived.python(*values)
-    except NO_NUMBER as error:
-        raise DomainError(
-            f"{instance.name}: what follows from the parameters alone cannot be computed for these "
-            f"numbers ({error})."
-        ) from None
-    return dict(zip(code.moves, results[len(results) - len(code.moves) :], strict=True))
+TANGENT_KINDS = (*KERNEL_KINDS, *(FLOATS,) * 3)
+"""Kinds of the arguments of a march with derivatives, see `tangents.TANGENT_ARGUMENTS`."""
 
 
-def _initialised(
-    layout: JacobianLayout,
-    instance: Instance,
-    first: Mapping[str, float],
-    h: float,
-    start: Start,
-    started: Collection[str],
-) -> tuple[Struct[Program], Array]:
-    """The layout's program with its numbers, and derivatives of the states at the first sample.
+class ObservedMarch:
+    """The march that gives some signals and their derivatives by some columns, for any numbers.
 
-    `started` are paths of states that the run starts from as its own unknowns: nothing else moves
-    them. The code that computes the derivatives is generated when it is first needed.
+    Attributes
+    ----------
+    tangents : Tangents
+        Its text, and where its numbers are.
     """
-    structure = layout.structure
-    slopes = dict[Moved, float]()
-    if layout.columns:
-        slopes = _slopes(structure, instance, first, h, start)
-    tangent = np.zeros(layout.tangents)
-    for (state, column), index in layout.tangent_of.items():
-        if f"{structure.model.prefix(state.part)}{state.path}" in started:
-            tangent[index] = state.path in started_by(structure.model, state.part, column)
-        else:
-            tangent[index] = slopes.get((state, column), 0.0)
-    delays = instance.tap_delays(structure.signals, h)
-    scale = layout.program.scale.copy()
-    for term, factor in layout.factors:
-        factor_id, _ = factor
-        if factor_id.kind == "fraction":
-            scale[term] *= delays.slope[int(factor_id.path)]
-        else:
-            scale[term] *= slopes[factor]
-    return Struct(layout.program._replace(scale=scale)), tangent
+
+    def __init__(
+        self,
+        model: Model,
+        signals: tuple[str, ...],
+        options: tuple[Any, ...],
+        outputs: tuple[str, ...],
+        columns: tuple[str, ...],
+        start: Start,
+    ) -> None:
+        self._model, self._signals, self._options = model, signals, options
+        self._outputs, self._columns, self._start = outputs, columns, start
+        self._spare: deque[tuple[Array, ...]] = deque(maxlen=8)
+        self._start_code = start_code(model, signals, options, outputs, start)
+        begins: dict[SignalId, list[int]] = {}
+        for number, column in enumerate(columns):
+            for signal in self._started_by(column):
+                begins.setdefault(signal, []).append(number)
+        for signal, column in self._start_code.moves:
+            if column in columns:
+                begins.setdefault(signal, []).append(columns.index(column))
+        arguments = (model, signals, options, outputs, columns, begins)
+        if JIT_OFF:
+            observed = [output_of(model, output) for output in outputs]
+            sample_code = SampleCode(model, signals, options, [signal for signal, _ in observed])
+            self.interpreted = InterpretedTangents(sample_code, observed, columns, begins)
+            self.states = self.interpreted.states
+            return
+        name = f"{model.name}_tangents" if columns else f"{model.name}_residuals"
+        self.tangents: Tangents = cached_on_disk(
+            name,
+            (key_of(model), signals, options, outputs, columns, tuple(begins.items())),
+            lambda: tangents_of(*arguments),
+        )
+        self.states = [*self.tangents.states]
+        self._codes = [code_of_text(name, text, TANGENT_KINDS) for text in self.tangents.texts]
+        self.codes = np.array([code.address for code in self._codes], dtype=np.int64)
+
+    def _started_by(self, column: str) -> list[SignalId]:
+        """States that a column such as ``start.pump.pressure`` sets."""
+        return [
+            SignalId(part, "state", path)
+            for part in range(len(self._model.parts))
+            for path in started_by(self._model, part, column)
+        ]
+
+    def begin(
+        self, instance: Instance, first: Mapping[str, float], h: float, started: Collection[str]
+    ) -> Array:
+        """(s, w) derivatives of the states at the first sample by the columns, and by idle ones.
+
+        `started` are paths of states that the run starts from as its own unknowns: nothing else
+        moves them.
+        """
+        tangent = np.zeros((len(self.states), padded(len(self._columns))))
+        slopes = self._slopes(instance, first, h) if self._columns else {}
+        for number, column in enumerate(self._columns):
+            own = self._started_by(column)
+            for row, signal in zip(tangent, self.states, strict=True):
+                path = f"{self._model.prefix(signal.part)}{signal.path}"
+                if path in started:
+                    row[number] = signal in own
+                else:
+                    row[number] = slopes.get((signal, column), 0.0)
+        return tangent
+
+    def _slopes(
+        self, instance: Instance, first: Mapping[str, float], h: float
+    ) -> dict[Moved, float]:
+        """Derivatives of states at the start by all parameters that move them."""
+        code = self._start_code
+        signals_before = dict.fromkeys(first, 0.0)
+        if self._start == "steady":
+            signals_before.update(first)
+        values = [instance.number_at(argument, signals_before, h) for argument in code.arguments]
+        try:
+            results = code.derived.python(*values)
+        except NO_NUMBER as error:
+            raise DomainError(
+                f"{instance.name}: what follows from the parameters alone cannot be computed for "
+                f"these numbers ({error})."
+            ) from None
+        return dict(zip(code.moves, results[len(results) - len(code.moves) :], strict=True))
+
+    def take_room(self) -> tuple[Array, ...]:
+        """Memory for a march, of an earlier one if it can be: new memory takes longer to get."""
+        with suppress(IndexError):  # another thread may be faster
+            return self._spare.pop()
+        sizes = self.tangents
+        return (
+            aligned((sizes.block + 2) * sizes.row),
+            aligned(sizes.block * sizes.room),
+            aligned(max(sizes.tangents, 1)),
+        )
+
+    def give_back(self, room: tuple[Array, ...]) -> None:
+        """Keep the memory of a march that has ended."""
+        self._spare.append(room)
 
 
 @generating
-def _at_rest(
-    layout: JacobianLayout, instance: Instance, h: float, started: tuple[str, ...]
-) -> tuple[Struct[Program], Array]:
-    """Those of a start at rest, which depends on no record."""
-    return _initialised(layout, instance, {}, h, "rest", started)
+def _begin_at_rest(
+    march: ObservedMarch, instance: Instance, h: float, started: tuple[str, ...]
+) -> Array:
+    """Those of a start at rest, which depend on no record."""
+    return march.begin(instance, {}, h, started)
+
+
+@generating
+def observed_march(
+    model: Model,
+    signals: tuple[str, ...],
+    options: tuple[Any, ...],
+    outputs: tuple[str, ...],
+    columns: tuple[str, ...],
+    start: Start,
+) -> ObservedMarch:
+    """The march of a model that gives some outputs, and derivatives of them, made once."""
+    return ObservedMarch(model, signals, options, outputs, columns, start)
 
 
 # --- what a fit asks for --------------------------------------------------------------------------
@@ -249,49 +329,80 @@ def _march(
     ]
     if missing:
         raise InputError(f"{missing[0]} is a column, so RunValues needs a value of it.")
-    structure = structure_of(instance.model, signals, instance.options, outputs)
+    march = observed_march(
+        instance.model, signals, instance.options, outputs, tuple(columns), start
+    )
     plan = observed.plan
-    numbers = tuple(outputs.index(observation.signal) for observation in observed.observations)
-    layout = layout_of(structure, tuple(columns), numbers, start)
+    numbers = [outputs.index(observation.signal) for observation in observed.observations]
     first = {name: float(values[0]) for name, values in records.items()}
     initial = instance.start(first, h, start)
     states = initial_states(instance, initial, run_values.start)
+    delays = instance.tap_delays(signals, h)
+    values = tuple(records.values())
+    worst_margin = np.array([np.inf, 0.0])
+    places = np.array(row_places, dtype=np.int64)
+    offsets = observed.offsets(run_values.offsets)
+    offset_rows = observed.offset_rows(offset_start)
     if start == "rest":
-        program, tangent = _at_rest(layout, instance, h, tuple(run_values.start))
+        begin = _begin_at_rest(march, instance, h, tuple(run_values.start))
     else:
-        program, tangent = _initialised(layout, instance, first, h, start, run_values.start)
-    fields = Sink(
+        begin = march.begin(instance, first, h, run_values.start)
+    if JIT_OFF:
+        arrays = arrays_of(instance, values, initial, delays, states, worst_margin, states)
+        tangent = begin[:, : len(columns)]
+        simulated = march.interpreted(values[0].size, h, arrays, delays.slope, tangent)
+        interpreted_rows(plan.fields, numbers, simulated, places, offsets, offset_rows, rows)
+        if factor.size:
+            factor[:] = np.linalg.qr(rows.T, mode="r")
+        check_domain(instance, states, float(worst_margin[0]), observed.driven_by)
+        return
+    sizes = march.tangents
+    flat, room, tangent = march.take_room()
+    tangent[: begin.size] = begin.reshape(-1)
+    tangent[begin.size :] = 0.0
+    sink = Sink(
         columns=len(rows),
         length=rows.shape[1],
         rows=rows,
-        derived=len(columns),
-        target=np.array(row_places, dtype=np.int64),
+        target=np.concatenate([places, np.full(sizes.width - places.size, len(rows) - 1)]),
         first_offset_row=offset_start,
         folded=int(factor.size > 0),
         factor=factor,
-        offset=observed.offsets(run_values.offsets),
-        offset_row=observed.offset_rows(offset_start),
+        offset=offsets,
+        offset_row=offset_rows,
     )
-    sink = Struct(fields)
-    room = layout.take_room()
-    room.fields.tangent[:] = tangent
-    room.fields.integral_states[:] = 0.0
-    room.fields.next_sample[:] = plan.fields.first[:-1]
-    values = tuple(records.values())
-    worst_margin = np.array([np.inf])
-    arrays = arrays_of(
-        instance,
-        values,
-        initial,
-        instance.tap_delays(signals, h),
-        states,
-        worst_margin,
-        room.fields.block,
+    left = Room(
+        block=sizes.block,
+        row=sizes.row,
+        width=sizes.width,
+        flat=flat,
+        value=np.array(numbers, dtype=np.int64),
+        column=np.array(
+            [sizes.first_column + number * sizes.width for number in numbers], dtype=np.int64
+        ),
+        next_stamp=plan.fields.first[:-1].copy(),
     )
-    structs = march_struct(program, plan, sink, room)
-    march = compiled_march()
-    march(layout.kernels, pointers(arrays), values[0].size, h, structs.address)
-    layout.give_back(room)
+    given = (
+        *arrays_of(instance, values, initial, delays, states, worst_margin, flat[sizes.row :]),
+        delays.slope,
+        tangent,
+        room,
+    )
+    run, write_rows, absorb = routines()
+    struct = Struct(
+        Run(
+            len(march.codes),
+            march.codes,
+            pointers(given),
+            plan,
+            Struct(sink),
+            Struct(left),
+            write_rows,
+            absorb,
+        )
+    )
+    run(values[0].size, h, struct.words)
+    march.give_back((flat, room, tangent))
     check_domain(instance, states, float(worst_margin[0]), observed.driven_by)
 
 

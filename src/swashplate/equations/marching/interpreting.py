@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from math import inf, isnan
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from swashplate.equations import graph
 from swashplate.equations.code_generation.evaluation import evaluated
 from swashplate.equations.code_generation.values import leaves
 from swashplate.equations.graph import Node
 from swashplate.equations.marching.part_code import PartCode, SignalId
+from swashplate.equations.marching.rows import Plan
 from swashplate.equations.marching.sample_code import SampleCode
+from swashplate.equations.marching.tangents import Carried
+from swashplate.equations.marching.tangents import delay_slope as delay_slope_of
+
+Array = NDArray[np.float64]
 
 
 class InterpretedMarch:
@@ -22,13 +30,21 @@ class InterpretedMarch:
         sample_code: SampleCode,
         targets: Mapping[SignalId, int],
         further: Mapping[SignalId, int],
-        *,
-        whole: bool,
     ) -> None:
         self._sample_code, self._targets, self._further = sample_code, targets, further
-        self._whole = whole
 
-    def __call__(
+    def __call__(self, count: int, first: int, h: float, *arrays: Any) -> None:
+        """March; the arguments are those of `kernels.KERNEL_ARGUMENTS`."""
+        *_, worst_margin, flat = arrays
+        kept = {**self._targets, **(self._further if worst_margin[1] != 0.0 else {})}
+
+        def keep(n: int, known: dict[Node, Any]) -> None:
+            for signal, row in kept.items():
+                flat[row * count + n - first] = self.observed(signal, known)
+
+        self.run(count, first, h, *arrays, keep=keep)
+
+    def run(
         self,
         count: int,
         first: int,
@@ -41,9 +57,11 @@ class InterpretedMarch:
         given: Any,
         states: Any,
         worst_margin: Any,
-        flat: Any,
+        _: Any,
+        *,
+        keep: Callable[[int, dict[Node, Any]], None],
     ) -> None:
-        """March; the arguments are those of `kernels.KERNEL_ARGUMENTS`."""
+        """March; `keep` is given the number of each sample, and what is known there."""
         sample_code = self._sample_code
         constant: dict[Node, Any] = {graph.name("h"): h}
         places = {kind: sample_code.model.places(kind) for kind in ("parameters", "given", "state")}
@@ -62,7 +80,6 @@ class InterpretedMarch:
             for path in sample_code.carried[part.part]:
                 place = places["state"].index((part.part, path))
                 state_at[names[path]] = (place, following[path])
-        kept = {**self._targets, **(self._further if worst_margin[1] != 0.0 else {})}
         state = {node: float(states[place]) for node, (place, _) in state_at.items()}
         margins: list[float] = []
         for n in range(first, first + count):
@@ -74,9 +91,7 @@ class InterpretedMarch:
                         (known[graph.name(part.source(source))],) = evaluated([node], known)
                 if part.margin is not None:
                     margins += evaluated([part.margin], known)
-            for signal, row in kept.items():
-                place = row * count + n - first if self._whole else row + n - first
-                flat[place] = self._observed(signal, known)
+            keep(n, known)
             ends = [node for _, node in state_at.values()]
             state = dict(zip(state_at, map(float, evaluated(ends, known)), strict=True))
         for node, (place, _) in state_at.items():
@@ -104,10 +119,95 @@ class InterpretedMarch:
                 known[graph.name(f"x_{signal}")] = float(records[signals.index(signal)][n])
         return known
 
-    def _observed(self, signal: SignalId, known: dict[Node, Any]) -> float:
+    def observed(self, signal: SignalId, known: dict[Node, Any]) -> float:
+        """A number of a sample that is kept: limits as a sum of a bit each."""
         part = self._sample_code.parts[signal.part]
         if signal.kind != "limits":
             (value,) = evaluated([self._sample_code.observed(part, signal)], known)
             return float(value)
         tests = evaluated(part.limits, known)
         return float(sum(1 << bit for bit, test in enumerate(tests) if test))
+
+
+class InterpretedTangents:
+    """The march of one set with derivatives, see `tangents.Tangents`: over a whole record at once.
+
+    It carries them through every node.
+    """
+
+    def __init__(
+        self,
+        sample_code: SampleCode,
+        outputs: Sequence[tuple[SignalId, bool]],
+        columns: Sequence[str],
+        begins: Mapping[SignalId, Any],
+    ) -> None:
+        self._sample_code, self._outputs = sample_code, outputs
+        signals = [signal for signal, _ in outputs]
+        self._carried = Carried(sample_code, signals, columns, begins, keep_all=True)
+        self.states = self._carried.ids
+
+    def __call__(
+        self, size: int, h: float, arrays: Sequence[Any], delay_slope: Array, tangent: Array
+    ) -> tuple[Array, Array]:
+        """(n, r) outputs, and (n, r, k) derivatives; `tangent` are those of the states, (s, k)."""
+        march, carried = InterpretedMarch(self._sample_code, {}, {}), self._carried
+        count = len(self._outputs)
+        values = np.empty((size, count))
+        derivatives = np.zeros((size, count, tangent.shape[1]))
+        slopes = {delay_slope_of(tap): slope for tap, slope in enumerate(delay_slope.tolist())}
+        moving = dict(zip(carried.states, tangent, strict=True))
+
+        def keep(n: int, known: dict[Node, Any]) -> None:
+            nonlocal moving
+            values[n] = [march.observed(signal, known) for signal, _ in self._outputs]
+            known = known | slopes
+            now = dict(moving)
+            for vertex in carried.vertices:
+                total = np.zeros(tangent.shape[1])
+                for number, amount in carried.direct[vertex].items():
+                    (total[number],) = evaluated([amount], known)
+                for operand, contribution in carried.flows[vertex].items():
+                    (amount,) = evaluated([contribution.zero_elsewhere], known)
+                    if amount and operand in now:
+                        total += amount * now[operand]
+                now[vertex] = total
+            for number, output in enumerate(carried.outputs):
+                derivatives[n, number] = now.get(output, 0.0)
+            none = np.zeros(tangent.shape[1])
+            moving = {
+                state: now.get(following, none)
+                for state, following in zip(carried.states, carried.following, strict=True)
+            }
+
+        march.run(size, 0, h, *arrays, keep=keep)
+        for number, (_, integral) in enumerate(self._outputs):
+            if integral:
+                for rates in (values[:, number], derivatives[:, number]):
+                    rates[1:] = np.cumsum(0.5 * h * (rates[:-1] + rates[1:]), axis=0)
+                    rates[0] = 0.0
+        return values, derivatives
+
+
+def interpreted_rows(
+    plan: Plan,
+    outputs: Sequence[int],
+    simulated: tuple[Array, Array],
+    places: Any,
+    offsets: Array,
+    offset_rows: Any,
+    rows: Array,
+) -> None:
+    """Fill in weighted rows of the problem, residuals last; see `rows.Sink`."""
+    values, derivatives = (np.concatenate([each, each[-1:]]) for each in simulated)
+    for r, output in enumerate(outputs):
+        stamps = slice(int(plan.first[r]), int(plan.first[r + 1]))
+        cell, f, weight = plan.cell[stamps], plan.fraction[stamps], plan.weight[stamps]
+        column = derivatives[:, output].T
+        rows[places, stamps] = weight * ((1.0 - f) * column[:, cell] + f * column[:, cell + 1])
+        for number, row in enumerate(offset_rows):
+            if row >= 0:
+                rows[row, stamps] = weight if number == r else 0.0
+        value = values[:, output]
+        error = (1.0 - f) * value[cell] + f * value[cell + 1]
+        rows[-1, stamps] = weight * (error - (plan.measured[stamps] - offsets[r]))

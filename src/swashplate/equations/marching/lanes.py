@@ -323,7 +323,7 @@ class Lanes:
         cost: Array,
         outputs: Array,
     ) -> None:
-        march = InterpretedMarch(self._interpreted, {self._signal: 0}, {}, whole=True)
+        march = InterpretedMarch(self._interpreted, {self._signal: 0}, {})
         before = np.zeros(len(records))
         for lane in range(LANES):
             row, margin, state = np.empty(count), np.array([np.inf, 0.0]), states[:, lane].copy()

@@ -50,8 +50,26 @@ def numbers_known(
     return known
 
 
+def known_ahead(
+    sample_code: SampleCode, code: Code, names: Collection[str] = ()
+) -> dict[Node, str]:
+    """What does not change over a march: numbers, fractions of delays, and what follows from them.
+
+    `names` are those that are read beside what parts read.
+    """
+    known = numbers_known(sample_code, code, lambda part: sample_code.read(part) | {*names})
+    for part in sample_code.used:
+        for tap in part.taps:
+            fraction = graph.name(part.delay_fraction(tap))
+            known[fraction] = code.load("%delay_fraction", tap.number * (code.wide or 1))
+        code.values(part.ahead(sample_code.ends[part.part], part.delay_fractions), known)
+    return known
+
+
 class March:
     """The text of a march under way.
+
+    `names` are those that are read beside what parts read.
 
     Attributes
     ----------
@@ -61,16 +79,10 @@ class March:
         What does not change over the march.
     """
 
-    def __init__(self, sample_code: SampleCode, code: Code) -> None:
+    def __init__(self, sample_code: SampleCode, code: Code, names: Collection[str] = ()) -> None:
         self.sample_code, self.code = sample_code, code
-        self._lanes = code.wide or 1
-        self.known = numbers_known(sample_code, code, sample_code.read)
-        for part in sample_code.used:
-            for tap in part.taps:
-                fraction = graph.name(part.delay_fraction(tap))
-                self.known[fraction] = code.load("%delay_fraction", tap.number * self._lanes)
-            ends = sample_code.ends[part.part]
-            code.values(part.ahead(ends, part.delay_fractions), self.known)
+        self._lanes, self._names = code.wide or 1, {*names}
+        self.known = known_ahead(sample_code, code, names)
         self._records = {
             signal: code.load("%records", index, "ptr")
             for index, signal in enumerate(sample_code.signals)
@@ -119,7 +131,7 @@ class March:
     def _inputs(self, part: PartCode, n: str) -> dict[Node, str]:
         """What a part reads of records at sample n."""
         code, sample_code = self.code, self.sample_code
-        known, read = dict[Node, str](), sample_code.read(part)
+        known, read = dict[Node, str](), sample_code.read(part) | self._names
         for tap in part.taps:
             for age, name in enumerate(part.tap_samples(tap)):
                 if name in read:
@@ -127,7 +139,7 @@ class March:
                         self._past(tap.tap.signal, tap.number, lane, age, n)
                         for lane in range(self._lanes)
                     ]
-                    known[graph.name(name)] = code.side_by_side(places)
+                    known[graph.name(name)] = code.joined(places)
         for name in part.part_model.input_types:
             signal = part.part_model.tap(name).signal
             if signal in sample_code.signals and f"x_{signal}" in read:
@@ -179,6 +191,59 @@ class March:
         for (name, _, _), text in zip(carried, following, strict=True):
             self.code.store(text, self._states[name])
 
+    def run(
+        self,
+        keep: Callable[[dict[Node, str], str, Sequence[PartCode]], None],
+        *,
+        together: bool = False,
+    ) -> None:
+        """March ``count`` samples of one set from ``first`` on; `keep` is given what is known.
+
+        And the number of the sample in the march, and the parts of which it is known. Unless all
+        are to be known `together`, the last part is a sample later than those that it follows, so
+        that neither waits for the other.
+        """
+        code, sample_code = self.code, self.sample_code
+
+        def advance(
+            at: str, parts: Sequence[PartCode], sources: Mapping[Node, str] = NOTHING
+        ) -> dict[Node, str]:
+            known = self.sample(code.put(f"add i64 %first, {at}"), parts, sources)
+            keep(known, at, parts)
+            self.step(known, parts)
+            return known
+
+        *others, last = sample_code.used
+        passed = [
+            graph.name(sample_code.parts[source.part].source(source))
+            for source in sample_code.sources
+            if source.part != last.part
+        ]
+        if passed and not together:
+            variables = {node: code.variable(code.constant(0.0)) for node in passed}
+            with code.loop("0", code.put("add i64 %count, 1")) as at:
+                late = {node: code.load(variable) for node, variable in variables.items()}
+                with code.only_if(code.put(f"icmp slt i64 {at}, %count")):
+                    known = advance(at, others)
+                    for node, variable in variables.items():
+                        code.store(known[node], variable)
+                with code.only_if(code.put(f"icmp sgt i64 {at}, 0")):
+                    advance(code.put(f"sub i64 {at}, 1"), [last], late)
+        else:
+            with code.loop("0", "%count") as at:
+                advance(at, sample_code.used)
+        self._end_of_one()
+
+    def _end_of_one(self) -> None:
+        """Leave states and the worst margin of one set."""
+        code = self.code
+        worst = self.end()
+        before = code.load("%worst_margin")
+        lower = code.put(f"fcmp olt double {worst}, {before}")
+        unordered = code.put(f"fcmp uno double {worst}, {worst}")
+        takes = code.put(f"or i1 {lower}, {unordered}")
+        code.store(code.select(takes, worst, before), "%worst_margin")
+
     def end(self) -> str:
         """Leave the states in their array; the worst margin, not a number if one was none."""
         code = self.code
@@ -197,8 +262,6 @@ def march_text(
     options: Sequence[Any],
     targets: Mapping[SignalId, int],
     further: Mapping[SignalId, int] = MappingProxyType({}),
-    *,
-    whole: bool = True,
 ) -> str:
     """Text of the march of one set.
 
@@ -210,8 +273,6 @@ def march_text(
         What is kept, and its row of the block.
     further : mapping of SignalId to int
         What is kept, too, if the second number of ``worst_margin`` is not zero.
-    whole : bool
-        Whether rows are as long as the march; else their numbers are places in the block.
     """
     sample_code = SampleCode(model, signals, options, [*targets, *further])
     code = Code(ARGUMENTS)
@@ -219,15 +280,11 @@ def march_text(
 
     def keep(rows: Mapping[SignalId, int], known: dict[Node, str], at: str) -> None:
         for signal, row in rows.items():
-            place = code.put(f"mul i64 %count, {row}") if whole else str(row)
+            place = code.put(f"mul i64 %count, {row}")
             place = code.put(f"add i64 {place}, {at}")
             code.store(march.observed(signal, known), "%flat", place)
 
-    def advance(
-        at: str, parts: Sequence[PartCode], sources: Mapping[Node, str] = NOTHING
-    ) -> dict[Node, str]:
-        """A sample of some parts: what is known there."""
-        known = march.sample(code.put(f"add i64 %first, {at}"), parts, sources)
+    def keep_sample(known: dict[Node, str], at: str, parts: Sequence[PartCode]) -> None:
         numbers = {part.part for part in parts}
         of_parts = [
             {signal: row for signal, row in rows.items() if signal.part in numbers}
@@ -238,33 +295,6 @@ def march_text(
             everything = code.load("%worst_margin", 1)
             with code.only_if(code.put(f"fcmp une double {everything}, 0.0")):
                 keep(of_parts[1], dict(known), at)
-        march.step(known, parts)
-        return known
 
-    *others, last = sample_code.used
-    passed = [
-        graph.name(sample_code.parts[source.part].source(source))
-        for source in sample_code.sources
-        if source.part != last.part
-    ]
-    if passed:
-        # the last part is a sample later than the others, so that neither waits for the other
-        variables = {node: code.variable(code.constant(0.0)) for node in passed}
-        with code.loop("0", code.put("add i64 %count, 1")) as at:
-            late = {node: code.load(variable) for node, variable in variables.items()}
-            with code.only_if(code.put(f"icmp slt i64 {at}, %count")):
-                known = advance(at, others)
-                for node, variable in variables.items():
-                    code.store(known[node], variable)
-            with code.only_if(code.put(f"icmp sgt i64 {at}, 0")):
-                advance(code.put(f"sub i64 {at}, 1"), [last], late)
-    else:
-        with code.loop("0", "%count") as at:
-            advance(at, sample_code.used)
-    worst = march.end()
-    before = code.load("%worst_margin")
-    lower = code.put(f"fcmp olt double {worst}, {before}")
-    unordered = code.put(f"fcmp uno double {worst}, {worst}")
-    takes = code.put(f"or i1 {lower}, {unordered}")
-    code.store(code.select(takes, worst, before), "%worst_margin")
+    march.run(keep_sample)
     return code.text

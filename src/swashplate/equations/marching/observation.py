@@ -181,23 +181,22 @@ class ObservedRecord:
         cells: list[Indices] = []
         fractions: list[Array] = []
         for cell, fraction in positions:
-            if (fraction == 0.0).all() and (np.diff(cell) == 1).all():
-                regular.append(True)
+            regular.append(bool((fraction == 0.0).all() and (np.diff(cell) == 1).all()))
+            if regular[-1]:
                 cells.append(_in_a_row(int(cell[0]), cell.size))
                 fractions.append(_alike(0.0, fraction.size))
             else:
-                regular.append(False)
                 cells.append(cell)
                 fractions.append(fraction)
         plan = Plan(
-            observations=len(regular),
+            observations=len(cells),
             first=self._first,
             cell=_joined(cells),
             fraction=_joined(fractions),
             measured=measured,
             weight=weight,
-            even=np.array([(weight == 1.0).all() for weight in weights], dtype=np.int64),
             regular=np.array(regular, dtype=np.int64),
+            all_weigh=np.array([weight.all() for weight in weights], dtype=np.int64),
         )
         return Struct(plan)
 

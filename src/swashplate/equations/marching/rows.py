@@ -1,79 +1,43 @@
 """From derivatives on the grid to weighted rows of a least-squares problem, and their triangle.
 
-What is here knows no model: routines work on rows of a block of samples that a program names by
-their first places.
+What is here knows no model: it calls a march by its address, block by block, and works on what that
+leaves. With [J r] = Q R, the small triangle R holds all that a Gauss-Newton or trust-region step
+needs: RᵀR is [J r]ᵀ[J r], and J has the singular values of R's columns. R is made by Householder
+reflections, never from the normal equations, whose condition number is squared and which a zero
+column breaks (G. H. Golub, C. F. Van Loan: Matrix Computations, 4th ed., 5.2).
 
-With [J r] = Q R, the small triangle R holds all that a Gauss-Newton or trust-region step needs: RᵀR
-is [J r]ᵀ[J r], and J has the singular values of R's columns. R is made by Householder reflections,
-never from the normal equations, whose condition number is squared and which a zero column breaks.
+The routines are printed in LLVM's language, as marches are, and do the same in the same order on
+every processor.
 """
 
-from math import sqrt
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from swashplate.equations.code_generation.elimination import SIDE_BY_SIDE
 from swashplate.equations.code_generation.functions import generating
-from swashplate.equations.marching.kernels import (
-    Struct,
-    call_kernel,
-    call_recurrence,
-    fields_of,
-    routine,
-    row_from,
-    run_routine,
-)
+from swashplate.equations.code_generation.llvm import Code
+from swashplate.equations.code_generation.machine_code import code_of_text
+from swashplate.equations.marching.kernels import INTS, Struct
+from swashplate.equations.marching.march import ZERO
+from swashplate.equations.marching.tangents import TANGENT_ARGUMENTS, VECTOR, summed
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-BLOCK = 512
-"""Most samples of a block."""
-STRIDE = BLOCK + 16
-"""From one row to the next: not a power of two, so that rows do not share places in a cache; and
-room before and after a row for the samples next to the block."""
+ROWS = 512
+"""Rows that are rotated at once: few enough for a fast cache."""
+TOGETHER = 4
+"""Vectors whose products are summed side by side."""
+NOTHING = 1e-290
+"""Square of a column's norm that counts as none: the reflection divides by numbers of its size."""
+CACHE_LINE = 64
+"""Bytes. Vectors that lie across two lines take twice as long to load."""
 
 
 # Routines read these named tuples as structs (see `kernels.Struct`), whose arrays do not know their
 # shapes.
-
-
-class Program(NamedTuple):
-    """What is done in every block, in order, and what is observed then."""
-
-    steps: int
-    """Rows of `todo`: w."""
-    todo: Indices
-    """(w, 4) in each row one of
-
-    - CALL, number of a kernel: call it;
-    - COMBINE, first and end of the sums: make rows of the block;
-    - INTEGRATE, place of a row, its number among all: make it its integral;
-    - RECUR, number of a kernel, first place and end in `lanes`: run a recurrence.
-    """
-    target: Indices
-    """(t,) rows that are sums; those that are observed last, which have no place."""
-    first: Indices
-    """(t + 1,) first term of each, and how many there are."""
-    first_factor: Indices
-    """(s,) row of a term's first factor."""
-    second_factor: Indices
-    """(s,) row of its second factor, -1 for none."""
-    scale: Array
-    """(s,) number that multiplies a term."""
-    lanes: Indices
-    """For each recurrence its `graph.recurrence`'s."""
-    first_observed: (
-        int  # Number of the first sum that is observed: of each observation one for each column.
-    )
-    value: Indices
-    """(r,) row of each observation's signal."""
-    integral_count: int
-    """Rows that become integrals."""
-
-
-CALL, COMBINE, INTEGRATE, RECUR = range(4)
 
 
 class Plan(NamedTuple):
@@ -91,10 +55,10 @@ class Plan(NamedTuple):
     """(m,) measured values."""
     weight: Array
     """(m,)"""
-    even: Indices
-    """(r,) whether all weights of an observation are 1."""
     regular: Indices
-    """(r,) whether its stamps are successive points of the grid."""
+    """(r,) whether an observation's stamps are successive points of the grid."""
+    all_weigh: Indices
+    """(r,) whether all its stamps have weight."""
 
 
 class Sink(NamedTuple):
@@ -106,10 +70,9 @@ class Sink(NamedTuple):
     """From one row to the next: m, or ROWS for a triangle."""
     rows: Array
     """(k + 1, length) all rows, or as many as are rotated at once."""
-    derived: int
-    """Derivatives that the march gives: d."""
     target: Indices
-    """(d,) rows where they go."""
+    """(w,) rows where the derivatives of a march go; of idle columns the residuals', which are
+    written last."""
     first_offset_row: int
     """First row of those by the observations' own offsets; residuals come after them."""
     folded: int
@@ -123,100 +86,60 @@ class Sink(NamedTuple):
 
 
 class Room(NamedTuple):
-    """Memory that a march writes to."""
+    """What a march leaves in a block, see `tangents.Tangents`."""
 
-    size: int
-    """Of the block, in numbers."""
-    block: Array
-    tangent: Array
-    """Derivatives of the states at the first sample, replaced by those after the last."""
-    aside: Array
-    """(STRIDE,) a row before it is interpolated."""
-    products: Array
-    """(EIGHTH,) see `absorb`."""
-    integral_states: Array
-    """(i, 3) states of integrals, zeros before the first sample."""
-    next_sample: Indices
-    """(r,) next sample of each observation."""
-
-
-# --- the triangle ---------------------------------------------------------------------------------
-
-ROWS = 512
-"""Rows of a block: known to the compiler, and few enough for a fast cache."""
-EIGHTH = ROWS // 8
-NOTHING = 1e-290
-"""Square of a column's norm that counts as none: the reflection divides by numbers of its size."""
-CACHE_LINE = 64
-"""Bytes. Vectors that lie across two lines take twice as long to load."""
+    block: int
+    """Most samples of it."""
+    row: int
+    """From one sample to the next."""
+    width: int
+    """Columns of an output, idle ones counted."""
+    flat: Array
+    """(block + 2, row) the last sample of the block before, then the block's, and one after."""
+    value: Indices
+    """(r,) place of each observation's value in a row."""
+    column: Indices
+    """(r,) place of its first column."""
+    next_stamp: Indices
+    """(r,) number of the next stamp of each observation."""
 
 
-def aligned_room(size: int) -> Array:
-    """Memory, as it is, that begins with a cache line."""
-    room = np.empty(size + CACHE_LINE // 8)
-    skipped = -room.ctypes.data % CACHE_LINE // 8
-    return room[skipped : skipped + size]
+class Run(NamedTuple):
+    """All that a run is given."""
+
+    steps: int
+    """How many functions there are for each block."""
+    codes: Indices
+    """Their addresses."""
+    arrays: Indices
+    """Addresses of what they take after the step, see `tangents.TANGENT_ARGUMENTS`."""
+    plan: Struct[Plan]
+    sink: Struct[Sink]
+    room: Struct[Room]
+    write_rows: Any
+    absorb: Any
+
+
+class Fields:
+    """Fields of the struct at an address, each loaded where it is read."""
+
+    def __init__(self, code: Code, address: str, kind: Any) -> None:
+        self._code, self._address, self._kind = code, address, kind
+
+    def __getattr__(self, name: str) -> str:
+        """A whole number, or a pointer to an array."""
+        place = self._kind._fields.index(name)
+        word = self._code.load(self._address, place, "i64")
+        whole = self._kind.__annotations__[name] is int
+        return word if whole else self._code.pointer(word)
 
 
 def aligned(*shape: int) -> Array:
     """Zeros that begin with a cache line."""
-    room = aligned_room(int(np.prod(shape))).reshape(shape)
-    room[:] = 0.0
-    return room
-
-
-def dot(a: Array, b: Array, room: Array) -> float:
-    """Scalar product of two columns of ROWS numbers, folded in eighths.
-
-    Summed from left to right, one addition would wait for the other; folded, it vectorises without
-    leave to reorder sums (docs/decisions/0002), and rounds less.
-    """
-    for i in range(EIGHTH):
-        j, k, l = i + 2 * EIGHTH, i + 4 * EIGHTH, i + 6 * EIGHTH
-        room[i] = (
-            (a[i] * b[i] + a[i + EIGHTH] * b[i + EIGHTH])
-            + (a[j] * b[j] + a[j + EIGHTH] * b[j + EIGHTH])
-        ) + (
-            (a[k] * b[k] + a[k + EIGHTH] * b[k + EIGHTH])
-            + (a[l] * b[l] + a[l + EIGHTH] * b[l + EIGHTH])
-        )
-    for i in range(8):
-        room[i] = ((room[i] + room[i + 8]) + (room[i + 16] + room[i + 24])) + (
-            (room[i + 32] + room[i + 40]) + (room[i + 48] + room[i + 56])
-        )
-    total: float = ((room[0] + room[1]) + (room[2] + room[3])) + (
-        (room[4] + room[5]) + (room[6] + room[7])
-    )
-    return total
-
-
-def absorb(sink: int, room: int) -> None:
-    """Rotate the rows of a sink into the triangular factor of all rows before it.
-
-    They are used up, and are to be zeros if there are fewer than ROWS.
-    """
-    columns = fields_of(sink, Sink).columns
-    rows = fields_of(sink, Sink).rows
-    factor = fields_of(sink, Sink).factor
-    products = fields_of(room, Room).products
-    for j in range(columns):
-        pivot, line = row_from(rows, j * ROWS), row_from(factor, j * columns)
-        square = dot(pivot, pivot, products)
-        if square < NOTHING:
-            continue  # nothing to rotate, as with a parameter that the block does not depend on
-        corner = line[j]
-        norm = sqrt(corner * corner + square)
-        diagonal = -norm if corner > 0.0 else norm
-        lead = corner - diagonal
-        # the reflection 1 - v vᵀ · scale with v = [lead, pivot]: no difference of like numbers
-        scale = 1.0 / (norm * (norm + abs(corner)))
-        line[j] = diagonal
-        for k in range(j + 1, columns):
-            column = row_from(rows, k * ROWS)
-            along = scale * (lead * line[k] + dot(pivot, column, products))
-            line[k] -= along * lead
-            for i in range(ROWS):
-                column[i] -= along * pivot[i]
+    size = int(np.prod(shape))
+    room = np.zeros(size + CACHE_LINE // 8)
+    skipped = -room.ctypes.data % CACHE_LINE // 8
+    return room[skipped : skipped + size].reshape(shape)
 
 
 def upright(factor: Array) -> Array:
@@ -225,225 +148,322 @@ def upright(factor: Array) -> Array:
     return np.asarray(turned[:, None] * factor)
 
 
+# --- the triangle ---------------------------------------------------------------------------------
+
+
+def absorb_text() -> str:
+    """Text of what rotates ROWS rows into the triangular factor of all rows before them.
+
+    Of a sink; the rows are used up, and are to be zeros if there are fewer than ROWS.
+    """
+    code = Code([("ptr", "sink")])
+    sink = Fields(code, "%sink", Sink)
+    columns, rows, factor = sink.columns, sink.rows, sink.factor
+    with code.loop("0", columns) as j:
+        pivot = code.address(rows, code.put(f"mul i64 {j}, {ROWS}"))
+        line = code.address(factor, code.put(f"mul i64 {j}, {columns}"))
+        square = _dot(code, pivot, pivot)
+        # nothing to rotate, as with a parameter that the rows do not depend on
+        with code.only_if(code.put(f"fcmp uge double {square}, {code.constant(NOTHING)}")):
+            corner = code.load(line, j)
+            corner_square = code.put(f"fmul double {corner}, {corner}")
+            norm = code.function("sqrt", code.put(f"fadd double {corner_square}, {square}"))
+            positive = code.put(f"fcmp ogt double {corner}, {ZERO}")
+            diagonal = code.select(positive, code.put(f"fneg double {norm}"), norm)
+            lead = code.put(f"fsub double {corner}, {diagonal}")
+            # the reflection 1 - v vᵀ · scale with v = [lead, pivot]: no difference of like numbers
+            size = code.put(f"fadd double {norm}, {code.function('fabs', corner)}")
+            size = code.put(f"fmul double {norm}, {size}")
+            scale = code.put(f"fdiv double {code.constant(1.0)}, {size}")
+            code.store(diagonal, line, j)
+            with code.loop(code.put(f"add i64 {j}, 1"), columns) as k:
+                _reflect(code, rows, pivot, line, k, lead, scale)
+    return code.text
+
+
+def _reflect(code: Code, rows: str, pivot: str, line: str, k: str, lead: str, scale: str) -> None:
+    """Reflect column k."""
+    column = code.address(rows, code.put(f"mul i64 {k}, {ROWS}"))
+    of_line = code.load(line, k)
+    along = code.put(f"fmul double {lead}, {of_line}")
+    along = code.put(f"fadd double {along}, {_dot(code, pivot, column)}")
+    along = code.put(f"fmul double {scale}, {along}")
+    moved = code.put(f"fmul double {along}, {lead}")
+    code.store(code.put(f"fsub double {of_line}, {moved}"), line, k)
+    in_all = code.vector(along, SIDE_BY_SIDE)
+    with code.loop("0", str(ROWS), SIDE_BY_SIDE) as i:
+        moved = code.put(f"fmul {VECTOR} {in_all}, {code.load(pivot, i, VECTOR)}")
+        reflected = code.put(f"fsub {VECTOR} {code.load(column, i, VECTOR)}, {moved}")
+        code.store(reflected, column, i, VECTOR)
+
+
+def _dot(code: Code, first: str, second: str) -> str:
+    """Scalar product of two columns of ROWS numbers, in sums that do not wait for each other."""
+    sums = [code.variable("zeroinitializer", VECTOR) for _ in range(TOGETHER)]
+    with code.loop("0", str(ROWS), TOGETHER * SIDE_BY_SIDE) as i:
+        for number, variable in enumerate(sums):
+            at = code.put(f"add i64 {i}, {number * SIDE_BY_SIDE}") if number else i
+            one, other = (code.load(column, at, VECTOR) for column in (first, second))
+            product = code.put(f"fmul {VECTOR} {one}, {other}")
+            total = code.put(f"fadd {VECTOR} {code.load(variable, 0, VECTOR)}, {product}")
+            code.store(total, variable, 0, VECTOR)
+    total = summed(code, [code.load(variable, 0, VECTOR) for variable in sums], VECTOR)
+    numbers = [
+        code.put(f"extractelement {VECTOR} {total}, i32 {lane}") for lane in range(SIDE_BY_SIDE)
+    ]
+    return summed(code, numbers, "double")
+
+
 # --- rows -----------------------------------------------------------------------------------------
 
-
-def combine(struct: int, flat: Array, t: int, shift: int, count: int, row: Array) -> None:
-    """Sum the products of the terms of a program's sum t, from `shift` after their rows' first."""
-    program = fields_of(struct, Program)
-    first = program.first[t]
-    end = program.first[t + 1]
-    if first == end:
-        for m in range(count):
-            row[m] = 0.0
-    for s in range(first, end):
-        scale = program.scale[s]
-        factor = row_from(flat, program.first_factor[s] + shift)
-        if program.second_factor[s] >= 0:
-            second = row_from(flat, program.second_factor[s] + shift)
-            if s == first:
-                for m in range(count):
-                    row[m] = scale * (factor[m] * second[m])
-            else:
-                for m in range(count):
-                    row[m] += scale * (factor[m] * second[m])
-        elif s == first:
-            for m in range(count):
-                row[m] = scale * factor[m]
-        else:
-            for m in range(count):
-                row[m] += scale * factor[m]
+STAMPS = (
+    *(("ptr", name) for name in ("plan", "sink", "room")),
+    *(("i64", name) for name in ("observation", "first", "stamp", "count", "to")),
+)
+"""Of what writes rows: structs, an observation, the block's first sample, the first stamp and how
+many they are, and the place in the sink that they go to."""
 
 
-def integrate(row: Array, count: int, step: float, state: Array) -> None:
-    """Replace a rate by its trapezoidal integral over the whole record.
+def rows_text() -> str:
+    """Text of what writes weighted rows of the problem at some stamps of an observation."""
+    code = Code(STAMPS)
+    plan, sink, room = (
+        Fields(code, f"%{name}", kind)
+        for name, kind in (("plan", Plan), ("sink", Sink), ("room", Room))
+    )
+    stamps = _Stamps(code, plan, room)
+    rows, length, target = sink.rows, sink.length, sink.target
+    column = code.load(room.column, "%observation", "i64")
+    whole = code.put(f"and i64 %count, {-SIDE_BY_SIDE}")
+    regular = code.put(f"icmp ne i64 {code.load(plan.regular, '%observation', 'i64')}, 0")
+    cases = ((True, regular), (False, code.put(f"xor i1 {regular}, true")))
 
-    `state` holds integral and rate at the sample before, and 1.0 once there is one.
-    """
-    total = state[0]
-    last = state[1]
-    for n in range(count):
-        rate = row[n]
-        if state[2] != 0.0:
-            total = total + 0.5 * step * (last + rate)
-        state[2] = 1.0
-        last = rate
-        row[n] = total
-    state[0] = total
-    state[1] = last
+    def goes_to(row: str) -> str:
+        place = code.put(f"mul i64 {row}, {length}")
+        return code.address(rows, code.put(f"add i64 {place}, %to"))
 
-
-def write_rows(structs: int, r: int, first: int, size: int, at: int, count: int, to: int) -> None:
-    """Weighted rows of the problem at some stamps of an observation.
-
-    `first` and `size` are the block's first sample and how many it has, `at` and `count` the first
-    stamp and how many they are; they go into the sink from `to` on.
-    """
-    march = fields_of(structs, March)
-    program = fields_of(march.program, Program)
-    plan = fields_of(march.plan, Plan)
-    sink = fields_of(march.sink, Sink)
-    room = fields_of(march.room, Room)
-    flat = room.block
-    aside = room.aside
-    cell = row_from(plan.cell, at)
-    fraction = row_from(plan.fraction, at)
-    weight = row_from(plan.weight, at)
-    measured = row_from(plan.measured, at)
-    begin = cell[0]
-    width = min(first + size, cell[count - 1] + 2) - begin
-    for c in range(sink.derived):
-        column = row_from(sink.rows, sink.target[c] * sink.length + to)
-        t = program.first_observed + r * sink.derived + c
-        if plan.regular[r]:
-            run_routine(march.combine, (march.program, flat, t, begin - first, count, column))
-            for i in range(0 if not plan.even[r] else count, count):
-                column[i] *= weight[i]
-        else:
-            run_routine(march.combine, (march.program, flat, t, begin - first, width, aside))
-            aside[width] = aside[width - 1]
-            for i in range(count):
-                n, f = cell[i] - begin, fraction[i]
-                column[i] = weight[i] * ((1.0 - f) * aside[n] + f * aside[n + 1])
-    for c in range(sink.first_offset_row, sink.columns - 1):
-        column = row_from(sink.rows, c * sink.length + to)
-        for i in range(count):
-            column[i] = weight[i] if c == sink.offset_row[r] else 0.0
-    signal = row_from(flat, program.value[r] + begin - first)
-    offset = sink.offset[r]
-    column = row_from(sink.rows, (sink.columns - 1) * sink.length + to)
-    for i in range(count):
-        n, f = cell[i] - begin, fraction[i]
-        simulated = (1.0 - f) * signal[n] + f * signal[n + 1]
-        column[i] = weight[i] * (simulated - (measured[i] - offset))
+    with code.loop("0", room.width, SIDE_BY_SIDE) as group:
+        place = code.put(f"add i64 {column}, {group}")
+        targets = [
+            goes_to(code.load(target, code.put(f"add i64 {group}, {lane}"), "i64"))
+            for lane in range(SIDE_BY_SIDE)
+        ]
+        for on_grid, test in cases:
+            with code.only_if(test):
+                with code.loop("0", whole, SIDE_BY_SIDE) as i:
+                    vectors = [
+                        stamps.weighted(code.put(f"add i64 {i}, {k}"), place, on_grid=on_grid)
+                        for k in range(SIDE_BY_SIDE)
+                    ]
+                    for row, vector in zip(targets, code.transposed(vectors), strict=True):
+                        code.store(vector, row, i, VECTOR)
+                with code.loop(whole, "%count") as i:
+                    vector = stamps.weighted(i, place, on_grid=on_grid)
+                    for lane, row in enumerate(targets):
+                        number = code.put(f"extractelement {VECTOR} {vector}, i32 {lane}")
+                        code.store(number, row, i)
+    residuals = code.put(f"sub i64 {sink.columns}, 1")
+    own = code.load(sink.offset_row, "%observation", "i64")
+    with code.loop(sink.first_offset_row, residuals) as row:
+        is_own = code.put(f"icmp eq i64 {row}, {own}")
+        to = goes_to(row)
+        with code.loop("0", "%count") as i:
+            weight = stamps.weight(i)
+            code.store(code.put(f"select i1 {is_own}, double {weight}, double {ZERO}"), to, i)
+    value = code.load(room.value, "%observation", "i64")
+    offset = code.load(sink.offset, "%observation")
+    to = goes_to(residuals)
+    for on_grid, test in cases:
+        with code.only_if(test), code.loop("0", "%count") as i:
+            simulated = stamps.between(i, value, "double", on_grid=on_grid)
+            expected = code.put(f"fsub double {stamps.measured(i)}, {offset}")
+            error = code.put(f"fsub double {simulated}, {expected}")
+            code.store(code.put(f"fmul double {stamps.weight(i)}, {error}"), to, i)
+    return code.text
 
 
-class March(NamedTuple):
-    """Addresses of structs, and of routines, which are compiled alone (see `kernels.routine`)."""
+class _Stamps:
+    """What is known at some stamps of an observation."""
 
-    program: int
-    plan: int
-    sink: int
-    room: int
-    combine: int
-    write_rows: int
-    absorb: int
+    def __init__(self, code: Code, plan: Fields, room: Fields) -> None:
+        self._code = code
+        self._cell = code.address(plan.cell, "%stamp", "i64")
+        self._first_cell = code.load(self._cell, 0, "i64")
+        self._fraction, self._weight, self._measured = (
+            code.address(pointer, "%stamp")
+            for pointer in (plan.fraction, plan.weight, plan.measured)
+        )
+        self._row = room.row
+        self._flat = room.flat
+
+    def weight(self, i: str) -> str:
+        """Weight of a stamp."""
+        return self._code.load(self._weight, i)
+
+    def measured(self, i: str) -> str:
+        """Measured value at a stamp."""
+        return self._code.load(self._measured, i)
+
+    def between(self, i: str, place: str, kind: str, *, on_grid: bool = False) -> str:
+        """A number, or a vector, of the rows of samples at a stamp: between two of them."""
+        code = self._code
+        cell = self._first_cell if on_grid else code.load(self._cell, i, "i64")
+        cell = code.put(f"add i64 {cell}, {i}") if on_grid else cell
+        # the row before the block's first is that of the sample before
+        row = code.put(f"sub i64 {cell}, %first")
+        row = code.put(f"mul i64 {code.put(f'add i64 {row}, 1')}, {self._row}")
+        at = code.address(self._flat, code.put(f"add i64 {row}, {place}"))
+        before = code.load(at, 0, kind)
+        if on_grid:
+            return before
+        fraction = code.load(self._fraction, i)
+        rest = code.put(f"fsub double {code.constant(1.0)}, {fraction}")
+        if kind == VECTOR:
+            rest, fraction = (code.vector(each, SIDE_BY_SIDE) for each in (rest, fraction))
+        before = code.put(f"fmul {kind} {rest}, {before}")
+        after = code.put(f"fmul {kind} {fraction}, {code.load(at, self._row, kind)}")
+        return code.put(f"fadd {kind} {before}, {after}")
+
+    def weighted(self, i: str, place: str, *, on_grid: bool) -> str:
+        """A vector at a stamp, weighted."""
+        weight = self._code.vector(self.weight(i), SIDE_BY_SIDE)
+        vector = self.between(i, place, VECTOR, on_grid=on_grid)
+        return self._code.put(f"fmul {VECTOR} {weight}, {vector}")
+
+
+# --- block by block -------------------------------------------------------------------------------
+
+
+def run_text() -> str:
+    """Text of what marches block by block, and compares what comes with what was observed."""
+    code = Code([("i64", "size"), ("double", "h"), ("ptr", "run")])
+    run = Fields(code, "%run", Run)
+    plan_struct, sink_struct, room_struct = run.plan, run.sink, run.room
+    plan = Fields(code, plan_struct, Plan)
+    sink = Fields(code, sink_struct, Sink)
+    room = Fields(code, room_struct, Room)
+    write_rows, absorb = run.write_rows, run.absorb
+    block, row, flat, folded = room.block, room.row, room.flat, sink.folded
+    folds = code.put(f"icmp ne i64 {folded}, 0")
+    _, _, _, *pointers = TANGENT_ARGUMENTS
+    arrays = [
+        code.pointer(code.load(run.arrays, number, "i64")) for number, _ in enumerate(pointers)
+    ]
+    waiting = code.variable("0", "i64")
+
+    def copy(source: str, target: str) -> None:
+        source, target = (
+            code.address(flat, code.put(f"mul i64 {each}, {row}")) for each in (source, target)
+        )
+        with code.loop("0", row) as i:
+            code.store(code.load(source, i), target, i)
+
+    def rotate() -> None:
+        code.do(f"call void {absorb}(ptr {sink_struct})")
+        code.store("0", waiting, 0, "i64")
+
+    with code.loop("0", "%size", block) as first:
+        with code.only_if(code.put(f"icmp sgt i64 {first}, 0")):
+            copy(block, "0")  # what interpolation looks back at
+        left = code.put(f"sub i64 %size, {first}")
+        ends = code.put(f"icmp sle i64 {left}, {block}")
+        count = code.put(f"select i1 {ends}, i64 {left}, i64 {block}")
+        given = ", ".join(f"ptr {array}" for array in arrays)
+        with code.loop("0", run.steps) as number:
+            function = code.pointer(code.load(run.codes, number, "i64"))
+            code.do(f"call void {function}(i64 {count}, i64 {first}, double %h, {given})")
+        copy(count, code.put(f"add i64 {count}, 1"))  # nothing comes after the record's end
+        known = code.put(f"add i64 {first}, {count}")
+        # the point after a stamp must be known as well
+        known = code.put(f"select i1 {ends}, i64 {known}, i64 {code.put(f'sub i64 {known}, 1')}")
+        with code.loop("0", plan.observations) as r:
+            next_stamp = room.next_stamp
+            stop = code.load(plan.first, code.put(f"add i64 {r}, 1"), "i64")
+            stamp = code.variable(code.load(next_stamp, r, "i64"), "i64")
+            end = _first_beyond(code, plan.cell, code.load(stamp, 0, "i64"), stop, known)
+            code.store(end, next_stamp, r, "i64")
+            some_weigh_nothing = code.put(f"icmp eq i64 {code.load(plan.all_weigh, r, 'i64')}, 0")
+            skips = code.put(f"and i1 {folds}, {some_weigh_nothing}")
+            with code.as_long_as(
+                lambda: code.put(f"icmp slt i64 {code.load(stamp, 0, 'i64')}, {end}")
+            ):
+                at = code.load(stamp, 0, "i64")
+                held = code.load(waiting, 0, "i64")
+                room_left = code.put(f"sub i64 {ROWS}, {held}")
+                most = code.put(f"add i64 {at}, {room_left}")
+                fits = code.put(f"icmp sle i64 {end}, {most}")
+                limit = code.put(f"select i1 {fits}, i64 {end}, i64 {most}")
+                limit = code.put(f"select i1 {folds}, i64 {limit}, i64 {end}")
+                until = code.variable(limit, "i64")
+                with code.only_if(skips):
+                    code.store(_first_without_weight(code, plan.weight, at, limit), until, 0, "i64")
+                until = code.load(until, 0, "i64")
+                many = code.put(f"sub i64 {until}, {at}")
+                some = code.put(f"icmp sgt i64 {many}, 0")
+                with code.only_if(some):
+                    to = code.put(f"select i1 {folds}, i64 {held}, i64 {at}")
+                    structs = f"ptr {plan_struct}, ptr {sink_struct}, ptr {room_struct}"
+                    numbers = f"i64 {r}, i64 {first}, i64 {at}, i64 {many}, i64 {to}"
+                    code.do(f"call void {write_rows}({structs}, {numbers})")
+                    more = code.put(f"select i1 {folds}, i64 {many}, i64 0")
+                    held = code.put(f"add i64 {held}, {more}")
+                    code.store(held, waiting, 0, "i64")
+                    with code.only_if(code.put(f"icmp eq i64 {held}, {ROWS}")):
+                        rotate()
+                skipped = code.put(f"add i64 {at}, 1")
+                code.store(
+                    code.put(f"select i1 {some}, i64 {until}, i64 {skipped}"), stamp, 0, "i64"
+                )
+    held = code.load(waiting, 0, "i64")
+    with code.only_if(code.put(f"icmp sgt i64 {held}, 0")):
+        with code.loop("0", sink.columns) as column:
+            place = code.put(f"mul i64 {column}, {ROWS}")
+            to = code.address(sink.rows, place)
+            with code.loop(held, str(ROWS)) as i:
+                code.store(ZERO, to, i)
+        rotate()
+    return code.text
+
+
+def _first_beyond(code: Code, cells: str, start: str, stop: str, limit: str) -> str:
+    """The first place between two whose cell is not below a limit; cells never fall."""
+    low, high = code.variable(start, "i64"), code.variable(stop, "i64")
+
+    def goes_on() -> str:
+        return code.put(f"icmp slt i64 {code.load(low, 0, 'i64')}, {code.load(high, 0, 'i64')}")
+
+    with code.as_long_as(goes_on):
+        first, last = code.load(low, 0, "i64"), code.load(high, 0, "i64")
+        middle = code.put(f"ashr i64 {code.put(f'add i64 {first}, {last}')}, 1")
+        below = code.put(f"icmp slt i64 {code.load(cells, middle, 'i64')}, {limit}")
+        after = code.put(f"add i64 {middle}, 1")
+        code.store(code.put(f"select i1 {below}, i64 {after}, i64 {first}"), low, 0, "i64")
+        code.store(code.put(f"select i1 {below}, i64 {last}, i64 {middle}"), high, 0, "i64")
+    return code.load(low, 0, "i64")
+
+
+def _first_without_weight(code: Code, weights: str, start: str, stop: str) -> str:
+    """The first place from `start` on whose weight is zero, at most `stop`."""
+    place, weighs = code.variable(start, "i64"), code.variable("true", "i1")
+
+    def goes_on() -> str:
+        inside = code.put(f"icmp slt i64 {code.load(place, 0, 'i64')}, {stop}")
+        return code.put(f"and i1 {inside}, {code.load(weighs, 0, 'i1')}")
+
+    with code.as_long_as(goes_on):
+        at = code.load(place, 0, "i64")
+        test = code.put(f"fcmp une double {code.load(weights, at)}, 0.0")
+        code.store(test, weighs, 0, "i1")
+        after = code.put(f"select i1 {test}, i64 {code.put(f'add i64 {at}, 1')}, i64 {at}")
+        code.store(after, place, 0, "i64")
+    return code.load(place, 0, "i64")
 
 
 @generating
-def routines() -> tuple[Any, ...]:
-    """The last fields of a `March`."""
-    return routine(combine), routine(write_rows), routine(absorb)
-
-
-def march_struct(
-    program: Struct[Program], plan: Struct[Plan], sink: Struct[Sink], room: Struct[Room]
-) -> Struct[March]:
-    """What `march_observed` is given, with routines, and structs, which must be kept as well."""
-    structs = program.address, plan.address, sink.address, room.address
-    return Struct(March(*structs, *routines()))
-
-
-def run_program(
-    march: Any, kernels: Indices, arrays: Indices, first: int, count: int, h: float
-) -> None:
-    """Do in a block what the program says; arguments as in `march_observed`."""
-    program = fields_of(march.program, Program)
-    room = fields_of(march.room, Room)
-    flat = room.block
-    for step in range(program.steps):
-        todo = row_from(program.todo, 4 * step)
-        what = todo[0]
-        if what == CALL:
-            call_kernel(kernels[todo[1]], count, first, h, arrays)
-        elif what == COMBINE:
-            for t in range(todo[1], todo[2]):
-                row = row_from(flat, program.target[t])
-                run_routine(march.combine, (march.program, flat, t, 0, count, row))
-        elif what == INTEGRATE:
-            rate = row_from(flat, todo[1])
-            integrate(rate, count, h, row_from(room.integral_states, 3 * todo[2]))
-        else:
-            begin = todo[2]
-            lanes = row_from(program.lanes, begin)
-            call_recurrence(kernels[todo[1]], count, lanes, todo[3] - begin, room.tangent, arrays)
-
-
-def write_observation(
-    structs: int, march: Any, r: int, first: int, count: int, size: int, waiting: int
-) -> int:
-    """Write the rows of an observation whose stamps lie in a block, and rotate full sinks.
-
-    `waiting` rows wait in the sink to be rotated; returns how many do so then.
-    """
-    program = fields_of(march.program, Program)
-    plan = fields_of(march.plan, Plan)
-    sink = fields_of(march.sink, Sink)
-    room = fields_of(march.room, Room)
-    # off the grid the point after the stamp must be known as well
-    points = first + count
-    if points < size and plan.regular[r] == 0:
-        points -= 1
-    signal = row_from(room.block, program.value[r])
-    signal[count] = signal[count - 1]
-    stamp = room.next_sample[r]
-    end = stamp
-    while end < plan.first[r + 1] and plan.cell[end] < points:
-        end += 1
-    room.next_sample[r] = end
-    while stamp < end:
-        if sink.folded and plan.weight[stamp] == 0.0:
-            stamp += 1
-            continue
-        many = min(end - stamp, sink.length - waiting)
-        for i in range(1, many if sink.folded else 0):
-            if plan.weight[stamp + i] == 0.0:
-                many = i
-                break
-        to = waiting if sink.folded else stamp
-        run_routine(march.write_rows, (structs, r, first, count, stamp, many, to))
-        stamp += many
-        waiting += many if sink.folded else 0
-        if sink.folded and waiting == sink.length:
-            run_routine(march.absorb, (march.sink, march.room))
-            waiting = 0
-    return waiting
-
-
-def march_observed(kernels: Indices, arrays: Indices, size: int, h: float, structs: int) -> None:
-    """March block by block, and compare what comes with what was observed.
-
-    `kernels` are addresses, of the march first. `arrays` is what they take from ``records`` on (see
-    `kernels.KERNEL_ARGUMENTS`), of a record of `size` samples with step `h`. `structs` is the
-    address of a `March`.
-    """
-    march = fields_of(structs, March)
-    plan = fields_of(march.plan, Plan)
-    sink = fields_of(march.sink, Sink)
-    room = fields_of(march.room, Room)
-    flat = room.block
-    waiting = 0  # Rows in the sink that are to be rotated.
-    looks_back = False
-    for r in range(plan.observations):
-        looks_back = looks_back or plan.regular[r] == 0
-    for first in range(0, size, BLOCK):
-        if first > 0 and looks_back:
-            # what interpolation looks back at, from the end of the block before
-            for row in range(STRIDE, room.size, STRIDE):
-                flat[row - 1] = flat[row + BLOCK - 1]
-        count = min(size - first, BLOCK)
-        run_program(march, kernels, arrays, first, count, h)
-        for r in range(plan.observations):
-            waiting = write_observation(structs, march, r, first, count, size, waiting)
-    if waiting > 0:
-        for c in range(sink.columns):
-            column = row_from(sink.rows, c * sink.length)
-            for i in range(waiting, sink.length):
-                column[i] = 0.0
-        run_routine(march.absorb, (march.sink, march.room))
-
-
-@generating
-def compiled_march() -> Any:
-    """`march_observed`, compiled."""
-    return routine(march_observed)
+def routines() -> tuple[Any, Any, Any]:
+    """What runs a march, writes rows, and rotates them."""
+    return (
+        code_of_text("run", run_text(), ("int", "float", INTS)),
+        code_of_text("rows", rows_text(), (*(INTS,) * 3, *("int",) * 5)),
+        code_of_text("absorb", absorb_text(), (INTS,)),
+    )

@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 
 from swashplate.equations.cache import generated, kernel
 from swashplate.equations.code_generation.functions import FUNCTIONS, generating
-from swashplate.equations.code_generation.lowering import definition_in
-from swashplate.equations.code_generation.machine_code import code_of_function, code_of_text
+from swashplate.equations.code_generation.machine_code import code_of_text
 from swashplate.equations.declaration import JIT_OFF, Replacements, inlined, interpreted
 from swashplate.equations.fields import (
     check_mapping,
@@ -388,40 +387,6 @@ def module(name: str, text: str, **further: Any) -> dict[str, Any]:
 
 
 @dataclass(frozen=True)
-class PlannedKernel:
-    """A kernel as text, which is compiled when it is first called for."""
-
-    file: str
-    """How the name of its module begins."""
-    member: str
-    text: str
-
-    def __call__(self) -> Kernel:
-        """The kernel, compiled."""
-        return _compiled(self)
-
-
-@generating
-def _compiled(planned: PlannedKernel) -> Kernel:
-    return compiled_kernel(planned.file, planned.text, planned.member, KERNEL_KINDS, {})
-
-
-def compiled_kernel(
-    file: str, text: str, member: str, kinds: tuple[str, ...], names: Mapping[str, Any]
-) -> Kernel:
-    """A function of a generated module, compiled: it takes numbers and arrays, and fills arrays.
-
-    `file` is how the module's name begins, `kinds` are those of the arguments (see `lowering`), and
-    `names` what the text refers to besides `LIBRARY`.
-    """
-    if JIT_OFF:
-        return module(file, text, **names)[member]
-    title = file if file.endswith(member) else f"{file}_{member}"
-    library = LIBRARY | {**names}
-    return code_of_function(title, text, kinds, lambda: definition_in(text, member, library))
-
-
-@dataclass(frozen=True)
 class PlannedMarch:
     """The march of one set, which is compiled when it is first called for."""
 
@@ -433,8 +398,6 @@ class PlannedMarch:
     """What is kept, and its row of the block."""
     further: tuple[tuple[SignalId, int], ...] = ()
     """What is kept if everything is wanted."""
-    whole: bool = True
-    """Whether rows are as long as the march; else they are places in the block."""
 
     def __call__(self) -> Kernel:
         """The march, compiled."""
@@ -443,16 +406,16 @@ class PlannedMarch:
 
 @generating
 def _march_of(planned: PlannedMarch) -> Kernel:
-    model, signals, options, targets, further, whole = (
+    model, signals, options, targets, further = (
         getattr(planned, each.name) for each in fields(planned)
     )
     if JIT_OFF:
         sample_code = SampleCode(model, signals, options, [each for each, _ in targets + further])
-        return InterpretedMarch(sample_code, dict(targets), dict(further), whole=whole)
+        return InterpretedMarch(sample_code, dict(targets), dict(further))
     text = cached_on_disk(
         f"{model.name}_march",
-        (key_of(model), signals, options, targets, further, whole),
-        lambda: march_text(model, signals, options, dict(targets), dict(further), whole=whole),
+        (key_of(model), signals, options, targets, further),
+        lambda: march_text(model, signals, options, dict(targets), dict(further)),
     )
     return code_of_text(f"{model.name}_march", text, KERNEL_KINDS)
 
