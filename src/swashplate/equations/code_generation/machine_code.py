@@ -40,7 +40,7 @@ def address_of(array: NDArray[Any]) -> int:
         return int(array.ctypes.data)
 
 
-class Code:
+class MachineCode:
     """A function's machine code: it is called with numbers and arrays, and by others at `address`.
 
     It is never unloaded.
@@ -66,10 +66,10 @@ class Code:
         )
 
 
-_loaded: dict[tuple[str, str, tuple[str, ...]], Code] = {}
+_loaded: dict[tuple[str, str, tuple[str, ...]], MachineCode] = {}
 
 
-def code_of_text(name: str, text: str, kinds: tuple[str, ...]) -> Code:
+def code_of_text(name: str, text: str, kinds: tuple[str, ...]) -> MachineCode:
     """Machine code of a function that returns nothing.
 
     Parameters
@@ -88,7 +88,7 @@ def code_of_text(name: str, text: str, kinds: tuple[str, ...]) -> Code:
             (*key, llvmlite_version, llvm.llvm_version_info, *_host()),
             lambda: _compiled(name, text),
         )
-        _loaded[key] = Code(content, kinds)
+        _loaded[key] = MachineCode(content, kinds)
     return _loaded[key]
 
 

@@ -20,8 +20,8 @@ from swashplate.equations.marching.observation import ObservedRecord, RunValues
 from swashplate.equations.marching.part_code import SignalId
 from swashplate.equations.marching.rows import (
     ROWS,
+    BlockRun,
     Room,
-    Run,
     Sink,
     aligned,
     routines,
@@ -36,7 +36,7 @@ from swashplate.equations.marching.run import (
     initial_states,
 )
 from swashplate.equations.marching.sample_code import SampleCode, output_of
-from swashplate.equations.marching.start_code import Moved, start_code, started_by
+from swashplate.equations.marching.start_code import Moved, start_code_of, started_by
 from swashplate.equations.marching.tangents import Tangents, padded, tangents_of
 from swashplate.equations.model import Model
 from swashplate.errors import DomainError, InputError
@@ -68,7 +68,7 @@ class ObservedMarch:
         self._model, self._signals, self._options = model, signals, options
         self._outputs, self._columns, self._start = outputs, columns, start
         self._spare: deque[tuple[Array, ...]] = deque(maxlen=8)
-        self._start_code = start_code(model, signals, options, outputs, start)
+        self._start_code = start_code_of(model, signals, options, outputs, start)
         begins: dict[SignalId, list[int]] = {}
         for number, column in enumerate(columns):
             for signal in self._started_by(column):
@@ -390,7 +390,7 @@ def _march(
     )
     run, write_rows, absorb = routines()
     struct = Struct(
-        Run(
+        BlockRun(
             len(march.codes),
             march.codes,
             pointers(given),

@@ -13,6 +13,7 @@ from swashplate.equations import graph
 from swashplate.equations.code_generation.evaluation import evaluated
 from swashplate.equations.code_generation.values import leaves
 from swashplate.equations.graph import Node
+from swashplate.equations.marching.kernels import MarchArrays
 from swashplate.equations.marching.part_code import PartCode, SignalId
 from swashplate.equations.marching.rows import Plan
 from swashplate.equations.marching.sample_code import SampleCode
@@ -35,30 +36,21 @@ class InterpretedMarch:
 
     def __call__(self, count: int, first: int, h: float, *arrays: Any) -> None:
         """March; the arguments are those of `kernels.KERNEL_ARGUMENTS`."""
-        *_, worst_margin, flat = arrays
-        kept = {**self._targets, **(self._further if worst_margin[1] != 0.0 else {})}
+        given = MarchArrays(*arrays)
+        kept = {**self._targets, **(self._further if given.worst_margin[1] != 0.0 else {})}
 
         def keep(n: int, known: dict[Node, Any]) -> None:
             for signal, row in kept.items():
-                flat[row * count + n - first] = self.observed(signal, known)
+                given.flat[row * count + n - first] = self.observed(signal, known)
 
-        self.run(count, first, h, *arrays, keep=keep)
+        self.run(count, first, h, given, keep)
 
     def run(
         self,
         count: int,
         first: int,
         h: float,
-        records: Sequence[Any],
-        before: Any,
-        delay_samples: Any,
-        delay_fraction: Any,
-        params: Any,
-        given: Any,
-        states: Any,
-        worst_margin: Any,
-        _: Any,
-        *,
+        arrays: MarchArrays,
         keep: Callable[[int, dict[Node, Any]], None],
     ) -> None:
         """March; `keep` is given the number of each sample, and what is known there."""
@@ -68,24 +60,24 @@ class InterpretedMarch:
         state_at: dict[Node, tuple[int, Node]] = {}
         for part in sample_code.used:
             for numbers, kind, array in (
-                (part.p, "parameters", params),
-                (part.given, "given", given),
+                (part.p, "parameters", arrays.params),
+                (part.given, "given", arrays.given),
             ):
                 for path, node in leaves(numbers):
                     constant[node] = float(array[places[kind].index((part.part, path))])
             for tap in part.taps:
                 fraction = graph.name(part.delay_fraction(tap))
-                constant[fraction] = float(delay_fraction[tap.number])
+                constant[fraction] = float(arrays.delay_fraction[tap.number])
             names, following = dict(leaves(part.state)), dict(leaves(part.following))
             for path in sample_code.carried[part.part]:
                 place = places["state"].index((part.part, path))
                 state_at[names[path]] = (place, following[path])
-        state = {node: float(states[place]) for node, (place, _) in state_at.items()}
+        state = {node: float(arrays.states[place]) for node, (place, _) in state_at.items()}
         margins: list[float] = []
         for n in range(first, first + count):
             known = constant | state
             for part in sample_code.used:
-                known |= self._inputs(part, n, records, before, delay_samples)
+                known |= self._inputs(part, n, arrays)
                 for source, node in sample_code.sources.items():
                     if source.part == part.part:
                         (known[graph.name(part.source(source))],) = evaluated([node], known)
@@ -95,28 +87,28 @@ class InterpretedMarch:
             ends = [node for _, node in state_at.values()]
             state = dict(zip(state_at, map(float, evaluated(ends, known)), strict=True))
         for node, (place, _) in state_at.items():
-            states[place] = state[node]
+            arrays.states[place] = state[node]
         worst = min((margin for margin in margins if not isnan(margin)), default=inf)
         if worst > 0.0 and any(map(isnan, margins)):
             worst = float("nan")
-        if worst < worst_margin[0] or isnan(worst):
-            worst_margin[0] = worst
+        if worst < arrays.worst_margin[0] or isnan(worst):
+            arrays.worst_margin[0] = worst
 
-    def _inputs(
-        self, part: PartCode, n: int, records: Sequence[Any], before: Any, delay_samples: Any
-    ) -> dict[Node, float]:
+    def _inputs(self, part: PartCode, n: int, arrays: MarchArrays) -> dict[Node, float]:
         """What a part reads of records at sample n."""
         signals = self._sample_code.signals
         known = dict[Node, float]()
         for tap in part.taps:
             index = signals.index(tap.tap.signal)
             for age, name in enumerate(part.tap_samples(tap)):
-                at = n - int(delay_samples[tap.number]) - age
-                known[graph.name(name)] = float(records[index][at] if at >= 0 else before[index])
+                at = n - int(arrays.delay_samples[tap.number]) - age
+                known[graph.name(name)] = float(
+                    arrays.records[index][at] if at >= 0 else arrays.before[index]
+                )
         for name in part.part_model.input_types:
             signal = part.part_model.tap(name).signal
             if signal in signals:
-                known[graph.name(f"x_{signal}")] = float(records[signals.index(signal)][n])
+                known[graph.name(f"x_{signal}")] = float(arrays.records[signals.index(signal)][n])
         return known
 
     def observed(self, signal: SignalId, known: dict[Node, Any]) -> float:
@@ -148,7 +140,7 @@ class InterpretedTangents:
         self.states = self._carried.ids
 
     def __call__(
-        self, size: int, h: float, arrays: Sequence[Any], delay_slope: Array, tangent: Array
+        self, size: int, h: float, arrays: MarchArrays, delay_slope: Array, tangent: Array
     ) -> tuple[Array, Array]:
         """(n, r) outputs, and (n, r, k) derivatives; `tangent` are those of the states, (s, k)."""
         march, carried = InterpretedMarch(self._sample_code, {}, {}), self._carried
@@ -180,7 +172,7 @@ class InterpretedTangents:
                 for state, following in zip(carried.states, carried.following, strict=True)
             }
 
-        march.run(size, 0, h, *arrays, keep=keep)
+        march.run(size, 0, h, arrays, keep)
         for number, (_, integral) in enumerate(self._outputs):
             if integral:
                 for rates in (values[:, number], derivatives[:, number]):

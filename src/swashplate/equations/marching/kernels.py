@@ -1,7 +1,7 @@
 """What compiled marches are given: numbers, arrays, and structs of them."""
 
 from functools import cache, cached_property
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,22 @@ each signal, ``before`` what it was before; ``delay_samples, delay_fraction`` de
 ``worst_margin`` the worst margin of the domain so far, and whether everything is kept; ``flat``
 what is kept.
 """
+
+
+class MarchArrays(NamedTuple):
+    """Arrays that a march takes after its step, see `KERNEL_ARGUMENTS`."""
+
+    records: Any
+    """Addresses of the records; where nothing is compiled, the records."""
+    before: Any
+    delay_samples: Any
+    delay_fraction: Any
+    params: Any
+    given: Any
+    states: Any
+    worst_margin: Any
+    flat: Any
+
 
 FLOATS, INTS = "*float", "*int"
 KERNEL_KINDS = ("int", "int", "float", f"*{FLOATS}", FLOATS, INTS, *(FLOATS,) * 6)

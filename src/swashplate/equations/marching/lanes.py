@@ -6,7 +6,8 @@ are.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
+from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -306,51 +307,26 @@ class Lanes:
                     (value,) = evaluated([initial[path]], known)
                     states[model.places("state").index((part.part, path)), lane] = value
 
-    def _interpreted_march(
-        self,
-        count: int,
-        h: float,
-        length: int,
-        records: Sequence[Any],
-        delay_samples: Any,
-        delay_fraction: Array,
-        params: Array,
-        given: Array,
-        states: Array,
-        measured: Array,
-        weight: Array,
-        worst: Array,
-        cost: Array,
-        outputs: Array,
-    ) -> None:
+    def _interpreted_march(self, count: int, h: float, *others: Any) -> None:
+        names = [name for _, name in MARCH[2:]]
+        x = SimpleNamespace(**dict(zip(names, others, strict=True)))
         march = InterpretedMarch(self._interpreted, {self._signal: 0}, {})
-        before = np.zeros(len(records))
+        before = np.zeros(len(x.records))
         for lane in range(LANES):
-            row, margin, state = np.empty(count), np.array([np.inf, 0.0]), states[:, lane].copy()
-            march(
-                count,
-                0,
-                h,
-                records,
-                before,
-                delay_samples[:, lane],
-                delay_fraction[:, lane],
-                params[:, lane],
-                given[:, lane],
-                state,
-                margin,
-                row,
-            )
-            states[:, lane], worst[lane] = state, margin[0]
+            row, margin, state = np.empty(count), np.array([np.inf, 0.0]), x.states[:, lane].copy()
+            numbers = (x.delay_samples, x.delay_fraction, x.params, x.given)
+            of_lane = (each[:, lane] for each in numbers)
+            march(count, 0, h, x.records, before, *of_lane, state, margin, row)
+            x.states[:, lane], x.worst[lane] = state, margin[0]
             total = rate = 0.0
             for n, value in enumerate(row.tolist()):
                 if self._integral:
                     total, rate = total + (0.5 * h if n else 0.0) * (rate + value), value
                     value = total
-                error = value - float(measured[n])
-                cost[lane] += float(weight[n]) * error * error
-                if length:
-                    outputs[lane, n] = value
+                error = value - float(x.measured[n])
+                x.cost[lane] += float(x.weight[n]) * error * error
+                if x.length:
+                    x.outputs[lane, n] = value
 
 
 @generating

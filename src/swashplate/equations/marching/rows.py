@@ -104,7 +104,7 @@ class Room(NamedTuple):
     """(r,) number of the next stamp of each observation."""
 
 
-class Run(NamedTuple):
+class BlockRun(NamedTuple):
     """All that a run is given."""
 
     steps: int
@@ -337,7 +337,7 @@ class _Stamps:
 def run_text() -> str:
     """Text of what marches block by block, and compares what comes with what was observed."""
     code = Code([("i64", "size"), ("double", "h"), ("ptr", "run")])
-    run = Fields(code, "%run", Run)
+    run = Fields(code, "%run", BlockRun)
     plan_struct, sink_struct, room_struct = run.plan, run.sink, run.room
     plan = Fields(code, plan_struct, Plan)
     sink = Fields(code, sink_struct, Sink)

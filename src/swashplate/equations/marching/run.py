@@ -29,11 +29,7 @@ from swashplate.equations.fields import (
 from swashplate.equations.keeping import cached_on_disk, key_of
 from swashplate.equations.language import plain
 from swashplate.equations.marching.interpreting import InterpretedMarch
-from swashplate.equations.marching.kernels import (
-    KERNEL_KINDS,
-    Kernel,
-    pointers,
-)
+from swashplate.equations.marching.kernels import KERNEL_KINDS, Kernel, MarchArrays, pointers
 from swashplate.equations.marching.march import march_text
 from swashplate.equations.marching.part_code import SignalId, taps_of
 from swashplate.equations.marching.sample_code import SampleCode
@@ -511,12 +507,12 @@ def arrays_of(
     states: Array,
     worst_margin: Array,
     flat: Array,
-) -> tuple[Any, ...]:
+) -> MarchArrays:
     """What kernels take from ``records`` on (see `kernels.KERNEL_ARGUMENTS`).
 
     The caller must keep `values` as well: what is made of them are addresses.
     """
-    return (
+    return MarchArrays(
         pointers(values),
         np.array([*initial.before.values()]),
         delays.samples,

@@ -28,7 +28,7 @@ class StartCode(NamedTuple):
 
 
 @generating
-def start_code(
+def start_code_of(
     model: Model,
     signals: tuple[str, ...],
     options: tuple[Any, ...],
