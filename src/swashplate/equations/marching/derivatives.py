@@ -90,7 +90,10 @@ class ObservedMarch:
             lambda: tangents_of(*arguments),
         )
         self.states = [*self.tangents.states]
-        self._codes = [code_of_text(name, text, TANGENT_KINDS) for text in self.tangents.texts]
+        self._codes = [
+            code_of_text(name, text, TANGENT_KINDS, is_wide=bool(columns))
+            for text in self.tangents.texts
+        ]
         self.codes = np.array([code.address for code in self._codes], dtype=np.int64)
 
     def _started_by(self, column: str) -> list[SignalId]:
