@@ -261,7 +261,7 @@ def _step_slopes(
     model = instance.model
     signals = tuple(initial.before)
     stored_outputs = tuple(output_of(model, name)[0] for name in outputs)
-    arguments, derived = step_derivatives(model, signals, instance.options, stored_outputs)
+    arguments, program = step_derivatives(model, signals, instance.options, stored_outputs)
     delays = instance.tap_delays(signals, h)
     values = []
     for stored in arguments.values():
@@ -275,7 +275,7 @@ def _step_slopes(
         (tap.part, tap.input): int(delays.samples[tap.number]) for tap in taps_of(model, signals)
     }
     varied: list[str | InputSample] = []  # of each derivative the state, or the sample of an input
-    for i, kind, path in map(arguments.__getitem__, derived.inputs):
+    for i, kind, path in map(arguments.__getitem__, program.by):
         if kind == "state":
             varied.append(f"{model.prefix(i)}{path}")
             continue
@@ -289,9 +289,8 @@ def _step_slopes(
     )
     column_of = {source: column for column, source in enumerate([*states, *samples])}
     slopes = np.zeros((len(states) + len(outputs), len(column_of)))
-    derivatives = derived.python(*values)[len(slopes) :]
-    for (row, index), slope in zip(derived.entries, derivatives, strict=True):
-        column = column_of.get(varied[index])
+    for source, by_one in zip(varied, program.slopes(values).T, strict=True):
+        column = column_of.get(source)
         if column is not None:
-            slopes[row, column] += slope
+            slopes[:, column] += by_one
     return samples, slopes

@@ -55,11 +55,11 @@ def _value(node: Node, known: Mapping[Node, Any]) -> Any:
     if node.op == "call":
         return _called(node.value.loop, operands)
     if node.op == "**":
-        return _power(operands[0], node.value)
+        return power(operands[0], node.value)
     return OPERATIONS[node.op](*operands)
 
 
-def _power(base: float, exponent: int) -> float:
+def power(base: float, exponent: int) -> float:
     """By squaring, as compilers do."""
     product, remaining = 1.0, abs(exponent)
     while remaining:

@@ -28,7 +28,6 @@ from swashplate.equations.marching.rows import (
     upright,
 )
 from swashplate.equations.marching.run import (
-    NO_NUMBER,
     Instance,
     Start,
     arrays_of,
@@ -133,14 +132,13 @@ class ObservedMarch:
         if self._start == "steady":
             signals_before.update(first)
         values = [instance.number_at(argument, signals_before, h) for argument in code.arguments]
-        try:
-            results = code.derived.python(*values)
-        except NO_NUMBER as error:
+        slopes = code.program.slopes(values)
+        if not np.isfinite(slopes).all():
             raise DomainError(
                 f"{instance.name}: what follows from the parameters alone cannot be computed for "
-                f"these numbers ({error})."
-            ) from None
-        return dict(zip(code.moves, results[len(results) - len(code.moves) :], strict=True))
+                "these numbers."
+            )
+        return {move: slopes[entry] for move, entry in zip(code.moves, code.entries, strict=True)}
 
     def take_room(self) -> tuple[Array, ...]:
         """Memory for a march, of an earlier one if it can be: new memory takes longer to get."""

@@ -172,7 +172,8 @@ class InterpretedTangents:
                 for state, following in zip(carried.states, carried.following, strict=True)
             }
 
-        march.run(size, 0, h, arrays, keep)
+        with np.errstate(all="ignore"):  # what is not taken may be infinite
+            march.run(size, 0, h, arrays, keep)
         for number, (_, integral) in enumerate(self._outputs):
             if integral:
                 for rates in (values[:, number], derivatives[:, number]):

@@ -125,6 +125,14 @@ class SampleCode:
                 self.sources[source] = node
                 self.ends[source.part].append(node)
 
+    @property
+    def stands_for(self) -> dict[Node, Node]:
+        """What the names of signals between parts stand for."""
+        return {
+            graph.name(self.parts[source.part].source(source)): node
+            for source, node in self.sources.items()
+        }
+
     def outside(self) -> dict[str, SignalId]:
         """What is known ahead of a sample, by name: numbers, the state, delays and records."""
         ids = {"h": SignalId(0, "h")}

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from swashplate.equations import graph
 from swashplate.equations.code_generation.functions import generating
-from swashplate.equations.code_generation.gradients import Derived, derived_function
+from swashplate.equations.code_generation.program import Program, names_of, program_of
 from swashplate.equations.code_generation.values import leaves
-from swashplate.equations.graph import Node, names_in, rewritten
+from swashplate.equations.graph import Node
 from swashplate.equations.keeping import cached_on_disk, key_of
 from swashplate.equations.marching.part_code import SignalId
 from swashplate.equations.marching.sample_code import SampleCode, output_of
@@ -19,12 +18,14 @@ Moved = tuple[SignalId, str]
 
 
 class StartCode(NamedTuple):
-    """States at the start with their derivatives, as a function of scalars."""
+    """States at the start with their derivatives, as a program."""
 
     arguments: tuple[SignalId, ...]
     moves: tuple[Moved, ...]
-    """What is derived, by which parameter: the last numbers that `derived` gives."""
-    derived: Derived
+    """What is derived, by which parameter."""
+    entries: tuple[tuple[int, int], ...]
+    """Row and column of each of these among the derivatives that the program gives."""
+    program: Program
 
 
 @generating
@@ -58,43 +59,28 @@ def _generated(
     }
     results: dict[SignalId, Node] = {}
     column_of: dict[str, str] = {}
-    begins: dict[Node, Node] = {}
+    begins = {**sample_code.stands_for}
     """What names stand for where the record begins."""
-    labels: dict[Node, str] = {}
     for part in sample_code.used:
-        prefix = model.prefix(part.part)
         initial = dict(leaves(part.initial_state(start)))
-        states = dict(leaves(part.state))
-        starts = dict(zip(initial, rewritten(initial.values(), begins), strict=True))
-        begins |= {states[path]: node for path, node in starts.items()}
-        sources = {
-            graph.name(part.source(source)): node
-            for source, node in sample_code.sources.items()
-            if source.part == part.part
-        }
-        begins |= dict(zip(sources, rewritten(sources.values(), begins), strict=True))
+        begins |= {node: initial[path] for path, node in leaves(part.state)}
         results |= {
-            SignalId(part.part, "state", path): starts[path]
+            SignalId(part.part, "state", path): initial[path]
             for path in sample_code.carried[part.part]
         }
-        column_of |= {name: f"{prefix}{path}" for name, path in part.parameters.items()}
-        labels |= part.trace.labels
-    arguments = sorted(names_in(results.values()) & outside.keys())
-    moving = [name for name in arguments if name in column_of]
-    derived = derived_function(
-        f"{model.name}_start",
-        f"States of {model.name} at the start.",
-        arguments,
-        [("_".join(map(str, key)), node) for key, node in results.items()],
-        [(name, name) for name in moving],
-        labels,
-        chained=True,
+        column_of |= {
+            name: f"{model.prefix(part.part)}{path}" for name, path in part.parameters.items()
+        }
+    names = names_of([*results.values()], begins)
+    moving = [name for name in names if name in column_of]
+    program = program_of([*results.values()], moving, begins)
+    states = [*results]
+    return StartCode(
+        tuple(outside[name] for name in names),
+        tuple((states[result], column_of[moving[by]]) for result, by in program.entries),
+        tuple((result, by) for result, by in program.entries),
+        program,
     )
-    keys = [*results]
-    moves = tuple(
-        (keys[result], column_of[moving[argument]]) for result, argument in derived.entries
-    )
-    return StartCode(tuple(outside[name] for name in arguments), moves, derived)
 
 
 def started_by(model: Model, part: int, column: str) -> tuple[str, ...]:

@@ -140,16 +140,12 @@ class Carried:
         self.outputs = [
             sample_code.observed(sample_code.parts[signal.part], signal) for signal in outputs
         ]
-        stands_for = {
-            graph.name(sample_code.parts[source.part].source(source)): node
-            for source, node in sample_code.sources.items()
-        }
         elimination = Elimination(
             [*self.following, *self.outputs],
             self.states,
             [*column_of],
             len(columns),
-            stands_for,
+            sample_code.stands_for,
             keep_all=keep_all,
         )
         self.flows: dict[Node, dict[Node, Contribution]] = {}

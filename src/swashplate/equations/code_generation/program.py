@@ -1,0 +1,198 @@
+"""Equations as a list of steps, which Python does number by number: values, then derivatives.
+
+For what is computed once, such as where a record begins and a linear model: the list is plain data,
+kept on disk, and nothing is compiled. Derivatives are carried through every node, all columns side
+by side.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from types import MappingProxyType
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swashplate.equations.code_generation.elimination import Elimination
+from swashplate.equations.code_generation.evaluation import OPERATIONS, power
+from swashplate.equations.code_generation.loops import Inner, Loop, root
+from swashplate.equations.code_generation.values import leaves
+from swashplate.equations.declaration import interpreted
+from swashplate.equations.graph import Node, name, ordered, plain_value
+
+Array = NDArray[np.float64]
+
+
+class Step(NamedTuple):
+    """A number that is computed."""
+
+    op: str
+    operands: tuple[int, ...]
+    """Numbers of the steps that it is computed from."""
+    value: Any = None
+    """Of a number itself, of a power its exponent, of a result its index; of an equation that is
+    called apart its `Program`."""
+
+
+class Program(NamedTuple):
+    """What computes some results, and their derivatives.
+
+    Attributes
+    ----------
+    arguments : tuple of str
+        Names of the numbers that it takes; they come before the steps.
+    results : tuple of int
+        Steps that are wanted.
+    by : tuple of str
+        Arguments that results are differentiated by.
+    flows : tuple of (int, tuple of (int, int))
+        What carries derivatives, in order: for each of what it follows the place among all that
+        carry them, arguments first, and the step that is the derivative by it.
+    carriers : tuple of int
+        Place of each result among all that carry derivatives, -1 if it has none.
+    """
+
+    arguments: tuple[str, ...]
+    steps: tuple[Step, ...]
+    results: tuple[int, ...]
+    by: tuple[str, ...] = ()
+    flows: tuple[tuple[tuple[int, int], ...], ...] = ()
+    carriers: tuple[int, ...] = ()
+
+    def values(self, given: Sequence[Any]) -> list[Any]:
+        """Results for some arguments."""
+        numbers = self._numbers(given)
+        return [numbers[result] for result in self.results]
+
+    def slopes(self, given: Sequence[float]) -> Array:
+        """(r, k) derivatives of the results by the arguments in `by`."""
+        numbers = self._numbers(given)
+        carried = [*np.eye(len(self.by))]
+        with np.errstate(all="ignore"):
+            for flow in self.flows:
+                total = np.zeros(len(self.by))
+                for operand, amount in flow:
+                    if numbers[amount]:  # what is not taken may be infinite
+                        total += numbers[amount] * carried[operand]
+                carried.append(total)
+        none = np.zeros(len(self.by))
+        rows = [none if place < 0 else carried[place] for place in self.carriers]
+        return np.array(rows).reshape(len(self.results), len(self.by))
+
+    @property
+    def entries(self) -> list[tuple[int, int]]:
+        """Numbers of result and argument of each derivative that is not zero for all numbers."""
+        reached = [{k} for k in range(len(self.by))]
+        for flow in self.flows:
+            reached.append(set[int]().union(*(reached[operand] for operand, _ in flow)))
+        return [
+            (result, argument)
+            for result, place in enumerate(self.carriers)
+            if place >= 0
+            for argument in sorted(reached[place])
+        ]
+
+    def _numbers(self, given: Sequence[Any]) -> list[Any]:
+        """The arguments, then what each step gives."""
+        numbers = [*given]
+        for step in self.steps:
+            numbers.append(_done(step, [numbers[operand] for operand in step.operands]))
+        return numbers
+
+
+def _done(step: Step, operands: list[Any]) -> Any:
+    match step.op:
+        case "number":
+            return step.value
+        case "name":
+            return operands[0]
+        case "if":
+            return operands[1] if operands[0] else operands[2]
+        case "result":
+            return operands[0][step.value]
+        case "**":
+            return power(operands[0], step.value)
+        case "once":
+            return step.value.values(operands)
+        case "root":
+            residual: Callable[..., Any] = lambda *given: step.value.values(given)[0]  # noqa: E731
+            return [interpreted(root)(residual, *operands)]
+        case "repeated":
+            size = len(step.value.results)
+            state, others = operands[1 : 1 + size], operands[1 + size :]
+            for number in range(int(operands[0])):
+                state = step.value.values([*state, float(number), *others])
+            return state
+    return OPERATIONS[step.op](*operands)
+
+
+def names_of(
+    results: Sequence[Node], stands_for: Mapping[Node, Node] = MappingProxyType({})
+) -> list[str]:
+    """Names that some results are computed from, sorted, but those that stand for other nodes."""
+    order = ordered(results, (), lambda node: _computed_from(node, stands_for))
+    return sorted(node.value for node in order if node.op == "name" and node not in stands_for)
+
+
+def _computed_from(node: Node, stands_for: Mapping[Node, Node]) -> Sequence[Node]:
+    if node in stands_for:
+        return (plain_value(stands_for[node]),)
+    return [*map(plain_value, node.args)]
+
+
+def program_of(
+    results: Sequence[Node],
+    by: Collection[str] = (),
+    stands_for: Mapping[Node, Node] = MappingProxyType({}),
+    arguments: Sequence[str] | None = None,
+) -> Program:
+    """The program of some results, and of their derivatives by some names.
+
+    `stands_for` are nodes that names among them stand for; `arguments` are by default all other
+    names.
+    """
+    arguments = names_of(results, stands_for) if arguments is None else arguments
+    columns = [name(each) for each in by]
+    elimination = Elimination(results, (), columns, len(columns), stands_for, keep_all=True)
+    edges = elimination.edges if columns else {}
+    amounts = [each.zero_elsewhere for flow in edges.values() for each in flow.values()]
+    place_of = {name(argument): place for place, argument in enumerate(arguments)}
+    place_of |= {name(argument, "int"): place for place, argument in enumerate(arguments)}
+    ends = [*map(plain_value, results), *map(plain_value, amounts)]
+    steps = list[Step]()
+    for node in ordered(ends, place_of, lambda node: _computed_from(node, stands_for)):
+        operands = tuple(place_of[each] for each in _computed_from(node, stands_for))
+        steps.append(_step(node, operands))
+        place_of[node] = len(arguments) + len(steps) - 1
+    carrier = {column: place for place, column in enumerate(columns)}
+    flows = list[tuple[tuple[int, int], ...]]()
+    for vertex, flow in edges.items():
+        flows.append(
+            tuple(
+                (carrier[operand], place_of[plain_value(each.zero_elsewhere)])
+                for operand, each in flow.items()
+            )
+        )
+        carrier[vertex] = len(columns) + len(flows) - 1
+    return Program(
+        arguments=tuple(arguments),
+        steps=tuple(steps),
+        results=tuple(place_of[plain_value(result)] for result in results),
+        by=tuple(by),
+        flows=tuple(flows),
+        carriers=tuple(carrier.get(result, -1) for result in results),
+    )
+
+
+def _step(node: Node, operands: tuple[int, ...]) -> Step:
+    if node.op != "call":
+        return Step(node.op, operands, node.value)
+    loop: Loop = node.value.loop
+    return Step(loop.kind, operands, _inner(loop.inner))
+
+
+def _inner(inner: Inner) -> Program:
+    """The program of an equation that is called apart, for numbers that stand for its arguments."""
+    results = [node for _, node in leaves(inner.result)]
+    return program_of(results, arguments=[*inner.leading, *inner.formals])
