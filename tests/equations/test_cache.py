@@ -1,17 +1,15 @@
-"""Machine code and generated modules on disk: kept as long as what they reach is unchanged."""
+"""Machine code on disk: kept as long as what it follows from is unchanged."""
 
 import inspect
 import json
 import os
 import subprocess
 import sys
-import traceback
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from time import time
 from typing import Any
 
-import numpy as np
 import pytest
 
 from swashplate.equations import (
@@ -19,8 +17,6 @@ from swashplate.equations import (
     closure_hash,
     derive,
     equation,
-    generated,
-    kernel,
     source,
 )
 from swashplate.equations.cache import DAY, UNCACHED
@@ -208,83 +204,63 @@ def test_source_of_an_equation_and_of_what_is_derived() -> None:
     assert derived.source.isascii()
 
 
-# --- generated modules ----------------------------------------------------------------------------
+# --- machine code of models -----------------------------------------------------------------------
 
-MODULE = '''
-@inlined
-{derived}
+LAG = """
+from typing import NamedTuple
 
-@kernel
-def fill(x, out):
-    """Filled."""
-    for i in range(x.size):
-        out[i, 0], out[i, 1] = bend_by_x(x[i])
+from swashplate.equations import Model, equation
 
 
-def failing():
-    raise ValueError("here")
-'''
+class Lag(NamedTuple):
+    share: float
 
 
-def made() -> dict[str, Any]:
-    from swashplate.equations import inlined
-
-    derived = derive(bend, "x")
-    texts = "\n\n@inlined\n".join(derived.texts.values())
-    names = {**derived.names, "kernel": kernel, "inlined": inlined}
-    return generated("bends", MODULE.format(derived=texts), names)
+class Rod(NamedTuple):
+    position: float
 
 
-@pytest.mark.interpreted
-def test_a_generated_module_computes_and_can_be_read() -> None:
-    space = made()
-    x, out = np.array([1.0, 2.0]), np.zeros((2, 2))
-    space["fill"](x, out)
-    assert out.tolist() == [[8.0, 12.0], [24.0, 20.0]]
-    path = Path(space["__file__"])
-    assert path.name.startswith("bends_")
-    assert "def fill(x, out):" in path.read_text()
-    assert inspect.getsource(space["failing"]) == 'def failing():\n    raise ValueError("here")\n'
-    with pytest.raises(ValueError, match="here") as raised:
-        space["failing"]()
-    assert 'raise ValueError("here")' in "".join(traceback.format_tb(raised.value.__traceback__))
-    assert made()["__file__"] == space["__file__"]
-    assert not list(path.parent.glob("*.tmp"))
+@equation
+def step(state: Rod, command: float, p: Lag, h: float) -> Rod:
+    return Rod(state.position + p.share * (command - state.position))
 
 
-GENERATE = """
-import sys
-import numpy as np
-from swashplate.equations import derive, generated, inlined, kernel
-sys.path.insert(0, sys.argv[1])
-import machine
-d = derive(machine.both, ("x", "s"))
-texts = "\\n".join("@inlined\\n" + t for t in d.texts.values())
-text = texts + "\\n@kernel\\ndef fill(x, s):\\n    return " + d.name + "(x, s)\\n"
-space = generated("machine", text, {**d.names, "inlined": inlined, "kernel": kernel})
-print(space["fill"](2.0, machine.Spring(3.0)), sum(space["fill"].stats.cache_hits.values()))
+rod = Model("rod", parameters=Lag, state=Rod, step=step)
 """
+MARCH = """
+import sys
+sys.path.insert(0, sys.argv[1])
+from swashplate.equations.code_generation import machine_code
+compiled, count = machine_code._compiled, []
+machine_code._compiled = lambda *given, **more: count.append(given) or compiled(*given, **more)
+import lag
+from swashplate.equations import simulate
+run = simulate(lag.rod, lag.Lag(0.5), {"command": [1.0, 1.0, 1.0]}, 100.0)
+print(run["position"].tolist(), len(count))
+"""
+POSITIONS = "[0.0, 0.5, 0.75]"
 
 
-def generate(folder: Path, **environment: str) -> subprocess.CompletedProcess[str]:
-    (folder / "machine.py").write_text(EQUATIONS)
-    return python("-c", GENERATE, str(folder), **environment)
+def march(folder: Path, **environment: str) -> subprocess.CompletedProcess[str]:
+    """Positions of a model, and how many functions were compiled for them."""
+    (folder / "lag.py").write_text(LAG)
+    return python("-c", MARCH, str(folder), **environment)
 
 
 @pytest.mark.slow
 def test_a_second_process_compiles_nothing(tmp_path: Path) -> None:
     cache = str(tmp_path / "cache")
-    assert generate(tmp_path, NUMBA_CACHE_DIR=cache).stdout == "(15.0, 7.0, 4.0) 0\n"
-    assert generate(tmp_path, NUMBA_CACHE_DIR=cache).stdout == "(15.0, 7.0, 4.0) 1\n"
-    assert len(list((tmp_path / "cache" / "swashplate_generated").glob("*.py"))) == 1
+    assert march(tmp_path, NUMBA_CACHE_DIR=cache).stdout == f"{POSITIONS} 1\n"
+    assert march(tmp_path, NUMBA_CACHE_DIR=cache).stdout == f"{POSITIONS} 0\n"
 
 
 @pytest.mark.slow
 def test_many_workers_at_once(tmp_path: Path) -> None:
     cache = {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
     with ThreadPoolExecutor(3) as pool:
-        workers = [pool.submit(generate, tmp_path, **cache) for _ in range(3)]
-    assert all(each.result().stdout.startswith("(15.0, 7.0, 4.0)") for each in workers)
+        workers = [pool.submit(march, tmp_path, **cache) for _ in range(3)]
+    assert all(each.result().stdout.startswith(POSITIONS) for each in workers)
+    assert not [*(tmp_path / "cache").rglob("*.tmp")]
 
 
 def files(folder: Path, *names: str, age: float = 0.0, size: int = 10) -> None:
@@ -296,22 +272,22 @@ def files(folder: Path, *names: str, age: float = 0.0, size: int = 10) -> None:
 
 @pytest.mark.slow
 def test_the_folder_is_tidied_once_a_day_and_use_counts(tmp_path: Path) -> None:
-    modules = tmp_path / "cache" / "swashplate_generated"
+    kept = tmp_path / "cache" / "swashplate_generated"
     environment = {"NUMBA_CACHE_DIR": str(tmp_path / "cache")}
-    generate(tmp_path, **environment)
-    files(modules, "old_1.py", age=1000.0 * DAY)
+    march(tmp_path, **environment)
+    files(kept, "old_1.pickle", age=1000.0 * DAY)
     files(tmp_path / "cache" / "swashplate_generated_1a", "old_1.march-3.nbi", age=1000.0 * DAY)
-    (own,) = modules.glob("machine_*.py")
+    (own,) = kept.glob("rod_march_code_*")
     os.utime(own, (0.0, 0.0))
-    generate(tmp_path, **environment)  # nothing new
+    march(tmp_path, **environment)  # nothing new
     assert time() - own.stat().st_mtime < DAY
-    assert (modules / "old_1.py").exists()
+    assert (kept / "old_1.pickle").exists()
     own.unlink()
-    generate(tmp_path, **environment)  # tidied already today
-    assert (modules / "old_1.py").exists()
+    march(tmp_path, **environment)  # tidied already today
+    assert (kept / "old_1.pickle").exists()
     own.unlink()
-    os.utime(modules / "tidied", (0.0, 0.0))
-    generate(tmp_path, **environment)
+    os.utime(kept / "tidied", (0.0, 0.0))
+    march(tmp_path, **environment)
     assert not [*(tmp_path / "cache").rglob("old_1.*")]
     assert own.exists()
 
@@ -357,12 +333,12 @@ def test_kernels_around_compiled_functions_are_kept_apart(tmp_path: Path) -> Non
 def test_without_a_place_it_works_with_a_warning(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     (tmp_path / "temporary").mkdir()
-    done = generate(
+    done = march(
         tmp_path,
         NUMBA_CACHE_DIR=str(tmp_path / "file"),
         TMPDIR=str(tmp_path / "temporary"),
         PYTHONWARNINGS="default",
     )
-    assert done.stdout.startswith("(15.0, 7.0, 4.0)")
+    assert done.stdout.startswith(POSITIONS)
     assert UNCACHED in done.stderr
     assert not [*(tmp_path / "temporary").iterdir()]  # nothing is left behind

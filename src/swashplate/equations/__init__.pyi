@@ -1,6 +1,5 @@
 from . import graph as graph
 from .cache import cache_folder as cache_folder
-from .cache import generated as generated
 from .cache import kernel as kernel
 from .cache import no_cache_reason as no_cache_reason
 from .code_generation.derivatives import declared as declared
@@ -52,6 +51,7 @@ from .marching.simulation import stepper as stepper
 from .marching.stepping import CompiledStep as CompiledStep
 from .marching.stepping import StepContext as StepContext
 from .marching.stepping import compiled_step as compiled_step
+from .marching.stepping import step as step
 from .model import Equation as Equation
 from .model import Link as Link
 from .model import Model as Model

@@ -1,4 +1,4 @@
-"""Machine code and generated modules, kept on disk.
+"""What is made once on a machine, kept on disk.
 
 Kernels inline the equations that they call, which Numba's disk cache does not know: it looks at a
 kernel's own file alone. Here the stamp is a hash of the kernel and of all that it reaches, so that
@@ -8,17 +8,15 @@ used for long is removed.
 
 import os
 import pickle
-import re
 import sys
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import cache, cached_property
 from glob import escape
 from hashlib import blake2b
 from pathlib import Path
 from stat import S_IWGRP, S_IWOTH
 from time import time
-from types import ModuleType
 from typing import Any, ParamSpec, TypeVar
 from warnings import warn
 
@@ -34,7 +32,6 @@ from swashplate.equations.declaration import (
     compiled_functions,
     hash_of,
     is_function,
-    remember_text,
 )
 from swashplate.equations.language import plain
 
@@ -50,14 +47,10 @@ OPEN = (
     "Remove it, or set NUMBA_CACHE_DIR to a folder that only you can write to."
 )
 COMPILING = "Compiling equations, once on this machine"
-GENERATED = "swashplate_generated"
-"""Package of the generated modules."""
 DAY = 86400.0
 """[s]"""
 UNUSED = 30.0 * DAY
-"""Time after which a generated module that nobody used is removed, and machine code is made again.
-[s]"""
-DOCSTRING = re.compile(r'^ *""".*?"""\n', re.MULTILINE | re.DOTALL)
+"""Time after which what nobody used is removed, and made again. [s]"""
 
 
 # --- who can write --------------------------------------------------------------------------------
@@ -219,9 +212,7 @@ class _KernelCache(FunctionCache):
 
     @property
     def _title(self) -> str:
-        """The function's name, or that of its generated module without the hash."""
-        package, _, module = str(self._py_func.__module__).partition(".")
-        return module.rpartition("_")[0] if package == GENERATED else str(self._py_func.__name__)
+        return str(self._py_func.__name__)
 
 
 def _cells(function: Any) -> list[tuple[str, str]]:
@@ -268,12 +259,12 @@ def kernel(function: Callable[P, R]) -> Callable[P, R]:
     return compiled  # type: ignore[no-any-return]
 
 
-# --- generated modules ----------------------------------------------------------------------------
+# --- what is generated ----------------------------------------------------------------------------
 
 
 @cache
 def _folder(numba_cache_dir: str) -> Path | None:
-    """Where generated modules are kept, None if no folder can be written."""
+    """Where what is generated is kept, None if no folder can be written."""
     if numba_cache_dir:
         folder = Path(numba_cache_dir) / "swashplate_generated"
     else:
@@ -294,7 +285,7 @@ def _folder(numba_cache_dir: str) -> Path | None:
 
 
 def generated_folder() -> Path | None:
-    """Folder in which generated modules are kept, None if nowhere."""
+    """Folder in which what is generated is kept, None if nowhere."""
     return _folder(str(config.CACHE_DIR or ""))  # type: ignore[attr-defined]
 
 
@@ -306,57 +297,17 @@ def no_cache_reason() -> str:
 
 
 def cache_folder() -> Path | None:
-    """Folder below which generated modules and their machine code are kept, None if nowhere."""
+    """Folder below which all is kept, None if nowhere."""
     folder = generated_folder()
     if folder is None:
         return None
     return folder.parent if config.CACHE_DIR else folder  # type: ignore[attr-defined]
 
 
-def generated(name: str, text: str, names: Mapping[str, Any]) -> dict[str, Any]:
-    """Globals of a generated module, written where it is kept and executed.
-
-    Its file's name begins with `name` and carries a hash of the text without its docstrings, and of
-    all that the `names` it refers to reach; many processes may write it at once. `kernel`s in it
-    are cached on disk as those of any file. If no folder can be written, the module is kept in
-    memory only, and its kernels are compiled in every session.
-    """
-    words = set(re.findall(r"\w+", text))
-    used = {word: meaning for word, meaning in names.items() if word in words}
-    reached = {
-        word: closure_hash(meaning) if is_function(meaning) else meaning
-        for word, meaning in used.items()
-    }
-    digest = blake2b(digest_size=8)
-    digest.update(DOCSTRING.sub("", text).encode())
-    digest.update(hash_of(reached).encode())
-    stem = f"{name}_{digest.hexdigest()}"
-    folder = generated_folder()
-    file = None if folder is None else _written(folder / f"{stem}.py", text)
-    path = str(file) if file is not None else remember_text(stem, text)
-    module = ModuleType(f"{GENERATED}.{stem}")
-    module.__file__ = path
-    module.__dict__.update(names)
-    sys.modules[module.__name__] = module
-    exec(compile(text, path, "exec"), module.__dict__)
-    return module.__dict__
-
-
 def mark_used(path: Path) -> None:
     """Note that a file is still in use."""
     if time() - path.stat().st_mtime > DAY:
         path.touch()
-
-
-def _written(path: Path, text: str) -> Path | None:
-    """The file of a generated module, None if it cannot be written."""
-    try:
-        if path.exists() and path.read_text("utf-8") == text:
-            mark_used(path)
-            return path
-    except (OSError, UnicodeDecodeError):  # something else of that name
-        return None
-    return written(path, text.encode())
 
 
 def written(path: Path, content: bytes) -> Path | None:
@@ -376,13 +327,13 @@ def written(path: Path, content: bytes) -> Path | None:
 
 
 def _tidy(folder: Path) -> None:
-    """Remove generated modules that were not used lately, and old machine code, once a day."""
+    """Remove what was not used lately, once a day."""
     mark = folder / "tidied"
     try:
         if mark.exists() and time() - mark.stat().st_mtime < DAY:
             return
         mark.touch()
-        # Numba keeps machine code next to the modules, or in folders next to theirs
+        # Numba keeps machine code in folders next to theirs
         sibling_folders = folder.parent.glob(f"{escape(folder.name)}_*")
         for swept in [folder, folder / "__pycache__", *sibling_folders]:
             for path in [*swept.glob("*.*")]:

@@ -15,9 +15,8 @@ they are marched before.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from math import atan2, floor, inf, pi, sqrt
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,8 +51,7 @@ from swashplate.crane.rope import (
     rope_step,
     set_off,
 )
-from swashplate.equations import StepContext, equation, inlined, kernel
-from swashplate.equations.code_generation import generating
+from swashplate.equations import StepContext, equation, inlined, kernel, step
 from swashplate.parameters import FULL_VOLTAGE
 
 Array = NDArray[np.float64]
@@ -116,6 +114,8 @@ class LoopArrays(NamedTuple):
 
     drives: tuple[StepContext, StepContext, StepContext]
     controller: StepContext
+    controlled: bool
+    """Whether there is a controller; else its arrays are not used."""
     picks: NDArray[np.int64]
     """Which of `SEEN` the controller takes."""
     memory: Array
@@ -471,151 +471,137 @@ def open_voltages(stick: Array, inverse: Inverse, actuation: int) -> Array:
 # --- the loop -------------------------------------------------------------------------------------
 
 
-def _no_controller(*_: Any) -> float:
-    return inf
-
-
-@generating
-def loop_of(
-    hoist: Any, slew_drive: Any, luff: Any, controller: Any
-) -> Callable[..., tuple[State, int]]:
-    """The compiled loop over steps of three drives and of a user-defined controller, or None."""
-    controlled = controller is not None
-    advance_controller = controller if controlled else inlined(_no_controller)
-
-    @kernel
-    def loop(
-        h: float,
-        fixed: Fixed,
-        state: State,
-        arrays: LoopArrays,
-        stick: Array,
-        ship: Array,
-        out: Array,
-    ) -> tuple[State, int]:
-        """Take the stick's samples; the state after the last, and how the pass ended."""
-        inverses = fixed.inverses
-        settings = fixed.settings
-        sensing = settings.sensing
-        actuation = fixed.actuation
-        loaded = fixed.loaded
-        columns = fixed.columns
-        g = fixed.geometry
-        home = fixed.home
-        a, b, c = arrays.drives
-        user = arrays.controller
-        picks = arrays.picks
-        memory = arrays.memory
-        margins = arrays.margins
-        marched = arrays.marched
-        moving = ship.shape[1] > 1
-        sample, axes, tip, hung, rest_time, brake = state
+@kernel
+def advance_crane(
+    h: float,
+    fixed: Fixed,
+    state: State,
+    arrays: LoopArrays,
+    stick: Array,
+    ship: Array,
+    out: Array,
+) -> tuple[State, int]:
+    """Take the stick's samples; the state after the last, and how the pass ended."""
+    inverses = fixed.inverses
+    settings = fixed.settings
+    sensing = settings.sensing
+    actuation = fixed.actuation
+    loaded = fixed.loaded
+    columns = fixed.columns
+    g = fixed.geometry
+    home = fixed.home
+    a, b, c = arrays.drives
+    user = arrays.controller
+    picks = arrays.picks
+    memory = arrays.memory
+    margins = arrays.margins
+    marched = arrays.marched
+    moving = ship.shape[1] > 1
+    sample, axes, tip, hung, rest_time, brake = state
+    shafts = shafts_of(axes, ANGLE)
+    boom = boom_at(shafts.luff, g, home)
+    rope = rope_length(shafts, g, home)
+    reference = np.zeros(3)
+    volts = np.zeros(3)
+    omega = np.zeros(3)
+    limits = np.zeros(3)
+    inputs = np.zeros(len(SEEN))
+    r = rotation(0.0, 0.0, 0.0)
+    shift = Vector(0.0, 0.0, 0.0)
+    angles = Vector(0.0, 0.0, 0.0)
+    first = measurement_at(sample - 1, sensing.rate) + 1 if sample > 0 else 0
+    ended = FINE
+    for m in range(len(stick)):
+        if moving:
+            shift = Vector(ship[m, 0], ship[m, 1], ship[m, 2])
+            angles = Vector(ship[m, 3], ship[m, 4], ship[m, 5])
+            r = rotation(angles.x, angles.y, angles.z)
+        for i in range(3):
+            reference[i] = limited(stick[m, i], inverses[i])
+        if settings.path:
+            # 1. what control sees
+            swing = add_scaled(hung.hook, -1.0, tip)
+            slew = home.slew + shafts.slew
+            seen = Seen(swing.x, swing.y, rope, slew, boom, tip.z - shift.z, shift, angles)
+            seen_r = r
+            if sensing.rate > 0.0:
+                seen = measured(seen, sample, first, sensing, arrays.readings, arrays.noise)
+                seen_r = rotation(seen.angles.x, seen.angles.y, seen.angles.z)
+            # 2. path, offsets, clip, reference speeds
+            half = pi * sqrt(rope / GRAVITY) / h
+            path = operator_path(reference, axes, memory, sample, half, h, fixed)
+            x, y = tip_offset(path, seen, seen_r, memory, sample, half, settings)
+            if arrays.controlled:
+                inputs[0] = seen.swing_x
+                inputs[1] = seen.swing_y
+                inputs[2] = seen.rope
+                inputs[3] = seen.slew
+                inputs[4] = atan2(seen.boom.sin, seen.boom.cos)
+                inputs[5], inputs[6] = path
+                inputs[7], inputs[8], inputs[9] = seen.shift
+                inputs[10], inputs[11], inputs[12] = seen.angles
+                for i in range(picks.size):
+                    user.inputs[i] = inputs[picks[i]]
+                margin = step(user)
+                # what is not a number would pass through every limit as one
+                if not abs(user.outputs[0]) + abs(user.outputs[1]) < inf:
+                    ended = NO_NUMBER
+                    break
+                margins[3] = min(margins[3], margin)
+                x += user.outputs[0]
+                y += user.outputs[1]
+            if settings.clip > 0.0 or settings.share > 0.0:
+                x, y = clipped_offset((x, y), path, boom, rope, fixed)
+            follow_path(path[0] + x, path[1] + y, axes, reference, sample, h, fixed)
+        # 3. speeds
+        if actuation == IDEAL:
+            for i in range(3):
+                omega[i] = min(max(reference[i], inverses[i].low), inverses[i].high)
+        elif actuation == MARCHED:
+            volts[0], volts[1], volts[2] = marched[0][m], marched[1][m], marched[2][m]
+            omega[0], omega[1], omega[2] = marched[3][m], marched[4][m], marched[5][m]
+            limits[0], limits[1], limits[2] = marched[6][m], marched[7][m], marched[8][m]
+        else:
+            for i in range(3):
+                volts[i] = stick[m, i]
+                if actuation != DIRECT:
+                    volts[i] = voltage_for(reference[i], inverses[i], actuation)
+            a.inputs[0] = volts[0]
+            b.inputs[0] = volts[1]
+            c.inputs[0] = volts[2]
+            if loaded:
+                a.inputs[1] = axes[TORQUE, 0]
+                b.inputs[1] = axes[TORQUE, 1]
+                c.inputs[1] = axes[TORQUE, 2]
+            margins[0] = min(margins[0], step(a))
+            margins[1] = min(margins[1], step(b))
+            margins[2] = min(margins[2], step(c))
+            omega[0], omega[1], omega[2] = a.outputs[0], b.outputs[0], c.outputs[0]
+            limits[0], limits[1], limits[2] = a.outputs[1], b.outputs[1], c.outputs[1]
+        if fixed.brake and actuation != IDEAL:
+            rest_time, brake = braked(volts[0], rest_time, brake, h, inverses[0])
+            omega[0] = omega[0] * (1.0 - brake)
+        # 4. kinematics and rope
+        advance(axes, ANGLE, SHAFT_SPEED, omega, h, sample > 0)
         shafts = shafts_of(axes, ANGLE)
+        previous_rope = rope
         boom = boom_at(shafts.luff, g, home)
         rope = rope_length(shafts, g, home)
-        reference = np.zeros(3)
-        volts = np.zeros(3)
-        omega = np.zeros(3)
-        limits = np.zeros(3)
-        inputs = np.zeros(len(SEEN))
-        r = rotation(0.0, 0.0, 0.0)
-        shift = Vector(0.0, 0.0, 0.0)
-        angles = Vector(0.0, 0.0, 0.0)
-        first = measurement_at(sample - 1, sensing.rate) + 1 if sample > 0 else 0
-        ended = FINE
-        for m in range(len(stick)):
-            if moving:
-                shift = Vector(ship[m, 0], ship[m, 1], ship[m, 2])
-                angles = Vector(ship[m, 3], ship[m, 4], ship[m, 5])
-                r = rotation(angles.x, angles.y, angles.z)
-            for i in range(3):
-                reference[i] = limited(stick[m, i], inverses[i])
-            if settings.path:
-                # 1. what control sees
-                swing = add_scaled(hung.hook, -1.0, tip)
-                slew = home.slew + shafts.slew
-                seen = Seen(swing.x, swing.y, rope, slew, boom, tip.z - shift.z, shift, angles)
-                seen_r = r
-                if sensing.rate > 0.0:
-                    seen = measured(seen, sample, first, sensing, arrays.readings, arrays.noise)
-                    seen_r = rotation(seen.angles.x, seen.angles.y, seen.angles.z)
-                # 2. path, offsets, clip, reference speeds
-                half = pi * sqrt(rope / GRAVITY) / h
-                path = operator_path(reference, axes, memory, sample, half, h, fixed)
-                x, y = tip_offset(path, seen, seen_r, memory, sample, half, settings)
-                if controlled:
-                    inputs[0] = seen.swing_x
-                    inputs[1] = seen.swing_y
-                    inputs[2] = seen.rope
-                    inputs[3] = seen.slew
-                    inputs[4] = atan2(seen.boom.sin, seen.boom.cos)
-                    inputs[5], inputs[6] = path
-                    inputs[7], inputs[8], inputs[9] = seen.shift
-                    inputs[10], inputs[11], inputs[12] = seen.angles
-                    for i in range(picks.size):
-                        user.inputs[i] = inputs[picks[i]]
-                    margin = advance_controller(user)
-                    # what is not a number would pass through every limit as one
-                    if not abs(user.outputs[0]) + abs(user.outputs[1]) < inf:
-                        ended = NO_NUMBER
-                        break
-                    margins[3] = min(margins[3], margin)
-                    x += user.outputs[0]
-                    y += user.outputs[1]
-                if settings.clip > 0.0 or settings.share > 0.0:
-                    x, y = clipped_offset((x, y), path, boom, rope, fixed)
-                follow_path(path[0] + x, path[1] + y, axes, reference, sample, h, fixed)
-            # 3. speeds
-            if actuation == IDEAL:
-                for i in range(3):
-                    omega[i] = min(max(reference[i], inverses[i].low), inverses[i].high)
-            elif actuation == MARCHED:
-                volts[0], volts[1], volts[2] = marched[0][m], marched[1][m], marched[2][m]
-                omega[0], omega[1], omega[2] = marched[3][m], marched[4][m], marched[5][m]
-                limits[0], limits[1], limits[2] = marched[6][m], marched[7][m], marched[8][m]
-            else:
-                for i in range(3):
-                    volts[i] = stick[m, i]
-                    if actuation != DIRECT:
-                        volts[i] = voltage_for(reference[i], inverses[i], actuation)
-                a.inputs[0] = volts[0]
-                b.inputs[0] = volts[1]
-                c.inputs[0] = volts[2]
-                if loaded:
-                    a.inputs[1] = axes[TORQUE, 0]
-                    b.inputs[1] = axes[TORQUE, 1]
-                    c.inputs[1] = axes[TORQUE, 2]
-                margins[0] = min(margins[0], hoist(a))
-                margins[1] = min(margins[1], slew_drive(b))
-                margins[2] = min(margins[2], luff(c))
-                omega[0], omega[1], omega[2] = a.outputs[0], b.outputs[0], c.outputs[0]
-                limits[0], limits[1], limits[2] = a.outputs[1], b.outputs[1], c.outputs[1]
-            if fixed.brake and actuation != IDEAL:
-                rest_time, brake = braked(volts[0], rest_time, brake, h, inverses[0])
-                omega[0] = omega[0] * (1.0 - brake)
-            # 4. kinematics and rope
-            advance(axes, ANGLE, SHAFT_SPEED, omega, h, sample > 0)
-            shafts = shafts_of(axes, ANGLE)
-            previous_rope = rope
-            boom = boom_at(shafts.luff, g, home)
-            rope = rope_length(shafts, g, home)
-            following = to_inertial(r, tip_of(home.slew + shafts.slew, boom, g), shift)
-            if not (fixed.ropes[0] <= rope <= fixed.ropes[1]):
-                ended = ROPE_OUT
-                break
-            if not (fixed.boom[0] <= boom.sin <= fixed.boom[1] and boom.cos > 0.0):
-                ended = BOOM_OUT
-                break
-            hung = led_load(hung, tip, following, rope, previous_rope, sample, h, fixed)
-            if hung.pull < 0.0:
-                ended = TOO_FAST
-                break
-            tip = following
-            store(out[m], volts, omega, limits, axes, tip, hung, columns)
-            if loaded:
-                torques = rope_torques(hung, tip, r, home.slew + shafts.slew, boom, fixed)
-                axes[TORQUE, 0], axes[TORQUE, 1], axes[TORQUE, 2] = torques
-            sample += 1
-        return State(sample, axes, tip, hung, rest_time, brake), ended
-
-    return loop
+        following = to_inertial(r, tip_of(home.slew + shafts.slew, boom, g), shift)
+        if not (fixed.ropes[0] <= rope <= fixed.ropes[1]):
+            ended = ROPE_OUT
+            break
+        if not (fixed.boom[0] <= boom.sin <= fixed.boom[1] and boom.cos > 0.0):
+            ended = BOOM_OUT
+            break
+        hung = led_load(hung, tip, following, rope, previous_rope, sample, h, fixed)
+        if hung.pull < 0.0:
+            ended = TOO_FAST
+            break
+        tip = following
+        store(out[m], volts, omega, limits, axes, tip, hung, columns)
+        if loaded:
+            torques = rope_torques(hung, tip, r, home.slew + shafts.slew, boom, fixed)
+            axes[TORQUE, 0], axes[TORQUE, 1], axes[TORQUE, 2] = torques
+        sample += 1
+    return State(sample, axes, tip, hung, rest_time, brake), ended

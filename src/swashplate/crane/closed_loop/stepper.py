@@ -142,23 +142,18 @@ class CraneStepper:
         compiled = [_compiled(getattr(crane, axis), inputs) for axis in AXES]
         self._steps = [step for step, _ in compiled]
         hoist, slew, luff = (context.copied() for _, context in compiled)
-        # without a user-defined controller its arrays are not used
         user = hoist
-        controller_step = None
         picks = np.zeros(0, dtype=np.int64)
         if controller is not None:
             names = controller.model.external
             step = compiled_step(controller.model, controller.values, names, GIVES, RATE)
             self._steps.append(step)
             user = step.context()
-            controller_step = step.step
             picks = np.array([SEEN.index(name) for name in names], dtype=np.int64)
         # in open loop nothing acts back on the drives
         self._open = (
             not settings.path and not fixed.loaded and fixed.actuation in (loop.VOLTS, loop.INVERSE)
         )
-        hoist_step, slew_step, luff_step = (step.step for step, _ in compiled)
-        self._loop = loop.loop_of(hoist_step, slew_step, luff_step, controller_step)
         g = fixed.geometry
         home = fixed.home
         axes = np.zeros((6, 3))
@@ -182,6 +177,7 @@ class CraneStepper:
         self._arrays = LoopArrays(
             drives=(hoist, slew, luff),
             controller=user,
+            controlled=controller is not None,
             picks=picks,
             memory=memory,
             readings=np.zeros((1 << on_their_way.bit_length(), loop.READINGS)),
@@ -282,7 +278,9 @@ class CraneStepper:
     def _advanced(self, fixed: Fixed, commands: Array, ship: Array, out: Array) -> Array:
         """The rows, filled by the loop; refuses what has stopped it."""
         arrays = self._arrays._replace(noise=self._next_noise(len(commands)))
-        self._state, ended = self._loop(1.0 / RATE, fixed, self._state, arrays, commands, ship, out)
+        self._state, ended = loop.advance_crane(
+            1.0 / RATE, fixed, self._state, arrays, commands, ship, out
+        )
         if ended != loop.FINE:
             raise self._stopped(ended)
         contexts = (*self._arrays.drives, self._arrays.controller)

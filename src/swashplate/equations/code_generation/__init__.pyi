@@ -1,3 +1,4 @@
+from .evaluation import evaluated as evaluated
 from .functions import FUNCTIONS as FUNCTIONS
 from .functions import GENERATING as GENERATING
 from .functions import RESERVED as RESERVED

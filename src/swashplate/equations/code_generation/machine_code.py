@@ -69,9 +69,7 @@ class MachineCode:
 _loaded: dict[tuple[str, str, tuple[str, ...]], MachineCode] = {}
 
 
-def code_of_text(
-    name: str, text: str, kinds: tuple[str, ...], *, is_wide: bool = False
-) -> MachineCode:
+def code_of_text(name: str, text: str, kinds: tuple[str, ...], *, pack: bool = True) -> MachineCode:
     """Machine code of a function that returns nothing.
 
     Parameters
@@ -82,15 +80,16 @@ def code_of_text(
         A module in LLVM's language, with the function by the name of `SYMBOL`.
     kinds : tuple of str
         Of the arguments: ``int``, ``float``, and with ``*`` before them arrays of these.
-    is_wide : bool
-        Whether its operations are on vectors already, so that none are to be found.
+    pack : bool
+        Whether operations on numbers that are alike become one on a vector. It takes a third of the
+        time to compile, and finds nothing in what is written for vectors.
     """
     key = (name, text, kinds)
     if key not in _loaded:
         content = cached_on_disk(
             f"{name}_code",
             (*key, llvmlite_version, llvm.llvm_version_info, *_host()),
-            lambda: _compiled(name, text, is_wide=is_wide),
+            lambda: _compiled(name, text, pack=pack),
         )
         _loaded[key] = MachineCode(content, kinds)
     return _loaded[key]
@@ -118,32 +117,32 @@ def _target_machine() -> Any:
     )
 
 
-def _passes(machine: Any, *, is_wide: bool) -> Any:
+def _passes(machine: Any, *, pack: bool) -> Any:
     """What optimises: operations become vector instructions, and stay as they are written."""
     options = llvm.create_pipeline_tuning_options(speed_level=OPTIMISATION_LEVEL)
-    options.loop_vectorization, options.slp_vectorization = True, not is_wide
+    options.loop_vectorization, options.slp_vectorization = True, pack
     return llvm.create_pass_builder(machine, options)
 
 
-def optimised(text: str, *, is_wide: bool = False) -> Any:
+def optimised(text: str, *, pack: bool = True) -> Any:
     """A module of LLVM's, in the form in which it becomes machine code."""
     with global_compiler_lock:
         machine, module = _target_machine(), llvm.parse_assembly(text)
         module.triple, module.data_layout = machine.triple, str(machine.target_data)
         module.verify()
         for function in module.functions:
-            passes = _passes(machine, is_wide=is_wide)
+            passes = _passes(machine, pack=pack)
             passes.getFunctionPassManager().run(function, passes)
-        passes = _passes(machine, is_wide=is_wide)
+        passes = _passes(machine, pack=pack)
         passes.getModulePassManager().run(module, passes)
         return module
 
 
-def _compiled(name: str, text: str, *, is_wide: bool) -> bytes:
+def _compiled(name: str, text: str, *, pack: bool) -> bytes:
     """Object code of a module."""
     work = progress.begin(COMPILING, name)
     try:
-        module = optimised(text, is_wide=is_wide)
+        module = optimised(text, pack=pack)
         with global_compiler_lock:
             content: bytes = _target_machine().emit_object(module)
         return content

@@ -286,11 +286,6 @@ VECTOR = {*CHEAP, "/", "sqrt", "**"}
 """Operations that processors have for many numbers at once."""
 
 
-def all_vector(nodes: Sequence[Node]) -> bool:
-    """Whether a processor can compute some nodes for many samples at once, whatever tests say."""
-    return all(node.op in VECTOR for node in nodes)
-
-
 def is_cheap(node: Node) -> bool:
     """Whether an operation costs little, and is defined for all numbers."""
     divided = node.op == "/" and node.args[1].op == "number" and node.args[1].value != 0.0

@@ -28,7 +28,6 @@ from .run import PartNumbers as PartNumbers
 from .run import Start as Start
 from .run import called as called
 from .run import marched as marched
-from .run import module as module
 from .run import outside as outside
 from .sample_code import SampleCode as SampleCode
 from .sample_code import output_of as output_of

@@ -90,7 +90,7 @@ class ObservedMarch:
         )
         self.states = [*self.tangents.states]
         self._codes = [
-            code_of_text(name, text, TANGENT_KINDS, is_wide=bool(columns))
+            code_of_text(name, text, TANGENT_KINDS, pack=not columns)
             for text in self.tangents.texts
         ]
         self.codes = np.array([code.address for code in self._codes], dtype=np.int64)

@@ -69,7 +69,8 @@ def known_ahead(
 class March:
     """The text of a march under way.
 
-    `names` are those that are read beside what parts read.
+    `names` are those that are read beside what parts read; `known` is what does not change, if that
+    was computed before.
 
     Attributes
     ----------
@@ -79,10 +80,16 @@ class March:
         What does not change over the march.
     """
 
-    def __init__(self, sample_code: SampleCode, code: Code, names: Collection[str] = ()) -> None:
+    def __init__(
+        self,
+        sample_code: SampleCode,
+        code: Code,
+        names: Collection[str] = (),
+        known: Mapping[Node, str] | None = None,
+    ) -> None:
         self.sample_code, self.code = sample_code, code
         self._lanes, self._names = code.wide or 1, {*names}
-        self.known = known_ahead(sample_code, code, names)
+        self.known = known_ahead(sample_code, code, names) if known is None else {**known}
         self._records = {
             signal: code.load("%records", index, "ptr")
             for index, signal in enumerate(sample_code.signals)
@@ -254,6 +261,65 @@ class March:
         below = code.put(f"fcmp ole {code.number} {worst}, {code.constant(0.0)}")
         keeps = code.put(f"or {code.bit} {counts}, {below}")
         return code.select(keeps, worst, total)
+
+
+STEP_ARGUMENTS = (*ARGUMENTS, *(("ptr", name) for name in ("inputs", "constants", "position")))
+"""Of a march of one sample: ``count`` the length of the records, ``inputs`` the newest sample,
+``constants`` what does not change, ``position`` where in the records the sample goes, and how many
+samples delays look back."""
+PREPARE_ARGUMENTS = (
+    ("double", "h"),
+    *(("ptr", name) for name in ("delay_fraction", "params", "given", "constants")),
+)
+"""Of what computes that."""
+
+
+def step_texts(
+    model: Model, signals: Sequence[str], options: Sequence[Any], stored: Sequence[SignalId]
+) -> tuple[str, str, int]:
+    """Texts of what computes constants, and of a step; and how many constants there are.
+
+    A step puts the newest inputs into the records, behind the last ones, and marches one sample.
+    From the end of the records it goes on at their beginning, with the last samples before it.
+    """
+    sample_code = SampleCode(model, signals, options, stored)
+    constants = [
+        node
+        for part in sample_code.used
+        for node in part.ahead(sample_code.ends[part.part], part.delay_fractions)
+    ]
+    prepare = Code(PREPARE_ARGUMENTS)
+    known = known_ahead(sample_code, prepare)
+    for place, text in enumerate(prepare.values(constants, known)):
+        prepare.store(text, "%constants", place)
+    code = Code(STEP_ARGUMENTS)
+    records = [code.load("%records", place, "ptr") for place, _ in enumerate(signals)]
+    at = code.variable(code.load("%position", 0, "i64"), "i64")
+    with code.only_if(code.put(f"icmp eq i64 {code.load(at, 0, 'i64')}, %count")):
+        longest = code.load("%position", 1, "i64")
+        since = code.put(f"sub i64 %count, {longest}")
+        for record in records:
+            with code.loop("0", longest) as age:
+                later = code.load(record, code.put(f"add i64 {since}, {age}"))
+                code.store(later, record, age)
+        code.store(longest, at, 0, "i64")
+    first = code.load(at, 0, "i64")
+    code.store(code.put(f"add i64 {first}, 1"), "%position", 0, "i64")
+    for place, record in enumerate(records):
+        code.store(code.load("%inputs", place), record, first)
+    known = numbers_known(sample_code, code, sample_code.read)
+    for part in sample_code.used:
+        for tap in part.taps:
+            fraction = graph.name(part.delay_fraction(tap))
+            known[fraction] = code.load("%delay_fraction", tap.number)
+    known |= {node: code.load("%constants", place) for place, node in enumerate(constants)}
+    march = March(sample_code, code, known=known)
+    known = march.sample(first)
+    for place, signal in enumerate(stored):
+        code.store(march.observed(signal, known), "%flat", place)
+    march.step(known)
+    code.store(march.end(), "%worst_margin")
+    return prepare.text, code.text, len(constants)
 
 
 def march_text(

@@ -13,10 +13,9 @@ from typing import Any, Literal, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.equations.cache import generated, kernel
-from swashplate.equations.code_generation.functions import FUNCTIONS, generating
+from swashplate.equations.code_generation.functions import generating
 from swashplate.equations.code_generation.machine_code import code_of_text
-from swashplate.equations.declaration import JIT_OFF, Replacements, inlined, interpreted
+from swashplate.equations.declaration import JIT_OFF, Replacements, interpreted
 from swashplate.equations.fields import (
     check_mapping,
     defaults_of,
@@ -366,20 +365,6 @@ def instance_of(model: Model, p: Any, *, options: Any = None, given: Any = None)
 
 
 # --- marching -------------------------------------------------------------------------------------
-
-
-LIBRARY: dict[str, Any] = {
-    **{name: member for name, member in vars(math).items() if not name.startswith("_")},
-    "kernel": kernel,
-    "inlined": inlined,
-    **FUNCTIONS,
-}
-"""What generated modules call besides their own functions."""
-
-
-def module(name: str, text: str, **further: Any) -> dict[str, Any]:
-    """A generated module, compiled."""
-    return generated(name, text, LIBRARY | further)
 
 
 @dataclass(frozen=True)

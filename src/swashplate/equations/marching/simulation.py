@@ -28,7 +28,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.equations.cache import kernel
-from swashplate.equations.code_generation.functions import generating
 from swashplate.equations.fields import check_mapping
 from swashplate.equations.marching.part_code import SignalId
 from swashplate.equations.marching.record import (
@@ -47,7 +46,7 @@ from swashplate.equations.marching.run import (
     marched,
 )
 from swashplate.equations.marching.sample_code import output_of
-from swashplate.equations.marching.stepping import CompiledStep, StepContext
+from swashplate.equations.marching.stepping import CompiledStep, StepContext, step
 from swashplate.equations.model import Model
 from swashplate.errors import DomainError, InputError, UnknownNameError
 from swashplate.results import GivenAxes, Tabular, figures, pandas_frame
@@ -509,42 +508,37 @@ def simulate(
 # --- one sample at a time -------------------------------------------------------------------------
 
 
-@generating
-def _sample_kernel(step: Callable[[StepContext], float]) -> Callable[..., tuple[float, bool]]:
-    """Compiled function that advances by one sample, in several steps."""
+@kernel
+def _advance(
+    inputs: Array, zero_order: NDArray[np.bool_], substeps: int, context: StepContext,
+    rates: NDArray[np.int64], totals: Array,
+) -> tuple[float, bool]:  # fmt: skip
+    """Advance by one sample, from the inputs before to these, in several steps.
 
-    @kernel
-    def steps(
-        inputs: Array, zero_order: NDArray[np.bool_], substeps: int, context: StepContext,
-        rates: NDArray[np.int64], totals: Array,
-    ) -> tuple[float, bool]:  # fmt: skip
-        """Advance by one sample, from the inputs before to these; `totals` as in `StepperState`.
-
-        Returns the least margin of the domain, and whether state and outputs are finite.
-        """
-        worst = np.inf
-        for j in range(substeps):
-            for i in range(zero_order.size):
-                context.inputs[i] = inputs[1, i]
-                if j < substeps - 1:
-                    rise = 0.0 if zero_order[i] else (j + 1) / substeps
-                    context.inputs[i] = inputs[0, i] + rise * (inputs[1, i] - inputs[0, i])
-            worst = min(worst, step(context))
-            for r in range(rates.size):
-                rate = context.outputs[rates[r]]
-                totals[0, r] = totals[0, r] + 0.5 * context.h * (totals[1, r] + rate)
-                totals[1, r] = rate
-        inputs[0] = inputs[1]
-        finite = True
-        for state in context.states:
-            finite = finite and np.isfinite(state)
-        for output in context.outputs:
-            finite = finite and np.isfinite(output)
-        for total in totals[0]:
-            finite = finite and np.isfinite(total)
-        return worst, finite
-
-    return steps
+    `totals` are as in `StepperState`. Returns the least margin of the domain, and whether state and
+    outputs are finite.
+    """
+    worst = np.inf
+    for j in range(substeps):
+        for i in range(zero_order.size):
+            context.inputs[i] = inputs[1, i]
+            if j < substeps - 1:
+                rise = 0.0 if zero_order[i] else (j + 1) / substeps
+                context.inputs[i] = inputs[0, i] + rise * (inputs[1, i] - inputs[0, i])
+        worst = min(worst, step(context))
+        for r in range(rates.size):
+            rate = context.outputs[rates[r]]
+            totals[0, r] = totals[0, r] + 0.5 * context.h * (totals[1, r] + rate)
+            totals[1, r] = rate
+    inputs[0] = inputs[1]
+    finite = True
+    for state in context.states:
+        finite = finite and np.isfinite(state)
+    for output in context.outputs:
+        finite = finite and np.isfinite(output)
+    for total in totals[0]:
+        finite = finite and np.isfinite(total)
+    return worst, finite
 
 
 class StepperState(NamedTuple):
@@ -617,7 +611,6 @@ class Stepper(Generic[S]):
             self._order.append(index)
         self._zero_order = np.array([between[name] == "previous" for name in inputs])
         self._compiled = CompiledStep(instance, inputs, stored, 1.0 / (rate * self._substeps))
-        self._advance = _sample_kernel(self._compiled.step)
         self._state = StepperState(
             context=self._compiled.context(),
             totals=np.zeros((2, len(rates))),
@@ -643,6 +636,7 @@ class Stepper(Generic[S]):
             states=earlier.states,
             outputs=earlier.outputs,
             lines=earlier.lines,
+            position=earlier.position,
             inputs=earlier.inputs,
         )
         self._state = state._replace(context=context).copied()
@@ -702,9 +696,7 @@ class Stepper(Generic[S]):
                 context = self._compiled.context(first, "steady")
             self._state = StepperState(context, totals, values, True)
         substeps = self._substeps if initialised else 1
-        worst, finite = self._advance(
-            values, self._zero_order, substeps, context, self._rates, totals
-        )
+        worst, finite = _advance(values, self._zero_order, substeps, context, self._rates, totals)
         if not initialised:
             totals[0] = 0.0
         if not (worst > 0.0 and finite):

@@ -3,7 +3,6 @@
 Examples
 --------
 >>> valve = compiled_step(model, Valve(0.05, 0.1), ("command",), ("position",), rate=512.0)
->>> step = valve.step
 >>> @kernel
 ... def positioned(context, target, path):
 ...     worst = inf
@@ -18,14 +17,22 @@ Examples
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from swashplate.equations.code_generation.functions import generating
+from swashplate.equations.code_generation.machine_code import code_of_text
+from swashplate.equations.declaration import JIT_OFF, inlined
 from swashplate.equations.keeping import cached_on_disk, key_of
+from swashplate.equations.marching.interpreting import InterpretedMarch
+from swashplate.equations.marching.kernels import FLOATS, INTS, KERNEL_KINDS
+from swashplate.equations.marching.march import step_texts
 from swashplate.equations.marching.part_code import SignalId
 from swashplate.equations.marching.record import check_rate
 from swashplate.equations.marching.run import (
@@ -34,10 +41,8 @@ from swashplate.equations.marching.run import (
     check_domain,
     check_outputs,
     instance_of,
-    module,
 )
-from swashplate.equations.marching.sample_code import output_of
-from swashplate.equations.marching.step_code import step_source
+from swashplate.equations.marching.sample_code import SampleCode, output_of
 from swashplate.equations.model import Model
 from swashplate.errors import InputError
 
@@ -45,7 +50,7 @@ Array = NDArray[np.float64]
 
 
 class StepContext(NamedTuple):
-    """What a compiled step takes in a loop: a model's numbers, and all that it remembers."""
+    """What a step takes in a loop: a model's numbers, and all that it remembers."""
 
     inputs: Array
     """Newest sample of each input; the loop sets them before each step."""
@@ -53,7 +58,12 @@ class StepContext(NamedTuple):
     """Outputs at that sample, filled by the step."""
     states: Array
     lines: Array
-    """Past samples of the inputs, newest first, for the delays."""
+    """Past samples of the inputs, a row each, for the delays."""
+    position: NDArray[np.int64]
+    """Where the next one goes, and how many samples delays look back."""
+    records: NDArray[np.int64]
+    """Addresses of the rows of these."""
+    before: Array
     delay_samples: NDArray[np.int64]
     """Whole samples of each tap's delay."""
     delay_fraction: Array
@@ -61,31 +71,148 @@ class StepContext(NamedTuple):
     params: Array
     given: Array
     constants: Array
+    margin: Array
+    """Margin of the model's domain at the newest sample, first."""
     h: float
     """[s]"""
+    code: Any
+    """Address of the step; without compiled code the step itself."""
 
     def copied(self) -> StepContext:
         """A copy that remembers for itself: both go on from here independently."""
+        lines = self.lines.copy()
         return self._replace(
             inputs=self.inputs.copy(),
             outputs=self.outputs.copy(),
             states=self.states.copy(),
-            lines=self.lines.copy(),
+            lines=lines,
+            position=self.position.copy(),
+            records=_rows_of(lines),
+            margin=self.margin.copy(),
         )
 
 
+def _rows_of(lines: Array) -> NDArray[np.int64]:
+    """Addresses of the rows."""
+    first, row = lines.ctypes.data, lines.strides[0]
+    return np.array([first + row * number for number in range(len(lines))], dtype=np.int64)
+
+
+def _call_intrinsic(typing: Any, context: Any) -> Any:
+    """Signature and code of `call_step` for Numba: a call of the step at its address."""
+    places = {name: place for place, name in enumerate(context.fields)}
+
+    def generate(target: Any, builder: Any, signature: Any, values: Any) -> Any:
+        (value,) = values
+
+        def data(name: str) -> Any:
+            array = builder.extract_value(value, places[name])
+            kind = context.types[places[name]]
+            return builder.bitcast(target.make_array(kind)(target, builder, array).data, POINTER)
+
+        lines = builder.extract_value(value, places["lines"])
+        shape = target.make_array(context.types[places["lines"]])(target, builder, lines).shape
+        length = builder.extract_value(shape, 1)
+        arguments = [
+            length,
+            ir.Constant(LONG, 0),
+            builder.extract_value(value, places["h"]),
+            *map(data, STEP_ARRAYS),
+        ]
+        kind = ir.FunctionType(ir.VoidType(), [argument.type for argument in arguments])
+        address = builder.extract_value(value, places["code"])
+        builder.call(builder.inttoptr(address, kind.as_pointer()), arguments)
+        return target.get_dummy_value()
+
+    return types.none(context), generate
+
+
+STEP_ARRAYS = (
+    *("records", "before", "delay_samples", "delay_fraction", "params", "given", "states"),
+    *("margin", "outputs", "inputs", "constants", "position"),
+)
+"""Fields of a context that a step is given after its step, see `march.STEP_ARGUMENTS`."""
+PREPARE_KINDS = ("float", *(FLOATS,) * 4)
+STEP_KINDS = (*KERNEL_KINDS, FLOATS, FLOATS, INTS)
+"""Kinds of the arguments of `march.PREPARE_ARGUMENTS` and `march.STEP_ARGUMENTS`."""
+OLDEST = 3
+"""Samples that a tap looks back at most beside its delay."""
+ROOM = 500
+"""Samples that are put behind each other before they are moved."""
+LONG, POINTER = ir.IntType(64), ir.IntType(8).as_pointer()
+
+
+def _call(context: StepContext) -> None:
+    context.code(context)
+
+
+call_step: Any = _call if JIT_OFF else intrinsic(_call_intrinsic)
+"""``call_step(context)`` runs the step of a context."""
+
+
+@inlined
+def step(context: StepContext) -> float:
+    """Take a model to the next sample, in a `kernel`.
+
+    It reads ``context.inputs``, fills ``context.outputs`` with the same sample, takes the state to
+    the next one, and returns the margin of the model's domain. The same for all models: which one
+    is stepped follows from the context.
+    """
+    call_step(context)
+    margin: float = context.margin[0]
+    return margin
+
+
+class _InterpretedStep:
+    """A step without compiled code."""
+
+    def __init__(self, sample_code: SampleCode, stored: Sequence[SignalId]) -> None:
+        targets = {signal: place for place, signal in enumerate(stored)}
+        self._march = InterpretedMarch(sample_code, targets, {})
+
+    def __call__(self, context: StepContext) -> None:
+        """Take the model to the next sample."""
+        at, longest = context.position
+        if at == context.lines.shape[1]:
+            context.lines[:, :longest] = context.lines[:, at - longest :]
+            at = longest
+        context.lines[:, at] = context.inputs
+        context.position[0] = at + 1
+        margin = np.array([np.inf, 0.0])
+        self._march(
+            1,
+            int(at),
+            context.h,
+            context.lines,
+            context.before,
+            context.delay_samples,
+            context.delay_fraction,
+            context.params,
+            context.given,
+            context.states,
+            margin,
+            context.outputs,
+        )
+        context.margin[0] = margin[0]
+
+
 @generating
-def _kernels(
+def _step_of(
     model: Model, inputs: tuple[str, ...], options: tuple[Any, ...], stored: tuple[SignalId, ...]
-) -> tuple[Callable[..., None], Callable[[StepContext], float], int]:
-    """Compiled constants of a model, its step, and how many constants there are."""
-    text, count = cached_on_disk(
+) -> tuple[Any, Any, int]:
+    """What computes a model's constants, its step, and how many constants there are."""
+    if JIT_OFF:
+        sample_code = SampleCode(model, inputs, options, stored)
+        return lambda *_: None, _InterpretedStep(sample_code, stored), 0
+    prepare, text, count = cached_on_disk(
         f"{model.name}_step",
         (key_of(model), inputs, options, stored),
-        lambda: step_source(model, inputs, options, stored),
+        lambda: step_texts(model, inputs, options, stored),
     )
-    functions = module(f"{model.name}_step", text)
-    return functions["prepare"], functions["step"], count
+    constants = code_of_text(f"{model.name}_constants", prepare, PREPARE_KINDS)
+    # what comes from memory is not there in pairs: packed, a step takes 1.6 times as long
+    code = code_of_text(f"{model.name}_step", text, STEP_KINDS, pack=False)
+    return constants, code.address, count
 
 
 class CompiledStep:
@@ -96,9 +223,7 @@ class CompiledStep:
     Attributes
     ----------
     step : callable
-        ``step(context) -> margin``: reads ``context.inputs``, fills ``context.outputs`` with the
-        same sample, takes the state to the next one, and returns the margin of the model's domain.
-        A `kernel` that calls it inlines it; numbers are those of `simulate` to the last bit.
+        `step`, the same for all models; numbers are those of `simulate` to the last bit.
     inputs, outputs : tuple of str
         Names, in the arrays' order.
     """
@@ -112,9 +237,14 @@ class CompiledStep:
         self.inputs = tuple(inputs)
         self.outputs = tuple(signal.path or signal.kind for signal in stored)
         instance.check_inputs(self.inputs)
-        self._prepare, self.step, self._count = _kernels(
+        self._prepare, self._code, self._count = _step_of(
             instance.model, self.inputs, instance.options, tuple(stored)
         )
+
+    @property
+    def step(self) -> Any:
+        """`step`, which a `kernel` calls with a context."""
+        return step
 
     def __repr__(self) -> str:
         return (
@@ -132,9 +262,9 @@ class CompiledStep:
         newest = np.array([*values.values()])
         delays = instance.tap_delays(self.inputs, self._h)
         constants = np.zeros(self._count)
-        self._prepare(instance.params, instance.given, self._h, constants)
-        longest = int(delays.samples.max(initial=0))
-        lines = np.zeros((len(self.inputs), longest + 3))
+        self._prepare(self._h, delays.fraction, instance.params, instance.given, constants)
+        longest = int(delays.samples.max(initial=0)) + OLDEST
+        lines = np.zeros((len(self.inputs), longest + ROOM))
         if start == "steady":
             lines[:] = newest[:, None]
         return StepContext(
@@ -142,12 +272,17 @@ class CompiledStep:
             outputs=np.zeros(len(self.outputs)),
             states=instance.start(values, self._h, start).flat,
             lines=lines,
+            position=np.array([longest, longest]),
+            records=_rows_of(lines),
+            before=np.zeros(len(self.inputs)),
             delay_samples=delays.samples,
             delay_fraction=delays.fraction,
             params=instance.params,
             given=instance.given,
             constants=constants,
+            margin=np.full(2, np.inf),
             h=self._h,
+            code=self._code,
         )
 
     def check(self, context: StepContext, margin: float, cause: str = "input") -> None:

@@ -7,8 +7,8 @@ samples every part in the order of the flow, and then takes all states to the ne
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from functools import cached_property, lru_cache
-from typing import Any, get_type_hints
+from functools import lru_cache
+from typing import get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,17 +28,15 @@ from swashplate.equations.code_generation import (
     GENERATING,
     C,
     CodeBlock,
-    Function,
     Trace,
     c_function,
     c_literal,
     c_name,
     first_line,
     fresh_name,
-    function_source,
 )
 from swashplate.equations.graph import Node, names_in
-from swashplate.equations.marching import SampleCode, module, output_of
+from swashplate.equations.marching import SampleCode, output_of
 from swashplate.export.c_source.exported import Exported
 from swashplate.export.c_source.layout import Layout, path_of
 from swashplate.export.c_source.parts import PartInC
@@ -332,23 +330,6 @@ class Writer:
         """Index of the first constant of a part."""
         return sum(len(part.constants) for part in self.parts[:number])
 
-    @cached_property
-    def prepare(self) -> Any:
-        """``prepare(params, given, options, h, constants)``, compiled: fills the constants."""
-        lines: list[str] = []
-        functions: dict[str, Function] = {}
-        for part in self.parts:
-            part_lines, called = part.prepared(self.first_constant(part.number))
-            lines += part_lines
-            functions |= called
-        head = "prepare(params, given, options, h, constants)"
-        text = function_source(head, "What follows from numbers, options and the step.", lines)
-        inner: dict[str, str] = {}
-        for called_function in functions.values():
-            inner |= called_function.texts
-        texts = [*(f"@inlined\n{inner_text}" for inner_text in inner.values()), text]
-        return module(f"{self.model.name}_constants", "\n\n".join(texts))["prepare"]
-
 
 @lru_cache(maxsize=16)
 def writer_of(exported: Exported) -> Writer:
@@ -366,13 +347,14 @@ def numbers(exported: Exported, instance: Instance, step: float) -> Array:
         for option in part.options
     ]
     writer = writer_of(exported)
-    constants = np.zeros(len(writer.constant_names()))
-    flags = np.array(options, dtype=np.bool_)
-    if constants.size:
-        with GENERATING:
-            prepare = writer.prepare
-        prepare(instance.params, instance.given, flags, step, constants)
-    return np.array([step, *instance.params, *instance.given, *options, *constants])
+    params, given = instance.params.tolist(), instance.given.tolist()
+    with GENERATING:
+        constants = [
+            value
+            for part in writer.parts
+            for value in part.constant_values(params, given, options, step)
+        ]
+    return np.array([step, *params, *given, *options, *constants])
 
 
 def _finite(members: Sequence[str], owner: str) -> list[str]:

@@ -22,20 +22,17 @@ from swashplate.equations import (
 )
 from swashplate.equations.code_generation import (
     FEW,
-    FUNCTIONS,
-    RESERVED,
     STEMS,
     C,
     CodeBlock,
-    Function,
     Trace,
     Tuple,
     Value,
     as_double,
-    assigned,
     c_function,
     c_literal,
     c_name,
+    evaluated,
     first_line,
     fixed,
     fresh_name,
@@ -389,35 +386,22 @@ class PartInC:
 
     # -- numbers -----------------------------------------------------------------------------------
 
-    def prepared(self, first: int) -> tuple[list[str], dict[str, Function]]:
-        """Lines of Python that compute the constants, and the functions that these call.
-
-        They read ``params``, ``given``, ``options`` and ``h``, and fill ``constants``.
-        """
-        used_names = {
-            *FUNCTIONS,
-            *RESERVED,
-            "params",
-            "given",
-            "options",
-            "h",
-            "constants",
-            "prepare",
-        }
-        available = {}
-        for array, numbers in (("params", self.part.p), ("given", self.part.given)):
-            paths = self.layout.exported.model.places(
-                "parameters" if array == "params" else "given"
-            )
+    def constant_values(
+        self, params: Sequence[float], given: Sequence[float], options: Sequence[bool], step: float
+    ) -> list[float]:
+        """What the constants are for some numbers and options of the whole model."""
+        exported = self.layout.exported
+        known: dict[Node, Any] = {graph.name("h"): step}
+        for numbers, kind, values in (
+            (self.part.p, "parameters", params),
+            (self.part.given, "given", given),
+        ):
+            paths = exported.model.places(kind)
             for path, node in leaves(numbers):
-                available[node] = f"{array}[{paths.index((self.number, path))}]"
+                known[node] = values[paths.index((self.number, path))]
         for name, node in self.options.items():
-            available[node] = f"options[{self.layout.exported.options.index((self.number, name))}]"
-        block = CodeBlock([*self.constants], self._labels, used_names, available=available)
-        lines = [*block.lines]
-        for index, text in enumerate(block.texts):
-            lines += assigned(f"constants[{first + index}]", text)
-        return lines, block.functions
+            known[node] = options[exported.options.index((self.number, name))]
+        return evaluated([*self.constants], known)
 
 
 def formulas(trace: Trace) -> set[Parsed]:
