@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from swashplate.equations import is_named_tuple, parsed, plain
+from swashplate.equations import is_named_tuple, kernel, parsed, plain
 from swashplate.equations.code_generation import Loops, helpers_in
-from swashplate.equations.marching import module
+from swashplate.equations.declaration import remember_text
 from swashplate.export.c_source import EquationInC, equation_in_c
 
 CALLS = 3000
@@ -166,6 +166,13 @@ def flagged(equation: Any) -> bool:
     return any(word == "flag" for name, h in hints.items() for word, _ in scalars(h, name))
 
 
+def compiled(text: str, names: Mapping[str, Any]) -> dict[str, Any]:
+    """A module of kernels, executed."""
+    space = {**vars(math), "kernel": kernel, **names}
+    exec(compile(text, remember_text("twin", text), "exec"), space)
+    return space
+
+
 class InC:
     """Equations as one source of C, with a function for each that takes numbers in a row."""
 
@@ -188,7 +195,7 @@ class InC:
         twin = Twin(self.equations[key], on)
         given = rows(twin.columns, on, self.numbers[key])
         wanted, found = np.empty((CALLS, twin.width)), np.empty((CALLS, twin.width))
-        made = module(f"twin_{key.replace('.', '_')}", twin.text, **twin.names)
+        made = compiled(twin.text, twin.names)
         try:
             made["rows_of"](given, wanted)
         except ZeroDivisionError:  # 0 to a negative power, where C goes on with infinity

@@ -10,10 +10,7 @@ from threading import RLock
 from time import perf_counter
 from typing import Any, ParamSpec, TypeVar
 
-from numba import types
-from numba.extending import intrinsic
-
-from swashplate.equations.declaration import JIT_OFF, inlined, interpreted, remember_text
+from swashplate.equations.declaration import inlined, interpreted, remember_text
 from swashplate.equations.language import CHOICES, MATH
 
 P = ParamSpec("P")
@@ -23,37 +20,8 @@ GENERATING = RLock()
 """Held while equations are read or code is written: nodes are compared by identity."""
 
 
-def _choose(test: bool, if_true: Any, if_false: Any) -> Any:
-    return if_true if test else if_false
-
-
-def _select_intrinsic(typing: Any, test: Any, if_true: Any, if_false: Any) -> Any:
-    """Signature and code of `choose` for Numba: LLVM's ``select`` of two numbers of one type."""
-    result_type = typing.unify_types(if_true, if_false)
-
-    def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-        test_value, true_value, false_value = values
-        _, true_type, false_type = signature.args
-        return builder.select(
-            test_value,
-            context.cast(builder, true_value, true_type, result_type),
-            context.cast(builder, false_value, false_type, result_type),
-        )
-
-    return result_type(types.boolean, if_true, if_false), generate
-
-
-choose: Any = _choose if JIT_OFF else intrinsic(_select_intrinsic)
-"""``choose(test, a, b)`` is one of two numbers, both computed before.
-
-It is not written as ``a if test else b``: from that the compiler makes a branch, or a choice
-between two addresses to load from, and loops no longer become good vector code.
-"""
-
-
 FUNCTIONS: dict[str, Any] = {name: function for function, name in [*MATH.items(), *CHOICES.items()]}
 """Functions that generated texts call, by name."""
-FUNCTIONS["choose"] = choose
 RESERVED = {*FUNCTIONS, "inf", "nan", "range", "int", "float", "None", "True", "False"}
 """Names that generated texts must not give to values."""
 
@@ -124,7 +92,7 @@ class Function:
         """The function, as plain Python throughout."""
         library = {name: interpreted(function) for name, function in FUNCTIONS.items()}
         called = {name: function.python for name, function in self.names.items()}
-        function: Callable[..., Any] = self._executed({**library, "choose": _choose, **called})
+        function: Callable[..., Any] = self._executed({**library, **called})
         return function
 
     @cached_property

@@ -16,7 +16,7 @@ from textwrap import TextWrapper
 from typing import Any, NamedTuple
 
 from swashplate.equations.code_generation.functions import FUNCTIONS, RESERVED, Function, fresh_name
-from swashplate.equations.code_generation.scheduling import Conditional, Flat, Region, Schedule
+from swashplate.equations.code_generation.scheduling import Conditional, Region, Schedule
 from swashplate.equations.graph import COMPARISONS, FALSE, LEAVES, TRUE, Node, plain_value
 
 WIDTH = 96
@@ -92,16 +92,7 @@ def grouped(text: Text, level: int) -> str:
 
 
 class Python(Language):
-    """Python as Numba compiles it.
-
-    A choice of which both sides may be computed is ``choose(test, one, two)``, and tests are joined
-    by ``&`` and ``|``: no branch, which a compiler would take a while to remove. With `branches` it
-    is ``one if test else two``, as the compiler likes: where one sample waits for the one before, a
-    processor that foresees a branch need not wait for its test.
-    """
-
-    def __init__(self, *, branches: bool = False) -> None:
-        self._all = ONCE if branches else ALL
+    """Python, for people and for whoever compiles it."""
 
     def number(self, value: Any) -> Text:
         """A literal number."""
@@ -112,7 +103,7 @@ class Python(Language):
         """An operation on texts."""
         op, level = node.op, PRECEDENCE.get(node.op, ATOM)
         if op == "if":
-            return self._choice(node, operands, min(computed, self._all))
+            return self._choice(node, operands)
         if op == "not":
             return f"not {grouped(operands[0], level)}", level
         if op == "neg":
@@ -127,20 +118,13 @@ class Python(Language):
             )
         return f"{op}({', '.join(text for text, _ in operands)})", ATOM
 
-    def _choice(self, node: Node, texts: Sequence[Text], computed: int) -> Text:
+    def _choice(self, node: Node, texts: Sequence[Text]) -> Text:
         _, if_true, if_false = node.args
         test, text_if_true, text_if_false = texts
         if if_false is FALSE or if_true is TRUE:
-            if if_false is FALSE:
-                word, sign, second = "and", "&", text_if_true
-            else:
-                word, sign, second = "or", "|", text_if_false
-            if computed == ALL:
-                return f"{grouped(test, ATOM)} {sign} {grouped(second, ATOM)}", 4
+            word, second = ("and", text_if_true) if if_false is FALSE else ("or", text_if_false)
             level = PRECEDENCE[word]
             return f"{grouped(test, level + 1)} {word} {grouped(second, level)}", level
-        if computed == ALL:
-            return f"choose({test[0]}, {text_if_true[0]}, {text_if_false[0]})", ATOM
         return (
             f"{grouped(text_if_true, 2)} if {grouped(test, 2)} else {grouped(text_if_false, 1)}",
             PRECEDENCE["if"],
@@ -173,7 +157,7 @@ class Python(Language):
         return [*head, *then, *([f"{pad}else:", *otherwise] if otherwise else [])]
 
 
-PYTHON, BRANCHING = Python(), Python(branches=True)
+PYTHON = Python()
 
 
 # --- blocks ---------------------------------------------------------------------------------------
@@ -202,8 +186,6 @@ class CodeBlock:
         Names that stand for something else; those of the block are added.
     available : mapping of Node to str, optional
         Values that are there already, with their names.
-    flat : callable, optional
-        Which branches are not worth one, see `scheduling.Schedule`.
     language : Language
         Python by default.
     named : bool
@@ -228,14 +210,13 @@ class CodeBlock:
         used_names: set[str],
         *,
         available: Mapping[Node, str] | None = None,
-        flat: Flat | None = None,
         language: Language = PYTHON,
         named: bool = False,
     ) -> None:
         self._labels, self._used_names, self._available = labels, used_names, dict(available or {})
         self._language = language
         self.functions: dict[str, Function] = {}
-        self._schedule = Schedule(results, self._available, flat)
+        self._schedule = Schedule(results, self._available)
         self._reads: set[str] = set()
         self._written_nodes: list[Node] = []
         self._named: dict[tuple[Node, Region], str] = {}

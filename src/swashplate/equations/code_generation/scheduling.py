@@ -6,15 +6,13 @@ it costs less to compute both. Choices of one test that do not wait for each oth
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from heapq import heappop, heappush
 
 from swashplate.equations.graph import CHEAP, LEAVES, Node, ordered
 
 FEW = 8
 """Most operations that are computed without need instead of a branch."""
-Flat = Callable[[Sequence[Node]], bool]
-"""Whether what both sides of a branch compute may be computed whatever the test says."""
 
 
 class Region:
@@ -75,7 +73,7 @@ class Conditional:
 class Schedule:
     """Regions of all nodes that some results need.
 
-    `available` nodes are there already. `flat` says which branches are not worth one.
+    `available` nodes are there already.
 
     Attributes
     ----------
@@ -85,9 +83,7 @@ class Schedule:
         Choices for which both sides are computed.
     """
 
-    def __init__(
-        self, results: Sequence[Node], available: Mapping[Node, object], flat: Flat | None = None
-    ) -> None:
+    def __init__(self, results: Sequence[Node], available: Mapping[Node, object]) -> None:
         self._results = [*results]
         self._order = [node for node in ordered(results, available) if node.op not in LEAVES]
         self._index = {node: index for index, node in enumerate(self._order)}
@@ -96,13 +92,12 @@ class Schedule:
             if node.op == "result":
                 self._results_of.setdefault(node.args[0], []).append(node)
         self.selects: set[Node] = set()
-        decide = flat or is_little
         while True:
             self._place()
             little = [
                 branch
                 for branch in self._all
-                if not any(side.branches for side in branch.sides) and decide([*branch.inside])
+                if not any(side.branches for side in branch.sides) and is_little([*branch.inside])
             ]
             if not little:
                 break
