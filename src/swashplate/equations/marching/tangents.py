@@ -27,7 +27,10 @@ from swashplate.equations.marching.march import ARGUMENTS, HALF, March, known_ah
 from swashplate.equations.marching.part_code import PartCode, SignalId
 from swashplate.equations.marching.sample_code import SampleCode, output_of
 from swashplate.equations.model import Model
+from swashplate.errors import InputError
 
+MOST_OPERATIONS = 400_000
+"""Of what is done with a block: compiled in a minute or so."""
 MOST_IN_ROOM = 1 << 15
 """Numbers that a block leaves at most, so that they stay in a fast cache."""
 MOST_SAMPLES = 256
@@ -211,7 +214,7 @@ class _Block:
         begins: Mapping[SignalId, Any],
     ) -> None:
         self.sample_code, self.outputs = sample_code, outputs
-        self.together = bool(columns)
+        self._columns = len(columns)
         self.width = padded(len(columns))
         self.first_column = padded(len(outputs))
         self.row = self.first_column + len(outputs) * self.width
@@ -286,6 +289,7 @@ class _Block:
             texts.append(self._amounts_text())
         if self.width:
             texts.append(self._columns_text())
+        self._check_size(texts)
         return Tangents(
             texts=tuple(texts),
             block=self.block,
@@ -296,6 +300,16 @@ class _Block:
             tangents=self._first_integral + 2 * integrals * (SIDE_BY_SIDE + self.width),
             states=tuple(self.carried.ids),
         )
+
+    def _check_size(self, texts: Sequence[str]) -> None:
+        """Refuse what would be compiled for minutes."""
+        operations = sum(text.count("\n") for text in texts)
+        if operations > MOST_OPERATIONS:
+            raise InputError(
+                f"{self.sample_code.model.name}: the derivatives by {self._columns} columns are "
+                f"{operations} operations a sample, more than the {MOST_OPERATIONS} that are "
+                "compiled (a minute): ask for fewer columns at a time, or for those of a part."
+            )
 
     # -- values, and what derivatives are made of --------------------------------------------------
 
@@ -315,7 +329,7 @@ class _Block:
             for row, text in zip(self.kept.values(), code.floats(self.kept, known), strict=True):
                 code.store(text, to, row * self.stride)
 
-        march.run(keep, together=self.together)
+        march.run(keep, together=self._columns > 0)
         return code.text
 
     def _amounts_text(self) -> str:
