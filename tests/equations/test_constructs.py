@@ -9,9 +9,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from tests.equations.differences import compared
+from tests.equations.printed import assert_printed
 from tests.marks import rest_slow
 
 from swashplate.equations import JIT_OFF, declared, derive, equation, interpolate, repeated, root
+from swashplate.equations.declaration import closure_hash
 from swashplate.errors import EquationError
 
 pytestmark = pytest.mark.interpreted
@@ -58,10 +60,9 @@ def check(
     derived = derive(function, by, options=options, lengths=lengths)
     assert compared(getattr(function, "py_func", function), derived, arguments)
     decided = derive(function, (), options=options, lengths=lengths)
-    values = derived.python(*arguments.values())
-    assert derived.compiled(*arguments.values()) == pytest.approx(values, rel=1e-12, abs=1e-15)
-    exact = derived.compiled(*arguments.values())[: len(derived.outputs)]
-    assert exact == decided.compiled(*arguments.values())
+    exact = derived(*arguments.values())[: len(derived.outputs)]
+    assert exact == decided(*arguments.values())
+    assert_printed(function, derived, arguments, options, lengths)
     return derived
 
 
@@ -125,8 +126,7 @@ def test_expressions() -> None:
 
 def test_what_is_not_done_is_not_divided_by() -> None:
     derived = derive(careful, ("x", "y"))
-    for run in (derived.python, derived.compiled):
-        assert run(0.0, 0.6) == (3.6, 0.0, 6.0)
+    assert derived(0.0, 0.6) == (3.6, 0.0, 6.0)
 
 
 # --- tuples ---------------------------------------------------------------------------------------
@@ -210,7 +210,6 @@ def test_options_decide_what_there_is(damped: bool | None, doubled: bool | None)
     o = Options(damped, doubled)
     derived = check(optional, ("x", "y"), {"o": o, "extra": None}, x=0.7, y=1.3, o=o, extra=None)
     assert len(derived.entries) == (1 if damped is None else 2)
-    assert "exp" not in derived.source or damped
     said = {"o.damped": damped, "o.doubled": doubled}
     check(forwarding, ("x", "y"), said, x=0.7, y=1.3, o=o)
 
@@ -246,7 +245,7 @@ def _(x: float, y: float) -> tuple[float, float]:
 
 
 def test_declared_rules() -> None:
-    assert derive(bent, ("x", "y")).python(-0.7, 1.3)[1:] == (1.4, 1.0)
+    assert derive(bent, ("x", "y"))(-0.7, 1.3)[1:] == (1.4, 1.0)
 
 
 @equation
@@ -304,7 +303,7 @@ def test_interpolation(x: float) -> None:
 def test_a_knot_counts_to_its_right_and_ends_hold() -> None:
     derived = derive(moving_table, "x")
     k, v = (-1.0, 0.5, 2.0), (0.0, 1.5, 1.5)
-    assert derived.python(0.5, k, v) == (0.75, 1.5)
+    assert derived(0.5, k, v) == (0.75, 1.5)
     assert interpolate(-5.0, k, v) == 0.0
     assert interpolate(9.0, k, v) == 1.5
 
@@ -437,7 +436,7 @@ def ties(x: float, y: float) -> tuple[float, float, float, float]:
 
 def test_at_a_tie_the_last_argument_counts() -> None:
     derived = derive(ties, ("x", "y"))
-    values = derived.python(2.0, 2.0)
+    values = derived(2.0, 2.0)
     slopes = dict(zip(derived.entries, values[4:], strict=True))
     assert slopes == {
         (0, 0): 0.0, (0, 1): 1.0, (1, 0): 0.0, (1, 1): 1.0, (2, 0): 1.0, (2, 1): -1.0,
@@ -452,8 +451,7 @@ def endless(x: float) -> tuple[float, float, float, float, float]:
 
 def test_an_infinite_slope_counts_as_none() -> None:
     derived = derive(endless, "x")
-    for run in (derived.python, derived.compiled):
-        assert run(0.0)[5:] == (0.0, 0.0, 0.0, 0.0, 0.0)[: len(derived.entries)]
+    assert derived(0.0)[5:] == (0.0, 0.0, 0.0, 0.0, 0.0)[: len(derived.entries)]
 
 
 @equation
@@ -463,8 +461,7 @@ def unlimited(x: float, rate: float) -> float:
 
 def test_an_infinite_limit_does_no_harm() -> None:
     derived = derive(unlimited, "x")
-    for run in (derived.python, derived.compiled):
-        assert run(0.5, math.inf) == (1.0, 2.0)
+    assert derived(0.5, math.inf) == (1.0, 2.0)
 
 
 @equation
@@ -517,7 +514,7 @@ def shared_arc(x: float) -> float:
 def test_a_value_of_sides_that_are_not_taken_does_no_harm(
     function: Any, x: float, slope: float
 ) -> None:
-    assert derive(function, "x").compiled(x)[1] == pytest.approx(slope, rel=1e-14)
+    assert derive(function, "x")(x)[1] == pytest.approx(slope, rel=1e-14)
 
 
 @equation
@@ -534,13 +531,13 @@ def link_of_a_chain(x: float) -> tuple[float, float]:
 
 @pytest.mark.skipif(JIT_OFF, reason="plain Python refuses 1/0 where the equation asks for it")
 def test_a_guard_holds_for_what_is_divided_by_and_along_a_chain() -> None:
-    derived = derive(guarded_divisor, "x").compiled
+    derived = derive(guarded_divisor, "x")
     assert derived(0.0) == (0.0, 0.0)
     assert derived(4.0) == (2.5, 0.25 - 1.0 / 16.0)
     chain = derive(link_of_a_chain, "x")
-    slopes = dict(zip(chain.entries, chain.compiled(0.0)[2:], strict=True))
+    slopes = dict(zip(chain.entries, chain(0.0)[2:], strict=True))
     assert slopes[1, 0] == 0.0
-    assert chain.compiled(2.0)[2:] == (-0.25, -0.25)
+    assert chain(2.0)[2:] == (-0.25, -0.25)
 
 
 @equation
@@ -561,7 +558,7 @@ def both_ways(x: float) -> float:
 
 
 def test_a_rule_is_that_of_its_options() -> None:
-    assert derive(both_ways, "x").python(0.5) == (5.5, 1.0 + 10.0)
+    assert derive(both_ways, "x")(0.5) == (5.5, 1.0 + 10.0)
 
 
 @equation
@@ -578,10 +575,10 @@ def between(low: float, high: float, a: float) -> float:
 def test_a_bracket_may_fall(ends: tuple[float, float]) -> None:
     derived = derive(between, ("low", "high", "a"))
     assert derived.inputs == ("low", "high", "a")
-    value, *slopes = derived.python(*ends, 0.25)
+    value, *slopes = derived(*ends, 0.25)
     assert value == pytest.approx(0.25, rel=1e-15)
     assert slopes == [0.0, 0.0, 1.0]
-    value, *slopes = derived.python(*ends, 3.0)  # beyond: the nearer end
+    value, *slopes = derived(*ends, 3.0)  # beyond: the nearer end
     assert value == 1.0
     assert slopes == [float(ends[0] == 1.0), float(ends[1] == 1.0), 0.0]
 
@@ -595,7 +592,7 @@ def halved(x: float) -> float:
 
 
 def test_a_constant_may_be_numpys() -> None:
-    assert derive(halved, "x").python(3.0) == (1.5, 0.5)
+    assert derive(halved, "x")(3.0) == (1.5, 0.5)
 
 
 # --- what comes together --------------------------------------------------------------------------
@@ -631,13 +628,31 @@ def test_options_that_hold_parameters() -> None:
     derived = derive(rubbed, ("v", "p"), options={"p": on})
     assert derived.inputs == ("v", "p.mass", "p.friction.force", "p.friction.width", "p.bias")
     slopes = (1.0 + 0.1 * (0.5 - 0.5 / 3.0), -0.025, -0.1 / 3.0, 0.05 / 9.0, 0.1)
-    for run in (derived.python, derived.compiled):
-        assert run(1.0, on) == pytest.approx((1.0 + 0.1 * (0.75 - 0.5 / 3.0), *slopes))
+    assert derived(1.0, on) == pytest.approx((1.0 + 0.1 * (0.75 - 0.5 / 3.0), *slopes))
     derived = derive(rubbed, ("v", "p"), options={"p.friction": None, "p.bias": None})
     assert derived.inputs == ("v", "p.mass")
-    for run in (derived.python, derived.compiled):
-        assert run(1.0, off) == pytest.approx((1.05, 1.05, -0.025))
+    assert derived(1.0, off) == pytest.approx((1.05, 1.05, -0.025))
     decided = derive(rubbed, (), options={"p": on})
     assert decided.entries == ()
-    for run in (decided.python, decided.compiled):
-        assert run(1.0, on) == pytest.approx((1.0 + 0.1 * (0.75 - 0.5 / 3.0),))
+    assert decided(1.0, on) == pytest.approx((1.0 + 0.1 * (0.75 - 0.5 / 3.0),))
+
+
+def scaled(factor: float) -> Any:
+    @equation
+    def scaling(x: float) -> float:
+        return factor * x
+
+    return scaling
+
+
+double, triple = scaled(2.0), scaled(3.0)
+
+
+@equation
+def both_scaled(x: float) -> float:
+    return double(x) * triple(x)
+
+
+def test_functions_of_one_name_are_kept_apart() -> None:
+    assert derive(both_scaled, "x")(2.0) == (24.0, 24.0)
+    assert closure_hash(double) != closure_hash(triple)

@@ -235,7 +235,7 @@ def test_a_helper_alone_that_is_run_again_counts(monkeypatch: pytest.MonkeyPatch
     found = derive(space["deeper"], "x")
     assert found.python(1.0) == (1.0, 4.0)
     cell(105, "GAIN = 6.0", space)
-    assert derive(space["deeper"], "x").python(1.0) == (3.0, 6.0)
+    assert derive(space["deeper"], "x")(1.0) == (3.0, 6.0)
 
 
 TABLES = """

@@ -41,9 +41,9 @@ import swashplate.equations.code_generation.machine_code as machine_code
 compiled = []
 compile_one = machine_code._compiled
 
-def counted(name, text):
+def counted(name, text, **how):
     compiled.append(name)
-    return compile_one(name, text)
+    return compile_one(name, text, **how)
 
 machine_code._compiled = counted
 import machine

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 from tests.equations.differences import compared
+from tests.equations.printed import assert_printed
 
 from swashplate.equations import derive, equation
 
@@ -117,3 +118,4 @@ def test_random_equations(body: str, at: tuple[float, ...]) -> None:
     assert set(derived.inputs) == {"x", "y", "p.k", "p.l"}
     arguments = {"x": at[0], "y": at[1], "p": Gains(*at[2:])}
     assume(compared(getattr(f, "py_func", f), derived, arguments))
+    assert_printed(f, derived, arguments)

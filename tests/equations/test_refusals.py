@@ -160,7 +160,7 @@ def test_a_function_without_a_file_is_refused() -> None:
 def test_a_notebooks_cell_is_a_source() -> None:
     text = "@equation\ndef f(x: float) -> float:\n    return x * x\n"
     f = defined(text, "/tmp/ipykernel_123/456.py")
-    assert derive(f, "x").python(3.0) == (9.0, 6.0)
+    assert derive(f, "x")(3.0) == (9.0, 6.0)
 
 
 def test_two_equations_that_call_each_other_are_refused() -> None:

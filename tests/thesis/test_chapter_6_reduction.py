@@ -161,14 +161,14 @@ def test_eq_6_72_to_6_74_and_erratum_23_slopes_at_rest(hoist: Drive) -> None:
     6.74 has α_sw in place of the opening, on which alone the rate depends.
     """
     p = tuple_from(Pump, hoist.replace(Z18=0.0).parameters.numbers)
-    spool = derive(control.spool_balance, by=("force", "arm_sine")).python(0.0, 0.0, p)[1:]
+    spool = derive(control.spool_balance, by=("force", "arm_sine"))(0.0, 0.0, p)[1:]
     assert spool == pytest.approx((p.Z5**2 / sqrt(p.Z4), -p.Z5))
-    (sine,) = derive(control.arm_sine, by=("pressure",)).python(0.0, p)[1:]
-    (plate,) = derive(control.swash_tangent, by=("pressure",)).python(0.0, p)[1:]
+    (sine,) = derive(control.arm_sine, by=("pressure",))(0.0, p)[1:]
+    (plate,) = derive(control.swash_tangent, by=("pressure",))(0.0, p)[1:]
     assert (plate, sine) == pytest.approx((p.Z1, p.Z3 * p.Z1))
-    rate = derive(
-        control.pressure_rate, by=("pressure", "opening"), options={"symmetric": None}
-    ).python(0.0, 0.0, control.Stroking(p.Z6, 0.0, p.Z8, p.Z9), None)[1:]
+    rate = derive(control.pressure_rate, by=("pressure", "opening"), options={"symmetric": None})(
+        0.0, 0.0, control.Stroking(p.Z6, 0.0, p.Z8, p.Z9), None
+    )[1:]
     assert rate == pytest.approx((0.0, p.Z8 * sqrt(p.Z9 / 2.0) / (1.0 + p.Z6)))
 
 

@@ -2,9 +2,9 @@ from . import graph as graph
 from .cache import cache_folder as cache_folder
 from .cache import kernel as kernel
 from .cache import no_cache_reason as no_cache_reason
+from .code_generation.derivatives import Derived as Derived
 from .code_generation.derivatives import declared as declared
 from .code_generation.derivatives import derive as derive
-from .code_generation.gradients import Derived as Derived
 from .code_generation.loops import interpolate as interpolate
 from .code_generation.loops import repeated as repeated
 from .code_generation.loops import root as root

@@ -81,27 +81,14 @@ def module_of(function: FunctionType) -> str:
 
 
 def source(function: Any) -> str:
-    """Text of an equation, or of a function that was derived from one.
-
-    Parameters
-    ----------
-    function : equation, Derived or callable
-        Whose text.
-
-    Returns
-    -------
-    str
-        Python.
+    """Text of an equation, as it stands in its file.
 
     Examples
     --------
-    >>> from swashplate.equations import derive, soft_threshold, source
-    >>> "def soft_threshold_by_value" in source(derive(soft_threshold, "value"))
+    >>> from swashplate.equations import soft_threshold, source
+    >>> "def soft_threshold" in source(soft_threshold)
     True
     """
-    text = getattr(function, "source", None)
-    if isinstance(text, str):
-        return text
     try:
         return inspect.getsource(plain(function))
     except (OSError, TypeError):

@@ -8,7 +8,7 @@ Besides arithmetic there are
 
 - "if": one of two values, by a test; `and` and `or` are choices with a literal side;
 - "ruled": a value whose derivatives are declared, by the `DerivativeRule` in the node's `value`;
-- "call" of a generated function, and "result", one of the numbers that it returns.
+- "call" of an equation apart, and "result", one of the numbers that it returns.
 """
 
 from __future__ import annotations
@@ -74,24 +74,22 @@ class DerivativeRule:
 
 
 class Call:
-    """A generated function that is called, and how its derivatives are had.
+    """An equation that is called apart, and how its derivatives are had.
 
-    `results` is how many numbers the function returns. `derivative` takes a node that calls it and
-    indices of arguments that move; it gives a call that returns the same numbers first, and nodes
-    of their derivatives by the indices of result and argument. None if nothing flows through it.
-    `loop` says what the function does, from which other languages print theirs.
+    `results` is how many numbers it returns, `loop` says what it does. `derivative` takes a node
+    that calls it and indices of arguments that move; it gives a call that returns the same numbers
+    first, and nodes of their derivatives by the indices of result and argument. None if nothing
+    flows through it.
     """
 
     def __init__(
         self,
-        function: Any,
         results: int,
+        loop: Any,
         derivative: Callable[[Node, tuple[int, ...]], tuple[Node, dict[tuple[int, int], Node]]]
         | None = None,
-        loop: Any = None,
     ) -> None:
-        self.function, self.results, self.derivative = function, results, derivative
-        self.loop = loop
+        self.results, self.loop, self.derivative = results, loop, derivative
 
 
 _nodes: dict[tuple[Any, ...], Node] = {}

@@ -2,7 +2,6 @@ from .evaluation import evaluated as evaluated
 from .functions import FUNCTIONS as FUNCTIONS
 from .functions import GENERATING as GENERATING
 from .functions import RESERVED as RESERVED
-from .functions import Function as Function
 from .functions import forget_generated as forget_generated
 from .functions import fresh_name as fresh_name
 from .functions import generating as generating
@@ -10,7 +9,6 @@ from .functions import generating_time as generating_time
 from .printing import STEMS as STEMS
 from .printing import CodeBlock as CodeBlock
 from .printing import assigned as assigned
-from .printing import function_source as function_source
 from .printing_c import HELPERS as HELPERS
 from .printing_c import C as C
 from .printing_c import Loops as Loops

@@ -1,19 +1,58 @@
-"""Derivatives of equations: from the source of a value, the source of value and partials."""
+"""Derivatives of single equations, and rules that stand in their place."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from hashlib import blake2b
+from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from swashplate.equations.code_generation.functions import GENERATING
-from swashplate.equations.code_generation.gradients import Derived, derived_function, listed
+from swashplate.equations.code_generation.program import Program, program_of
 from swashplate.equations.code_generation.tracing import Trace
 from swashplate.equations.code_generation.values import Value, arguments, leaves
-from swashplate.equations.declaration import RULES, closure_hash, inlined, module_of
+from swashplate.equations.declaration import RULES, closure_hash, inlined
 from swashplate.equations.language import parsed, plain
 
 F = TypeVar("F", bound=Callable[..., Any])
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Derived:
+    """An equation that gives its values, then its partial derivatives, as one flat tuple.
+
+    Attributes
+    ----------
+    outputs, inputs : tuple of str
+        Dotted paths of the results, and of what they are differentiated by.
+    entries : tuple of (int, int)
+        Numbers of output and input of each partial derivative that is not structurally zero, in
+        the order in which they follow the values.
+    """
+
+    outputs: tuple[str, ...]
+    inputs: tuple[str, ...]
+    entries: tuple[tuple[int, int], ...]
+    names: tuple[str, ...]
+    """The equation's arguments."""
+    places: tuple[tuple[str, str], ...]
+    """Argument and path of each number that the program takes."""
+    program: Program
+
+    def __call__(self, *arguments: Any) -> tuple[Any, ...]:
+        """Values and derivatives for some arguments of the equation."""
+        given = dict(zip(self.names, arguments, strict=True))
+        numbers = [_at(given[name], path) for name, path in self.places]
+        slopes = self.program.slopes(numbers) if self.entries else None
+        partials = () if slopes is None else (float(slopes[entry]) for entry in self.entries)
+        return (*self.program.values(numbers), *partials)
+
+
+def _at(value: Any, path: str) -> Any:
+    """What lies at a dotted path of nested tuples, with names or numbers."""
+    for word in path.split(".") if path else ():
+        value = value[int(word)] if word.isdigit() else getattr(value, word)
+    return value
+
 
 _derived_functions: dict[Any, Derived] = {}
 
@@ -56,7 +95,7 @@ def derive(
     options: Mapping[str, Any] | None = None,
     lengths: Mapping[str, int] | None = None,
 ) -> Derived:
-    """Value and partial derivatives of an equation, as a function made from its source.
+    """Value and partial derivatives of an equation.
 
     Parameters
     ----------
@@ -74,7 +113,7 @@ def derive(
     Returns
     -------
     Derived
-        All that the equation calls is written out in it.
+        It is called as the equation is, and gives one flat tuple.
 
     Raises
     ------
@@ -89,15 +128,12 @@ def derive(
         key = (plain(function), settings, closure_hash(function))
         if key not in _derived_functions:
             values = arguments(parsed(function), options, lengths)
-            digest = blake2b(settings.encode(), digest_size=3).hexdigest()
-            _derived_functions[key] = _derived(
-                function, by, values, f"_{digest}" if options else ""
-            )
+            _derived_functions[key] = _derived(function, by, values)
         return _derived_functions[key]
 
 
-def _derived(function: Any, by: tuple[str, ...], values: Mapping[str, Value], mark: str) -> Derived:
-    """What `derive` makes for some arguments; `mark` ends its name."""
+def _derived(function: Any, by: tuple[str, ...], values: Mapping[str, Value]) -> Derived:
+    """What `derive` makes for some arguments."""
     source = parsed(function)
     floats = {
         f"{name}.{path}" if path else name: node.value
@@ -122,16 +158,17 @@ def _derived(function: Any, by: tuple[str, ...], values: Mapping[str, Value], ma
         inputs |= below
     trace = Trace()
     results = [(path or "value", node) for path, node in leaves(trace.call(function, values))]
-    label = "_".join(path.rpartition(".")[2] for path in inputs)
-    label = label if len(label) <= 32 else f"{len(inputs)}"
-    name = f"{source.name}_by_{label}{mark}" if inputs else f"{source.name}_decided{mark}"
-    says = f"derivatives by {listed([*inputs])}" if inputs else "options decided"
-    return derived_function(
-        name,
-        f"{source.name} with its {says} ({module_of(source.function)}, line {source.node.lineno}).",
-        [argument.arg for argument in source.arguments],
-        results,
-        [*inputs.items()],
-        trace.labels,
-        chained=True,
+    nodes = [node for _, node in results]
+    arguments = sorted({node.value for value in values.values() for _, node in leaves(value)})
+    program = program_of(nodes, [*inputs.values()], arguments=arguments)
+    places = {
+        node.value: (name, path) for name, value in values.items() for path, node in leaves(value)
+    }
+    return Derived(
+        outputs=tuple(path for path, _ in results),
+        inputs=tuple(inputs),
+        entries=tuple(program.entries),
+        names=tuple(values),
+        places=tuple(places[argument] for argument in arguments),
+        program=program,
     )

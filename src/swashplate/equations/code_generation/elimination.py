@@ -12,9 +12,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
+from typing import Literal
 
 from swashplate.equations.code_generation.slopes import Contribution, Slopes, total_of
-from swashplate.equations.graph import TRUE, ZERO, Node, both, times
+from swashplate.equations.graph import ONE, TRUE, ZERO, Node, both, times
 
 SIDE_BY_SIDE = 8
 """Columns that are carried side by side in one instruction, or in two or four."""
@@ -39,8 +40,8 @@ class Elimination:
         How many derivatives a vertex carries.
     stands_for : mapping of Node to Node
         Nodes that names stand for.
-    keep_all : bool
-        Whether no vertex is eliminated, as a reference.
+    keep : {"cheaper", "all", "results"}
+        What stays of the others: what is cheaper to keep, all of them as a reference, or none.
 
     Attributes
     ----------
@@ -56,8 +57,7 @@ class Elimination:
         columns: Sequence[Node],
         count: int,
         stands_for: Mapping[Node, Node] = MappingProxyType({}),
-        *,
-        keep_all: bool = False,
+        keep: Literal["cheaper", "all", "results"] = "cheaper",
     ) -> None:
         self._vectors = -(-count // SIDE_BY_SIDE)
         self._columns = dict.fromkeys(columns)
@@ -82,23 +82,31 @@ class Elimination:
         for node in self._inner:  # from the results back: what none of them follows
             if not self._out[node]:
                 self._drop(node)
-        if not keep_all:
-            self._eliminate()
+        if keep == "cheaper":
+            self._eliminate_dearer()
+        elif keep == "results":
+            for node in reversed(self._vertices):
+                if node in self.edges:
+                    self._pass_by(node)
+                    if node not in wanted:
+                        self._drop(node)
 
     def _drop(self, node: Node) -> None:
         for operand in self.edges.pop(node):
             del self._out[operand][node]
 
-    def _eliminate(self) -> None:
-        """Eliminate what is cheaper without, until nothing changes."""
+    def _eliminate_dearer(self) -> None:
+        """Eliminate what is dearer to keep, until nothing changes."""
         before = None
         while before != len(self.edges):
             before = len(self.edges)
             for node in self._inner:
                 if node in self.edges and self._gain(node) >= 0.0:
-                    self._eliminate_one(node)
+                    self._pass_by(node)
+                    self._drop(node)
 
-    def _eliminate_one(self, node: Node) -> None:
+    def _pass_by(self, node: Node) -> None:
+        """Replace what follows a vertex by ways to all that it follows itself."""
         within = self.edges[node]
         for later in self._out[node]:
             edges = self.edges[later]
@@ -109,7 +117,7 @@ class Elimination:
                     continue
                 edges[operand] = total_of([edges[operand], way]) if operand in edges else way
                 self._out[operand][later] = None
-        self._drop(node)
+        self._out[node] = {}
 
     def _chained(self, outer: Contribution, inner: Contribution) -> Contribution:
         """The derivative by way of a vertex."""
@@ -153,3 +161,21 @@ class Elimination:
         if amount.op == "number":
             return LITERAL * self._vectors
         return self._vectors + 2.0 * SCALAR
+
+
+def partials_of(results: Sequence[Node], by: Sequence[Node]) -> dict[tuple[int, int], Node]:
+    """Partial derivatives of results by some nodes that are not structurally zero.
+
+    By the indices of result and node.
+    """
+    edges = Elimination(results, (), by, len(by), keep="results").edges
+    number_of = {node: number for number, node in enumerate(by)}
+    partials = dict[tuple[int, int], Node]()
+    for number, result in enumerate(results):
+        if result in number_of:
+            partials[number, number_of[result]] = ONE
+        for node, contribution in edges.get(result, {}).items():
+            amount = contribution.zero_elsewhere
+            if amount is not ZERO:
+                partials[number, number_of[node]] = amount
+    return dict(sorted(partials.items()))

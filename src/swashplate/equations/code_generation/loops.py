@@ -8,14 +8,8 @@ from math import inf
 from typing import Any, Literal, NamedTuple, TypeVar
 
 from swashplate.equations import graph
-from swashplate.equations.code_generation.functions import FUNCTIONS, RESERVED, Function, fresh_name
-from swashplate.equations.code_generation.gradients import partials_of
-from swashplate.equations.code_generation.printing import (
-    UNNAMED,
-    function_source,
-    function_text,
-    named_by_text,
-)
+from swashplate.equations.code_generation.elimination import partials_of
+from swashplate.equations.code_generation.functions import FUNCTIONS, RESERVED, fresh_name
 from swashplate.equations.code_generation.runner import Callee, Runner
 from swashplate.equations.code_generation.values import Flag, Tuple, Value, alike, leaves, rebuilt
 from swashplate.equations.declaration import inlined
@@ -168,23 +162,10 @@ class Inner(NamedTuple):
         """Name of the equation."""
         return self.source.name
 
-    def function(self, *, always_tuple: bool = False) -> Function:
-        """The equation as a function of scalars, which returns a tuple if it is `always_tuple`."""
-        nodes = [node for _, node in leaves(self.result)]
-        formals = [*self.leading, *self.formals]
-        name = f"{self.name}_{UNNAMED}"
-        docstring = f"{self.name} of scalars."
-        text, names = function_text(
-            name, docstring, formals, nodes, self.labels, always_tuple=always_tuple
-        )
-        return Function(*named_by_text(name, text), dict(names))
-
 
 class Loop(NamedTuple):
-    """What a generated call does, for other languages."""
+    """What a call does."""
 
-    name: str
-    """Name of the generated function."""
     kind: Literal["root", "repeated", "once"]
     inner: Inner
 
@@ -236,11 +217,10 @@ def _inner(outer: Runner, callee: Callee, leading: Sequence[Value], rest: Sequen
 
 
 def called_apart(trace: Runner, callee: Callee, values: Sequence[Value]) -> Value:
-    """An equation as a call of a generated function, without derivatives."""
+    """An equation as a call, without derivatives."""
     inner = _inner(trace, callee, [], values)
-    function = inner.function(always_tuple=True)
     count = sum(1 for _ in leaves(inner.result))
-    called = Call(function, count, loop=Loop(function.name, "once", inner))
+    called = Call(count, Loop("once", inner))
     call = make("call", *inner.actuals, value=called)
     results = [trace.make("result", call, value=index) for index in range(count)]
     if count == 1:
@@ -249,21 +229,14 @@ def called_apart(trace: Runner, callee: Callee, values: Sequence[Value]) -> Valu
 
 
 def solved(trace: Runner, callee: Callee, low: Value, high: Value, rest: Sequence[Value]) -> Value:
-    """`root` as a call of a generated function, with the rule of its derivatives."""
+    """`root` as a call, with the rule of its derivatives."""
     residual = callee.source
     inner = _inner(trace, callee, [graph.name("x")], rest)
     if not (isinstance(inner.result, Node) and isinstance(low, Node) and isinstance(high, Node)):
         trace.under_way[-1].source.refuse(
             None, "a residual or a bracket that is a tuple", "let each be one float"
         )
-    function = inner.function()
-    ends = [fresh_name(end_name, inner.used_names) for end_name in ("low", "high")]
-    arguments = ", ".join([*ends, *inner.formals])
-    name = f"root_of_{function.name}"
-    return_line = f"return (root({function.name}, {arguments}),)"
-    text = function_source(f"{name}({arguments})", f"Root of {residual.name}.", [return_line], "")
-    solver = Function(name, text, {function.name: function})
-    called = Call(solver, 1, loop=Loop(name, "root", inner))
+    called = Call(1, Loop("root", inner))
     call = make("call", low, high, *inner.actuals, value=called)
     x = trace.make("result", call, value=0)
     trace.label(x, "root")
@@ -302,7 +275,7 @@ def solved(trace: Runner, callee: Callee, low: Value, high: Value, rest: Sequenc
 def repetition(
     trace: Runner, callee: Callee, count: Value, state: Value, rest: Sequence[Value]
 ) -> Value:
-    """`repeated` as a call of a generated function, with one that carries its derivatives along."""
+    """`repeated` as a call, with one that carries its derivatives along."""
     step = callee.source
     inner = _inner(trace, callee, [state, graph.name("number")], rest)
     names: tuple[str, ...] = ("state",)
@@ -326,23 +299,9 @@ def repetition(
 def _repeated(
     inner: Inner, arguments: Sequence[Node], derivative: Callable[..., Any] | None = None
 ) -> Node:
-    """A call of a generated function that repeats an equation: of count, states and formals."""
-    *state_names, number = inner.leading
-    count = fresh_name("count", {*inner.used_names})
-    formals = [count, *state_names, *inner.formals]
-    function = inner.function(always_tuple=True)
-    given = ", ".join([*state_names, f"float({number})", *inner.formals])
-    lines = [
-        f"for {number} in range(int({count})):",
-        f"    {', '.join(state_names)}, = {function.name}({given})",
-        f"return {', '.join(state_names)},",
-    ]
-    name = f"repeated_{function.name}"
-    docstring = f"{inner.name}, repeated."
-    text = function_source(f"{name}({', '.join(formals)})", docstring, lines, "")
-    called = Function(name, text, {function.name: function})
-    loop = Loop(name, "repeated", inner)
-    return make("call", *arguments, value=Call(called, len(state_names), derivative, loop))
+    """A call that repeats an equation: of count, states and formals."""
+    count = len(inner.leading) - 1
+    return make("call", *arguments, value=Call(count, Loop("repeated", inner), derivative))
 
 
 def _derivatives(call: Node, moving: tuple[int, ...]) -> tuple[Node, dict[tuple[int, int], Node]]:
@@ -356,7 +315,7 @@ def _derivatives(call: Node, moving: tuple[int, ...]) -> tuple[Node, dict[tuple[
     states = [graph.name(name) for name in state_names]
     formals = [graph.name(name, kind) for name, kind in inner.formals.items()]
     following = [node for _, node in leaves(inner.result)]
-    partials = partials_of(following, [*states, *formals], chained=True)
+    partials = partials_of(following, [*states, *formals])
     used_names = {*inner.used_names}
     tangents, begins, becomes = dict[tuple[int, int], Node](), list[Node](), list[Node]()
     moving = tuple(index for index in moving if index > 0)

@@ -1,8 +1,8 @@
-"""The graph printed: as Python, which Numba compiles, and as C99.
+"""The graph printed for people: as statements with names.
 
 Every value that is needed twice, and every one that an equation calls by a name, gets a name where
 it is first needed; what nobody needs is left out. The operations stay as the equations have them,
-so that both languages give the same bits.
+so that what is compiled gives the same bits.
 """
 
 from __future__ import annotations
@@ -11,13 +11,12 @@ import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
-from hashlib import blake2b
 from textwrap import TextWrapper
 from typing import Any, NamedTuple
 
-from swashplate.equations.code_generation.functions import FUNCTIONS, RESERVED, Function, fresh_name
+from swashplate.equations.code_generation.functions import fresh_name
 from swashplate.equations.code_generation.scheduling import Conditional, Region, Schedule
-from swashplate.equations.graph import COMPARISONS, FALSE, LEAVES, TRUE, Node, plain_value
+from swashplate.equations.graph import LEAVES, Node, plain_value
 
 WIDTH = 96
 """Characters of a line."""
@@ -33,9 +32,6 @@ STEMS = {
 
 Text = tuple[str, int]
 """An expression, and how tightly it binds: `ATOM` needs no brackets anywhere."""
-_LEVELS = (("if",), ("or",), ("and",), ("not",), COMPARISONS, ("+", "-"), ("*", "/"), ("neg",))
-PRECEDENCE = {op: level for level, ops in enumerate(_LEVELS, 1) for op in ops}
-POWER = 9
 ATOM = 10
 ONCE, ALL = 1, 2
 """Of a choice: one side is computed, or both are and one is taken."""
@@ -91,75 +87,6 @@ def grouped(text: Text, level: int) -> str:
     return text[0] if text[1] >= level else f"({text[0]})"
 
 
-class Python(Language):
-    """Python, for people and for whoever compiles it."""
-
-    def number(self, value: Any) -> Text:
-        """A literal number."""
-        text = repr(value)
-        return text, ATOM if text[0] != "-" else PRECEDENCE["neg"]
-
-    def operation(self, node: Node, operands: Sequence[Text], computed: int) -> Text:
-        """An operation on texts."""
-        op, level = node.op, PRECEDENCE.get(node.op, ATOM)
-        if op == "if":
-            return self._choice(node, operands)
-        if op == "not":
-            return f"not {grouped(operands[0], level)}", level
-        if op == "neg":
-            return f"-{grouped(operands[0], level + 1)}", level
-        if op == "**":
-            return f"{grouped(operands[0], ATOM)}**{node.value!r}", POWER
-        if level < ATOM:
-            left_level = level + 1 if op in COMPARISONS else level
-            return (
-                f"{grouped(operands[0], left_level)} {op} {grouped(operands[1], level + 1)}",
-                level,
-            )
-        return f"{op}({', '.join(text for text, _ in operands)})", ATOM
-
-    def _choice(self, node: Node, texts: Sequence[Text]) -> Text:
-        _, if_true, if_false = node.args
-        test, text_if_true, text_if_false = texts
-        if if_false is FALSE or if_true is TRUE:
-            word, second = ("and", text_if_true) if if_false is FALSE else ("or", text_if_false)
-            level = PRECEDENCE[word]
-            return f"{grouped(test, level + 1)} {word} {grouped(second, level)}", level
-        return (
-            f"{grouped(text_if_true, 2)} if {grouped(test, 2)} else {grouped(text_if_false, 1)}",
-            PRECEDENCE["if"],
-        )
-
-    def assigned(self, name: str, node: Node, text: str, pad: str, *, new: bool) -> list[str]:
-        """Lines of an assignment."""
-        return assigned(name, text, pad)
-
-    def called(
-        self,
-        call: Node,
-        targets: Sequence[str],
-        arguments: Sequence[str],
-        declared: set[str],
-        pad: str,
-    ) -> list[str]:
-        """A call whose tuple comes apart."""
-        unpacked = ", ".join(target or "_" for target in targets) + (
-            "," if len(targets) == 1 else ""
-        )
-        return assigned(unpacked, f"{call.value.function.name}({', '.join(arguments)})", pad)
-
-    def branch(self, test: str, then: list[str], otherwise: list[str], pad: str) -> list[str]:
-        """Lines of an `if` and its `else`."""
-        if not then:
-            return [*bracketed("if not (", test, "):", pad), *otherwise]
-        fits = len(pad) + len(test) < WIDTH - 4
-        head = [f"{pad}if {test}:"] if fits else bracketed("if (", test, "):", pad)
-        return [*head, *then, *([f"{pad}else:", *otherwise] if otherwise else [])]
-
-
-PYTHON = Python()
-
-
 # --- blocks ---------------------------------------------------------------------------------------
 
 
@@ -197,8 +124,6 @@ class CodeBlock:
         What is computed, in order.
     lines, texts : list of str
         The lines of these, and the results by the names that they make.
-    functions : dict of str to Function
-        What the lines call.
     names : dict of Node to str
         Values that have a name after the block, those of branches left out.
     """
@@ -210,12 +135,11 @@ class CodeBlock:
         used_names: set[str],
         *,
         available: Mapping[Node, str] | None = None,
-        language: Language = PYTHON,
+        language: Language,
         named: bool = False,
     ) -> None:
         self._labels, self._used_names, self._available = labels, used_names, dict(available or {})
         self._language = language
-        self.functions: dict[str, Function] = {}
         self._schedule = Schedule(results, self._available)
         self._reads: set[str] = set()
         self._written_nodes: list[Node] = []
@@ -359,8 +283,6 @@ class CodeBlock:
 
     def _call(self, call: Node, region: Region, pad: str) -> tuple[list[str], list[str]]:
         """Lines of a call, whose results are a tuple."""
-        function: Function = call.value.function
-        self.functions[function.name] = function
         targets = [""] * call.value.results
         declared = set[str]()
         for node in region.nodes:
@@ -498,50 +420,3 @@ def assigned(left: str, text: str, pad: str = "") -> list[str]:
 def indented(lines: Iterable[str]) -> list[str]:
     """Lines indented by four spaces."""
     return [f"    {line}" for line in lines]
-
-
-def function_source(head: str, docstring: str, lines: Iterable[str], mark: str = "@kernel") -> str:
-    """Text of a function."""
-    head = f"{mark}\ndef {head}:" if mark else f"def {head}:"
-    return "\n".join([head, f'    """{docstring}"""', *indented(lines), ""])
-
-
-def function_text(
-    name: str,
-    docstring: str,
-    parameters: Sequence[str],
-    results: Sequence[Node],
-    labels: Mapping[Node, str],
-    *,
-    always_tuple: bool = False,
-) -> tuple[str, dict[str, Function]]:
-    """Text of a function of scalars, and the generated functions that it calls.
-
-    It returns a tuple of the results; of a single one the number, unless it is `always_tuple`.
-    """
-    arguments = {parameter.partition(".")[0] for parameter in parameters}
-    block = CodeBlock(results, labels, {*FUNCTIONS, *arguments, *RESERVED, name})
-    returned = ", ".join(block.texts) or "()"
-    if len(results) == 1 and always_tuple:
-        returned += ","
-    if len(returned) < WIDTH - 10:
-        return_lines = [f"return {returned}"]
-    else:
-        return_lines = bracketed("return (", returned, ")")
-    head = bracketed(f"def {name}(", ", ".join(parameters), "):")
-    if len(docstring) > WIDTH - 6:
-        # a parenthesis at its end goes onto a line of its own
-        docstring = "\n    (".join(docstring.rsplit(" (", 1))
-    body = indented([*block.lines, *return_lines])
-    text = "\n".join([*head, f'    """{docstring}"""', *body, ""])
-    return text, block.functions
-
-
-UNNAMED = "00000000"
-"""Placeholder in a function's name for the hash of its text, until that is known."""
-
-
-def named_by_text(name: str, text: str) -> tuple[str, str]:
-    """Name and text of a function, with the hash of its text instead of `UNNAMED`."""
-    digest = blake2b(text.encode(), digest_size=4).hexdigest()
-    return name.replace(UNNAMED, digest), text.replace(UNNAMED, digest, 1)

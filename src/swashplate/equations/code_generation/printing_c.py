@@ -453,7 +453,7 @@ class Loops:
     def __init__(self, used_names: Iterable[str] = ()) -> None:
         self.texts: list[str] = []
         self.used_names = {*WORDS, *used_names}
-        self._names: dict[str, str] = {}
+        self._names: dict[tuple[Any, ...], str] = {}
 
     def fresh(self, stem: str, used_names: Iterable[str] = ()) -> str:
         """A name for a function."""
@@ -463,9 +463,10 @@ class Loops:
 
     def name_of(self, loop: Any, used_names: set[str]) -> str:
         """Name of the function that does a loop."""
-        key = loop.name
+        inner: Inner = loop.inner
+        nodes = tuple(node for _, node in leaves(inner.result))
+        key = loop.kind, inner.name, nodes, (*inner.leading, *inner.formals)
         if key not in self._names:
-            inner: Inner = loop.inner
             name = self.fresh(inner.source.name, used_names)
             self.texts.append(self.function(name, inner))
             if loop.kind == "once":

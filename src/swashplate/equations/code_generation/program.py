@@ -154,11 +154,12 @@ def program_of(
     """
     arguments = names_of(results, stands_for) if arguments is None else arguments
     columns = [name(each) for each in by]
-    elimination = Elimination(results, (), columns, len(columns), stands_for, keep_all=True)
+    elimination = Elimination(results, (), columns, len(columns), stands_for, keep="all")
     edges = elimination.edges if columns else {}
     amounts = [each.zero_elsewhere for flow in edges.values() for each in flow.values()]
     place_of = {name(argument): place for place, argument in enumerate(arguments)}
-    place_of |= {name(argument, "int"): place for place, argument in enumerate(arguments)}
+    for kind in ("int", "bool"):
+        place_of |= {name(argument, kind): place for place, argument in enumerate(arguments)}
     ends = [*map(plain_value, results), *map(plain_value, amounts)]
     steps = list[Step]()
     for node in ordered(ends, place_of, lambda node: _computed_from(node, stands_for)):

@@ -56,8 +56,6 @@ MARCH = (
 )
 """Of a march: samples, step, length of a row of the outputs, 0 without any, and arrays."""
 MARCH_KINDS = ("int", "float", "int", f"*{FLOATS}", INTS, *(FLOATS,) * 9)
-DIGEST = 8
-"""Characters that the name of a generated function ends in."""
 
 
 def vectorisation_report(model: Model, output: str | None = None, *, options: Any = None) -> str:
@@ -108,8 +106,8 @@ def _called(node: Node) -> str:
     """What a node calls, as a user would say it."""
     if node.op != "call":
         return node.op
-    name, mark, digest = node.value.function.name.rpartition("_")
-    return name if mark and len(digest) == DIGEST else f"{name}{mark}{digest}"
+    word = {"root": "root_of_", "repeated": "repeated_"}.get(node.value.loop.kind, "")
+    return f"{word}{node.value.loop.inner.name}"
 
 
 class Marched(NamedTuple):

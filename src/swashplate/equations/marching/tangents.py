@@ -149,7 +149,7 @@ class Carried:
             [*column_of],
             len(columns),
             sample_code.stands_for,
-            keep_all=keep_all,
+            keep="all" if keep_all else "cheaper",
         )
         self.flows: dict[Node, dict[Node, Contribution]] = {}
         self.direct: dict[Node, dict[int, Node]] = {}
