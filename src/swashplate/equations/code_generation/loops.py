@@ -301,7 +301,8 @@ def _repeated(
 ) -> Node:
     """A call that repeats an equation: of count, states and formals."""
     count = len(inner.leading) - 1
-    return make("call", *arguments, value=Call(count, Loop("repeated", inner), derivative))
+    called = Call(count, Loop("repeated", inner), derivative)
+    return make("call", *arguments, value=called)
 
 
 def _derivatives(call: Node, moving: tuple[int, ...]) -> tuple[Node, dict[tuple[int, int], Node]]:

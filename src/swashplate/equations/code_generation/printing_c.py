@@ -464,8 +464,9 @@ class Loops:
     def name_of(self, loop: Any, used_names: set[str]) -> str:
         """Name of the function that does a loop."""
         inner: Inner = loop.inner
-        nodes = tuple(node for _, node in leaves(inner.result))
-        key = loop.kind, inner.name, nodes, (*inner.leading, *inner.formals)
+        results = [node for _, node in leaves(inner.result)]
+        formals = (*inner.leading.items(), *inner.formals.items())
+        key = loop.kind, inner.name, formals, *self._values_of(results, used_names)
         if key not in self._names:
             name = self.fresh(inner.source.name, used_names)
             self.texts.append(self.function(name, inner))
@@ -481,6 +482,19 @@ class Loops:
             self._names[key] = outer
             used_names |= {name, outer}
         return self._names[key]
+
+    def _values_of(self, results: Sequence[Node], used_names: set[str]) -> list[Node]:
+        """What is computed, without the rules of its derivatives: calls by their names."""
+        values = dict[Node, Node]()
+        for node in graph.ordered(results):
+            operands = [values[operand] for operand in node.args]
+            value = self.name_of(node.value.loop, used_names) if node.op == "call" else node.value
+            values[node] = (
+                operands[0]
+                if node.op == "ruled"
+                else graph.make(node.op, *operands, value=value, kind=node.kind)
+            )
+        return [values[result] for result in results]
 
     def function(self, name: str, inner: Inner) -> str:
         """An equation as a function of scalars; several results go to where pointers say."""
