@@ -1,4 +1,3 @@
-from .evaluation import evaluated as evaluated
 from .functions import FUNCTIONS as FUNCTIONS
 from .functions import GENERATING as GENERATING
 from .functions import RESERVED as RESERVED
@@ -28,6 +27,7 @@ from .printing_c import scalar_function as scalar_function
 from .printing_c import sections as sections
 from .printing_c import without_comments as without_comments
 from .printing_c import wrapped as wrapped
+from .program import program_of as program_of
 from .scheduling import FEW as FEW
 from .tracing import Trace as Trace
 from .values import Flag as Flag

@@ -7,7 +7,9 @@ by side.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Collection, Mapping, Sequence
+from operator import add, eq, ge, gt, le, lt, mul, ne, neg, sub
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -15,11 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.equations.code_generation.elimination import Elimination
-from swashplate.equations.code_generation.evaluation import OPERATIONS, power
 from swashplate.equations.code_generation.loops import Inner, Loop, root
 from swashplate.equations.code_generation.values import leaves
 from swashplate.equations.declaration import interpreted
-from swashplate.equations.graph import Node, name, ordered, plain_value
+from swashplate.equations.graph import MATH_FUNCTIONS, Node, name, ordered, plain_value
 
 Array = NDArray[np.float64]
 
@@ -197,3 +198,46 @@ def _inner(inner: Inner) -> Program:
     """The program of an equation that is called apart, for numbers that stand for its arguments."""
     results = [node for _, node in leaves(inner.result)]
     return program_of(results, arguments=[*inner.leading, *inner.formals])
+
+
+# --- operations, as processors do them ------------------------------------------------------------
+
+
+def power(base: float, exponent: int) -> float:
+    """By squaring, as compilers do."""
+    product, remaining = 1.0, abs(exponent)
+    while remaining:
+        if remaining % 2:
+            product *= base
+        base, remaining = base * base, remaining // 2
+    return product if exponent >= 0 else _over(1.0, product)
+
+
+def _over(a: float, b: float) -> float:
+    """a / b, as processors do it."""
+    if b != 0.0:
+        return a / b
+    if a == 0.0 or a != a:
+        return math.nan
+    return math.copysign(math.inf, a) * math.copysign(1.0, b)
+
+
+def _as_compiled(function: Callable[..., float]) -> Callable[..., float]:
+    """A function of `math` that is not a number, or infinite, where Python raises."""
+
+    def called(*arguments: float) -> float:
+        try:
+            return function(*arguments)
+        except ValueError:
+            return -math.inf if function is math.log and arguments[0] == 0.0 else math.nan
+        except OverflowError:
+            return math.inf
+
+    return called
+
+
+OPERATIONS: dict[str, Callable[..., Any]] = {
+    **{"+": add, "-": sub, "*": mul, "/": _over, "neg": neg, "abs": abs, "min": min, "max": max},
+    **{"<": lt, "<=": le, ">": gt, ">=": ge, "==": eq, "!=": ne, "not": lambda test: not test},
+    **{name: _as_compiled(getattr(math, name)) for name in MATH_FUNCTIONS},
+}

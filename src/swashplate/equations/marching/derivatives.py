@@ -79,7 +79,7 @@ class ObservedMarch:
         if JIT_OFF:
             observed = [output_of(model, output) for output in outputs]
             sample_code = SampleCode(model, signals, options, [signal for signal, _ in observed])
-            self.interpreted = InterpretedTangents(sample_code, observed, columns, begins)
+            self.interpreted = InterpretedTangents(sample_code, observed, columns)
             self.states = self.interpreted.states
             return
         name = f"{model.name}_tangents" if columns else f"{model.name}_residuals"

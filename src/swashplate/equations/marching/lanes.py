@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.equations import graph
-from swashplate.equations.code_generation.evaluation import evaluated
 from swashplate.equations.code_generation.functions import generating
 from swashplate.equations.code_generation.llvm import Code, computed_from
 from swashplate.equations.code_generation.machine_code import code_of_text
+from swashplate.equations.code_generation.program import program_of
 from swashplate.equations.code_generation.scheduling import VECTOR
 from swashplate.equations.code_generation.values import leaves
 from swashplate.equations.declaration import JIT_OFF
@@ -289,21 +289,28 @@ class Lanes:
     # -- without compiled code ---------------------------------------------------------------------
 
     def _interpreted_rest(self, h: float, params: Array, given: Array, states: Array) -> None:
-        sample_code, model = self._interpreted, self._model
+        sample_code, places = self._interpreted, self._model.places("state")
+        begins = {
+            (part.part, path): node
+            for part in sample_code.used
+            for path, node in leaves(part.initial_state())
+            if path in sample_code.carried[part.part]
+        }
+        program = program_of([*begins.values()])
+        outside = sample_code.outside()
         for lane in range(LANES):
-            known: dict[Node, Any] = {graph.name("h"): h}
-            for part in sample_code.used:
-                for numbers, kind, array in (
-                    (part.p, "parameters", params),
-                    (part.given, "given", given),
-                ):
-                    places = model.places(kind)
-                    for path, node in leaves(numbers):
-                        known[node] = float(array[places.index((part.part, path)), lane])
-                initial = dict(leaves(part.initial_state()))
-                for path in sample_code.carried[part.part]:
-                    (value,) = evaluated([initial[path]], known)
-                    states[model.places("state").index((part.part, path)), lane] = value
+            numbers = [
+                self._number(outside[name], h, params[:, lane], given[:, lane])
+                for name in program.arguments
+            ]
+            for place, value in zip(begins, program.values(numbers), strict=True):
+                states[places.index(place), lane] = value
+
+    def _number(self, stored: SignalId, h: float, params: Array, given: Array) -> float:
+        if stored.kind == "h":
+            return h
+        kind, array = ("parameters", params) if stored.kind == "p" else ("given", given)
+        return float(array[self._model.places(kind).index((stored.part, stored.path))])
 
     def _interpreted_march(self, count: int, h: float, *others: Any) -> None:
         names = [name for _, name in MARCH[2:]]

@@ -85,6 +85,15 @@ class SampleCode:
                 self.ends[source.part].append(node)
 
     @property
+    def carried_ids(self) -> list[SignalId]:
+        """States that are carried, part by part."""
+        return [
+            SignalId(part.part, "state", path)
+            for part in self.used
+            for path in self.carried[part.part]
+        ]
+
+    @property
     def stands_for(self) -> dict[Node, Node]:
         """What the names of signals between parts stand for."""
         return {

@@ -89,8 +89,6 @@ class Carried:
         Paths of parameters, and ``start.`` with the path of a state.
     begins : mapping of SignalId to collection of int
         States that columns move where the record begins, by the numbers of these.
-    keep_all : bool
-        Whether all nodes carry derivatives, as a reference.
 
     Attributes
     ----------
@@ -114,8 +112,6 @@ class Carried:
         outputs: Sequence[SignalId],
         columns: Sequence[str],
         begins: Mapping[SignalId, Any],
-        *,
-        keep_all: bool = False,
     ) -> None:
         model = sample_code.model
         number_of = {column: number for number, column in enumerate(columns)}
@@ -123,7 +119,7 @@ class Carried:
         slope_of = dict[Node, Node]()
         """Of the fraction in a delay, how it grows with that."""
         self.states, self.following = list[Node](), list[Node]()
-        self.ids = list[SignalId]()
+        self.ids = sample_code.carried_ids
         for part in sample_code.used:
             prefix = model.prefix(part.part)
             for path, node in leaves(part.p):
@@ -136,7 +132,6 @@ class Carried:
                     slope_of[fraction] = delay_slope(tap.number)
             names, following = dict(leaves(part.state)), dict(leaves(part.following))
             for path in sample_code.carried[part.part]:
-                self.ids.append(SignalId(part.part, "state", path))
                 self.states.append(names[path])
                 self.following.append(following[path])
         self.moving = {*self.states}
@@ -149,7 +144,6 @@ class Carried:
             [*column_of],
             len(columns),
             sample_code.stands_for,
-            keep="all" if keep_all else "cheaper",
         )
         self.flows: dict[Node, dict[Node, Contribution]] = {}
         self.direct: dict[Node, dict[int, Node]] = {}

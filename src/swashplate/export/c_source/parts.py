@@ -32,12 +32,12 @@ from swashplate.equations.code_generation import (
     c_function,
     c_literal,
     c_name,
-    evaluated,
     first_line,
     fixed,
     fresh_name,
     leaves,
     mentions,
+    program_of,
     undecided,
     without_comments,
 )
@@ -391,17 +391,18 @@ class PartInC:
     ) -> list[float]:
         """What the constants are for some numbers and options of the whole model."""
         exported = self.layout.exported
-        known: dict[Node, Any] = {graph.name("h"): step}
+        known: dict[str, Any] = {"h": step}
         for numbers, kind, values in (
             (self.part.p, "parameters", params),
             (self.part.given, "given", given),
         ):
             paths = exported.model.places(kind)
             for path, node in leaves(numbers):
-                known[node] = values[paths.index((self.number, path))]
+                known[node.value] = values[paths.index((self.number, path))]
         for name, node in self.options.items():
-            known[node] = options[exported.options.index((self.number, name))]
-        return evaluated([*self.constants], known)
+            known[node.value] = options[exported.options.index((self.number, name))]
+        program = program_of([*self.constants])
+        return program.values([known[name] for name in program.arguments])
 
 
 def formulas(trace: Trace) -> set[Parsed]:
