@@ -7,7 +7,6 @@ from .functions import generating as generating
 from .functions import generating_time as generating_time
 from .printing import STEMS as STEMS
 from .printing import CodeBlock as CodeBlock
-from .printing import assigned as assigned
 from .printing_c import HELPERS as HELPERS
 from .printing_c import C as C
 from .printing_c import Loops as Loops

@@ -8,20 +8,19 @@ so that what is compiled gives the same bits.
 from __future__ import annotations
 
 import re
-from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
-from textwrap import TextWrapper
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from swashplate.equations.code_generation.functions import fresh_name
 from swashplate.equations.code_generation.scheduling import Conditional, Region, Schedule
 from swashplate.equations.graph import LEAVES, Node, plain_value
 
+if TYPE_CHECKING:
+    from swashplate.equations.code_generation.printing_c import C
+
 WIDTH = 96
 """Characters of a line."""
-SHORT = 30
-"""Characters of a result, beyond which it gets a name."""
 STEMS = {
     "sqrt": "root", "exp": "power", "/": "ratio", "*": "product", "+": "total", "-": "difference",
     "if": "chosen", ">": "above", ">=": "above", "<": "below", "<=": "below",
@@ -33,53 +32,6 @@ STEMS = {
 Text = tuple[str, int]
 """An expression, and how tightly it binds: `ATOM` needs no brackets anywhere."""
 ATOM = 10
-ONCE, ALL = 1, 2
-"""Of a choice: one side is computed, or both are and one is taken."""
-
-
-class Language(ABC):
-    """How operations are written."""
-
-    short = SHORT
-    """Characters of a result, beyond which it gets a name."""
-
-    @abstractmethod
-    def number(self, value: Any) -> Text:
-        """A literal number."""
-
-    @abstractmethod
-    def operation(self, node: Node, operands: Sequence[Text], computed: int) -> Text:
-        """An operation on texts; of a choice `computed` says whether both sides may be."""
-
-    @abstractmethod
-    def assigned(self, name: str, node: Node, text: str, pad: str, *, new: bool) -> list[str]:
-        """Lines of an assignment; a `new` name is declared by it."""
-
-    @abstractmethod
-    def called(
-        self,
-        call: Node,
-        targets: Sequence[str],
-        arguments: Sequence[str],
-        declared: set[str],
-        pad: str,
-    ) -> list[str]:
-        """Lines of a call, whose results get their names; an empty one is not needed.
-
-        Some of them are `declared` already.
-        """
-
-    @abstractmethod
-    def branch(self, test: str, then: list[str], otherwise: list[str], pad: str) -> list[str]:
-        """Lines of an `if` and its `else`."""
-
-    def declared(self, names: Mapping[str, Node], pad: str, *, always: bool) -> list[str]:
-        """Lines ahead of a branch that gives some names their values, on both sides `always`."""
-        return []
-
-    def heading(self, node: Node, pad: str) -> list[str]:
-        """Lines ahead of the statement that computes a node."""
-        return []
 
 
 def grouped(text: Text, level: int) -> str:
@@ -113,10 +65,8 @@ class CodeBlock:
         Names that stand for something else; those of the block are added.
     available : mapping of Node to str, optional
         Values that are there already, with their names.
-    language : Language
-        Python by default.
-    named : bool
-        Whether every result gets a name.
+    language : C
+        How operations are written.
 
     Attributes
     ----------
@@ -135,8 +85,7 @@ class CodeBlock:
         used_names: set[str],
         *,
         available: Mapping[Node, str] | None = None,
-        language: Language,
-        named: bool = False,
+        language: C,
     ) -> None:
         self._labels, self._used_names, self._available = labels, used_names, dict(available or {})
         self._language = language
@@ -149,7 +98,7 @@ class CodeBlock:
         self._uses = self._uses_of(results)
         outermost = self._schedule.whole
         self.statements = [*self._steps(outermost, "")]
-        self.results = [self._result(node, named=named) for node in results]
+        self.texts = [self._text(plain_value(node), outermost)[0] for node in results]
         self.names = {
             **self._available,
             **{node: name for (node, region), name in self._named.items() if region is outermost},
@@ -159,11 +108,6 @@ class CodeBlock:
     def lines(self) -> list[str]:
         """Lines of all statements."""
         return [line for statement in self.statements for line in statement.lines]
-
-    @property
-    def texts(self) -> list[str]:
-        """The results, by the names that the lines make."""
-        return [text for text, _ in self.results]
 
     # -- names -------------------------------------------------------------------------------------
 
@@ -332,20 +276,6 @@ class CodeBlock:
         ]
         return [*ahead, *self._language.branch(test, sides[0], sides[1], pad)], [*names.values()]
 
-    def _result(self, node: Node, *, named: bool) -> tuple[str, frozenset[str]]:
-        """Text of a result, by a name if it is long or must have one, and what that reads."""
-        node, outermost = plain_value(node), self._schedule.whole
-        self._reads = set()
-        text = self._text(node, outermost)[0]
-        is_written = (
-            (node, outermost) in self._named or node in self._available or node.op in LEAVES
-        )
-        if is_written or (not named and (len(text) <= self._language.short or _is_trivial(node))):
-            return text, frozenset(self._reads)
-        self.statements += self._statement(node, partial(self._define, node, outermost, ""), "")
-        name = self._named[node, outermost]
-        return name, frozenset((name,))
-
     # -- expressions -------------------------------------------------------------------------------
 
     def _text(self, node: Node, region: Region) -> Text:
@@ -376,47 +306,12 @@ class CodeBlock:
         branch = None if where is None else self._schedule.branch_of(node, where)
         if branch is None:
             operands = [self._text(operand, region) for operand in node.args]
-            return self._language.operation(node, operands, ALL)
+            return self._language.operation(node, operands)
         operands = [self._text(branch.test, region)]
         sides = zip(node.args[1:], branch.sides, strict=True)
         operands += [self._text(operand, side) for operand, side in sides]
-        return self._language.operation(node, operands, ONCE)
+        return self._language.operation(node, operands)
 
 
 def _is_trivial(node: Node) -> bool:
     return node.op == "neg" and node.args[0].op in LEAVES
-
-
-# --- functions ------------------------------------------------------------------------------------
-
-
-def bracketed(start: str, text: str, end: str, pad: str = "") -> list[str]:
-    """Text within brackets, on one line or on as many as it takes."""
-    line, inner = f"{pad}{start}{text}{end}", f"{pad}    "
-    if len(line) <= WIDTH:
-        return [line]
-    wrapper = TextWrapper(
-        WIDTH,
-        initial_indent=inner,
-        subsequent_indent=inner,
-        break_long_words=False,
-        break_on_hyphens=False,
-    )
-    return [f"{pad}{start}", *wrapper.wrap(text), f"{pad}{end}"]
-
-
-def assigned(left: str, text: str, pad: str = "") -> list[str]:
-    """Lines of an assignment."""
-    line = f"{pad}{left} = {text}"
-    if len(line) <= WIDTH:
-        return [line]
-    if len(left) <= WIDTH // 2:
-        return bracketed(f"{left} = (", text, ")", pad)
-    *head, last = bracketed("(", left, ")", pad)
-    first, *tail = bracketed("(", text, ")", pad)
-    return [*head, f"{last} = {first.strip()}", *tail]
-
-
-def indented(lines: Iterable[str]) -> list[str]:
-    """Lines indented by four spaces."""
-    return [f"    {line}" for line in lines]

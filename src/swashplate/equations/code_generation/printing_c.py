@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 import re
-import sys
 from collections.abc import Iterable, Mapping, Sequence
 from importlib.resources import files
 from typing import Any
@@ -16,7 +15,7 @@ from typing import Any
 from swashplate.equations import graph
 from swashplate.equations.code_generation.functions import fresh_name
 from swashplate.equations.code_generation.loops import PRECISION, STEPS, TINY, Inner
-from swashplate.equations.code_generation.printing import ATOM, CodeBlock, Language, Text, grouped
+from swashplate.equations.code_generation.printing import ATOM, CodeBlock, Text, grouped
 from swashplate.equations.code_generation.values import leaves
 from swashplate.equations.graph import COMPARISONS, FALSE, TRUE, Node
 from swashplate.equations.language import MATH, Parsed
@@ -208,7 +207,7 @@ def first_line(source: Parsed) -> str:
 # --- the language ---------------------------------------------------------------------------------
 
 
-class C(Language):
+class C:
     """C99, long lines not yet on several.
 
     Parameters
@@ -229,14 +228,12 @@ class C(Language):
 
     # -- expressions -------------------------------------------------------------------------------
 
-    short = sys.maxsize
-
     def number(self, value: Any) -> Text:
         """A literal number."""
         text = c_literal(value)
         return text, UNARY if text[0] == "-" else ATOM
 
-    def operation(self, node: Node, operands: Sequence[Text], computed: int) -> Text:
+    def operation(self, node: Node, operands: Sequence[Text]) -> Text:
         """An operator with its operands, or a call; whole numbers among doubles are cast."""
         op, level = node.op, LEVELS.get(node.op, ATOM)
         if op == "if":
