@@ -43,7 +43,7 @@ test-slow: $(STAMP) ## the slow tests: pages, examples, reproduction, searches, 
 	@echo "== Slow tests"
 	@$(BIN)/pytest -n 2 --durations=40 -m slow
 	@echo; echo "== Tests marked 'interpreted', without the JIT"
-	@NUMBA_DISABLE_JIT=1 $(BIN)/pytest -n 2 -m interpreted
+	@SWASHPLATE_COMPILE=0 $(BIN)/pytest -n 2 -m interpreted
 # the one that differs most from what the tests before ran with
 	@$(MAKE) --no-print-directory test-kernels KERNELS="$(firstword $(KERNELS))" TESTS="$(ROUNDED)"
 
@@ -57,7 +57,7 @@ TESTS ?= tests
 test-kernels: $(STAMP) ## the quick tests with other kernels of the linear algebra, and compiled for any processor
 	@for kernel in $(KERNELS); do \
 	  echo; echo "== Linear algebra for $$kernel, compiled for any processor"; \
-	  OPENBLAS_CORETYPE=$$kernel NUMBA_CPU_NAME=generic $(BIN)/pytest -n 2 --dist loadgroup -m "not slow" $(TESTS) || exit 1; \
+	  OPENBLAS_CORETYPE=$$kernel SWASHPLATE_CPU=generic $(BIN)/pytest -n 2 --dist loadgroup -m "not slow" $(TESTS) || exit 1; \
 	done
 
 lint: $(STAMP) ## style, format, types and the direction of imports
@@ -119,7 +119,7 @@ owner-table: $(STAMP) ## whether the numbers of a report's first page hold, over
 coverage: $(STAMP) ## which lines of src no test reaches; the kernels interpreted (ten minutes)
 	@$(BIN)/coverage erase
 	@$(BIN)/coverage run -m pytest -n 2
-	@NUMBA_DISABLE_JIT=1 $(BIN)/coverage run -m pytest -n 2 -m 'interpreted or traced'
+	@SWASHPLATE_COMPILE=0 $(BIN)/coverage run -m pytest -n 2 -m 'interpreted or traced'
 	@$(BIN)/coverage combine -q
 	@$(BIN)/coverage report
 

@@ -16,7 +16,7 @@ from swashplate.equations import (
     equation,
     source,
 )
-from swashplate.equations.cache import DAY
+from swashplate.equations.cache import DAY, MOST_BYTES
 
 SLOPE = 2.0
 
@@ -298,3 +298,38 @@ def test_kernels_around_compiled_functions_are_kept_apart(tmp_path: Path) -> Non
     said = [python(str(script), **cache).stdout.split("]") for _ in range(2)]
     assert [each[0] for each in said] == ["[12.0, 18.0"] * 2
     assert [int(each[1]) for each in said] == [0, 2]
+
+
+@pytest.mark.slow
+def test_the_oldest_beyond_the_bound_are_removed(tmp_path: Path) -> None:
+    kept = tmp_path / "cache" / "swashplate_generated"
+    environment = {"SWASHPLATE_CACHE_DIR": str(tmp_path / "cache")}
+    march(tmp_path, **environment)
+    files(kept, "new.kept", age=2.0 * DAY)
+    files(kept, "old.kept", age=3.0 * DAY)
+    for name in ("new.kept", "old.kept"):  # without taking the room
+        with (kept / name).open("r+b") as file:
+            file.truncate(MOST_BYTES - 1_000_000)
+        os.utime(kept / name, (0.0, time() - (2.0 if name[0] == "n" else 3.0) * DAY))
+    os.utime(kept / "tidied", (0.0, 0.0))
+    for own in kept.glob("rod_march_code_*"):
+        own.unlink()
+    march(tmp_path, **environment)
+    assert (kept / "new.kept").exists()
+    assert not (kept / "old.kept").exists()
+
+
+@pytest.mark.slow
+def test_nothing_is_compiled_if_told_so(tmp_path: Path) -> None:
+    cache = tmp_path / "cache"
+    done = march(tmp_path, SWASHPLATE_CACHE_DIR=str(cache), SWASHPLATE_COMPILE="0")
+    assert done.stdout == "[0.0, 0.5, 0.75]\n"
+    assert not [*cache.rglob("*_code_*")]
+
+
+@pytest.mark.slow
+def test_code_is_for_the_processor_that_is_told(tmp_path: Path) -> None:
+    cache = {"SWASHPLATE_CACHE_DIR": str(tmp_path / "cache")}
+    for processor in ("", "generic"):
+        assert march(tmp_path, **cache, SWASHPLATE_CPU=processor).returncode == 0
+    assert len([*(tmp_path / "cache").rglob("rod_march_code_*")]) == 2

@@ -233,7 +233,7 @@ def test_a_helper_alone_that_is_run_again_counts(monkeypatch: pytest.MonkeyPatch
     cell(104, "GAIN = 4.0", space)
     assert end() == pytest.approx(expected(1.0)[0], rel=1e-14)
     found = derive(space["deeper"], "x")
-    assert found.python(1.0) == (1.0, 4.0)
+    assert found(1.0) == (1.0, 4.0)
     cell(105, "GAIN = 6.0", space)
     assert derive(space["deeper"], "x")(1.0) == (3.0, 6.0)
 

@@ -15,6 +15,7 @@ import typer
 from swashplate.__about__ import __version__
 from swashplate.cli.commands import command
 from swashplate.cli.terminal import note, say, show, spinner
+from swashplate.environment import COMPILE
 from swashplate.executors import available_cores
 from swashplate.tables import Column, Table
 
@@ -55,10 +56,10 @@ def doctor() -> None:
     table.add("Python", platform.python_version(), "")
     table.add("system", f"{platform.system()} {platform.machine()}", "")
     table.add("cores", str(available_cores()), "")
-    if os.environ.get("NUMBA_DISABLE_JIT", "0") != "0":
+    if os.environ.get("NUMBA_DISABLE_JIT", "0") != "0":  # or by `environment.obey`
         table.add(
-            "NUMBA_DISABLE_JIT",
-            "set",
+            COMPILE,
+            "0",
             "nothing is compiled; everything is about a hundred times slower",
         )
     if sys.dont_write_bytecode and (names := _without_byte_code()):

@@ -40,15 +40,17 @@ R = TypeVar("R")
 
 UNCACHED = (
     "swashplate's compiled kernels cannot be stored, so every session compiles them again; set "
-    "NUMBA_CACHE_DIR to a writable folder."
+    "SWASHPLATE_CACHE_DIR to a writable folder."
 )
 OPEN = (
     "swashplate's compiled kernels are not read from {folder}, as {why}: what it holds is run. "
-    "Remove it, or set NUMBA_CACHE_DIR to a folder that only you can write to."
+    "Remove it, or set SWASHPLATE_CACHE_DIR to a folder that only you can write to."
 )
 COMPILING = "Compiling equations, once on this machine"
 DAY = 86400.0
 """[s]"""
+MOST_BYTES = 500_000_000
+"""Of all that is kept; the oldest go first."""
 UNUSED = 30.0 * DAY
 """Time after which what nobody used is removed, and made again. [s]"""
 
@@ -237,7 +239,7 @@ def kernel(function: Callable[P, R]) -> Callable[P, R]:
     Returns
     -------
     callable
-        The compiled function, or the plain one under ``NUMBA_DISABLE_JIT=1``.
+        The compiled function, or the plain one under ``SWASHPLATE_COMPILE=0``.
 
     Warns
     -----
@@ -327,7 +329,7 @@ def written(path: Path, content: bytes) -> Path | None:
 
 
 def _tidy(folder: Path) -> None:
-    """Remove what was not used lately, once a day."""
+    """Remove what was not used lately, and the oldest beyond `MOST_BYTES`, once a day."""
     mark = folder / "tidied"
     try:
         if mark.exists() and time() - mark.stat().st_mtime < DAY:
@@ -339,5 +341,11 @@ def _tidy(folder: Path) -> None:
             for path in [*swept.glob("*.*")]:
                 if time() - path.stat().st_mtime > UNUSED:
                     path.unlink()
+        files = [(path.stat().st_mtime, path) for path in folder.glob("*.kept")]
+        size = 0
+        for _, path in sorted(files, reverse=True):
+            size += path.stat().st_size
+            if size > MOST_BYTES:
+                path.unlink()
     except OSError:  # another process tidies at once, or the folder is no longer ours
         return

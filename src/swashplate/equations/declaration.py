@@ -29,7 +29,7 @@ NO_REPLACEMENTS: Replacements = MappingProxyType({})
 
 # numba makes its settings from the environment, so that a type checker sees none of them
 JIT_OFF = bool(config.DISABLE_JIT)  # type: ignore[attr-defined]
-"""Whether nothing is compiled: ``NUMBA_DISABLE_JIT=1``."""
+"""Whether nothing is compiled: ``SWASHPLATE_COMPILE=0``."""
 RULES: WeakKeyDictionary[FunctionType, Any] = WeakKeyDictionary()
 """Equations that return the derivatives of others, see `declared`."""
 compiled_functions: dict[Any, None] = {}
@@ -39,7 +39,7 @@ compiled_functions: dict[Any, None] = {}
 def inlined(function: F) -> F:
     """Compile a function so that its callers inline it: strict arithmetic, no exceptions.
 
-    Under ``NUMBA_DISABLE_JIT=1`` it is the plain function.
+    Under ``SWASHPLATE_COMPILE=0`` it is the plain function.
     """
     compiled_functions[plain(function)] = None
     compiled: Any = njit(forceinline=True, error_model="numpy")(function)
@@ -62,7 +62,7 @@ def equation(function: F) -> F:
     -------
     callable
         The compiled function, inlined by its callers; the plain one is its ``.py_func``. Under
-        ``NUMBA_DISABLE_JIT=1`` it is the plain function.
+        ``SWASHPLATE_COMPILE=0`` it is the plain function.
 
     Raises
     ------

@@ -1,8 +1,8 @@
 """What was made of a model's equations, kept on disk: a warm process reads none of them.
 
-What is kept is plain data: texts of generated modules, and where their numbers go. It is found by a
-key that covers all that it follows from: every equation, constant and type that the model reaches,
-declared derivatives among them, and the engine's own source.
+What is kept is plain data: texts, where their numbers go, and object code. It is found by a key
+that covers all that it follows from: of a text every equation, constant and type that the model
+reaches, declared derivatives among them, and the engine's own source; of object code its text.
 """
 
 from __future__ import annotations
@@ -32,7 +32,9 @@ SIZE = 16
 """Bytes of the hash that a file begins with."""
 
 
-def cached_on_disk(name: str, key: tuple[Any, ...], make: Callable[[], T]) -> T:
+def cached_on_disk(
+    name: str, key: tuple[Any, ...], make: Callable[[], T], *, by_engine: bool = True
+) -> T:
     """What was made before under this key, or what is made now.
 
     Parameters
@@ -44,13 +46,16 @@ def cached_on_disk(name: str, key: tuple[Any, ...], make: Callable[[], T]) -> T:
         source apart.
     make : callable
         Makes plain data: it is pickled.
+    by_engine : bool
+        Whether the result follows from the engine's source as well.
 
     Returns
     -------
     object
         What `make` returned, in this process or another. A damaged file is made again.
     """
-    digest = blake2b(f"{engine_hash()} {key!r}".encode(), digest_size=10).hexdigest()
+    engine = engine_hash() if by_engine else ""
+    digest = blake2b(f"{engine} {key!r}".encode(), digest_size=16).hexdigest()
     folder = generated_folder()
     path = None if folder is None else folder / f"{name}_{digest}.kept"
     content = _read(path)

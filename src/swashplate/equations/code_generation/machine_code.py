@@ -66,7 +66,7 @@ class MachineCode:
         )
 
 
-_loaded: dict[tuple[str, str, tuple[str, ...]], MachineCode] = {}
+_loaded: dict[tuple[str, str, tuple[str, ...], bool], MachineCode] = {}
 
 
 def code_of_text(name: str, text: str, kinds: tuple[str, ...], *, pack: bool = True) -> MachineCode:
@@ -84,12 +84,13 @@ def code_of_text(name: str, text: str, kinds: tuple[str, ...], *, pack: bool = T
         Whether operations on numbers that are alike become one on a vector. It takes a third of the
         time to compile, and finds nothing in what is written for vectors.
     """
-    key = (name, text, kinds)
+    key = (name, text, kinds, pack)
     if key not in _loaded:
         content = cached_on_disk(
             f"{name}_code",
-            (*key, llvmlite_version, llvm.llvm_version_info, *_host()),
+            (*key, OPTIMISATION_LEVEL, llvmlite_version, llvm.llvm_version_info, *_host()),
             lambda: _compiled(name, text, pack=pack),
+            by_engine=False,
         )
         _loaded[key] = MachineCode(content, kinds)
     return _loaded[key]
