@@ -2,6 +2,8 @@
 
 import math
 from math import acos, asin, atan2, cos, exp, floor, hypot, log, sin, sqrt, tan, tanh
+from pathlib import Path
+from runpy import run_path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -656,3 +658,23 @@ def both_scaled(x: float) -> float:
 def test_functions_of_one_name_are_kept_apart() -> None:
     assert derive(both_scaled, "x")(2.0) == (24.0, 24.0)
     assert closure_hash(double) != closure_hash(triple)
+
+
+@pytest.mark.parametrize(
+    ("expression", "expected"),
+    [(" + ".join(["x", *["0.5"] * 2400]), 1202.0), ("-" * 500 + "x", 2.0)],
+    ids=["a sum of 2,401 terms", "500 signs"],
+)
+def test_what_python_can_read_is_not_too_deep(
+    expression: str, expected: float, tmp_path: Path
+) -> None:
+    text = "\n".join(
+        [
+            "from swashplate.equations import equation",
+            "@equation",
+            f"def deep(x: float) -> float:\n    return {expression}",
+        ]
+    )
+    (tmp_path / "deep.py").write_text(text, "utf-8")
+    deep = run_path(str(tmp_path / "deep.py"))["deep"]
+    assert derive(deep, "x")(2.0) == (expected, 1.0)

@@ -7,6 +7,7 @@ What is left are operations in the order of the equations: results keep their la
 from __future__ import annotations
 
 import ast
+import sys
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import reduce
@@ -66,6 +67,8 @@ from swashplate.equations.language import (
 )
 
 Names = dict[str, Value]
+DEEPEST = 50_000
+"""Frames of Python within an expression: a sum of 3,000 terms takes some 9,000."""
 MOST_WAYS = 500
 """Ways through an equation to a return: what follows an `if` with one is done for each."""
 LARGEST_WHOLE = 2**63
@@ -159,12 +162,15 @@ class Trace:
 
     @contextmanager
     def running(self, callee: Callee) -> Iterator[None]:
-        """While an equation is being run."""
+        """While an equation is being run, whose expressions may be deeper than Python expects."""
         self.under_way.append(callee)
+        limit = sys.getrecursionlimit()
+        sys.setrecursionlimit(max(limit, DEEPEST))
         try:
             yield
         finally:
             self.under_way.pop()
+            sys.setrecursionlimit(limit)
 
     @contextmanager
     def within(self, chain: Sequence[Callee]) -> Iterator[None]:
