@@ -336,93 +336,129 @@ class _Stamps:
 
 def run_text() -> str:
     """Text of what marches block by block, and compares what comes with what was observed."""
-    code = Code([("i64", "size"), ("double", "h"), ("ptr", "run")])
-    run = Fields(code, "%run", BlockRun)
-    plan_struct, sink_struct, room_struct = run.plan, run.sink, run.room
-    plan = Fields(code, plan_struct, Plan)
-    sink = Fields(code, sink_struct, Sink)
-    room = Fields(code, room_struct, Room)
-    write_rows, absorb = run.write_rows, run.absorb
-    block, row, flat, folded = room.block, room.row, room.flat, sink.folded
-    folds = code.put(f"icmp ne i64 {folded}, 0")
-    _, _, _, *pointers = TANGENT_ARGUMENTS
-    arrays = [
-        code.pointer(code.load(run.arrays, number, "i64")) for number, _ in enumerate(pointers)
-    ]
-    waiting = code.variable("0", "i64")
+    return _RunText().finished()
 
-    def copy(source: str, target: str) -> None:
-        source, target = (
-            code.address(flat, code.put(f"mul i64 {each}, {row}")) for each in (source, target)
+
+class _RunText:
+    """That text, under way."""
+
+    def __init__(self) -> None:
+        code = self._code = Code([("i64", "size"), ("double", "h"), ("ptr", "run")])
+        run = self._run = Fields(code, "%run", BlockRun)
+        self._structs = run.plan, run.sink, run.room
+        self._plan, self._sink, self._room = (
+            Fields(code, struct, kind)
+            for struct, kind in zip(self._structs, (Plan, Sink, Room), strict=True)
         )
-        with code.loop("0", row) as i:
+        self._write_rows, self._absorb = run.write_rows, run.absorb
+        self._row, self._flat = self._room.row, self._room.flat
+        self._folds = code.put(f"icmp ne i64 {self._sink.folded}, 0")
+        self._waiting = code.variable("0", "i64")
+        """Rows that wait in the sink to be rotated."""
+
+    def finished(self) -> str:
+        """All blocks, then what waits."""
+        code, block = self._code, self._room.block
+        with code.loop("0", "%size", block) as first:
+            with code.only_if(code.put(f"icmp sgt i64 {first}, 0")):
+                self._copy(block, "0")  # what interpolation looks back at
+            left = code.put(f"sub i64 %size, {first}")
+            ends = code.put(f"icmp sle i64 {left}, {block}")
+            count = code.put(f"select i1 {ends}, i64 {left}, i64 {block}")
+            self._march(first, count)
+            self._copy(count, code.put(f"add i64 {count}, 1"))  # nothing comes after the end
+            known = code.put(f"add i64 {first}, {count}")
+            # the point after a stamp must be known as well
+            before = code.put(f"sub i64 {known}, 1")
+            known = code.put(f"select i1 {ends}, i64 {known}, i64 {before}")
+            with code.loop("0", self._plan.observations) as r:
+                self._observe(r, first, known)
+        held = code.load(self._waiting, 0, "i64")
+        with code.only_if(code.put(f"icmp sgt i64 {held}, 0")):
+            with code.loop("0", self._sink.columns) as column:
+                to = code.address(self._sink.rows, code.put(f"mul i64 {column}, {ROWS}"))
+                with code.loop(held, str(ROWS)) as i:
+                    code.store(ZERO, to, i)
+            self._rotate()
+        return code.text
+
+    def _copy(self, source: str, target: str) -> None:
+        """Copy a sample's row."""
+        code = self._code
+        source, target = (
+            code.address(self._flat, code.put(f"mul i64 {each}, {self._row}"))
+            for each in (source, target)
+        )
+        with code.loop("0", self._row) as i:
             code.store(code.load(source, i), target, i)
 
-    def rotate() -> None:
-        code.do(f"call void {absorb}(ptr {sink_struct})")
-        code.store("0", waiting, 0, "i64")
-
-    with code.loop("0", "%size", block) as first:
-        with code.only_if(code.put(f"icmp sgt i64 {first}, 0")):
-            copy(block, "0")  # what interpolation looks back at
-        left = code.put(f"sub i64 %size, {first}")
-        ends = code.put(f"icmp sle i64 {left}, {block}")
-        count = code.put(f"select i1 {ends}, i64 {left}, i64 {block}")
+    def _march(self, first: str, count: str) -> None:
+        """Do with a block what a march has functions for."""
+        code, run = self._code, self._run
+        _, _, _, *pointers = TANGENT_ARGUMENTS
+        arrays = [
+            code.pointer(code.load(run.arrays, place, "i64")) for place, _ in enumerate(pointers)
+        ]
         given = ", ".join(f"ptr {array}" for array in arrays)
         with code.loop("0", run.steps) as number:
             function = code.pointer(code.load(run.codes, number, "i64"))
             code.do(f"call void {function}(i64 {count}, i64 {first}, double %h, {given})")
-        copy(count, code.put(f"add i64 {count}, 1"))  # nothing comes after the record's end
-        known = code.put(f"add i64 {first}, {count}")
-        # the point after a stamp must be known as well
-        known = code.put(f"select i1 {ends}, i64 {known}, i64 {code.put(f'sub i64 {known}, 1')}")
-        with code.loop("0", plan.observations) as r:
-            next_stamp = room.next_stamp
-            stop = code.load(plan.first, code.put(f"add i64 {r}, 1"), "i64")
-            stamp = code.variable(code.load(next_stamp, r, "i64"), "i64")
-            end = _first_beyond(code, plan.cell, code.load(stamp, 0, "i64"), stop, known)
-            code.store(end, next_stamp, r, "i64")
-            some_weigh_nothing = code.put(f"icmp eq i64 {code.load(plan.all_weigh, r, 'i64')}, 0")
-            skips = code.put(f"and i1 {folds}, {some_weigh_nothing}")
-            with code.as_long_as(
-                lambda: code.put(f"icmp slt i64 {code.load(stamp, 0, 'i64')}, {end}")
-            ):
-                at = code.load(stamp, 0, "i64")
-                held = code.load(waiting, 0, "i64")
-                room_left = code.put(f"sub i64 {ROWS}, {held}")
-                most = code.put(f"add i64 {at}, {room_left}")
-                fits = code.put(f"icmp sle i64 {end}, {most}")
-                limit = code.put(f"select i1 {fits}, i64 {end}, i64 {most}")
-                limit = code.put(f"select i1 {folds}, i64 {limit}, i64 {end}")
-                until = code.variable(limit, "i64")
-                with code.only_if(skips):
-                    code.store(_first_without_weight(code, plan.weight, at, limit), until, 0, "i64")
-                until = code.load(until, 0, "i64")
-                many = code.put(f"sub i64 {until}, {at}")
-                some = code.put(f"icmp sgt i64 {many}, 0")
-                with code.only_if(some):
-                    to = code.put(f"select i1 {folds}, i64 {held}, i64 {at}")
-                    structs = f"ptr {plan_struct}, ptr {sink_struct}, ptr {room_struct}"
-                    numbers = f"i64 {r}, i64 {first}, i64 {at}, i64 {many}, i64 {to}"
-                    code.do(f"call void {write_rows}({structs}, {numbers})")
-                    more = code.put(f"select i1 {folds}, i64 {many}, i64 0")
-                    held = code.put(f"add i64 {held}, {more}")
-                    code.store(held, waiting, 0, "i64")
-                    with code.only_if(code.put(f"icmp eq i64 {held}, {ROWS}")):
-                        rotate()
-                skipped = code.put(f"add i64 {at}, 1")
-                code.store(
-                    code.put(f"select i1 {some}, i64 {until}, i64 {skipped}"), stamp, 0, "i64"
-                )
-    held = code.load(waiting, 0, "i64")
-    with code.only_if(code.put(f"icmp sgt i64 {held}, 0")):
-        with code.loop("0", sink.columns) as column:
-            place = code.put(f"mul i64 {column}, {ROWS}")
-            to = code.address(sink.rows, place)
-            with code.loop(held, str(ROWS)) as i:
-                code.store(ZERO, to, i)
-        rotate()
-    return code.text
+
+    def _rotate(self) -> None:
+        code = self._code
+        code.do(f"call void {self._absorb}(ptr {self._structs[1]})")
+        code.store("0", self._waiting, 0, "i64")
+
+    def _observe(self, r: str, first: str, known: str) -> None:
+        """Write the rows of an observation whose stamps are known."""
+        code, plan, room = self._code, self._plan, self._room
+        stop = code.load(plan.first, code.put(f"add i64 {r}, 1"), "i64")
+        stamp = code.variable(code.load(room.next_stamp, r, "i64"), "i64")
+        end = _first_beyond(code, plan.cell, code.load(stamp, 0, "i64"), stop, known)
+        code.store(end, room.next_stamp, r, "i64")
+        # a stamp without weight changes no triangle
+        all_weigh = code.load(plan.all_weigh, r, "i64")
+        skips = code.put(f"icmp eq i64 {all_weigh}, 0")
+        skips = code.put(f"and i1 {self._folds}, {skips}")
+
+        def goes_on() -> str:
+            return code.put(f"icmp slt i64 {code.load(stamp, 0, 'i64')}, {end}")
+
+        with code.as_long_as(goes_on):
+            at = code.load(stamp, 0, "i64")
+            until = code.variable(self._most(at, end), "i64")
+            with code.only_if(skips):
+                limit = code.load(until, 0, "i64")
+                code.store(_first_without_weight(code, plan.weight, at, limit), until, 0, "i64")
+            until = code.load(until, 0, "i64")
+            count = code.put(f"sub i64 {until}, {at}")
+            some = code.put(f"icmp sgt i64 {count}, 0")
+            with code.only_if(some):
+                self._write(f"i64 {r}, i64 {first}, i64 {at}, i64 {count}", at, count)
+            after = code.put(f"add i64 {at}, 1")
+            code.store(code.put(f"select i1 {some}, i64 {until}, i64 {after}"), stamp, 0, "i64")
+
+    def _most(self, at: str, end: str) -> str:
+        """The first stamp that no longer fits, at most `end`."""
+        code = self._code
+        room = code.put(f"sub i64 {ROWS}, {code.load(self._waiting, 0, 'i64')}")
+        most = code.put(f"add i64 {at}, {room}")
+        fits = code.put(f"icmp sle i64 {end}, {most}")
+        most = code.put(f"select i1 {fits}, i64 {end}, i64 {most}")
+        return code.put(f"select i1 {self._folds}, i64 {most}, i64 {end}")
+
+    def _write(self, numbers: str, at: str, count: str) -> None:
+        """Write rows, and rotate the sink once it is full."""
+        code = self._code
+        held = code.load(self._waiting, 0, "i64")
+        to = code.put(f"select i1 {self._folds}, i64 {held}, i64 {at}")
+        structs = ", ".join(f"ptr {struct}" for struct in self._structs)
+        code.do(f"call void {self._write_rows}({structs}, {numbers}, i64 {to})")
+        more = code.put(f"select i1 {self._folds}, i64 {count}, i64 0")
+        held = code.put(f"add i64 {held}, {more}")
+        code.store(held, self._waiting, 0, "i64")
+        with code.only_if(code.put(f"icmp eq i64 {held}, {ROWS}")):
+            self._rotate()
 
 
 def _first_beyond(code: Code, cells: str, start: str, stop: str, limit: str) -> str:
