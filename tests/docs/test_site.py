@@ -194,8 +194,9 @@ def test_every_figure_can_be_made_again(scripts: ModuleType) -> None:
         if "_build" not in page.parts
         for target in re.findall(r"!\[[^\]]*\]\(([^)]+)\)", page.read_text("utf-8"))
     }
-    assert shown == set(figures.FIGURES)
-    assert {each.name for each in figures.IMAGES.iterdir()} == shown
+    drawn = {each.name for each in (DOCS / "static").glob("*.svg")}  # by hand
+    assert shown == set(figures.FIGURES) | drawn
+    assert {each.name for each in figures.IMAGES.iterdir()} == set(figures.FIGURES)
 
 
 # --- theory: what is said to be checked is, and every erratum has a test --------------------------
