@@ -10,14 +10,11 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 from swashplate.equations.code_generation.functions import fresh_name
 from swashplate.equations.code_generation.scheduling import Conditional, Region, Schedule
 from swashplate.equations.graph import LEAVES, Node, plain_value
-
-if TYPE_CHECKING:
-    from swashplate.equations.code_generation.printing_c import C
 
 WIDTH = 96
 """Characters of a line."""
@@ -32,6 +29,41 @@ STEMS = {
 Text = tuple[str, int]
 """An expression, and how tightly it binds: `ATOM` needs no brackets anywhere."""
 ATOM = 10
+
+
+class Language(Protocol):
+    """How a block's operations are written; see `printing_c.C`."""
+
+    def number(self, value: Any) -> Text:
+        """A literal number."""
+
+    def operation(self, node: Node, operands: Sequence[Text]) -> Text:
+        """An operation on texts."""
+
+    def assigned(self, name: str, node: Node, text: str, pad: str, *, new: bool) -> list[str]:
+        """Lines of an assignment; a `new` name is declared by it."""
+
+    def called(
+        self,
+        call: Node,
+        targets: Sequence[str],
+        arguments: Sequence[str],
+        declared: set[str],
+        pad: str,
+    ) -> list[str]:
+        """Lines of a call, whose results get their names; an empty one is not needed.
+
+        Some of them are `declared` already.
+        """
+
+    def branch(self, test: str, then: list[str], otherwise: list[str], pad: str) -> list[str]:
+        """Lines of an `if` and its `else`."""
+
+    def declared(self, names: Mapping[str, Node], pad: str, *, always: bool) -> list[str]:
+        """Lines ahead of a branch that gives some names their values, on both sides `always`."""
+
+    def heading(self, node: Node, pad: str) -> list[str]:
+        """Lines ahead of the statement that computes a node."""
 
 
 def grouped(text: Text, level: int) -> str:
@@ -65,7 +97,7 @@ class CodeBlock:
         Names that stand for something else; those of the block are added.
     available : mapping of Node to str, optional
         Values that are there already, with their names.
-    language : C
+    language : Language
         How operations are written.
 
     Attributes
@@ -85,7 +117,7 @@ class CodeBlock:
         used_names: set[str],
         *,
         available: Mapping[Node, str] | None = None,
-        language: C,
+        language: Language,
     ) -> None:
         self._labels, self._used_names, self._available = labels, used_names, dict(available or {})
         self._language = language
