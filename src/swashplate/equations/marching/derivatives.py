@@ -35,7 +35,7 @@ from swashplate.equations.marching.run import (
     initial_states,
 )
 from swashplate.equations.marching.sample_code import SampleCode, output_of
-from swashplate.equations.marching.start_code import Moved, start_code_of, started_by
+from swashplate.equations.marching.start_code import start_code_of, started_by
 from swashplate.equations.marching.tangents import Tangents, padded, tangents_of
 from swashplate.equations.model import Model
 from swashplate.errors import DomainError, InputError
@@ -80,7 +80,7 @@ class ObservedMarch:
             observed = [output_of(model, output) for output in outputs]
             sample_code = SampleCode(model, signals, options, [signal for signal, _ in observed])
             self.interpreted = InterpretedTangents(sample_code, observed, columns)
-            self.states = self.interpreted.states
+            self._set_states(self.interpreted.states)
             return
         name = f"{model.name}_tangents" if columns else f"{model.name}_residuals"
         self.tangents: Tangents = cached_on_disk(
@@ -88,12 +88,31 @@ class ObservedMarch:
             (key_of(model), signals, options, outputs, columns, tuple(begins.items())),
             lambda: tangents_of(*arguments),
         )
-        self.states = [*self.tangents.states]
+        self._set_states(self.tangents.states)
         self._codes = [
             code_of_text(name, text, TANGENT_KINDS, pack=not columns)
             for text in self.tangents.texts
         ]
         self.codes = np.array([code.address for code in self._codes], dtype=np.int64)
+
+    def _set_states(self, states: Sequence[SignalId]) -> None:
+        """Find out which states the columns move where a record begins."""
+        self.states = tuple(states)
+        row_of = {signal: row for row, signal in enumerate(states)}
+        number_of = {column: number for number, column in enumerate(self._columns)}
+        self._paths = [f"{self._model.prefix(s.part)}{s.path}" for s in states]
+        code = self._start_code
+        self._moves = [
+            (row_of[signal], number_of[column], entry)
+            for (signal, column), entry in zip(code.moves, code.entries, strict=True)
+            if signal in row_of and column in number_of
+        ]
+        self._starts = [
+            (row_of[signal], number)
+            for number, column in enumerate(self._columns)
+            for signal in self._started_by(column)
+            if signal in row_of
+        ]
 
     def _started_by(self, column: str) -> list[SignalId]:
         """States that a column such as ``start.pump.pressure`` sets."""
@@ -112,20 +131,18 @@ class ObservedMarch:
         moves them.
         """
         tangent = np.zeros((len(self.states), padded(len(self._columns))))
-        slopes = self._slopes(instance, first, h) if self._columns else {}
-        for number, column in enumerate(self._columns):
-            own = self._started_by(column)
-            for row, signal in zip(tangent, self.states, strict=True):
-                path = f"{self._model.prefix(signal.part)}{signal.path}"
-                if path in started:
-                    row[number] = signal in own
-                else:
-                    row[number] = slopes.get((signal, column), 0.0)
+        slopes = self._slopes(instance, first, h) if self._moves else tangent
+        for state, column, entry in self._moves:
+            tangent[state, column] = slopes[entry]
+        for state, path in enumerate(self._paths):
+            if path in started:
+                tangent[state] = 0.0
+        for state, column in self._starts:
+            if self._paths[state] in started:
+                tangent[state, column] = 1.0
         return tangent
 
-    def _slopes(
-        self, instance: Instance, first: Mapping[str, float], h: float
-    ) -> dict[Moved, float]:
+    def _slopes(self, instance: Instance, first: Mapping[str, float], h: float) -> Array:
         """Derivatives of states at the start by all parameters that move them."""
         code = self._start_code
         signals_before = dict.fromkeys(first, 0.0)
@@ -138,7 +155,7 @@ class ObservedMarch:
                 f"{instance.name}: what follows from the parameters alone cannot be computed for "
                 "these numbers."
             )
-        return {move: slopes[entry] for move, entry in zip(code.moves, code.entries, strict=True)}
+        return slopes
 
     def take_room(self) -> tuple[Array, ...]:
         """Memory for a march, of an earlier one if it can be: new memory takes longer to get."""
