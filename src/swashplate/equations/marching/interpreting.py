@@ -20,7 +20,7 @@ from swashplate.equations.marching.sample_code import SampleCode
 Array = NDArray[np.float64]
 
 
-class _Sample:
+class _SampleProgram:
     """One sample of a model as a program, and where what it takes is found.
 
     Its results are the states that follow, the margins, and further ones.
@@ -109,7 +109,7 @@ class InterpretedMarch:
         self._limits = {
             row for rows in (targets, further) for s, row in rows.items() if s.kind == "limits"
         }
-        self._sample = _Sample(sample_code, nodes)
+        self._sample = _SampleProgram(sample_code, nodes)
 
     def __call__(self, count: int, first: int, h: float, *arrays: Any) -> None:
         """March; the arguments are those of `kernels.KERNEL_ARGUMENTS`."""
@@ -128,7 +128,7 @@ class InterpretedMarch:
 
 
 def marched(
-    sample: _Sample,
+    sample: _SampleProgram,
     count: int,
     first: int,
     h: float,
@@ -190,7 +190,7 @@ class InterpretedTangents:
                     by[part.delay_fraction(tap)] = column, tap.number
         self.states = sample_code.carried_ids
         names = [dict(leaves(sample_code.parts[i].state))[path].value for i, _, path in self.states]
-        self._sample = _Sample(sample_code, nodes, [*names, *by])
+        self._sample = _SampleProgram(sample_code, nodes, [*names, *by])
         self._state_of = {name: number for number, name in enumerate(names)}
         self._column_of = by
 
