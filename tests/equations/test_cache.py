@@ -9,6 +9,7 @@ from time import time
 from typing import Any
 
 import pytest
+from tests.equations.test_machine_code import MACHINE
 
 from swashplate.equations import (
     closure,
@@ -199,27 +200,6 @@ def test_source_of_an_equation() -> None:
 
 # --- machine code of models -----------------------------------------------------------------------
 
-LAG = """
-from typing import NamedTuple
-
-from swashplate.equations import Model, equation
-
-
-class Lag(NamedTuple):
-    share: float
-
-
-class Rod(NamedTuple):
-    position: float
-
-
-@equation
-def step(state: Rod, command: float, p: Lag, h: float) -> Rod:
-    return Rod(state.position + p.share * (command - state.position))
-
-
-rod = Model("rod", parameters=Lag, state=Rod, step=step)
-"""
 MARCH = """
 import sys
 sys.path.insert(0, sys.argv[1])
@@ -231,7 +211,7 @@ print(run["position"].tolist())
 
 
 def march(folder: Path, **environment: str) -> subprocess.CompletedProcess[str]:
-    (folder / "lag.py").write_text(LAG)
+    (folder / "lag.py").write_text(MACHINE)
     return python("-c", MARCH, str(folder), **environment)
 
 

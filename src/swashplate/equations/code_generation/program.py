@@ -66,6 +66,11 @@ class Program(NamedTuple):
         numbers = self._numbers(given)
         return [numbers[result] for result in self.results]
 
+    def only_value(self, *given: Any) -> Any:
+        """The one result for some arguments."""
+        (value,) = self.values(given)
+        return value
+
     def slopes(self, given: Sequence[float]) -> Array:
         """(r, k) derivatives of the results by the arguments in `by`."""
         numbers = self._numbers(given)
@@ -86,7 +91,7 @@ class Program(NamedTuple):
         """Numbers of result and argument of each derivative that is not zero for all numbers."""
         reached = [{k} for k in range(len(self.by))]
         for flow in self.flows:
-            reached.append(set[int]().union(*(reached[operand] for operand, _ in flow)))
+            reached.append({argument for operand, _ in flow for argument in reached[operand]})
         return [
             (result, argument)
             for result, place in enumerate(self.carriers)
@@ -117,8 +122,7 @@ def _done(step: Step, operands: list[Any]) -> Any:
         case "once":
             return step.value.values(operands)
         case "root":
-            residual: Callable[..., Any] = lambda *given: step.value.values(given)[0]  # noqa: E731
-            return [interpreted(root)(residual, *operands)]
+            return [interpreted(root)(step.value.only_value, *operands)]
         case "repeated":
             size = len(step.value.results)
             state, others = operands[1 : 1 + size], operands[1 + size :]

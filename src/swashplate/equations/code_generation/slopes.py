@@ -22,6 +22,7 @@ from swashplate.equations.graph import (
     TRUE,
     ZERO,
     Call,
+    DerivativeRule,
     Node,
     choose,
     make,
@@ -105,7 +106,8 @@ class Slopes:
         if node.kind != "float" or node.op in ("number", "name"):
             return ()
         if node.op == "ruled":
-            return node.value.arguments  # type: ignore[no-any-return]
+            rule: DerivativeRule = node.value
+            return rule.arguments
         return node.args[1:] if node.op == "if" else node.args
 
     def of(self, node: Node) -> Iterator[tuple[Node, Contribution]]:
@@ -226,7 +228,7 @@ def _restricted(contribution: Contribution, test: Node) -> Contribution:
 
 
 def total_of(pending: Sequence[Contribution]) -> Contribution:
-    """All contributions to an adjoint as one."""
+    """All contributions to a derivative as one."""
     total = pending[0]
     for contribution in pending[1:]:
         if contribution.test is total.test:

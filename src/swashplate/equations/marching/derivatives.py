@@ -64,8 +64,7 @@ class ObservedMarch:
         columns: tuple[str, ...],
         start: Start,
     ) -> None:
-        self._model, self._signals, self._options = model, signals, options
-        self._outputs, self._columns, self._start = outputs, columns, start
+        self._model, self._columns, self._start = model, columns, start
         self._spare: deque[tuple[Array, ...]] = deque(maxlen=8)
         self._start_code = start_code_of(model, signals, options, outputs, start)
         begins: dict[SignalId, list[int]] = {}
@@ -104,7 +103,7 @@ class ObservedMarch:
         code = self._start_code
         self._moves = [
             (row_of[signal], number_of[column], entry)
-            for (signal, column), entry in zip(code.moves, code.entries, strict=True)
+            for (signal, column), entry in zip(code.moves, code.program.entries, strict=True)
             if signal in row_of and column in number_of
         ]
         self._starts = [
@@ -134,6 +133,11 @@ class ObservedMarch:
         slopes = self._slopes(instance, first, h) if self._moves else tangent
         for state, column, entry in self._moves:
             tangent[state, column] = slopes[entry]
+        if not np.isfinite(tangent).all():
+            raise DomainError(
+                f"{instance.name}: what follows from the parameters alone cannot be computed for "
+                "these numbers."
+            )
         for state, path in enumerate(self._paths):
             if path in started:
                 tangent[state] = 0.0
@@ -149,13 +153,7 @@ class ObservedMarch:
         if self._start == "steady":
             signals_before.update(first)
         values = [instance.number_at(argument, signals_before, h) for argument in code.arguments]
-        slopes = code.program.slopes(values)
-        if not np.isfinite(slopes).all():
-            raise DomainError(
-                f"{instance.name}: what follows from the parameters alone cannot be computed for "
-                "these numbers."
-            )
-        return slopes
+        return code.program.slopes(values)
 
     def take_room(self) -> tuple[Array, ...]:
         """Memory for a march, of an earlier one if it can be: new memory takes longer to get."""

@@ -224,6 +224,9 @@ STAMPS = (
 many they are, and the place in the sink that they go to."""
 
 
+STAMP_KINDS = tuple(INTS if kind == "ptr" else "int" for kind, _ in STAMPS)
+
+
 def rows_text() -> str:
     """Text of what writes weighted rows of the problem at some stamps of an observation."""
     code = Code(STAMPS)
@@ -500,6 +503,6 @@ def routines() -> tuple[Any, Any, Any]:
     """What runs a march, writes rows, and rotates them."""
     return (
         code_of_text("run", run_text(), ("int", "float", INTS)),
-        code_of_text("rows", rows_text(), (*(INTS,) * 3, *("int",) * 5)),
+        code_of_text("rows", rows_text(), STAMP_KINDS),
         code_of_text("absorb", absorb_text(), (INTS,)),
     )

@@ -22,9 +22,7 @@ class StartCode(NamedTuple):
 
     arguments: tuple[SignalId, ...]
     moves: tuple[Moved, ...]
-    """What is derived, by which parameter."""
-    entries: tuple[tuple[int, int], ...]
-    """Row and column of each of these among the derivatives that the program gives."""
+    """What is derived, by which parameter, in the order of the program's `entries`."""
     program: Program
 
 
@@ -78,7 +76,6 @@ def _generated(
     return StartCode(
         tuple(outside[name] for name in names),
         tuple((states[result], column_of[moving[by]]) for result, by in program.entries),
-        tuple((result, by) for result, by in program.entries),
         program,
     )
 

@@ -175,7 +175,8 @@ class Carried:
         while before != (now := sum(map(len, self.groups.values()))):
             before = now
             for vertex, flows in self.flows.items():
-                self.groups[vertex].update(*(self.groups.get(operand, ()) for operand in flows))
+                for operand in flows:
+                    self.groups[vertex] |= self.groups.get(operand, set())
             for state, following in zip(self.states, self.following, strict=True):
                 self.groups[state] |= self.groups.get(following, set())
 
