@@ -1,6 +1,5 @@
 from . import graph as graph
 from .cache import cache_folder as cache_folder
-from .cache import kernel as kernel
 from .cache import no_cache_reason as no_cache_reason
 from .code_generation.derivatives import Derived as Derived
 from .code_generation.derivatives import declared as declared
@@ -9,6 +8,7 @@ from .code_generation.loops import interpolate as interpolate
 from .code_generation.loops import repeated as repeated
 from .code_generation.loops import root as root
 from .declaration import JIT_OFF as JIT_OFF
+from .declaration import TEACHING as TEACHING
 from .declaration import closure as closure
 from .declaration import closure_hash as closure_hash
 from .declaration import equation as equation
@@ -27,6 +27,7 @@ from .fields import floats_of as floats_of
 from .fields import is_real as is_real
 from .fields import tuple_from as tuple_from
 from .fields import value_at as value_at
+from .kernels import kernel as kernel
 from .language import Parsed as Parsed
 from .language import is_named_tuple as is_named_tuple
 from .language import parsed as parsed

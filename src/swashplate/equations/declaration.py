@@ -7,6 +7,7 @@ a file, decides whether machine code kept on disk still holds.
 import inspect
 import linecache
 import math
+import os
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from hashlib import blake2b
 from itertools import chain, count
@@ -14,8 +15,6 @@ from pathlib import Path
 from types import CellType, CodeType, FunctionType, MappingProxyType, ModuleType, SimpleNamespace
 from typing import Any, TypeVar, get_args
 from weakref import WeakKeyDictionary
-
-from numba import config, njit
 
 from swashplate.equations.language import is_named_tuple, parsed, plain, resolved
 from swashplate.errors import EquationError
@@ -27,8 +26,7 @@ Replacements = Mapping[Any, tuple[Any, ...]]
 within it the next."""
 NO_REPLACEMENTS: Replacements = MappingProxyType({})
 
-# numba makes its settings from the environment, so that a type checker sees none of them
-JIT_OFF = bool(config.DISABLE_JIT)  # type: ignore[attr-defined]
+JIT_OFF = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
 """Whether nothing is compiled: ``SWASHPLATE_COMPILE=0``."""
 RULES: WeakKeyDictionary[FunctionType, Any] = WeakKeyDictionary()
 """Equations that return the derivatives of others, see `declared`."""
@@ -36,14 +34,14 @@ compiled_functions: dict[Any, None] = {}
 """Plain functions that were given to `inlined`, for when nothing is compiled."""
 
 
-def inlined(function: F) -> F:
-    """Compile a function so that its callers inline it: strict arithmetic, no exceptions.
+TEACHING: list[Callable[[], None]] = []
+"""What tells Numba of functions of ours, once it is imported."""
 
-    Under ``SWASHPLATE_COMPILE=0`` it is the plain function.
-    """
-    compiled_functions[plain(function)] = None
-    compiled: Any = njit(forceinline=True, error_model="numpy")(function)
-    return compiled  # type: ignore[no-any-return]
+
+def inlined(function: F) -> F:
+    """Have kernels compile a function into themselves: strict arithmetic, no exceptions."""
+    compiled_functions[function] = None
+    return function
 
 
 def equation(function: F) -> F:
@@ -61,8 +59,7 @@ def equation(function: F) -> F:
     Returns
     -------
     callable
-        The compiled function, inlined by its callers; the plain one is its ``.py_func``. Under
-        ``SWASHPLATE_COMPILE=0`` it is the plain function.
+        The function itself. Models and kernels that use it compile it into themselves.
 
     Raises
     ------

@@ -11,10 +11,9 @@ from math import inf, isfinite
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba.np.unsafe.ndarray import to_fixed_tuple
 from numpy.typing import NDArray
 
-from swashplate.equations import JIT_OFF, inlined, interpreted, kernel
+from swashplate.equations import TEACHING, inlined, interpreted, kernel
 from swashplate.errors import ParameterError
 from swashplate.models.amplifier import CardChannel, channel_level
 from swashplate.models.displacement_control import (
@@ -257,12 +256,29 @@ def _extremes(channel: CardChannel, pump: Pump, side: int, voltages: Array) -> t
     return least, most
 
 
-def _plain_tuple(values: Array, length: int) -> tuple[float, ...]:
-    return tuple(float(value) for value in values)
+def tuple_of(values: Array, length: int) -> tuple[float, ...]:
+    """Numbers of an array whose length compiled code must know; see `_teach_tuple_of`."""
+    return tuple(float(value) for value in values[:length])
 
 
-# compiled code needs to know the length; Numba's function for it does not run uncompiled
-tuple_of: Any = _plain_tuple if JIT_OFF else to_fixed_tuple
+def _teach_tuple_of() -> None:
+    """Have Numba make tuples by its own function, which does not run uncompiled."""
+    from numba import types
+    from numba.extending import overload
+    from numba.np.unsafe.ndarray import to_fixed_tuple
+
+    to_fixed: Any = to_fixed_tuple
+
+    def of(length: Any) -> Any:
+        if not isinstance(length, types.IntegerLiteral):
+            return None
+        count = length.literal_value
+        return lambda values, length: to_fixed(values, count)
+
+    overload(tuple_of, prefer_literal=True)(lambda values, length: of(length))
+
+
+TEACHING.append(_teach_tuple_of)
 
 
 @kernel

@@ -183,6 +183,12 @@ class Code:
         self.do(f"store {kind} {value}, ptr {name}")
         return name
 
+    def named(self, kind: str, name: str, word: str) -> None:
+        """Give what a word of 64 bits holds a name, as if it were an argument."""
+        made = {"ptr": "inttoptr", "double": "bitcast"}.get(kind)
+        text = f"{made} i64 {word} to {kind}" if made else f"add i64 {word}, 0"
+        self.do(f"%{name} = {text}")
+
     def pointer(self, address: str) -> str:
         """A pointer to what is at an address."""
         return self.put(f"inttoptr i64 {address} to ptr")

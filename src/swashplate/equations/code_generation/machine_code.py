@@ -1,27 +1,29 @@
 """Machine code of functions in LLVM's language, made once on a machine and kept on disk.
 
-The passes, the processor's instructions and C's functions are those that Numba takes, so that
-numbers are the same to the last bit wherever an equation is compiled.
+The passes and the processor's instructions are those that Numba takes for kernels, so that numbers
+are the same to the last bit wherever an equation is compiled.
 """
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from ctypes import CFUNCTYPE, addressof, c_char, c_double, c_int64, c_void_p
 from functools import cache
+from threading import RLock
 from typing import Any
 
 import numpy as np
 from llvmlite import __version__ as llvmlite_version
 from llvmlite import binding as llvm
-from numba.core.compiler_lock import global_compiler_lock
-from numba.core.registry import cpu_target
 from numpy.typing import NDArray
 
 from swashplate import progress
 from swashplate.equations.cache import COMPILING
 from swashplate.equations.keeping import cached_on_disk
 
+_COMPILING = RLock()
+"""Held while LLVM works for this process."""
 SYMBOL = "code"
 """Name of every function within its own module."""
 OPTIMISATION_LEVEL = 3
@@ -47,7 +49,7 @@ class MachineCode:
     """
 
     def __init__(self, content: bytes, kinds: Sequence[str]) -> None:
-        with global_compiler_lock:
+        with _COMPILING:
             self._engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _target_machine())
             self._engine.add_object_file(llvm.ObjectFileRef.from_data(content))
             self._engine.finalize_object()
@@ -99,9 +101,12 @@ def code_of_text(name: str, text: str, kinds: tuple[str, ...], *, pack: bool = T
 @cache
 def _host() -> tuple[str, str, str]:
     """The machine that code is made for: triple, processor, and what that can do."""
-    # Numba makes the functions of C known to LLVM as well
-    triple, processor, features = cpu_target.target_context.codegen().magic_tuple()
-    return triple, processor, features
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    triple, told = llvm.get_process_triple(), os.environ.get("NUMBA_CPU_NAME")
+    if told and told != "host":
+        return triple, told, os.environ.get("NUMBA_CPU_FEATURES", "")
+    return triple, llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()
 
 
 def _target_machine() -> Any:
@@ -127,7 +132,7 @@ def _passes(machine: Any, *, pack: bool) -> Any:
 
 def optimised(text: str, *, pack: bool = True) -> Any:
     """A module of LLVM's, in the form in which it becomes machine code."""
-    with global_compiler_lock:
+    with _COMPILING:
         machine, module = _target_machine(), llvm.parse_assembly(text)
         module.triple, module.data_layout = machine.triple, str(machine.target_data)
         module.verify()
@@ -144,7 +149,7 @@ def _compiled(name: str, text: str, *, pack: bool) -> bytes:
     work = progress.begin(COMPILING, name)
     try:
         module = optimised(text, pack=pack)
-        with global_compiler_lock:
+        with _COMPILING:
             content: bytes = _target_machine().emit_object(module)
         return content
     finally:

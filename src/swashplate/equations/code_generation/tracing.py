@@ -12,7 +12,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import reduce
 from inspect import Parameter, Signature
-from types import FunctionType, ModuleType
+from types import ModuleType
 from typing import Any, TypeVar
 
 from swashplate.equations import graph
@@ -35,11 +35,11 @@ from swashplate.equations.code_generation.values import (
     rebuilt,
 )
 from swashplate.equations.declaration import (
-    JIT_OFF,
     NO_REPLACEMENTS,
     RULES,
     Replacements,
     closure,
+    is_function,
     standing,
 )
 from swashplate.equations.graph import (
@@ -670,7 +670,5 @@ def _whole(number: float) -> float:
 
 
 def _is_equation(function: Any) -> bool:
-    """Whether something may be an equation: a function that is compiled, if any is."""
-    return isinstance(plain(function), FunctionType) and (
-        plain(function) is not function or JIT_OFF
-    )
+    """Whether something may be an equation."""
+    return is_function(function)

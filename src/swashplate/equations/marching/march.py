@@ -264,9 +264,9 @@ class March:
 
 
 STEP_ARGUMENTS = (*ARGUMENTS, *(("ptr", name) for name in ("inputs", "constants", "position")))
-"""Of a march of one sample: ``count`` the length of the records, ``inputs`` the newest sample,
-``constants`` what does not change, ``position`` where in the records the sample goes, and how many
-samples delays look back."""
+"""Of a march of one sample, which is given them as words: ``count`` the length of the records,
+``inputs`` the newest sample, ``constants`` what does not change, ``position`` where in the records
+the sample goes, and how many samples delays look back."""
 PREPARE_ARGUMENTS = (
     ("double", "h"),
     *(("ptr", name) for name in ("delay_fraction", "params", "given", "constants")),
@@ -292,7 +292,9 @@ def step_texts(
     known = known_ahead(sample_code, prepare)
     for place, text in enumerate(prepare.values(constants, known)):
         prepare.store(text, "%constants", place)
-    code = Code(STEP_ARGUMENTS)
+    code = Code([("ptr", "words")])
+    for place, (kind, name) in enumerate(STEP_ARGUMENTS):
+        code.named(kind, name, code.load("%words", place, "i64"))
     records = [code.load("%records", place, "ptr") for place, _ in enumerate(signals)]
     at = code.variable(code.load("%position", 0, "i64"), "i64")
     with code.only_if(code.put(f"icmp eq i64 {code.load(at, 0, 'i64')}, %count")):

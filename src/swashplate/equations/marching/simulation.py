@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from functools import cached_property, lru_cache
+from math import isfinite
 from types import MappingProxyType
 from typing import (
     TYPE_CHECKING,
@@ -27,7 +28,6 @@ from typing import (
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swashplate.equations.cache import kernel
 from swashplate.equations.fields import check_mapping
 from swashplate.equations.marching.part_code import SignalId
 from swashplate.equations.marching.record import (
@@ -46,7 +46,7 @@ from swashplate.equations.marching.run import (
     marched,
 )
 from swashplate.equations.marching.sample_code import output_of
-from swashplate.equations.marching.stepping import CompiledStep, StepContext, step
+from swashplate.equations.marching.stepping import CompiledStep, StepContext, bound_step
 from swashplate.equations.model import Model
 from swashplate.errors import DomainError, InputError, UnknownNameError
 from swashplate.results import GivenAxes, Tabular, figures, pandas_frame
@@ -508,39 +508,6 @@ def simulate(
 # --- one sample at a time -------------------------------------------------------------------------
 
 
-@kernel
-def _advance(
-    inputs: Array, zero_order: NDArray[np.bool_], substeps: int, context: StepContext,
-    rates: NDArray[np.int64], totals: Array,
-) -> tuple[float, bool]:  # fmt: skip
-    """Advance by one sample, from the inputs before to these, in several steps.
-
-    `totals` are as in `StepperState`. Returns the least margin of the domain, and whether state and
-    outputs are finite.
-    """
-    worst = np.inf
-    for j in range(substeps):
-        for i in range(zero_order.size):
-            context.inputs[i] = inputs[1, i]
-            if j < substeps - 1:
-                rise = 0.0 if zero_order[i] else (j + 1) / substeps
-                context.inputs[i] = inputs[0, i] + rise * (inputs[1, i] - inputs[0, i])
-        worst = min(worst, step(context))
-        for r in range(rates.size):
-            rate = context.outputs[rates[r]]
-            totals[0, r] = totals[0, r] + 0.5 * context.h * (totals[1, r] + rate)
-            totals[1, r] = rate
-    inputs[0] = inputs[1]
-    finite = True
-    for state in context.states:
-        finite = finite and np.isfinite(state)
-    for output in context.outputs:
-        finite = finite and np.isfinite(output)
-    for total in totals[0]:
-        finite = finite and np.isfinite(total)
-    return worst, finite
-
-
 class StepperState(NamedTuple):
     """All that a stepper remembers; one that was kept can be returned to."""
 
@@ -601,7 +568,7 @@ class Stepper(Generic[S]):
                 signals.append(output_of(instance.model, name))
         stored = list(dict.fromkeys(signal for signal, _ in signals))
         rates = [stored.index(signal) for signal, is_integral in signals if is_integral]
-        self._rates = np.array(rates, dtype=np.int64)
+        self._rates, self._integrates = np.array(rates, dtype=np.int64), bool(rates)
         # of each output its index in a row of inputs, numbers of the step and integrals
         first_integral = len(inputs) + len(stored)
         integrals = iter(range(first_integral, first_integral + len(rates)))
@@ -611,12 +578,17 @@ class Stepper(Generic[S]):
             self._order.append(index)
         self._zero_order = np.array([between[name] == "previous" for name in inputs])
         self._compiled = CompiledStep(instance, inputs, stored, 1.0 / (rate * self._substeps))
-        self._state = StepperState(
-            context=self._compiled.context(),
-            totals=np.zeros((2, len(rates))),
-            inputs=np.zeros((2, len(inputs))),
-            initialised=False,
+        self._keep(
+            StepperState(
+                context=self._compiled.context(),
+                totals=np.zeros((2, len(rates))),
+                inputs=np.zeros((2, len(inputs))),
+                initialised=False,
+            )
         )
+
+    def _keep(self, state: StepperState) -> None:
+        self._state, self._take_step = state, bound_step(state.context)
 
     def __repr__(self) -> str:
         return f"Stepper({self._compiled!r})"
@@ -639,7 +611,7 @@ class Stepper(Generic[S]):
             position=earlier.position,
             inputs=earlier.inputs,
         )
-        self._state = state._replace(context=context).copied()
+        self._keep(state._replace(context=context).copied())
 
     def step(self, *inputs: float) -> S:
         """Advance by one sample interval.
@@ -694,16 +666,36 @@ class Stepper(Generic[S]):
             if self._start == "steady":
                 first = dict(zip(self.inputs, inputs, strict=True))
                 context = self._compiled.context(first, "steady")
-            self._state = StepperState(context, totals, values, True)
-        substeps = self._substeps if initialised else 1
-        worst, finite = _advance(values, self._zero_order, substeps, context, self._rates, totals)
+            self._keep(StepperState(context, totals, values, True))
+        worst = self._advance(self._substeps if initialised else 1)
         if not initialised:
             totals[0] = 0.0
-        if not (worst > 0.0 and finite):
+        outputs = [*context.outputs.tolist(), *totals[0].tolist()]
+        if not (worst > 0.0 and all(map(isfinite, [*outputs, *context.states.tolist()]))):
             self._compiled.check(context, worst, self.inputs[0])
             raise DomainError(f"{self._name}: an integral overflows under this {self.inputs[0]}.")
-        row = [*inputs, *context.outputs.tolist(), *totals[0].tolist()]
+        row = [*inputs, *outputs]
         return self._sample([row[index] for index in self._order])
+
+    def _advance(self, substeps: int) -> float:
+        """Advance from the inputs before to these, in several steps; the least margin."""
+        context, totals, (before, now), _ = self._state
+        worst = np.inf
+        take_step = self._take_step
+        for j in range(1, substeps + 1):
+            context.inputs[:] = now
+            if j < substeps:
+                rise = np.where(self._zero_order, 0.0, j / substeps)
+                context.inputs[:] = before + rise * (now - before)
+            take_step()
+            worst = min(worst, context.margin.item(0))
+            if self._integrates:
+                rates = context.outputs[self._rates]
+                with np.errstate(over="ignore", invalid="ignore"):  # `step` says it
+                    totals[0] += 0.5 * context.h * (totals[1] + rates)
+                totals[1] = rates
+        before[:] = now
+        return worst
 
 
 def stepper(

@@ -17,21 +17,20 @@ Examples
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from ctypes import CFUNCTYPE, c_void_p
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
-from llvmlite import ir
-from numba import types
-from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from swashplate.equations.code_generation.functions import generating
-from swashplate.equations.code_generation.machine_code import code_of_text
-from swashplate.equations.declaration import JIT_OFF, inlined
+from swashplate.equations.code_generation.machine_code import address_of, code_of_text
+from swashplate.equations.declaration import JIT_OFF, TEACHING, inlined
 from swashplate.equations.keeping import cached_on_disk, key_of
 from swashplate.equations.marching.interpreting import InterpretedMarch
-from swashplate.equations.marching.kernels import FLOATS, INTS, KERNEL_KINDS
+from swashplate.equations.marching.kernels import FLOATS, INTS
 from swashplate.equations.marching.march import step_texts
 from swashplate.equations.marching.part_code import SignalId
 from swashplate.equations.marching.record import check_rate
@@ -78,6 +77,9 @@ class StepContext(NamedTuple):
     code: Any
     """Address of the step; without compiled code the step itself."""
 
+    words: NDArray[np.int64]
+    """All that the step takes, as words: numbers and addresses of the arrays."""
+
     def copied(self) -> StepContext:
         """A copy that remembers for itself: both go on from here independently."""
         lines = self.lines.copy()
@@ -89,7 +91,13 @@ class StepContext(NamedTuple):
             position=self.position.copy(),
             records=_rows_of(lines),
             margin=self.margin.copy(),
-        )
+        ).bound()
+
+    def bound(self) -> StepContext:
+        """The context with the words of its own arrays."""
+        numbers = [self.lines.shape[1], 0, int(np.float64(self.h).view(np.int64))]
+        addresses = [getattr(self, name).ctypes.data for name in STEP_ARRAYS]
+        return self._replace(words=np.array([*numbers, *addresses], dtype=np.int64))
 
 
 def _rows_of(lines: Array) -> NDArray[np.int64]:
@@ -98,56 +106,58 @@ def _rows_of(lines: Array) -> NDArray[np.int64]:
     return np.array([first + row * number for number in range(len(lines))], dtype=np.int64)
 
 
-def _call_intrinsic(typing: Any, context: Any) -> Any:
-    """Signature and code of `call_step` for Numba: a call of the step at its address."""
-    places = {name: place for place, name in enumerate(context.fields)}
-
-    def generate(target: Any, builder: Any, signature: Any, values: Any) -> Any:
-        (value,) = values
-
-        def data(name: str) -> Any:
-            array = builder.extract_value(value, places[name])
-            kind = context.types[places[name]]
-            return builder.bitcast(target.make_array(kind)(target, builder, array).data, POINTER)
-
-        lines = builder.extract_value(value, places["lines"])
-        shape = target.make_array(context.types[places["lines"]])(target, builder, lines).shape
-        length = builder.extract_value(shape, 1)
-        arguments = [
-            length,
-            ir.Constant(LONG, 0),
-            builder.extract_value(value, places["h"]),
-            *map(data, STEP_ARRAYS),
-        ]
-        kind = ir.FunctionType(ir.VoidType(), [argument.type for argument in arguments])
-        address = builder.extract_value(value, places["code"])
-        builder.call(builder.inttoptr(address, kind.as_pointer()), arguments)
-        return target.get_dummy_value()
-
-    return types.none(context), generate
-
-
 STEP_ARRAYS = (
     *("records", "before", "delay_samples", "delay_fraction", "params", "given", "states"),
     *("margin", "outputs", "inputs", "constants", "position"),
 )
 """Fields of a context that a step is given after its step, see `march.STEP_ARGUMENTS`."""
 PREPARE_KINDS = ("float", *(FLOATS,) * 4)
-STEP_KINDS = (*KERNEL_KINDS, FLOATS, FLOATS, INTS)
-"""Kinds of the arguments of `march.PREPARE_ARGUMENTS` and `march.STEP_ARGUMENTS`."""
+"""Kinds of the arguments of `march.PREPARE_ARGUMENTS`."""
+_STEP = CFUNCTYPE(None, c_void_p)
 OLDEST = 3
 """Samples that a tap looks back at most beside its delay."""
 ROOM = 500
 """Samples that are put behind each other before they are moved."""
-LONG, POINTER = ir.IntType(64), ir.IntType(8).as_pointer()
 
 
-def _call(context: StepContext) -> None:
-    context.code(context)
+def call_step(context: StepContext) -> None:
+    """Run the step of a context; for Numba see `_teach_call_step`."""
+    bound_step(context)()
 
 
-call_step: Any = _call if JIT_OFF else intrinsic(_call_intrinsic)
-"""``call_step(context)`` runs the step of a context."""
+def bound_step(context: StepContext) -> Callable[[], None]:
+    """What runs the step of a context again and again, which must be kept meanwhile."""
+    if not isinstance(context.code, int):
+        return partial(context.code, context)
+    return partial(_STEP(context.code), address_of(context.words))
+
+
+def _teach_call_step() -> None:
+    """Have Numba call the step at its address."""
+    from llvmlite import ir
+    from numba import types
+    from numba.extending import intrinsic, overload
+
+    def called(typing: Any, context: Any) -> Any:
+        places = {name: place for place, name in enumerate(context.fields)}
+
+        def generate(target: Any, builder: Any, signature: Any, values: Any) -> Any:
+            (value,) = values
+            array = builder.extract_value(value, places["words"])
+            words = target.make_array(context.types[places["words"]])(target, builder, array).data
+            kind = ir.FunctionType(ir.VoidType(), [words.type])
+            address = builder.extract_value(value, places["code"])
+            builder.call(builder.inttoptr(address, kind.as_pointer()), [words])
+            return target.get_dummy_value()
+
+        return types.none(context), generate
+
+    call: Any = intrinsic(called)
+
+    overload(call_step, inline="always")(lambda context: lambda context: call(context))
+
+
+TEACHING.append(_teach_call_step)
 
 
 @inlined
@@ -211,7 +221,7 @@ def _step_of(
     )
     constants = code_of_text(f"{model.name}_constants", prepare, PREPARE_KINDS)
     # what comes from memory is not there in pairs: packed, a step takes 1.6 times as long
-    code = code_of_text(f"{model.name}_step", text, STEP_KINDS, pack=False)
+    code = code_of_text(f"{model.name}_step", text, (INTS,), pack=False)
     return constants, code.address, count
 
 
@@ -283,7 +293,8 @@ class CompiledStep:
             margin=np.full(2, np.inf),
             h=self._h,
             code=self._code,
-        )
+            words=np.zeros(0, dtype=np.int64),
+        ).bound()
 
     def check(self, context: StepContext, margin: float, cause: str = "input") -> None:
         """Refuse what a loop has computed outside the model's equations.
