@@ -15,12 +15,14 @@ import socket
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from threading import Thread, current_thread, main_thread
+from threading import Thread, Timer, current_thread, main_thread
 from types import FrameType
 from typing import Any
 
 GRACE = 3.0
 """Time that a command has to end by itself: people press Ctrl-C again after about that. [s]"""
+AGAIN = 0.02
+"""Time after which an import is looked at again. [s]"""
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 _undoings = dict[object, Callable[[], object]]()
@@ -122,10 +124,22 @@ def _tell(number: int, frame: FrameType | None) -> None:
     """Handle a signal, in the main thread."""
     if _Told.over:
         _end(number)
-    if not _Told.told:
+    if _imports(frame) and hasattr(signal, "pthread_kill"):
+        # compiled modules panic if what they import for themselves ends half-way
+        again = Timer(AGAIN, signal.pthread_kill, (main_thread().ident or 0, number))
+        again.daemon = True
+        again.start()
+    elif not _Told.told:
         _Told.told = number
         if not _Told.put_off:
             raise Stopped
+
+
+def _imports(frame: FrameType | None) -> bool:
+    """Whether a module is being imported where the main thread is."""
+    while frame is not None and "<frozen importlib" not in frame.f_code.co_filename:
+        frame = frame.f_back
+    return frame is not None
 
 
 def _ignore_signals() -> None:

@@ -9,7 +9,7 @@ from typing import Any, get_type_hints
 
 import numpy as np
 
-from swashplate.equations import Window, arguments_of, floats_of, plain, value_at
+from swashplate.equations import Window, arguments_of, floats_of, value_at
 from swashplate.equations.model import linear, mean_over_sample, previous
 
 
@@ -199,7 +199,7 @@ def marched(
                 link, tap = model.link_of(i, name), part.tap(name)
                 if link is not None:
                     args = [signals[source.part, source.signal] for source in link.sources]
-                    value = args[0] if link.equation is None else plain(link.equation)(*args)
+                    value = args[0] if link.equation is None else link.equation(*args)
                 elif tap.signal not in records:
                     value = value_at(p[i], part.defaults[name])
                 elif name not in part.taps:

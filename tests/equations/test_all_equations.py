@@ -19,7 +19,7 @@ from tests.marks import rest_slow
 import swashplate.equations
 import swashplate.models
 from swashplate import Drive, PhysicalSet
-from swashplate.equations import Window, derive, interpreted, plain
+from swashplate.equations import Window, derive
 from swashplate.equations.declaration import is_function
 from swashplate.models import amplifier, full_order, machine, pump
 from swashplate.models import displacement_control as control
@@ -52,8 +52,8 @@ def equations_of(space: dict[str, Any]) -> dict[str, Any]:
         name: thing
         for name, thing in space.items()
         if is_function(thing)
-        and plain(thing).__module__ == space["__name__"]
-        and inspect.getsource(plain(thing)).startswith("@equation\n")
+        and thing.__module__ == space["__name__"]
+        and inspect.getsource(thing).startswith("@equation\n")
     }
 
 
@@ -206,7 +206,7 @@ def hoist_machine(draw: Draw, _: dict[str, Any]) -> machine.Machine:
 
 
 def pump_state(draw: Draw, known: dict[str, Any]) -> pump.PumpState:
-    limits = interpreted(control.pressure_limits)(known["p"])
+    limits = control.pressure_limits(known["p"])
     pressures = [draw.uniform(0.98 * limits.lower, 0.98 * limits.upper) for _ in range(2)]
     names = ("current", "position", *pump.PumpState._fields[4:-1])
     return pump.PumpState(*pressures, *map(draw.number, names), 1.0)
@@ -217,13 +217,13 @@ def pump_signals(draw: Draw, known: dict[str, Any]) -> pump.PumpSignals:
     given = {"options": options, **known}
     state = known.get("state") or pump_state(draw, given)
     inputs = known.get("inputs") or draw.argument("inputs", pump.PumpInputs, known)
-    return interpreted(pump.pump_sample)(state, inputs, known["p"], H, options)
+    return pump.pump_sample(state, inputs, known["p"], H, options)
 
 
 def plant_signals(draw: Draw, known: dict[str, Any]) -> full_order.PlantSignals:
     motion = draw.argument("state", full_order.Motion, known)
     options = full_order.PlantOptions()
-    return interpreted(full_order.plant_signals)(motion, 0.4, known["p"], options)
+    return full_order.plant_signals(motion, 0.4, known["p"], options)
 
 
 MADE: dict[Any, Callable[[Draw, dict[str, Any]], Any]] = {
@@ -238,9 +238,7 @@ MADE: dict[Any, Callable[[Draw, dict[str, Any]], Any]] = {
     ),
     pump.PumpState: pump_state,
     pump.PumpSignals: pump_signals,
-    machine.ReliefPressures: lambda _, known: interpreted(machine.relief_pressures)(
-        known["p"].machine
-    ),
+    machine.ReliefPressures: lambda _, known: machine.relief_pressures(known["p"].machine),
     full_order.PlantSignals: plant_signals,
 }
 """What is no mere tuple of numbers, each of a range of its own."""
@@ -265,7 +263,7 @@ def compared_at(
         if path.endswith(".s.0"):
             lengths[path.removesuffix(".0")] = 3
     derived = derived_of(function, tuple(floats), tuple(options.items()), tuple(lengths.items()))
-    return compared(interpreted(function), derived, arguments, implicit, vanishing)
+    return compared(function, derived, arguments, implicit, vanishing)
 
 
 @cache
@@ -276,7 +274,7 @@ def derived_of(function: Any, by: Any, options: Any, lengths: Any) -> Any:
 @pytest.mark.parametrize("name", rest_slow([*EQUATIONS], 40))
 def test_partials_are_those_of_differences(name: str) -> None:
     function = EQUATIONS[name]
-    hints = get_type_hints(plain(function))
+    hints = get_type_hints(function)
     hints.pop("return", None)
     random = Random(name)
     several = [Draw(name, random) for _ in range(6)]

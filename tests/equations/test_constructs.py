@@ -678,3 +678,101 @@ def test_what_python_can_read_is_not_too_deep(
     (tmp_path / "deep.py").write_text(text, "utf-8")
     deep = run_path(str(tmp_path / "deep.py"))["deep"]
     assert derive(deep, "x")(2.0) == (expected, 1.0)
+
+
+# --- what Python runs -----------------------------------------------------------------------------
+
+COUNT, SHARES = 4, (0.5, 0.25, 0.125)
+
+
+@equation
+def first_above(x: float, s: tuple[float, float, float]) -> float:
+    """A loop that is left on the way, by a return."""
+    for i, value in enumerate(s):
+        if value > x:
+            return value + i
+    return x
+
+
+@equation
+def up_to_gap(x: float, s: tuple[float, float, float]) -> float:
+    """A loop with `continue`, `break` and `else`, within another."""
+    total = 0.0
+    for turn in range(2):
+        for value in s:
+            if value < 0.0:
+                continue
+            if value > x:
+                total += 10.0 * value
+                break
+            total = total * x + value
+        else:
+            total += 100.0 + turn
+        if total > 1000.0:
+            return total
+    return total
+
+
+@equation
+def shared_out(x: float, s: tuple[float, float, float]) -> float:
+    """What Python knows ahead: whole numbers, tuples, comprehensions, arguments with `*`."""
+    odd = tuple(value for number, value in enumerate(s) if number % 2 == 0)
+    weighted = tuple(a * b for a, b in zip(s, SHARES, strict=True))
+    first, *others = weighted
+    total = first * x ** (len(others) - COUNT + 3)
+    for number in range(COUNT // 2):
+        total = total + weighted[number + 1] / (number + 1)
+    return accelerated(State(*odd), max(weighted), Body(total, Spring(x), drag=min(*s, x)))
+
+
+@equation
+def turned_back(s: State, x: float, mirrored: bool | None = None) -> State:
+    """`_replace`, and chains of comparisons."""
+    if mirrored:
+        s = s._replace(position=-s.position)
+    return s._replace(speed=x) if 0.0 < s.position <= x != 1.0 else s
+
+
+@pytest.mark.parametrize("x", [-2.0, 0.2, 0.55, 3.0])
+@pytest.mark.parametrize("s", [(0.3, 0.5, 0.7), (0.6, -0.4, 0.3), (-1.0, -0.8, 9.0)])
+def test_what_python_runs(x: float, s: tuple[float, float, float]) -> None:
+    for each in (first_above, up_to_gap, shared_out):
+        check(each, ("x", "s"), x=x, s=s)
+    for mirrored in (OFF, ON):
+        said = {"mirrored": mirrored}
+        check(turned_back, ("x", "s"), said, s=State(*s[:2]), x=x, mirrored=mirrored)
+
+
+@equation
+def decided_often(x: float) -> float:
+    y = x
+    if y > 1.0:
+        y = y - 0.5
+    if y > 2.0:
+        y = y * 0.5
+    if x > 3.0:
+        y += 1.0
+    if y > 4.0:
+        y = y * y
+    if y > 5.0:
+        y = y - x
+    if x > 6.0:
+        y = sqrt(abs(y))
+    if y > 0.7:
+        y = y + 0.7
+    if y > 0.8:
+        y = 0.8 * y
+    if y > 0.9:
+        y = y - 0.9
+    if x > 10.0:
+        y = y + x
+    if y > 11.0:
+        y = y / 11.0
+    if y > 12.0:
+        y = 12.0
+    return y
+
+
+@pytest.mark.parametrize("x", [-1.0, 0.85, 2.9, 4.4, 7.0, 30.0])
+def test_decisions_one_after_another(x: float) -> None:
+    check(decided_often, "x", x=x)

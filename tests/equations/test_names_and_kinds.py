@@ -176,9 +176,9 @@ def test_a_nested_state_begins_at_its_defaults() -> None:
 REFUSED = {
     "x = WORDS(u)": "list",
     "x = TABLE(u)": "ndarray",
-    "x = 1.0\nfor i in range(0, 5, 0):\n    x = x + u": "literal range",
-    "x = 1.0\nfor i in range():\n    x = x + u": "literal range",
-    "x = os.path.join(u)": r"import join itself",
+    "x = 1.0\nfor i in range(0, 5, 0):\n    x = x + u": "must not be zero",
+    "x = 1.0\nfor i in range():\n    x = x + u": "at least 1 argument",
+    "x = os.path.join(u)": r"make os.path.join an @equation",
     "x = u * SINGLE": "make it a float or an int of Python",
     "x = NUMBER(u)": "NUMBER, which is of type float",
 }

@@ -13,6 +13,7 @@ from swashplate.batch import simulate_many
 from swashplate.equations import (
     Model,
     Tap,
+    derive,
     equation,
     join,
     replaced,
@@ -496,8 +497,8 @@ def test_text_complex_numbers_and_lists_are_refused_in_the_equation(tmp_path, va
     path.write_text(f"def step(state: float, flow: float) -> float:\n    return {value}\n", "utf-8")
     names: dict[str, Any] = {"__name__": "own"}
     exec(compile(path.read_text("utf-8"), str(path), "exec"), names)
-    with pytest.raises(EquationError, match=r"own\.py, line 2: .* in step"):
-        equation(names["step"])
+    with pytest.raises(EquationError, match=r"own\.py, line 1: a result .* in step"):
+        derive(equation(names["step"]), "state")
 
 
 OUTSIDE = {

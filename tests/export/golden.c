@@ -216,7 +216,7 @@ static double settled_pressure(double inputs_current, double inputs_supply_press
         /* closed_pressure: δP at which the spool closes, held within the limits. */
         const double a = lesser_of(greater_of(force * (p_Z5 / sqrt(p_Z4)), -1.0), 1.0);
         const double angle = lesser_of(greater_of(asin(a) + atan(p_Z18 / p_Z5),
-            -0.5 * 3.141592653589793), 0.5 * 3.141592653589793);
+            -1.5707963267948966), 1.5707963267948966);
         const double closed = (sin(angle) / p_Z3 + p_Z2) / p_Z1;
         const double closed_2 = lesser_of(greater_of(closed, limits_lower), limits_upper);
 

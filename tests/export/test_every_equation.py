@@ -22,6 +22,8 @@ from swashplate.export.c_source import equation_in_c
 
 REFUSED = ("rubbing", "rubbed")
 """Constructs of which there are none in C: an option that is a tuple of numbers, or None."""
+TWINLESS = ("turned_back", "shared_out")
+"""Constructs that Numba does not compile: the operations in them are those of others."""
 CONSTRUCTS = equations_of(vars(test_constructs))
 
 
@@ -103,7 +105,9 @@ def looped(x: float, on: bool | None) -> float:
 
 SETS = {
     "packaged": EQUATIONS,
-    "constructs": {name: each for name, each in CONSTRUCTS.items() if name not in REFUSED},
+    "constructs": {
+        name: each for name, each in CONSTRUCTS.items() if name not in (*REFUSED, *TWINLESS)
+    },
     "own": equations_of(globals()),
 }
 CASES = [

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from swashplate.equations import is_named_tuple, kernel, parsed, plain
+from swashplate.equations import is_named_tuple, kernel, parsed
 from swashplate.equations.code_generation import Loops, helpers_in
 from swashplate.equations.declaration import remember_text
 from swashplate.export.c_source import EquationInC, equation_in_c
@@ -147,7 +147,7 @@ def rows(columns: list[tuple[str, str]], on: bool, seed: int) -> np.ndarray:
 
 def hints_of(equation: Any) -> dict[str, Any]:
     """Types of what an equation takes and returns."""
-    f = plain(equation)
+    f = equation
     hints = typing.get_type_hints(f)
     names = [*(each.arg for each in parsed(f).arguments), "return"]
     return {name: by_itself(hints[name]) for name in names}

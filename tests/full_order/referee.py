@@ -4,7 +4,6 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from swashplate.drive import Simulation
-from swashplate.equations import interpreted
 from swashplate.full_order import FullOrderDrive
 from swashplate.models.displacement_control import solenoid_force
 from swashplate.models.full_order import Motion, free_rates
@@ -29,12 +28,12 @@ def solved(full: FullOrderDrive, run: Simulation, tolerance: float = 1e-8) -> np
     options = instance.options[1]
     started = instance.start({"current": float(current[0])}, run.record.step, "rest")
     state = np.array(started.states[1].motion)
-    relief = interpreted(relief_pressures)(m)
+    relief = relief_pressures(m)
     time = run.record.step * np.arange(current.size)
     lower = np.array([-m.spool_stroke, relief.lower, -m.swash_stop_minus])
     upper = np.array([m.spool_stroke, relief.upper, m.swash_stop_plus])
     size, places = upper - lower, [0, 2, 3]
-    rates_of, force_of = interpreted(free_rates), interpreted(solenoid_force)
+    rates_of, force_of = free_rates, solenoid_force
 
     def pushes(t: float, y: np.ndarray) -> np.ndarray:
         """Rates of spool velocity, pressure and swash rate where no limit holds."""

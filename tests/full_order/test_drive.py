@@ -8,7 +8,6 @@ import pytest
 from tests.full_order.referee import solved
 
 from swashplate import DomainError, Drive, InputError, UnknownParameterError, maneuvers
-from swashplate.equations import interpreted
 from swashplate.full_order import (
     TABLE_MANEUVERS,
     FullOrderDrive,
@@ -41,7 +40,7 @@ def referee(full: FullOrderDrive, command: np.ndarray, tolerance: float = 1e-8) 
     """Speed by SciPy's stiff solver."""
     run = full.drive.simulate(command)
     states = solved(full, run, tolerance)[:: run.record.substeps]
-    speed, m = interpreted(machine_speed), full.plant.machine
+    speed, m = machine_speed, full.plant.machine
     return np.array([speed(angle, rate, m) for angle, rate in states[:, 3:].tolist()])
 
 
@@ -106,7 +105,7 @@ def test_oil_and_energy_are_kept(hoist: FullOrderDrive) -> None:
     loaded = hoist.replace(load_torque=3e3, piston_leakage=1e-12)
     command = maneuvers.step(4.0, start=0.1, stop=0.6, length=1.0).sample(8192.0)
     run, m = loaded.simulate(command, 8192.0), loaded.physical.machine
-    pressure = run.stroker_pressure + interpreted(static_pressure)(m)
+    pressure = run.stroker_pressure + static_pressure(m)
 
     def passed(rate: np.ndarray) -> float:
         return float(np.trapezoid(rate, run.time))

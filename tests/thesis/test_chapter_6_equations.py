@@ -9,7 +9,7 @@ import pytest
 import sympy as sp
 
 from swashplate import Drive, PhysicalSet
-from swashplate.equations import interpreted, tuple_from
+from swashplate.equations import tuple_from
 from swashplate.models import displacement_control, machine, pump, refinements
 from swashplate.models.displacement_control import Pump
 from swashplate.models.machine import Machine
@@ -23,12 +23,11 @@ Formula = Callable[..., float]
 Range = tuple[float, float]
 
 arm_sine, orifice_opening, spool_balance = (
-    interpreted(getattr(displacement_control, name))
-    for name in ("arm_sine", "orifice_opening", "spool_balance")
+    getattr(displacement_control, name) for name in ("arm_sine", "orifice_opening", "spool_balance")
 )
-shaft_speed = interpreted(pump.shaft_speed)
-load_leakage = interpreted(refinements.load_leakage)
-motor_pressure_drop = interpreted(refinements.motor_pressure_drop)
+shaft_speed = pump.shaft_speed
+load_leakage = refinements.load_leakage
+motor_pressure_drop = refinements.motor_pressure_drop
 
 
 def points(*ranges: Range) -> list[tuple[float, ...]]:
@@ -39,21 +38,21 @@ def points(*ranges: Range) -> list[tuple[float, ...]]:
 
 def of(name: str, *states: float, **values: float) -> float:
     """An equation of the machine, of which some quantities are given."""
-    return interpreted(getattr(machine, name))(*states, MACHINE._replace(**values))
+    return getattr(machine, name)(*states, MACHINE._replace(**values))
 
 
 def valve_flow(
     x: float, pressure: float, supply: float, gain: float, symmetric: bool | None = True
 ) -> float:
     p = MACHINE._replace(supply_pressure=supply, valve_flow_gain=gain, **OPEN)
-    return interpreted(machine.valve_flow)(x, pressure, p, symmetric)
+    return machine.valve_flow(x, pressure, p, symmetric)
 
 
 def oil_pressure_rate(
     pressure: float, flow: float, speed: float, area: float, leakage: float, V: float, B: float
 ) -> float:
     p = MACHINE._replace(piston_area=area, piston_leakage=leakage, oil_volume=V, bulk_modulus=B)
-    return interpreted(machine.oil_pressure_rate)(pressure, flow, speed, p, None)
+    return machine.oil_pressure_rate(pressure, flow, speed, p, None)
 
 
 def rest_of_spool(force: float, arm: float, Z4: float, Z5: float) -> float:

@@ -9,7 +9,7 @@ import pint
 import pytest
 
 from swashplate import Drive, maneuvers
-from swashplate.equations import derive, interpreted, tuple_from
+from swashplate.equations import derive, tuple_from
 from swashplate.full_order import QUANTITIES, FullOrderDrive, PhysicalSet
 from swashplate.models import displacement_control as control
 from swashplate.models import machine
@@ -45,7 +45,7 @@ def test_eq_6_56_to_6_70_and_erratum_20_lumps() -> None:
     n = LOADED.numbers
     found = LOADED.to_lumped()
     expected = lumps(SimpleNamespace(**{key: n.get(name) for key, name in SYMBOLS.items()}))
-    P0 = interpreted(machine.static_pressure)(Machine(**n))
+    P0 = machine.static_pressure(Machine(**n))
     expected["Z9"] -= P0
     expected["Z2"] -= expected["Z1"] * P0
     assert {each: found[each] for each in expected} == pytest.approx(expected, abs=1e-15)
@@ -74,15 +74,15 @@ def test_eq_6_61_to_6_68_and_erratum_15_the_plate_follows_the_pressure(changes: 
     open_valve = p._replace(spool_stroke=1.0, orifice_opening_plus=1.0, orifice_opening_minus=1.0)
     Z = physical.to_lumped()
     oil, flow, speed, static = (
-        interpreted(getattr(machine, name))
+        getattr(machine, name)
         for name in ("oil_pressure_rate", "valve_flow", "piston_speed", "static_pressure")
     )
     for rise, opening in ((5e5, 2e-4), (-5e5, 1e-4), (2e5, -2e-4), (0.0, -1e-4)):
-        rate = interpreted(control.pressure_rate)(
+        rate = control.pressure_rate(
             rise, opening, control.Stroking(*(Z[f"Z{n}"] for n in (6, 7, 8, 9))), None
         )
         pressure, tangent = static(p) + rise, Z["Z1"] * rise
-        turning = interpreted(control.swash_rate)(tangent, rate, Z["Z1"])
+        turning = control.swash_rate(tangent, rate, Z["Z1"])
         fed = flow(opening, pressure, open_valve, None)
         assert oil(pressure, fed, speed(tangent, turning, p), p, None) == pytest.approx(rate)
 
@@ -91,10 +91,10 @@ def test_erratum_15_eq_6_65_the_valve_feeds_the_leak_at_rest() -> None:
     """K_L B P0/V = C_o B/V √((ΔP - P0)/2) x0, printed with a β and without B on the left."""
     n = LOADED.replace(piston_leakage=3e-12).numbers
     p = Machine(**n)
-    P0 = interpreted(machine.static_pressure)(p)
+    P0 = machine.static_pressure(p)
     x0 = n["piston_leakage"] * P0 / n["valve_flow_gain"] / sqrt((n["supply_pressure"] - P0) / 2.0)
-    fed = interpreted(machine.valve_flow)(x0, P0, p, None)
-    left = interpreted(machine.oil_pressure_rate)(P0, fed, 0.0, p, None)
+    fed = machine.valve_flow(x0, P0, p, None)
+    left = machine.oil_pressure_rate(P0, fed, 0.0, p, None)
     assert abs(left) < 1e-9 * fed * n["bulk_modulus"] / n["oil_volume"]
 
 
@@ -106,7 +106,7 @@ def test_erratum_01_eq_6_61_on_the_signed_current() -> None:
         **{f"Z{n}_plus": each for n, each in enumerate(plus, 19)},
         **{f"Z{n}_minus": each for n, each in enumerate(minus, 19)},
     )
-    force = interpreted(control.solenoid_force)
+    force = control.solenoid_force
     for sign, (c1, c2, c3, c4) in ((1.0, plus), (-1.0, minus)):
         assert force(sign * 0.2, p) == 0.0
         for current in (0.28, 0.5, 0.7):

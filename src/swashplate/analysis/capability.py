@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.drive import Drive, drive_instance
-from swashplate.equations import Instance, interpreted
+from swashplate.equations import Instance, with_replacements
 from swashplate.equations.marching import SOURCE_RATE, PartNumbers, called
 from swashplate.models.displacement_control import PumpOptions, pressure_limits
 from swashplate.models.pump import PumpState
@@ -157,7 +157,7 @@ def _settled_pressure(drive: Drive, voltage: float) -> float:
 def speed_limits(drive: Drive) -> tuple[float, float]:
     """Lowest and highest speed that the swash plate's stops, or Z15, allow at all. [rad/s]"""
     instance = drive_instance(drive.parameters, by_voltage=False)
-    limits_of = interpreted(pressure_limits, instance.model.parts[1].replacements)
+    limits_of = with_replacements(pressure_limits, instance.model.parts[1].replacements)
     limits = limits_of(instance.parts[1].p)
     low, high = _curve(drive, 0.0, np.array([limits.lower, limits.upper])).speed
     return float(low), float(high)

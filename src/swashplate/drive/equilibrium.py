@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.drive.instance import card_of, drive_instance, models_of, without_ripple
-from swashplate.equations import interpreted, is_real
+from swashplate.equations import is_real, with_replacements
 from swashplate.equations.marching import SOURCE_RATE, InitialStates, SignalId, called, marched
 from swashplate.errors import DomainError, InputError
 from swashplate.models.displacement_control import moment_sine, solenoid_force
@@ -101,8 +101,8 @@ def operating_point(
     instance = without_ripple(drive_instance(parameters, by_voltage=False))
     pump, options, _ = instance.parts[1]
     replacements = instance.model.parts[1].replacements
-    force = interpreted(solenoid_force, replacements)(current, pump)
-    sine = interpreted(moment_sine, replacements)(force, pump)
+    force = with_replacements(solenoid_force, replacements)(current, pump)
+    sine = with_replacements(moment_sine, replacements)(force, pump)
     if not (margin := 1.0 - sine * sine) > 0.0:
         raise DomainError(f"{name}: {overpowered(margin, 'current')}")
 

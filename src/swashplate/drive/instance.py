@@ -16,8 +16,6 @@ from swashplate.equations import (
     Model,
     Replacement,
     check_members,
-    interpreted,
-    plain,
     replaced_once,
     uses_equation,
 )
@@ -83,13 +81,13 @@ def with_equation(parameters: ParameterSet, replacement: Replacement) -> Paramet
     models = models_of(parameters.equations)
     if not uses_equation(models.drive, replacement.old):
         raise InputError(
-            f"{plain(replacement.old).__name__} is not an equation of the drive: those are in "
+            f"{replacement.old.__name__} is not an equation of the drive: those are in "
             "swashplate.models.amplifier, swashplate.models.displacement_control, "
             "swashplate.models.pump and swashplate.models.refinements."
         )
     if replacement.parameters is not None and not uses_equation(models.pump_drive, replacement.old):
         raise InputError(
-            f"{plain(replacement.old).__name__} is an equation of the card: its replacement must "
+            f"{replacement.old.__name__} is an equation of the card: its replacement must "
             "take the same arguments; only replacements of the pump's equations can add "
             "parameters."
         )
@@ -131,7 +129,7 @@ def card_options(parameters: ParameterSet) -> CardOptions:
 def pump_options(parameters: ParameterSet) -> PumpOptions:
     """Forms of the pump."""
     on = set(parameters.options)
-    if interpreted(steep_stops)(pump_of(parameters)):
+    if steep_stops(pump_of(parameters)):
         on.add("steep")
     if parameters.pressure_root == "symmetric":
         on.add("symmetric")
@@ -167,7 +165,7 @@ def without_ripple(instance: Instance) -> Instance:
 def filter_step_limit(zeta: ArrayLike, exact: bool) -> Array:
     """Largest ωh that the card's filter bears, for each ζ; see the equation of that name."""
     damping = np.asarray(zeta, dtype=np.float64)
-    limit = interpreted(filter_limit)
+    limit = filter_limit
     form = True if exact else None
     limits = [limit(value, form) for value in damping.reshape(-1).tolist()]
     return np.array(limits).reshape(damping.shape)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from swashplate.drive.equilibrium import OperatingPoint
 from swashplate.drive.instance import drive_instance, models_of, without_ripple
-from swashplate.equations import Instance, interpreted
+from swashplate.equations import Instance, with_replacements
 from swashplate.equations.marching import SOURCE_RATE, called
 from swashplate.linear import LinearModel, Matrices, linearize
 from swashplate.models.amplifier import Card
@@ -142,8 +142,8 @@ def small_motion_model(
         # alone, the deflection that would be left if it came back to its balance
         spool = states.index("pump.spool")
         deflection = states.index("pump.deflection")
-        width_of = interpreted(friction_width, pump.replacements)
-        remaining_of = interpreted(dither_factor, pump.replacements)
+        width_of = with_replacements(friction_width, pump.replacements)
+        remaining_of = with_replacements(dither_factor, pump.replacements)
         friction = width_of(p.spool_friction, p.Z4, p.Z5) / p.spool_presliding
         remaining = remaining_of(p.dither_time, step)
         for matrix in (A, C):

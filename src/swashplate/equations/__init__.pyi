@@ -13,8 +13,8 @@ from .declaration import closure as closure
 from .declaration import closure_hash as closure_hash
 from .declaration import equation as equation
 from .declaration import inlined as inlined
-from .declaration import interpreted as interpreted
 from .declaration import source as source
+from .declaration import with_replacements as with_replacements
 from .fields import MINUS as MINUS
 from .fields import OFF as OFF
 from .fields import Definition as Definition
@@ -31,7 +31,6 @@ from .kernels import kernel as kernel
 from .language import Parsed as Parsed
 from .language import is_named_tuple as is_named_tuple
 from .language import parsed as parsed
-from .language import plain as plain
 from .library import TAN_22_5 as TAN_22_5
 from .library import arctangent as arctangent
 from .library import clipped as clipped

@@ -16,7 +16,7 @@ from types import CellType, CodeType, FunctionType, MappingProxyType, ModuleType
 from typing import Any, TypeVar, get_args
 from weakref import WeakKeyDictionary
 
-from swashplate.equations.language import is_named_tuple, parsed, plain, resolved
+from swashplate.equations.language import is_named_tuple, parsed, resolved
 from swashplate.errors import EquationError
 
 F = TypeVar("F", bound=Callable[..., Any])
@@ -30,6 +30,8 @@ JIT_OFF = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
 """Whether nothing is compiled: ``SWASHPLATE_COMPILE=0``."""
 RULES: WeakKeyDictionary[FunctionType, Any] = WeakKeyDictionary()
 """Equations that return the derivatives of others, see `declared`."""
+_NOTHING = object()
+
 compiled_functions: dict[Any, None] = {}
 """Plain functions that were given to `inlined`, for when nothing is compiled."""
 
@@ -50,11 +52,11 @@ def equation(function: F) -> F:
     Parameters
     ----------
     function : callable
-        Assignments, `if`, loops over a literal range, `return`; arithmetic, comparisons,
-        conditional expressions, `min`, `max`, `abs`, functions of `math`, powers with whole
-        numbers; fields of named tuples and elements of tuples; other equations, `root`,
-        `interpolate` and `repeated`; constants of the module that are numbers. Its arguments have
-        types.
+        Python runs it once with symbols in the place of numbers: whatever it does with them that
+        needs no number, and decisions by them (`if`, `and`, `or`, `not`, conditional expressions).
+        It calls other equations, `root`, `interpolate` and `repeated`, `min`, `max`, `abs`,
+        functions of `math`, and what of Python counts and orders: `len`, `range`, `zip`,
+        `enumerate`, `reversed`, `tuple`. From outside it reads constants. Its arguments have types.
 
     Returns
     -------
@@ -64,7 +66,9 @@ def equation(function: F) -> F:
     Raises
     ------
     EquationError
-        If there is anything else in it, or its source cannot be read.
+        If it contains a statement that only does something, a loop without a known length or a
+        function of its own, or its source cannot be read. Other calls and decisions are refused
+        when it is first used.
     """
     if not str(getattr(function, "__module__", "")).startswith("swashplate."):
         parsed(function)  # the package's own are read when they are needed, and all by its tests
@@ -87,7 +91,7 @@ def source(function: Any) -> str:
     True
     """
     try:
-        return inspect.getsource(plain(function))
+        return inspect.getsource(function)
     except (OSError, TypeError):
         raise EquationError(f"{function!r} has no source that can be read.") from None
 
@@ -116,7 +120,7 @@ def standing(function: Any, replacements: Replacements) -> tuple[Any, Replacemen
     An equation does not stand for anything while it is run: it may call what it replaces.
     """
     replacements = _without(function, replacements)
-    while chain := replacements.get(plain(function)):
+    while chain := replacements.get(function):
         function = chain[0]
         replacements = _without(function, replacements)
     return function, replacements
@@ -132,52 +136,47 @@ def _without(function: Any, replacements: Replacements) -> Replacements:
     }
 
 
-_uncompiled: dict[tuple[Any, ...], Any] = {}
+_with_replacements: dict[tuple[Any, ...], Any] = {}
 
 
-def interpreted(function: Any, replacements: Replacements = NO_REPLACEMENTS) -> Any:
-    """A function and all that it calls as plain Python, if compiling would take longer."""
+def with_replacements(function: Any, replacements: Replacements) -> Any:
+    """An equation that calls what stands for others, as does all that it calls."""
     function, replacements = standing(function, replacements)
-    python_function = plain(function)
-    if not isinstance(python_function, FunctionType):
-        return function
     changed = [(old, chain) for old, chain in replacements.items() if chain]
-    key = (python_function, *changed)
-    if key not in _uncompiled:
-        space = dict(python_function.__globals__)
-        cells = tuple(CellType() for _ in python_function.__closure__ or ())
-        uncompiled = FunctionType(
-            python_function.__code__,
-            space,
-            python_function.__name__,
-            python_function.__defaults__,
-            cells or None,
+    if not changed:
+        return function
+    key = (function, *changed)
+    if key not in _with_replacements:
+        space = dict(function.__globals__)
+        cells = tuple(CellType() for _ in function.__closure__ or ())
+        copy = FunctionType(
+            function.__code__, space, function.__name__, function.__defaults__, cells or None
         )
-        uncompiled.__kwdefaults__ = python_function.__kwdefaults__
-        _uncompiled[key] = uncompiled
-        names = dict.fromkeys(_names(python_function.__code__))
+        copy.__kwdefaults__ = function.__kwdefaults__
+        _with_replacements[key] = copy
+        names = dict.fromkeys(_names(function.__code__))
         for name in names:
             if name in space:
-                space[name] = _interpreted(space[name], names, replacements)
-        for cell, original in zip(cells, python_function.__closure__ or (), strict=True):
-            cell.cell_contents = _interpreted(original.cell_contents, names, replacements)
-    return _uncompiled[key]
+                space[name] = _member(space[name], names, replacements)
+        for cell, original in zip(cells, function.__closure__ or (), strict=True):
+            cell.cell_contents = _member(original.cell_contents, names, replacements)
+    return _with_replacements[key]
 
 
-def forget_interpreted() -> None:
-    """Have functions made anew as plain Python when they are next asked for."""
-    _uncompiled.clear()
+def forget_replacements() -> None:
+    """Have functions with replacements made anew when they are next asked for."""
+    _with_replacements.clear()
 
 
-def _interpreted(member: Any, names: Iterable[str], replacements: Replacements) -> Any:
-    """What a function names, with all equations of these names as plain Python."""
+def _member(member: Any, names: Iterable[str], replacements: Replacements) -> Any:
+    """What a function names, with all equations of these names replaced."""
     if is_function(member):
-        return interpreted(member, replacements)
+        return with_replacements(member, replacements)
     if not isinstance(member, ModuleType):
         return member
     members = {name: getattr(member, name) for name in names if hasattr(member, name)}
     equations = {
-        name: interpreted(function, replacements)
+        name: with_replacements(function, replacements)
         for name, function in members.items()
         if is_function(function)
     }
@@ -203,9 +202,19 @@ def _is_constant(thing: Any) -> bool:
 
 def is_function(thing: Any) -> bool:
     """Whether something is a function that compiled code can call."""
-    if not isinstance(plain(thing), FunctionType):
-        return False
-    return plain(thing) is not thing or thing in compiled_functions
+    return isinstance(thing, FunctionType) and thing in compiled_functions
+
+
+def _reached(thing: Any) -> Any:
+    """What of something decides what code does that names it; nothing of most things.
+
+    Of a kernel, and of what Numba has compiled, its function.
+    """
+    function = getattr(thing, "py_func", None)
+    if isinstance(function, FunctionType):
+        return function
+    known = is_function(thing) or is_named_tuple(thing) or _is_constant(thing)
+    return thing if known or isinstance(thing, ModuleType) else _NOTHING
 
 
 def _referenced(function: Any) -> Iterator[tuple[str, Any]]:
@@ -213,33 +222,40 @@ def _referenced(function: Any) -> Iterator[tuple[str, Any]]:
 
     Those that its code names, and those that the types of its arguments or fields name.
     """
-    python_function = plain(function)
     names: list[str] = []
-    if not is_named_tuple(python_function):
-        names = list(dict.fromkeys(_names(python_function.__code__)))
+    if not is_named_tuple(function):
+        names = list(dict.fromkeys(_names(function.__code__)))
     for name in names:
         try:
-            member = resolved(python_function, name)
+            member = _reached(resolved(function, name))
         except NameError:
             continue
         if isinstance(member, ModuleType):
-            for attribute in names:
-                value = getattr(member, attribute, member)
-                if is_function(value) or is_named_tuple(value):
-                    yield attribute, value
-                elif _is_constant(value):
-                    yield f"{member.__name__}.{attribute}", value
-        elif is_function(member) or is_named_tuple(member) or _is_constant(member):
+            yield from _referenced_in(member, names, {member})
+        elif member is not _NOTHING:
             yield name, member
-    yield from _types_named(python_function)
+    yield from _types_named(function)
 
 
-def _types_named(python_function: Any) -> Iterator[tuple[str, Any]]:
+def _referenced_in(
+    module: ModuleType, names: Iterable[str], visited: set[ModuleType]
+) -> Iterator[tuple[str, Any]]:
+    """What of these names a module has, or one within it."""
+    for name in names:
+        value = _reached(getattr(module, name, _NOTHING))
+        if isinstance(value, ModuleType):
+            if value not in visited:
+                yield from _referenced_in(value, names, visited | {value})
+        elif value is not _NOTHING:
+            yield (name if callable(value) else f"{module.__name__}.{name}"), value
+
+
+def _types_named(function: Any) -> Iterator[tuple[str, Any]]:
     """Classes of named tuples that types of arguments or fields name, by their names."""
-    for hint in python_function.__annotations__.values():
-        if isinstance(hint, str) and not is_named_tuple(python_function):
+    for hint in function.__annotations__.values():
+        if isinstance(hint, str) and not is_named_tuple(function):
             try:
-                hint = resolved(python_function, hint)
+                hint = resolved(function, hint)
             except NameError:
                 continue
         for kind in (hint, *get_args(hint)):
@@ -253,23 +269,23 @@ def closure(function: Any) -> dict[str, Any]:
     The function is the first entry. If two things have the same name, the second has its module's
     name in front.
     """
-    members: dict[str, Any] = {plain(function).__name__: function}
-    visited = {plain(function)}
+    members: dict[str, Any] = {function.__name__: function}
+    visited = {function}
     pending = [function]
     while pending:
         referring = pending.pop()
         for name, member in _referenced(referring):
-            is_constant = not (is_function(member) or is_named_tuple(member))
-            if not is_constant and plain(member) in visited:
+            is_constant = not callable(member)
+            if not is_constant and member in visited:
                 continue
             if name in members:
                 if is_constant and _fingerprint(members[name]) == _fingerprint(member):
                     continue
-                module = getattr(member, "__module__", None) or plain(referring).__module__
+                module = getattr(member, "__module__", None) or referring.__module__
                 name = _unused(f"{module}.{name}", members)
             members[name] = member
             if not is_constant:
-                visited.add(plain(member))
+                visited.add(member)
                 pending.append(member)
     return members
 
@@ -287,10 +303,10 @@ def functions_run(functions: Iterable[Any], replacements: Replacements) -> set[F
     pending = [(function, replacements) for function in functions]
     while pending:
         function, within = standing(*pending.pop())
-        state = (plain(function), *((old, chain) for old, chain in within.items() if chain))
+        state = (function, *((old, chain) for old, chain in within.items() if chain))
         if state not in visited:
             visited.add(state)
-            plain_functions.add(plain(function))
+            plain_functions.add(function)
             called = [member for _, member in _referenced(function) if is_function(member)]
             pending += [(member, within) for member in called]
     return plain_functions
@@ -311,21 +327,16 @@ def hash_of(things: dict[str, Any]) -> str:
 
 def _fingerprint(thing: Any) -> str:
     """What of one thing matters to compiled code."""
-    python_function = plain(thing)
-    if isinstance(python_function, FunctionType) or is_named_tuple(python_function):
+    if isinstance(thing, FunctionType) or is_named_tuple(thing):
         hints = {
             name: getattr(hint, "__name__", str(hint))
-            for name, hint in python_function.__annotations__.items()
+            for name, hint in thing.__annotations__.items()
         }
-    if is_named_tuple(python_function):
-        kind = python_function
-        return repr((kind.__name__, kind._fields, kind._field_defaults, hints))
-    if isinstance(python_function, FunctionType):
-        options = sorted(map(str, getattr(thing, "targetoptions", {}).items()))
-        code = _code(python_function.__code__, python_function.__doc__)
-        return repr(
-            (code, python_function.__defaults__, python_function.__kwdefaults__, options, hints)
-        )
+    if is_named_tuple(thing):
+        return repr((thing.__name__, thing._fields, thing._field_defaults, hints))
+    if isinstance(thing, FunctionType):
+        code = _code(thing.__code__, thing.__doc__)
+        return repr((code, thing.__defaults__, thing.__kwdefaults__, hints))
     if hasattr(thing, "tobytes"):
         return repr((thing.dtype, thing.shape, blake2b(thing.tobytes()).hexdigest()))
     return repr(thing)

@@ -23,7 +23,7 @@ from swashplate.equations.declaration import (
     closure_hash,
     is_function,
 )
-from swashplate.equations.language import is_named_tuple, plain
+from swashplate.equations.language import is_named_tuple
 from swashplate.equations.model import Model
 
 T = TypeVar("T")
@@ -108,12 +108,12 @@ def fingerprint(equations: Iterable[Any]) -> str:
     pending, visited = [*equations], set[Any]()
     while pending:
         equation = pending.pop()
-        if plain(equation) in visited:
+        if equation in visited:
             continue
-        visited.add(plain(equation))
-        digest.update(f"{plain(equation).__name__} {closure_hash(equation)}\0".encode())
+        visited.add(equation)
+        digest.update(f"{equation.__name__} {closure_hash(equation)}\0".encode())
         for reached in closure(equation).values():
-            rule = RULES.get(plain(reached)) if is_function(reached) else None
+            rule = RULES.get(reached) if is_function(reached) else None
             if rule is not None:
                 pending.append(rule)
     return digest.hexdigest()

@@ -1,8 +1,8 @@
-"""The language of equations: what a function may consist of, checked on its source.
+"""The sources of equations, and what no equation may contain.
 
-An equation is a pure function of floats and named tuples: assignments, `if`, `return`, loops over
-a literal range, arithmetic, comparisons, `min`, `max`, `abs`, functions of `math`, other equations.
-Its source is found and checked here, without types and without running anything.
+An equation is a pure function of floats and named tuples, which Python runs on symbols. What would
+do something besides, or what Python would do in silence otherwise than its author thinks, is
+refused when it is declared; all else, such as a decision that cannot be taken, when it is run.
 """
 
 import ast
@@ -11,11 +11,12 @@ import linecache
 import math
 import os
 import sys
+import traceback
 import typing
-from collections.abc import Collection, Hashable, Iterable
+from collections.abc import Callable, Collection, Hashable
 from dataclasses import dataclass
 from functools import lru_cache
-from types import FunctionType, ModuleType, SimpleNamespace
+from types import FunctionType, SimpleNamespace
 from typing import Any, NoReturn
 from weakref import WeakKeyDictionary
 
@@ -25,21 +26,14 @@ from swashplate.errors import EquationError
 MATH: dict[Any, str] = {getattr(math, name): name for name in MATH_FUNCTIONS}
 """Functions of `math` that an equation may call."""
 CHOICES: dict[Any, str] = {min: "min", max: "max", abs: "abs"}
-ARITHMETIC = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Pow: "**"}
-COMPARISONS = {
-    ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!=",
-}  # fmt: skip
-
-
 # --- what is refused ------------------------------------------------------------------------------
 
-TUPLES, ABOVE = "use a tuple or a named tuple", "import at the top of the file"
+ABOVE = "import at the top of the file"
 GLOBAL = "an equation depends only on its arguments and on constants"
-NUMBERS = "an equation handles only real numbers; use options for choices"
-TERMS = "write the terms out, or a loop over a literal range"
+TURNS = "write `for i in range(4):` with a number of turns that is known"
 
 INSTEAD: dict[type[ast.AST], tuple[str, str]] = {
-    ast.While: ("a while loop", "write `for i in range(4):` with a literal number of steps"),
+    ast.While: ("a while loop", TURNS),
     ast.Try: ("try", "test the arguments with if"),
     ast.With: ("with", "an equation only computes"),
     ast.Raise: ("raise", "return a value; models state their domain separately"),
@@ -52,45 +46,15 @@ INSTEAD: dict[type[ast.AST], tuple[str, str]] = {
     ast.Global: ("global", GLOBAL),
     ast.Nonlocal: ("nonlocal", GLOBAL),
     ast.Delete: ("del", "leave the name alone"),
-    ast.Break: ("break", "use if within the loop"),
-    ast.Continue: ("continue", "use if within the loop"),
     ast.Match: ("match", "use if and elif"),
     ast.Expr: ("a statement without effect on the result", "leave it out"),
     ast.Lambda: ("lambda", "write a separate equation"),
-    ast.ListComp: ("a comprehension", TERMS),
-    ast.SetComp: ("a comprehension", TERMS),
-    ast.DictComp: ("a comprehension", TERMS),
-    ast.GeneratorExp: ("a comprehension", TERMS),
-    ast.List: ("a list", TUPLES),
-    ast.Set: ("a set", TUPLES),
-    ast.Dict: ("a dictionary", "use a named tuple"),
-    ast.JoinedStr: ("a string", NUMBERS),
     ast.NamedExpr: (":=", "write a separate assignment"),
     ast.Yield: ("yield", "return a tuple"),
     ast.YieldFrom: ("yield", "return a tuple"),
     ast.Await: ("await", "call the equation"),
-    ast.Starred: ("an argument or element with *", "write the elements out"),
-    ast.FloorDiv: ("//", "write floor(a / b)"),
-    ast.Mod: ("%", "write a - b * floor(a / b)"),
-    ast.MatMult: ("@", "write the products out"),
-    ast.BitAnd: ("&", "write `and`"),
-    ast.BitOr: ("|", "write `or`"),
-    ast.BitXor: ("^", "write `!=` of two tests, or ** for a power"),
-    ast.LShift: ("<<", "multiply"),
-    ast.RShift: (">>", "divide"),
-    ast.Invert: ("~", "write `not`"),
 }
-"""What to write in place of statements, expressions and operators that an equation may not use."""
-INSTEAD_OF_BUILTIN = {
-    "print": "inspect results outside the equation",
-    "len": "write the number",
-    "sum": "write the terms out",
-    "float": "write the number as a float",
-    "int": "write floor(x)",
-    "round": "write floor(x + 0.5)",
-    "pow": "write ** with a whole number, or exp(b * log(a))",
-    "range": "write it in a for statement only",
-}
+"""What to write in place of statements and expressions that an equation may not use."""
 
 
 def _refused(node: ast.AST) -> tuple[str, str] | None:
@@ -98,59 +62,23 @@ def _refused(node: ast.AST) -> tuple[str, str] | None:
     match node:
         case ast.AnnAssign(value=None):
             return "a declaration", "assign a value to a name"
-        case ast.AnnAssign(target=target) | ast.AugAssign(target=target) if not isinstance(
-            target, ast.Name
-        ):
-            return "a declaration", "assign a value to a name"
-        case ast.BinOp(op=ast.Pow(), right=power) | ast.AugAssign(op=ast.Pow(), value=power) if (
-            whole(power) is None
-        ):
-            what = "a power other than a whole number"
-            return what, "write sqrt(a), or exp(b * log(a))"
         case ast.Return(value=None):
             return "a return without a value", "return a value"
-        case ast.For() if not is_range(node):
-            what = "a loop over something other than a literal range"
-            return what, "write `for i in range(4):`, which is unrolled"
         case ast.Attribute(ctx=ast.Store()):
             instead = "named tuples cannot be changed; make a new one, as in State(t.a, b)"
             return "an assignment to a field", instead
+        case ast.Attribute(attr=attribute) if attribute.startswith("__"):
+            return f"{attribute}, which is Python's own", "name a field of the named tuple"
         case ast.Subscript(ctx=ast.Store()):
             return "an assignment to an element", "assign to a name"
-        case ast.Constant(value=value) if not isinstance(value, int | float | None):
-            return "a string" if isinstance(value, str) else repr(value), NUMBERS
         case ast.Compare(ops=ops, comparators=rights):
             for op, right in zip(ops, rights, strict=True):
                 none = isinstance(right, ast.Constant) and right.value is None
                 if isinstance(op, ast.Is | ast.IsNot) and not none:
                     return "`is` with something other than None", "write `==`"
-                if type(op) not in (*COMPARISONS, ast.Is, ast.IsNot):
+                if isinstance(op, ast.In | ast.NotIn):
                     return "`in`", "compare with == and or"
-        case ast.Call(keywords=keywords) if any(keyword.arg is None for keyword in keywords):
-            return "an argument with **", "write the arguments out"
-        case ast.Call(func=called) if not isinstance(called, ast.Name | ast.Attribute):
-            return "a call of an expression", "call equations by their names"
     return INSTEAD.get(type(node))
-
-
-def whole(node: ast.expr) -> int | None:
-    """Value of a literal whole number, or nothing."""
-    match node:
-        case ast.UnaryOp(op=ast.USub(), operand=operand):
-            value = whole(operand)
-            return None if value is None else -value
-        case ast.Constant(value=int(value)) if type(value) is int:
-            return value
-    return None
-
-
-def is_range(node: ast.For) -> bool:
-    """Whether a loop counts in a literal range."""
-    match node:
-        case ast.For(ast.Name(), ast.Call(ast.Name("range"), args, []), orelse=[]):
-            bounds = [whole(arg) for arg in args]
-            return None not in bounds and 1 <= len(bounds) <= 3 and bounds[2:] != [0]
-    return False
 
 
 def is_among(thing: Any, table: Collection[Any]) -> bool:
@@ -191,23 +119,17 @@ class Parsed:
         }
         return by_position | (self.function.__kwdefaults__ or {})
 
-    @property
-    def local(self) -> set[str]:
-        """Names of its arguments and of what it assigns."""
-        return set(self.function.__code__.co_varnames)
+    def line_of(self, error: BaseException) -> int:
+        """The line in which an error came up while the equation was run."""
+        file = self.function.__code__.co_filename
+        frames = traceback.walk_tb(error.__traceback__)
+        lines = [line for frame, line in frames if frame.f_code.co_filename == file]
+        return lines[-1] if lines else self.node.lineno
 
-    def called(self, function: ast.expr) -> Any:
-        """What a call calls; `NameError` or `AttributeError` if nothing."""
-        if isinstance(function, ast.Attribute):
-            return getattr(self.called(function.value), function.attr)
-        if not isinstance(function, ast.Name):
-            raise NameError(ast.unparse(function))
-        return resolved(self.function, function.id)
-
-    def refuse(self, node: ast.AST | None, what: str, instead: str) -> NoReturn:
-        """Refuse a construct in a sentence with file and line."""
-        line = getattr(node, "lineno", self.node.lineno)
-        raise EquationError(f"{self.file}, line {line}: {what} in {self.name}: {instead}.")
+    def refuse(self, line: int | None, what: str, instead: str) -> NoReturn:
+        """Refuse something in a sentence with file and line, by itself that of the equation."""
+        place = f"{self.file}, line {line or self.node.lineno}"
+        raise EquationError(f"{place}: {what} in {self.name}: {instead}.") from None
 
 
 def resolved(function: FunctionType, name: str) -> Any:
@@ -229,7 +151,7 @@ def hints_of(function: FunctionType) -> dict[str, Any]:
     return typing.get_type_hints(function, None, free or None, include_extras=True)
 
 
-def type_of(function: FunctionType, argument: str) -> Any:
+def type_of(function: Callable[..., Any], argument: str) -> Any:
     """Type of an argument; None if it has none, or one that only an enclosing function knows."""
     hint = function.__annotations__.get(argument)
     if not isinstance(hint, str):
@@ -239,11 +161,6 @@ def type_of(function: FunctionType, argument: str) -> Any:
         return typing.get_type_hints(annotated, function.__globals__, include_extras=True)[argument]
     except NameError:
         return None
-
-
-def plain(function: Any) -> Any:
-    """The plain Python function within a compiled one."""
-    return getattr(function, "py_func", function)
 
 
 def is_named_tuple(thing: Any) -> bool:
@@ -263,11 +180,10 @@ def _functions(text: str) -> dict[int, ast.FunctionDef]:
     }
 
 
-def unchecked(function: Any) -> Parsed:
+def unchecked(f: Any) -> Parsed:
     """Source of any function, as it stands: for those that equations are built on."""
-    f = plain(function)
     if not isinstance(f, FunctionType):
-        raise EquationError(f"{function!r} is not a function that can be an equation.")
+        raise EquationError(f"{f!r} is not a function that can be an equation.")
     file = f.__code__.co_filename
     linecache.checkcache(file)
     try:
@@ -289,9 +205,8 @@ def unchecked(function: Any) -> Parsed:
 _parsed: "WeakKeyDictionary[FunctionType, Parsed]" = WeakKeyDictionary()
 
 
-def parsed(function: Any) -> Parsed:
-    """Source of an equation, compiled or plain, checked once."""
-    f = plain(function)
+def parsed(f: Any) -> Parsed:
+    """Source of an equation, checked once."""
     source = _parsed.get(f) if isinstance(f, FunctionType) else None
     if source is None:
         source = unchecked(f)
@@ -304,88 +219,18 @@ def _check(source: Parsed) -> None:
     """Go once through the tree of an equation and refuse what does not belong there."""
     node, refuse = source.node, source.refuse
     if node.args.vararg or node.args.kwarg:
-        refuse(node, "an argument with *", "name every argument")
+        refuse(node.lineno, "an argument with *", "name every argument")
     for argument in source.arguments:
         if argument.annotation is None:
             instead = f"write `{argument.arg}: float`, or the named tuple that it is"
-            refuse(argument, f"{argument.arg} without a type", instead)
+            refuse(argument.lineno, f"{argument.arg} without a type", instead)
     body = node.body[1:] if ast.get_docstring(node, clean=False) is not None else node.body
-    nodes = [inner for statement in body for inner in ast.walk(statement)]
-    loops = [inner for inner in nodes if isinstance(inner, ast.For) and is_range(inner)]
-    ranges = {loop.iter for loop in loops}
-    counters = {loop.target.id for loop in loops if isinstance(loop.target, ast.Name)}
-    for inner in nodes:  # what stands outside comes before what is in it
-        marks = [part for part in ast.iter_child_nodes(inner) if not hasattr(part, "lineno")]
-        for part in (inner, *marks):  # operators have no line of their own
-            if (refused := _refused(part)) is not None:
-                refuse(inner, *refused)
-        if isinstance(inner, ast.Subscript) and not _is_index(inner.slice, counters):
-            refuse(inner, "an index that is not a whole number", "write the number, as in s[0]")
-        if isinstance(inner, ast.Call) and inner not in ranges:
-            if isinstance(inner.func, ast.Name) and inner.func.id == source.node.name:
-                refuse(inner, "a recursive call", "write a loop over a literal range")
-            _check_call(source, inner)
+    for statement in body:
+        for inner in ast.walk(statement):  # what stands outside comes before what is in it
+            if (refused := _refused(inner)) is not None:
+                refuse(getattr(inner, "lineno", None), *refused)
     if not _returns(body):
-        refuse(node, "an end without return", "return a value on every path")
-
-
-def _check_call(source: Parsed, node: ast.Call) -> None:
-    """Refuse a call of what is certainly not an equation; a name may be given to one later."""
-    function = node.func
-    base = function.value if isinstance(function, ast.Attribute) else function
-    if not isinstance(base, ast.Name) or base.id in source.local:
-        if isinstance(function, ast.Attribute) and _is_module(source, base):
-            name = ast.unparse(function)
-            instead = f"import {function.attr} itself, or the module {ast.unparse(base)}, by a name"
-            source.refuse(node, f"a call of {name}", instead)
-        if isinstance(function, ast.Attribute):
-            instead = "call equations; make a new named tuple, as in State(t.a, b)"
-            source.refuse(node, f"the method {function.attr}", instead)
-        name = ast.unparse(function)
-        source.refuse(node, f"a call of the argument {name}", "call equations by their names")
-    try:
-        called = source.called(function)
-    except (NameError, AttributeError):
-        return  # defined further down, or missing: seen when it is wanted
-    if not callable(called) or is_named_tuple(called):
-        return
-    if is_among(called, MATH) or is_among(called, CHOICES):
-        return
-    if isinstance(plain(called), FunctionType):
-        return
-    instead, short = "call only equations and functions of math", ast.unparse(function)
-    short = short.rpartition(".")[2]
-    if hasattr(math, short):
-        instead = f"an equation may call these functions of math: {', '.join(MATH.values())}"
-    if getattr(builtins, short, None) is called:
-        instead = INSTEAD_OF_BUILTIN.get(short, instead)
-    source.refuse(node, f"a call of {ast.unparse(function)}", instead)
-
-
-def _is_module(source: Parsed, node: ast.expr) -> bool:
-    """Whether an expression is a module within a module."""
-    root = node
-    while isinstance(root, ast.Attribute):
-        root = root.value
-    if not isinstance(root, ast.Name) or root.id in source.local:
-        return False
-    try:
-        member = source.called(root)
-        for name in ast.unparse(node).split(".")[1:]:
-            member = getattr(member, name)
-    except (NameError, AttributeError):
-        return False
-    return isinstance(member, ModuleType)
-
-
-def _is_index(index: ast.expr, counters: set[str]) -> bool:
-    """Whether an index is arithmetic of whole numbers and counters of loops."""
-    if isinstance(index, ast.BinOp):
-        is_arithmetic = isinstance(index.op, ast.Add | ast.Sub | ast.Mult)
-        return (
-            is_arithmetic and _is_index(index.left, counters) and _is_index(index.right, counters)
-        )
-    return whole(index) is not None or (isinstance(index, ast.Name) and index.id in counters)
+        refuse(node.lineno, "an end without return", "return a value on every path")
 
 
 def _returns(body: list[ast.stmt]) -> bool:
@@ -399,8 +244,3 @@ def _returns(body: list[ast.stmt]) -> bool:
         )
         for statement in body
     )
-
-
-def has_return(statements: Iterable[ast.stmt]) -> bool:
-    """Whether a return stands anywhere in the statements."""
-    return any(isinstance(node, ast.Return) for body in statements for node in ast.walk(body))

@@ -41,7 +41,7 @@ from swashplate.equations.fields import (
     floats_of,
     ranges_of,
 )
-from swashplate.equations.language import is_named_tuple, plain, type_of
+from swashplate.equations.language import is_named_tuple, type_of
 from swashplate.errors import InputError
 
 Equation = Callable[..., Any]
@@ -245,10 +245,10 @@ class Model:
         """Type of what ``sample`` returns."""
         if self.sample is None:
             return None
-        returned = get_type_hints(plain(self.sample)).get("return")
+        returned = get_type_hints(self.sample).get("return")
         if not is_named_tuple(returned):
             raise InputError(
-                f"Model {self.name}: {plain(self.sample).__name__} must return a named tuple, and "
+                f"Model {self.name}: {self.sample.__name__} must return a named tuple, and "
                 "say so, as in '-> Signals'."
             )
         return returned
@@ -271,7 +271,7 @@ class Model:
         bits: dict[str, tuple[int, int]] = {}
         for i, part in enumerate(self.parts):
             if part.limits is not None:
-                fields = get_type_hints(plain(part.limits))["return"]._fields
+                fields = get_type_hints(part.limits)["return"]._fields
                 bits |= {name: (i, bit) for bit, name in enumerate(fields)}
         return bits
 
@@ -318,7 +318,7 @@ class Model:
         declared = dict[str, Definition]()
         for part in self.parts:
             for name in part.input_types:
-                types = [type_of(plain(equation), name) for equation in part.equations]
+                types = [type_of(equation, name) for equation in part.equations]
                 if part.inputs is not None:
                     types.append(get_type_hints(part.inputs, include_extras=True)[name])
                 for kind in types:
@@ -359,7 +359,7 @@ def _wrong(model: Model) -> Iterator[str]:
     for word in ("step", "sample", "rest", "settled", "limits", "domain"):
         member = getattr(model, word)
         is_left_out = member is None and word != "step"
-        if not isinstance(plain(member), FunctionType) and not is_left_out:
+        if not isinstance(member, FunctionType) and not is_left_out:
             yield f"{prefix}{word} must be an equation, not {member!r}."
     input_names = [*model.input_types]
     parameters = floats_of(model.parameters)
@@ -367,7 +367,7 @@ def _wrong(model: Model) -> Iterator[str]:
         for name in arguments_of(asking):
             if name not in (*ARGUMENTS, *input_names):
                 choice = ", ".join((*ARGUMENTS, *input_names))
-                name_of = plain(asking).__name__
+                name_of = asking.__name__
                 yield f"{prefix}{name_of} needs '{name}', which is not one of {choice}."
     for name, tap in model.taps.items():
         if name not in input_names:
@@ -584,7 +584,7 @@ def tap_delay(tap: Tap, delay: float, h: float) -> TapDelay:
 
 def arguments_of(equation: Equation) -> tuple[str, ...]:
     """Names of an equation's arguments."""
-    code = plain(equation).__code__
+    code = equation.__code__
     names: tuple[str, ...] = code.co_varnames[: code.co_argcount]
     return names
 
@@ -661,14 +661,13 @@ def discretised(
         raise InputError(f"substeps is {substeps!r}, but must be a whole number, at least 1.")
     kind = _state_of(rates)
     names: dict[str, Any] = {"rates": rates, "project": project}
-    hints = get_type_hints(plain(rates), include_extras=True)
+    hints = get_type_hints(rates, include_extras=True)
     if project is not None:
         if _state_of(project) is not kind:
             raise InputError(
-                f"{plain(project).__name__} must return a {kind.__name__}, as "
-                f"{plain(rates).__name__} does."
+                f"{project.__name__} must return a {kind.__name__}, as {rates.__name__} does."
             )
-        hints = {**get_type_hints(plain(project), include_extras=True), **hints}
+        hints = {**get_type_hints(project, include_extras=True), **hints}
     del hints["return"]
     names |= {f"{name}_type": hint for name, hint in hints.items()}
 
@@ -700,11 +699,11 @@ def discretised(
     lines.append(f"state = {state(tableau.weights)}")
     if project is not None:
         lines.append(f"state = {call('project', project, 'state')}")
-    name = f"{plain(rates).__name__}_{method}"
+    name = f"{rates.__name__}_{method}"
     arguments = [*(f"{name}: {name}_type" for name in hints), "h: float"]
     text = [
         f"def {name}({', '.join(arguments)}) -> state_type:",
-        f'    """Step of {plain(rates).__name__}: {method}, {substeps} a sample."""',
+        f'    """Step of {rates.__name__}: {method}, {substeps} a sample."""',
         f"    sub_step = h / {float(substeps)!r}",
         f"    for _ in range({substeps}):",
         *(f"        {line}" for line in lines),
@@ -717,8 +716,8 @@ def discretised(
 
 def _state_of(equation: Equation) -> type[Any]:
     """Type of the state that an equation takes and returns."""
-    name, arguments = plain(equation).__name__, arguments_of(equation)
-    hints: dict[str, type[Any]] = get_type_hints(plain(equation))
+    name, arguments = equation.__name__, arguments_of(equation)
+    hints: dict[str, type[Any]] = get_type_hints(equation)
     kind = hints.get("return")
     if kind is None or not is_named_tuple(kind) or hints.get("state") is not kind:
         raise InputError(

@@ -4,9 +4,8 @@ import sys
 from weakref import WeakKeyDictionary
 
 from swashplate.equations.code_generation.functions import forget_generated
-from swashplate.equations.declaration import forget_interpreted
+from swashplate.equations.declaration import forget_replacements
 from swashplate.equations.keeping import key_of, roles_of
-from swashplate.equations.language import plain
 from swashplate.equations.model import Model
 
 _last_keys: WeakKeyDictionary[Model, str] = WeakKeyDictionary()
@@ -21,11 +20,11 @@ def renew(model: Model) -> None:
     if not (hasattr(sys, "ps1") or "ipykernel" in sys.modules):
         return
     roles = [role for part in model.parts for role in roles_of(part) if role is not None]
-    if not any(plain(role).__module__ == "__main__" for role in roles):
+    if not any(role.__module__ == "__main__" for role in roles):
         return
     key = key_of.__wrapped__(model)
     if _last_keys.setdefault(model, key) != key:
         key_of.cache_clear()
         forget_generated()
-        forget_interpreted()
+        forget_replacements()
         _last_keys[model] = key

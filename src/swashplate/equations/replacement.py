@@ -23,7 +23,7 @@ from swashplate.equations.declaration import (
     functions_run,
     is_function,
 )
-from swashplate.equations.language import is_named_tuple, plain
+from swashplate.equations.language import is_named_tuple
 from swashplate.equations.model import Equation, Model, arguments_of, join
 from swashplate.errors import InputError
 
@@ -39,9 +39,7 @@ class Replacement(NamedTuple):
     @property
     def places(self) -> dict[str, str]:
         """Where its members stand, as ``module:name``."""
-        present = {
-            name: plain(member) for name, member in self._asdict().items() if member is not None
-        }
+        present = {name: member for name, member in self._asdict().items() if member is not None}
         return {
             name: f"{member.__module__}:{member.__qualname__}" for name, member in present.items()
         }
@@ -120,7 +118,7 @@ def _link_equations(model: Model) -> dict[str, Equation]:
 
 def _calls(equations: Iterable[Equation], replacements: Replacements, equation: Equation) -> bool:
     """Whether any of some equations is or calls another one."""
-    return plain(equation) in functions_run(equations, replacements)
+    return equation in functions_run(equations, replacements)
 
 
 def replaced(
@@ -152,14 +150,14 @@ def replaced(
     """
     replacement = Replacement(old, new, parameters)
     if not uses_equation(model, old):
-        raise InputError(f"Model {model.name} does not use {plain(old).__name__}.")
+        raise InputError(f"Model {model.name} does not use {old.__name__}.")
     parts = [_part(part, replacement) for part in model.parts]
     if model.parts == (model,):
         return parts[0]
     links, replacements = _link_equations(model), model.replacements
     if parameters is not None and all(map(operator.is_, parts, model.parts)):
         raise InputError(
-            f"{plain(old).__name__} is an equation of a link between models, which has no "
+            f"{old.__name__} is an equation of a link between models, which has no "
             "parameters: its replacement must take the same arguments and cannot add any."
         )
     if _calls(links.values(), replacements, old):
@@ -198,9 +196,7 @@ def _part(part: Model, replacement: Replacement) -> Model:
         kind = _extended(kind, further)
     new = _called_like(replacement.old, replacement.new, part.name, kind)
     changes: dict[str, Any] = {
-        field.name: new
-        for field in fields(part)
-        if plain(getattr(part, field.name)) is plain(replacement.old)
+        field.name: new for field in fields(part) if getattr(part, field.name) is replacement.old
     }
     changes["replacements"] = _with(part.replacements, replacement.old, new)
     changes["recipe"] = replaced_once, (part, replacement)
@@ -210,10 +206,10 @@ def _part(part: Model, replacement: Replacement) -> Model:
 def _with(replacements: Replacements, old: Equation, new: Equation) -> Replacements:
     """Replacements with one more, also in the place of what already stands for another."""
     chains = {
-        equation: tuple(new if plain(stands) is plain(old) else stands for stands in chain)
+        equation: tuple(new if stands is old else stands for stands in chain)
         for equation, chain in replacements.items()
     }
-    chains[plain(old)] = (*chains.get(plain(old), ()), new)
+    chains[old] = (*chains.get(old, ()), new)
     return chains
 
 
@@ -247,25 +243,23 @@ def _called_like(old: Equation, new: Equation, part: str, kind: type[Any]) -> Eq
     """The new equation with the arguments of the old one."""
     taken = arguments_of(old)
     requested = arguments_of(new)
-    name = plain(old).__name__
+    name = old.__name__
     if requested[: len(taken)] != taken:
         raise InputError(
-            f"{plain(new).__name__} must begin with the arguments of {name}: {', '.join(taken)}."
+            f"{new.__name__} must begin with the arguments of {name}: {', '.join(taken)}."
         )
     further = requested[len(taken) :]
     if not further:
         return new
     unknown = [path for path in further if path not in kind._fields]
     if unknown:
-        raise InputError(
-            f"{plain(new).__name__} needs {unknown[0]}, which is not a parameter of {part}."
-        )
+        raise InputError(f"{new.__name__} needs {unknown[0]}, which is not a parameter of {part}.")
     if "p" not in taken:
         raise InputError(
-            f"{name} does not take the parameters p, so {plain(new).__name__} cannot have "
+            f"{name} does not take the parameters p, so {new.__name__} cannot have "
             f"{further[0]}; replace an equation that calls it and takes p."
         )
-    hints = get_type_hints(plain(old)) | {"p": kind}
+    hints = get_type_hints(old) | {"p": kind}
     names: dict[str, Any] = {f"Type_{argument}": hints[argument] for argument in (*taken, "return")}
     arguments = ", ".join(f"{argument}: Type_{argument}" for argument in taken)
     passed = ", ".join((*taken, *(f"p.{path}" for path in further)))

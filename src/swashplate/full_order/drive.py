@@ -23,7 +23,7 @@ from swashplate.drive import (
     check_filter_stability,
     drive_records,
 )
-from swashplate.equations import BoundModel, Instance, Run, Sensitivities, interpreted
+from swashplate.equations import BoundModel, Instance, Run, Sensitivities
 from swashplate.equations.marching import (
     SOURCE_RATE,
     Interpolation,
@@ -158,7 +158,7 @@ class FullOrderSimulation(Run, Tabular):
     def relief_hold(self) -> Flags:
         """1 or -1 while the relief valve holds the stroker pressure."""
         pressure = self.sampled(self.fine("piston_pressure"))
-        return _beyond(pressure, *interpreted(relief_pressures)(self.plant.machine))
+        return _beyond(pressure, *relief_pressures(self.plant.machine))
 
     @property
     def plate_hold(self) -> Flags:
@@ -333,7 +333,7 @@ class FullOrderDrive:
         InputError
             If so few are requested that the march would be unstable.
         """
-        fastest = float(interpreted(fastest_rate)(self.physical.machine))
+        fastest = float(fastest_rate(self.physical.machine))
         needed = max(ceil(fastest * step / RESOLUTION), LEAST_SUBSTEPS)
         if requested is not None:
             least = floor(fastest * step / STABLE) + 1

@@ -18,7 +18,7 @@ import numpy as np
 
 from swashplate.documents import parse_toml, validated
 from swashplate.entries import FormerlyFormat
-from swashplate.equations import Definition, Flag, declared_by, interpreted
+from swashplate.equations import Definition, Flag, declared_by
 from swashplate.errors import ParameterError, UnknownParameterError
 from swashplate.models import machine as equations
 from swashplate.models.machine import Machine
@@ -256,8 +256,8 @@ def _air(machine: Machine) -> Flag:
 
 def _rest(machine: Machine) -> tuple[float, float]:
     """P0, which holds the load with the plate upright [Pa], and the oil's B/V there [Pa/m³]."""
-    pressure = float(interpreted(equations.static_pressure)(machine))
-    modulus = interpreted(equations.oil_modulus)(pressure, machine, _air(machine))
+    pressure = float(equations.static_pressure(machine))
+    modulus = equations.oil_modulus(pressure, machine, _air(machine))
     return pressure, float(modulus) / machine.oil_volume
 
 
@@ -273,7 +273,7 @@ def _check_rules(parameters: Mapping[str, Parameter]) -> Iterator[CheckedRule]:
     for side in ("plus", "minus"):
         arm_sine = n["swash_arm"] / n["control_arm"] * np.tan(n[f"swash_stop_{side}"])
         yield apply_rule(ARM_TURNS, {"side": side, "arm_sine": arm_sine})
-    rest = interpreted(equations.static_pressure)(Machine(**{k: float(v[0]) for k, v in n.items()}))
+    rest = equations.static_pressure(Machine(**{k: float(v[0]) for k, v in n.items()}))
     ceiling = np.minimum(n["supply_pressure"], n["relief_pressure"])
     yield apply_rule(LOAD_HELD, {"rest": np.array([rest]), "ceiling": ceiling})
 

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.equations import TEACHING, inlined, interpreted, kernel
+from swashplate.equations import TEACHING, inlined, kernel
 from swashplate.errors import ParameterError
 from swashplate.models.amplifier import CardChannel, channel_level
 from swashplate.models.displacement_control import (
@@ -236,7 +236,7 @@ def _steady_extremes(values: Values, set_count: int) -> _SteadyExtremes:
         volts = VOLTAGES.tolist()
         for k in range(2):
             channel = CardChannel(*channels[0, k].tolist())
-            lowest[0, k], moment_sines[0, k] = interpreted(_extremes)(channel, pump, k, volts)
+            lowest[0, k], moment_sines[0, k] = _extremes(channel, pump, k, volts)
     else:
         static_extremes(channels, pumps, VOLTAGES, lowest, moment_sines)
     return _SteadyExtremes(lowest, moment_sines)

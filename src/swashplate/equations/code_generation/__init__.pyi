@@ -29,10 +29,9 @@ from .printing_c import wrapped as wrapped
 from .program import program_of as program_of
 from .scheduling import FEW as FEW
 from .tracing import Trace as Trace
-from .values import Flag as Flag
-from .values import Tuple as Tuple
+from .values import Option as Option
 from .values import Value as Value
 from .values import arguments as arguments
-from .values import fixed as fixed
 from .values import leaves as leaves
+from .values import node_of as node_of
 from .values import undecided as undecided

@@ -11,7 +11,7 @@ from swashplate.equations.code_generation.program import Program, program_of
 from swashplate.equations.code_generation.tracing import Trace
 from swashplate.equations.code_generation.values import Value, arguments, leaves
 from swashplate.equations.declaration import RULES, closure_hash, inlined
-from swashplate.equations.language import parsed, plain
+from swashplate.equations.language import parsed
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -82,7 +82,7 @@ def declared(function: Any) -> Callable[[F], F]:
     def decorate(rule: F) -> F:
         parsed(rule)
         compiled: F = inlined(rule)
-        RULES[plain(function)] = compiled
+        RULES[function] = compiled
         _derived_functions.clear()
         return compiled
 
@@ -125,7 +125,7 @@ def derive(
     options, lengths = dict(options or {}), dict(lengths or {})
     with GENERATING:
         settings = repr((by, sorted(options.items()), sorted(lengths.items())))
-        key = (plain(function), settings, closure_hash(function))
+        key = (function, settings, closure_hash(function))
         if key not in _derived_functions:
             values = arguments(parsed(function), options, lengths)
             _derived_functions[key] = _derived(function, by, values)
@@ -159,11 +159,14 @@ def _derived(function: Any, by: tuple[str, ...], values: Mapping[str, Value]) ->
     trace = Trace()
     results = [(path or "value", node) for path, node in leaves(trace.call(function, values))]
     nodes = [node for _, node in results]
-    arguments = sorted({node.value for value in values.values() for _, node in leaves(value)})
-    program = program_of(nodes, [*inputs.values()], arguments=arguments)
     places = {
-        node.value: (name, path) for name, value in values.items() for path, node in leaves(value)
+        node.value: (name, path)
+        for name, value in values.items()
+        for path, node in leaves(value)
+        if node.op == "name"
     }
+    arguments = sorted(places)
+    program = program_of(nodes, [*inputs.values()], arguments=arguments)
     return Derived(
         outputs=tuple(path for path, _ in results),
         inputs=tuple(inputs),

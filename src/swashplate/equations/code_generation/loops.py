@@ -11,10 +11,20 @@ from swashplate.equations import graph
 from swashplate.equations.code_generation.elimination import partials_of
 from swashplate.equations.code_generation.functions import FUNCTIONS, RESERVED, fresh_name
 from swashplate.equations.code_generation.runner import Callee, Runner
-from swashplate.equations.code_generation.values import Flag, Tuple, Value, alike, leaves, rebuilt
+from swashplate.equations.code_generation.symbols import RefusedError
+from swashplate.equations.code_generation.values import (
+    Option,
+    Value,
+    alike,
+    as_tuple,
+    fields,
+    leaves,
+    node_of,
+    rebuilt,
+)
 from swashplate.equations.declaration import inlined
 from swashplate.equations.graph import ONE, ZERO, Call, DerivativeRule, Node, choose, make, names_in
-from swashplate.equations.language import Parsed
+from swashplate.equations.language import Parsed, is_named_tuple
 
 S = TypeVar("S")
 
@@ -180,22 +190,21 @@ def _inner(outer: Runner, callee: Callee, leading: Sequence[Value], rest: Sequen
 
     def formal(value: Value, stem: str, *, always: bool) -> Value:
         """The value with a name for each scalar, and each option that is decided at run time."""
-        if isinstance(value, Tuple):
-            elements = tuple(
+        if isinstance(value, tuple):
+            elements = [
                 formal(element, f"{stem}_{field}", always=always)
-                for field, element in zip(value.fields, value.items, strict=True)
-            )
-            return Tuple(value.cls, elements)
-        if isinstance(value, Flag):
-            if not isinstance(value.value, Node):
-                return value
-            return Flag(formal(value.value, stem, always=False), value.text)
-        if value.op == "number" and not always:
+                for field, element in zip(fields(value), value, strict=True)
+            ]
+            return as_tuple(value, elements)
+        if isinstance(value, Option):
+            return Option(formal(value.node, stem, always=False), value.path)
+        node = node_of(value)
+        if node is None or (node.op == "number" and not always):
             return value
-        kind = "float" if always and value.kind == "int" else value.kind
-        node = graph.name(fresh_name(stem, used_names), kind)
-        stands_for[node] = value
-        return node
+        kind = "float" if always and node.kind == "int" else node.kind
+        name = graph.name(fresh_name(stem, used_names), kind)
+        stands_for[name] = node
+        return name
 
     for index, (name, value) in enumerate(zip(names, [*leading, *rest], strict=True)):
         values[name] = formal(value, name, always=index < len(leading))
@@ -232,10 +241,9 @@ def solved(trace: Runner, callee: Callee, low: Value, high: Value, rest: Sequenc
     """`root` as a call, with the rule of its derivatives."""
     residual = callee.source
     inner = _inner(trace, callee, [graph.name("x")], rest)
-    if not (isinstance(inner.result, Node) and isinstance(low, Node) and isinstance(high, Node)):
-        trace.under_way[-1].source.refuse(
-            None, "a residual or a bracket that is a tuple", "let each be one float"
-        )
+    low, high = node_of(low), node_of(high)
+    if low is None or high is None or node_of(inner.result) is None:
+        raise RefusedError("a residual or a bracket that is a tuple", "let each be one float")
     called = Call(1, Loop("root", inner))
     call = make("call", low, high, *inner.actuals, value=called)
     x = trace.make("result", call, value=0)
@@ -249,8 +257,7 @@ def solved(trace: Runner, callee: Callee, low: Value, high: Value, rest: Sequenc
         names = [argument.arg for argument in residual.arguments]
         with trace.within(chain):
             difference = trace.run(callee, dict(zip(names, [x, *rest], strict=True)))
-        assert isinstance(difference, Node)
-        partials = partials_of([difference], [x, *moving])
+        partials = partials_of([node for _, node in leaves(difference)], [x, *moving])
         if (0, 0) not in partials:
             residual.refuse(None, f"no derivative by {names[0]}", "use the unknown in it")
         lowest, highest = make("min", low, high), make("max", low, high)
@@ -280,13 +287,14 @@ def repetition(
     inner = _inner(trace, callee, [state, graph.name("number")], rest)
     names: tuple[str, ...] = ("state",)
     components: tuple[Value, ...] = (state,)
-    if isinstance(state, Tuple) and state.cls:
-        names, components = state.fields, state.items
-    numbers = all(isinstance(component, Node) for component in components)
-    if not (numbers and isinstance(count, Node) and alike(inner.result, state)):
+    if is_named_tuple(type(state)):
+        names, components = state._fields, state
+    numbers = all(node_of(component) is not None for component in components)
+    count = node_of(count)
+    if not numbers or count is None or not alike(inner.result, state):
         what = f"repeated of {step.name}, which does not return a state"
         instead = "let it take and return the same named tuple of floats, or a float"
-        trace.under_way[-1].source.refuse(None, what, instead)
+        raise RefusedError(what, instead)
     arguments = (count, *(node for _, node in leaves(state)), *inner.actuals)
     call = _repeated(inner, arguments, _derivatives)
     results = []
@@ -341,7 +349,7 @@ def _derivatives(call: Node, moving: tuple[int, ...]) -> tuple[Node, dict[tuple[
             **dict.fromkeys([*state_names, *(node.value for node in tangents.values())], "float"),
             number: "float",
         },
-        result=Tuple(None, (*following, *becomes)),
+        result=(*following, *becomes),
     )
     given = call.args
     again = _repeated(wide, (*given[: 1 + size], *begins, *given[1 + size :]))

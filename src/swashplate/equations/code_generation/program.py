@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 from swashplate.equations.code_generation.elimination import Elimination
 from swashplate.equations.code_generation.loops import Inner, Loop, root
 from swashplate.equations.code_generation.values import leaves
-from swashplate.equations.declaration import interpreted
 from swashplate.equations.graph import MATH_FUNCTIONS, Node, name, ordered, plain_value
 
 Array = NDArray[np.float64]
@@ -122,7 +121,7 @@ def _done(step: Step, operands: list[Any]) -> Any:
         case "once":
             return step.value.values(operands)
         case "root":
-            return [interpreted(root)(step.value.only_value, *operands)]
+            return [root(step.value.only_value, *operands)]
         case "repeated":
             size = len(step.value.results)
             state, others = operands[1 : 1 + size], operands[1 + size :]

@@ -1,21 +1,24 @@
-"""Equations run on symbols: the statements of a function, done with the nodes of one graph.
+"""Equations run on symbols: Python runs them, and what is left is one graph of their operations.
 
-Named tuples come apart, calls are followed, loops are unrolled, options decided if they are known.
-What is left are operations in the order of the equations: results keep their last bit.
+Named tuples come apart, calls are followed, loops are unrolled, options decided if they are known:
+all this Python does by itself, see `decisions` for what it cannot. The operations are in the order
+of the equations: results keep their last bit.
 """
 
 from __future__ import annotations
 
-import ast
-import sys
+import builtins
+import math
+import operator
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import reduce
-from inspect import Parameter, Signature
-from types import ModuleType
-from typing import Any, TypeVar
+from inspect import signature
+from types import MethodType, ModuleType
+from typing import Any
 
 from swashplate.equations import graph
+from swashplate.equations.code_generation.decisions import deep, on_symbols
 from swashplate.equations.code_generation.loops import (
     called_apart,
     interpolate,
@@ -25,13 +28,15 @@ from swashplate.equations.code_generation.loops import (
     solved,
 )
 from swashplate.equations.code_generation.runner import Callee
+from swashplate.equations.code_generation.symbols import RefusedError, Symbol, Unset, operand
 from swashplate.equations.code_generation.values import (
-    Flag,
-    Tuple,
+    NotGiven,
+    Option,
     Value,
     alike,
-    fixed,
     leaves,
+    mapped,
+    node_of,
     rebuilt,
 )
 from swashplate.equations.declaration import (
@@ -42,44 +47,42 @@ from swashplate.equations.declaration import (
     is_function,
     standing,
 )
-from swashplate.equations.graph import (
-    FALSE,
-    LEAVES,
-    ONE,
-    TRUE,
-    ZERO,
-    DerivativeRule,
-    Node,
-    choose,
-    make,
-)
+from swashplate.equations.graph import LEAVES, ONE, ZERO, DerivativeRule, Node, choose, make
 from swashplate.equations.language import (
-    ARITHMETIC,
     CHOICES,
-    COMPARISONS,
     MATH,
     Parsed,
-    has_return,
     is_among,
     is_named_tuple,
     parsed,
-    plain,
 )
+from swashplate.errors import EquationError
 
-Names = dict[str, Value]
-DEEPEST = 50_000
-"""Frames of Python within an expression: a sum of 3,000 terms takes some 9,000."""
 MOST_WAYS = 500
 """Ways through an equation to a return: what follows an `if` with one is done for each."""
-LARGEST_WHOLE = 2**63
-"""Whole numbers from here on are floats: compiled code has none as large."""
-R = TypeVar("R")
+OF_PYTHON: dict[Any, None] = dict.fromkeys((enumerate, len, range, reversed, tuple, zip))
+"""What of Python's own an equation may call besides: it counts and orders, and computes nothing."""
 
+ARITHMETIC = {
+    **{"Add": operator.add, "Sub": operator.sub, "Mult": operator.mul, "Div": operator.truediv},
+    **{"FloorDiv": operator.floordiv, "Mod": operator.mod, "Pow": operator.pow},
+    **{"MatMult": operator.matmul, "BitAnd": operator.and_, "BitOr": operator.or_},
+    **{"BitXor": operator.xor, "LShift": operator.lshift, "RShift": operator.rshift},
+}
+"""Operations by their names in Python's syntax."""
 LOOPS = {
     "root": ("residual, low, high", ("the unknown",), solved),
     "repeated": ("step, count, state", ("a state", "the number of the repetition"), repetition),
 }
 """What loops take ahead of the rest, what their equation takes ahead of it, how they are made."""
+INSTEAD_OF_BUILTIN = {
+    "print": "inspect results outside the equation",
+    "sum": "write the terms out: Python's versions add up differently",
+    "float": "write the number as a float",
+    "int": "write floor(x)",
+    "round": "write floor(x + 0.5)",
+    "pow": "write ** with a whole number, or exp(b * log(a))",
+}
 
 
 def callee_of(equation: Any, replacements: Replacements) -> Callee:
@@ -114,6 +117,8 @@ class Trace:
         self.labels: dict[Node, str] = {}
         self.origins: dict[Node, Parsed] = {}
         self.under_way: list[Callee] = []
+        self._returns: list[int] = []
+        """How often each equation under way has come to a decision with a return."""
         self._rules: dict[tuple[Any, ...], DerivativeRule] = {}
 
     @property
@@ -134,18 +139,13 @@ class Trace:
         source = callee.source
         if callee in self.under_way:
             source.refuse(None, "a recursive call", "write a loop over a literal range")
-        values: dict[str, Value] = {}
-        for argument in source.arguments:
-            name = argument.arg
-            default = fixed(source.defaults[name]) if name in source.defaults else None
-            if name in arguments:
-                values[name] = arguments[name]
-            elif default is not None:
-                values[name] = default
+        given = source.defaults | dict(arguments)
+        names = [argument.arg for argument in source.arguments]
+        values: dict[str, Value] = {name: given[name] for name in names if name in given}
         if source in self.outlined:
             return called_apart(self, callee, [*values.values()])
         with self.running(callee):
-            result = _Tracer(source, self).result(values)
+            result = self._returned(source, values)
             scalars = tuple(node for value in values.values() for _, node in leaves(value))
             returned = tuple(node for _, node in leaves(result))
             self.calls.setdefault(source, set()).add((scalars, returned))
@@ -153,6 +153,24 @@ class Trace:
             if rule is None or _is_changed(callee):
                 return result
             return self._ruled(source, parsed(rule), values, result)
+
+    def _returned(self, source: Parsed, values: Mapping[str, Value]) -> Value:
+        """What Python makes of an equation."""
+        for name, value in values.items():
+            self.label(value, name)
+        names = [argument.arg for argument in source.arguments]
+        symbols = [self._symbols(values[name]) if name in values else Unset(name) for name in names]
+        try:
+            result = _nodes(on_symbols(source, self)(*symbols), "a result that is")
+            if isinstance(result, str):
+                raise RefusedError("a result that is text", "return numbers or tuples of them")
+            return result
+        except EquationError:
+            raise
+        except RefusedError as refused:
+            source.refuse(source.line_of(refused), refused.what, refused.instead)
+        except Exception as error:
+            source.refuse(source.line_of(error), *_said(error))
 
     def inner(self, source: Parsed) -> Trace:
         """A separate trace for an equation that is run within another, again and again."""
@@ -162,15 +180,15 @@ class Trace:
 
     @contextmanager
     def running(self, callee: Callee) -> Iterator[None]:
-        """While an equation is being run, whose expressions may be deeper than Python expects."""
+        """While an equation is being run."""
         self.under_way.append(callee)
-        limit = sys.getrecursionlimit()
-        sys.setrecursionlimit(max(limit, DEEPEST))
+        self._returns.append(0)
         try:
-            yield
+            with deep():
+                yield
         finally:
             self.under_way.pop()
-            sys.setrecursionlimit(limit)
+            self._returns.pop()
 
     @contextmanager
     def within(self, chain: Sequence[Callee]) -> Iterator[None]:
@@ -199,6 +217,10 @@ class Trace:
                 name = "_".join(filter(None, (stem, path))) or "value"
                 self.labels.setdefault(plain_node, name)
 
+    def _symbols(self, value: Value) -> Any:
+        """A value as an equation sees it."""
+        return mapped(lambda leaf: Symbol(leaf, self) if isinstance(leaf, Node) else leaf, value)
+
     def _ruled(
         self, source: Parsed, rule: Parsed, arguments: Mapping[str, Value], result: Value
     ) -> Value:
@@ -215,7 +237,7 @@ class Trace:
         def slopes() -> tuple[Node, ...]:
             # a rule is that of the equation as it is written
             with self.within(chain), self.running(Callee(rule, NO_REPLACEMENTS)):
-                partials = [node for _, node in leaves(_Tracer(rule, self).result(arguments))]
+                partials = [node for _, node in leaves(self._returned(rule, arguments))]
             if len(partials) != len(floats) * len(results):
                 rule.refuse(
                     None,
@@ -234,415 +256,246 @@ class Trace:
             nodes.append(self.make("ruled", node, value=rule_of_one))
         return rebuilt(result, iter(nodes))
 
+    # -- decisions, see `decisions` ----------------------------------------------------------------
 
-def _is_changed(callee: Callee) -> bool:
-    """Whether an equation reaches one for which another stands, so that no rule of it holds."""
-    replaced = {old for old, chain in callee.replacements.items() if chain}
-    if not replaced:
-        return False
-    return any(plain(reached) in replaced for reached in closure(callee.source.function).values())
+    def _test(self, value: Any) -> bool | Node:
+        """Whether a value counts as true: known, or the node that says so."""
+        if isinstance(value, Option | NotGiven):
+            return _setting(value)
+        if isinstance(value, tuple):
+            raise RefusedError("a test of a tuple", "compare its elements")
+        if not isinstance(value, Symbol):
+            return bool(value)
+        node = value.node
+        if node.op == "number":
+            return bool(node.value)
+        if node.kind == "bool":
+            return node
+        return self.make("!=", node, ZERO if node.kind == "float" else graph.number(0))
 
+    def chosen(self, test: Any, if_true: Callable[[], Any], if_false: Callable[[], Any]) -> Any:
+        """`a if test else b`."""
+        decision = self._test(test)
+        if isinstance(decision, bool):
+            return if_true() if decision else if_false()
+        return self._one_of(decision, if_true(), if_false())
 
-def _options_in(value: Value) -> tuple[Any, ...]:
-    """What of a value a rule may decide by besides floats: options, and whole numbers."""
-    if isinstance(value, Tuple):
-        return tuple(map(_options_in, value.items))
-    if isinstance(value, Flag):
-        return (value.value,)
-    return () if value.kind == "float" else (value,)
+    def one_return(self, test: Any, if_true: Callable[[], Any], if_false: Callable[[], Any]) -> Any:
+        """What an equation returns on one of two ways."""
+        if self._returns:
+            self._returns[-1] += 1
+            if self._returns[-1] > MOST_WAYS:
+                what = f"more than {MOST_WAYS} ways to a return"
+                raise RefusedError(what, "set a variable on each way, and return it at the end")
+        return self.chosen(test, if_true, if_false)
 
-
-def _part_of(rule: DerivativeRule, index: int) -> DerivativeRule:
-    """The rule of one result among several."""
-    size = len(rule.arguments)
-    return DerivativeRule(rule.arguments, lambda: rule.slopes[index * size : (index + 1) * size])
-
-
-class _Tracer:
-    """Runs the statements of one equation."""
-
-    def __init__(self, source: Parsed, trace: Trace) -> None:
-        self.source, self.trace, self.refuse = source, trace, source.refuse
-        self.local = source.local
-        self.names: Names = {}
-        self.ways = 0
-        """How often what follows an `if` that returns was done once more."""
-
-    def result(self, arguments: Mapping[str, Value]) -> Value:
-        """What the equation returns for some arguments."""
-        self.names = dict(arguments)
-        for name, value in arguments.items():
-            self.trace.label(value, name)
-        return self.returned(self.source.node.body)
-
-    def returned(self, statements: Sequence[ast.stmt]) -> Value:
-        """What statements return that certainly do."""
-        value = self.block(statements)
-        assert value is not None  # a checked equation ends in a return
-        return value
-
-    # -- statements --------------------------------------------------------------------------------
-
-    def block(self, statements: Sequence[ast.stmt]) -> Value | None:
-        """Do statements; what they return, if they do."""
-        pending = [*statements]
-        while pending:
-            match statement := pending.pop(0):
-                case ast.Return(value=ast.expr() as value):
-                    return self.value(value)
-                case ast.If():
-                    test = self.test(statement.test)
-                    if test.op == "number":
-                        pending[:0] = statement.body if test.value else statement.orelse
-                    elif has_return([statement]):
-                        self.ways += 1
-                        if self.ways > MOST_WAYS:
-                            self.refuse(
-                                statement,
-                                f"more than {MOST_WAYS} ways to a return",
-                                "set a variable on each way, and return it at the end",
-                            )
-                        if_true, _ = self.in_branch(self.returned, [*statement.body, *pending])
-                        if_false, _ = self.in_branch(self.returned, [*statement.orelse, *pending])
-                        return self.select(statement, test, if_true, if_false)
-                    else:
-                        self.merge(test, statement)
-                case ast.For(target=target, iter=ast.Call(args=bounds)):
-                    for count in reversed(range(*map(ast.literal_eval, bounds))):
-                        number = ast.copy_location(ast.Constant(count), statement)
-                        set_counter = ast.copy_location(ast.Assign([target], number), statement)
-                        pending[:0] = [set_counter, *statement.body]
-                case ast.Assign(targets=targets, value=value):
-                    assigned = self.value(value)
-                    for target in targets:
-                        self.bind(target, assigned)
-                case ast.AnnAssign(target=target, value=ast.expr() as value):
-                    self.bind(target, self.value(value))
-                case ast.AugAssign(target=ast.Name(id=name) as target):
-                    left = ast.copy_location(ast.Name(name), statement)
-                    term = ast.copy_location(
-                        ast.BinOp(left, statement.op, statement.value), statement
-                    )
-                    self.bind(target, self.value(term))
-        return None
-
-    def in_branch(self, run: Callable[[Any], R], what: Any) -> tuple[R, Names]:
-        """What one way of a decision comes to, and its names; those here stay as they are."""
-        outer, self.names = self.names, dict(self.names)
-        try:
-            return run(what), self.names
-        finally:
-            self.names = outer
-
-    def merge(self, test: Node, statement: ast.If) -> None:
-        """An `if` that does not return: what both of its ways set is merged."""
-        _, if_true = self.in_branch(self.block, statement.body)
-        _, if_false = self.in_branch(self.block, statement.orelse)
-        for name in {**if_true, **if_false}:
-            if name not in if_true or name not in if_false:
-                self.names.pop(name, None)  # without a value on one way: refused if it is read
+    def either_way(
+        self,
+        test: Any,
+        if_true: Callable[[], tuple[Any, ...]],
+        if_false: Callable[[], tuple[Any, ...]],
+        names: Sequence[str],
+    ) -> tuple[Any, ...]:
+        """What names stand for after an `if`."""
+        decision = self._test(test)
+        if isinstance(decision, bool):
+            return if_true() if decision else if_false()
+        merged = []
+        for name, first, second in zip(names, if_true(), if_false(), strict=True):
+            if type(first) is Unset or type(second) is Unset:
+                merged.append(Unset(name))  # refused if it is read
                 continue
-            value_if_true, value_if_false = if_true[name], if_false[name]
-            if value_if_true is value_if_false:
-                self.names[name] = value_if_true
-                continue
-            if not alike(value_if_true, value_if_false):
-                self.refuse(
-                    statement, f"{name} of two structures", "give it the same kind of value"
-                )
-            self.names[name] = self.select(statement, test, value_if_true, value_if_false)
-            self.trace.label(self.names[name], name)
+            what, instead = f"{name} of two structures", "give it the same kind of value"
+            merged.append(
+                first if first is second else self._one_of(decision, first, second, what, instead)
+            )
+            self.named(**{name: merged[-1]})
+        return tuple(merged)
 
-    def select(self, at: ast.AST, test: Node, if_true: Value, if_false: Value) -> Value:
+    def _one_of(
+        self,
+        test: Node,
+        if_true: Any,
+        if_false: Any,
+        what: str = "results of different structure",
+        instead: str = "give the same tuple on every path",
+    ) -> Any:
         """The value of one of two ways."""
-        if not alike(if_true, if_false):
-            self.refuse(at, "results of different structure", "give the same tuple on every path")
-        pairs = zip(leaves(if_true), leaves(if_false), strict=True)
-        choices = (
-            self.trace.noted(choose(test, first, second)) for (_, first), (_, second) in pairs
-        )
-        return rebuilt(if_true, choices)
+        first, second = _nodes(if_true), _nodes(if_false)
+        if not alike(first, second):
+            raise RefusedError(what, instead)
+        pairs = zip(leaves(first), leaves(second), strict=True)
+        choices = (self.noted(choose(test, one, other)) for (_, one), (_, other) in pairs)
+        return self._symbols(rebuilt(first, choices))
 
-    def bind(self, target: ast.expr, value: Value) -> None:
-        """Give a name its value, or each of several in a tuple."""
-        if isinstance(target, ast.Tuple):
-            if not isinstance(value, Tuple) or len(value.items) != len(target.elts):
-                self.refuse(
-                    target, "an unpacking of something else", "unpack a tuple of as many values"
-                )
-            for element, element_value in zip(target.elts, value.items, strict=True):
-                self.bind(element, element_value)
-            return
-        assert isinstance(target, ast.Name)
-        self.names[target.id] = value
-        self.trace.label(value, target.id)
+    def negated(self, value: Any) -> Any:
+        """`not` of a test."""
+        test = self._test(value)
+        if isinstance(test, bool):
+            return not test
+        return Symbol(self.make("not", test), self)
 
-    # -- expressions -------------------------------------------------------------------------------
+    def is_none(self, value: Any) -> Any:
+        """`value is None`."""
+        if isinstance(value, Option | NotGiven):
+            return self.negated(Symbol(_setting(value), self))
+        return value is None
 
-    def test(self, node: ast.expr) -> Node:
-        """A decision; an option that is on counts as true."""
-        value = self.value(node)
-        if isinstance(value, Flag):
-            setting = self.setting_of(node, value)
-            return setting if isinstance(setting, Node) else graph.number(setting is not None)
-        if isinstance(value, Node):
-            if value.op == "number":
-                return graph.number(bool(value.value))
-            if value.kind == "bool":
-                return value
-            return self.trace.make("!=", value, ZERO if value.kind == "float" else graph.number(0))
-        self.refuse(node, "a test of a tuple", "compare its elements")
+    def both(self, *operands: tuple[str, Callable[[], Any]]) -> Any:
+        """`and`."""
+        return self._joined("and", graph.both, operands)
 
-    def setting_of(self, node: ast.AST, option: Flag) -> Any:
-        """Value of an option, refused if it was not given."""
-        if option.value == "unknown":
-            what = f"a test of the option {option.text}, whose value is not known"
-            self.refuse(node, what, f'say options={{"{option.text}": None}}, or True')
-        return option.value
+    def either(self, *operands: tuple[str, Callable[[], Any]]) -> Any:
+        """`or`."""
+        return self._joined("or", graph.either, operands)
 
-    def scalar(self, node: ast.expr) -> Node:
-        """Value of an expression that has to be a number."""
-        value = self.value(node)
-        if isinstance(value, Node):
-            return value
-        if isinstance(value, Flag):
-            self.refuse(node, "arithmetic with an option", "test it with `is None`")
-        self.refuse(node, "arithmetic with a tuple", "name its elements")
+    def _joined(
+        self,
+        word: str,
+        join: Callable[[Node, Node], Node],
+        operands: Sequence[tuple[str, Callable[[], Any]]],
+    ) -> Any:
+        """Tests of which each only counts after the ones before it."""
+        known = joined = graph.number(word == "and")
+        for text, value_of in operands:
+            value = value_of()
+            number = value.node if isinstance(value, Symbol) else node_of(value)
+            if number is not None and number.kind != "bool":
+                raise RefusedError(f"{word} of the number {text}", f"compare it, as {text} != 0.0")
+            test = self._test(value)
+            node = graph.number(test) if isinstance(test, bool) else test
+            joined = self.noted(join(joined, node))
+            if joined.op == "number" and joined is not known:
+                break
+        return joined.value if joined.op == "number" else Symbol(joined, self)
 
-    def value(self, node: ast.expr) -> Value:
-        """Value of any expression."""
-        match node:
-            case ast.Constant(value=None):
-                return Flag(None)
-            case ast.Constant(value=int(number) | float(number)):
-                return graph.number(_whole(number))
-            case ast.Tuple(elts=elements):
-                return Tuple(None, tuple(map(self.value, elements)))
-            case ast.Name(id=name) if name in self.names:
-                return self.names[name]
-            case ast.Name(id=name):
-                if name in self.local:
-                    instead = "give it a value on every path"
-                    self.refuse(node, f"{name} without a value on some path", instead)
-                return self.constant(node, name, self.outside(node))
-            case ast.Attribute():
-                return self.field(node)
-            case ast.Subscript():
-                return self.element(node)
-            case ast.UnaryOp(op=ast.Not()):
-                test = self.test(node.operand)
-                return self.negated(test)
-            case ast.UnaryOp():
-                operand = self.scalar(node.operand)
-                if isinstance(node.op, ast.UAdd):
-                    return operand
-                if operand.op == "number":
-                    return graph.number(-operand.value)
-                return self.trace.make("neg", operand)
-            case ast.BinOp():
-                return self.arithmetic(node)
-            case ast.Compare():
-                return self.comparison(node)
-            case ast.BoolOp():
-                return self.joined(node)
-            case ast.IfExp():
-                test = self.test(node.test)
-                if test.op == "number":
-                    return self.value(node.body if test.value else node.orelse)
-                return self.select(node, test, self.value(node.body), self.value(node.orelse))
-            case ast.Call():
-                return self.call(node)
-        self.refuse(node, "this expression", "use arithmetic")
-
-    def outside(self, node: ast.expr) -> Any:
-        """What a name, or a name in a module, stands for outside the equation."""
-        try:
-            return self.source.called(node)
-        except (NameError, AttributeError):
-            self.refuse(node, f"the unknown name {ast.unparse(node)}", "define or import it")
-
-    def constant(self, node: ast.AST, text: str, constant: Any) -> Value:
-        """Value of something that stands outside the equation."""
-        value = fixed(constant)
-        if value is None:
-            what = f"{text}, which is {type(constant).__name__}"
-            instead = "from outside, an equation reads only numbers"
-            if any(map(_is_of_numpy, constant if isinstance(constant, tuple) else [constant])):
-                instead = "make it a float or an int of Python where it is defined"
-            self.refuse(node, what, instead)
+    def long_sum(self, value: Any, *steps: tuple[str, Any]) -> Any:
+        """Arithmetic from left to right."""
+        for operation, term in steps:
+            value = ARITHMETIC[operation](value, term)
         return value
 
-    def field(self, node: ast.Attribute) -> Value:
-        """Value of a field, or of a constant of a module."""
-        base = node.value
-        module = isinstance(base, ast.Name) and base.id not in {*self.local, *self.names}
-        if module and isinstance(self.outside(base), ModuleType):
-            return self.constant(node, node.attr, self.outside(node))
-        value = self.value(base)
-        if not isinstance(value, Tuple) or value.cls is None or node.attr not in value.fields:
-            what = f"the field {node.attr}, which is unknown"
-            self.refuse(node, what, "name a field of the named tuple")
-        return value.items[value.fields.index(node.attr)]
+    # -- names -------------------------------------------------------------------------------------
 
-    def element(self, node: ast.Subscript) -> Value:
-        """Value of an element of a tuple."""
-        index, value = self.scalar(node.slice), self.value(node.value)
-        if index.op != "number" or index.kind != "int":
-            self.refuse(node.slice, "an index that is not a whole number", "write the number")
-        if not isinstance(value, Tuple) or not -len(value.items) <= index.value < len(value.items):
-            self.refuse(node, f"the element {index.value}, which does not exist", "count from 0")
-        element: Value = value.items[index.value]
-        return element
+    def unset(self, name: str) -> Unset:
+        """What a name stands for before it is given a value."""
+        return Unset(name)
 
-    def negated(self, test: Node) -> Node:
-        """`not` of a test."""
-        if test.op == "number":
-            return graph.number(not test.value)
-        return self.trace.make("not", test)
+    def named(self, /, **names: Any) -> None:
+        """Remember what an equation calls its values."""
+        for name, value in names.items():
+            if isinstance(value, list | dict | set):
+                kind = type(value).__name__
+                raise RefusedError(f"{name}, which is a {kind},", "use a tuple")
+            self.label(_nodes(value), name)
 
-    def arithmetic(self, node: ast.BinOp) -> Node:
-        """Value of an arithmetic operation, exactly as written."""
-        op, left = ARITHMETIC[type(node.op)], self.scalar(node.left)
-        if op == "**":
-            return self.trace.make("**", left, value=ast.literal_eval(node.right))
-        right = self.scalar(node.right)
-        if left.kind == right.kind == "int" and left.op == right.op == "number" and op != "/":
-            integer_operation = {"+": int.__add__, "-": int.__sub__, "*": int.__mul__}[op]
-            return graph.number(_whole(integer_operation(left.value, right.value)))
-        if op == "*" and left.kind == right.kind == "float":  # a factor that is known to be one
-            for factor, other in ((left, right), (right, left)):
-                if graph.is_number(factor, 1.0):
-                    return other
-        return self.trace.make(op, left, right)
+    def items(self, values: Any) -> tuple[Any, ...]:
+        """What a loop goes through."""
+        return tuple(values)
 
-    def comparison(self, node: ast.Compare) -> Node:
-        """A comparison, also of several terms, and `is None`."""
-        left = self.value(node.left)
-        test = TRUE
-        for op, right_node in zip(node.ops, node.comparators, strict=True):
-            if isinstance(op, ast.Is | ast.IsNot):
-                test = graph.both(test, self.missing(node, left, isinstance(op, ast.Is)))
-                continue
-            right = self.scalar(right_node)
-            if not isinstance(left, Node):
-                self.refuse(node, "a comparison of a tuple", "compare its elements")
-            test = graph.both(test, self.trace.make(COMPARISONS[type(op)], left, right))
-            left = right
-        return test
+    def member(self, base: Any, name: str, field: str) -> Any:
+        """A constant of a module, or a field of a constant."""
+        if isinstance(base, ModuleType):
+            return self.outside(getattr(base, field), field)
+        return getattr(self.outside(base, name), field)
 
-    def missing(self, node: ast.AST, value: Value, off: bool) -> Node:
-        """Whether a value `is None` (`off`), or is not."""
-        setting = self.setting_of(node, value) if isinstance(value, Flag) else True
-        if isinstance(setting, Node):
-            return self.negated(setting) if off else setting
-        return graph.number((setting is None) == off)
-
-    def joined(self, node: ast.BoolOp) -> Node:
-        """`and` and `or`, which are choices: the second test only counts after the first."""
-        conjunction = isinstance(node.op, ast.And)
-        test = TRUE if conjunction else FALSE
-        for operand in node.values:
-            if test.op == "number" and bool(test.value) != conjunction:
-                return test
-            join = graph.both if conjunction else graph.either
-            value = self.value(operand)
-            if isinstance(value, Node) and value.kind != "bool":
-                word, text = ("and" if conjunction else "or"), ast.unparse(operand)
-                self.refuse(node, f"{word} of the number {text}", f"compare it, as {text} != 0.0")
-            test = self.trace.noted(join(test, self.test(operand)))
-        return test
+    def outside(self, constant: Any, name: str) -> Any:
+        """An equation or a constant from outside, numbers as Python's own."""
+        if constant is None or isinstance(constant, str) or is_function(constant):
+            return constant
+        if isinstance(constant, tuple):
+            return mapped(lambda each: self.outside(each, name), constant)
+        if isinstance(constant, bool | int | float):
+            return float(constant) if isinstance(constant, float) else constant
+        instead = "from outside, an equation reads only numbers"
+        if type(constant).__module__ == "numpy":
+            instead = "make it a float or an int of Python where it is defined"
+        raise RefusedError(f"{name}, which is {type(constant).__name__}", instead)
 
     # -- calls -------------------------------------------------------------------------------------
 
-    def call(self, node: ast.Call) -> Value:
-        """Value of a call."""
-        called = self.outside(node.func)
-        if is_among(called, MATH) or is_among(called, CHOICES):
-            return self.function(node, MATH.get(called) or CHOICES[called])
-        if is_named_tuple(called):
-            return Tuple(called, tuple(self.arguments(node, called._fields, ()).values()))
-        kind = plain(called)
-        if kind is plain(root) or kind is plain(repeated):
-            return self.loop(node, kind.__name__)
-        if kind is plain(interpolate):
-            return self.interpolation(self.arguments(node, ("x", "knots", "values"), ()), node)
-        if not _is_equation(called):
-            text = ast.unparse(node.func)
-            if not callable(called):
-                what = f"a call of {text}, which is of type {type(called).__name__}"
-                self.refuse(node, what, "call an @equation")
-            self.refuse(node, f"a call of {text}", f"make {text} an @equation")
-        callee = self.trace.callee(called)
-        names = [argument.arg for argument in callee.source.arguments]
-        return self.trace.run(callee, self.arguments(node, names, callee.source.defaults))
+    def called(self, function: Any, text: str, /, *arguments: Any, **named: Any) -> Any:
+        """What a call in an equation returns."""
+        if is_among(function, MATH) or is_among(function, CHOICES):
+            op = MATH.get(function) or CHOICES[function]
+            return self._function(op, function, arguments, named)
+        if is_named_tuple(function) or is_among(function, OF_PYTHON):
+            return function(*arguments, **named)
+        if isinstance(function, MethodType) and function.__name__ == "_replace":
+            return function(*arguments, **named)
+        if function is root or function is repeated:
+            return self._loop(function.__name__, arguments, named)
+        if function is interpolate:
+            return self._interpolation(**self._given(interpolate, text, arguments, named))
+        if not is_function(function):
+            _refuse_call(function, text)
+        callee = self.callee(function)
+        given = self._given(callee.source.function, text, arguments, named)
+        values = {name: _nodes(value) for name, value in given.items()}
+        return self._symbols(self.run(callee, values))
 
-    def function(self, node: ast.Call, op: str) -> Node:
-        """Value of a function of numbers."""
-        operands = [self.scalar(argument) for argument in node.args]
-        least = 2 if op in ("atan2", "hypot", "min", "max") else 1
-        exactly = len(operands) == least or (len(operands) > least and op in ("min", "max"))
-        if not exactly or node.keywords:
-            self.refuse(node, f"{op} of {len(operands)} arguments", f"give it {least}")
-        if len(operands) == 1:
-            return self.trace.make(op, operands[0])
-        return reduce(lambda first, second: self.trace.make(op, first, second), operands)
-
-    def arguments(self, node: ast.Call, names: Sequence[str], optional: Any) -> Names:
-        """Values for arguments of these names, in their order as far as they are given."""
-        positional = [self.value(each) for each in node.args]
-        by_name = {str(each.arg): self.value(each.value) for each in node.keywords}
-        defaults = {name: None if name in optional else Parameter.empty for name in names}
-        parameters = [
-            Parameter(name, Parameter.POSITIONAL_OR_KEYWORD, default=defaults[name])
-            for name in names
-        ]
+    def _given(
+        self, function: Any, text: str, arguments: Sequence[Any], named: Mapping[str, Any]
+    ) -> dict[str, Any]:
+        """Values for the arguments of a function by their names, as far as they are given."""
+        takes = signature(function)
         try:
-            return Signature(parameters).bind(*positional, **by_name).arguments
+            return takes.bind(*arguments, **named).arguments
         except TypeError as error:
-            what = f"a call of {ast.unparse(node.func)} with {error}"
-            self.refuse(node, what, f"it takes {', '.join(names)}")
+            what = f"a call of {text} with {error}"
+            raise RefusedError(what, f"it takes {', '.join(takes.parameters)}") from None
 
-    def loop(self, node: ast.Call, word: str) -> Value:
-        """Value of `root` or `repeated`: the equation by its name, and the other arguments."""
+    def _function(
+        self, op: str, function: Any, arguments: Sequence[Any], named: Mapping[str, Any]
+    ) -> Any:
+        """Value of a function of numbers."""
+        if op in ("min", "max") and len(arguments) == 1 and isinstance(arguments[0], tuple):
+            (arguments,) = arguments
+        least = 2 if op in ("atan2", "hypot", "min", "max") else 1
+        exactly = len(arguments) == least or (len(arguments) > least and op in ("min", "max"))
+        if not exactly or named:
+            raise RefusedError(f"{op} of {len(arguments)} arguments", f"give it {least}")
+        nodes = [operand(argument) for argument in arguments]
+        if not any(isinstance(argument, Symbol) for argument in arguments):
+            return function(*arguments)
+        if len(nodes) == 1:
+            return Symbol(self.make(op, *nodes), self)
+        return Symbol(reduce(lambda first, second: self.make(op, first, second), nodes), self)
+
+    def _loop(self, word: str, arguments: Sequence[Any], named: Mapping[str, Any]) -> Any:
+        """Value of `root` or `repeated`: the equation, and the other arguments."""
         takes, own_arguments, make_of = LOOPS[word]
-        if len(node.args) < 3 or node.keywords:
-            self.refuse(node, f"{word} with other arguments", f"write {word}({takes}, a, b, ...)")
-        first = node.args[0]
-        named = isinstance(first, ast.Name | ast.Attribute) and ast.unparse(first) not in self.local
-        equation = self.outside(first) if named else None
-        if not _is_equation(equation):
-            self.refuse(node, f"{word} of something else", "give it the name of an @equation")
-        inner = self.trace.callee(equation)
-        values = [self.value(argument) for argument in node.args[1:]]
-        if len(inner.source.arguments) != len(own_arguments) + len(values) - 2:
+        if len(arguments) < 3 or named:
+            raise RefusedError(f"{word} with other arguments", f"write {word}({takes}, a, b, ...)")
+        equation, *others = arguments
+        if not is_function(equation):
+            raise RefusedError(f"{word} of something else", "give it the name of an @equation")
+        inner = self.callee(equation)
+        if len(inner.source.arguments) != len(own_arguments) + len(others) - 2:
             what = f"{word} of {inner.source.name} with other arguments"
-            self.refuse(node, what, f"let it take {', '.join(own_arguments)} and the rest")
-        return make_of(self.trace, inner, values[0], values[1], values[2:])
+            raise RefusedError(what, f"let it take {', '.join(own_arguments)} and the rest")
+        values = [_nodes(value) for value in others]
+        return self._symbols(make_of(self, inner, values[0], values[1], values[2:]))
 
-    def interpolation(self, arguments: Mapping[str, Value], node: ast.Call) -> Value:
-        """Value of a call of `interpolate`, whose arguments are checked."""
-        x, knots, values = arguments.values()
-        if not (
-            isinstance(x, Node)
-            and isinstance(knots, Tuple)
-            and isinstance(values, Tuple)
-            and len(knots.items) == len(values.items) > 1
-        ):
-            self.refuse(
-                node,
+    def _interpolation(self, x: Any, knots: Any, values: Any) -> Any:
+        """Value of a call of `interpolate`."""
+        table = isinstance(knots, tuple) and isinstance(values, tuple)
+        if isinstance(x, tuple) or not table or not len(knots) == len(values) > 1:
+            raise RefusedError(
                 "interpolate with something else than a number and two tuples of one length",
                 "type them tuple[float, float, ...] with every element, or give derive their "
                 "lengths",
             )
-        return self.interpolated(
-            x,
-            knots=[leaf for _, leaf in leaves(knots)],
-            values=[leaf for _, leaf in leaves(values)],
+        node = self._interpolated(
+            operand(x),
+            knots=[node for _, node in leaves(_nodes(knots))],
+            values=[node for _, node in leaves(_nodes(values))],
         )
+        return Symbol(node, self)
 
-    def interpolated(self, x: Node, knots: Sequence[Node], values: Sequence[Node]) -> Node:
+    def _interpolated(self, x: Node, knots: Sequence[Node], values: Sequence[Node]) -> Node:
         """Nodes of `interpolate`: the segment of x is chosen, then a straight line evaluated."""
-        make, label = self.trace.make, self.trace.label
+        make, label = self.make, self.label
         ends = [knots[0], knots[1], values[0], values[1]]
         for segment in range(1, len(knots) - 1):
             beyond = make(">=", x, knots[segment])
@@ -651,7 +504,7 @@ class _Tracer:
                 choose(beyond, next_end, end) for end, next_end in zip(ends, next_ends, strict=True)
             ]
             for node, name in zip(ends, ("left", "right", "low", "high"), strict=True):
-                label(self.trace.noted(node), name)
+                label(self.noted(node), name)
         left, right, low, high = ends
         share = make("/", make("-", x, left), make("-", right, left))
         label(share, "share")
@@ -659,16 +512,78 @@ class _Tracer:
         return make("+", low, make("*", inside, make("-", high, low)))
 
 
-def _is_of_numpy(constant: Any) -> bool:
-    """Whether a constant has a type of NumPy's."""
-    return type(constant).__module__ == "numpy"
+def _nodes(value: Any, what: str = "a value that is") -> Value:
+    """What an equation sees as the engine holds it."""
+
+    def node(leaf: Any) -> Any:
+        if isinstance(leaf, Symbol):
+            return leaf.node
+        if leaf is None or isinstance(leaf, bool | int | float | str | Option | NotGiven):
+            return leaf
+        raise RefusedError(f"{what} a {type(leaf).__name__}", "use numbers and tuples of them")
+
+    return mapped(node, value)
 
 
-def _whole(number: float) -> float:
-    """A literal number, a float if it is too large for a whole number of compiled code."""
-    return number if abs(number) < LARGEST_WHOLE else float(number)
+def _setting(option: Option | NotGiven) -> Node:
+    """The node of an option that is decided at run time, refused if it was not given."""
+    if isinstance(option, NotGiven):
+        what = f"a test of the option {option.path}, whose value is not known"
+        raise RefusedError(what, f'say options={{"{option.path}": None}}, or True')
+    return option.node
 
 
-def _is_equation(function: Any) -> bool:
-    """Whether something may be an equation."""
-    return is_function(function)
+def _said(error: Exception) -> tuple[str, str]:
+    """What Python says of an equation, and what to do."""
+    if isinstance(error, AttributeError):
+        fields = getattr(error.obj, "_fields", ())
+        instead = "name a field of the named tuple"
+        if fields:
+            instead += f": {type(error.obj).__name__} has {', '.join(fields)}"
+        return f"the field {error.name}, which is unknown", instead
+    if isinstance(error, NameError):
+        return f"the unknown name {error.name}", "define or import it"
+    if isinstance(error, ValueError) and "unpack" in str(error):
+        return "an unpacking of something else", "unpack a tuple of as many values"
+    return type(error).__name__, str(error).strip().rstrip(".") or "Python cannot run it"
+
+
+def _refuse_call(function: Any, text: str) -> None:
+    """Refuse to call what is no equation."""
+    name = text.rpartition(".")[2]
+    if isinstance(function, ModuleType | type(None)) or not callable(function):
+        what = f"a call of {text}, which is of type {type(function).__name__}"
+        raise RefusedError(what, "call an @equation")
+    if getattr(builtins, name, None) is function:
+        instead = INSTEAD_OF_BUILTIN.get(name, "call only equations and functions of math")
+        raise RefusedError(f"a call of {text}", instead)
+    if hasattr(math, name):
+        functions = ", ".join(MATH.values())
+        instead = f"an equation may call these functions of math: {functions}"
+        raise RefusedError(f"a call of {text}", instead)
+    if hasattr(function, "__self__"):
+        instead = "call equations; make a new named tuple, as in State(t.a, b)"
+        raise RefusedError(f"the method {name}", instead)
+    raise RefusedError(f"a call of {text}", f"make {text} an @equation")
+
+
+def _is_changed(callee: Callee) -> bool:
+    """Whether an equation reaches one for which another stands, so that no rule of it holds."""
+    replaced = {old for old, chain in callee.replacements.items() if chain}
+    if not replaced:
+        return False
+    return any(reached in replaced for reached in closure(callee.source.function).values())
+
+
+def _options_in(value: Value) -> tuple[Any, ...]:
+    """What of a value a rule may decide by besides floats: options, and whole numbers."""
+    if isinstance(value, tuple):
+        return tuple(map(_options_in, value))
+    node = node_of(value)
+    return () if node is not None and node.kind == "float" else (value,)
+
+
+def _part_of(rule: DerivativeRule, index: int) -> DerivativeRule:
+    """The rule of one result among several."""
+    size = len(rule.arguments)
+    return DerivativeRule(rule.arguments, lambda: rule.slopes[index * size : (index + 1) * size])

@@ -9,10 +9,10 @@ from typing import Any, NamedTuple, get_type_hints
 from swashplate.equations import graph
 from swashplate.equations.code_generation.functions import fresh_name
 from swashplate.equations.code_generation.tracing import Trace, callee_of
-from swashplate.equations.code_generation.values import Flag, Tuple, Value, fixed, leaves, rebuilt
+from swashplate.equations.code_generation.values import Value, leaves, node_of, rebuilt
 from swashplate.equations.fields import defaults_of, floats_of
 from swashplate.equations.graph import LEAVES, Node, names_in, ordered
-from swashplate.equations.language import is_named_tuple, plain
+from swashplate.equations.language import is_named_tuple
 from swashplate.equations.model import (
     Equation,
     Link,
@@ -104,9 +104,7 @@ class PartCode:
             self.source(source) for link in model.links.values() for source in link.sources
         }
         self.p = _named(part_model.parameters, self._fresh("p"))
-        self.given = (
-            _named(part_model.given, self._fresh("given")) if part_model.given else Tuple(None, ())
-        )
+        self.given = _named(part_model.given, self._fresh("given")) if part_model.given else ()
         self.state = _named(part_model.state, self._fresh("s"))
         self.parameters = {node.value: path for path, node in leaves(self.p)}
         """Path of each parameter by the name that stands for it."""
@@ -115,17 +113,16 @@ class PartCode:
         self.inputs = {name: self._input(name) for name in part_model.input_types}
         self.arguments |= self.inputs
         if part_model.inputs is not None:
-            self.arguments["inputs"] = Tuple(part_model.inputs, tuple(self.inputs.values()))
+            self.arguments["inputs"] = part_model.inputs(*self.inputs.values())
         if part_model.sample is not None:
             self.arguments["signals"] = self._call(part_model.sample)
         self.following = self._call(part_model.step)
-        cls = self.following.cls if isinstance(self.following, Tuple) else None
         numbers = tuple(
             path for path, node in leaves(self.following) if node.kind in ("float", "int")
         )
-        if cls is not part_model.state or numbers != floats_of(part_model.state):
+        if type(self.following) is not part_model.state or numbers != floats_of(part_model.state):
             raise InputError(
-                f"Model {part_model.name}: {plain(part_model.step).__name__} must return a "
+                f"Model {part_model.name}: {part_model.step.__name__} must return a "
                 f"{part_model.state.__name__} of numbers on every path."
             )
 
@@ -142,9 +139,10 @@ class PartCode:
         values = {**self.arguments, **inputs}
         arguments = {name: values[name] for name in arguments_of(equation) if name in values}
         if "options" in arguments_of(equation):
-            arguments["options"] = fixed(self.options) or Flag("unknown", "options")
+            arguments["options"] = self.options
         returned = self.trace.call(equation, arguments)
-        self.trace.label(returned, plain(equation).__name__ if isinstance(returned, Node) else "")
+        is_number = node_of(returned) is not None
+        self.trace.label(returned, equation.__name__ if is_number else "")
         return returned
 
     def _input(self, name: str) -> Value:
@@ -164,7 +162,7 @@ class PartCode:
             return dict(leaves(self.p))[self.part_model.defaults[name]]
         samples = tuple(map(graph.name, self.tap_samples(record_tap)))
         fraction = graph.name(self.delay_fraction(record_tap))
-        window = Tuple(Window, (Tuple(None, samples), fraction))
+        window = Window._make((samples, fraction))
         return window if tap.width else self._call(HOLDS[tap.hold], window=window)
 
     def _linked(self, link: Link) -> Node:
@@ -176,8 +174,8 @@ class PartCode:
 
     def link(self, equation: Equation, name: str, sources: Mapping[str, Value]) -> Node:
         """A signal that an equation makes of several."""
-        signal = self.trace.run(callee_of(equation, self.model.replacements), sources)
-        assert isinstance(signal, Node)
+        signal = node_of(self.trace.run(callee_of(equation, self.model.replacements), sources))
+        assert signal is not None
         self.trace.label(signal, name)
         return signal
 
@@ -207,9 +205,9 @@ class PartCode:
         """Margin of the domain."""
         if self.part_model.domain is None:
             return None
-        margin = self._call(self.part_model.domain)
-        if not isinstance(margin, Node):
-            domain = plain(self.part_model.domain).__name__
+        margin = node_of(self._call(self.part_model.domain))
+        if margin is None:
+            domain = self.part_model.domain.__name__
             raise InputError(
                 f"Model {self.part_model.name}: {domain} must return one number, the margin."
             )
@@ -258,7 +256,7 @@ class PartCode:
 
     def signal(self, path: str) -> Node:
         """A signal, or a number of the state, by its path."""
-        signals = self.arguments.get("signals", Tuple(None, ()))
+        signals = self.arguments.get("signals", ())
         return {**dict(leaves(self.state)), **dict(leaves(signals))}[path]
 
     def node(self, stored: SignalId) -> Node:
@@ -290,11 +288,11 @@ class PartCode:
                 inputs[name] = dict(leaves(self.p))[part_model.defaults[name]]
             elif part_model.tap(name).width:
                 zeros = (graph.ZERO,) * part_model.tap(name).width
-                inputs[name] = Tuple(Window, (Tuple(None, zeros), graph.ZERO))
+                inputs[name] = Window._make((zeros, graph.ZERO))
             else:
                 inputs[name] = graph.ZERO
         if part_model.inputs is not None:
-            inputs["inputs"] = Tuple(part_model.inputs, tuple(inputs.values()))
+            inputs["inputs"] = part_model.inputs(*inputs.values())
         return self._call(part_model.rest, **inputs)
 
 
@@ -307,4 +305,4 @@ def _named(kind: Any, name_of: Callable[[str], str], path: str = "") -> Value:
             elements.append(_named(hints[name], name_of, f"{path}{name}_"))
         else:
             elements.append(graph.name(name_of(f"{path}{name}")))
-    return Tuple(kind, tuple(elements))
+    return kind._make(elements)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from swashplate.equations.code_generation.functions import generating
 from swashplate.equations.code_generation.machine_code import code_of_text
-from swashplate.equations.declaration import JIT_OFF, Replacements, interpreted
+from swashplate.equations.declaration import JIT_OFF, Replacements, with_replacements
 from swashplate.equations.fields import (
     check_mapping,
     defaults_of,
@@ -26,7 +26,6 @@ from swashplate.equations.fields import (
     value_at,
 )
 from swashplate.equations.keeping import cached_on_disk, key_of
-from swashplate.equations.language import plain
 from swashplate.equations.marching.interpreting import InterpretedMarch
 from swashplate.equations.marching.kernels import KERNEL_KINDS, Kernel, MarchArrays, pointers
 from swashplate.equations.marching.march import march_text
@@ -251,7 +250,7 @@ class Instance:
             state = self._called(part, equation, arguments)
             if not isinstance(state, part.state):
                 raise InputError(
-                    f"{self.name}: {plain(equation).__name__} must return a "
+                    f"{self.name}: {equation.__name__} must return a "
                     f"{part.state.__name__}, not {state!r}."
                 )
             return state
@@ -270,15 +269,14 @@ class Instance:
             return called(part, equation, arguments)
         except NO_NUMBER as error:
             raise DomainError(
-                f"{self.name}: {plain(equation).__name__} cannot be computed for these numbers "
-                f"({error})."
+                f"{self.name}: {equation.__name__} cannot be computed for these numbers ({error})."
             ) from None
 
 
 def called(part: Model, equation: Callable[..., Any], arguments: Mapping[str, Any]) -> Any:
     """What an equation of a part returns; it takes those of the arguments that it names."""
     values = (arguments[name] for name in arguments_of(equation))
-    return interpreted(equation, part.replacements)(*values)
+    return with_replacements(equation, part.replacements)(*values)
 
 
 def linked(
@@ -295,7 +293,7 @@ def linked(
         values.append(value_at(signals if inside else states[source.part], source.signal))
     if link.equation is None:
         return float(values[0])
-    return float(interpreted(link.equation, replacements)(*values))
+    return float(with_replacements(link.equation, replacements)(*values))
 
 
 def instance_of(model: Model, p: Any, *, options: Any = None, given: Any = None) -> Instance:

@@ -9,10 +9,9 @@ from typing import Any, NamedTuple
 
 from swashplate.equations import parsed
 from swashplate.equations.code_generation import (
-    Flag,
     Loops,
+    Option,
     Trace,
-    Tuple,
     Value,
     arguments,
     leaves,
@@ -77,7 +76,6 @@ def equation_in_c(
 
 def _names(value: Value) -> list[Node]:
     """All names of an argument, options among them."""
-    if isinstance(value, Tuple):
-        return [node for element in value.items for node in _names(element)]
-    node: Node = value.value if isinstance(value, Flag) else value
-    return [node]
+    if isinstance(value, tuple):
+        return [node for element in value for node in _names(element)]
+    return [value.node if isinstance(value, Option) else value]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import get_type_hints
 
-from swashplate.equations import SignalSource, floats_of, plain
+from swashplate.equations import SignalSource, floats_of
 from swashplate.equations.code_generation import Loops, c_name
 from swashplate.export.c_source.exported import Exported
 from swashplate.export.c_source.structs import Structs
@@ -35,7 +35,7 @@ class Layout:
             kinds = {"": part.parameters, "options": part.options, "given": part.given}
             kinds |= {"signals": part.signals, "state": part.state}
             if part.limits is not None:
-                kinds["limits"] = get_type_hints(plain(part.limits))["return"]
+                kinds["limits"] = get_type_hints(part.limits)["return"]
             tags = {word: self.structs.of(kind) for word, kind in kinds.items() if kind}
             self.tags.append(tags)
 

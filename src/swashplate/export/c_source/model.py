@@ -21,7 +21,6 @@ from swashplate.equations import (
     declared_by,
     graph,
     parsed,
-    plain,
     value_at,
 )
 from swashplate.equations.code_generation import (
@@ -34,8 +33,9 @@ from swashplate.equations.code_generation import (
     c_name,
     first_line,
     fresh_name,
+    node_of,
 )
-from swashplate.equations.graph import Node, names_in
+from swashplate.equations.graph import names_in
 from swashplate.equations.marching import SampleCode, output_of
 from swashplate.export.c_source.exported import Exported
 from swashplate.export.c_source.layout import Layout, path_of
@@ -108,8 +108,8 @@ class Writer:
                 source.signal: graph.name(self.layout.place(source, "before"))
                 for source in link.sources
             }
-            signal = trace.call(link.equation, sources)
-            assert isinstance(signal, Node)
+            signal = node_of(trace.call(link.equation, sources))
+            assert signal is not None
             used_names = {*self.loops.used_names, "m"}
             labels = {node: c_name(label) for node, label in trace.labels.items()}
             language = C(self.loops, trace.origins, used_names)
@@ -263,7 +263,7 @@ class Writer:
         stored, _ = output_of(self.model, name)
         if stored.kind == "link":
             link = self.model.links[stored.path]
-            return "" if link.equation is None else first_line(parsed(plain(link.equation)))
+            return "" if link.equation is None else first_line(parsed(link.equation))
         part = self.model.parts[stored.part]
         kind = part.signals if stored.kind == "signals" else part.state
         return notes_of(kind).get(stored.path, "")
@@ -286,7 +286,7 @@ class Writer:
         """What a limit is."""
         limits = self.model.parts[part].limits
         assert limits is not None
-        return notes_of(get_type_hints(plain(limits))["return"]).get(name, "")
+        return notes_of(get_type_hints(limits)["return"]).get(name, "")
 
     # -- numbers -----------------------------------------------------------------------------------
 

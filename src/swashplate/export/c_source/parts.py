@@ -26,14 +26,12 @@ from swashplate.equations.code_generation import (
     C,
     CodeBlock,
     Trace,
-    Tuple,
     Value,
     as_double,
     c_function,
     c_literal,
     c_name,
     first_line,
-    fixed,
     fresh_name,
     leaves,
     mentions,
@@ -77,9 +75,7 @@ class PartInC:
                 undecided(hints[name], f"{kind.__name__}.{name}", f"option {self.member}.{name}")
                 for name in kind._fields
             ]
-            self.options = {
-                name: flag.value for name, flag in zip(kind._fields, flags, strict=True)
-            }
+            self.options = {name: flag.node for name, flag in zip(kind._fields, flags, strict=True)}
             self._symbols = kind(*flags)
         self._trace(self.trace())
         self._trace(self.trace(outlined=formulas(self.part.trace)))
@@ -115,17 +111,16 @@ class PartInC:
     def traced(self, equation: Equation, trace: Trace) -> Value:
         """What an equation of the part returns."""
         values = dict(self.part.arguments)
-        if (options := fixed(self._symbols)) is not None:
-            values["options"] = options
+        values["options"] = self._symbols
         arguments = {name: values[name] for name in arguments_of(equation) if name in values}
         return trace.call(equation, arguments)
 
     def _results(self) -> dict[str, list[tuple[str, Node]]]:
         """Paths and nodes of what a sample computes: signals, limits, the next state."""
         part, model = self.part, self.part_model
-        limits = Tuple(None, ()) if model.limits is None else self.traced(model.limits, part.trace)
+        limits = () if model.limits is None else self.traced(model.limits, part.trace)
         return {
-            "signals": [*leaves(part.arguments.get("signals", Tuple(None, ())))],
+            "signals": [*leaves(part.arguments.get("signals", ()))],
             "limits": [*leaves(limits)],
             "next": [*leaves(part.following)],
         }
