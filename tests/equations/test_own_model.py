@@ -15,6 +15,7 @@ from swashplate.equations import (
     Tap,
     derive,
     equation,
+    instance_of,
     join,
     replaced,
     sensitivities,
@@ -556,3 +557,55 @@ def test_a_model_goes_to_other_processes_by_its_name() -> None:
     assert pickle.loads(pickle.dumps(pump_drive)) is pump_drive
     with pytest.raises(InputError, match=r"tank .* module .*--jobs 1"):
         pickle.dumps(Model("tank", Outlet, Fill, filled))
+
+
+# --- what parameters decide alone -----------------------------------------------------------------
+
+
+class Pipe(NamedTuple):
+    lag: float
+    leak: float = 0.0
+    stop: float = 0.0
+
+
+class Filled(NamedTuple):
+    level: float
+
+
+@equation
+def piped(state: Filled, flow: float, p: Pipe, h: float) -> Filled:
+    level = state.level + h / p.lag * flow
+    if p.leak > 0.0:
+        level = level - h * p.leak * level
+    if p.stop > 0.0 and level > p.stop:
+        level = p.stop
+    return Filled(level)
+
+
+pipe = Model("pipe", Pipe, Filled, piped)
+PIPES = [Pipe(0.5), Pipe(0.5, leak=0.3), Pipe(0.5, stop=0.25), Pipe(0.5, 0.3, 0.25)]
+
+
+@pytest.mark.parametrize("p", PIPES)
+def test_what_parameters_decide_alone_is_decided_ahead(p: Pipe) -> None:
+    flow = np.abs(np.sin(0.1 * np.arange(60)))
+    decisions = instance_of(pipe, p).form(["flow"]).decisions
+    assert sorted(decisions) == sorted((p.leak > 0.0, p.stop > 0.0))
+    state, expected = Filled(0.0), []
+    for each in flow.tolist():
+        expected.append(state.level)
+        state = piped(state, each, p, 0.01)
+    assert simulate(pipe, p, {"flow": flow}, 100.0)["level"].tolist() == expected
+    single = stepper(pipe, p, ["flow"], rate=100.0)
+    assert [single.step(each)["level"] for each in flow] == expected
+    slopes = sensitivities(pipe, p, {"flow": flow}, 100.0)["level"]
+    for column, (name, value) in enumerate(p._asdict().items()):
+        if value == 0.0:
+            assert not slopes[:, column].any()
+            continue
+        ends = [
+            simulate(pipe, p._replace(**{name: value + change}), {"flow": flow}, 100.0)["level"]
+            for change in (-1e-6, 1e-6)
+        ]
+        difference = (ends[1] - ends[0]) / 2e-6
+        np.testing.assert_allclose(slopes[:, column], difference, rtol=1e-6, atol=1e-8)

@@ -187,7 +187,7 @@ def dependencies(node: Node) -> Sequence[Node]:
 
 
 def rewritten(ends: Iterable[Node], replacements: Mapping[Node, Node]) -> list[Node]:
-    """The ends with other nodes in place of some."""
+    """The ends with other nodes in place of some; what that decides is decided."""
     ends = [*ends]
     replaced = dict(replacements)
     for node in ordered(ends, replacements, dependencies):
@@ -198,9 +198,12 @@ def rewritten(ends: Iterable[Node], replacements: Mapping[Node, Node]) -> list[N
             arguments = tuple(replaced[operand] for operand in value.arguments)
             unchanged = unchanged and arguments == value.arguments
             value = _rewritten_rule(value, arguments, replacements)
-        replaced[node] = (
-            node if unchanged else make(node.op, *operands, value=value, kind=node.kind)
-        )
+        if unchanged:
+            replaced[node] = node
+        elif node.op == "if":
+            replaced[node] = choose(*operands)
+        else:
+            replaced[node] = make(node.op, *operands, value=value, kind=node.kind)
     return [replaced[node] for node in ends]
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -34,7 +34,7 @@ from swashplate.equations.marching.run import (
     check_domain,
     initial_states,
 )
-from swashplate.equations.marching.sample_code import SampleCode, output_of
+from swashplate.equations.marching.sample_code import Form, SampleCode, output_of
 from swashplate.equations.marching.start_code import start_code_of, started_by
 from swashplate.equations.marching.tangents import Tangents, padded, tangents_of
 from swashplate.equations.model import Model
@@ -58,15 +58,14 @@ class ObservedMarch:
     def __init__(
         self,
         model: Model,
-        signals: tuple[str, ...],
-        options: tuple[Any, ...],
+        form: Form,
         outputs: tuple[str, ...],
         columns: tuple[str, ...],
         start: Start,
     ) -> None:
         self._model, self._columns, self._start = model, columns, start
         self._spare: deque[tuple[Array, ...]] = deque(maxlen=8)
-        self._start_code = start_code_of(model, signals, options, outputs, start)
+        self._start_code = start_code_of(model, form, outputs, start)
         begins: dict[SignalId, list[int]] = {}
         for number, column in enumerate(columns):
             for signal in self._started_by(column):
@@ -74,17 +73,17 @@ class ObservedMarch:
         for signal, column in self._start_code.moves:
             if column in columns:
                 begins.setdefault(signal, []).append(columns.index(column))
-        arguments = (model, signals, options, outputs, columns, begins)
+        arguments = (model, form, outputs, columns, begins)
         if JIT_OFF:
             observed = [output_of(model, output) for output in outputs]
-            sample_code = SampleCode(model, signals, options, [signal for signal, _ in observed])
+            sample_code = SampleCode(model, form, [signal for signal, _ in observed])
             self.interpreted = InterpretedTangents(sample_code, observed, columns)
             self._set_states(self.interpreted.states)
             return
         name = f"{model.name}_tangents" if columns else f"{model.name}_residuals"
         self.tangents: Tangents = cached_on_disk(
             name,
-            (key_of(model), signals, options, outputs, columns, tuple(begins.items())),
+            (key_of(model), form, outputs, columns, tuple(begins.items())),
             lambda: tangents_of(*arguments),
         )
         self._set_states(self.tangents.states)
@@ -181,15 +180,10 @@ def _begin_at_rest(
 
 @generating
 def observed_march(
-    model: Model,
-    signals: tuple[str, ...],
-    options: tuple[Any, ...],
-    outputs: tuple[str, ...],
-    columns: tuple[str, ...],
-    start: Start,
+    model: Model, form: Form, outputs: tuple[str, ...], columns: tuple[str, ...], start: Start
 ) -> ObservedMarch:
     """The march of a model that gives some outputs, and derivatives of them, made once."""
-    return ObservedMarch(model, signals, options, outputs, columns, start)
+    return ObservedMarch(model, form, outputs, columns, start)
 
 
 # --- what a fit asks for --------------------------------------------------------------------------
@@ -345,9 +339,7 @@ def _march(
     ]
     if missing:
         raise InputError(f"{missing[0]} is a column, so RunValues needs a value of it.")
-    march = observed_march(
-        instance.model, signals, instance.options, outputs, tuple(columns), start
-    )
+    march = observed_march(instance.model, instance.form(signals), outputs, tuple(columns), start)
     plan = observed.plan
     numbers = [outputs.index(observation.signal) for observation in observed.observations]
     first = {name: float(values[0]) for name, values in records.items()}

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from types import MappingProxyType
-from typing import Any
 
 from swashplate.equations import graph
 from swashplate.equations.code_generation.llvm import Code
@@ -17,7 +16,7 @@ from swashplate.equations.code_generation.values import leaves
 from swashplate.equations.graph import Node
 from swashplate.equations.marching.kernels import KERNEL_ARGUMENTS, KERNEL_KINDS
 from swashplate.equations.marching.part_code import PartCode, SignalId
-from swashplate.equations.marching.sample_code import SampleCode
+from swashplate.equations.marching.sample_code import Form, SampleCode
 from swashplate.equations.model import Model
 
 TYPES = {"int": "i64", "float": "double"}
@@ -274,15 +273,13 @@ PREPARE_ARGUMENTS = (
 """Of what computes that."""
 
 
-def step_texts(
-    model: Model, signals: Sequence[str], options: Sequence[Any], stored: Sequence[SignalId]
-) -> tuple[str, str, int]:
+def step_texts(model: Model, form: Form, stored: Sequence[SignalId]) -> tuple[str, str, int]:
     """Texts of what computes constants, and of a step; and how many constants there are.
 
     A step puts the newest inputs into the records, behind the last ones, and marches one sample.
     From the end of the records it goes on at their beginning, with the last samples before it.
     """
-    sample_code = SampleCode(model, signals, options, stored)
+    sample_code = SampleCode(model, form, stored)
     constants = [
         node
         for part in sample_code.used
@@ -295,7 +292,7 @@ def step_texts(
     code = Code([("ptr", "words")])
     for place, (kind, name) in enumerate(STEP_ARGUMENTS):
         code.named(kind, name, code.load("%words", place, "i64"))
-    records = [code.load("%records", place, "ptr") for place, _ in enumerate(signals)]
+    records = [code.load("%records", place, "ptr") for place, _ in enumerate(form.signals)]
     at = code.variable(code.load("%position", 0, "i64"), "i64")
     with code.only_if(code.put(f"icmp eq i64 {code.load(at, 0, 'i64')}, %count")):
         longest = code.load("%position", 1, "i64")
@@ -326,8 +323,7 @@ def step_texts(
 
 def march_text(
     model: Model,
-    signals: Sequence[str],
-    options: Sequence[Any],
+    form: Form,
     targets: Mapping[SignalId, int],
     further: Mapping[SignalId, int] = MappingProxyType({}),
 ) -> str:
@@ -335,14 +331,14 @@ def march_text(
 
     Parameters
     ----------
-    model, signals, options
-        What is marched, signals that are given as records, options of each part.
+    model, form
+        What is marched, and of what form.
     targets : mapping of SignalId to int
         What is kept, and its row of the block.
     further : mapping of SignalId to int
         What is kept, too, if the second number of ``worst_margin`` is not zero.
     """
-    sample_code = SampleCode(model, signals, options, [*targets, *further])
+    sample_code = SampleCode(model, form, [*targets, *further])
     code = Code(ARGUMENTS)
     march = March(sample_code, code)
 

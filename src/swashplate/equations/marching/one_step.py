@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from swashplate.equations.code_generation.functions import generating
 from swashplate.equations.code_generation.program import Program, names_of, program_of
@@ -10,7 +10,7 @@ from swashplate.equations.code_generation.values import leaves
 from swashplate.equations.graph import Node
 from swashplate.equations.keeping import cached_on_disk, key_of
 from swashplate.equations.marching.part_code import SignalId
-from swashplate.equations.marching.sample_code import SampleCode
+from swashplate.equations.marching.sample_code import Form, SampleCode
 from swashplate.equations.model import Model
 
 
@@ -24,23 +24,19 @@ class StepDerivatives(NamedTuple):
 
 
 @generating
-def step_derivatives(
-    model: Model, signals: tuple[str, ...], options: tuple[Any, ...], outputs: tuple[SignalId, ...]
-) -> StepDerivatives:
+def step_derivatives(model: Model, form: Form, outputs: tuple[SignalId, ...]) -> StepDerivatives:
     """A model's next states, then its `outputs`, with their derivatives."""
     return cached_on_disk(
         f"{model.name}_linear",
-        (key_of(model), signals, options, outputs),
-        lambda: _derived(model, signals, options, outputs),
+        (key_of(model), form, outputs),
+        lambda: _derived(model, form, outputs),
     )
 
 
-def _derived(
-    model: Model, signals: tuple[str, ...], options: tuple[Any, ...], outputs: tuple[SignalId, ...]
-) -> StepDerivatives:
+def _derived(model: Model, form: Form, outputs: tuple[SignalId, ...]) -> StepDerivatives:
     """The same, made of the equations."""
     states = [SignalId(part_index, "state", path) for part_index, path in model.places("state")]
-    sample_code = SampleCode(model, signals, options, [*states, *outputs])
+    sample_code = SampleCode(model, form, [*states, *outputs])
     results = list[Node]()
     for part in sample_code.used:
         results += [node for _, node in leaves(part.following)]

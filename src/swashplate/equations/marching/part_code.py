@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from copy import copy
 from functools import cached_property, lru_cache
 from typing import Any, NamedTuple, get_type_hints
 
@@ -201,6 +202,42 @@ class PartCode:
         return f"{self.prefix}{tap.input}_whole"
 
     @cached_property
+    def tests(self) -> list[Node]:
+        """What parameters and givens decide alone, of all that a march needs."""
+        numbers = {node.value for _, node in (*leaves(self.p), *leaves(self.given))}
+        ends = [node for _, node in (*leaves(self.following), *leaves(self._signals))]
+        ends += [] if self.margin is None else [self.margin]
+        fixed, tests = set[Node](), list[Node]()
+        for node in ordered(ends):
+            is_number = node.op == "number" or (node.op == "name" and node.value in numbers)
+            follows = node.args and node.op != "call" and all(each in fixed for each in node.args)
+            if is_number or follows:
+                fixed.add(node)
+                if node.kind == "bool" and follows:
+                    tests.append(node)
+        return tests
+
+    def decided(self, decisions: Sequence[bool]) -> PartCode:
+        """The same where `tests` are known to be as the `decisions` say."""
+        known = dict(zip(self.tests, map(graph.number, decisions), strict=True))
+
+        def rewritten(value: Value) -> Value:
+            nodes = [node for _, node in leaves(value)]
+            return rebuilt(value, iter(graph.rewritten(nodes, known)))
+
+        part = copy(self)
+        part.following = rewritten(self.following)
+        part.arguments = {**self.arguments, "signals": rewritten(self._signals)}
+        part.margin = None if self.margin is None else rewritten(self.margin)
+        part.limits = rewritten(self.limits)
+        return part
+
+    @property
+    def _signals(self) -> Value:
+        """What ``sample`` returns; nothing without one."""
+        return self.arguments.get("signals", ())
+
+    @cached_property
     def margin(self) -> Node | None:
         """Margin of the domain."""
         if self.part_model.domain is None:
@@ -214,11 +251,11 @@ class PartCode:
         return margin
 
     @cached_property
-    def limits(self) -> list[Node]:
+    def limits(self) -> tuple[Node, ...]:
         """The limits, in their order."""
         if self.part_model.limits is None:
-            return []
-        return [node for _, node in leaves(self._call(self.part_model.limits))]
+            return ()
+        return tuple(node for _, node in leaves(self._call(self.part_model.limits)))
 
     def ahead(self, ends: Iterable[Node], further_constants: Collection[str] = ()) -> list[Node]:
         """What some ends need that follows from parameters, givens and the step alone.
@@ -254,10 +291,18 @@ class PartCode:
                 signals[node.value] = SignalId(self.part, "input", name)
         return signals
 
+    @property
+    def numbers(self) -> dict[str, SignalId]:
+        """Names of its parameters and givens."""
+        return {
+            node.value: SignalId(self.part, kind, path)
+            for kind, numbers in (("p", self.p), ("given", self.given))
+            for path, node in leaves(numbers)
+        }
+
     def signal(self, path: str) -> Node:
         """A signal, or a number of the state, by its path."""
-        signals = self.arguments.get("signals", ())
-        return {**dict(leaves(self.state)), **dict(leaves(signals))}[path]
+        return {**dict(leaves(self.state)), **dict(leaves(self._signals))}[path]
 
     def node(self, stored: SignalId) -> Node:
         """A number that is kept."""

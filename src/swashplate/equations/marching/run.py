@@ -30,7 +30,7 @@ from swashplate.equations.marching.interpreting import InterpretedMarch
 from swashplate.equations.marching.kernels import KERNEL_KINDS, Kernel, MarchArrays, pointers
 from swashplate.equations.marching.march import march_text
 from swashplate.equations.marching.part_code import SignalId, taps_of
-from swashplate.equations.marching.sample_code import SampleCode
+from swashplate.equations.marching.sample_code import Form, SampleCode, decisions_of
 from swashplate.equations.model import (
     Link,
     Model,
@@ -106,6 +106,15 @@ class Instance:
     def options(self) -> tuple[Any, ...]:
         """Options of each part."""
         return tuple(part.options for part in self.parts)
+
+    def form(self, signals: Sequence[str]) -> Form:
+        """For what its code is made if these signals are given as records."""
+        return self._cached(("form", *signals), lambda: self._form(tuple(signals)))
+
+    def _form(self, signals: tuple[str, ...]) -> Form:
+        arguments, program = decisions_of(self.model, signals, self.options)
+        values = program.values([self.number_at(argument, {}, 0.0) for argument in arguments])
+        return Form(signals, self.options, tuple(map(bool, values)))
 
     @cached_property
     def params(self) -> Array:
@@ -370,9 +379,7 @@ class PlannedMarch:
     """The march of one set, which is compiled when it is first called for."""
 
     model: Model
-    signals: tuple[str, ...]
-    """External ones that are given as records."""
-    options: tuple[Any, ...]
+    form: Form
     targets: tuple[tuple[SignalId, int], ...]
     """What is kept, and its row of the block."""
     further: tuple[tuple[SignalId, int], ...] = ()
@@ -385,16 +392,14 @@ class PlannedMarch:
 
 @generating
 def _march_of(planned: PlannedMarch) -> Kernel:
-    model, signals, options, targets, further = (
-        getattr(planned, each.name) for each in fields(planned)
-    )
+    model, form, targets, further = (getattr(planned, each.name) for each in fields(planned))
     if JIT_OFF:
-        sample_code = SampleCode(model, signals, options, [each for each, _ in targets + further])
+        sample_code = SampleCode(model, form, [each for each, _ in targets + further])
         return InterpretedMarch(sample_code, dict(targets), dict(further))
     text = cached_on_disk(
         f"{model.name}_march",
-        (key_of(model), signals, options, targets, further),
-        lambda: march_text(model, signals, options, dict(targets), dict(further)),
+        (key_of(model), form, targets, further),
+        lambda: march_text(model, form, dict(targets), dict(further)),
     )
     return code_of_text(f"{model.name}_march", text, KERNEL_KINDS)
 
@@ -422,8 +427,7 @@ def marched(
     rows = [*zip((*stored, *further), count(), strict=False)]
     planned = PlannedMarch(
         instance.model,
-        signals,
-        instance.options,
+        instance.form(signals),
         tuple(rows[: len(stored)]),
         tuple(rows[len(stored) :]),
     )

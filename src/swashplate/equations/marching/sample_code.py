@@ -3,15 +3,72 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 from swashplate.equations import graph
+from swashplate.equations.code_generation.functions import generating
+from swashplate.equations.code_generation.program import Program, program_of
 from swashplate.equations.code_generation.values import Value, leaves
 from swashplate.equations.fields import floats_of
 from swashplate.equations.graph import Node, names_in
+from swashplate.equations.keeping import cached_on_disk, key_of
 from swashplate.equations.marching.part_code import PartCode, SignalId
 from swashplate.equations.model import Model, SignalSource
 from swashplate.errors import InputError
+
+
+class Form(NamedTuple):
+    """For what a model's code is made, besides the model and what is kept of it."""
+
+    signals: tuple[str, ...]
+    """External signals that are given as records; for others default parameters count."""
+    options: tuple[Any, ...]
+    """Of each part."""
+    decisions: tuple[bool, ...] = ()
+    """What parameters and givens decide alone, see `decisions_of`; none if the code decides it."""
+
+
+class Decisions(NamedTuple):
+    """What parameters and givens of a model decide alone."""
+
+    arguments: tuple[SignalId, ...]
+    """What the program takes."""
+    program: Program
+    """Of the tests of all parts, one after the other."""
+
+
+@generating
+def decisions_of(model: Model, signals: tuple[str, ...], options: tuple[Any, ...]) -> Decisions:
+    """What parameters and givens decide alone in a model.
+
+    A march need not ask for it at every sample, so that only one of both ways becomes code.
+    """
+
+    def made() -> Decisions:
+        parts = parts_of(model, signals, options)
+        program = program_of([test for part in parts for test in part.tests])
+        ids = {name: number for part in parts for name, number in part.numbers.items()}
+        return Decisions(tuple(ids[name] for name in program.arguments), program)
+
+    return cached_on_disk(f"{model.name}_decisions", (key_of(model), signals, options), made)
+
+
+@generating
+def parts_of(
+    model: Model, signals: tuple[str, ...], options: tuple[Any, ...]
+) -> tuple[PartCode, ...]:
+    """Code of all parts of a model."""
+    used_names = set[str]()
+    return tuple(
+        PartCode(model, index, signals, options_of_part, used_names)
+        for index, options_of_part in enumerate(options)
+    )
+
+
+def _decided(parts: Sequence[PartCode], decisions: Sequence[bool]) -> list[PartCode]:
+    """The parts where it is known what parameters and givens decide alone."""
+    left = iter(decisions)
+    return [part.decided([next(left) for _ in part.tests]) for part in parts]
 
 
 class SampleCode:
@@ -21,7 +78,7 @@ class SampleCode:
 
     Attributes
     ----------
-    parts, used : list of PartCode
+    parts, used : sequence of PartCode
         All parts, and those that are needed.
     ends, carried : list
         Of each part the results that are needed, and the paths of the states.
@@ -29,20 +86,11 @@ class SampleCode:
         Signals that other parts or links need.
     """
 
-    def __init__(
-        self,
-        model: Model,
-        signals: Sequence[str],
-        options: Sequence[Any],
-        outputs: Sequence[SignalId],
-    ) -> None:
-        self.model = model
-        self.signals = tuple(signals)
-        used_names = set[str]()
-        self.parts = [
-            PartCode(model, index, signals, options_of_part, used_names)
-            for index, options_of_part in enumerate(options)
-        ]
+    def __init__(self, model: Model, form: Form, outputs: Sequence[SignalId]) -> None:
+        self.model, self.signals = model, form.signals
+        self.parts: Sequence[PartCode] = parts_of(model, form.signals, form.options)
+        if form.decisions:
+            self.parts = _decided(self.parts, form.decisions)
         self.ends: list[list[Node]] = [[] for _ in self.parts]
         self.carried: list[list[str]] = [[] for _ in self.parts]
         self.sources: dict[SignalSource, Node] = {}
@@ -106,10 +154,10 @@ class SampleCode:
         ids = {"h": SignalId(0, "h")}
         for part in self.used:
             part_index = part.part
-            for kind, numbers in (("p", part.p), ("given", part.given), ("state", part.state)):
-                ids |= {
-                    node.value: SignalId(part_index, kind, path) for path, node in leaves(numbers)
-                }
+            ids |= part.numbers
+            ids |= {
+                node.value: SignalId(part_index, "state", path) for path, node in leaves(part.state)
+            }
             ids |= part.outside
             for tap in part.taps:
                 ids[part.delay_fraction(tap)] = SignalId(part_index, "fraction", str(tap.number))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from swashplate.equations.code_generation.functions import generating
 from swashplate.equations.code_generation.program import Program, names_of, program_of
@@ -10,7 +10,7 @@ from swashplate.equations.code_generation.values import leaves
 from swashplate.equations.graph import Node
 from swashplate.equations.keeping import cached_on_disk, key_of
 from swashplate.equations.marching.part_code import SignalId
-from swashplate.equations.marching.sample_code import SampleCode, output_of
+from swashplate.equations.marching.sample_code import Form, SampleCode, output_of
 from swashplate.equations.model import Model
 
 Moved = tuple[SignalId, str]
@@ -27,31 +27,19 @@ class StartCode(NamedTuple):
 
 
 @generating
-def start_code_of(
-    model: Model,
-    signals: tuple[str, ...],
-    options: tuple[Any, ...],
-    outputs: tuple[str, ...],
-    start: str,
-) -> StartCode:
+def start_code_of(model: Model, form: Form, outputs: tuple[str, ...], start: str) -> StartCode:
     """States that some outputs need where a record begins, ``"rest"`` or ``"steady"``."""
     return cached_on_disk(
         f"{model.name}_start",
-        (key_of(model), signals, options, outputs, start),
-        lambda: _generated(model, signals, options, outputs, start),
+        (key_of(model), form, outputs, start),
+        lambda: _generated(model, form, outputs, start),
     )
 
 
-def _generated(
-    model: Model,
-    signals: tuple[str, ...],
-    options: tuple[Any, ...],
-    outputs: tuple[str, ...],
-    start: str,
-) -> StartCode:
+def _generated(model: Model, form: Form, outputs: tuple[str, ...], start: str) -> StartCode:
     """The same, made of the equations."""
     observed = [output_of(model, output)[0] for output in outputs]
-    sample_code = SampleCode(model, signals, options, observed)
+    sample_code = SampleCode(model, form, observed)
     outside = {
         name: stored for name, stored in sample_code.outside().items() if stored.kind != "state"
     }

@@ -41,7 +41,7 @@ from swashplate.equations.marching.run import (
     check_outputs,
     instance_of,
 )
-from swashplate.equations.marching.sample_code import SampleCode, output_of
+from swashplate.equations.marching.sample_code import Form, SampleCode, output_of
 from swashplate.equations.model import Model
 from swashplate.errors import InputError
 
@@ -207,17 +207,15 @@ class _InterpretedStep:
 
 
 @generating
-def _step_of(
-    model: Model, inputs: tuple[str, ...], options: tuple[Any, ...], stored: tuple[SignalId, ...]
-) -> tuple[Any, Any, int]:
+def _step_of(model: Model, form: Form, stored: tuple[SignalId, ...]) -> tuple[Any, Any, int]:
     """What computes a model's constants, its step, and how many constants there are."""
     if JIT_OFF:
-        sample_code = SampleCode(model, inputs, options, stored)
+        sample_code = SampleCode(model, form, stored)
         return lambda *_: None, _InterpretedStep(sample_code, stored), 0
     prepare, text, count = cached_on_disk(
         f"{model.name}_step",
-        (key_of(model), inputs, options, stored),
-        lambda: step_texts(model, inputs, options, stored),
+        (key_of(model), form, stored),
+        lambda: step_texts(model, form, stored),
     )
     constants = code_of_text(f"{model.name}_constants", prepare, PREPARE_KINDS)
     # what comes from memory is not there in pairs: packed, a step takes 1.6 times as long
@@ -248,7 +246,7 @@ class CompiledStep:
         self.outputs = tuple(signal.path or signal.kind for signal in stored)
         instance.check_inputs(self.inputs)
         self._prepare, self._code, self._count = _step_of(
-            instance.model, self.inputs, instance.options, tuple(stored)
+            instance.model, instance.form(self.inputs), tuple(stored)
         )
 
     @property

@@ -25,7 +25,7 @@ from swashplate.equations.code_generation.values import leaves
 from swashplate.equations.graph import ONE, TRUE, ZERO, Node, names_in, ordered, times
 from swashplate.equations.marching.march import ARGUMENTS, HALF, March, known_ahead
 from swashplate.equations.marching.part_code import PartCode, SignalId
-from swashplate.equations.marching.sample_code import SampleCode, output_of
+from swashplate.equations.marching.sample_code import Form, SampleCode, output_of
 from swashplate.equations.model import Model
 from swashplate.errors import InputError
 
@@ -547,13 +547,12 @@ def _ahead(ends: Iterable[Node], known: Collection[Node]) -> list[Node]:
 
 def tangents_of(
     model: Model,
-    signals: Sequence[str],
-    options: Sequence[Any],
+    form: Form,
     outputs: Sequence[str],
     columns: Sequence[str],
     begins: Mapping[SignalId, Any],
 ) -> Tangents:
     """The march of a model with the derivatives of some signals, or their integrals, by columns."""
     found = [output_of(model, output) for output in outputs]
-    sample_code = SampleCode(model, signals, options, [signal for signal, _ in found])
+    sample_code = SampleCode(model, form, [signal for signal, _ in found])
     return _Block(sample_code, found, columns, begins).finished()
