@@ -1,16 +1,26 @@
 """What grows with the square of a model's states elsewhere: derivatives and linear models."""
 
+from collections.abc import Collection
 from math import asin, pi, sin, sqrt
 
 import numpy as np
 import pytest
-from tests.equations.large_models import SHIP, Body, State, body, chain_of, crane_run
+from tests.equations.large_models import (
+    AXES,
+    SHIP,
+    Body,
+    State,
+    body,
+    chain_of,
+    crane_of_drives,
+    crane_run,
+)
 from tests.equations.tangents import marched
 
-from swashplate import InputError
+from swashplate import Drive, InputError
 from swashplate.crane.kinematics import Shafts, boom_at, rope_length, tip_of
 from swashplate.crane.rope import hanging_load
-from swashplate.equations import floats_of, instance_of, sensitivities, simulate
+from swashplate.equations import floats_of, instance_of, parameter_paths, sensitivities, simulate
 from swashplate.equations.marching import tangents
 from swashplate.linear import linearize
 
@@ -33,11 +43,15 @@ def inputs(run, size: int) -> dict[str, np.ndarray]:
     return speeds | {name: np.zeros(size) for name in SHIP}
 
 
-def assert_columns(found, signal: str, slopes: np.ndarray, paths: list[str]) -> None:
+def assert_columns(
+    found, signal: str, slopes: np.ndarray, paths: list[str], but: Collection[str] = ()
+) -> None:
     """That columns are those of tangents, carried node by node."""
     columns = found[signal]
     assert np.abs(columns).max() > 0.0
     for k, name in enumerate(found.names):
+        if name in but:
+            continue
         expected = slopes[:, paths.index(name)]
         size = np.abs(expected).max()
         assert np.abs(columns[:, k] - expected).max() <= 1e-9 * size, name
@@ -76,6 +90,45 @@ def test_a_hanging_load_swings_as_a_pendulum(parameters: Body) -> None:
     assert damped < 0.01
     # 20 m of rope along two directions, and 4th digits of damping
     assert swings == pytest.approx([sqrt(GRAVITY / rope)] * 2, rel=1e-4)
+
+
+def voltages(size: int) -> dict[str, np.ndarray]:
+    time = np.arange(size) / RATE
+    moves = {f"{axis}_voltage": 5.0 * np.sin(0.3 * time + k) for k, axis in enumerate(AXES)}
+    return moves | {name: 0.1 * np.sin(0.7 * time) for name in SHIP}
+
+
+def test_three_drives_and_a_body_are_the_drives_and_the_body(parameters: Body) -> None:
+    (crane, p, options), given = crane_of_drives(parameters), voltages(2000)
+    found = simulate(crane, p, given, RATE, options=options)
+    speeds = {
+        axis: Drive.preset(axis).simulate(voltage=given[f"{axis}_voltage"], rate=RATE).shaft_speed
+        for axis in AXES
+    }
+    for axis, speed in speeds.items():
+        assert np.array_equal(found[axis], speed), axis
+    ship = {name: given[name] for name in SHIP}
+    assert np.array_equal(
+        found["hung.load.x"], simulate(body, parameters, speeds | ship, RATE)["hung.load.x"]
+    )
+
+
+@pytest.mark.slow
+def test_columns_of_three_drives_and_a_body(parameters: Body) -> None:
+    (crane, p, options), given = crane_of_drives(parameters), voltages(120)
+    found = sensitivities(crane, p, given, RATE, options=options)
+    instance = instance_of(crane, p, options=options)
+    values, slopes = marched(instance, given, 1.0 / RATE, "hung.load.x")
+    assert np.array_equal(found.run["hung.load.x"], values)
+    assert len(found.names) == 233
+    paths = list(parameter_paths(crane))
+    off = {
+        path
+        for path, value in zip(paths, instance.params.tolist(), strict=True)
+        if value == 0.0 and not path.startswith("body.")
+    }
+    """With a derivative to one side that is declared."""
+    assert_columns(found, "hung.load.x", slopes, paths, off)
 
 
 @pytest.fixture(scope="module")
