@@ -13,13 +13,15 @@ from numpy.typing import ArrayLike
 
 from swashplate.campaign.experiment import Channel
 from swashplate.campaign.samples import Array, interpolate_counts, signal, stamps_of
-from swashplate.equations import kernel
+from swashplate.equations import Model, equation, simulate
 from swashplate.errors import InputError
 
 LOW_PASS = 2.0 * np.pi * 10.0
 """a, cut-off of the low pass. [rad/s]"""
 DIFFERENTIATOR = 2.0 * np.pi * 30.0
 """b, cut-off of the band-limited differentiator. [rad/s]"""
+RATE = 1.0
+"""Of the march, which knows intervals by what they leave. [Hz]"""
 Method = Literal["exact", "difference"]
 """How a position becomes a speed: by the filters, or by the change between neighbours."""
 
@@ -97,19 +99,39 @@ def speed_from_angle(time: ArrayLike, angle: ArrayLike) -> Array:
     stamps, period = stamps_of(time)
     position = signal("angle", angle, stamps.size)
     intervals = np.diff(stamps) if period is None else np.full(stamps.size - 1, period)
-    first, second = np.exp(-LOW_PASS * intervals), np.exp(-DIFFERENTIATOR * intervals)
-    filtered = np.zeros(position.size)
-    march_low_passes(np.diff(position) / intervals, first, second, filtered)
-    return filtered
+    speed = np.diff(position) / intervals
+    # of each interval, and of none after the last sample
+    records = {
+        "speed": np.append(speed, 0.0),
+        "first": np.append(np.exp(-LOW_PASS * intervals), 0.0),
+        "second": np.append(np.exp(-DIFFERENTIATOR * intervals), 0.0),
+    }
+    return np.array(simulate(low_passes, NoParameters(), records, RATE)["differentiated"])
 
 
-@kernel
-def march_low_passes(speeds: Array, first: Array, second: Array, filtered: Array) -> None:
-    """March the low passes from rest by mean speeds; (n - 1,) of what intervals leave of each."""
-    state = 0.0
-    for n in range(speeds.size):
-        # what the first low pass has at the start of an interval leaves in the second at its end
-        difference = DIFFERENTIATOR / (DIFFERENTIATOR - LOW_PASS) * (first[n] - second[n])
-        fresh = 1.0 - second[n] - difference
-        filtered[n + 1] = second[n] * filtered[n] + difference * state + fresh * speeds[n]
-        state = first[n] * state + (1.0 - first[n]) * speeds[n]
+class NoParameters(NamedTuple):
+    """What the low passes have, whose cut-offs are constants."""
+
+
+class LowPasses(NamedTuple):
+    """Outputs of the low passes, at rest at first."""
+
+    smooth: float = 0.0
+    """Of the first, a/(s + a). [rad/s]"""
+    differentiated: float = 0.0
+    """Of the second, b/(s + b), behind it. [rad/s]"""
+
+
+@equation
+def over_interval(state: LowPasses, speed: float, first: float, second: float) -> LowPasses:
+    """Outputs at the end of an interval with a mean `speed`, of which so much is left of each."""
+    # what the first low pass has at the start of an interval leaves in the second at its end
+    difference = DIFFERENTIATOR / (DIFFERENTIATOR - LOW_PASS) * (first - second)
+    fresh = 1.0 - second - difference
+    return LowPasses(
+        first * state.smooth + (1.0 - first) * speed,
+        second * state.differentiated + difference * state.smooth + fresh * speed,
+    )
+
+
+low_passes = Model("low_passes", NoParameters, LowPasses, over_interval)

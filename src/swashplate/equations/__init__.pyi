@@ -8,7 +8,6 @@ from .code_generation.loops import interpolate as interpolate
 from .code_generation.loops import repeated as repeated
 from .code_generation.loops import root as root
 from .declaration import JIT_OFF as JIT_OFF
-from .declaration import TEACHING as TEACHING
 from .declaration import closure as closure
 from .declaration import closure_hash as closure_hash
 from .declaration import equation as equation

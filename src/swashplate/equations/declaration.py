@@ -36,10 +36,6 @@ compiled_functions: dict[Any, None] = {}
 """Plain functions that were given to `inlined`, for when nothing is compiled."""
 
 
-TEACHING: list[Callable[[], None]] = []
-"""What tells Numba of functions of ours, once it is imported."""
-
-
 def inlined(function: F) -> F:
     """Have kernels compile a function into themselves: strict arithmetic, no exceptions."""
     compiled_functions[function] = None

@@ -13,20 +13,21 @@ from types import FunctionType
 from typing import Any
 from warnings import warn
 
+from llvmlite import ir
 from numba import __version__ as numba_version
 from numba import njit, types
 from numba.core.caching import FunctionCache, IndexDataCacheFile
-from numba.extending import typeof_impl
+from numba.extending import intrinsic, overload, typeof_impl
 
 from swashplate import progress
 from swashplate.equations.cache import COMPILING, UNCACHED, exposed, told_folder, warn_exposed
 from swashplate.equations.declaration import (
-    TEACHING,
     closure_hash,
     compiled_functions,
     hash_of,
     is_function,
 )
+from swashplate.equations.marching.stepping import call_step
 
 
 class _ExposedError(Exception):
@@ -193,5 +194,25 @@ def _type_of_kernel(kernel: Any, _: Any) -> Any:
     return types.Dispatcher(kernel.dispatcher)
 
 
-for _teach in TEACHING:
-    _teach()
+def _called(typing: Any, context: Any) -> Any:
+    places = {name: place for place, name in enumerate(context.fields)}
+
+    def generate(target: Any, builder: Any, signature: Any, values: Any) -> Any:
+        (value,) = values
+        array = builder.extract_value(value, places["words"])
+        words = target.make_array(context.types[places["words"]])(target, builder, array).data
+        kind = ir.FunctionType(ir.VoidType(), [words.type])
+        address = builder.extract_value(value, places["code"])
+        builder.call(builder.inttoptr(address, kind.as_pointer()), [words])
+        return target.get_dummy_value()
+
+    return types.none(context), generate
+
+
+_called_at_address: Any = intrinsic(_called)
+
+
+@overload(call_step, inline="always")
+def _call_step(context: Any) -> Any:
+    """Have a kernel call a step at its address."""
+    return lambda context: _called_at_address(context)

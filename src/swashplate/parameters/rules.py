@@ -6,14 +6,13 @@ single one.
 """
 
 from collections.abc import Callable, Iterator, Mapping
-from itertools import count
-from math import inf, isfinite
+from math import isfinite
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.equations import TEACHING, inlined, kernel
+from swashplate.equations import derive, equation
 from swashplate.errors import ParameterError
 from swashplate.models.amplifier import CardChannel, channel_level
 from swashplate.models.displacement_control import (
@@ -57,12 +56,8 @@ FULL_VOLTAGE = 10.0  # Largest command, either way. [V]
 SIDES = ("plus", "minus")  # Endings of values for the two directions.
 VOLTAGES = np.linspace(0.0, FULL_VOLTAGE, 101)
 """Commands at which the static rules are checked. [V]"""
-MOST_INTERPRETED = 5000
-"""Number of single sets whose check by Python takes as long as compiling the check does."""
-_single_checks = count()
-"""Counts the sets that are checked one by one."""
-N_CHANNEL = len(CardChannel._fields)
-N_PUMP = len(Pump._fields)
+AT_ONCE = 100
+"""Sets that are checked at once: what is computed of more leaves the processor's cache."""
 
 REFINEMENT_RULES: tuple[ParameterRule, ...] = (
     ParameterRule(
@@ -225,73 +220,32 @@ class _SteadyExtremes(NamedTuple):
 
 
 def _steady_extremes(values: Values, set_count: int) -> _SteadyExtremes:
-    sides = [[values[f"{name}_{side}"] for name in CardChannel._fields] for side in SIDES]
-    channels = np.moveaxis(np.array(sides), -1, 0)
-    pumps = np.column_stack([values[name] for name in Pump._fields])
-    lowest = np.empty((set_count, 2))
-    moment_sines = np.empty((set_count, 2))
-    if set_count == 1 and next(_single_checks) < MOST_INTERPRETED:
-        # commands that read a few sets and simulate nothing need not wait for machine code
-        pump = Pump(*pumps[0].tolist())
-        volts = VOLTAGES.tolist()
-        for k in range(2):
-            channel = CardChannel(*channels[0, k].tolist())
-            lowest[0, k], moment_sines[0, k] = _extremes(channel, pump, k, volts)
-    else:
-        static_extremes(channels, pumps, VOLTAGES, lowest, moment_sines)
+    lowest, moment_sines = np.empty((2, set_count, len(SIDES)))
+    steady = derive(steady_point, ())
+    signs = np.array([[1.0], [-1.0]])
+    for first in range(0, set_count, AT_ONCE):
+        some = np.s_[first : first + AT_ONCE]
+        channel = CardChannel._make(
+            np.stack([values[f"{name}_{side}"][some, None] for side in SIDES], axis=1)
+            for name in CardChannel._fields
+        )
+        pump = Pump(*(values[name][some, None, None] for name in Pump._fields))
+        currents, sines = steady.over(VOLTAGES, channel, signs, pump)
+        lowest[some], moment_sines[some] = currents.min(axis=2), sines.max(axis=2)  # NaN stays
     return _SteadyExtremes(lowest, moment_sines)
 
 
-@inlined
-def _extremes(channel: CardChannel, pump: Pump, side: int, voltages: Array) -> tuple[float, float]:
-    """Lowest steady current [A] and largest |sin φ| of one side within some voltages."""
-    least, most = inf, 0.0
-    for voltage in voltages:
-        current = channel_level(voltage, channel)
-        force = solenoid_force(-current if side == 1 else current, pump)
-        sine = abs(moment_sine(force, pump))
-        # NaN stays
-        least = current if current < least or current != current else least
-        most = sine if sine > most or sine != sine else most
-    return least, most
+class SteadyPoint(NamedTuple):
+    """What a side settles at under a voltage."""
+
+    current: float
+    """[A]"""
+    moment_sine: float
+    """|sin φ|"""
 
 
-def tuple_of(values: Array, length: int) -> tuple[float, ...]:
-    """Numbers of an array whose length compiled code must know; see `_teach_tuple_of`."""
-    return tuple(float(value) for value in values[:length])
-
-
-def _teach_tuple_of() -> None:
-    """Have Numba make tuples by its own function, which does not run uncompiled."""
-    from numba import types
-    from numba.extending import overload
-    from numba.np.unsafe.ndarray import to_fixed_tuple
-
-    to_fixed: Any = to_fixed_tuple
-
-    def of(length: Any) -> Any:
-        if not isinstance(length, types.IntegerLiteral):
-            return None
-        count = length.literal_value
-        return lambda values, length: to_fixed(values, count)
-
-    overload(tuple_of, prefer_literal=True)(lambda values, length: of(length))
-
-
-TEACHING.append(_teach_tuple_of)
-
-
-@kernel
-def static_extremes(
-    channels: Array, pumps: Array, voltages: Array, lowest: Array, moment_sines: Array
-) -> None:
-    """Lowest steady current [A] and largest |sin φ| of both sides of many sets, (m, 2) outputs.
-
-    `channels` are the fields of `CardChannel` of every set and side, (m, 2, 13), `pumps` those of
-    `Pump`, (m, N_PUMP); NaN if what is computed of a set and side has no value.
-    """
-    for i in range(pumps.shape[0]):
-        pump = Pump(*tuple_of(pumps[i], N_PUMP))
-        for side in range(2):
-            channel = CardChannel(*tuple_of(channels[i, side], N_CHANNEL))
-            lowest[i, side], moment_sines[i, side] = _extremes(channel, pump, side, voltages)
+@equation
+def steady_point(voltage: float, channel: CardChannel, sign: float, pump: Pump) -> SteadyPoint:
+    """What a side settles at under a voltage in its direction, with the `sign` of its force. [V]"""
+    current = channel_level(voltage, channel)
+    return SteadyPoint(current, abs(moment_sine(solenoid_force(sign * current, pump), pump)))

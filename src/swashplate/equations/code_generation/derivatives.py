@@ -46,6 +46,11 @@ class Derived:
         partials = () if slopes is None else (float(slopes[entry]) for entry in self.entries)
         return (*self.program.values(numbers), *partials)
 
+    def over(self, *arguments: Any) -> tuple[Any, ...]:
+        """Values for arguments that are arrays where the equation has numbers, broadcast."""
+        given = dict(zip(self.names, arguments, strict=True))
+        return tuple(self.program.over([_at(given[name], path) for name, path in self.places]))
+
 
 def _at(value: Any, path: str) -> Any:
     """What lies at a dotted path of nested tuples, with names or numbers."""

@@ -65,6 +65,15 @@ class Program(NamedTuple):
         numbers = self._numbers(given)
         return [numbers[result] for result in self.results]
 
+    def over(self, given: Sequence[Array]) -> list[Array]:
+        """Results for arrays of arguments, element by element; there must be no loop in it."""
+        numbers: list[Any] = [*given]
+        with np.errstate(all="ignore"):
+            for step in self.steps:
+                operands = [numbers[operand] for operand in step.operands]
+                numbers.append(_done_over(step, operands))
+        return [numbers[result] for result in self.results]
+
     def only_value(self, *given: Any) -> Any:
         """The one result for some arguments."""
         (value,) = self.values(given)
@@ -129,6 +138,17 @@ def _done(step: Step, operands: list[Any]) -> Any:
                 state = step.value.values([*state, float(number), *others])
             return state
     return OPERATIONS[step.op](*operands)
+
+
+def _done_over(step: Step, operands: list[Any]) -> Any:
+    match step.op:
+        case "number":
+            return step.value
+        case "**" if step.value < 0:
+            return np.divide(1.0, power(operands[0], -step.value))
+        case "**":
+            return power(operands[0], step.value)
+    return OPERATIONS_OVER[step.op](*operands)
 
 
 def names_of(
@@ -244,3 +264,12 @@ OPERATIONS: dict[str, Callable[..., Any]] = {
     **{"<": lt, "<=": le, ">": gt, ">=": ge, "==": eq, "!=": ne, "not": lambda test: not test},
     **{name: _as_compiled(getattr(math, name)) for name in MATH_FUNCTIONS},
 }
+OPERATIONS_OVER: dict[str, Callable[..., Any]] = {
+    **{"+": np.add, "-": np.subtract, "*": np.multiply, "/": np.divide, "neg": np.negative},
+    **{"<": np.less, "<=": np.less_equal, ">": np.greater, ">=": np.greater_equal},
+    **{"==": np.equal, "!=": np.not_equal, "not": np.logical_not, "if": np.where, "abs": np.abs},
+    "min": lambda a, b: np.where(b < a, b, a),
+    "max": lambda a, b: np.where(b > a, b, a),
+    **{name: getattr(np, name.replace("a", "arc", name[0] == "a")) for name in MATH_FUNCTIONS},
+}
+"""The same for arrays."""

@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 
 from swashplate.equations.code_generation.functions import generating
 from swashplate.equations.code_generation.machine_code import address_of, code_of_text
-from swashplate.equations.declaration import JIT_OFF, TEACHING, inlined
+from swashplate.equations.declaration import JIT_OFF, inlined
 from swashplate.equations.keeping import cached_on_disk, key_of
 from swashplate.equations.marching.interpreting import InterpretedMarch
 from swashplate.equations.marching.kernels import FLOATS, INTS
@@ -121,7 +121,7 @@ ROOM = 500
 
 
 def call_step(context: StepContext) -> None:
-    """Run the step of a context; for Numba see `_teach_call_step`."""
+    """Run the step of a context; for Numba see `numba_kernels`."""
     bound_step(context)()
 
 
@@ -130,34 +130,6 @@ def bound_step(context: StepContext) -> Callable[[], None]:
     if not isinstance(context.code, int):
         return partial(context.code, context)
     return partial(_STEP(context.code), address_of(context.words))
-
-
-def _teach_call_step() -> None:
-    """Have Numba call the step at its address."""
-    from llvmlite import ir
-    from numba import types
-    from numba.extending import intrinsic, overload
-
-    def called(typing: Any, context: Any) -> Any:
-        places = {name: place for place, name in enumerate(context.fields)}
-
-        def generate(target: Any, builder: Any, signature: Any, values: Any) -> Any:
-            (value,) = values
-            array = builder.extract_value(value, places["words"])
-            words = target.make_array(context.types[places["words"]])(target, builder, array).data
-            kind = ir.FunctionType(ir.VoidType(), [words.type])
-            address = builder.extract_value(value, places["code"])
-            builder.call(builder.inttoptr(address, kind.as_pointer()), [words])
-            return target.get_dummy_value()
-
-        return types.none(context), generate
-
-    call: Any = intrinsic(called)
-
-    overload(call_step, inline="always")(lambda context: lambda context: call(context))
-
-
-TEACHING.append(_teach_call_step)
 
 
 @inlined
