@@ -7,11 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from swashplate.equations import JIT_OFF, parsed
+from swashplate.equations import parsed
 from swashplate.equations.code_generation import Trace, arguments, leaves
 from swashplate.equations.code_generation.elimination import partials_of
 from swashplate.equations.code_generation.llvm import Code
 from swashplate.equations.code_generation.machine_code import code_of_text
+from swashplate.equations.declaration import JIT_OFF
 
 LANES = 8
 

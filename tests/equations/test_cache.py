@@ -12,12 +12,11 @@ import pytest
 from tests.equations.test_machine_code import MACHINE
 
 from swashplate.equations import (
-    closure,
-    closure_hash,
     equation,
     source,
 )
 from swashplate.equations.cache import DAY, MOST_BYTES
+from swashplate.equations.declaration import closure, closure_hash
 
 SLOPE = 2.0
 
@@ -72,7 +71,7 @@ RUN = """
 import json, sys
 sys.path.insert(0, sys.argv[1])
 import machine
-from swashplate.equations import closure_hash
+from swashplate.equations.declaration import closure_hash
 s = machine.Spring(3.0)
 out = {"march": machine.march(4, s), "other": machine.other(4)}
 for name in ("march", "other"):

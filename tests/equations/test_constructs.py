@@ -14,8 +14,8 @@ from tests.equations.differences import compared
 from tests.equations.printed import assert_printed
 from tests.marks import rest_slow
 
-from swashplate.equations import JIT_OFF, declared, derive, equation, interpolate, repeated, root
-from swashplate.equations.declaration import closure_hash
+from swashplate.equations import declared, derive, equation, interpolate, repeated, root
+from swashplate.equations.declaration import JIT_OFF, closure_hash
 from swashplate.errors import EquationError
 
 pytestmark = pytest.mark.interpreted

@@ -7,9 +7,6 @@ from .code_generation.derivatives import derive as derive
 from .code_generation.loops import interpolate as interpolate
 from .code_generation.loops import repeated as repeated
 from .code_generation.loops import root as root
-from .declaration import JIT_OFF as JIT_OFF
-from .declaration import closure as closure
-from .declaration import closure_hash as closure_hash
 from .declaration import equation as equation
 from .declaration import inlined as inlined
 from .declaration import source as source

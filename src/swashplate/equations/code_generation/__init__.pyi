@@ -1,9 +1,6 @@
 from .functions import FUNCTIONS as FUNCTIONS
 from .functions import GENERATING as GENERATING
-from .functions import RESERVED as RESERVED
-from .functions import forget_generated as forget_generated
 from .functions import fresh_name as fresh_name
-from .functions import generating as generating
 from .functions import generating_time as generating_time
 from .printing import STEMS as STEMS
 from .printing import CodeBlock as CodeBlock
