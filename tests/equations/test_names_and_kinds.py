@@ -96,6 +96,11 @@ def test_a_variable_may_be_called_what_the_march_calls_an_input() -> None:
         level = 0.5 * level + (FIRST[n] + SECOND[n])
 
 
+@equation
+def helper(function: float, text: float) -> float:
+    return 2.0 * function + text
+
+
 # What an equation says, and the same in plain Python.
 KINDS = {
     "max of two tests": ("x = max(u > 0.0, v > 0.0) + 1.0", lambda u, v: max(u > 0, v > 0) + 1.0),
@@ -111,6 +116,26 @@ KINDS = {
         "x = 0.0\nfor i in range(1, 4):\n    x = x + u * i**-1",
         lambda u, v: 0.0 + u * 1**-1 + u * 2**-1 + u * 3**-1,
     ),
+    "names that calls have": (
+        "self = u\ntext = helper(function=self, text=v)\narguments = named = text\n"
+        "x = named + arguments if self > 0.0 else helper(text, self)",
+        lambda u, v: 2.0 * (2.0 * u + v) if u > 0 else 2.0 * (2.0 * u + v) + u,
+    ),
+    "keywords of C and names of math": (
+        "double = u\nint_ = v\nregister = double - int_\nexp = sin = register * 0.5\n"
+        "return_ = max(exp, sin)\n__init__ = return_\nx = __init__ + double",
+        lambda u, v: (u - v) * 0.5 + u,
+    ),
+    "names of Python's own": (
+        "len = u\nrange_ = (v, u)\nmin_ = range_[0]\nprint = min_ * len\nx = print",
+        lambda u, v: v * u,
+    ),
+    "a value that a loop sets": (
+        "total = 0.0\nfor weight, each in zip((2.0, 3.0), (u, v)):\n"
+        "    if each < 0.0:\n        last = -each\n        continue\n    last = each\n"
+        "    total = total + weight * each\nx = total + last",
+        lambda u, v: (2.0 * u if u >= 0 else 0.0) + (3.0 * v if v >= 0 else 0.0) + abs(v),
+    ),
     "a literal beyond 64 bits": (
         "x = u * 1000000000000000000000 * 1e-21",
         lambda u, v: u * 1000000000000000000000 * 1e-21,
@@ -120,7 +145,8 @@ KINDS = {
 
 @pytest.mark.parametrize(("body", "right"), rest_slow([*KINDS.values()], 6), ids=KINDS)
 def test_numbers_of_every_kind(body: str, right: Any) -> None:
-    model = Model("kinds", parameters=Gain, state=Level, step=step_of(body), outputs=("level",))
+    step = step_of(body, helper=helper)
+    model = Model("kinds", parameters=Gain, state=Level, step=step, outputs=("level",))
     first = np.where(np.arange(SIZE) % 3 == 0, 0.0, FIRST)
     found = simulate(model, Gain(0.0), {"u": first, "v": SECOND}, RATE)["level"]
     single = stepper(model, Gain(0.0), ["u", "v"], rate=RATE)

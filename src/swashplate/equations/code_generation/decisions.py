@@ -20,10 +20,12 @@ from collections.abc import Iterable, Sequence
 from contextlib import contextmanager
 from itertools import count
 from types import CellType, CodeType, FunctionType
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 from weakref import WeakKeyDictionary
 
 from swashplate.equations.language import Parsed
+
+N = TypeVar("N", bound=ast.AST)
 
 TRACE, EQUATION, AROUND = "<trace>", "<equation>", "<around>"
 """Names of the trace, of an equation and of what is around it: none that Python's syntax allows."""
@@ -175,6 +177,11 @@ def _leaves(statement: ast.stmt) -> bool:
 # --- the equation ---------------------------------------------------------------------------------
 
 
+def _at(old: ast.AST, new: N) -> N:
+    """A new node with the place of an old one."""
+    return ast.copy_location(new, old)
+
+
 class _Rewriting(ast.NodeTransformer):
     """Rewrites the statements of one equation.
 
@@ -193,11 +200,7 @@ class _Rewriting(ast.NodeTransformer):
             else (self.visit(part) if isinstance(part, ast.AST) else part)
             for name, part in ast.iter_fields(node)
         }
-        return self._at(node, type(node)(**parts))
-
-    def _at(self, node: ast.AST, new: Any) -> Any:
-        """A new node with the place of an old one."""
-        return ast.copy_location(new, node)
+        return _at(node, type(node)(**parts))
 
     def _visited(self, node: ast.expr) -> ast.expr:
         rewritten: ast.expr = self.visit(node)
@@ -233,10 +236,10 @@ class _Rewriting(ast.NodeTransformer):
                     body = [*self._called(statement.target), *self.block(statement.body)]
                     orelse = self.block(statement.orelse)
                     loop = ast.For(statement.target, iterable, body, orelse)
-                    done.append(self._at(statement, loop))
+                    done.append(_at(statement, loop))
                 case ast.AugAssign():
-                    left = self._at(statement, _read(_stored([statement.target])[0]))
-                    term = self._at(statement, ast.BinOp(left, statement.op, statement.value))
+                    left = _at(statement, _read(_stored([statement.target])[0]))
+                    term = _at(statement, ast.BinOp(left, statement.op, statement.value))
                     done += self._bound(statement, [statement.target], term)
                 case ast.AnnAssign(target=target, value=ast.expr() as value):
                     done += self._bound(statement, [target], value)
@@ -250,7 +253,7 @@ class _Rewriting(ast.NodeTransformer):
         self, statement: ast.stmt, targets: list[ast.expr], value: ast.expr
     ) -> list[ast.stmt]:
         """An assignment, and what the trace hears of it."""
-        assignment = self._at(statement, ast.Assign(targets, self._visited(value)))
+        assignment = _at(statement, ast.Assign(targets, self._visited(value)))
         named = [name for target in targets for name in self._called(target)]
         return [assignment, *named]
 
@@ -260,15 +263,14 @@ class _Rewriting(ast.NodeTransformer):
         named.keywords = [ast.keyword(name, _read(name)) for name in _stored([target])]
         starred = [node for node in ast.walk(target) if isinstance(node, ast.Starred)]
         gathered = [_assigned([name], _asked("items", [_read(name)])) for name in _stored(starred)]
-        return [*(self._at(target, each) for each in gathered), self._at(target, ast.Expr(named))]
+        return [*(_at(target, each) for each in gathered), _at(target, ast.Expr(named))]
 
     def _way(
         self, word: str, at: ast.stmt, body: list[ast.stmt], *, bound: bool = True
     ) -> ast.FunctionDef:
         """A way through an equation as a function of all its names."""
         name = f"<{word} {next(self._numbers)}>"
-        way: ast.FunctionDef = self._at(at, _function(name, self.names, body, bound=bound))
-        return way
+        return _at(at, _function(name, self.names, body, bound=bound))
 
     def _merged(self, statement: ast.If) -> list[ast.stmt]:
         """A decision both of whose ways go on."""
@@ -283,7 +285,7 @@ class _Rewriting(ast.NodeTransformer):
         if names:
             targets = ast.Tuple([ast.Name(name, ast.Store()) for name in names], ast.Store())
             new = ast.Assign([targets], merged)
-        return [if_true, if_false, self._at(statement, new)]
+        return [if_true, if_false, _at(statement, new)]
 
     def _rest(
         self,
@@ -295,7 +297,7 @@ class _Rewriting(ast.NodeTransformer):
         """What comes after a statement as a function, and its call."""
         rest = self._way("rest", at, self.block(statements, then, exits), bound=False)
         call = _call(_read(rest.name), map(_read, self.names))
-        return rest, self._at(at, ast.Return(call))
+        return rest, _at(at, ast.Return(call))
 
     def _forked(
         self,
@@ -310,7 +312,7 @@ class _Rewriting(ast.NodeTransformer):
         if_false = self._way("else", statement, self.block(statement.orelse, go_on, exits))
         ways = [_read(if_true.name), _read(if_false.name)]
         chosen = _asked("one_return", [self._visited(statement.test), *ways])
-        return [rest, if_true, if_false, self._at(statement, ast.Return(chosen))]
+        return [rest, if_true, if_false, _at(statement, ast.Return(chosen))]
 
     def _looped(
         self,
@@ -325,8 +327,7 @@ class _Rewriting(ast.NodeTransformer):
 
         def next_turn(items: ast.expr) -> ast.stmt:
             turn = _call(_read(name), [items, *map(_read, self.names)])
-            new: ast.stmt = self._at(statement, ast.Return(turn))
-            return new
+            return _at(statement, ast.Return(turn))
 
         first = ast.Subscript(_read(left), ast.Constant(0), ast.Load())
         others = ast.Subscript(_read(left), ast.Slice(ast.Constant(1), None, None), ast.Load())
@@ -335,11 +336,11 @@ class _Rewriting(ast.NodeTransformer):
             ast.If(
                 ast.UnaryOp(ast.Not(), _read(left)), self.block(statement.orelse, go_on, exits), []
             ),
-            self._at(statement, ast.Assign([statement.target], first)),
+            _at(statement, ast.Assign([statement.target], first)),
             *self._called(statement.target),
             *self.block(statement.body, going_on, Exits(go_on, going_on)),
         ]
-        turn = self._at(statement, _function(name, [left, *self.names], body))
+        turn = _at(statement, _function(name, [left, *self.names], body))
         return [rest, turn, next_turn(_asked("items", [self._visited(statement.iter)]))]
 
     # -- expressions -------------------------------------------------------------------------------
@@ -348,15 +349,13 @@ class _Rewriting(ast.NodeTransformer):
         """A name; one from outside is looked at."""
         if node.id in self.known or not isinstance(node.ctx, ast.Load):
             return node
-        new: ast.expr = self._at(node, _asked("outside", [node, ast.Constant(node.id)]))
-        return new
+        return _at(node, _asked("outside", [node, ast.Constant(node.id)]))
 
     def visit_Attribute(self, node: ast.Attribute) -> ast.expr:
         """A field, or a constant of a module."""
         if isinstance(node.value, ast.Name) and node.value.id not in self.known:
             words = map(ast.Constant, (node.value.id, node.attr))
-            new: ast.expr = self._at(node, _asked("member", [node.value, *words]))
-            return new
+            return _at(node, _asked("member", [node.value, *words]))
         field: ast.expr = self.generic_visit(node)
         return field
 
@@ -371,8 +370,7 @@ class _Rewriting(ast.NodeTransformer):
         call.keywords = [
             ast.keyword(keyword.arg, self._visited(keyword.value)) for keyword in node.keywords
         ]
-        new: ast.expr = self._at(node, call)
-        return new
+        return _at(node, call)
 
     def _is_outside(self, node: ast.expr) -> bool:
         """Whether an expression is a name from outside, or a name in a module."""
@@ -393,16 +391,14 @@ class _Rewriting(ast.NodeTransformer):
             _tuple([ast.Constant(type(op).__name__), self._visited(term)])
             for op, term in reversed(terms)
         ]
-        new: ast.expr = self._at(node, _asked("long_sum", [self._visited(first), *steps]))
-        return new
+        return _at(node, _asked("long_sum", [self._visited(first), *steps]))
 
     def visit_UnaryOp(self, node: ast.UnaryOp) -> ast.expr:
         """`not` is a decision."""
         operand = self._visited(node.operand)
         negated = _asked("negated", [operand])
         is_not = isinstance(node.op, ast.Not)
-        new: ast.expr = self._at(node, negated if is_not else ast.UnaryOp(node.op, operand))
-        return new
+        return _at(node, negated if is_not else ast.UnaryOp(node.op, operand))
 
     def visit_BoolOp(self, node: ast.BoolOp) -> ast.expr:
         """`and` and `or`, whose second test only counts after the first."""
@@ -411,18 +407,17 @@ class _Rewriting(ast.NodeTransformer):
             _tuple([ast.Constant(ast.unparse(each)), _later(self._visited(each))])
             for each in node.values
         ]
-        new: ast.expr = self._at(node, _asked(word, operands))
-        return new
+        return _at(node, _asked(word, operands))
 
     def visit_Compare(self, node: ast.Compare) -> ast.expr:
         """A comparison; several are joined, and `is None` asks for an option."""
         if len(node.ops) > 1:
             lefts = [node.left, *node.comparators]
             parts: list[ast.expr] = [
-                self._at(node, ast.Compare(left, [op], [right]))
+                _at(node, ast.Compare(left, [op], [right]))
                 for left, op, right in zip(lefts, node.ops, node.comparators, strict=False)
             ]
-            return self._visited(self._at(node, ast.BoolOp(ast.And(), parts)))
+            return self._visited(_at(node, ast.BoolOp(ast.And(), parts)))
         left, op = self._visited(node.left), node.ops[0]
         if isinstance(op, ast.Is | ast.IsNot):
             missing = _asked("is_none", [left])
@@ -431,11 +426,9 @@ class _Rewriting(ast.NodeTransformer):
                 new = _asked("negated", [missing])
         else:
             new = ast.Compare(left, [op], [self._visited(node.comparators[0])])
-        placed: ast.expr = self._at(node, new)
-        return placed
+        return _at(node, new)
 
     def visit_IfExp(self, node: ast.IfExp) -> ast.expr:
         """A choice between two values, of which only one is evaluated if that is known."""
         ways = [_later(self._visited(way)) for way in (node.body, node.orelse)]
-        new: ast.expr = self._at(node, _asked("chosen", [self._visited(node.test), *ways]))
-        return new
+        return _at(node, _asked("chosen", [self._visited(node.test), *ways]))
