@@ -47,7 +47,7 @@ INSTEAD: dict[type[ast.AST], tuple[str, str]] = {
     ast.Nonlocal: ("nonlocal", GLOBAL),
     ast.Delete: ("del", "leave the name alone"),
     ast.Match: ("match", "use if and elif"),
-    ast.Expr: ("a statement without effect on the result", "leave it out"),
+    ast.Expr: ("a statement that sets nothing", "give its value to a name, or leave it out"),
     ast.Lambda: ("lambda", "write a separate equation"),
     ast.NamedExpr: (":=", "write a separate assignment"),
     ast.Yield: ("yield", "return a tuple"),
@@ -222,7 +222,8 @@ def _check(source: Parsed) -> None:
         refuse(node.lineno, "an argument with *", "name every argument")
     for argument in source.arguments:
         if argument.annotation is None:
-            instead = f"write `{argument.arg}: float`, or the named tuple that it is"
+            name = argument.arg
+            instead = f"write `{name}: float`, `{name}: tuple[float, float]` or its named tuple"
             refuse(argument.lineno, f"{argument.arg} without a type", instead)
     body = node.body[1:] if ast.get_docstring(node, clean=False) is not None else node.body
     for statement in body:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, ClassVar, NoReturn
+from typing import Any, NoReturn
 
 from swashplate.equations import graph
 from swashplate.equations.code_generation.runner import Runner
@@ -75,7 +75,6 @@ class Symbol:
     """A number that is known only when the model runs: a node, and what runs the equation."""
 
     __slots__ = ("node", "runner")
-    __hash__: ClassVar[None]  # type: ignore[assignment]
 
     def __init__(self, node: Node, runner: Runner) -> None:
         self.node, self.runner = node, runner
@@ -101,9 +100,9 @@ class Symbol:
         return self.of(self.runner.make("neg", self.node))
 
     def __pow__(self, power: Any) -> Symbol:
-        if type(power) is not int:
+        if not isinstance(power, int | float) or isinstance(power, bool) or power != int(power):
             self.__rpow__(power)
-        return self.of(self.runner.make("**", self.node, value=power))
+        return self.of(self.runner.make("**", self.node, value=int(power)))
 
     __rpow__ = _refused("a power other than a whole number", "write sqrt(a), or exp(b * log(a))")
     __floordiv__ = __rfloordiv__ = _refused("//", "write floor(a / b)")
@@ -119,8 +118,10 @@ class Symbol:
         f"a decision {_UNKNOWN}, where Python decides at once", "write it with if, and, or, not"
     )
     __float__ = _refused(f"float {_UNKNOWN}", "leave it out")
-    __int__ = _refused(f"int {_UNKNOWN}", "write floor(x)")
-    __round__ = _refused(f"round {_UNKNOWN}", "write floor(x + 0.5)")
+    __int__ = _refused(f"int {_UNKNOWN}", "write floor(x), which rounds down")
+    __round__ = _refused(f"round {_UNKNOWN}", "write floor(x + 0.5), which rounds halves up")
+    __format__ = __str__ = __repr__ = _refused(f"text {_UNKNOWN}", "leave it out")
+    __hash__ = _refused(f"a key or a member {_UNKNOWN}", "use a tuple and its elements")
     __index__ = _refused(
         f"a count or an index {_UNKNOWN}", "write a whole number, or use repeated for a loop"
     )

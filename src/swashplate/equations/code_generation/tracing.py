@@ -10,11 +10,11 @@ from __future__ import annotations
 import builtins
 import math
 import operator
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import reduce
 from inspect import signature
-from types import MethodType, ModuleType
+from types import FunctionType, MethodType, ModuleType
 from typing import Any
 
 from swashplate.equations import graph
@@ -78,9 +78,9 @@ LOOPS = {
 INSTEAD_OF_BUILTIN = {
     "print": "inspect results outside the equation",
     "sum": "write the terms out: Python's versions add up differently",
-    "float": "write the number as a float",
-    "int": "write floor(x)",
-    "round": "write floor(x + 0.5)",
+    "float": "leave it out, of a test write `1.0 if test else 0.0`",
+    "int": "write floor(x), which rounds down",
+    "round": "write floor(x + 0.5), which rounds halves up",
     "pow": "write ** with a whole number, or exp(b * log(a))",
 }
 
@@ -305,7 +305,8 @@ class Trace:
             if type(first) is Unset or type(second) is Unset:
                 merged.append(Unset(name))  # refused if it is read
                 continue
-            what, instead = f"{name} of two structures", "give it the same kind of value"
+            what = f"{name} of two structures"
+            instead = "let both ways set a number, or both the same named tuple or as many elements"
             merged.append(
                 first if first is second else self._one_of(decision, first, second, what, instead)
             )
@@ -416,6 +417,9 @@ class Trace:
 
     def called(self, function: Any, text: str, /, *arguments: Any, **named: Any) -> Any:
         """What a call in an equation returns."""
+        if not callable(function):
+            what = f"a call of {text}, which is of type {type(function).__name__}"
+            raise RefusedError(what, "call an @equation")
         if is_among(function, MATH) or is_among(function, CHOICES):
             op = MATH.get(function) or CHOICES[function]
             return self._function(op, function, arguments, named)
@@ -449,8 +453,8 @@ class Trace:
         self, op: str, function: Any, arguments: Sequence[Any], named: Mapping[str, Any]
     ) -> Any:
         """Value of a function of numbers."""
-        if op in ("min", "max") and len(arguments) == 1 and isinstance(arguments[0], tuple):
-            (arguments,) = arguments
+        if op in ("min", "max") and len(arguments) == 1 and isinstance(arguments[0], Iterable):
+            arguments = tuple(arguments[0])
         least = 2 if op in ("atan2", "hypot", "min", "max") else 1
         exactly = len(arguments) == least or (len(arguments) > least and op in ("min", "max"))
         if not exactly or named:
@@ -485,6 +489,11 @@ class Trace:
                 "interpolate with something else than a number and two tuples of one length",
                 "type them tuple[float, float, ...] with every element, or give derive their "
                 "lengths",
+            )
+        known = [each for each in knots if isinstance(each, int | float)]
+        if len(known) == len(knots) and known != sorted(set(known)):
+            raise RefusedError(
+                "interpolate with knots that do not ascend", "sort the table by them"
             )
         node = self._interpolated(
             operand(x),
@@ -551,9 +560,6 @@ def _said(error: Exception) -> tuple[str, str]:
 def _refuse_call(function: Any, text: str) -> None:
     """Refuse to call what is no equation."""
     name = text.rpartition(".")[2]
-    if isinstance(function, ModuleType | type(None)) or not callable(function):
-        what = f"a call of {text}, which is of type {type(function).__name__}"
-        raise RefusedError(what, "call an @equation")
     if getattr(builtins, name, None) is function:
         instead = INSTEAD_OF_BUILTIN.get(name, "call only equations and functions of math")
         raise RefusedError(f"a call of {text}", instead)
@@ -561,10 +567,12 @@ def _refuse_call(function: Any, text: str) -> None:
         functions = ", ".join(MATH.values())
         instead = f"an equation may call these functions of math: {functions}"
         raise RefusedError(f"a call of {text}", instead)
-    if hasattr(function, "__self__"):
+    if isinstance(getattr(function, "__self__", None), tuple):
         instead = "call equations; make a new named tuple, as in State(t.a, b)"
         raise RefusedError(f"the method {name}", instead)
-    raise RefusedError(f"a call of {text}", f"make {text} an @equation")
+    if isinstance(function, FunctionType) and "numpy" not in str(function.__module__):
+        raise RefusedError(f"a call of {text}", f"make {text} an @equation")
+    raise RefusedError(f"a call of {text}", "call only equations and functions of math")
 
 
 def _is_changed(callee: Callee) -> bool:
