@@ -6,13 +6,14 @@ single one.
 """
 
 from collections.abc import Callable, Iterator, Mapping
+from functools import cache
 from math import isfinite
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.equations import derive, equation
+from swashplate.equations import Derived, derive, equation
 from swashplate.errors import ParameterError
 from swashplate.models.amplifier import CardChannel, channel_level
 from swashplate.models.displacement_control import (
@@ -56,7 +57,7 @@ FULL_VOLTAGE = 10.0  # Largest command, either way. [V]
 SIDES = ("plus", "minus")  # Endings of values for the two directions.
 VOLTAGES = np.linspace(0.0, FULL_VOLTAGE, 101)
 """Commands at which the static rules are checked. [V]"""
-AT_ONCE = 100
+AT_ONCE = 50
 """Sets that are checked at once: what is computed of more leaves the processor's cache."""
 
 REFINEMENT_RULES: tuple[ParameterRule, ...] = (
@@ -219,9 +220,14 @@ class _SteadyExtremes(NamedTuple):
     """Largest |sin φ|, the solenoid's moment over the greatest moment of the feedback spring."""
 
 
+@cache
+def _steady() -> Derived:
+    """What many sets settle at, at once."""
+    return derive(steady_point, ())
+
+
 def _steady_extremes(values: Values, set_count: int) -> _SteadyExtremes:
     lowest, moment_sines = np.empty((2, set_count, len(SIDES)))
-    steady = derive(steady_point, ())
     signs = np.array([[1.0], [-1.0]])
     for first in range(0, set_count, AT_ONCE):
         some = np.s_[first : first + AT_ONCE]
@@ -230,7 +236,7 @@ def _steady_extremes(values: Values, set_count: int) -> _SteadyExtremes:
             for name in CardChannel._fields
         )
         pump = Pump(*(values[name][some, None, None] for name in Pump._fields))
-        currents, sines = steady.over(VOLTAGES, channel, signs, pump)
+        currents, sines = _steady().over(VOLTAGES, channel, signs, pump)
         lowest[some], moment_sines[some] = currents.min(axis=2), sines.max(axis=2)  # NaN stays
     return _SteadyExtremes(lowest, moment_sines)
 
