@@ -265,7 +265,7 @@ def closure(function: Any) -> dict[str, Any]:
     The function is the first entry. If two things have the same name, the second has its module's
     name in front.
     """
-    function = _reached(function)
+    function = getattr(function, "py_func", function)
     members: dict[str, Any] = {function.__name__: function}
     visited = {function}
     pending = [function]
