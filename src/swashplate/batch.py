@@ -26,8 +26,8 @@ from swashplate.equations import (
 )
 from swashplate.equations.marching import (
     LANES,
+    CodeForm,
     Command,
-    Form,
     Observation,
     Record,
     Sampling,
@@ -378,7 +378,7 @@ def _march_blocks(shared: _Sets, blocks: Sequence[Block]) -> list[_Marched]:
     for sets, options in blocks:
         padded = np.resize(sets, LANES)
         size = sets.size
-        march = lanes_of(shared.model, Form(tuple(inputs), options), shared.output)
+        march = lanes_of(shared.model, CodeForm(tuple(inputs), options), shared.output)
         lanes = march(
             {path: values[padded] for path, values in shared.numbers.items()},
             inputs,

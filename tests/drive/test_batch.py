@@ -25,7 +25,7 @@ from swashplate import batch as batches
 from swashplate.drive import drive_instance
 from swashplate.equations import Model, Tap, equation, simulate
 from swashplate.equations.code_generation.machine_code import optimised
-from swashplate.equations.marching import Form, SampleCode, output_of
+from swashplate.equations.marching import CodeForm, SampleCode, output_of
 from swashplate.equations.marching.lanes import lanes_text
 from swashplate.models.displacement_control import PumpOptions
 from swashplate.models.drive import pump_drive
@@ -321,7 +321,7 @@ def test_names_of_equations_are_not_those_of_the_march(hoist: Drive) -> None:
 @pytest.mark.skipif(config.CPU_NAME == "generic", reason="vectors of two do not pay")
 def test_the_sets_are_marched_as_vectors() -> None:
     signal, integral = output_of(pump_drive, "shaft_speed")
-    sample_code = SampleCode(pump_drive, Form(("current",), (None, PumpOptions())), [signal])
+    sample_code = SampleCode(pump_drive, CodeForm(("current",), (None, PumpOptions())), [signal])
     text = str(optimised(lanes_text(sample_code, signal, integral=integral)))
     assert re.search(r"<\d+ x double> @llvm\.sqrt", text)
     assert not re.search(r"gather|call double @llvm\.sqrt", text)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from swashplate.equations import Instance, check_mapping, floats_of, is_real, state_paths, value_at
 from swashplate.equations.marching import (
-    Form,
+    CodeForm,
     InitialStates,
     called,
     check_rate,
@@ -262,7 +262,9 @@ def _step_slopes(
     model = instance.model
     signals = tuple(initial.before)
     stored_outputs = tuple(output_of(model, name)[0] for name in outputs)
-    arguments, program = step_derivatives(model, Form(signals, instance.options), stored_outputs)
+    arguments, program = step_derivatives(
+        model, CodeForm(signals, instance.options), stored_outputs
+    )
     delays = instance.tap_delays(signals, h)
     values = []
     for stored in arguments.values():

@@ -29,7 +29,7 @@ from .run import Start as Start
 from .run import called as called
 from .run import marched as marched
 from .run import outside as outside
-from .sample_code import Form as Form
+from .sample_code import CodeForm as CodeForm
 from .sample_code import SampleCode as SampleCode
 from .sample_code import output_of as output_of
 from .simulation import Command as Command

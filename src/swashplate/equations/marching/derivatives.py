@@ -34,7 +34,7 @@ from swashplate.equations.marching.run import (
     check_domain,
     initial_states,
 )
-from swashplate.equations.marching.sample_code import Form, SampleCode, output_of
+from swashplate.equations.marching.sample_code import CodeForm, SampleCode, output_of
 from swashplate.equations.marching.start_code import start_code_of, started_by
 from swashplate.equations.marching.tangents import Tangents, padded, tangents_of
 from swashplate.equations.model import Model
@@ -58,7 +58,7 @@ class ObservedMarch:
     def __init__(
         self,
         model: Model,
-        form: Form,
+        form: CodeForm,
         outputs: tuple[str, ...],
         columns: tuple[str, ...],
         start: Start,
@@ -180,7 +180,7 @@ def _begin_at_rest(
 
 @generating
 def observed_march(
-    model: Model, form: Form, outputs: tuple[str, ...], columns: tuple[str, ...], start: Start
+    model: Model, form: CodeForm, outputs: tuple[str, ...], columns: tuple[str, ...], start: Start
 ) -> ObservedMarch:
     """The march of a model that gives some outputs, and derivatives of them, made once."""
     return ObservedMarch(model, form, outputs, columns, start)

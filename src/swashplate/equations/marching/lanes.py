@@ -27,7 +27,7 @@ from swashplate.equations.marching.interpreting import InterpretedMarch
 from swashplate.equations.marching.kernels import FLOATS, INTS, pointers
 from swashplate.equations.marching.march import HALF, ZERO, March, numbers_known
 from swashplate.equations.marching.part_code import SignalId, taps_of
-from swashplate.equations.marching.sample_code import Form, SampleCode, output_of
+from swashplate.equations.marching.sample_code import CodeForm, SampleCode, output_of
 from swashplate.equations.model import Model
 
 Array = NDArray[np.float64]
@@ -88,7 +88,7 @@ def vectorisation_report(model: Model, output: str | None = None, *, options: An
         options_of_parts.append(own_options)
     names = (*model.outputs, *model.parts[-1].outputs) or model.parts[-1].signal_names
     signal, _ = output_of(model, output or names[-1])
-    sample_code = SampleCode(model, Form(tuple(signals), tuple(options_of_parts)), [signal])
+    sample_code = SampleCode(model, CodeForm(tuple(signals), tuple(options_of_parts)), [signal])
     for used in sample_code.used:
         ends = sample_code.ends[used.part]
         constant = {*used.ahead(ends, used.delay_fractions)}
@@ -178,7 +178,7 @@ def lanes_text(sample_code: SampleCode, signal: SignalId, *, integral: bool) -> 
 class Lanes:
     """The march of LANES sets of a model over one record, for one output."""
 
-    def __init__(self, model: Model, form: Form, output: str) -> None:
+    def __init__(self, model: Model, form: CodeForm, output: str) -> None:
         self._model = model
         self._taps = taps_of(model, form.signals)
         self._signal, self._integral = output_of(model, output)
@@ -333,6 +333,6 @@ class Lanes:
 
 
 @generating
-def lanes_of(model: Model, form: Form, output: str) -> Lanes:
+def lanes_of(model: Model, form: CodeForm, output: str) -> Lanes:
     """The compiled lanes of a model for one output."""
     return Lanes(model, form, output)

@@ -16,7 +16,7 @@ from swashplate.equations.code_generation.values import leaves
 from swashplate.equations.graph import Node
 from swashplate.equations.marching.kernels import KERNEL_ARGUMENTS, KERNEL_KINDS
 from swashplate.equations.marching.part_code import PartCode, SignalId
-from swashplate.equations.marching.sample_code import Form, SampleCode
+from swashplate.equations.marching.sample_code import CodeForm, SampleCode
 from swashplate.equations.model import Model
 
 TYPES = {"int": "i64", "float": "double"}
@@ -273,7 +273,7 @@ PREPARE_ARGUMENTS = (
 """Of what computes that."""
 
 
-def step_texts(model: Model, form: Form, stored: Sequence[SignalId]) -> tuple[str, str, int]:
+def step_texts(model: Model, form: CodeForm, stored: Sequence[SignalId]) -> tuple[str, str, int]:
     """Texts of what computes constants, and of a step; and how many constants there are.
 
     A step puts the newest inputs into the records, behind the last ones, and marches one sample.
@@ -323,7 +323,7 @@ def step_texts(model: Model, form: Form, stored: Sequence[SignalId]) -> tuple[st
 
 def march_text(
     model: Model,
-    form: Form,
+    form: CodeForm,
     targets: Mapping[SignalId, int],
     further: Mapping[SignalId, int] = MappingProxyType({}),
 ) -> str:

@@ -10,7 +10,7 @@ from swashplate.equations.code_generation.values import leaves
 from swashplate.equations.graph import Node
 from swashplate.equations.keeping import cached_on_disk, key_of
 from swashplate.equations.marching.part_code import SignalId
-from swashplate.equations.marching.sample_code import Form, SampleCode
+from swashplate.equations.marching.sample_code import CodeForm, SampleCode
 from swashplate.equations.model import Model
 
 
@@ -24,7 +24,9 @@ class StepDerivatives(NamedTuple):
 
 
 @generating
-def step_derivatives(model: Model, form: Form, outputs: tuple[SignalId, ...]) -> StepDerivatives:
+def step_derivatives(
+    model: Model, form: CodeForm, outputs: tuple[SignalId, ...]
+) -> StepDerivatives:
     """A model's next states, then its `outputs`, with their derivatives."""
     return cached_on_disk(
         f"{model.name}_linear",
@@ -33,7 +35,7 @@ def step_derivatives(model: Model, form: Form, outputs: tuple[SignalId, ...]) ->
     )
 
 
-def _derived(model: Model, form: Form, outputs: tuple[SignalId, ...]) -> StepDerivatives:
+def _derived(model: Model, form: CodeForm, outputs: tuple[SignalId, ...]) -> StepDerivatives:
     """The same, made of the equations."""
     states = [SignalId(part_index, "state", path) for part_index, path in model.places("state")]
     sample_code = SampleCode(model, form, [*states, *outputs])

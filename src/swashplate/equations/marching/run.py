@@ -30,7 +30,7 @@ from swashplate.equations.marching.interpreting import InterpretedMarch
 from swashplate.equations.marching.kernels import KERNEL_KINDS, Kernel, MarchArrays, pointers
 from swashplate.equations.marching.march import march_text
 from swashplate.equations.marching.part_code import SignalId, taps_of
-from swashplate.equations.marching.sample_code import Form, SampleCode, decisions_of
+from swashplate.equations.marching.sample_code import CodeForm, SampleCode, decisions_of
 from swashplate.equations.model import (
     Link,
     Model,
@@ -107,14 +107,14 @@ class Instance:
         """Options of each part."""
         return tuple(part.options for part in self.parts)
 
-    def form(self, signals: Sequence[str]) -> Form:
+    def form(self, signals: Sequence[str]) -> CodeForm:
         """For what its code is made if these signals are given as records."""
         return self._cached(("form", *signals), lambda: self._form(tuple(signals)))
 
-    def _form(self, signals: tuple[str, ...]) -> Form:
+    def _form(self, signals: tuple[str, ...]) -> CodeForm:
         arguments, program = decisions_of(self.model, signals, self.options)
         values = program.values([self.number_at(argument, {}, 0.0) for argument in arguments])
-        return Form(signals, self.options, tuple(map(bool, values)))
+        return CodeForm(signals, self.options, tuple(map(bool, values)))
 
     @cached_property
     def params(self) -> Array:
@@ -379,7 +379,7 @@ class PlannedMarch:
     """The march of one set, which is compiled when it is first called for."""
 
     model: Model
-    form: Form
+    form: CodeForm
     targets: tuple[tuple[SignalId, int], ...]
     """What is kept, and its row of the block."""
     further: tuple[tuple[SignalId, int], ...] = ()

@@ -17,7 +17,7 @@ from swashplate.equations.model import Model, SignalSource
 from swashplate.errors import InputError
 
 
-class Form(NamedTuple):
+class CodeForm(NamedTuple):
     """For what a model's code is made, besides the model and what is kept of it."""
 
     signals: tuple[str, ...]
@@ -86,7 +86,7 @@ class SampleCode:
         Signals that other parts or links need.
     """
 
-    def __init__(self, model: Model, form: Form, outputs: Sequence[SignalId]) -> None:
+    def __init__(self, model: Model, form: CodeForm, outputs: Sequence[SignalId]) -> None:
         self.model, self.signals = model, form.signals
         self.parts: Sequence[PartCode] = parts_of(model, form.signals, form.options)
         if form.decisions:

@@ -10,7 +10,7 @@ from swashplate.equations.code_generation.values import leaves
 from swashplate.equations.graph import Node
 from swashplate.equations.keeping import cached_on_disk, key_of
 from swashplate.equations.marching.part_code import SignalId
-from swashplate.equations.marching.sample_code import Form, SampleCode, output_of
+from swashplate.equations.marching.sample_code import CodeForm, SampleCode, output_of
 from swashplate.equations.model import Model
 
 Moved = tuple[SignalId, str]
@@ -27,7 +27,7 @@ class StartCode(NamedTuple):
 
 
 @generating
-def start_code_of(model: Model, form: Form, outputs: tuple[str, ...], start: str) -> StartCode:
+def start_code_of(model: Model, form: CodeForm, outputs: tuple[str, ...], start: str) -> StartCode:
     """States that some outputs need where a record begins, ``"rest"`` or ``"steady"``."""
     return cached_on_disk(
         f"{model.name}_start",
@@ -36,7 +36,7 @@ def start_code_of(model: Model, form: Form, outputs: tuple[str, ...], start: str
     )
 
 
-def _generated(model: Model, form: Form, outputs: tuple[str, ...], start: str) -> StartCode:
+def _generated(model: Model, form: CodeForm, outputs: tuple[str, ...], start: str) -> StartCode:
     """The same, made of the equations."""
     observed = [output_of(model, output)[0] for output in outputs]
     sample_code = SampleCode(model, form, observed)

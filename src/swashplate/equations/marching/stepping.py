@@ -41,7 +41,7 @@ from swashplate.equations.marching.run import (
     check_outputs,
     instance_of,
 )
-from swashplate.equations.marching.sample_code import Form, SampleCode, output_of
+from swashplate.equations.marching.sample_code import CodeForm, SampleCode, output_of
 from swashplate.equations.model import Model
 from swashplate.errors import InputError
 
@@ -179,7 +179,7 @@ class _InterpretedStep:
 
 
 @generating
-def _step_of(model: Model, form: Form, stored: tuple[SignalId, ...]) -> tuple[Any, Any, int]:
+def _step_of(model: Model, form: CodeForm, stored: tuple[SignalId, ...]) -> tuple[Any, Any, int]:
     """What computes a model's constants, its step, and how many constants there are."""
     if JIT_OFF:
         sample_code = SampleCode(model, form, stored)

@@ -25,7 +25,7 @@ from swashplate.equations.code_generation.values import leaves
 from swashplate.equations.graph import ONE, TRUE, ZERO, Node, names_in, ordered, times
 from swashplate.equations.marching.march import ARGUMENTS, HALF, March, known_ahead
 from swashplate.equations.marching.part_code import PartCode, SignalId
-from swashplate.equations.marching.sample_code import Form, SampleCode, output_of
+from swashplate.equations.marching.sample_code import CodeForm, SampleCode, output_of
 from swashplate.equations.model import Model
 from swashplate.errors import InputError
 
@@ -547,7 +547,7 @@ def _ahead(ends: Iterable[Node], known: Collection[Node]) -> list[Node]:
 
 def tangents_of(
     model: Model,
-    form: Form,
+    form: CodeForm,
     outputs: Sequence[str],
     columns: Sequence[str],
     begins: Mapping[SignalId, Any],

@@ -36,7 +36,7 @@ from swashplate.equations.code_generation import (
     node_of,
 )
 from swashplate.equations.graph import names_in
-from swashplate.equations.marching import Form, SampleCode, output_of
+from swashplate.equations.marching import CodeForm, SampleCode, output_of
 from swashplate.export.c_source.exported import Exported
 from swashplate.export.c_source.layout import Layout, path_of
 from swashplate.export.c_source.parts import PartInC
@@ -373,7 +373,7 @@ def feedthrough(exported: Exported, instance: Instance, step: float) -> dict[str
     """
     model, at_once = exported.model, newest(exported, instance, step)
     observed = [output_of(model, name)[0] for name in exported.names]
-    sample_code = SampleCode(model, Form(model.external, instance.options), observed)
+    sample_code = SampleCode(model, CodeForm(model.external, instance.options), observed)
     signals = {f"x_{name}": name for name in model.external}
     for part in sample_code.used:
         signals |= {
