@@ -1,7 +1,6 @@
 """Models of many states: a crane's body, three drives with it, and a chain of masses."""
 
 import importlib.util
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -22,9 +21,7 @@ from swashplate.crane.kinematics import (
 from swashplate.crane.rope import Hanging, Hung, hanging_load, rope_step, set_off
 from swashplate.drive.instance import drive_instance
 from swashplate.equations import Model, equation, join
-from swashplate.models.amplifier import card
-from swashplate.models.drive import Nothing, Source, forgotten
-from swashplate.models.pump import pump
+from swashplate.models.drive import drive
 
 # --- a crane's body: three speeds and the ship's motion in, the load out --------------------------
 
@@ -114,69 +111,34 @@ def crane_run():  # of crane.simulate
     return simulate(Crane.preset("tg3637"), command)
 
 
-# --- three drives and the body, their names told apart by hand ------------------------------------
+# --- three drives and the body --------------------------------------------------------------------
+
+AXES = ("hoist", "slew", "luff")
+
+crane = join(
+    "crane",
+    {**dict.fromkeys(AXES, drive), "body": body},
+    links={f"body.{axis}": f"{axis}.shaft_speed" for axis in AXES},
+)
 
 
-class Hoist(NamedTuple):
-    hoist: float
-
-
-class Slew(NamedTuple):
-    slew: float
-
-
-class Luff(NamedTuple):
-    luff: float
-
-
-@equation
-def hoist_speed(shaft_speed: float) -> Hoist:
-    return Hoist(shaft_speed)
-
-
-@equation
-def slew_speed(shaft_speed: float) -> Slew:
-    return Slew(shaft_speed)
-
-
-@equation
-def luff_speed(shaft_speed: float) -> Luff:
-    return Luff(shaft_speed)
-
-
-AXES = {"hoist": hoist_speed, "slew": slew_speed, "luff": luff_speed}
-
-
-class Numbered(NamedTuple):
-    model: Model
+class Numbers(NamedTuple):
     p: Any
     options: Any
 
 
-def crane_of_drives(numbers: Body) -> Numbered:
-    """The packaged drives and a body on their shafts as one model."""
-    parts, p, options = list[Model](), dict[str, Any](), dict[str, Any]()
-    for axis, speed in AXES.items():
-        taps = {
-            name: tap._replace(signal=f"{axis}_voltage") if tap.signal == "voltage" else tap
-            for name, tap in card.taps.items()
-        }
-        parts += [
-            replace(card, name=f"{axis}_card", taps=taps, parts=()),
-            replace(pump, name=f"{axis}_pump", parts=()),
-            Model(f"{axis}_speed", Source, Nothing, forgotten, speed),
-        ]
-        drive = drive_instance(Drive.preset(axis).parameters, by_voltage=True)
-        for part, of_part in zip(("card", "pump"), drive.parts, strict=True):
-            p[f"{axis}_{part}"], options[f"{axis}_{part}"] = of_part.p, of_part.options
-        p[f"{axis}_speed"] = Source()
-    crane = join("crane", *parts, body)
-    p["body"] = numbers
-    values, settings = (
-        kind(*(given[name] for name in kind._fields))
-        for kind, given in ((crane.parameters, p), (crane.options, options))
-    )
-    return Numbered(crane, values, settings)
+def numbers_of_drive(axis: str) -> Numbers:
+    """Parameters and options of a packaged drive."""
+    parts = drive_instance(Drive.preset(axis).parameters, by_voltage=True).parts
+    p = drive.parameters(*(part.p for part in parts))
+    return Numbers(p, drive.options(*(part.options for part in parts)))
+
+
+def numbers_of_crane(numbers: Body) -> Numbers:
+    """Those of the packaged drives and a body on their shafts."""
+    drives = {axis: numbers_of_drive(axis) for axis in AXES}
+    p = crane.parameters(**{axis: each.p for axis, each in drives.items()}, body=numbers)
+    return Numbers(p, crane.options(**{axis: each.options for axis, each in drives.items()}))
 
 
 # --- a chain of masses, springs and stops ---------------------------------------------------------

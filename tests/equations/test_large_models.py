@@ -12,8 +12,9 @@ from tests.equations.large_models import (
     State,
     body,
     chain_of,
-    crane_of_drives,
+    crane,
     crane_run,
+    numbers_of_crane,
 )
 from tests.equations.tangents import marched
 
@@ -94,20 +95,20 @@ def test_a_hanging_load_swings_as_a_pendulum(parameters: Body) -> None:
 
 def voltages(size: int) -> dict[str, np.ndarray]:
     time = np.arange(size) / RATE
-    moves = {f"{axis}_voltage": 5.0 * np.sin(0.3 * time + k) for k, axis in enumerate(AXES)}
-    return moves | {name: 0.1 * np.sin(0.7 * time) for name in SHIP}
+    moves = {f"{axis}.voltage": 5.0 * np.sin(0.3 * time + k) for k, axis in enumerate(AXES)}
+    return moves | {f"body.{name}": 0.1 * np.sin(0.7 * time) for name in SHIP}
 
 
 def test_three_drives_and_a_body_are_the_drives_and_the_body(parameters: Body) -> None:
-    (crane, p, options), given = crane_of_drives(parameters), voltages(2000)
+    (p, options), given = numbers_of_crane(parameters), voltages(2000)
     found = simulate(crane, p, given, RATE, options=options)
     speeds = {
-        axis: Drive.preset(axis).simulate(voltage=given[f"{axis}_voltage"], rate=RATE).shaft_speed
+        axis: Drive.preset(axis).simulate(voltage=given[f"{axis}.voltage"], rate=RATE).shaft_speed
         for axis in AXES
     }
     for axis, speed in speeds.items():
-        assert np.array_equal(found[axis], speed), axis
-    ship = {name: given[name] for name in SHIP}
+        assert np.array_equal(found[f"{axis}.shaft_speed"], speed), axis
+    ship = {name: given[f"body.{name}"] for name in SHIP}
     assert np.array_equal(
         found["hung.load.x"], simulate(body, parameters, speeds | ship, RATE)["hung.load.x"]
     )
@@ -115,7 +116,7 @@ def test_three_drives_and_a_body_are_the_drives_and_the_body(parameters: Body) -
 
 @pytest.mark.slow
 def test_columns_of_three_drives_and_a_body(parameters: Body) -> None:
-    (crane, p, options), given = crane_of_drives(parameters), voltages(120)
+    (p, options), given = numbers_of_crane(parameters), voltages(120)
     found = sensitivities(crane, p, given, RATE, options=options)
     instance = instance_of(crane, p, options=options)
     values, slopes = marched(instance, given, 1.0 / RATE, "hung.load.x")

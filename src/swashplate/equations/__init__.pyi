@@ -23,6 +23,7 @@ from .fields import floats_of as floats_of
 from .fields import is_real as is_real
 from .fields import tuple_from as tuple_from
 from .fields import value_at as value_at
+from .joining import join as join
 from .kernels import kernel as kernel
 from .language import Parsed as Parsed
 from .language import is_named_tuple as is_named_tuple
@@ -56,7 +57,6 @@ from .model import Tap as Tap
 from .model import Window as Window
 from .model import arguments_of as arguments_of
 from .model import discretised as discretised
-from .model import join as join
 from .model import parameter_paths as parameter_paths
 from .model import state_paths as state_paths
 from .replacement import Replacement as Replacement

@@ -230,6 +230,13 @@ def value_at(value: Any, path: str) -> Any:
     return value
 
 
+def member_at(value: Any, path: str) -> Any:
+    """What lies at a dotted path; None if nothing does."""
+    for name in path.split("."):
+        value = getattr(value, name, None)
+    return value
+
+
 def numbers_of(value: Any) -> list[float]:
     """All floats of a nested named tuple, in the order of `floats_of`."""
     numbers: list[float] = []

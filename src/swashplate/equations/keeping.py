@@ -128,6 +128,7 @@ def key_of(model: Model) -> str:
         kinds = (part.parameters, part.state, part.inputs, part.options, part.given)
         description = (
             part.name,
+            (part.place, part.scope, sorted(part.wired.items())),
             [None if kind is None else _shape(kind) for kind in kinds],
             sorted(part.taps.items()),
             sorted(part.defaults.items()),

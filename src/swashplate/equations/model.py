@@ -25,8 +25,9 @@ Equations name the arguments that they need; the names mean
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from difflib import get_close_matches
 from functools import cached_property
 from importlib import import_module
 from operator import attrgetter
@@ -197,6 +198,12 @@ class Model:
     replacements: Replacements = field(default_factory=dict)
     """Equations that stand for others wherever those are called, see `replaced`; of a joined model
     in its links."""
+    place: str = ""
+    """Where it stands in a joined model, such as ``hoist.pump``; by default its name."""
+    scope: str = ""
+    """What the names of its signals begin with there, such as ``hoist``."""
+    wired: Mapping[str, str] = field(default_factory=dict)
+    """Full names of the signals that its inputs take there."""
     recipe: tuple[Any, ...] = ()
     """A function and its arguments that make the model again in another process; by default it is
     looked up by its name."""
@@ -262,7 +269,7 @@ class Model:
     @cached_property
     def every_signal(self) -> tuple[str, ...]:
         """Signals of all parts, numbers of their states, and links; integrals apart."""
-        signals = [name for part in self.parts for name in part.signal_names]
+        signals = [part.full(name) for part in self.parts for name in part.signal_names]
         return tuple(dict.fromkeys([*signals, *self.links]))
 
     @cached_property
@@ -272,7 +279,7 @@ class Model:
         for i, part in enumerate(self.parts):
             if part.limits is not None:
                 fields = get_type_hints(part.limits)["return"]._fields
-                bits |= {name: (i, bit) for bit, name in enumerate(fields)}
+                bits |= {part.full(name): (i, bit) for bit, name in enumerate(fields)}
         return bits
 
     @cached_property
@@ -288,12 +295,26 @@ class Model:
         link = self.links.get(signal)
         if link is not None and link.after < part:
             return link
-        source = _source(self.parts[:part], signal)
+        source = source_of(self.parts[:part], signal)
         return Link(signal, (source,)) if source else None
 
     def prefix(self, part: int) -> str:
-        """What stands before a part's paths: its name and a dot, if there are several."""
-        return f"{self.parts[part].name}." if len(self.parts) > 1 else ""
+        """What stands before a part's paths: where it stands and a dot, in a joined model."""
+        return f"{self.parts[part].path}." if self.is_joined else ""
+
+    @property
+    def is_joined(self) -> bool:
+        """Whether it consists of other models."""
+        return self.parts != (self,)
+
+    @property
+    def path(self) -> str:
+        """Where it stands in a joined model: its parameters and states are found there."""
+        return self.place or self.name
+
+    def full(self, signal: str) -> str:
+        """Name of a signal of a part in the whole."""
+        return f"{self.scope}.{signal}" if self.scope else signal
 
     def places(self, kind: str) -> tuple[tuple[int, str], ...]:
         """Part and path of every number of its parameters, given or state, in flat order."""
@@ -325,14 +346,14 @@ class Model:
                     definition = definition_of(kind)
                     if definition is not None:
                         declared.setdefault(part.tap(name).signal, definition)
-            declared |= definitions_of(part.state)
-            if part.signals is not None:
-                declared |= definitions_of(part.signals)
+            for kind in filter(None, (part.state, part.signals)):
+                declared |= {part.full(name): each for name, each in definitions_of(kind).items()}
         return declared
 
     def tap(self, name: str) -> Tap:
         """How an input is looked at."""
-        return self.taps.get(name, Tap(name))
+        tap = self.taps.get(name, Tap(name))
+        return tap._replace(signal=self.wired[name]) if name in self.wired else tap
 
     @property
     def equations(self) -> tuple[Equation, ...]:
@@ -397,12 +418,12 @@ def _wrong(model: Model) -> Iterator[str]:
 def _own_names(model: Model) -> Iterator[tuple[str, str]]:
     """Names of a single model's states, signals and integrals, with what they are in."""
     yield from ((name, "the integrals") for name in model.integrals)
-    if not _packaged(model):
+    if not packaged(model):
         for type_ in filter(None, (model.state, model.signals)):
             yield from ((name, type_.__name__) for name in floats_of(type_))
 
 
-def _packaged(model: Model) -> bool:
+def packaged(model: Model) -> bool:
     """Whether a single model is the package's: some pass an input on, or keep it, by its name."""
     return bool(model.state.__module__.startswith("swashplate."))
 
@@ -451,116 +472,34 @@ def _imported(module: str, name: str) -> Model:
     return model
 
 
-def join(
-    name: str, *parts: Model, links: Mapping[str, Equation] | None = None, **changes: Any
-) -> Model:
-    """Models in series: an input takes the signal of that name of a model before it.
-
-    Parameters
-    ----------
-    name : str
-        Name of the whole.
-    *parts : Model
-        In the order of the flow. Their parameters, states and options become fields named as the
-        parts.
-    links : mapping of str to equation, optional
-        Further signals, made of the parts' signals that the equation's arguments name.
-    **changes
-        `integrals`, `outputs`, `free_start`, `replacements` of the whole.
-
-    Returns
-    -------
-    Model
-        The whole; `Model.parts` are the models that were given.
-
-    Raises
-    ------
-    InputError
-        If two parts have the same name, an equation asks for a signal that no part has, or a part
-        for one that is only known after it.
-
-    Notes
-    -----
-    A signal must be known before it is needed: loops without delay between parts are not possible.
-
-    Examples
-    --------
-    >>> from swashplate import equations
-    >>> from swashplate.models.amplifier import card
-    >>> from swashplate.models.pump import pump
-    >>> equations.join("winch", card, pump).external
-    ('voltage', 'pump_speed', 'load_torque', 'supply_pressure')
-    """
-    for part in parts:
-        if not isinstance(part, Model):
-            raise InputError(f"Model {name} is joined from models, not from {part!r}.")
-    single = tuple(inner for part in parts for inner in part.parts)
-    names = [part.name for part in single]
-    if len(set(names)) != len(names):
-        raise InputError(f"Joined models need different names, not {', '.join(names)}.")
-    linked = {}
-    for signal, link_equation in (links or {}).items():
-        sources = []
-        for argument in arguments_of(link_equation):
-            source = _source(single, argument)
-            if source is None:
-                names_of_parts = ", ".join(name for part in single for name in part.signal_names)
-                raise InputError(
-                    f"Model {name}: a link needs '{argument}', but the parts have {names_of_parts}."
-                )
-            sources.append(source)
-        linked[signal] = Link(signal, tuple(sources), link_equation)
-
-    def gathered(attribute: str) -> Any:
-        present = [
-            (part.name, getattr(part, attribute)) for part in single if getattr(part, attribute)
-        ]
-        return NamedTuple(f"{name.title()}{attribute.title()}", present)
-
-    kinds = {kind: gathered(kind) for kind in ("parameters", "state", "options", "given")}
-    model = Model(name, step=single[0].step, parts=single, links=linked, **kinds, **changes)
-    for wrong in _too_late(model):
-        raise InputError(wrong)
-    return model
-
-
-def _too_late(model: Model) -> Iterator[str]:
-    """What a part of a joined model would take from outside, although it is known after it."""
-    upstream = [set[int]() for _ in model.parts]
-    inputs = [(index, name) for index, part in enumerate(model.parts) for name in part.input_types]
-    for index, name in inputs:
-        link = model.link_of(index, name)
-        for source in link.sources if link else ():
-            upstream[index] |= {source.part, *upstream[source.part]}
-    for index, name in inputs:
-        signal = model.parts[index].tap(name).signal
-        part = model.parts[index].name
-        signal_link = model.links.get(signal)
-        later = _source(model.parts[index + 1 :], signal)
-        after = -1
-        if signal_link:
-            after = signal_link.after
-        elif later:
-            after = index + 1 + later.part
-        passed_on = signal in model.parts[index].signal_names and _packaged(model.parts[after])
-        if after < index or passed_on or model.link_of(index, name) is not None:
-            continue
-        giver = model.parts[after].name
-        instead = f"put {giver} before {part}"
-        if index in {after, *upstream[after]}:
-            instead = "a loop must be one model, or be closed sample by sample with steppers"
-        yield (
-            f"Model {model.name}: {part} needs '{signal}', which is known only after {giver}: "
-            f"{instead}."
-        )
-
-
-def _source(parts: Sequence[Model], signal: str) -> SignalSource | None:
-    """Where a signal of some parts comes from: of the last that has it."""
+def source_of(parts: Sequence[Model], signal: str) -> SignalSource | None:
+    """Where a signal of some parts comes from, by its full name: of the last that has it."""
     for index in range(len(parts) - 1, -1, -1):
-        if signal in parts[index].signal_names:
-            return SignalSource(index, signal)
+        for name in parts[index].signal_names:
+            if parts[index].full(name) == signal:
+                return SignalSource(index, name)
     return None
+
+
+def full_name(name: str, names: Iterable[str]) -> str:
+    """The one of some names that this one means: itself, or the only one that ends in it.
+
+    Itself, too, if there is none or more than one.
+    """
+    names = [*names]
+    if name in names:
+        return name
+    ends = [each for each in names if each.endswith(f".{name}")]
+    return ends[0] if len(ends) == 1 else name
+
+
+def near_names(wanted: str, names: Iterable[str]) -> str:
+    """A name that is none of these, with those that may be meant."""
+    names = [*dict.fromkeys(names)]
+    last = wanted.rpartition(".")[2]
+    ends = [each for each in names if each.rpartition(".")[2] == last]
+    near = ends or get_close_matches(wanted, names, 5) or names
+    return f"'{wanted}'; there are {', '.join(near)}"
 
 
 def parameter_paths(model: Model) -> tuple[str, ...]:

@@ -23,8 +23,9 @@ from swashplate.equations.declaration import (
     functions_run,
     is_function,
 )
+from swashplate.equations.joining import join
 from swashplate.equations.language import is_named_tuple
-from swashplate.equations.model import Equation, Model, arguments_of, join
+from swashplate.equations.model import Equation, Model, arguments_of
 from swashplate.errors import InputError
 
 
@@ -152,7 +153,7 @@ def replaced(
     if not uses_equation(model, old):
         raise InputError(f"Model {model.name} does not use {old.__name__}.")
     parts = [_part(part, replacement) for part in model.parts]
-    if model.parts == (model,):
+    if not model.is_joined:
         return parts[0]
     links, replacements = _link_equations(model), model.replacements
     if parameters is not None and all(map(operator.is_, parts, model.parts)):
@@ -163,10 +164,14 @@ def replaced(
     if _calls(links.values(), replacements, old):
         in_links = _called_like(old, new, model.name, model.parameters)
         replacements = _with(replacements, old, in_links)
+    wires = {
+        name: (link.equation, *(model.parts[part].full(signal) for part, signal in link.sources))
+        for name, link in model.links.items()
+    }
     return join(
         model.name,
         *parts,
-        links=links,
+        links=wires,
         integrals=model.integrals,
         outputs=model.outputs,
         free_start=model.free_start,

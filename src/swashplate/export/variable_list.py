@@ -187,13 +187,15 @@ def variables(
         bounds = ", ".join(f"{name} beyond ±{bound:g}" for name, bound in exported.bounds.items())
         settings.append(("clip", references.CLIP, f"clip a {bounds} instead of failing", True))
     first_option = 1 + len(parameters) + len(exported.named("given"))
-    for index, option in enumerate(exported.settable):
+    for index, (full, option) in enumerate(
+        zip(exported.option_names, exported.settable, strict=True)
+    ):
         option_description = descriptions.get(option[1], Description(f"option {option[1]}"))
         if option[1] != exported.free_step:
             on = values[first_option + exported.options.index(option)] != 0.0
             settings.append(
                 (
-                    option_description.name or option[1],
+                    (option_description.name or full) if full == option[1] else full,
                     references.OPTION + index,
                     option_description.meaning,
                     on,

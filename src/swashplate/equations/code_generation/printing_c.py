@@ -113,7 +113,7 @@ def ascii_name(name: str) -> str:
 
 def c_name(name: str) -> str:
     """A name of Python's as one of C's and C++'s; two names stay two."""
-    letters = ascii_name(name)
+    letters = ascii_name(name).replace(".", "_")
     return f"{letters}_" if letters.rstrip("_") in WORDS else letters
 
 

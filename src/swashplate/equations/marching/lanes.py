@@ -21,6 +21,7 @@ from swashplate.equations.code_generation.program import program_of
 from swashplate.equations.code_generation.scheduling import VECTOR
 from swashplate.equations.code_generation.values import leaves
 from swashplate.equations.declaration import JIT_OFF
+from swashplate.equations.fields import member_at
 from swashplate.equations.graph import Node, names_in
 from swashplate.equations.keeping import cached_on_disk, key_of
 from swashplate.equations.marching.interpreting import InterpretedMarch
@@ -82,7 +83,7 @@ def vectorisation_report(model: Model, output: str | None = None, *, options: An
     for index, part in enumerate(model.parts):
         outside = [name for name in part.input_types if model.link_of(index, name) is None]
         signals += [part.tap(name).signal for name in outside if name not in part.defaults]
-        own_options = options if len(model.parts) == 1 else getattr(options, part.name, None)
+        own_options = member_at(options, part.path) if model.is_joined else options
         if own_options is None and part.options is not None:
             own_options = part.options()
         options_of_parts.append(own_options)

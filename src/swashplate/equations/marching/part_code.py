@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from copy import copy
 from functools import cached_property, lru_cache
 from typing import Any, NamedTuple, get_type_hints
@@ -90,7 +90,7 @@ class PartCode:
         self.records, self.options = tuple(signals), options
         self.trace = Trace(replacements=self.part_model.replacements) if trace is None else trace
         self.used_names: set[str] = set() if used_names is None else used_names
-        self.prefix = f"{self.part_model.name}_" if len(model.parts) > 1 else ""
+        self.prefix = model.prefix(part).replace(".", "_")
         self.used_names.add("h")
         self.taps = [tap for tap in taps_of(model, self.records) if tap.part == part]
         for tap in self.taps:
@@ -168,21 +168,20 @@ class PartCode:
 
     def _linked(self, link: Link) -> Node:
         """A signal between parts, from the names of its sources."""
-        sources = {source.signal: graph.name(self.source(source)) for source in link.sources}
-        if link.equation is None:
-            return next(iter(sources.values()))
-        return self.link(link.equation, link.name, sources)
+        sources = [graph.name(self.source(source)) for source in link.sources]
+        return sources[0] if link.equation is None else self.link(link.equation, link.name, sources)
 
-    def link(self, equation: Equation, name: str, sources: Mapping[str, Value]) -> Node:
+    def link(self, equation: Equation, name: str, sources: Sequence[Node]) -> Node:
         """A signal that an equation makes of several."""
-        signal = node_of(self.trace.run(callee_of(equation, self.model.replacements), sources))
+        arguments = dict(zip(arguments_of(equation), sources, strict=True))
+        signal = node_of(self.trace.run(callee_of(equation, self.model.replacements), arguments))
         assert signal is not None
         self.trace.label(signal, name)
         return signal
 
     def source(self, source: SignalSource) -> str:
         """Name of a signal that another part needs."""
-        return f"x_{self.model.parts[source.part].name}_{source.signal.replace('.', '_')}"
+        return f"x_{self.model.parts[source.part].path}_{source.signal}".replace(".", "_")
 
     def tap_samples(self, tap: TapOf) -> list[str]:
         """Names of a tap's samples, newest first."""

@@ -21,6 +21,7 @@ from swashplate.equations.fields import (
     defaults_of,
     floats_of,
     is_real,
+    member_at,
     numbers_of,
     tuple_from,
     value_at,
@@ -326,23 +327,23 @@ def instance_of(model: Model, p: Any, *, options: Any = None, given: Any = None)
     parts = []
     for part in model.parts:
         numbers = PartNumbers(p, options, given)
-        if len(model.parts) > 1:
+        if model.is_joined:
             numbers = PartNumbers(
-                p=getattr(p, part.name, None),
-                options=getattr(options, part.name, None),
-                given=getattr(given, part.name, None),
+                p=member_at(p, part.path),
+                options=member_at(options, part.path),
+                given=member_at(given, part.path),
             )
         if numbers.options is None and part.options is not None:
             numbers = numbers._replace(options=part.options())
         kinds = {"parameters": part.parameters, "options": part.options, "given": part.given}
         for (what, kind), value in zip(kinds.items(), numbers, strict=True):
             if kind is None:
-                if value is not None and len(model.parts) == 1:
+                if value is not None and not model.is_joined:
                     raise InputError(f"Model {part.name} has no {what}, but is passed {value!r}.")
                 continue
             if not isinstance(value, kind):
                 hint = ""
-                if len(model.parts) > 1:
+                if model.is_joined:
                     fields = ", ".join(f"{field}=..." for field in getattr(model, what)._fields)
                     hint = f": those of {model.name} are its {what}({fields})"
                 raise InputError(

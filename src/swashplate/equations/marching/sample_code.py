@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 from swashplate.equations import graph
 from swashplate.equations.code_generation.functions import generating
 from swashplate.equations.code_generation.program import Program, program_of
-from swashplate.equations.code_generation.values import Value, leaves
+from swashplate.equations.code_generation.values import leaves
 from swashplate.equations.fields import floats_of
 from swashplate.equations.graph import Node, names_in
 from swashplate.equations.keeping import cached_on_disk, key_of
 from swashplate.equations.marching.part_code import PartCode, SignalId
-from swashplate.equations.model import Model, SignalSource
+from swashplate.equations.model import Model, SignalSource, full_name
 from swashplate.errors import InputError
 
 
@@ -172,27 +173,37 @@ class SampleCode:
         if stored.kind != "link":
             return part.node(stored)
         link = self.model.links[stored.path]
-        sources: dict[str, Value] = {
-            source.signal: graph.name(part.source(source)) for source in link.sources
-        }
+        sources = [graph.name(part.source(source)) for source in link.sources]
         assert link.equation is not None
         return part.link(link.equation, link.name, sources)
 
 
 def output_of(model: Model, output: str) -> tuple[SignalId, bool]:
     """Where a signal comes from, and whether it is that signal's integral."""
-    integral = output in model.integrals
-    name = model.integrals[output] if integral else output
-    if name in model.links:
-        return SignalId(model.links[name].after, "link", name), integral
-    for index in range(len(model.parts) - 1, -1, -1):
-        part = model.parts[index]
-        if part.signals is not None and name in floats_of(part.signals):
-            return SignalId(index, "signals", name), integral
-        if name in floats_of(part.state):
-            return SignalId(index, "state", name), integral
-    signals = [name for part in model.parts for name in part.signal_names]
-    raise InputError(
-        f"{model.name} has no signal '{output}'; it has "
-        f"{', '.join([*signals, *model.links, *model.integrals])}."
-    )
+    signals = _signals_of(model)
+    name = full_name(output, [*model.integrals, *signals])
+    integral = name in model.integrals
+    signal = model.integrals.get(name, name)
+    if signal not in signals:
+        raise InputError(
+            f"{model.name} has no signal '{output}'; it has "
+            f"{', '.join([*model.every_signal, *model.integrals])}."
+        )
+    return signals[signal], integral
+
+
+@lru_cache(maxsize=256)
+def _signals_of(model: Model) -> dict[str, SignalId]:
+    """Signals, and numbers of the states, by full names: of two parts that have one the last's."""
+    signals = dict[str, SignalId]()
+    for index, part in enumerate(model.parts):
+        kinds = {"signals": part.signals, "state": part.state}
+        own = [
+            (part.full(name), SignalId(index, kind, name))
+            for kind, type_ in kinds.items()
+            if type_ is not None
+            for name in floats_of(type_)
+        ]
+        signals |= dict(reversed(own))
+    links = {name: SignalId(link.after, "link", name) for name, link in model.links.items()}
+    return signals | links

@@ -15,7 +15,7 @@ from swashplate.equations.marching.observation import RunValues, every_sample
 from swashplate.equations.marching.record import Sampling
 from swashplate.equations.marching.run import Start, initial_states, instance_of
 from swashplate.equations.marching.simulation import Command, Run, inputs_of
-from swashplate.equations.model import Model, parameter_paths
+from swashplate.equations.model import Model, full_name, parameter_paths
 from swashplate.errors import DomainError, InputError
 
 Array = NDArray[np.float64]
@@ -123,7 +123,9 @@ def sensitivities(
     run = Run(instance, records, start, begin or {})
     initial_states(instance, run.initial, run.begin)  # refuses what does not fit
     selectable = (*parameter_paths(model), *(f"start.{path}" for path in run.begin))
-    columns = tuple(parameters) if parameters is not None else parameter_paths(model)
+    columns = parameter_paths(model)
+    if parameters is not None:
+        columns = tuple(full_name(path, selectable) for path in parameters)
     for path in columns:
         if path not in selectable:
             raise InputError(

@@ -47,7 +47,7 @@ from swashplate.equations.marching.run import (
 )
 from swashplate.equations.marching.sample_code import output_of
 from swashplate.equations.marching.stepping import CompiledStep, StepContext, bound_step
-from swashplate.equations.model import Model
+from swashplate.equations.model import Model, full_name
 from swashplate.errors import DomainError, InputError, UnknownNameError
 from swashplate.results import GivenAxes, Tabular, figures, pandas_frame
 
@@ -329,9 +329,15 @@ class Run(Tabular):
         InputError
             If there is none of that name.
         """
+        signal = full_name(str(signal), self.names)
         if signal in self.samples:
             return self.samples[signal]
         if signal not in self.names:
+            ends = [name for name in self.names if name.endswith(f".{signal}")]
+            if ends:
+                raise UnknownNameError(
+                    f"A run of {self.name} has several signals '{signal}': {', '.join(ends)}."
+                )
             near = get_close_matches(str(signal), self.names, 1)
             meant = f"did you mean {near[0]}? It" if near else "it"
             raise UnknownNameError(
@@ -421,6 +427,7 @@ def inputs_of(
 ) -> dict[str, Record]:
     """External signals of a model on its grid, checked; see `on_grid`."""
     check_mapping("inputs", inputs)
+    inputs = {full_name(name, instance.model.external): each for name, each in inputs.items()}
     instance.check_inputs(inputs)
     samples: dict[str, ArrayLike] = {
         name: signal.sample(rate) if isinstance(signal, Command) else signal
@@ -747,6 +754,7 @@ def stepper(
     limits = model.limit_bits
     if outputs is None:
         outputs = (*model.every_signal, *model.integrals, *limits)
+    inputs = [full_name(name, model.external) for name in inputs]
     names = (*inputs, *outputs)
 
     def sample(values: list[float]) -> dict[str, float]:

@@ -42,7 +42,7 @@ from swashplate.equations.marching.run import (
     instance_of,
 )
 from swashplate.equations.marching.sample_code import CodeForm, SampleCode, output_of
-from swashplate.equations.model import Model
+from swashplate.equations.model import Model, full_name
 from swashplate.errors import InputError
 
 Array = NDArray[np.float64]
@@ -214,7 +214,7 @@ class CompiledStep:
         self._instance = instance
         self._h = h
         self._stored = tuple(stored)
-        self.inputs = tuple(inputs)
+        self.inputs = tuple(full_name(name, instance.model.external) for name in inputs)
         self.outputs = tuple(signal.path or signal.kind for signal in stored)
         instance.check_inputs(self.inputs)
         self._prepare, self._code, self._count = _step_of(

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from math import inf
+from typing import NamedTuple
 
 from swashplate.equations import Equation, Model, declared_by, floats_of
 from swashplate.equations.code_generation import ascii_name, c_name, fresh_name
@@ -19,6 +20,16 @@ from swashplate.export.c_source.names import (
     PART_MEMBERS,
     PUBLIC,
 )
+
+
+class ExportedLimit(NamedTuple):
+    """A limit of a part."""
+
+    part: int
+    name: str
+    """Of the part."""
+    full: str
+    """Of the whole model."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,8 +93,8 @@ class Exported:
         names_of_kind = {
             "PARAMETER_": [name for _, _, name in self.named("parameters")],
             "INPUT_": self.measured,
-            "OPTION_": [name for _, name in self.settable],
-            "LIMIT_": [name for _, name in self.limits],
+            "OPTION_": [*self.option_names],
+            "LIMIT_": [limit.full for limit in self.limits],
             "": self.names,
         }
         return {
@@ -114,7 +125,7 @@ class Exported:
     def members(self) -> list[str]:
         """Name of each part within the structs."""
         used_names = {*MEMBERS.split()}
-        return [_fresh_member(part.name, PART_MEMBERS, used_names) for part in self.model.parts]
+        return [_fresh_member(part.path, PART_MEMBERS, used_names) for part in self.model.parts]
 
     @cached_property
     def integrals(self) -> dict[str, str]:
@@ -160,6 +171,11 @@ class Exported:
         follows = {*self.switches, *self.follows}
         return [option for option in self.options if option not in follows]
 
+    @property
+    def option_names(self) -> tuple[str, ...]:
+        """Names of the options that are set, in the whole model."""
+        return tuple(self.model.parts[part].full(name) for part, name in self.settable)
+
     @cached_property
     def signals(self) -> tuple[str, ...]:
         """External signals that must be given."""
@@ -179,12 +195,17 @@ class Exported:
     def names(self) -> tuple[str, ...]:
         """All outputs."""
         all_outputs = self.outputs or (*self.model.every_signal, *self.model.integrals)
-        return tuple(dict.fromkeys(all_outputs))
+        # a packaged part may pass an input on, by its name
+        return tuple(dict.fromkeys(name for name in all_outputs if name not in self.model.external))
 
     @cached_property
-    def limits(self) -> list[tuple[int, str]]:
-        """Part and name of every limit."""
-        return [(part, name) for name, (part, _) in self.model.limit_bits.items()]
+    def limits(self) -> list[ExportedLimit]:
+        """Every limit of all parts."""
+        scopes = [part.scope for part in self.model.parts]
+        return [
+            ExportedLimit(part, full.removeprefix(f"{scopes[part]}."), full)
+            for full, (part, _) in self.model.limit_bits.items()
+        ]
 
     @cached_property
     def flags(self) -> list[str]:
@@ -194,7 +215,7 @@ class Exported:
             for part_index, name in self.options
         ]
         limits = [
-            f"{self.members[part_index]}_limits.{c_name(name)}" for part_index, name in self.limits
+            f"{self.members[limit.part]}_limits.{c_name(limit.name)}" for limit in self.limits
         ]
         set_inputs = [
             f"inputs.measured[{index}].given" for index in range(max(len(self.measured), 1))

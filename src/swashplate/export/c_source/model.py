@@ -18,6 +18,7 @@ from swashplate.equations import (
     Instance,
     Link,
     SignalSource,
+    arguments_of,
     declared_by,
     graph,
     parsed,
@@ -104,11 +105,9 @@ class Writer:
         name = c_name(link.name)
         if name not in self.links:
             trace = Trace(replacements=self.model.replacements)
-            sources = {
-                source.signal: graph.name(self.layout.place(source, "before"))
-                for source in link.sources
-            }
-            signal = node_of(trace.call(link.equation, sources))
+            sources = [graph.name(self.layout.place(source, "before")) for source in link.sources]
+            arguments = dict(zip(arguments_of(link.equation), sources, strict=True))
+            signal = node_of(trace.call(link.equation, arguments))
             assert signal is not None
             used_names = {*self.loops.used_names, "m"}
             labels = {node: c_name(label) for node, label in trace.labels.items()}

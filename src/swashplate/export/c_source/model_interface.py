@@ -76,8 +76,13 @@ class _Interface:
         outputs = {name: writer.output_note(name) for name in exported.names}
         parameters = {name: noted(definition) for name, _, definition in self.rows}
         inputs = {name: self.input_note(name) for name in exported.measured}
-        options = {name: writer.option_note(part, name) for part, name in exported.settable}
-        limits = {name: writer.limit_note(part, name) for part, name in exported.limits}
+        options = {
+            full: writer.option_note(part, name)
+            for full, (part, name) in zip(exported.option_names, exported.settable, strict=True)
+        }
+        limits = {
+            limit.full: writer.limit_note(limit.part, limit.name) for limit in exported.limits
+        }
         enums = [
             _enum("Outputs", constants[""], outputs, f"{P}_OUTPUTS"),
             _enum("Parameters", constants["PARAMETER_"], parameters, f"{P}_PARAMETERS"),
@@ -313,7 +318,7 @@ class _Interface:
             ("parameter", [name for name, _, _ in self.rows]),
             ("output", exported.names),
             ("input", exported.measured),
-            ("option", [name for _, name in exported.settable]),
+            ("option", exported.option_names),
         ):
             listed = " ".join(f'"{name}\\0"' for name in names) or '""'
             lines += [*wrapped(f"static const char {word}_names[] = {listed};"), ""]
@@ -362,9 +367,9 @@ class _Interface:
             return _body(["(void)m;", "return 0u;"])
         lines = ["unsigned bits = 0u;"]
         bit_of = self.exported.constants["LIMIT_"]
-        for part_index, name in self.exported.limits:
+        for part_index, name, full in self.exported.limits:
             member = f"m->{self.exported.members[part_index]}_limits.{c_name(name)}"
-            lines.append(f"bits |= {member} ? (unsigned){bit_of[name]} : 0u;")
+            lines.append(f"bits |= {member} ? (unsigned){bit_of[full]} : 0u;")
         return _body([*lines, "return bits;"])
 
 

@@ -138,7 +138,7 @@ def live_page(
             "does not have: export its C source with swashplate.export.c."
         )
     exported = exported_drive()
-    limits = [(1 << k, Limit[name.upper()]) for k, (_, name) in enumerate(exported.limits)]
+    limits = [(1 << k, Limit[name.upper()]) for k, (_, name, _) in enumerate(exported.limits)]
     numbers = values_of(Drive(parameters), runs[0]["step"])
     values = _parameters(parameters)
     present_label = "as fitted" if any(value["main"] for value in values) else "as it is"
