@@ -103,12 +103,12 @@ body = Model("body", parameters=Body, state=State, step=step, sample=sample, inp
 SHIP = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 
 
-def crane_run():  # of crane.simulate
+def crane_run(*, brake: bool = True):  # of crane.simulate
     """A run of the packaged crane, whose parts the body takes."""
     command = OperatorCommand.trapezoid(
         slew=1.0, luff=0.3, hoist=-0.2, until={"slew_deg": 45.0}, duration=5.0
     )
-    return simulate(Crane.preset("tg3637"), command)
+    return simulate(Crane.preset("tg3637"), command, brake=brake)
 
 
 # --- three drives and the body --------------------------------------------------------------------

@@ -114,6 +114,17 @@ def test_three_drives_and_a_body_are_the_drives_and_the_body(parameters: Body) -
     )
 
 
+def test_three_drives_and_a_body_are_the_crane(parameters: Body) -> None:
+    """Without the hoist's brake, which is no part of either."""
+    run = crane_run(brake=False)
+    p, options = numbers_of_crane(parameters)
+    given = {f"{axis}.voltage": run[f"voltage_{axis}"] for axis in AXES}
+    given |= {f"body.{name}": np.zeros(run["load_x"].size) for name in SHIP}
+    found = simulate(crane, p, given, RATE, options=options)
+    for axis in "xyz":
+        assert np.array_equal(found[f"hung.load.{axis}"], run[f"load_{axis}"]), axis
+
+
 @pytest.mark.slow
 def test_columns_of_three_drives_and_a_body(parameters: Body) -> None:
     (p, options), given = numbers_of_crane(parameters), voltages(120)
