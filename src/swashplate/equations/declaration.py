@@ -11,7 +11,6 @@ import os
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from hashlib import blake2b
 from itertools import chain, count
-from pathlib import Path
 from types import CellType, CodeType, FunctionType, MappingProxyType, ModuleType, SimpleNamespace
 from typing import Any, TypeVar, get_args
 from weakref import WeakKeyDictionary
@@ -69,12 +68,6 @@ def equation(function: F) -> F:
     if not str(getattr(function, "__module__", "")).startswith("swashplate."):
         parsed(function)  # the package's own are read when they are needed, and all by its tests
     return inlined(function)
-
-
-def module_of(function: FunctionType) -> str:
-    """Name of a function's module, or of its file if that says more."""
-    module = function.__module__ or ""
-    return Path(function.__code__.co_filename).name if module == "__main__" else module
 
 
 def source(function: Any) -> str:

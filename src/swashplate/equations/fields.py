@@ -22,7 +22,6 @@ Flag = bool | None
 """An option: None is off, True is on. In compiled code they are two types, and the branch that is
 not taken disappears."""
 OFF: Final = None
-ON: Final = True
 
 
 @dataclass(frozen=True)
