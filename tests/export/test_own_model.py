@@ -15,6 +15,7 @@ from tests.export.webassembly import Page
 from tests.marks import rest_slow
 
 from swashplate import Drive
+from swashplate.drive import drive_instance
 from swashplate.equations import (
     Model,
     Tap,
@@ -30,6 +31,7 @@ from swashplate.errors import EquationError
 from swashplate.export import c, content_of, drive_sources, fmu, libraries, values_of, wasm
 from swashplate.export.c_source import Exported, interface
 from swashplate.models import displacement_control
+from swashplate.models.drive import drive
 
 OFF = None
 PULLED = (0.0, 0.2, 1.0)
@@ -346,6 +348,88 @@ def test_an_fmu_of_a_model_has_the_bits_of_its_march(
         )  # fmt: skip
         for name in NAMES:
             assert (found[name] == run[name]).all(), name
+
+
+# --- joined models --------------------------------------------------------------------------------
+
+
+class Barge(NamedTuple):
+    """A barge that two winches pull on one rope each, straight ahead."""
+
+    radius: float = 0.3
+    stiffness: float = 8e4
+    mass: float = 4e5
+    drag: float = 2e4
+
+
+class Pulled(NamedTuple):
+    port: float = 0.0
+    starboard: float = 0.0
+    position: float = 0.0
+    speed: float = 0.0
+
+
+class Pulls(NamedTuple):
+    port_pull: float
+    starboard_pull: float
+
+
+@equation
+def pulls(state: Pulled, p: Barge) -> Pulls:
+    angles = state.port, state.starboard
+    return Pulls(*(max(0.0, p.stiffness * (p.radius * a - state.position)) for a in angles))
+
+
+@equation
+def pulled(
+    state: Pulled, signals: Pulls, port_speed: float, starboard_speed: float, p: Barge, h: float
+) -> Pulled:
+    force = signals.port_pull + signals.starboard_pull - p.drag * state.speed * abs(state.speed)
+    speed = state.speed + h * force / p.mass
+    return Pulled(
+        state.port + h * port_speed,
+        state.starboard + h * starboard_speed,
+        state.position + h * speed,
+        speed,
+    )
+
+
+tug = join(
+    "tug",
+    {"port": drive, "starboard": drive, "barge": Model("barge", Barge, Pulled, pulled, pulls)},
+    links={f"barge.{side}_speed": f"{side}.shaft_speed" for side in ("port", "starboard")},
+)
+
+
+@pytest.mark.slow
+def test_an_fmu_of_two_drives_on_one_load_has_the_bits_of_its_march(
+    tmp_path: Path, machine: list[str]
+) -> None:
+    fmpy = pytest.importorskip("fmpy")
+    parts = drive_instance(Drive.preset("hoist").parameters, by_voltage=True).parts
+    winch = drive.parameters(*(part.p for part in parts))
+    options = drive.options(*(part.options for part in parts))
+    numbers = {
+        "parameters": tug.parameters(winch, winch, Barge()),
+        "options": tug.options(options, options),
+    }
+    path = fmu(tug, tmp_path / "tug.fmu", step=1.0 / 512.0, platforms=machine, **numbers)
+    time = np.arange(1500) / 512.0
+    inputs = {
+        "port.voltage": np.where(time > 0.2, 6.0, 0.0),
+        "starboard.voltage": np.where(time > 0.5, 5.0, 0.0),
+    }
+    run = simulate(tug, numbers["parameters"], inputs, 512.0, options=numbers["options"])
+    columns = {"time": time, **inputs}
+    signals = np.rec.fromarrays(list(columns.values()), names=list(columns))
+    names = ["barge.position", "barge.port_pull", "port.shaft_position", "starboard.shaft_speed"]
+    found = fmpy.simulate_fmu(
+        str(path), stop_time=float(time[-1]), output_interval=1.0 / 512.0, input=signals,
+        output=names,
+    )  # fmt: skip
+    assert run["position"][-1] > 0.1
+    for name in names:
+        assert (found[name] == run[name]).all(), name
 
 
 @pytest.mark.slow
