@@ -122,6 +122,8 @@ def let_signals_end_waits(number: int = signal.SIGINT) -> None:
 
 def _tell(number: int, frame: FrameType | None) -> None:
     """Handle a signal, in the main thread."""
+    if _Told.told:
+        return  # it is ending, by itself or by the thread that watches
     if _Told.over:
         _end(number)
     if _imports(frame) and hasattr(signal, "pthread_kill"):
@@ -129,7 +131,7 @@ def _tell(number: int, frame: FrameType | None) -> None:
         again = Timer(AGAIN, signal.pthread_kill, (main_thread().ident or 0, number))
         again.daemon = True
         again.start()
-    elif not _Told.told:
+    else:
         _Told.told = number
         if not _Told.put_off:
             raise Stopped
