@@ -72,6 +72,8 @@ tank = Model(
     flowing,
     taps={"command": Tap("command", "delay")},
     limits=is_full,
+    integrals={"stored": "flow"},
+    outputs=("flow",),
 )
 
 
@@ -128,6 +130,8 @@ def test_members_are_what_they_are_alone() -> None:
     assert np.array_equal(run["sink.supply"], supply)
     mean = 0.5 * (alone["left"]["flow"][1:] + alone["left"]["flow"][:-1]) / RATE
     assert run["volume"][1:] == pytest.approx(np.cumsum(mean), rel=1e-12)
+    assert np.array_equal(run["volume"], run["left.stored"])
+    assert two.outputs == ("left.flow", "right.flow")
 
 
 def test_names_are_paths_whose_last_words_do_if_they_are_unique() -> None:
@@ -197,6 +201,8 @@ def test_an_equation_is_replaced_in_all_members() -> None:
     twice = P._replace(left=P.left._replace(time=0.6), right=P.right._replace(time=0.2))
     found = simulate(slow, P, INPUTS, RATE)
     assert np.array_equal(found["total"], simulate(two, twice, INPUTS, RATE)["total"])
+    assert slow.integrals == two.integrals
+    assert found.to_pandas()["right.stored"].size == TIME.size
     added = simulate(replaced(two, difference, sum_of), P, INPUTS, RATE)
     assert np.array_equal(added["supply"], added["left.flow"] + added["right.flow"])
 

@@ -47,7 +47,7 @@ def join(
         an equation over the signals that its arguments name, or a tuple of an equation and the
         paths of its signals. Any other name becomes a further signal.
     **changes
-        `integrals`, `outputs`, `replacements` of the whole, beside those of the models.
+        `integrals`, `outputs`, `free_start`, `replacements` of the whole. Members keep theirs.
 
     Returns
     -------
@@ -100,7 +100,8 @@ def join(
     kinds = {kind: gathered(kind) for kind in ("parameters", "state", "options", "given")}
     for word in ("integrals", "replacements"):
         changes[word] = dict(_carried(members, word)) | {**changes.get(word, {})}
-    changes.setdefault("outputs", tuple(_path(k, each) for k, m in members for each in m.outputs))
+    outputs = [_path(key, each) for key, model in members if key for each in model.outputs]
+    changes.setdefault("outputs", tuple(outputs))
     model = Model(name, step=parts[0].step, parts=tuple(parts), links=linked, **kinds, **changes)
     for wrong in _too_late(model):
         raise InputError(wrong)
@@ -145,19 +146,19 @@ def _placed(key: str, model: Model) -> Iterator[Model]:
 
 
 def _links_within(members: Sequence[tuple[str, Model]]) -> Iterator[tuple[str, Link]]:
-    """Links that the models have already."""
+    """Links that named models have already."""
     first = 0
     for key, model in members:
-        for name, link in model.links.items():
+        for name, link in model.links.items() if key else ():
             sources = tuple(SignalSource(first + part, signal) for part, signal in link.sources)
             yield _path(key, name), Link(_path(key, name), sources, link.equation)
         first += len(model.parts)
 
 
 def _carried(members: Sequence[tuple[str, Model]], word: str) -> Iterator[tuple[Any, Any]]:
-    """Integrals or replacements that the models have already."""
+    """Integrals or replacements that named models have already."""
     for key, model in members:
-        for name, value in getattr(model, word).items():
+        for name, value in getattr(model, word).items() if key else ():
             is_path = isinstance(name, str)
             yield (_path(key, name), _path(key, value)) if is_path else (name, value)
 
