@@ -304,8 +304,8 @@ class Model:
 
     @property
     def is_joined(self) -> bool:
-        """Whether it consists of other models."""
-        return self.parts != (self,)
+        """Whether it consists of several models, or of one by a name of its own."""
+        return len(self.parts) > 1 or (self.parts[0] is not self and self.parts[0].place != "")
 
     @property
     def path(self) -> str:
