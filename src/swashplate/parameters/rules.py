@@ -235,7 +235,7 @@ def _steady_extremes(values: Values, set_count: int) -> _SteadyExtremes:
             np.stack([values[f"{name}_{side}"][some, None] for side in SIDES], axis=1)
             for name in CardChannel._fields
         )
-        pump = Pump(*(values[name][some, None, None] for name in Pump._fields))
+        pump = Pump._make(values[name][some, None, None] for name in Pump._fields)
         currents, sines = _steady().over(VOLTAGES, channel, signs, pump)
         lowest[some], moment_sines[some] = currents.min(axis=2), sines.max(axis=2)  # NaN stays
     return _SteadyExtremes(lowest, moment_sines)

@@ -169,7 +169,7 @@ class Trace:
             raise
         except RefusedError as refused:
             source.refuse(source.line_of(refused), refused.what, refused.instead)
-        except Exception as error:
+        except Exception as error:  # whatever the author's text raises: it has a line of theirs
             source.refuse(source.line_of(error), *_said(error))
 
     def inner(self, source: Parsed) -> Trace:
