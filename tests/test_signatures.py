@@ -13,7 +13,7 @@ import typer
 import swashplate
 from swashplate import Drive, simulate_many
 from swashplate.cli import app
-from swashplate.equations import Definition, Model, equation, instance_of, sensitivities, simulate
+from swashplate.equations import Definition, Machine, Model, equation, sensitivities, simulate
 from swashplate.errors import SwashplateError
 from swashplate.export import content_of, fmu
 from swashplate.identification import ModelSetup
@@ -69,15 +69,15 @@ HOIST = Drive.preset("hoist")
 
 
 def simulated(p: Any = NUMBERS, inputs: Any = RECORD, **given: Any) -> Any:
-    return simulate(LAG, p, inputs, 10.0, **given)
+    return simulate(Machine(LAG, p), inputs, 10.0, **given)
 
 
 def linear(at: Any = STILL, rate: Any = 10.0, states: Any = BEGUN, **given: Any) -> Any:
-    return linearize(instance_of(LAG, NUMBERS), at, rate, states=states, **given)
+    return linearize(Machine(LAG, NUMBERS), at, rate, states=states, **given)
 
 
 def exported(step: Any) -> Any:
-    return content_of(LAG, step, parameters=NUMBERS)
+    return content_of(Machine(LAG, NUMBERS), step)
 
 
 WRONG: list[tuple[Callable[..., Any], tuple[Any, ...], str]] = [
@@ -87,8 +87,8 @@ WRONG: list[tuple[Callable[..., Any], tuple[Any, ...], str]] = [
         (inf, nan, -1.0, "a", None),
         "step .* number above 0",
     ),
-    (lambda what: content_of(what, 0.1), ("hoist", None), "give a Drive or a Model"),
-    (lambda p: content_of(LAG, 0.1, parameters=p), (None, 3), "parameters .* a Lag"),
+    (lambda what: content_of(what, 0.1), ("hoist", None), "give a Drive or a Machine"),
+    (lambda p: content_of(Machine(LAG, p), 0.1), (None, 3), "parameters .* a Lag"),
     (lambda at: linear(at), (3, None, [0.2]), "at .* mapping"),
     (lambda x: linear({"command": x}), ("a", nan, [1]), "command .* finite"),
     (
@@ -112,7 +112,7 @@ WRONG: list[tuple[Callable[..., Any], tuple[Any, ...], str]] = [
         "begin .* mapping",
     ),
     (
-        lambda begin: sensitivities(LAG, NUMBERS, RECORD, 10.0, begin=begin),
+        lambda begin: sensitivities(Machine(LAG, NUMBERS), RECORD, 10.0, begin=begin),
         ((1, 2), "place"),
         "begin .* mapping",
     ),
@@ -122,7 +122,7 @@ WRONG: list[tuple[Callable[..., Any], tuple[Any, ...], str]] = [
         (0, 1.5, inf, nan, "a"),
         "substeps .* whole number",
     ),
-    (lambda options: simulated(options=options), (3,), "lagging.* options"),
+    (lambda options: Machine(LAG, NUMBERS, options=options), (3,), "lagging.* options"),
     (
         lambda time: simulated(Lag(time)),
         (0.0, -0.1, nan),
@@ -134,7 +134,7 @@ WRONG: list[tuple[Callable[..., Any], tuple[Any, ...], str]] = [
         r"lagging, a bound: time .* s, .* above 0",
     ),
     (
-        lambda changes: simulate_many(LAG, NUMBERS, changes, RECORD, 10.0, output="place"),
+        lambda changes: simulate_many(Machine(LAG, NUMBERS), changes, RECORD, 10.0, output="place"),
         (3, [("time", [1.0])]),
         "changes .* mapping",
     ),
@@ -185,6 +185,6 @@ def test_what_does_not_fit_is_said_in_a_sentence(
 
 def test_sets_beyond_a_range_do_not_stop_the_others() -> None:
     sets = {"time": [0.1, -0.1, 0.2]}
-    batch = simulate_many(LAG, NUMBERS, sets, RECORD, 10.0, output="place")
+    batch = simulate_many(Machine(LAG, NUMBERS), sets, RECORD, 10.0, output="place")
     assert list(batch.failures) == [1]
     assert "time (time constant) is -0.1 s, but must be above 0" in batch.failures[1]

@@ -17,10 +17,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from swashplate.equations import (
     Definition,
-    Instance,
+    Machine,
     Model,
     check_mapping,
-    instance_of,
     parameter_paths,
     state_paths,
 )
@@ -98,8 +97,7 @@ class Batch(Result):
 
 
 def simulate_many(
-    model: Model,
-    p: Any,
+    machine: Machine,
     changes: Mapping[str, ArrayLike],
     inputs: Mapping[str, ArrayLike | Command],
     rate: float,
@@ -107,8 +105,6 @@ def simulate_many(
     output: str = "",
     cost: SquaredError | None = None,
     to: str | Path | None = None,
-    options: Any = None,
-    given: Any = None,
     executor: Executor | None = None,
     **sampling: Unpack[Sampling],
 ) -> Batch:
@@ -116,10 +112,10 @@ def simulate_many(
 
     Parameters
     ----------
-    model, p, inputs, rate, options, given, **sampling :
+    machine, inputs, rate, **sampling :
         As in `swashplate.equations.simulate`; `time`, `interpolation`, `substeps`.
     changes : mapping of str to (m,) array_like
-        Values of parameters by path, one for each set; the others are those of `p`. With
+        Values of parameters by path, one for each set; the others are those of the machine. With
         ``start.`` before its path, a number of the state at the first sample, as `begin` of
         `swashplate.equations.simulate`.
     output : str
@@ -149,23 +145,21 @@ def simulate_many(
     Examples
     --------
     >>> import numpy as np
-    >>> from swashplate import FullOrderDrive, simulate_many
+    >>> from swashplate import FullOrderDrive, Machine, simulate_many
     >>> from swashplate.models.full_order import Substeps, plant
     >>> numbers = FullOrderDrive.preset("hoist").plant
     >>> batch = simulate_many(
-    ...     plant,
-    ...     numbers,
+    ...     Machine(plant, numbers, given=Substeps(8.0)),
     ...     {"machine.load_torque": [0.0, 1e3]},
     ...     {"current": np.full(1024, 0.7)},
     ...     512.0,
     ...     output="shaft_speed",
-    ...     given=Substeps(8.0),
     ... )
     >>> batch.output.shape
     (2, 1024)
     """
-    instance = instance_of(model, p, options=options, given=given)
-    records = inputs_of(instance, inputs, rate, **sampling)
+    model = machine.model
+    records = inputs_of(machine, inputs, rate, **sampling)
     values, count = set_columns(changes)
     selectable = (*parameter_paths(model), *(f"start.{path}" for path in state_paths(model)))
     for path in values:
@@ -175,14 +169,14 @@ def simulate_many(
             )
     if cost is None and not output:
         raise InputError(f"{model.name}: name the output of the sets to return, or give a cost.")
-    numbers = {path: np.full(count, number) for path, number in _numbers_of(instance).items()}
+    numbers = {path: np.full(count, number) for path, number in _numbers_of(machine).items()}
     return march_sets(
         model,
         numbers | values,
         records,
         name=model.name,
         rules=_rules(model, values),
-        groups=[OptionGroup(np.ones(count, dtype=np.bool_), instance.options)],
+        groups=[OptionGroup(np.ones(count, dtype=np.bool_), machine.options)],
         output=output,
         cost=cost,
         to=to,
@@ -190,7 +184,7 @@ def simulate_many(
     )
 
 
-def _numbers_of(instance: Instance) -> dict[str, float]:
+def _numbers_of(instance: Machine) -> dict[str, float]:
     """Parameters by path, and givens by ``"given "`` and their path, as `Lanes` takes them."""
     model = instance.model
     givens = [

@@ -23,7 +23,7 @@ from swashplate import (
 )
 from swashplate import batch as batches
 from swashplate.drive import drive_instance
-from swashplate.equations import Model, Tap, equation, simulate
+from swashplate.equations import Machine, Model, Tap, equation, simulate
 from swashplate.equations.code_generation.machine_code import optimised
 from swashplate.equations.marching import CodeForm, SampleCode, output_of
 from swashplate.equations.marching.lanes import lanes_text
@@ -83,7 +83,7 @@ FAILED = [5, 7, 9]
 
 
 def many(**options):
-    return simulate_many(valve, P, SETS, INPUTS, RATE, given=STROKE, **options)
+    return simulate_many(Machine(valve, P, given=STROKE), SETS, INPUTS, RATE, **options)
 
 
 def test_sets_begin_where_they_are_told_to() -> None:
@@ -91,23 +91,25 @@ def test_sets_begin_where_they_are_told_to() -> None:
     begins = np.linspace(-0.04, 0.2, COUNT)
     changes = {"start.position": begins, "gain": np.linspace(0.1, 0.9, COUNT)}
     batch = simulate_many(
-        valve, P, changes, INPUTS, RATE, given=STROKE, output="position", executor=Serial()
+        Machine(valve, P, given=STROKE), changes, INPUTS, RATE, output="position", executor=Serial()
     )
     assert not batch.failures
     for k in (0, 17, COUNT - 1):
         p = P._replace(gain=changes["gain"][k])
         begin = {"position": begins[k]}
-        run = simulate(valve, p, INPUTS, RATE, given=STROKE, begin=begin)
+        run = simulate(Machine(valve, p, given=STROKE), INPUTS, RATE, begin=begin)
         assert np.array_equal(batch.output[k], run["position"])
     many = {"pump.Z10": np.full(3, 12.0), "start.pump.pressure": np.array([0.0, 2e5, 4e5])}
     parts = drive_instance(Drive.preset("hoist").parameters, by_voltage=False).parts
     p = pump_drive.parameters(*(part.p for part in parts))
     options = pump_drive.options(parts[1].options)
     record = {"current": np.full(200, 0.45)}
-    found = simulate_many(pump_drive, p, many, record, 512.0, output="shaft_speed", options=options)
+    found = simulate_many(
+        Machine(pump_drive, p, options=options), many, record, 512.0, output="shaft_speed"
+    )
     begin = {"pump.pressure": 4e5}
     p = p._replace(pump=p.pump._replace(Z10=12.0))
-    run = simulate(pump_drive, p, record, 512.0, options=options, begin=begin)
+    run = simulate(Machine(pump_drive, p, options=options), record, 512.0, begin=begin)
     assert np.array_equal(found.output[2], run["shaft_speed"])
 
 
@@ -119,7 +121,7 @@ def test_each_set_is_what_it_is_alone_to_the_last_bit() -> None:
             assert np.isnan(row).all()
             continue
         p = Valve(*(float(SETS[name][k]) for name in Valve._fields))
-        assert (simulate(valve, p, INPUTS, RATE, given=STROKE)["position"] == row).all()
+        assert (simulate(Machine(valve, p, given=STROKE), INPUTS, RATE)["position"] == row).all()
     assert list(found.failures) == FAILED
     assert found.failures[5] == "valve: gain is nan, but must be a finite number."
     assert found.failures[7] == "valve: the valve bursts under this command."
@@ -167,13 +169,11 @@ def test_executors_give_the_same(tmp_path: Path) -> None:
 
     def run(executor, **more):
         return simulate_many(
-            pump_drive,
-            pump_drive.parameters(*parts),
+            Machine(pump_drive, pump_drive.parameters(*parts), options=options),
             {"pump.Z16_plus": numbers},
             {"current": current},
             512.0,
             output="shaft_speed",
-            options=options,
             executor=executor,
             **more,
         )
@@ -197,7 +197,6 @@ REFUSED = {
     "output": ({"output": "speed"}, "valve .*'speed'.* opening, position"),
     "nothing wanted": ({"output": ""}, "valve: .* output"),
     "cost": ({"cost": SquaredError(COMMAND)}, "valve .* 'shaft_speed'"),
-    "given": ({"given": None}, "given .* Stroke, .*None"),
     "no input": ({"inputs": {}}, "valve .* 'command'"),
     "memory": (
         {"changes": {"lag": np.full(100_000, 0.1)}, "inputs": {"command": np.zeros(2_000_000)}},
@@ -211,15 +210,13 @@ REFUSED = {
 def test_bad_batches_are_refused(options, sentence: str) -> None:
     if "another process" in sentence:
         unnamed = Model("valve", Valve, Rod, step, given=Stroke)
-        options = {**options, "model": unnamed}
+        options = {**options, "machine": Machine(unnamed, P, given=STROKE)}
     asked = {
-        "model": valve,
-        "p": P,
+        "machine": Machine(valve, P, given=STROKE),
         "changes": {"lag": np.full(40, 0.1)},
         "inputs": INPUTS,
         "rate": RATE,
         "output": "position",
-        "given": STROKE,
         **options,
     }
     with pytest.raises(InputError, match=sentence):

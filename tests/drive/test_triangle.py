@@ -10,7 +10,7 @@ import pytest
 from tests.drive.experiments import triangle
 
 from swashplate import DomainError, Drive
-from swashplate.equations import Model, equation, instance_of
+from swashplate.equations import Machine, Model, equation
 from swashplate.equations.marching import Observation, ObservedRecord, Record, record_of
 from swashplate.equations.marching import derivatives as engine
 
@@ -55,7 +55,7 @@ def factor_of(matrix: np.ndarray) -> np.ndarray:
     seen = Observation("total", record.time, -matrix[:, -1])
     observed = ObservedRecord(record, [seen], driven_by="u", others=inputs)
     columns = "abcdef"[: matrix.shape[1] - 1]
-    return engine.triangle(instance_of(weighted, Gains()), observed, columns).factor
+    return engine.triangle(Machine(weighted, Gains()), observed, columns).factor
 
 
 def numbers(rows: int, columns: int, seed: int = 0) -> np.ndarray:
@@ -131,7 +131,7 @@ def test_a_copy_of_an_observed_record_outlives_it(copied: Callable[..., Observed
     inputs = {name: np.zeros(2000) for name in "vwxyz"}
     seen = Observation("total", record.time, -measured)
     observed = ObservedRecord(record, [seen], driven_by="u", others=inputs)
-    instance = instance_of(weighted, Gains())
+    instance = Machine(weighted, Gains())
     assert np.array_equal(engine.residuals(instance, observed), measured)
     again = copied(observed)
     del observed, seen, record

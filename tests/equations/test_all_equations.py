@@ -199,10 +199,10 @@ def window(draw: Draw, _: dict[str, Any]) -> Window:
     return Window((near[0], middle, near[1]), draw.uniform(0.02, 0.98))
 
 
-def hoist_machine(draw: Draw, _: dict[str, Any]) -> machine.Machine:
+def hoist_machine(draw: Draw, _: dict[str, Any]) -> machine.Hydrostat:
     numbers = PhysicalSet.preset("hoist").numbers
     sizes = (v if isfinite(v) and v else INSTEAD.get(n, 1e-3) for n, v in numbers.items())
-    return machine.Machine(*(size * draw.uniform(0.9, 1.1) for size in sizes))
+    return machine.Hydrostat(*(size * draw.uniform(0.9, 1.1) for size in sizes))
 
 
 def pump_state(draw: Draw, known: dict[str, Any]) -> pump.PumpState:
@@ -229,7 +229,7 @@ def plant_signals(draw: Draw, known: dict[str, Any]) -> full_order.PlantSignals:
 MADE: dict[Any, Callable[[Draw, dict[str, Any]], Any]] = {
     amplifier.Filter: filter_state,
     Window: window,
-    machine.Machine: hoist_machine,
+    machine.Hydrostat: hoist_machine,
     pump.PumpInputs: lambda draw, known: pump.PumpInputs(
         draw.number("current"),
         draw.uniform(0.8, 1.2),

@@ -8,7 +8,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from swashplate import InputError
-from swashplate.equations import Model, discretised, equation, sensitivities, simulate
+from swashplate.equations import Machine, Model, discretised, equation, sensitivities, simulate
 
 RATE, SIZE = 50.0, 60
 TORQUE = np.where(np.arange(SIZE) > 15, 3.0, 0.0)
@@ -68,7 +68,7 @@ def exact() -> np.ndarray:
 
 def run(method: str, substeps: int, p: Rope = P) -> np.ndarray:
     model = Model("swing", Rope, Swing, discretised(rates, method, substeps=substeps))
-    made = simulate(model, p, {"torque": TORQUE}, RATE, begin=BEGIN)
+    made = simulate(Machine(model, p), {"torque": TORQUE}, RATE, begin=BEGIN)
     return np.column_stack([made["arm.angle"], made["arm.speed"], made["work"]])
 
 
@@ -83,8 +83,7 @@ def test_sub_steps_converge_with_the_order_of_the_method(method: str, exact: np.
 def test_derivatives_are_those_of_the_step(method: str) -> None:
     model = Model("swing", Rope, Swing, discretised(rates, method))
     found = sensitivities(
-        model,
-        P,
+        Machine(model, P),
         {"torque": TORQUE},
         RATE,
         parameters=["length", "start.arm.angle"],
@@ -102,10 +101,10 @@ def test_derivatives_are_those_of_the_step(method: str) -> None:
 def test_an_end_stop_holds_and_has_no_derivative() -> None:
     step = discretised(rates, "heun", substeps=3, project=stopped)
     model = Model("swing", Rope, Swing, step, given=Wall)
-    more = {"given": Wall(0.35), "begin": BEGIN}
-    angle = simulate(model, P, {"torque": 4.0 * TORQUE}, RATE, **more)["arm.angle"]
+    swing = Machine(model, P, given=Wall(0.35))
+    angle = simulate(swing, {"torque": 4.0 * TORQUE}, RATE, begin=BEGIN)["arm.angle"]
     assert angle[-1] == angle.max() == 0.35
-    found = sensitivities(model, P, {"torque": 4.0 * TORQUE}, RATE, parameters=["drag"], **more)
+    found = sensitivities(swing, {"torque": 4.0 * TORQUE}, RATE, parameters=["drag"], begin=BEGIN)
     by = found["arm.angle"]
     assert (by[angle == 0.35] == 0.0).all()
     assert by[10, 0] != 0.0

@@ -7,10 +7,10 @@ import pytest
 
 from swashplate import InputError
 from swashplate.equations import (
+    Machine,
     Model,
     Tap,
     equation,
-    instance_of,
     join,
     parameter_paths,
     replaced,
@@ -116,9 +116,11 @@ INPUTS = {"left.command": np.sin(3.0 * TIME), "right.command": np.cos(5.0 * TIME
 
 
 def test_members_are_what_they_are_alone() -> None:
-    run = simulate(two, P, INPUTS, RATE)
+    run = simulate(Machine(two, P), INPUTS, RATE)
     alone = {
-        side: simulate(tank, getattr(P, side), {"command": INPUTS[f"{side}.command"]}, RATE)
+        side: simulate(
+            Machine(tank, getattr(P, side)), {"command": INPUTS[f"{side}.command"]}, RATE
+        )
         for side in ("left", "right")
     }
     for side, member in alone.items():
@@ -138,30 +140,33 @@ def test_names_are_paths_whose_last_words_do_if_they_are_unique() -> None:
     assert two.external == ("left.command", "right.command")
     assert parameter_paths(two)[:2] == ("left.time", "left.gain")
     assert state_paths(two) == ("left.level", "right.level", "sink.total")
-    run = simulate(two, P, INPUTS, RATE)
+    run = simulate(Machine(two, P), INPUTS, RATE)
     assert np.array_equal(run["total"], run["sink.total"])
     with pytest.raises(UnknownNameError, match=r"several signals 'flow': left\.flow, right\.flow"):
         run["flow"]
-    slopes = sensitivities(two, P, INPUTS, RATE, parameters=["ratio", "left.gain"])
+    slopes = sensitivities(Machine(two, P), INPUTS, RATE, parameters=["ratio", "left.gain"])
     assert slopes.names == ("sink.ratio", "left.gain")
     assert slopes["load"][:, 0] == pytest.approx(4.0 * run["load"], rel=1e-12, abs=1e-12)
     with pytest.raises(InputError, match="no parameter 'gain'"):
-        sensitivities(two, P, INPUTS, RATE, parameters=["gain"])
+        sensitivities(Machine(two, P), INPUTS, RATE, parameters=["gain"])
     one = join("one", {"tank": tank})
     numbers = one.parameters(tank=Lag(0.3))
-    assert simulate(one, numbers, {"command": INPUTS["left.command"]}, RATE)["level"].size == 200
+    assert (
+        simulate(Machine(one, numbers), {"command": INPUTS["left.command"]}, RATE)["level"].size
+        == 200
+    )
 
 
 def test_a_stepper_and_a_linear_model_are_of_the_whole() -> None:
-    run = simulate(two, P, INPUTS, RATE)
-    single = stepper(two, P, [*INPUTS], ["left.flow", "total", "left.full"], rate=RATE)
+    run = simulate(Machine(two, P), INPUTS, RATE)
+    single = stepper(Machine(two, P), [*INPUTS], ["left.flow", "total", "left.full"], rate=RATE)
     for n in range(60):
         sample = single.step(*(float(record[n]) for record in INPUTS.values()))
         assert sample["left.flow"] == run["left.flow"][n]
         assert sample["total"] == run["total"][n]
     at = dict.fromkeys(two.external, 0.0)
     rest = [Level(), Level(), Sum()]
-    whole = linearize(instance_of(two, P), at, RATE, states=rest, outputs=["sink.load"])
+    whole = linearize(Machine(two, P), at, RATE, states=rest, outputs=["sink.load"])
     poles = np.sort(np.linalg.eigvals(whole.A).real)
     # of each lag, and of the sum; the samples that a delay keeps are at zero
     expected = [1.0 - share(1.0 / RATE, 0.1), 1.0 - share(1.0 / RATE, 0.3), 1.0]
@@ -177,8 +182,8 @@ def test_members_may_be_joined_models() -> None:
     assert "first.left.gain" in parameter_paths(fleet)
     assert fleet.parameters._fields == ("first", "second", "sink")
     inputs = {f"{name}.{at}": each for name in ("first", "second") for at, each in INPUTS.items()}
-    found = simulate(fleet, fleet.parameters(P, P, Ratio(0.5)), inputs, RATE)
-    alone = simulate(two, P, INPUTS, RATE)
+    found = simulate(Machine(fleet, fleet.parameters(P, P, Ratio(0.5))), inputs, RATE)
+    alone = simulate(Machine(two, P), INPUTS, RATE)
     for name in ("left.flow", "sink.load", "sink.supply"):
         assert np.array_equal(found[f"first.{name}"], alone[name])
         assert np.array_equal(found[f"second.{name}"], alone[name])
@@ -199,11 +204,11 @@ def sum_of(first: float, second: float) -> float:
 def test_an_equation_is_replaced_in_all_members() -> None:
     slow = replaced(two, share, slower)
     twice = P._replace(left=P.left._replace(time=0.6), right=P.right._replace(time=0.2))
-    found = simulate(slow, P, INPUTS, RATE)
-    assert np.array_equal(found["total"], simulate(two, twice, INPUTS, RATE)["total"])
+    found = simulate(Machine(slow, P), INPUTS, RATE)
+    assert np.array_equal(found["total"], simulate(Machine(two, twice), INPUTS, RATE)["total"])
     assert slow.integrals == two.integrals
     assert found.to_pandas()["right.stored"].size == TIME.size
-    added = simulate(replaced(two, difference, sum_of), P, INPUTS, RATE)
+    added = simulate(Machine(replaced(two, difference, sum_of), P), INPUTS, RATE)
     assert np.array_equal(added["supply"], added["left.flow"] + added["right.flow"])
 
 

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from swashplate.equations import Model, derive, equation, join, simulate
+from swashplate.equations import Machine, Model, derive, equation, join, simulate
 
 pytestmark = pytest.mark.slow
 
@@ -208,7 +208,7 @@ def test_a_cell_of_a_notebook_that_is_run_again_counts() -> None:
         cell(3 * number, head, space)
         cell(3 * number + 1, f"@equation\ndef deepest{changed}", space)
         cell(3 * number + 2, f"@equation\ndef deeper{rest}", space)
-        found = simulate(space["rod"], space["Lag"](0.5), {"command": np.ones(4)}, 100.0)
+        found = simulate(Machine(space["rod"], space["Lag"](0.5)), {"command": np.ones(4)}, 100.0)
         ends.append(found["position"][-1])
     assert ends == pytest.approx([expected(5.0)[0], expected(-1.0)[0]], rel=1e-14)
 
@@ -225,7 +225,9 @@ def test_a_helper_alone_that_is_run_again_counts(monkeypatch: pytest.MonkeyPatch
     command = {"command": np.ones(4)}
 
     def end() -> float:
-        return float(simulate(space["rod"], space["Lag"](0.5), command, 100.0)["position"][-1])
+        return float(
+            simulate(Machine(space["rod"], space["Lag"](0.5)), command, 100.0)["position"][-1]
+        )
 
     assert end() == pytest.approx(expected(5.0)[0], rel=1e-14)
     cell(103, f"@equation\ndef deepest{helper.replace('x + TABLE', 'x - TABLE')}", space)
@@ -352,5 +354,5 @@ def test_models_of_other_links_are_told_apart() -> None:
     for links, factor in ((first, 2.0), (second, 3.0)):
         model = join("linked", *parts, links=links)
         numbers = model.parameters(Share(1.0), Share(1.0))
-        run = simulate(model, numbers, {"command": np.ones(4)}, 1.0)
+        run = simulate(Machine(model, numbers), {"command": np.ones(4)}, 1.0)
         assert run["two"].tolist() == [factor * each for each in run["level"]]

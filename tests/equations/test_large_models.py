@@ -21,7 +21,7 @@ from tests.equations.tangents import marched
 from swashplate import Drive, InputError
 from swashplate.crane.kinematics import Shafts, boom_at, rope_length, tip_of
 from swashplate.crane.rope import hanging_load
-from swashplate.equations import floats_of, instance_of, parameter_paths, sensitivities, simulate
+from swashplate.equations import Machine, floats_of, parameter_paths, sensitivities, simulate
 from swashplate.equations.marching import tangents
 from swashplate.linear import linearize
 
@@ -60,7 +60,7 @@ def assert_columns(
 
 def test_a_cranes_body_is_the_crane(run, parameters: Body) -> None:
     size = run["load_x"].size
-    found = simulate(body, parameters, inputs(run, size), RATE)
+    found = simulate(Machine(body, parameters), inputs(run, size), RATE)
     for axis in "xyz":
         assert np.array_equal(found[f"hung.load.{axis}"], run[f"load_{axis}"])
 
@@ -68,8 +68,8 @@ def test_a_cranes_body_is_the_crane(run, parameters: Body) -> None:
 @pytest.mark.slow
 def test_columns_of_a_cranes_body(run, parameters: Body) -> None:
     given = inputs(run, 400)
-    found = sensitivities(body, parameters, given, RATE)
-    instance = instance_of(body, parameters)
+    found = sensitivities(Machine(body, parameters), given, RATE)
+    instance = Machine(body, parameters)
     values, slopes = marched(instance, given, 1.0 / RATE, "hung.load.x")
     assert np.array_equal(found.run["hung.load.x"], values)
     assert_columns(found, "hung.load.x", slopes, [*floats_of(Body)])
@@ -83,7 +83,7 @@ def test_a_hanging_load_swings_as_a_pendulum(parameters: Body) -> None:
     hung = hanging_load(tip, 0.0, 0.0, rope, parameters.hanging)
     state = State(2.0, rest, rest, rope, tip, hung)
     at = dict.fromkeys(("hoist", "slew", "luff", *SHIP), 0.0)
-    model = linearize(instance_of(body, parameters), at, RATE, states=[state], outputs=["rope"])
+    model = linearize(Machine(body, parameters), at, RATE, states=[state], outputs=["rope"])
     values = np.linalg.eigvals(model.A)
     poles = RATE * np.log(values[np.abs(values) > 1e-6].astype(complex))
     swings = np.sort(poles.imag[poles.imag > 0.1])
@@ -101,7 +101,7 @@ def voltages(size: int) -> dict[str, np.ndarray]:
 
 def test_three_drives_and_a_body_are_the_drives_and_the_body(parameters: Body) -> None:
     (p, options), given = numbers_of_crane(parameters), voltages(2000)
-    found = simulate(crane, p, given, RATE, options=options)
+    found = simulate(Machine(crane, p, options=options), given, RATE)
     speeds = {
         axis: Drive.preset(axis).simulate(voltage=given[f"{axis}.voltage"], rate=RATE).shaft_speed
         for axis in AXES
@@ -110,7 +110,8 @@ def test_three_drives_and_a_body_are_the_drives_and_the_body(parameters: Body) -
         assert np.array_equal(found[f"{axis}.shaft_speed"], speed), axis
     ship = {name: given[f"body.{name}"] for name in SHIP}
     assert np.array_equal(
-        found["hung.load.x"], simulate(body, parameters, speeds | ship, RATE)["hung.load.x"]
+        found["hung.load.x"],
+        simulate(Machine(body, parameters), speeds | ship, RATE)["hung.load.x"],
     )
 
 
@@ -120,7 +121,7 @@ def test_three_drives_and_a_body_are_the_crane(parameters: Body) -> None:
     p, options = numbers_of_crane(parameters)
     given = {f"{axis}.voltage": run[f"voltage_{axis}"] for axis in AXES}
     given |= {f"body.{name}": np.zeros(run["load_x"].size) for name in SHIP}
-    found = simulate(crane, p, given, RATE, options=options)
+    found = simulate(Machine(crane, p, options=options), given, RATE)
     for axis in "xyz":
         assert np.array_equal(found[f"hung.load.{axis}"], run[f"load_{axis}"]), axis
 
@@ -128,8 +129,8 @@ def test_three_drives_and_a_body_are_the_crane(parameters: Body) -> None:
 @pytest.mark.slow
 def test_columns_of_three_drives_and_a_body(parameters: Body) -> None:
     (p, options), given = numbers_of_crane(parameters), voltages(120)
-    found = sensitivities(crane, p, given, RATE, options=options)
-    instance = instance_of(crane, p, options=options)
+    found = sensitivities(Machine(crane, p, options=options), given, RATE)
+    instance = Machine(crane, p, options=options)
     values, slopes = marched(instance, given, 1.0 / RATE, "hung.load.x")
     assert np.array_equal(found.run["hung.load.x"], values)
     assert len(found.names) == 233
@@ -154,7 +155,7 @@ def test_a_chain_of_thirty_masses_has_its_frequencies(chain) -> None:
     rate, stiffness = 2000.0, 1e4
     p = chain.Chain(1.0, stiffness, 0.0, 1e-3, 1e6)
     rest = chain.State(*[0.0] * 60)
-    model = linearize(instance_of(chain.chain, p), {"push": 0.0}, rate, states=[rest])
+    model = linearize(Machine(chain.chain, p), {"push": 0.0}, rate, states=[rest])
     found = np.sort(rate * np.abs(np.log(np.linalg.eigvals(model.A)).imag))[::2]
     ideal = [2.0 * sqrt(stiffness) * sin((2 * k - 1) * pi / 122) for k in range(1, 31)]
     expected = [2.0 * rate * asin(0.5 * omega / rate) for omega in ideal]
@@ -166,8 +167,8 @@ def test_columns_of_a_chain_that_meets_its_stops(chain) -> None:
     rate = 2000.0
     p = chain.Chain(1.0, 1e4, 5.0, 1e-3, 1e6)
     push = 25.0 * np.sin(np.arange(600) / 30.0)
-    found = sensitivities(chain.chain, p, {"push": push}, rate)
-    values, slopes = marched(instance_of(chain.chain, p), {"push": push}, 1.0 / rate, "end")
+    found = sensitivities(Machine(chain.chain, p), {"push": push}, rate)
+    values, slopes = marched(Machine(chain.chain, p), {"push": push}, 1.0 / rate, "end")
     assert np.array_equal(found.run["end"], values)
     assert np.abs(slopes[:, 4]).max() > 0.0, "no stop was met"
     assert_columns(found, "end", slopes, [*floats_of(chain.Chain)])
@@ -176,7 +177,9 @@ def test_columns_of_a_chain_that_meets_its_stops(chain) -> None:
 def test_what_is_too_large_is_refused_with_its_size(chain, monkeypatch) -> None:
     monkeypatch.setattr(tangents, "MOST_OPERATIONS", 1000)
     p = chain.Chain(1.0, 1e4, 4.0, 1e-3, 1e6)
-    found = sensitivities(chain.chain, p, {"push": [0.0, 1.0]}, 2000.0, parameters=["mass"])
+    found = sensitivities(
+        Machine(chain.chain, p), {"push": [0.0, 1.0]}, 2000.0, parameters=["mass"]
+    )
     with pytest.raises(
         InputError, match=r"chain: .* 1 columns are \d+ operations .* fewer columns"
     ):

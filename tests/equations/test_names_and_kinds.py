@@ -11,6 +11,7 @@ import pytest
 from tests.marks import rest_slow
 
 from swashplate.equations import (
+    Machine,
     Model,
     derive,
     equation,
@@ -70,16 +71,18 @@ NAMES = (
 def test_an_input_may_have_any_name(name: str) -> None:
     step = step_of(f"x = p.gain * {name} - v", first=name)
     model = Model("named", parameters=Gain, state=Level, step=step, outputs=("level",))
-    found = simulate(model, Gain(0.7), {name: FIRST, "v": SECOND}, RATE)["level"]
+    found = simulate(Machine(model, Gain(0.7)), {name: FIRST, "v": SECOND}, RATE)["level"]
     level, expected = 0.25, []
     for first, second in zip(FIRST.tolist(), SECOND.tolist(), strict=True):
         expected.append(level)
         level = 0.5 * level + (0.7 * first - second)
     assert found.tolist() == expected
-    single = stepper(model, Gain(0.7), [name, "v"], rate=RATE)
+    single = stepper(Machine(model, Gain(0.7)), [name, "v"], rate=RATE)
     for first, second, right in zip(FIRST, SECOND, expected, strict=True):
         assert single.step(float(first), float(second))["level"] == right
-    slope = sensitivities(model, Gain(0.7), {name: FIRST, "v": SECOND}, RATE)["level"][:, 0]
+    slope = sensitivities(Machine(model, Gain(0.7)), {name: FIRST, "v": SECOND}, RATE)["level"][
+        :, 0
+    ]
     rising = 0.0
     for first, right in zip(FIRST.tolist(), slope.tolist(), strict=True):
         assert right == pytest.approx(rising, rel=1e-14, abs=1e-14)
@@ -89,7 +92,7 @@ def test_an_input_may_have_any_name(name: str) -> None:
 def test_a_variable_may_be_called_what_the_march_calls_an_input() -> None:
     step = step_of("x_u = 3.0 * u\nx = x_u + u\nx_v = x + v\nx = x_v - x_u")
     model = Model("named", parameters=Gain, state=Level, step=step, outputs=("level",))
-    found = simulate(model, Gain(0.0), {"u": FIRST, "v": SECOND}, RATE)["level"]
+    found = simulate(Machine(model, Gain(0.0)), {"u": FIRST, "v": SECOND}, RATE)["level"]
     level = 0.25
     for n in range(SIZE):
         assert found[n] == pytest.approx(level, rel=1e-14, abs=1e-14)
@@ -148,8 +151,8 @@ def test_numbers_of_every_kind(body: str, right: Any) -> None:
     step = step_of(body, helper=helper)
     model = Model("kinds", parameters=Gain, state=Level, step=step, outputs=("level",))
     first = np.where(np.arange(SIZE) % 3 == 0, 0.0, FIRST)
-    found = simulate(model, Gain(0.0), {"u": first, "v": SECOND}, RATE)["level"]
-    single = stepper(model, Gain(0.0), ["u", "v"], rate=RATE)
+    found = simulate(Machine(model, Gain(0.0)), {"u": first, "v": SECOND}, RATE)["level"]
+    single = stepper(Machine(model, Gain(0.0)), ["u", "v"], rate=RATE)
     level = 0.25
     for n in range(SIZE):
         assert found[n] == level
@@ -191,8 +194,8 @@ def nested_step(state: Nested, u: float, p: Gain) -> Nested:
 
 def test_a_nested_state_begins_at_its_defaults() -> None:
     model = Model("nested", parameters=Gain, state=Nested, step=nested_step)
-    slopes = sensitivities(model, Gain(0.3), {"u": np.ones(4)}, RATE)
-    run = simulate(model, Gain(0.3), {"u": np.ones(4)}, RATE)
+    slopes = sensitivities(Machine(model, Gain(0.3)), {"u": np.ones(4)}, RATE)
+    run = simulate(Machine(model, Gain(0.3)), {"u": np.ones(4)}, RATE)
     assert run["pair.one"] == pytest.approx([0.5, 0.8, 1.1, 1.4])
     assert run["pair.two"].tolist() == [3.0] * 4
     assert run["level"].tolist() == [2.0, 4.0, 5.0, 5.5]

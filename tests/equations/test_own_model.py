@@ -11,11 +11,11 @@ import pytest
 from swashplate import DomainError, InputError
 from swashplate.batch import simulate_many
 from swashplate.equations import (
+    Machine,
     Model,
     Tap,
     derive,
     equation,
-    instance_of,
     join,
     replaced,
     sensitivities,
@@ -89,7 +89,7 @@ def by_hand(p: Valve) -> np.ndarray:
 
 
 def test_simulation_is_the_loop_by_hand() -> None:
-    run = simulate(valve, P, {"command": COMMAND}, RATE, given=STROKE)
+    run = simulate(Machine(valve, P, given=STROKE), {"command": COMMAND}, RATE)
     assert run["position"] == pytest.approx(by_hand(P), abs=1e-9)
     assert run.names == ("time", "command", "opening", "position")
     assert run.to_polars("SI").columns == list(run.names)
@@ -97,7 +97,7 @@ def test_simulation_is_the_loop_by_hand() -> None:
 
 @pytest.mark.parametrize("method", ["to_polars", "to_pandas"])
 def test_units_that_no_signal_has_are_refused(method: str) -> None:
-    run = simulate(valve, P, {"command": COMMAND}, RATE, given=STROKE)
+    run = simulate(Machine(valve, P, given=STROKE), {"command": COMMAND}, RATE)
     with pytest.raises(InputError, match=r"units .* 'display', .*'SI'"):
         getattr(run, method)(units="display")
 
@@ -138,8 +138,8 @@ def test_stamps_and_sub_steps_are_a_finer_grid(way) -> None:
     """Of signals, limits, integrals, many sets and derivatives: those of the gridded command."""
     substeps, inputs = way.get("substeps", 1), {"command": COMMAND}
     fine, rate = {"command": gridded(**way)}, way["rate"] * substeps
-    expected = simulate(stopped, P, fine, rate, given=SHORT)
-    run = simulate(stopped, P, inputs, given=SHORT, **way)
+    expected = simulate(Machine(stopped, P, given=SHORT), fine, rate)
+    run = simulate(Machine(stopped, P, given=SHORT), inputs, **way)
     assert run.time == pytest.approx(expected.time[::substeps] + way.get("time", [0.0])[0])
     assert run.names == ("time", "command", "opening", "position", "travel")
     for name in ("position", "travel"):
@@ -152,18 +152,18 @@ def test_stamps_and_sub_steps_are_a_finer_grid(way) -> None:
     assert all((table[name].to_numpy() == run[name]).all() for name in run.names)
     assert (table["limit_high"].to_numpy() == run.active("high")).all()
     many = simulate_many(
-        stopped, P, {"gain": [0.3, 0.4]}, inputs, output="travel", given=SHORT, **way
+        Machine(stopped, P, given=SHORT), {"gain": [0.3, 0.4]}, inputs, output="travel", **way
     )
     assert (many.output[1] == run["travel"]).all()
-    by = sensitivities(stopped, P, inputs, given=SHORT, **way)["position"]
-    finely = sensitivities(stopped, P, fine, rate, given=SHORT)["position"]
+    by = sensitivities(Machine(stopped, P, given=SHORT), inputs, **way)["position"]
+    finely = sensitivities(Machine(stopped, P, given=SHORT), fine, rate)["position"]
     assert by == pytest.approx(finely[::substeps], abs=1e-9)
 
 
 @pytest.mark.parametrize("way", ["sub-steps", "sub-steps, held"])
 def test_a_stepper_gives_the_bits_of_the_run(way: str) -> None:
-    run = simulate(stopped, P, {"command": COMMAND}, given=SHORT, **WAYS[way])
-    made = stepper(stopped, P, ["command"], given=SHORT, **WAYS[way])
+    run = simulate(Machine(stopped, P, given=SHORT), {"command": COMMAND}, **WAYS[way])
+    made = stepper(Machine(stopped, P, given=SHORT), ["command"], **WAYS[way])
     samples = [made.step(u) for u in COMMAND[:200]]
     kept = made.state
     later = [made.step(u) for u in COMMAND[200:]]
@@ -180,10 +180,10 @@ def test_a_stepper_gives_the_bits_of_the_run(way: str) -> None:
 def test_a_number_stands_for_a_constant_input() -> None:
     both = Model("both", Valve, Rod, pushed)
     levels = {"command": COMMAND, "push": np.full(COMMAND.size, 0.2)}
-    expected = simulate(both, P, levels, RATE)["position"]
-    assert (simulate(both, P, {**levels, "push": 0.2}, RATE)["position"] == expected).all()
+    expected = simulate(Machine(both, P), levels, RATE)["position"]
+    assert (simulate(Machine(both, P), {**levels, "push": 0.2}, RATE)["position"] == expected).all()
     with pytest.raises(InputError, match="single number: .* array"):
-        simulate(both, P, {"command": 1.0, "push": 0.2}, RATE)
+        simulate(Machine(both, P), {"command": 1.0, "push": 0.2}, RATE)
 
 
 @equation
@@ -193,13 +193,17 @@ def pushed(state: Rod, command: float, push: float, p: Valve, h: float) -> Rod:
 
 @pytest.mark.parametrize("name", Valve._fields)
 def test_derivatives_are_those_of_differences(name: str) -> None:
-    by = sensitivities(valve, P, {"command": COMMAND}, RATE, parameters=[name], given=STROKE)
+    by = sensitivities(
+        Machine(valve, P, given=STROKE), {"command": COMMAND}, RATE, parameters=[name]
+    )
     found = by["position"][:, 0]
     value = getattr(P, name)
     ends = []
     for factor in (1.0 + 1e-5, 1.0 - 1e-5):
         moved = P._replace(**{name: value * factor})
-        ends.append(simulate(valve, moved, {"command": COMMAND}, RATE, given=STROKE)["position"])
+        ends.append(
+            simulate(Machine(valve, moved, given=STROKE), {"command": COMMAND}, RATE)["position"]
+        )
     assert found == pytest.approx((ends[0] - ends[1]) / (2e-5 * value), rel=1e-5, abs=1e-6)
     assert np.abs(found).max() > 0.0
 
@@ -208,10 +212,12 @@ def test_a_library_and_decisions_leave_the_bits_of_many_sets_alone() -> None:
     model = Model("wobbling", Valve, Rod, wobbling)
     changes = {"gain": np.linspace(0.1, 0.9, 21), "lag": np.linspace(0.04, 0.08, 21)}
     changes["overlap"] = np.linspace(-0.2, 0.2, 21)
-    rows = simulate_many(model, P, changes, {"command": COMMAND}, RATE, output="position").output
+    rows = simulate_many(
+        Machine(model, P), changes, {"command": COMMAND}, RATE, output="position"
+    ).output
     for i, row in enumerate(rows):
         p = P._replace(**{name: float(values[i]) for name, values in changes.items()})
-        alone = simulate(model, p, {"command": COMMAND}, RATE)["position"]
+        alone = simulate(Machine(model, p), {"command": COMMAND}, RATE)["position"]
         assert (alone == row).all()
 
 
@@ -228,25 +234,27 @@ def wobbling(state: Rod, command: float, p: Valve, h: float) -> Rod:
 
 
 def test_bad_inputs_are_named() -> None:
-    given, good = {"given": STROKE}, {"command": COMMAND}
+    machine, good = Machine(valve, P, given=STROKE), {"command": COMMAND}
     with pytest.raises(InputError, match="input 'voltage'; .* command"):
-        simulate(valve, P, {"voltage": COMMAND}, RATE, **given)
+        simulate(machine, {"voltage": COMMAND}, RATE)
     with pytest.raises(InputError, match="a Valve"):
-        simulate(valve, STROKE, good, RATE, **given)
+        Machine(valve, STROKE, given=STROKE)
     with pytest.raises(InputError, match="command .* nan at sample 3"):
-        simulate(valve, P, {"command": np.array([0.0, 0.0, 0.0, np.nan])}, RATE, **given)
+        simulate(machine, {"command": np.array([0.0, 0.0, 0.0, np.nan])}, RATE)
     with pytest.raises(InputError, match="parameter 'lead'"):
-        sensitivities(valve, P, good, RATE, parameters=["lead"], **given)
+        sensitivities(machine, good, RATE, parameters=["lead"])
 
 
 def test_names_and_numbers_that_mean_nothing_are_refused() -> None:
-    made = stepper(stopped, P, ["command"], given=SHORT, rate=100.0)
+    made = stepper(Machine(stopped, P, given=SHORT), ["command"], rate=100.0)
     for wrong in ((), (1.0, 2.0), ("a",), (None,), (np.zeros(2),)):
         with pytest.raises(InputError, match="step takes command: 1 |command is"):
             made.step(*wrong)
     way: Any = {"order": "previous"}
     with pytest.raises(InputError, match="interpolation .* 'order', .* inputs"):
-        simulate(stopped, P, {"command": COMMAND}, rate=100.0, given=SHORT, interpolation=way)
+        simulate(
+            Machine(stopped, P, given=SHORT), {"command": COMMAND}, rate=100.0, interpolation=way
+        )
 
 
 class Gain(NamedTuple):
@@ -272,12 +280,12 @@ def counted(state: Lone, command: float, options: Ways, p: Gain) -> Lone:
 def test_an_option_that_is_false_is_off() -> None:
     made = Model("counter", Gain, Lone, counted, options=Ways)
     for options, end in ((Ways(True), 6.0), (Ways(False), 3.0), (Ways(), 3.0)):
-        run = simulate(made, Gain(1.0), {"command": np.ones(4)}, rate=1.0, options=options)
+        run = simulate(Machine(made, Gain(1.0), options=options), {"command": np.ones(4)}, rate=1.0)
         assert run["place"][-1] == end
     with pytest.raises(InputError, match="None or False .* or True"):
-        simulate(made, Gain(1.0), {"command": np.ones(4)}, rate=1.0, options=Ways(2))
+        simulate(Machine(made, Gain(1.0), options=Ways(2)), {"command": np.ones(4)}, rate=1.0)
     with pytest.raises(InputError, match="counter .* given"):
-        simulate(made, Gain(1.0), {"command": np.ones(4)}, rate=1.0, given=Ways())
+        simulate(Machine(made, Gain(1.0), given=Ways()), {"command": np.ones(4)}, rate=1.0)
 
 
 @equation
@@ -287,7 +295,7 @@ def implicit(p: Valve, h: float) -> float:
 
 def test_an_equation_of_a_model_is_replaced() -> None:
     other = replaced(valve, lag_share, implicit)
-    opening = simulate(other, P, {"command": np.ones(9)}, RATE, given=STROKE)["opening"]
+    opening = simulate(Machine(other, P, given=STROKE), {"command": np.ones(9)}, RATE)["opening"]
     # the delay of 3.3 samples is over
     np.testing.assert_allclose((1.0 - opening[6:]) / (1.0 - opening[5:-1]), 1.0 / 1.2, rtol=1e-12)
     assert replaced(join("two", valve), lag_share, implicit).parts[0] is not valve
@@ -414,7 +422,7 @@ def run(step: Any = filled, p: Any = WIDE, flow: Any = None, rate: Any = 1.0, **
     """A tank that one unit a second flows into."""
     begin = {"begin": more.pop("begin")} if "begin" in more else {}
     tank = Model("tank", more.pop("parameters", Outlet), more.pop("state", Fill), step, **more)
-    return simulate(tank, p, {"flow": np.ones(5) if flow is None else flow}, rate, **begin)
+    return simulate(Machine(tank, p), {"flow": np.ones(5) if flow is None else flow}, rate, **begin)
 
 
 NO_STATE = "must return a Fill of numbers on every path"
@@ -480,16 +488,16 @@ def test_models_that_cannot_be_in_series_are_refused(parts, links, sentence: str
 def test_a_part_of_a_joined_model_is_named_in_its_numbers() -> None:
     whole = join("whole", FED, PUMP)
     with pytest.raises(InputError, match=r"whole .*parameters\(tank=..., pump=...\)"):
-        simulate(whole, WIDE, {"inflow": np.ones(5)}, 1.0)
+        simulate(Machine(whole, WIDE), {"inflow": np.ones(5)}, 1.0)
 
 
 def test_a_derivative_that_overflows_is_named() -> None:
     tank = Model("tank", Outlet, Fill, growing)
     columns = {"parameters": ["width", "start.level"], "begin": {"level": 0.0}}
     with pytest.raises(DomainError, match=r"level by start\.level .* inf at sample 2"):
-        print(sensitivities(tank, WIDE, {"flow": np.zeros(5)}, 1.0, **columns)["level"])
+        print(sensitivities(Machine(tank, WIDE), {"flow": np.zeros(5)}, 1.0, **columns)["level"])
     with pytest.raises(InputError, match="limit 'full'; .* none"):
-        simulate(tank, WIDE, {"flow": np.zeros(5)}, 1.0).active("full")
+        simulate(Machine(tank, WIDE), {"flow": np.zeros(5)}, 1.0).active("full")
 
 
 @pytest.mark.parametrize("value", ['"high"', "1j", "[flow]"])
@@ -529,9 +537,11 @@ def test_a_margin_that_is_no_number_at_one_sample_is_outside(sets: int) -> None:
     inputs = {"flow": np.ones(9)}
     if sets == 1:
         with pytest.raises(DomainError, match="tank: "):
-            simulate(tank, Outlet(1.0), inputs, 1.0)
+            simulate(Machine(tank, Outlet(1.0)), inputs, 1.0)
         return
-    made = simulate_many(tank, Outlet(1.0), {"width": np.ones(sets)}, inputs, 1.0, output="level")
+    made = simulate_many(
+        Machine(tank, Outlet(1.0)), {"width": np.ones(sets)}, inputs, 1.0, output="level"
+    )
     assert len(made.failures) == sets
 
 
@@ -549,7 +559,7 @@ def test_of_two_models_in_series_both_say_what_may_have_happened() -> None:
     both = join("both", first, second)
     p = both.parameters(Outlet(1.0), Outlet(1.0))
     with pytest.raises(DomainError, match=r"the first runs over .* Or: the second does"):
-        simulate(both, p, {"flow": np.ones(5)}, 1.0)
+        simulate(Machine(both, p), {"flow": np.ones(5)}, 1.0)
 
 
 @pytest.mark.slow
@@ -589,22 +599,24 @@ PIPES = [Pipe(0.5), Pipe(0.5, leak=0.3), Pipe(0.5, stop=0.25), Pipe(0.5, 0.3, 0.
 @pytest.mark.parametrize("p", PIPES)
 def test_what_parameters_decide_alone_is_decided_ahead(p: Pipe) -> None:
     flow = np.abs(np.sin(0.1 * np.arange(60)))
-    decisions = instance_of(pipe, p).form(["flow"]).decisions
+    decisions = Machine(pipe, p).form(["flow"]).decisions
     assert sorted(decisions) == sorted((p.leak > 0.0, p.stop > 0.0))
     state, expected = Filled(0.0), []
     for each in flow.tolist():
         expected.append(state.level)
         state = piped(state, each, p, 0.01)
-    assert simulate(pipe, p, {"flow": flow}, 100.0)["level"].tolist() == expected
-    single = stepper(pipe, p, ["flow"], rate=100.0)
+    assert simulate(Machine(pipe, p), {"flow": flow}, 100.0)["level"].tolist() == expected
+    single = stepper(Machine(pipe, p), ["flow"], rate=100.0)
     assert [single.step(each)["level"] for each in flow] == expected
-    slopes = sensitivities(pipe, p, {"flow": flow}, 100.0)["level"]
+    slopes = sensitivities(Machine(pipe, p), {"flow": flow}, 100.0)["level"]
     for column, (name, value) in enumerate(p._asdict().items()):
         if value == 0.0:
             assert not slopes[:, column].any()
             continue
         ends = [
-            simulate(pipe, p._replace(**{name: value + change}), {"flow": flow}, 100.0)["level"]
+            simulate(Machine(pipe, p._replace(**{name: value + change})), {"flow": flow}, 100.0)[
+                "level"
+            ]
             for change in (-1e-6, 1e-6)
         ]
         difference = (ends[1] - ends[0]) / 2e-6

@@ -9,10 +9,10 @@ import pytest
 
 from swashplate import InputError
 from swashplate.equations import (
+    Machine,
     Model,
     declared,
     equation,
-    instance_of,
     join,
     repeated,
     replaced,
@@ -71,7 +71,7 @@ COMMAND = np.array([0.0, 1.0, 2.0, 3.0])
 
 
 def level_of(model: Model, gain: float = 1.0) -> np.ndarray:
-    return simulate(model, Gain(gain), {"command": COMMAND}, 1.0)["level"]
+    return simulate(Machine(model, Gain(gain)), {"command": COMMAND}, 1.0)["level"]
 
 
 @equation
@@ -96,10 +96,10 @@ def around(x: float) -> float:
 
 def test_a_replacement_may_call_the_original() -> None:
     model = replaced(tank, twice, ten_times)
-    run = simulate(model, Gain(0.5), {"command": COMMAND}, 1.0)
+    run = simulate(Machine(model, Gain(0.5)), {"command": COMMAND}, 1.0)
     assert run["level"].tolist() == [10.0, *(0.5 * (20.0 * COMMAND[:3] + 1.0))]
     assert run["reading"].tolist() == [20.0 * level for level in run["level"]]
-    step_by_step = stepper(model, Gain(0.5), ["command"], rate=1.0)
+    step_by_step = stepper(Machine(model, Gain(0.5)), ["command"], rate=1.0)
     assert [step_by_step.step(each)["level"] for each in COMMAND] == run["level"].tolist()
     assert level_of(tank)[0] == 2.0
 
@@ -199,7 +199,7 @@ def test_equations_of_roots_and_loops_are_replaced() -> None:
     ):
         changed = replaced(model, old, new)
         np.testing.assert_allclose(level_of(changed), expected, rtol=1e-12)
-        by = sensitivities(changed, Gain(1.0), {"command": COMMAND}, 1.0)["level"]
+        by = sensitivities(Machine(changed, Gain(1.0)), {"command": COMMAND}, 1.0)["level"]
         difference = (level_of(changed, 1.001) - level_of(changed, 0.999)) / 0.002
         np.testing.assert_allclose(by[:, 0], difference, rtol=1e-8, atol=1e-8)
 
@@ -221,7 +221,7 @@ def squared_level(state: Level, command: float, p: Gain) -> Level:
 
 def test_derivatives_that_are_declared_of_the_original_do_not_count() -> None:
     model = replaced(Model("tank", Gain, Level, squared_level), twice, ten_times)
-    by = sensitivities(model, Gain(0.5), {"command": COMMAND}, 1.0)["level"]
+    by = sensitivities(Machine(model, Gain(0.5)), {"command": COMMAND}, 1.0)["level"]
     np.testing.assert_allclose(by[1:, 0], 2.0 * 400.0 * 0.5 * COMMAND[:3] ** 2, rtol=1e-12)
 
 
@@ -277,7 +277,7 @@ def test_the_equation_of_a_link_is_replaced() -> None:
         (replaced(both, twice, ten_times), 20.0),
         (replaced(both, doubled, tripled), 3.0),
     ):
-        run = simulate(model, numbers, inputs, 1.0)
+        run = simulate(Machine(model, numbers), inputs, 1.0)
         assert run["deep"].tolist() == [factor * each for each in run["level"]]
         assert run["depth"][1:].tolist() == run["deep"][:-1].tolist()
     with pytest.raises(InputError, match="doubled .* link"):
@@ -296,6 +296,6 @@ def test_another_process_makes_the_model_again() -> None:
 
 
 def test_its_linear_model_is_that_of_the_replacements() -> None:
-    instance = instance_of(replaced(tank, twice, ten_times), Gain(0.5))
+    instance = Machine(replaced(tank, twice, ten_times), Gain(0.5))
     made = linearize(instance, {"command": 1.0}, 1.0, outputs=["level"])
     assert made.B[0, 0] == pytest.approx(10.0)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from swashplate import DomainError, Drive, InputError, Limit
-from swashplate.equations import Model, Tap, compiled_step, equation, kernel, simulate
+from swashplate.equations import Machine, Model, Tap, compiled_step, equation, kernel, simulate
 
 
 def marched(compiled, context, records):
@@ -90,9 +90,9 @@ lag = Model("lag", Lag, Level, approach, taps={"command": Tap("command", delay="
 
 def test_step_of_ones_own_model_waits_as_its_simulation_does():
     p = Lag(0.3, 0.0377)
-    compiled = compiled_step(lag, p, ("command",), ("level",), 100.0)
+    compiled = compiled_step(Machine(lag, p), ("command",), ("level",), 100.0)
     out = marched(compiled, compiled.context(), VOLTAGE[:, None])
-    run = simulate(lag, p, {"command": VOLTAGE}, 100.0)
+    run = simulate(Machine(lag, p), {"command": VOLTAGE}, 100.0)
     np.testing.assert_array_equal(out[:, 0], run["level"])
 
 
@@ -106,6 +106,6 @@ def test_what_no_step_has_is_refused():
         hoist.compiled_step(inputs=("load_torque",))
     with pytest.raises(InputError, match=r"step of 1/20 s"):
         hoist.compiled_step(rate=20.0)
-    compiled = compiled_step(lag, Lag(0.001, 0.0), ("command",), ("level",), 100.0)
+    compiled = compiled_step(Machine(lag, Lag(0.001, 0.0)), ("command",), ("level",), 100.0)
     with pytest.raises(DomainError, match="lag: lag's level .* end of the record"):
         marched(compiled, compiled.context(), np.ones((700, 1)))

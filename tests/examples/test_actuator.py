@@ -10,7 +10,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from swashplate import Campaign
-from swashplate.equations import simulate
+from swashplate.equations import Machine, simulate
 from swashplate.logs import open_log
 
 ROOT = Path(__file__).parents[2]
@@ -44,7 +44,7 @@ def free_run(actuator: ModuleType, opening: np.ndarray, rate: float = 1.0) -> np
         stiffness=0.084,
         drag=1.24,
     )
-    return simulate(actuator.actuator.model, numbers, {"u": opening}, rate)["p"]
+    return simulate(Machine(actuator.actuator.model, numbers), {"u": opening}, rate)["p"]
 
 
 def test_the_march_against_an_adaptive_solver(actuator: ModuleType) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from swashplate import Campaign
-from swashplate.equations import simulate
+from swashplate.equations import Machine, simulate
 
 ROOT = Path(__file__).parents[2]
 DATA = ROOT.parent / "shared" / "data" / "eha"
@@ -34,7 +34,7 @@ def rod(eha: ModuleType, pump: float, pressure_a: np.ndarray, pressure_b: np.nda
         "pressure_a": pressure_a,
         "pressure_b": pressure_b,
     }
-    return simulate(eha.ACTUATOR.model, p, record, RATE)["position"]
+    return simulate(Machine(eha.ACTUATOR.model, p), record, RATE)["position"]
 
 
 @pytest.mark.parametrize(

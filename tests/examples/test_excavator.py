@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from swashplate import Campaign
-from swashplate.equations import simulate
+from swashplate.equations import Machine, simulate
 
 ROOT = Path(__file__).parents[2]
 DATA = ROOT.parent / "shared" / "data" / "excavator"
@@ -56,7 +56,7 @@ def test_flow_beyond_the_overlap_and_what_others_take(
     for command, moved in moves.items():
         levels = {"command": command, "demand": demand, "boom": boom}
         record = {name: np.full(201, level) for name, level in levels.items()}
-        run = simulate(excavator.valve, p, record, RATE)
+        run = simulate(Machine(excavator.valve, p), record, RATE)
         assert run["position"][200] - run["position"][100] == pytest.approx(moved, abs=1e-12)
 
 

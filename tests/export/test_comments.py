@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from tests.marks import rest_slow
 
 from swashplate import Drive, export
-from swashplate.equations import Definition, Model, equation
+from swashplate.equations import Definition, Machine, Model, equation
 from swashplate.equations.code_generation import c_comment, c_function, comment_line
 from swashplate.export.c_source import interface
 
@@ -90,9 +90,9 @@ def test_no_text_of_a_model_or_a_drive_becomes_code(
     standard: str, hoist: Drive, tmp_path: Path
 ) -> None:
     model = Model("lag", Lag, Output, lagged)
-    content = export.content_of(model, 0.01, parameters=Lag(0.5), prefix="lag")
+    content = export.content_of(Machine(model, Lag(0.5)), 0.01, prefix="lag")
     texts = list(interface(content.exported).values())
-    files = export.c(model, tmp_path / "model", 0.01, parameters=Lag(0.5))
+    files = export.c(Machine(model, Lag(0.5)), tmp_path / "model", 0.01)
     for number, title in enumerate(ATTACKS):
         drive = Drive(replace(hoist.parameters, title=title))
         files += export.c(drive, tmp_path / f"drive_{number}")

@@ -12,7 +12,7 @@ import pytest
 from tests.export.conftest import InC
 from tests.marks import rest_slow
 
-from swashplate.equations import Model, Tap, join, simulate
+from swashplate.equations import Machine, Model, Tap, join, simulate
 from swashplate.export import c, content_of
 from swashplate.export.c_source import interface
 
@@ -160,8 +160,8 @@ def read_as_cpp(header: str, folder: Path) -> None:
 
 def check(model: Model, inputs: dict[str, Any], parameters: Any, compiled: Any, to: Path) -> None:
     """C99 without a warning, C++ too, and the bits of the march."""
-    run = simulate(model, parameters, inputs, 1.0 / STEP)
-    content = content_of(model, STEP, parameters=parameters, prefix="nasty")
+    run = simulate(Machine(model, parameters), inputs, 1.0 / STEP)
+    content = content_of(Machine(model, parameters), STEP, prefix="nasty")
     texts = interface(content.exported)
     read_as_cpp(texts[f"{content.exported.file}.h"], to)
     in_c = InC(compiled(texts, ["-O0"]), "nasty", content.values)
@@ -204,10 +204,10 @@ def test_names_of_parts_and_integrals(compiled: Any, tmp_path: Path) -> None:
 def test_names_of_models(name: str, compiled: Any, tmp_path: Path) -> None:
     module = module_of("signal", ["step", "sample", "OK"], tmp_path)
     model = model_of(module, name, integrals={"grown": "filled"})
-    files = c(model, tmp_path / "made", STEP, parameters=numbers_of(module))
+    files = c(Machine(model, numbers_of(module)), tmp_path / "made", STEP)
     sources = {file.name: file.read_text("utf-8") for file in files}
     compiled(sources, ["-O0", "-I."], program="example")
     header = next(file for file in sources if file.endswith(".h") and "_values" not in file)
     read_as_cpp(sources[header], tmp_path)
-    content = content_of(model, STEP, parameters=numbers_of(module))  # as an FMU has it
+    content = content_of(Machine(model, numbers_of(module)), STEP)  # as an FMU has it
     compiled(interface(content.exported), ["-O0"])

@@ -17,6 +17,7 @@ from tests.marks import rest_slow
 from swashplate import Drive
 from swashplate.drive import drive_instance
 from swashplate.equations import (
+    Machine,
     Model,
     Tap,
     discretised,
@@ -132,9 +133,9 @@ INPUTS = {"pumped": PUMPED, "outside": 0.1 + 0.05 * np.cos(np.arange(400) / 30.0
 NAMES = ("head", "steps", "level", "flow", "drained")
 
 
-def exported(model: Model, compiled: Any, rate: float, **numbers: Any) -> InC:
-    content = content_of(model, 1.0 / rate, prefix=model.name, **numbers)
-    return InC(compiled(interface(content.exported)), model.name, content.values)
+def exported(machine: Machine, compiled: Any, rate: float) -> InC:
+    content = content_of(machine, 1.0 / rate, prefix=machine.name)
+    return InC(compiled(interface(content.exported)), machine.name, content.values)
 
 
 @pytest.mark.parametrize(
@@ -143,8 +144,8 @@ def exported(model: Model, compiled: Any, rate: float, **numbers: Any) -> InC:
 def test_roots_tables_loops_and_options_have_the_bits_of_the_march(
     options: Ways, compiled: Any
 ) -> None:
-    run = simulate(tank, NUMBERS, INPUTS, RATE, options=options, given=AROUND)
-    model = exported(tank, compiled, RATE, parameters=NUMBERS, given=AROUND)
+    run = simulate(Machine(tank, NUMBERS, options=options, given=AROUND), INPUTS, RATE)
+    model = exported(Machine(tank, NUMBERS, given=AROUND), compiled, RATE)
     for name in ("rough", "stepped"):
         number = model.number("_option", name)
         assert model.set_option(number, getattr(options, name) is not None) == 0
@@ -211,8 +212,8 @@ MODELS = {
 @pytest.mark.parametrize("case", MODELS.values(), ids=MODELS)
 def test_a_model_has_the_bits_of_its_march(case: Any, compiled: Any) -> None:
     model, numbers, given, name, command, outputs = case
-    run = simulate(model, numbers, {name: command}, RATE, given=given)
-    found = exported(model, compiled, RATE, parameters=numbers, given=given)
+    run = simulate(Machine(model, numbers, given=given), {name: command}, RATE)
+    found = exported(Machine(model, numbers, given=given), compiled, RATE)
     for output, values in found.run(command, outputs.split()).items():
         assert np.ptp(values) > 0.1, output
         assert (run[output] == values).all(), output
@@ -261,8 +262,8 @@ def test_what_an_option_has_made_is_there_when_it_is_asked_again(
     options: Twice, compiled: Any
 ) -> None:
     model = Model("twice", Lag, Place, twice, options=Twice)
-    run = simulate(model, Lag(0.3), {"command": PUMPED}, RATE, options=options)
-    made = exported(model, compiled, RATE, parameters=Lag(0.3), options=options)
+    run = simulate(Machine(model, Lag(0.3), options=options), {"command": PUMPED}, RATE)
+    made = exported(Machine(model, Lag(0.3), options=options), compiled, RATE)
     assert (made.run(PUMPED, ["place"])["place"] == run["place"]).all()
     assert np.ptp(run["place"]) > 0.1
 
@@ -272,8 +273,8 @@ def test_a_constant_that_is_no_number_where_it_is_not_needed_is_none_of_the_numb
 ) -> None:
     """0/0 of parameters, on the side of a branch that is not taken."""
     model = Model("guarded", Gap, Place, guarded)
-    run = simulate(model, Gap(0.0, 0.0), {"command": PUMPED}, RATE)
-    made = exported(model, compiled, RATE, parameters=Gap(0.0, 0.0))
+    run = simulate(Machine(model, Gap(0.0, 0.0)), {"command": PUMPED}, RATE)
+    made = exported(Machine(model, Gap(0.0, 0.0)), compiled, RATE)
     assert (made.run(PUMPED, ["place"])["place"] == run["place"]).all()
 
 
@@ -291,13 +292,13 @@ def guarded(state: Place, command: float, p: Gap) -> Place:
 
 
 def test_a_domain_that_is_left_is_said(compiled: Any) -> None:
-    model = exported(tank, compiled, RATE, parameters=NUMBERS, given=Around(99.0))
+    model = exported(Machine(tank, NUMBERS, given=Around(99.0)), compiled, RATE)
     assert 4 in [model.step(200.0) for _ in range(100)]
     assert model.step(float("nan")) == 1
 
 
 def test_limits_are_bits(compiled: Any) -> None:
-    model = exported(tank, compiled, RATE, parameters=NUMBERS, given=AROUND)
+    model = exported(Machine(tank, NUMBERS, given=AROUND), compiled, RATE)
     seen = set()
     for pumped in [3.0] * 60 + [-9.0] * 60:
         assert model.step(pumped) == 0
@@ -325,10 +326,9 @@ def test_an_fmu_of_a_model_has_the_bits_of_its_march(
     fmi: Any, tmp_path: Path, machine: list[str]
 ) -> None:
     fmpy = pytest.importorskip("fmpy")
-    path = fmu(
-        tank, tmp_path / "tank.fmu", fmi=fmi, step=1.0 / FINE, platforms=machine,
-        parameters=NUMBERS, options=Ways(stepped=True), given=AROUND,
-    )  # fmt: skip
+    tank_of_numbers = Machine(tank, NUMBERS, options=Ways(stepped=True), given=AROUND)
+    to = tmp_path / "tank.fmu"
+    path = fmu(tank_of_numbers, to, fmi=fmi, step=1.0 / FINE, platforms=machine)
     from fmpy.validation import validate_fmu
 
     assert validate_fmu(str(path)) == []
@@ -341,7 +341,7 @@ def test_an_fmu_of_a_model_has_the_bits_of_its_march(
     columns = {"time": np.arange(400) / FINE, **INPUTS}
     signals = np.rec.fromarrays(list(columns.values()), names=list(columns))
     for options in (Ways(stepped=True), Ways(True, True)):
-        run = simulate(tank, NUMBERS, INPUTS, FINE, options=options, given=AROUND)
+        run = simulate(Machine(tank, NUMBERS, options=options, given=AROUND), INPUTS, FINE)
         found = fmpy.simulate_fmu(
             str(path), stop_time=399.0 / FINE, output_interval=1.0 / FINE, input=signals,
             output=NAMES, start_values={"rough": options.rough is not None},
@@ -409,17 +409,15 @@ def test_an_fmu_of_two_drives_on_one_load_has_the_bits_of_its_march(
     parts = drive_instance(Drive.preset("hoist").parameters, by_voltage=True).parts
     winch = drive.parameters(*(part.p for part in parts))
     options = drive.options(*(part.options for part in parts))
-    numbers = {
-        "parameters": tug.parameters(winch, winch, Barge()),
-        "options": tug.options(options, options),
-    }
-    path = fmu(tug, tmp_path / "tug.fmu", step=1.0 / 512.0, platforms=machine, **numbers)
+    both = tug.options(options, options)
+    tugging = Machine(tug, tug.parameters(winch, winch, Barge()), options=both)
+    path = fmu(tugging, tmp_path / "tug.fmu", step=1.0 / 512.0, platforms=machine)
     time = np.arange(1500) / 512.0
     inputs = {
         "port.voltage": np.where(time > 0.2, 6.0, 0.0),
         "starboard.voltage": np.where(time > 0.5, 5.0, 0.0),
     }
-    run = simulate(tug, numbers["parameters"], inputs, 512.0, options=numbers["options"])
+    run = simulate(tugging, inputs, 512.0)
     columns = {"time": time, **inputs}
     signals = np.rec.fromarrays(list(columns.values()), names=list(columns))
     names = ["barge.position", "barge.port_pull", "port.shaft_position", "starboard.shaft_speed"]
@@ -436,11 +434,11 @@ def test_an_fmu_of_two_drives_on_one_load_has_the_bits_of_its_march(
 def test_webassembly_of_a_model_has_the_bits_of_its_march(tmp_path: Path) -> None:
     if not libraries.has_zig():
         pytest.skip("ziglang is not installed")
-    numbers = {"parameters": NUMBERS, "given": AROUND}
-    page = Page(wasm(tank, tmp_path / "a.wasm", step=1.0 / RATE, **numbers))
-    names = content_of(tank, 1.0 / RATE, **numbers).exported.names
+    machine = Machine(tank, NUMBERS, given=AROUND)
+    page = Page(wasm(machine, tmp_path / "a.wasm", step=1.0 / RATE))
+    names = content_of(machine, 1.0 / RATE).exported.names
     found = page.run([PUMPED], 1.0 / RATE, [names.index(each) for each in NAMES])
-    run = simulate(tank, NUMBERS, {"pumped": PUMPED}, RATE, given=AROUND)
+    run = simulate(Machine(tank, NUMBERS, given=AROUND), {"pumped": PUMPED}, RATE)
     for name, values in zip(NAMES, found, strict=True):
         assert (values == run[name]).all(), name
     assert page.call("run", 1) == 1  # it has no equation for a settled start
@@ -468,7 +466,7 @@ def test_webassembly_says_what_overflows_and_takes_no_place_beyond_its_rows(
 def test_a_folder_of_c_compiles_and_runs(compiled: Any, hoist: Drive, tmp_path: Path) -> None:
     for what, numbers, steady in (
         (hoist.renamed("2-axis"), {}, hoist.steady_speed(9.0)),
-        (valve, {"step": 0.01, "parameters": P, "given": STROKE}, None),
+        (Machine(valve, P, given=STROKE), {"step": 0.01}, None),
     ):
         files = c(what, tmp_path / what.name, **numbers)
         sources = {file.name: file.read_text("utf-8") for file in files}
@@ -497,10 +495,10 @@ def register_step(state: Register, double: float, short: float, p: Lag, h: float
 @pytest.mark.slow
 def test_names_that_c_keeps_for_itself(compiled: Any, tmp_path: Path) -> None:
     model = Model("volatile", Lag, Register, register_step)
-    files = c(model, tmp_path, 0.01, parameters=Lag(0.5))
+    files = c(Machine(model, Lag(0.5)), tmp_path, 0.01)
     program = compiled({each.name: each.read_text("utf-8") for each in files}, program="example")
     printed = subprocess.run([program], capture_output=True, text=True, check=True).stdout
-    run = simulate(model, Lag(0.5), {"double": np.ones(201), "short": 1.0}, 100.0)
+    run = simulate(Machine(model, Lag(0.5)), {"double": np.ones(201), "short": 1.0}, 100.0)
     last = [float(line.split()[1]) for line in printed.splitlines()]
     np.testing.assert_allclose(last, run["register"][::10], rtol=1e-8)
 

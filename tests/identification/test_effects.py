@@ -11,7 +11,7 @@ from tests.identification.test_own_model import FREE, OWN, TRUTH, trial, valve
 
 from swashplate import Campaign, Drive, Experiment, ParameterError
 from swashplate.campaign import Accuracy, resolution_of_inputs
-from swashplate.equations import simulate
+from swashplate.equations import Machine, simulate
 from swashplate.identification import ModelSetup, StageFit, estimates_of, fit, uncertainty_of
 from swashplate.identification.statistics.effects import after_play, changes_of
 from swashplate.maneuvers import source_tests
@@ -208,7 +208,9 @@ def scaled_runs(random: np.random.Generator, count: int, deviation: float) -> li
         whole = trial(f"run {number}")
         gain = TRUTH.gain * (1.0 + deviation * random.standard_normal())
         inputs = {"command": whole.input.values}
-        position = simulate(valve, TRUTH._replace(gain=gain), inputs, 20.0, given=OWN.given)
+        position = simulate(
+            Machine(valve, TRUTH._replace(gain=gain), given=OWN.given), inputs, 20.0
+        )
         values = position["position"] + random.normal(0.0, 0.002, whole.input.values.size)
         channel = replace(whole["position"], values=values, accuracy=Accuracy())
         runs.append(replace(whole, channels={"position": channel}))

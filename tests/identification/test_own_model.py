@@ -22,7 +22,7 @@ from swashplate import (
     InputError,
     ParameterError,
 )
-from swashplate.equations import Definition, Model, Tap, equation, simulate
+from swashplate.equations import Definition, Machine, Model, Tap, equation, simulate
 from swashplate.executors import Processes
 from swashplate.identification import (
     Identification,
@@ -96,7 +96,9 @@ OWN = UserModel(valve, given=Load())
 
 def trial(name: str, load: Load = Load(), begin: float = 0.0, **channels: np.ndarray) -> Experiment:  # noqa: B008
     """A run of the true valve."""
-    run = simulate(valve, TRUTH, {"command": COMMAND}, RATE, given=load, begin={"position": begin})
+    run = simulate(
+        Machine(valve, TRUTH, given=load), {"command": COMMAND}, RATE, begin={"position": begin}
+    )
     channels = {"position": run["position"], **channels}
     return run_of(name, COMMAND, channels, time=TIME, kind="other", hold="previous")
 
@@ -161,7 +163,9 @@ def test_uneven_stamps_are_put_on_a_grid(hold: str) -> None:
     channels = {"position": np.zeros(time.size)}
     run = run_of("a", np.sin(2.0 * time), channels, time=time, kind="other", hold=hold)
     fine = np.arange(int(time[-1] * 200.0) + 1) / 200.0
-    level = simulate(valve, TRUTH, {"command": run.input.at(fine)}, 200.0, given=Load())["position"]
+    level = simulate(Machine(valve, TRUTH, given=Load()), {"command": run.input.at(fine)}, 200.0)[
+        "position"
+    ]
     run = moved(run, np.interp(time, fine, level))
     values = found(problem(UserModel(valve, given=Load(), rate=200.0), run))
     assert values == pytest.approx(TRUTH._asdict(), rel=1e-3)
@@ -179,7 +183,7 @@ def lagging(state: Rod, command: float, p: Valve, h: float) -> Rod:
 def test_sub_steps_of_a_fit_are_those_of_a_simulation(hold) -> None:
     coarse = Model("coarse", Valve, Rod, equation(lagging))
     way = {"interpolation": hold, "substeps": 3}
-    made = simulate(coarse, TRUTH, {"command": COMMAND}, RATE, **way)["position"]
+    made = simulate(Machine(coarse, TRUTH), {"command": COMMAND}, RATE, **way)["position"]
     run = moved(trial("a"), made)
     run = replace(run, input=replace(run.input, interpolation=hold))
     expected = {"lag": TRUTH.lag, "gain": TRUTH.gain}
@@ -205,7 +209,7 @@ def test_a_channel_that_is_an_input_is_what_its_campaign_says_between_samples(ho
     held = np.repeat(load, 5)[: TIME.size]
     between = held if hold == "previous" else np.interp(TIME, TIME[slow], load)
     inputs = {"command": COMMAND, "load": between}
-    expected = simulate(model, TRUTH, inputs, RATE)["position"]
+    expected = simulate(Machine(model, TRUTH), inputs, RATE)["position"]
     made = UserModel(model).simulate(TRUTH._asdict(), run)["position"]
     assert made == pytest.approx(expected, abs=1e-12)
 
@@ -306,7 +310,9 @@ def run(name: str, seed: int, *, begin: float = 0.0, role: str = "fit") -> Exper
     command = np.repeat(random.uniform(-1.0, 1.0, COUNT // 20), 20)
     supply = 1.0 + 0.2 * np.sin(0.9 * time + seed)
     given, how = {"command": command, "supply": supply}, {"interpolation": "previous"}
-    place = simulate(servo, Servo(GAIN, LAG), given, 50.0, begin={"place": begin}, **how)["place"]
+    place = simulate(Machine(servo, Servo(GAIN, LAG)), given, 50.0, begin={"place": begin}, **how)[
+        "place"
+    ]
     channels = {"place": place + 0.01 * random.standard_normal(COUNT), "supply": supply}
     return run_of(name, command, channels, time=time, kind="other", hold="previous", role=role)
 

@@ -9,7 +9,7 @@ import pytest
 
 from swashplate import DomainError, Drive, InputError
 from swashplate.drive import drive_instance
-from swashplate.equations import Instance, Model, Tap, discretised, equation, instance_of, join
+from swashplate.equations import Machine, Model, Tap, discretised, equation, join
 from swashplate.equations.marching import PartNumbers, SignalId, marched
 from swashplate.linear import LinearModel, linearize
 
@@ -89,9 +89,9 @@ rod = Model("rod", parameters=Rod, state=Place, step=rod_step)
 VALVE = Valve(0.05, 2.0, 3.0, 0.0237)
 
 
-def machine(hold: str = "linear") -> Instance:
+def machine(hold: str = "linear") -> Machine:
     whole = join("machine", valve(hold), rod, links={"doubled": twice})
-    return Instance(whole, (PartNumbers(VALVE), PartNumbers(Rod(0.5))), "mine")
+    return Machine.of_parts(whole, (PartNumbers(VALVE), PartNumbers(Rod(0.5))), "mine")
 
 
 @pytest.mark.parametrize("hold", ["linear", "previous", "mean"])
@@ -132,7 +132,7 @@ def test_a_machine_of_one_s_own(hold: str) -> None:
 
 
 def test_feedthrough_and_the_settled_state() -> None:
-    instance = Instance(valve("linear"), (PartNumbers(VALVE._replace(delay=0.0)),), "mine")
+    instance = Machine.of_parts(valve("linear"), (PartNumbers(VALVE._replace(delay=0.0)),), "mine")
     model = linearize(instance, {"command": 0.2}, RATE)
     assert model.outputs == ("flow", "opening")
     np.testing.assert_allclose(model.D[:, 0], [0.1, 0.0])
@@ -164,7 +164,7 @@ def table(rates: Callable[..., Table], lag: float, outputs: tuple[str, ...]) -> 
     model = Model("table", parameters=Lag, state=Table, step=discretised(rates, "euler"))
     states = (Table(0.0, 0.0),)
     return linearize(
-        instance_of(model, Lag(lag)), {"command": 0.0}, RATE, states=states, outputs=outputs
+        Machine(model, Lag(lag)), {"command": 0.0}, RATE, states=states, outputs=outputs
     )
 
 
@@ -214,7 +214,7 @@ def test_two_integrators_need_a_lead() -> None:
 
 
 def test_refusals() -> None:
-    alone = Instance(valve("linear"), (PartNumbers(VALVE),), "mine")
+    alone = Machine.of_parts(valve("linear"), (PartNumbers(VALVE),), "mine")
     with pytest.raises(InputError, match="'wind' .* input"):
         linearize(alone, {"command": 0.2}, RATE, inputs=("wind",))
     with pytest.raises(DomainError, match="the valve is wide open under this operating point"):

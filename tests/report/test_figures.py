@@ -30,7 +30,7 @@ from swashplate.analysis import (
     trial_of,
     what_if,
 )
-from swashplate.equations import Definition, Model, Run, discretised, equation, simulate
+from swashplate.equations import Definition, Machine, Model, Run, discretised, equation, simulate
 from swashplate.full_order import compare
 from swashplate.report import figures
 from swashplate.report.figures import plot_simulation, save_figure
@@ -403,7 +403,7 @@ SHAKER = Model(
 
 def shaken(**changes: object) -> Run:
     command = maneuvers.sine(5.0, 0.4)
-    return simulate(replace(SHAKER, **changes), Masses(), {"force": command}, 100.0)
+    return simulate(Machine(replace(SHAKER, **changes), Masses()), {"force": command}, 100.0)
 
 
 def levels(ax: Axes) -> list[float]:
@@ -468,7 +468,7 @@ def test_few_signals_of_a_user_defined_model_stand_in_one_column(assert_legible)
     assert (ax.get_ylabel(), ax.get_xlabel()) == ("chamber pressure (bar)", "time (s)")
     # a column of a table has a name, too, but is not a maneuver
     column = pl.Series("force", run["force"])
-    again = simulate(SHAKER, Masses(), {"force": column}, 100.0)
+    again = simulate(Machine(SHAKER, Masses()), {"force": column}, 100.0)
     assert again.title == "shaker"
     np.testing.assert_array_equal(again["pressure"], run["pressure"])
 
@@ -485,5 +485,5 @@ def test_a_model_whose_types_only_a_function_knows_is_shown_by_its_names() -> No
         return Level(state.level + h * p.gain * inflow)
 
     tank = Model("tank", Gain, Level, filled)
-    figure = simulate(tank, Gain(2.0), {"inflow": np.ones(9)}, 10.0).plot()
+    figure = simulate(Machine(tank, Gain(2.0)), {"inflow": np.ones(9)}, 10.0).plot()
     assert labels(figure) == ["inflow", "level"]

@@ -12,10 +12,10 @@ from swashplate import Drive, PhysicalSet
 from swashplate.equations import tuple_from
 from swashplate.models import displacement_control, machine, pump, refinements
 from swashplate.models.displacement_control import Pump
-from swashplate.models.machine import Machine
+from swashplate.models.machine import Hydrostat
 
 PUMP = tuple_from(Pump, Drive.preset("hoist").parameters.numbers)
-MACHINE = Machine(**PhysicalSet.preset("hoist").numbers)
+MACHINE = Hydrostat(**PhysicalSet.preset("hoist").numbers)
 PUMPING = MACHINE.pumping_area * MACHINE.pumping_arm
 OPEN = dict.fromkeys(("spool_stroke", "orifice_opening_plus", "orifice_opening_minus"), inf)
 

@@ -14,7 +14,7 @@ from swashplate.full_order import QUANTITIES, FullOrderDrive, PhysicalSet
 from swashplate.models import displacement_control as control
 from swashplate.models import machine
 from swashplate.models.displacement_control import Pump
-from swashplate.models.machine import Machine
+from swashplate.models.machine import Hydrostat
 from swashplate.parameters import CATALOGUE
 
 LOADED = PhysicalSet.preset("hoist").replace(load_torque=4000.0, motor_leakage=1e-6)
@@ -45,7 +45,7 @@ def test_eq_6_56_to_6_70_and_erratum_20_lumps() -> None:
     n = LOADED.numbers
     found = LOADED.to_lumped()
     expected = lumps(SimpleNamespace(**{key: n.get(name) for key, name in SYMBOLS.items()}))
-    P0 = machine.static_pressure(Machine(**n))
+    P0 = machine.static_pressure(Hydrostat(**n))
     expected["Z9"] -= P0
     expected["Z2"] -= expected["Z1"] * P0
     assert {each: found[each] for each in expected} == pytest.approx(expected, abs=1e-15)
@@ -70,7 +70,7 @@ def test_eq_6_61_to_6_68_and_erratum_15_the_plate_follows_the_pressure(changes: 
     Without leakage a static load enters as Z9 = ΔP - P0 and nowhere else, which counts it once.
     """
     physical = PhysicalSet.preset("hoist").replace(**changes)
-    p = Machine(**physical.numbers)
+    p = Hydrostat(**physical.numbers)
     open_valve = p._replace(spool_stroke=1.0, orifice_opening_plus=1.0, orifice_opening_minus=1.0)
     Z = physical.to_lumped()
     oil, flow, speed, static = (
@@ -90,7 +90,7 @@ def test_eq_6_61_to_6_68_and_erratum_15_the_plate_follows_the_pressure(changes: 
 def test_erratum_15_eq_6_65_the_valve_feeds_the_leak_at_rest() -> None:
     """K_L B P0/V = C_o B/V √((ΔP - P0)/2) x0, printed with a β and without B on the left."""
     n = LOADED.replace(piston_leakage=3e-12).numbers
-    p = Machine(**n)
+    p = Hydrostat(**n)
     P0 = machine.static_pressure(p)
     x0 = n["piston_leakage"] * P0 / n["valve_flow_gain"] / sqrt((n["supply_pressure"] - P0) / 2.0)
     fed = machine.valve_flow(x0, P0, p, None)

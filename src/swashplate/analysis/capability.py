@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.drive import Drive, drive_instance
-from swashplate.equations import Instance, with_replacements
+from swashplate.equations import Machine, with_replacements
 from swashplate.equations.marching import SOURCE_RATE, PartNumbers, called
 from swashplate.models.displacement_control import PumpOptions, pressure_limits
 from swashplate.models.pump import PumpState
@@ -186,7 +186,7 @@ def _curve(drive: Drive, voltage: float, pressure: Array) -> AccelerationCurve:
     leaks = options.leakage if options.line is None else options.line
     forms = PumpOptions(symmetric=options.symmetric, steep=options.steep, leakage=leaks)
     standing_load = PartNumbers(p._replace(Z12=0.0, load_inertia=0.0), forms)
-    instance = Instance(instance.model, (front, standing_load), instance.name)
+    instance = Machine.of_parts(instance.model, (front, standing_load), instance.name)
     arguments = instance.start({"current": drive.steady_current(voltage)}, 1.0).arguments[1]
     pump: Any = instance.model.parts[1]
     samples = [

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 
 from swashplate.campaign.experiment import Channel
 from swashplate.campaign.samples import Array, interpolate_counts, signal, stamps_of
-from swashplate.equations import Model, equation, simulate
+from swashplate.equations import Machine, Model, equation, simulate
 from swashplate.errors import InputError
 
 LOW_PASS = 2.0 * np.pi * 10.0
@@ -106,7 +106,7 @@ def speed_from_angle(time: ArrayLike, angle: ArrayLike) -> Array:
         "first": np.append(np.exp(-LOW_PASS * intervals), 0.0),
         "second": np.append(np.exp(-DIFFERENTIATOR * intervals), 0.0),
     }
-    return np.array(simulate(low_passes, NoParameters(), records, RATE)["differentiated"])
+    return np.array(simulate(Machine(low_passes, NoParameters()), records, RATE)["differentiated"])
 
 
 class NoParameters(NamedTuple):

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from swashplate.campaign import Channel, Experiment, InputSignal
 from swashplate.drafting.plain_drive import MODEL, JumpWidth, PlainDrive
-from swashplate.equations import Instance, instance_of
+from swashplate.equations import Machine
 from swashplate.equations.marching import (
     ObservedRecord,
     Record,
@@ -174,10 +174,10 @@ class MovingRun(NamedTuple):
     """Resolution of the way, 0 if it is fine."""
 
 
-def _model(run: MovingRun, numbers: Array) -> tuple[Instance, RunValues]:
+def _model(run: MovingRun, numbers: Array) -> tuple[Machine, RunValues]:
     """The plain drive with numbers, and the speed that it begins with."""
     finite = PlainDrive(*np.minimum(numbers[:DELAY], UNLIMITED).tolist())
-    instance = instance_of(MODEL, finite, given=JumpWidth(run.edge))
+    instance = Machine(MODEL, finite, given=JumpWidth(run.edge))
     return instance, RunValues({"speed": run.start})
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import ceil, isfinite
 from typing import Any
 
@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.drive.instance import card_of, drive_instance, models_of, without_ripple
-from swashplate.equations import is_real, with_replacements
+from swashplate.equations import Machine, is_real, with_replacements
 from swashplate.equations.marching import SOURCE_RATE, InitialStates, SignalId, called, marched
 from swashplate.errors import DomainError, InputError
 from swashplate.models.displacement_control import moment_sine, solenoid_force
@@ -33,7 +33,8 @@ DECIMALS = 4
 def steady_states(parameters: ParameterSet, voltage: Array) -> tuple[Array, Array]:
     """Signed current [A] and speed [rad/s] that each of many constant voltages settles at."""
     instance = without_ripple(drive_instance(parameters, by_voltage=True))
-    settled = replace(instance, model=models_of(parameters.equations).settled_drive)
+    drive = models_of(parameters.equations).settled_drive
+    settled = Machine.of_parts(drive, instance.parts, instance.name)
     stored = (SignalId(0, "signals", "current"), SignalId(1, "signals", "shaft_speed"))
     initial = InitialStates((), {"voltage": 0.0}, ())
     current, speed = marched(settled, {"voltage": voltage}, 1.0, initial, stored)

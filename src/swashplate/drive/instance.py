@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.equations import (
-    Instance,
+    Machine,
     Model,
     Replacement,
     check_members,
@@ -137,7 +137,7 @@ def pump_options(parameters: ParameterSet) -> PumpOptions:
 
 
 @lru_cache(maxsize=256)
-def drive_instance(parameters: ParameterSet, *, by_voltage: bool) -> Instance:
+def drive_instance(parameters: ParameterSet, *, by_voltage: bool) -> Machine:
     """A parameter set as a model with numbers.
 
     Parameters
@@ -150,16 +150,18 @@ def drive_instance(parameters: ParameterSet, *, by_voltage: bool) -> Instance:
     pump = PartNumbers(pump_of(parameters), pump_options(parameters))
     if by_voltage:
         card = PartNumbers(card_of(parameters), card_options(parameters))
-        return Instance(models_of(parameters.equations).drive, (card, pump), parameters.name)
+        return Machine.of_parts(
+            models_of(parameters.equations).drive, (card, pump), parameters.name
+        )
     model = models_of(parameters.equations).pump_drive
-    return Instance(model, (PartNumbers(CurrentSource()), pump), parameters.name)
+    return Machine.of_parts(model, (PartNumbers(CurrentSource()), pump), parameters.name)
 
 
-def without_ripple(instance: Instance) -> Instance:
+def without_ripple(instance: Machine) -> Machine:
     """The drive at the mean of a turn: the cam ring's ripple does not change it."""
     card, pump = instance.parts
     smooth = pump._replace(options=pump.options._replace(ripple=None))
-    return Instance(instance.model, (card, smooth), instance.name)
+    return Machine.of_parts(instance.model, (card, smooth), instance.name)
 
 
 def filter_step_limit(zeta: ArrayLike, exact: bool) -> Array:

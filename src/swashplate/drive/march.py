@@ -11,7 +11,7 @@ import numpy as np
 from swashplate.drive.instance import check_filter_stability, drive_instance
 from swashplate.drive.records import INPUT_RANGES
 from swashplate.drive.simulation import Simulation
-from swashplate.equations import Instance, Stepper, with_replacements
+from swashplate.equations import Machine, Stepper, with_replacements
 from swashplate.equations.marching import Interpolation, Record, Start, least_substeps
 from swashplate.errors import DomainError, InputError
 from swashplate.models.displacement_control import pressure_limits
@@ -38,7 +38,7 @@ def simulate_drive(
     return run.marched()
 
 
-def start_states(instance: Instance, pressure: float) -> dict[str, float]:
+def start_states(instance: Machine, pressure: float) -> dict[str, float]:
     """Initial values of the pump's states that a pressure at the start determines, by path. [Pa]"""
     if not np.isfinite(pressure):
         raise InputError(f"The pressure at the start must be a finite number, not {pressure}.")

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from swashplate.drive.equilibrium import OperatingPoint
 from swashplate.drive.instance import drive_instance, models_of, without_ripple
-from swashplate.equations import Instance, with_replacements
+from swashplate.equations import Machine, with_replacements
 from swashplate.equations.marching import SOURCE_RATE, called
 from swashplate.linear import LinearModel, Matrices, linearize
 from swashplate.models.amplifier import Card
@@ -110,7 +110,7 @@ def small_motion_model(
         at = {"current": point.solenoid_force}
     p, options, _ = machine
     at |= {"load_torque": p.load_torque, "pump_speed": p.pump_speed, "supply_pressure": p.Z9}
-    instance = Instance(instance.model, (front, machine), instance.name)
+    instance = Machine.of_parts(instance.model, (front, machine), instance.name)
 
     # a pump that has stood for a sample
     standing = instance.start(at, step or 1.0 / SOURCE_RATE, "steady").arguments[1]
@@ -124,7 +124,7 @@ def small_motion_model(
     if rate is None:
         models = models_of(parameters.equations)
         flowing = models.flowing_drive if by_voltage else models.flowing_pump_drive
-        instance = replace(instance, model=flowing)
+        instance = Machine.of_parts(flowing, instance.parts, instance.name)
     card_state = instance.start(at, step, "steady").states[0]
     model = linearize(
         instance,

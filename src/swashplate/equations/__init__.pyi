@@ -37,8 +37,7 @@ from .library import small_arctangent as small_arctangent
 from .library import soft_threshold as soft_threshold
 from .marching.derivatives import BoundModel as BoundModel
 from .marching.lanes import vectorisation_report as vectorisation_report
-from .marching.run import Instance as Instance
-from .marching.run import instance_of as instance_of
+from .marching.run import Machine as Machine
 from .marching.sensitivity import Sensitivities as Sensitivities
 from .marching.sensitivity import sensitivities as sensitivities
 from .marching.simulation import Run as Run

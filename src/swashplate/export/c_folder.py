@@ -23,7 +23,7 @@ from swashplate.drive import (
     drive_instance,
     models_of,
 )
-from swashplate.equations import Instance, Model, declared_by, instance_of
+from swashplate.equations import Machine, Model, declared_by
 from swashplate.equations.code_generation import (
     c_comment,
     c_literal,
@@ -123,7 +123,7 @@ class Content:
     """A drive, or a user-defined model, with its numbers, as it is exported."""
 
     exported: Exported
-    instance: Instance
+    instance: Machine
     values: Array
     """Numbers that its ``init`` takes."""
     name: str
@@ -149,19 +149,11 @@ class Content:
         return (f"_{name}" if name[0].isdigit() else name)[:LONGEST_IDENTIFIER]
 
 
-def content_of(
-    what: Drive | Model,
-    step: float,
-    *,
-    parameters: Any = None,
-    options: Any = None,
-    given: Any = None,
-    prefix: str = "swp",
-) -> Content:
-    """What is exported of a drive, or of a user-defined model with its numbers.
+def content_of(what: Drive | Machine, step: float, *, prefix: str = "swp") -> Content:
+    """What is exported of a drive, or of a machine.
 
-    Functions of the latter begin with `prefix`; the other arguments are those of `c`. A drive's
-    recursion for another rate becomes its equation, with a warning.
+    Functions of the latter begin with `prefix`. A drive's recursion for another rate becomes its
+    equation, with a warning.
 
     Raises
     ------
@@ -190,13 +182,12 @@ def content_of(
         references = DRIVE
         descriptions = DRIVE_DESCRIPTIONS
     else:
-        if not isinstance(what, Model):
+        if not isinstance(what, Machine):
             raise InputTypeError(
-                f"{what!r} cannot be exported: give a Drive or a Model of equations"
-                f"{_nearest(what)}."
+                f"{what!r} cannot be exported: give a Drive or a Machine{_nearest(what)}."
             )
-        instance = instance_of(what, parameters, options=options, given=given)
-        exported = Exported(what, prefix)
+        instance = what
+        exported = Exported(what.model, prefix)
         title = f"Model {what.name}"
         references = OWN
         descriptions = descriptions_of(exported)
@@ -220,6 +211,8 @@ def _nearest(what: object) -> str:
         return ": Drive(parameters)"
     if isinstance(what, str | Path):
         return ": Drive.preset(NAME) or Drive.from_toml(PATH)"
+    if isinstance(what, Model):
+        return ": Machine(model, parameters)"
     if hasattr(type(what), "drive"):  # an Identification, which stands above this package
         return ": its drive, as in export.fmu(identification.drive, PATH)"
     return ""
@@ -242,27 +235,17 @@ def licence_texts() -> dict[str, str]:
 # --- a folder -------------------------------------------------------------------------------------
 
 
-def c(
-    what: Drive | Model,
-    folder: str | Path,
-    step: float = LONGEST_STEP,
-    *,
-    parameters: Any = None,
-    options: Any = None,
-    given: Any = None,
-) -> list[Path]:
-    """Write C source of a drive, or of a user-defined model, with its numbers.
+def c(what: Drive | Machine, folder: str | Path, step: float = LONGEST_STEP) -> list[Path]:
+    """Write C source of a drive, or of a machine, with its numbers.
 
     Parameters
     ----------
-    what : Drive or Model
+    what : Drive or Machine
         What is exported.
     folder : path
         Where to; made if it is not there. Files of these names are overwritten.
     step : float
         Step of its grid; of a drive at most 1/512. [s]
-    parameters, options, given : named tuple
-        Numbers of a user-defined model, as `swashplate.equations.simulate` takes them.
 
     Returns
     -------
@@ -290,10 +273,8 @@ def c(
     >>> sorted(path.name for path in export.c(Drive.preset("hoist"), "source"))[3:]
     ['hoist_values.h', 'main.c', 'swashplate_drive.c', 'swashplate_drive.h']
     """
-    prefix = c_name(what.name) if isinstance(what, Model) else "swp"
-    content = content_of(
-        what, step, parameters=parameters, options=options, given=given, prefix=prefix
-    )
+    prefix = c_name(what.name) if isinstance(what, Machine) else "swp"
+    content = content_of(what, step, prefix=prefix)
     exported, values, name = content.exported, content.values, content.identifier
     texts = interface(exported)
     placeholders = {
@@ -302,7 +283,9 @@ def c(
         "type": exported.type,
         "p": exported.prefix,
         "P": exported.prefix.upper(),
-        "output": exported.constants[""][exported.names[-1 if isinstance(what, Model) else _SPEED]],
+        "output": exported.constants[""][
+            exported.names[-1 if isinstance(what, Machine) else _SPEED]
+        ],
         "commands": "".join(", 9.0" if s == "voltage" else ", 1.0" for s in exported.signals),
         "step": c_literal(step),
         "version": __version__,

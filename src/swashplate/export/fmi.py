@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from swashplate.__about__ import __version__
 from swashplate.drive import Drive
-from swashplate.equations import Model, value_at
+from swashplate.equations import Machine, value_at
 from swashplate.errors import FileError, InputError
 from swashplate.export.c_folder import (
     LONGEST_STEP,
@@ -73,23 +73,20 @@ _EARLIEST = (1980, 1, 1, 0, 0, 0)
 
 
 def fmu(
-    what: Drive | Model,
+    what: Drive | Machine,
     path: str | Path,
     *,
     fmi: Version = "2.0",
     step: float = LONGEST_STEP,
     platforms: Sequence[str] | None = None,
-    parameters: Any = None,
-    options: Any = None,
-    given: Any = None,
 ) -> Path:
-    """Write a drive, or a user-defined model, as an FMU for co-simulation.
+    """Write a drive, or a machine, as an FMU for co-simulation.
 
     Parameters
     ----------
-    what : Drive or Model
+    what : Drive or Machine
         Whose numbers and forms are the start values. A drive with a user-defined equation, or a
-        model, is compiled, which needs a compiler (extra ``binaries``).
+        machine, is compiled, which needs a compiler (extra ``binaries``).
     path : path
         The file, ``.fmu``; an older one is replaced.
     fmi : {"2.0", "3.0"}
@@ -99,8 +96,6 @@ def fmu(
     platforms : sequence of str, optional
         Of ``"linux64"``, ``"aarch64-linux"``, ``"win64"`` and ``"darwin64"``; by default all, or
         this machine where a C compiler is all that there is.
-    parameters, options, given : named tuple
-        Numbers of a user-defined model, as `swashplate.equations.simulate` takes them.
 
     Returns
     -------
@@ -135,14 +130,14 @@ def fmu(
     if Path(path).suffix.lower() != ".fmu":
         raise InputError(f"{path} must end in .fmu, as importers know it.")
     chosen_platforms(platforms)
-    content = exportable(what, step, parameters=parameters, options=options, given=given)
+    content = exportable(what, step)
     write_bytes(packed(content, fmi, chosen_platforms(platforms, not content.packaged)), path)
     return Path(path)
 
 
-def exportable(what: Drive | Model, step: float, **numbers: Any) -> Content:
+def exportable(what: Drive | Machine, step: float) -> Content:
     """What runs at a step, its delays checked; see `content_of`."""
-    content = content_of(what, step, **numbers)
+    content = content_of(what, step)
     for part_index, _, _, tap in content.exported.taps:
         delay = value_at(content.instance.parts[part_index].p, tap.delay) if tap.delay else 0.0
         if delay > LONGEST_LINE * step:

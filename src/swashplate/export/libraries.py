@@ -22,7 +22,7 @@ from typing import Any, NamedTuple
 
 from swashplate.documents import parse_toml
 from swashplate.drive import Drive
-from swashplate.equations import Model
+from swashplate.equations import Machine
 from swashplate.equations.code_generation import filled
 from swashplate.errors import FileError, InputError
 from swashplate.export.c_folder import (
@@ -204,27 +204,22 @@ LICENSES_SECTION = "swashplate.licenses"
 
 
 def wasm(
-    what: Drive | Model,
+    what: Drive | Machine,
     path: str | Path,
     *,
     step: float = LONGEST_STEP,
-    parameters: Any = None,
-    options: Any = None,
-    given: Any = None,
 ) -> Path:
-    """Write a drive, or a user-defined model, as WebAssembly, with a section of its numbers.
+    """Write a drive, or a machine, as WebAssembly, with a section of its numbers.
 
     Parameters
     ----------
-    what : Drive or Model
-        What is exported. A drive with a user-defined equation, or a model, is compiled, which needs
-        the extra ``binaries``.
+    what : Drive or Machine
+        What is exported. A drive with a user-defined equation, or a machine, is compiled, which
+        needs the extra ``binaries``.
     path : path
         The file; an older one is replaced.
     step : float
         Step of its grid; of a drive at most 1/512. [s]
-    parameters, options, given : named tuple
-        Numbers of a user-defined model.
 
     Returns
     -------
@@ -244,7 +239,7 @@ def wasm(
     >>> export.wasm(Drive.preset("hoist"), "hoist.wasm").name
     'hoist.wasm'
     """
-    content = content_of(what, step, parameters=parameters, options=options, given=given)
+    content = content_of(what, step)
     numbers = content.values.astype("<f8").tobytes()
     code = packaged(WASM) if content.packaged else compiled_wasm(sources(content))
     write_bytes(licensed(code) + _section(VALUES_SECTION, numbers), path)

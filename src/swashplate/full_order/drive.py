@@ -23,7 +23,7 @@ from swashplate.drive import (
     check_filter_stability,
     drive_records,
 )
-from swashplate.equations import BoundModel, Instance, Run, Sensitivities
+from swashplate.equations import BoundModel, Machine, Run, Sensitivities
 from swashplate.equations.marching import (
     SOURCE_RATE,
     Interpolation,
@@ -298,13 +298,13 @@ class FullOrderDrive:
 
     @cached_property
     def plant(self) -> model.Plant:
-        """Machine and solenoids, as the equations take them."""
+        """Hydrostat and solenoids, as the equations take them."""
         numbers = self.drive.parameters.numbers
         return model.Plant(
             self.physical.machine, Solenoids(*(numbers[name] for name in Solenoids._fields))
         )
 
-    def instance(self, step: float, *, substeps: int | None = None, card: bool = True) -> Instance:
+    def instance(self, step: float, *, substeps: int | None = None, card: bool = True) -> Machine:
         """The model with numbers, for the engine; a voltage drives it, or a current without `card`.
 
         `step` is the distance of the samples [s]; `substeps` as in `follow`.
@@ -316,10 +316,10 @@ class FullOrderDrive:
         plant = PartNumbers(self.plant, options, substep_count)
         if not card:
             source = PartNumbers(CurrentSource())
-            return Instance(model.full_machine, (source, plant), self.physical.name)
+            return Machine.of_parts(model.full_machine, (source, plant), self.physical.name)
         check_filter_stability(parameters, step)
         front = PartNumbers(card_of(parameters), card_options(parameters))
-        return Instance(model.full_drive, (front, plant), self.physical.name)
+        return Machine.of_parts(model.full_drive, (front, plant), self.physical.name)
 
     def substeps(self, step: float, requested: int | None = None) -> int:
         """Sub-steps that a step [s] of the record takes.
@@ -470,7 +470,7 @@ class FullOrderDrive:
         instance = self.instance(step, card=False)
         at = {"current": float(current)}
         motion = instance.start(at, step, "steady").states[1].motion
-        flowing = Instance(
+        flowing = Machine.of_parts(
             model.flowing_plant, (PartNumbers(self.plant, instance.options[1]),), self.physical.name
         )
         matrix = linearize(flowing, at, None, states=(motion,), outputs=("swash_angle",)).A

@@ -1,7 +1,7 @@
 """Physical sets: arms, springs, masses, areas, oil and load of one machine, always valid.
 
-The quantities are those that `swashplate.models.machine.Machine` declares. A set is given whole, or
-completed from lumped parameters and a few chosen values.
+The quantities are those that `swashplate.models.machine.Hydrostat` declares. A set is given whole,
+or completed from lumped parameters and a few chosen values.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from swashplate.entries import FormerlyFormat
 from swashplate.equations import Definition, Flag, declared_by
 from swashplate.errors import ParameterError, UnknownParameterError
 from swashplate.models import machine as equations
-from swashplate.models.machine import Machine
+from swashplate.models.machine import Hydrostat
 from swashplate.parameters import (
     AXES,
     Change,
@@ -46,7 +46,7 @@ from swashplate.tables import Column, Table
 from swashplate.units import chosen_unit, unit_text
 
 QUANTITIES: Mapping[str, Definition] = {
-    definition.symbol: definition for definition in declared_by(Machine)
+    definition.symbol: definition for definition in declared_by(Hydrostat)
 }
 """Quantities by name, from the spool to the load."""
 ALTERNATIVE_CHOICE: Mapping[str, str] = {
@@ -146,9 +146,9 @@ class PhysicalSet(Entries):
         return replace(from_lumped(load_parameters(name), name), title=title)
 
     @property
-    def machine(self) -> Machine:
+    def machine(self) -> Hydrostat:
         """The quantities as the equations take them."""
-        return Machine(**self.numbers)
+        return Hydrostat(**self.numbers)
 
     @property
     def air(self) -> Flag:
@@ -250,11 +250,11 @@ def chosen_quantity(name: str) -> Definition:
     return CHOICES[name] if name in CHOICES else quantity_of(name)
 
 
-def _air(machine: Machine) -> Flag:
+def _air(machine: Hydrostat) -> Flag:
     return True if machine.air_fraction > 0.0 else None
 
 
-def _rest(machine: Machine) -> tuple[float, float]:
+def _rest(machine: Hydrostat) -> tuple[float, float]:
     """P0, which holds the load with the plate upright [Pa], and the oil's B/V there [Pa/m³]."""
     pressure = float(equations.static_pressure(machine))
     modulus = equations.oil_modulus(pressure, machine, _air(machine))
@@ -268,12 +268,12 @@ def _check_rules(parameters: Mapping[str, Parameter]) -> Iterator[CheckedRule]:
         for column, value in parameter.numbers.items():
             n[column] = np.array([value])
             yield check_range(parameter.definition, column, n[column])
-    if not n.keys() >= set(Machine._fields):
+    if not n.keys() >= set(Hydrostat._fields):
         return  # not yet completed
     for side in ("plus", "minus"):
         arm_sine = n["swash_arm"] / n["control_arm"] * np.tan(n[f"swash_stop_{side}"])
         yield apply_rule(ARM_TURNS, {"side": side, "arm_sine": arm_sine})
-    rest = equations.static_pressure(Machine(**{k: float(v[0]) for k, v in n.items()}))
+    rest = equations.static_pressure(Hydrostat(**{k: float(v[0]) for k, v in n.items()}))
     ceiling = np.minimum(n["supply_pressure"], n["relief_pressure"])
     yield apply_rule(LOAD_HELD, {"rest": np.array([rest]), "ceiling": ceiling})
 
@@ -386,7 +386,7 @@ def _completed(
             "counted from the one that holds the load (eq. 6.56)."
         )
     # a machine of the chosen values only: fields that are not chosen are 0 and must not be read
-    machine = Machine(*(chosen.get(name, 0.0) for name in Machine._fields))
+    machine = Hydrostat(*(chosen.get(name, 0.0) for name in Hydrostat._fields))
     swash_arm = chosen["swash_arm"]
     area = chosen["piston_area"]
     oil = "oil_volume and bulk_modulus"

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, cast, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swashplate.equations import Instance, is_real
+from swashplate.equations import Machine, is_real
 from swashplate.equations.marching import check_rate, marched, output_of
 from swashplate.errors import DomainError, InputError
 from swashplate.linear.model import LinearModel
@@ -232,7 +232,7 @@ def checked_amplitudes(amplitudes: ArrayLike) -> Array:
 
 
 def sweep(
-    instance: Instance,
+    instance: Machine,
     frequencies: ArrayLike,
     amplitudes: ArrayLike,
     rate: float,
@@ -248,8 +248,8 @@ def sweep(
 
     Parameters
     ----------
-    instance : Instance
-        The model with its numbers, see `swashplate.equations.instance_of`. It must be able to start
+    instance : Machine
+        The model with its numbers, see `swashplate.equations.Machine`. It must be able to start
         settled.
     frequencies : (f,) array_like
         Rising, from 1 mHz to an eighth of the rate. [Hz]
@@ -339,7 +339,7 @@ def sweep(
 
 
 def _cycles(
-    instance: Instance, input: str, output: str, record: Array, step: float, steps: int
+    instance: Machine, input: str, output: str, record: Array, step: float, steps: int
 ) -> Array:
     """Answer from the steady state under the first sample, a row for each cycle."""
     initial = instance.start({input: float(record[0])}, step, "steady")

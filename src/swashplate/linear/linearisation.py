@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.equations import Instance, check_mapping, floats_of, is_real, state_paths, value_at
+from swashplate.equations import Machine, check_mapping, floats_of, is_real, state_paths, value_at
 from swashplate.equations.marching import (
     CodeForm,
     InitialStates,
@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 
 
 def linearize(
-    instance: Instance,
+    instance: Machine,
     at: Mapping[str, float],
     rate: float | None,
     *,
@@ -38,8 +38,8 @@ def linearize(
 
     Parameters
     ----------
-    instance : Instance
-        The model with its numbers, see `swashplate.equations.instance_of`.
+    instance : Machine
+        The model with its numbers, see `swashplate.equations.Machine`.
     at : mapping of str to float
         Constant external signals of the operating point.
     rate : float or None
@@ -73,10 +73,10 @@ def linearize(
     >>> linear.linearize(machine, {"current": 0.5}, 512.0)
     LinearModel('hoist', current to shaft_speed, sampled at 512 Hz)
     """
-    if not isinstance(instance, Instance):
+    if not isinstance(instance, Machine):
         raise InputError(
             f"{instance!r} is not a model with numbers: give "
-            "swashplate.equations.instance_of(model, p)."
+            "swashplate.equations.Machine(model, p)."
         )
     _check_point(instance, at, rate)
     moving = tuple(at if inputs is None else inputs)
@@ -119,7 +119,7 @@ def linearize(
     return _linear_model(instance, initial, rate, moving, requested)
 
 
-def _check_point(instance: Instance, at: Mapping[str, float], rate: float | None) -> None:
+def _check_point(instance: Machine, at: Mapping[str, float], rate: float | None) -> None:
     """Refuse a rate out of range, and constant signals that are not finite numbers."""
     if rate is not None:
         check_rate(rate)
@@ -129,7 +129,7 @@ def _check_point(instance: Instance, at: Mapping[str, float], rate: float | None
             raise InputError(f"{instance.name}: {name} is {value!r}, but must be a finite number.")
 
 
-def _settled_states(instance: Instance, at: Mapping[str, float], h: float) -> list[Any]:
+def _settled_states(instance: Machine, at: Mapping[str, float], h: float) -> list[Any]:
     """State of each part that the model settles at, one sample after the start."""
     model = instance.model
     for part in model.parts:
@@ -159,7 +159,7 @@ def _are(states: Any, kinds: Sequence[Any]) -> bool:
 
 
 def _linear_model(
-    instance: Instance,
+    instance: Machine,
     initial: InitialStates,
     rate: float | None,
     inputs: tuple[str, ...],
@@ -228,7 +228,7 @@ def _linear_model(
     )
 
 
-def _check_domain(instance: Instance, initial: InitialStates) -> None:
+def _check_domain(instance: Machine, initial: InitialStates) -> None:
     """Refuse an operating point outside the domain of one of the model's parts."""
     for part, arguments in zip(instance.model.parts, initial.arguments, strict=True):
         if part.domain is None:
@@ -248,7 +248,7 @@ class InputSample(NamedTuple):
 
 
 def _step_slopes(
-    instance: Instance,
+    instance: Machine,
     initial: InitialStates,
     h: float,
     inputs: tuple[str, ...],

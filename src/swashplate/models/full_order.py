@@ -19,7 +19,7 @@ from swashplate.models.amplifier import card
 from swashplate.models.displacement_control import Solenoids, solenoid_force
 from swashplate.models.drive import AMMETER, POSITION, source
 from swashplate.models.machine import (
-    Machine,
+    Hydrostat,
     ReliefPressures,
     balanced_spool,
     balanced_tangent,
@@ -51,7 +51,7 @@ from swashplate.models.machine import (
 class Plant(NamedTuple):
     """Parameters of everything behind the card."""
 
-    machine: Machine
+    machine: Hydrostat
     solenoids: Solenoids
 
 
@@ -115,7 +115,7 @@ class Rates(NamedTuple):
 
 
 @equation
-def free_rates(state: Motion, force: float, p: Machine, options: PlantOptions) -> Rates:
+def free_rates(state: Motion, force: float, p: Hydrostat, options: PlantOptions) -> Rates:
     """Rates where no limit holds; those of position and angle are velocity and swash rate."""
     tangent = tan(state.swash_angle)
     sine = feedback_sine(tangent, p)

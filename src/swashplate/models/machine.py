@@ -20,8 +20,8 @@ ATMOSPHERE = 101325.0
 """Pressure in the reservoir. [Pa]"""
 
 
-class Machine(NamedTuple):
-    """Physical parameters of a machine, from the spool to the load.
+class Hydrostat(NamedTuple):
+    """Physical parameters of a hydrostatic transmission, from the spool to the load.
 
     Plausible is three decades or more about what the packaged sets have or assume; a mass or an
     inertia may be as small as one likes, towards the model without it.
@@ -108,19 +108,19 @@ class ReliefPressures(NamedTuple):
 
 
 @equation
-def feedback_sine(tangent: float, p: Machine) -> float:
+def feedback_sine(tangent: float, p: Hydrostat) -> float:
     """sin α of the feedback arm, (d4/d3') tan α_sw; Kruse eq. 6.20."""
     return p.swash_arm / p.control_arm * tangent
 
 
 @equation
-def spring_moment(p: Machine) -> float:
+def spring_moment(p: Hydrostat) -> float:
     """k_f d3² of the feedback spring. [N m]"""
     return p.feedback_spring_rate * (p.feedback_spring_arm * p.feedback_spring_arm)
 
 
 @equation
-def feedback_moment(position: float, arm_sine: float, p: Machine) -> float:
+def feedback_moment(position: float, arm_sine: float, p: Hydrostat) -> float:
     """Moment k_f d3² sin(α + β) with which the spring resists the swash plate's arm. [N m]"""
     u = position - p.plussing
     cosine = sqrt(1.0 - arm_sine * arm_sine)
@@ -129,7 +129,7 @@ def feedback_moment(position: float, arm_sine: float, p: Machine) -> float:
 
 
 @equation
-def spool_inertia(position: float, p: Machine) -> float:
+def spool_inertia(position: float, p: Hydrostat) -> float:
     """Inertia of spool and feedback arm against the spool's lever, m_sp D/d1 + J_fa d1/D. [kg m]"""
     u = position - p.plussing
     D = p.spool_arm * p.spool_arm + u * u
@@ -137,7 +137,7 @@ def spool_inertia(position: float, p: Machine) -> float:
 
 
 @equation
-def spool_moment(position: float, force: float, arm_sine: float, p: Machine) -> float:
+def spool_moment(position: float, force: float, arm_sine: float, p: Hydrostat) -> float:
     """Moment of solenoids and feedback spring on the spool's lever; it falls with x. [N m]"""
     u = position - p.plussing
     D = p.spool_arm * p.spool_arm + u * u
@@ -145,7 +145,7 @@ def spool_moment(position: float, force: float, arm_sine: float, p: Machine) -> 
 
 
 @equation
-def spool_resistance(position: float, velocity: float, p: Machine) -> float:
+def spool_resistance(position: float, velocity: float, p: Hydrostat) -> float:
     """Moment that resists the spool's motion, by its velocity, b_sp D/d1 - 2 J_fa d1 u x'/D²."""
     u = position - p.plussing
     D = p.spool_arm * p.spool_arm + u * u
@@ -155,7 +155,7 @@ def spool_resistance(position: float, velocity: float, p: Machine) -> float:
 
 @equation
 def spool_acceleration(
-    position: float, velocity: float, force: float, arm_sine: float, p: Machine
+    position: float, velocity: float, force: float, arm_sine: float, p: Hydrostat
 ) -> float:
     """Acceleration x'' of the spool under the net force F of both solenoids. [m/s²]
 
@@ -172,14 +172,14 @@ def spool_acceleration(
 
 
 @equation
-def valve_opening(position: float, p: Machine) -> float:
+def valve_opening(position: float, p: Hydrostat) -> float:
     """Effective opening x_eff = clip(clip(x, ±x_max), -x_o₋, +x_o₊); Kruse eqs. 6.36, 6.71. [m]"""
     upper = min(p.orifice_opening_plus, p.spool_stroke)
     return clipped(position, -min(p.orifice_opening_minus, p.spool_stroke), upper)
 
 
 @equation
-def valve_flow(position: float, pressure: float, p: Machine, symmetric: Flag) -> float:
+def valve_flow(position: float, pressure: float, p: Hydrostat, symmetric: Flag) -> float:
     """Flow through the valve towards the stroking piston. [m³/s]
 
     q = C_o √((ΔP - σP)/2) x_eff; Kruse eq. 6.31 with the constant gain of eq. 6.37. σ is 1 in the
@@ -191,7 +191,7 @@ def valve_flow(position: float, pressure: float, p: Machine, symmetric: Flag) ->
 
 
 @equation
-def mixture_modulus(pressure: float, p: Machine) -> float:
+def mixture_modulus(pressure: float, p: Hydrostat) -> float:
     """Bulk modulus of oil with free air in it, at an absolute pressure. [Pa]
 
     B (1 + χ p0/p)/(1 + χ p0 B/p²), air compressed at a constant temperature and none of it
@@ -203,7 +203,7 @@ def mixture_modulus(pressure: float, p: Machine) -> float:
 
 
 @equation
-def oil_modulus(pressure: float, p: Machine, air: Flag) -> float:
+def oil_modulus(pressure: float, p: Hydrostat, air: Flag) -> float:
     """Bulk modulus at a stroker pressure P: with air the mean of both ends of the cylinder. [Pa]
 
     Both orifices of the valve drop the same, so that the ends are at p0 + (ΔP ± P)/2 (eqs. 6.26 to
@@ -218,7 +218,7 @@ def oil_modulus(pressure: float, p: Machine, air: Flag) -> float:
 
 @equation
 def oil_pressure_rate(
-    pressure: float, flow: float, piston_speed: float, p: Machine, air: Flag
+    pressure: float, flow: float, piston_speed: float, p: Hydrostat, air: Flag
 ) -> float:
     """Rate of the stroker pressure, (q - K_L P - A_s x_st') B/V; Kruse eqs. 6.32 to 6.35. [Pa/s]"""
     stays = flow - p.piston_leakage * pressure - p.piston_area * piston_speed
@@ -229,19 +229,19 @@ def oil_pressure_rate(
 
 
 @equation
-def plate_lever(tangent: float, p: Machine) -> float:
+def plate_lever(tangent: float, p: Hydrostat) -> float:
     """Lever d4 (1 + tan²α_sw) of the stroking piston, for force as for speed. [m]"""
     return p.swash_arm * (1.0 + tangent * tangent)
 
 
 @equation
-def piston_speed(tangent: float, swash_rate: float, p: Machine) -> float:
+def piston_speed(tangent: float, swash_rate: float, p: Hydrostat) -> float:
     """Speed of the stroking piston, d4 (1 + tan²α_sw) α_sw'; Kruse eq. 6.34. [m/s]"""
     return plate_lever(tangent, p) * swash_rate
 
 
 @equation
-def holding_pressure(tangent: float, motor_pressure: float, p: Machine) -> float:
+def holding_pressure(tangent: float, motor_pressure: float, p: Hydrostat) -> float:
     """Stroker pressure that holds the swash plate where it is. [Pa]
 
     (k_r d4 tan α + (P_hi - P_lo) A_p d5 cos α/(d4 (1 + tan²α)))/A_s; Kruse eq. 6.53.
@@ -254,14 +254,14 @@ def holding_pressure(tangent: float, motor_pressure: float, p: Machine) -> float
 
 
 @equation
-def plate_inertia(tangent: float, p: Machine) -> float:
+def plate_inertia(tangent: float, p: Hydrostat) -> float:
     """Inertia J_sw + m_st d4² (1 + tan²α)² of plate and piston. [kg m²]"""
     lever = plate_lever(tangent, p)
     return p.swash_inertia + p.piston_mass * lever * lever
 
 
 @equation
-def plate_moment(pressure: float, tangent: float, motor_pressure: float, p: Machine) -> float:
+def plate_moment(pressure: float, tangent: float, motor_pressure: float, p: Hydrostat) -> float:
     """Moment of stroking piston, return spring and pumping pistons on the plate. [N m]"""
     # as a difference of pressures, which is exactly zero where the relief valve holds the plate
     surplus = pressure - holding_pressure(tangent, motor_pressure, p)
@@ -269,7 +269,7 @@ def plate_moment(pressure: float, tangent: float, motor_pressure: float, p: Mach
 
 
 @equation
-def plate_resistance(tangent: float, swash_rate: float, p: Machine) -> float:
+def plate_resistance(tangent: float, swash_rate: float, p: Hydrostat) -> float:
     """Moment that resists the plate's motion, by its rate. [N m s]"""
     lever = plate_lever(tangent, p)
     return lever * lever * (p.piston_damping + 2.0 * p.piston_mass * tangent * swash_rate)
@@ -277,7 +277,7 @@ def plate_resistance(tangent: float, swash_rate: float, p: Machine) -> float:
 
 @equation
 def swash_acceleration(
-    pressure: float, tangent: float, swash_rate: float, motor_pressure: float, p: Machine
+    pressure: float, tangent: float, swash_rate: float, motor_pressure: float, p: Hydrostat
 ) -> float:
     """Angular acceleration α_sw'' of the swash plate. [rad/s²]
 
@@ -293,7 +293,7 @@ def swash_acceleration(
 
 
 @equation
-def pump_flow(swash_angle: float, p: Machine) -> float:
+def pump_flow(swash_angle: float, p: Hydrostat) -> float:
     """Flow of the pump, Q = C_q α_sw. [m³/s]
 
     A swash plate pump's flow goes with tan α_sw; the published Z10 belongs to the angle (erratum
@@ -303,13 +303,13 @@ def pump_flow(swash_angle: float, p: Machine) -> float:
 
 
 @equation
-def load_inertance(p: Machine) -> float:
+def load_inertance(p: Hydrostat) -> float:
     """Torque of the load's inertia for a swash rate, C_i K_mf C_q; Kruse eq. 6.42. [N m s]"""
     return p.load_inertia * p.motor_constant * p.pump_flow_gain
 
 
 @equation
-def motor_torque(swash_rate: float, p: Machine) -> float:
+def motor_torque(swash_rate: float, p: Hydrostat) -> float:
     """Torque of the load on the motor, C_i Ω' + C_g with Ω' = K_mf C_q α_sw'. [N m]
 
     Kruse eqs. 6.42 and 6.45; C_g of gravity is positive against positive speed.
@@ -318,13 +318,13 @@ def motor_torque(swash_rate: float, p: Machine) -> float:
 
 
 @equation
-def motor_drop(swash_rate: float, p: Machine) -> float:
+def motor_drop(swash_rate: float, p: Hydrostat) -> float:
     """P_hi - P_lo = K_mf τ, from the work done by the motor; Kruse eq. 6.41. [Pa]"""
     return p.motor_constant * motor_torque(swash_rate, p)
 
 
 @equation
-def load_resistance(tangent: float, p: Machine) -> float:
+def load_resistance(tangent: float, p: Hydrostat) -> float:
     """Moment with which the load's inertia resists the plate, by its rate. [N m s]
 
     It comes through the pressure drop across the motor and the pumping pistons.
@@ -334,7 +334,7 @@ def load_resistance(tangent: float, p: Machine) -> float:
 
 
 @equation
-def machine_speed(angle: float, swash_rate: float, p: Machine) -> float:
+def machine_speed(angle: float, swash_rate: float, p: Hydrostat) -> float:
     """Shaft speed K_mf Q less K_mL τ, what leaks at the motor under its load. [rad/s]"""
     return p.motor_constant * pump_flow(angle, p) - p.motor_leakage * motor_torque(swash_rate, p)
 
@@ -343,14 +343,14 @@ def machine_speed(angle: float, swash_rate: float, p: Machine) -> float:
 
 
 @equation
-def static_pressure(p: Machine) -> float:
+def static_pressure(p: Hydrostat) -> float:
     """P0 = K_mf C_g A_p d5/(A_s d4), which holds the load with the plate upright; eq. 6.54. [Pa]"""
     load = p.motor_constant * p.load_torque
     return load * (p.pumping_area * p.pumping_arm) / (p.piston_area * p.swash_arm)
 
 
 @equation
-def relief_pressures(p: Machine) -> ReliefPressures:
+def relief_pressures(p: Hydrostat) -> ReliefPressures:
     """Lowest and highest stroker pressure that the relief valve allows. [Pa]
 
     It keeps the pressure between those that hold the swash plate and its static load at the stops
@@ -365,7 +365,7 @@ def relief_pressures(p: Machine) -> ReliefPressures:
 
 
 @equation
-def fastest_rate(p: Machine) -> float:
+def fastest_rate(p: Hydrostat) -> float:
     """Fastest of spool, plate on its spring and trapped oil, and leakage. [rad/s]
 
     Damping does not count: the scheme is stable with any.
@@ -380,7 +380,7 @@ def fastest_rate(p: Machine) -> float:
 
 
 @equation
-def balanced_spool(force: float, arm_sine: float, p: Machine) -> float:
+def balanced_spool(force: float, arm_sine: float, p: Hydrostat) -> float:
     """Spool position at which solenoids and feedback spring balance, within the stroke. [m]
 
     Where the solenoids overpower the spring the spool is at its stop.
@@ -389,7 +389,7 @@ def balanced_spool(force: float, arm_sine: float, p: Machine) -> float:
 
 
 @equation
-def balanced_tangent(position: float, force: float, p: Machine) -> float:
+def balanced_tangent(position: float, force: float, p: Hydrostat) -> float:
     """tan α_sw, within the stops, at which solenoids and feedback spring hold the spool.
 
     d1 F (1 + tan²β) = k_f d3² sin(α + β), the printed eq. 6.19 at rest.
@@ -402,7 +402,7 @@ def balanced_tangent(position: float, force: float, p: Machine) -> float:
 
 
 @equation
-def surplus_flow(position: float, force: float, p: Machine, symmetric: Flag) -> float:
+def surplus_flow(position: float, force: float, p: Hydrostat, symmetric: Flag) -> float:
     """Flow through the valve less what leaks, with spool and plate in balance. [m³/s]"""
     tangent = balanced_tangent(position, force, p)
     pressure = holding_pressure(tangent, p.motor_constant * p.load_torque, p)

@@ -28,7 +28,7 @@ from swashplate.crane.rope import (
     too_fast_sentence,
 )
 from swashplate.drive import Drive, drive_instance
-from swashplate.equations import CompiledStep, StepContext, compiled_step
+from swashplate.equations import CompiledStep, Machine, StepContext, compiled_step
 from swashplate.equations.marching import marched, stored_of
 from swashplate.errors import DomainError, InputError
 from swashplate.parameters import FULL_VOLTAGE
@@ -146,7 +146,7 @@ class CraneStepper:
         picks = np.zeros(0, dtype=np.int64)
         if controller is not None:
             names = controller.model.external
-            step = compiled_step(controller.model, controller.values, names, GIVES, RATE)
+            step = compiled_step(Machine(controller.model, controller.values), names, GIVES, RATE)
             self._steps.append(step)
             user = step.context()
             picks = np.array([SEEN.index(name) for name in names], dtype=np.int64)

@@ -28,7 +28,7 @@ from swashplate.equations.marching.rows import (
     upright,
 )
 from swashplate.equations.marching.run import (
-    Instance,
+    Machine,
     Start,
     arrays_of,
     check_domain,
@@ -121,7 +121,7 @@ class ObservedMarch:
         ]
 
     def begin(
-        self, instance: Instance, first: Mapping[str, float], h: float, started: Collection[str]
+        self, instance: Machine, first: Mapping[str, float], h: float, started: Collection[str]
     ) -> Array:
         """(s, w) derivatives of the states at the first sample by the columns, and by idle ones.
 
@@ -145,7 +145,7 @@ class ObservedMarch:
                 tangent[state, column] = 1.0
         return tangent
 
-    def _slopes(self, instance: Instance, first: Mapping[str, float], h: float) -> Array:
+    def _slopes(self, instance: Machine, first: Mapping[str, float], h: float) -> Array:
         """Derivatives of states at the start by all parameters that move them."""
         code = self._start_code
         signals_before = dict.fromkeys(first, 0.0)
@@ -172,7 +172,7 @@ class ObservedMarch:
 
 @generating
 def _begin_at_rest(
-    march: ObservedMarch, instance: Instance, h: float, started: tuple[str, ...]
+    march: ObservedMarch, instance: Machine, h: float, started: tuple[str, ...]
 ) -> Array:
     """Those of a start at rest, which depend on no record."""
     return march.begin(instance, {}, h, started)
@@ -222,7 +222,7 @@ NO_RUN_VALUES = RunValues()
 
 
 def residuals(
-    instance: Instance, observed: ObservedRecord, run_values: RunValues = NO_RUN_VALUES
+    instance: Machine, observed: ObservedRecord, run_values: RunValues = NO_RUN_VALUES
 ) -> Array:
     """(m,) weighted residuals of all observations, one after the other; 0 if the weight is 0.
 
@@ -235,7 +235,7 @@ def residuals(
 
 
 def jacobian(
-    instance: Instance,
+    instance: Machine,
     observed: ObservedRecord,
     columns: Sequence[str],
     run_values: RunValues = NO_RUN_VALUES,
@@ -272,7 +272,7 @@ def jacobian(
 
 
 def triangle(
-    instance: Instance,
+    instance: Machine,
     observed: ObservedRecord,
     columns: Sequence[str],
     run_values: RunValues = NO_RUN_VALUES,
@@ -313,7 +313,7 @@ NO_FACTOR = np.zeros((0, 0))
 
 
 def _march(
-    instance: Instance,
+    instance: Machine,
     observed: ObservedRecord,
     run_values: RunValues,
     *,
@@ -420,7 +420,7 @@ def _march(
 class BoundModel(NamedTuple):
     """A model with numbers, and what it is differentiated by."""
 
-    instance: Instance
+    instance: Machine
     run_values: RunValues = NO_RUN_VALUES
     """Values of the run's own unknowns."""
     paths: Sequence[str] = ()

@@ -94,14 +94,49 @@ class TapDelays(NamedTuple):
     """Derivative of the fraction by the delay. [1/s]"""
 
 
-@dataclass(frozen=True)
-class Instance:
-    """A model with its numbers."""
+@dataclass(frozen=True, init=False)
+class Machine:
+    """A model with its numbers: what is simulated, stepped, linearised, fitted and exported.
+
+    Parameters
+    ----------
+    model : Model
+        A single model, or a joined one.
+    p, options, given : named tuple
+        Its parameters, options and what belongs to a run. Of a joined model each has a field for
+        every member that has any.
+
+    Raises
+    ------
+    InputError
+        If a tuple has not the type that the model declares.
+    ParameterError
+        If a parameter lies beyond the range of its `Definition`.
+    """
 
     model: Model
     parts: tuple[PartNumbers, ...]
     name: str
     """Of the numbers: a parameter set's, or the model's own."""
+
+    def __init__(self, model: Model, p: Any, *, options: Any = None, given: Any = None) -> None:
+        renew(model)
+        self._set(model, _checked_parts(model, p, options, given), model.name)
+        values = dict(zip(parameter_paths(model), self.params.tolist(), strict=True))
+        for path, definition in model.ranges.items():
+            if not definition.holds(values[path]):
+                raise ParameterError(f"{self.name}: {definition.broken(path, values[path])}.")
+
+    @classmethod
+    def of_parts(cls, model: Model, parts: tuple[PartNumbers, ...], name: str) -> Machine:
+        """A machine whose numbers are known to be those of the model's parts."""
+        machine = object.__new__(cls)
+        machine._set(model, parts, name)
+        return machine
+
+    def _set(self, model: Model, parts: tuple[PartNumbers, ...], name: str) -> None:
+        for word, value in (("model", model), ("parts", parts), ("name", name)):
+            object.__setattr__(self, word, value)
 
     @cached_property
     def options(self) -> tuple[Any, ...]:
@@ -306,24 +341,8 @@ def linked(
     return float(with_replacements(link.equation, replacements)(*values))
 
 
-def instance_of(model: Model, p: Any, *, options: Any = None, given: Any = None) -> Instance:
-    """A model with its numbers.
-
-    Parameters
-    ----------
-    model : Model
-        A single model, or a joined one.
-    p, options, given : named tuple
-        Of a joined model each has a field for every part that has any.
-
-    Raises
-    ------
-    InputError
-        If a tuple has not the type that the model declares.
-    ParameterError
-        If a parameter lies beyond the range of its `Definition`.
-    """
-    renew(model)
+def _checked_parts(model: Model, p: Any, options: Any, given: Any) -> tuple[PartNumbers, ...]:
+    """Numbers of each part, of the types that the model declares."""
     parts = []
     for part in model.parts:
         numbers = PartNumbers(p, options, given)
@@ -364,12 +383,7 @@ def instance_of(model: Model, p: Any, *, options: Any = None, given: Any = None)
             forms = [option or None for option in numbers.options]
             numbers = numbers._replace(options=type(numbers.options)(*forms))
         parts.append(numbers)
-    instance = Instance(model, tuple(parts), model.name)
-    values = dict(zip(parameter_paths(model), instance.params.tolist(), strict=True))
-    for path, definition in model.ranges.items():
-        if not definition.holds(values[path]):
-            raise ParameterError(f"{instance.name}: {definition.broken(path, values[path])}.")
-    return instance
+    return tuple(parts)
 
 
 # --- marching -------------------------------------------------------------------------------------
@@ -406,7 +420,7 @@ def _march_of(planned: PlannedMarch) -> Kernel:
 
 
 def marched(
-    instance: Instance,
+    instance: Machine,
     records: Mapping[str, Array],
     h: float,
     initial: InitialStates,
@@ -453,7 +467,7 @@ def marched(
 
 
 def check_outputs(
-    instance: Instance, stored: Sequence[SignalId], table: Array, h: float, cause: str
+    instance: Machine, stored: Sequence[SignalId], table: Array, h: float, cause: str
 ) -> None:
     """Refuse samples that are not finite; of (r, n) or (r,) numbers the first one is named."""
     with np.errstate(all="ignore"):
@@ -472,7 +486,7 @@ def check_outputs(
     )
 
 
-def initial_states(instance: Instance, initial: InitialStates, begin: Mapping[str, float]) -> Array:
+def initial_states(instance: Machine, initial: InitialStates, begin: Mapping[str, float]) -> Array:
     """States as numbers, some of them as given by path."""
     check_mapping("begin", begin)
     states = initial.flat
@@ -488,7 +502,7 @@ def initial_states(instance: Instance, initial: InitialStates, begin: Mapping[st
 
 
 def arrays_of(
-    instance: Instance,
+    instance: Machine,
     values: tuple[Array, ...],
     initial: InitialStates,
     delays: TapDelays,
@@ -513,7 +527,7 @@ def arrays_of(
     )
 
 
-def check_domain(instance: Instance, states: Array, worst: float, cause: str) -> None:
+def check_domain(instance: Machine, states: Array, worst: float, cause: str) -> None:
     """Refuse what was computed outside the model's equations, or is not a finite state."""
     if not worst > 0.0:
         raise DomainError(f"{instance.name}: {outside(instance.model, worst, cause)}")

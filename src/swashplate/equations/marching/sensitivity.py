@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import isfinite
-from typing import Any, Generic, TypeVar, Unpack
+from typing import Generic, TypeVar, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,9 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 from swashplate.equations.marching.derivatives import BoundModel
 from swashplate.equations.marching.observation import RunValues, every_sample
 from swashplate.equations.marching.record import Sampling
-from swashplate.equations.marching.run import Start, initial_states, instance_of
+from swashplate.equations.marching.run import Machine, Start, initial_states
 from swashplate.equations.marching.simulation import Command, Run, inputs_of
-from swashplate.equations.model import Model, full_name, parameter_paths
+from swashplate.equations.model import full_name, parameter_paths
 from swashplate.errors import DomainError, InputError
 
 Array = NDArray[np.float64]
@@ -86,14 +86,11 @@ class Sensitivities(Generic[R]):
 
 
 def sensitivities(
-    model: Model,
-    p: Any,
+    machine: Machine,
     inputs: Mapping[str, ArrayLike | Command],
     rate: float,
     *,
     parameters: Sequence[str] | None = None,
-    options: Any = None,
-    given: Any = None,
     start: Start = "rest",
     begin: Mapping[str, float] | None = None,
     **sampling: Unpack[Sampling],
@@ -102,7 +99,7 @@ def sensitivities(
 
     Parameters
     ----------
-    model, p, inputs, rate, options, given, start, begin, **sampling :
+    machine, inputs, rate, start, begin, **sampling :
         As in `simulate`; `time`, `interpolation`, `substeps`.
     parameters : sequence of str, optional
         Paths of parameters, or ``start.`` with the path of a state that `begin` names; by default
@@ -116,12 +113,12 @@ def sensitivities(
     Raises
     ------
     InputError
-        For inputs, numbers or names that do not fit the model.
+        For inputs or names that do not fit the model.
     """
-    instance = instance_of(model, p, options=options, given=given)
-    records = inputs_of(instance, inputs, rate, **sampling)
-    run = Run(instance, records, start, begin or {})
-    initial_states(instance, run.initial, run.begin)  # refuses what does not fit
+    model = machine.model
+    records = inputs_of(machine, inputs, rate, **sampling)
+    run = Run(machine, records, start, begin or {})
+    initial_states(machine, run.initial, run.begin)  # refuses what does not fit
     selectable = (*parameter_paths(model), *(f"start.{path}" for path in run.begin))
     columns = parameter_paths(model)
     if parameters is not None:
@@ -131,4 +128,4 @@ def sensitivities(
             raise InputError(
                 f"{model.name} has no parameter '{path}'; it has {', '.join(selectable) or 'none'}."
             )
-    return Sensitivities(run, columns, BoundModel(instance, RunValues(run.begin), columns))
+    return Sensitivities(run, columns, BoundModel(machine, RunValues(run.begin), columns))

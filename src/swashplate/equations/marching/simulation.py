@@ -39,10 +39,9 @@ from swashplate.equations.marching.record import (
 )
 from swashplate.equations.marching.run import (
     InitialStates,
-    Instance,
+    Machine,
     Start,
     check_start,
-    instance_of,
     marched,
 )
 from swashplate.equations.marching.sample_code import output_of
@@ -105,7 +104,7 @@ class Run(Tabular):
     `to_pandas` and `to_xarray` give all of them, `write` a file.
     """
 
-    instance: Instance = field(repr=False)
+    instance: Machine = field(repr=False)
     """The model with its numbers."""
     records: Mapping[str, Record] = field(repr=False)
     """Inputs by name, on the march's grid; what drives the model comes first."""
@@ -420,7 +419,7 @@ class Command(Protocol):
 
 
 def inputs_of(
-    instance: Instance,
+    instance: Machine,
     inputs: Mapping[str, ArrayLike | Command],
     rate: float,
     **sampling: Unpack[Sampling],
@@ -440,27 +439,22 @@ def inputs_of(
 
 
 def simulate(
-    model: Model,
-    p: Any,
+    machine: Machine,
     inputs: Mapping[str, ArrayLike | Command],
     rate: float,
     *,
     time: ArrayLike | None = None,
     interpolation: Between = None,
     substeps: int | None = None,
-    options: Any = None,
-    given: Any = None,
     start: Start = "rest",
     begin: Mapping[str, float] | None = None,
 ) -> Run:
-    """Simulate a model over its inputs.
+    """Simulate a machine over its inputs.
 
     Parameters
     ----------
-    model : Model
-        A user-defined one, or one of the package's.
-    p, options, given : named tuple
-        Its numbers, see `instance_of`.
+    machine : Machine
+        A model with its numbers.
     inputs : mapping of str to (n,) array_like, float or Maneuver
         External signals, numbers for constant ones; those with a default parameter may be left out.
         A maneuver is sampled at `rate`, its volts as the unit of the input.
@@ -475,7 +469,7 @@ def simulate(
     substeps : int, optional
         Steps of the model a sample; by default one.
     start : {"rest", "steady"}
-        See `Instance.start`.
+        See `Machine.start`.
     begin : mapping of str to float, optional
         Numbers of the state at the first sample, by path.
 
@@ -487,7 +481,7 @@ def simulate(
     Raises
     ------
     InputError
-        For inputs or numbers that do not fit the model.
+        For inputs that do not fit the model.
     DomainError
         If the model leaves its domain, or a number overflows.
 
@@ -502,14 +496,13 @@ def simulate(
     >>> run["shaft_speed"].shape
     (1024,)
     """
-    instance = instance_of(model, p, options=options, given=given)
     records = inputs_of(
-        instance, inputs, rate, time=time, interpolation=interpolation, substeps=substeps
+        machine, inputs, rate, time=time, interpolation=interpolation, substeps=substeps
     )
     maneuver = ", ".join(
         command.name for command in inputs.values() if isinstance(command, Command)
     )
-    return Run(instance, records, start, begin or {}, maneuver=maneuver).marched()
+    return Run(machine, records, start, begin or {}, maneuver=maneuver).marched()
 
 
 # --- one sample at a time -------------------------------------------------------------------------
@@ -545,7 +538,7 @@ class Stepper(Generic[S]):
 
     def __init__(
         self,
-        instance: Instance,
+        instance: Machine,
         inputs: Sequence[str],
         outputs: Sequence[str],
         rate: float,
@@ -706,19 +699,16 @@ class Stepper(Generic[S]):
 
 
 def stepper(
-    model: Model,
-    p: Any,
+    machine: Machine,
     inputs: Sequence[str],
     outputs: Sequence[str] | None = None,
     *,
     rate: float,
     interpolation: Between = None,
     substeps: int | None = None,
-    options: Any = None,
-    given: Any = None,
     start: Start = "rest",
 ) -> Stepper[dict[str, float]]:
-    """A model one sample at a time: inputs in, sample out, numbers as in `simulate`.
+    """A machine one sample at a time: inputs in, sample out, numbers as in `simulate`.
 
     Parameters
     ----------
@@ -750,7 +740,7 @@ def stepper(
     >>> machine.step(0.0)
     {'current': 0.0, 'shaft_speed': 0.0}
     """
-    instance = instance_of(model, p, options=options, given=given)
+    model = machine.model
     limits = model.limit_bits
     if outputs is None:
         outputs = (*model.every_signal, *model.integrals, *limits)
@@ -766,7 +756,7 @@ def stepper(
         return named
 
     return Stepper(
-        instance,
+        machine,
         inputs,
         outputs,
         rate,

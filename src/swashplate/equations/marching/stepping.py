@@ -35,11 +35,10 @@ from swashplate.equations.marching.march import step_texts
 from swashplate.equations.marching.part_code import SignalId
 from swashplate.equations.marching.record import check_rate
 from swashplate.equations.marching.run import (
-    Instance,
+    Machine,
     Start,
     check_domain,
     check_outputs,
-    instance_of,
 )
 from swashplate.equations.marching.sample_code import CodeForm, SampleCode, output_of
 from swashplate.equations.model import Model, full_name
@@ -209,7 +208,7 @@ class CompiledStep:
     """
 
     def __init__(
-        self, instance: Instance, inputs: Sequence[str], stored: Sequence[SignalId], h: float
+        self, instance: Machine, inputs: Sequence[str], stored: Sequence[SignalId], h: float
     ) -> None:
         self._instance = instance
         self._h = h
@@ -283,21 +282,17 @@ class CompiledStep:
 
 
 def compiled_step(
-    model: Model,
-    p: Any,
+    machine: Machine,
     inputs: Sequence[str],
     outputs: Sequence[str],
     rate: float,
-    *,
-    options: Any = None,
-    given: Any = None,
 ) -> CompiledStep:
-    """Compiled step of a user-defined model, for kernels that close loops around it.
+    """Compiled step of a machine, for kernels that close loops around it.
 
     Parameters
     ----------
-    model, p, options, given :
-        As in `simulate`.
+    machine : Machine
+        A model with its numbers.
     inputs, outputs : sequence of str
         Signals that the loop gives and takes; inputs with a default parameter may be left out.
         ``"limits"`` as an output are the acting limits of the last part that has any, a bit each.
@@ -307,11 +302,10 @@ def compiled_step(
     Raises
     ------
     InputError
-        For numbers that do not fit the model, and signals that it does not have.
+        For signals that the model does not have.
     """
     check_rate(rate)
-    instance = instance_of(model, p, options=options, given=given)
-    return CompiledStep(instance, inputs, stored_of(model, outputs), 1.0 / rate)
+    return CompiledStep(machine, inputs, stored_of(machine.model, outputs), 1.0 / rate)
 
 
 def stored_of(model: Model, outputs: Sequence[str]) -> tuple[SignalId, ...]:

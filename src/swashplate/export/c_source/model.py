@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from swashplate.equations import (
     Definition,
-    Instance,
     Link,
+    Machine,
     SignalSource,
     arguments_of,
     declared_by,
@@ -337,7 +337,7 @@ def writer_of(exported: Exported) -> Writer:
         return Writer(exported)
 
 
-def numbers(exported: Exported, instance: Instance, step: float) -> Array:
+def numbers(exported: Exported, instance: Machine, step: float) -> Array:
     """All numbers that the C ``init`` takes, as Python computes them."""
     options = [
         option is not None
@@ -365,7 +365,7 @@ def _finite(members: Sequence[str], owner: str) -> list[str]:
 # --- feedthrough ----------------------------------------------------------------------------------
 
 
-def feedthrough(exported: Exported, instance: Instance, step: float) -> dict[str, frozenset[str]]:
+def feedthrough(exported: Exported, instance: Machine, step: float) -> dict[str, frozenset[str]]:
     """External signals that each output follows at the same sample, with these options and delays.
 
     One that is read through a tap counts if the window reaches its newest sample.
@@ -398,7 +398,7 @@ def feedthrough(exported: Exported, instance: Instance, step: float) -> dict[str
     return inputs_of
 
 
-def newest(exported: Exported, instance: Instance, step: float) -> dict[str, tuple[float, float]]:
+def newest(exported: Exported, instance: Machine, step: float) -> dict[str, tuple[float, float]]:
     """Signals that are read at their newest sample: delay [s], and steps that would be enough."""
     steps = dict[str, float]()
     for _, _, _, tap in exported.taps:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swashplate.campaign import CommandJump, Experiment
-from swashplate.equations import BoundModel, instance_of, parameter_paths, state_paths, tuple_from
+from swashplate.equations import BoundModel, Machine, parameter_paths, state_paths, tuple_from
 from swashplate.equations import Model as Equations
 from swashplate.equations.marching import (
     Observation,
@@ -413,5 +413,5 @@ class UserModel(Result, EquationModel):
             if experiment.name not in given:
                 raise InputError(f"{model.name} has no given numbers for {experiment.name}.")
             given = given[experiment.name]
-        instance = instance_of(model, p, options=self.options, given=given)
+        instance = Machine(model, p, options=self.options, given=given)
         return BoundModel(instance, RunValues(begin, request.offsets), request.columns)
