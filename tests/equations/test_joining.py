@@ -191,6 +191,19 @@ def test_members_may_be_joined_models() -> None:
     assert np.array_equal(found["sink.load"], 0.5 * alone["sink.load"])
 
 
+def test_machines_joined_are_a_machine_with_their_numbers() -> None:
+    left, right = Machine(tank, Lag(0.3, 2.0, 0.013)), Machine(tank, Lag(0.1))
+    tanks = {"left": left, "right": right, "sink": Machine(sink, Ratio())}
+    links = {"sink.supply": (difference, "left.flow", "right.flow")}
+    joined = join("two", tanks, links=links)
+    found = simulate(joined, INPUTS, RATE)
+    assert np.array_equal(found["total"], simulate(Machine(two, P), INPUTS, RATE)["total"])
+    again = join("pair", {"first": joined, "second": joined})
+    assert again.params.tolist() == 2 * joined.params.tolist()
+    with pytest.raises(InputError, match="left is Machine.* is no model"):
+        join("two", {**tanks, "right": tank}, links=links)
+
+
 @equation
 def slower(h: float, time: float) -> float:
     return h / (2.0 * time + h)
@@ -221,7 +234,7 @@ def test_an_equation_is_replaced_in_all_members() -> None:
         ({"a": tank, "b": tank}, {"a.command": "b.flow"}, r"known only after b: put b before a"),
         ({"a": tank}, {"x": (difference, "a.flow")}, r"takes first, second, but the link x names"),
         ({"a b": tank}, {}, r"a member's name is one word, not 'a b'"),
-        ({"a": 3.0}, {}, r"one mapping of names to models, and a is 3.0"),
+        ({"a": 3.0}, {}, r"one mapping of names to models or to machines, and a is 3.0"),
     ],
 )
 def test_what_cannot_be_joined_is_said(members, links, said: str) -> None:

@@ -18,7 +18,7 @@ each_example = pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.s
 
 
 @pytest.mark.parametrize(
-    "name", ["simulate", "limits_of_a_crane", "controller", "identify_hoist", "joint_shaper"]
+    "name", ["simulate", "limits_of_a_crane", "controller", "identify_hoist", "joint_shaper", "tug"]
 )
 def test_an_example_prints_what_its_page_shows(run_example, name):
     made = run_example(name, "--figure", "figure.png")

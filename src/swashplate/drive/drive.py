@@ -20,7 +20,7 @@ from swashplate.drive.instance import (
 from swashplate.drive.march import Sample, drive_stepper, simulate_drive
 from swashplate.drive.records import RunKeywords, drive_records
 from swashplate.drive.simulation import Simulation
-from swashplate.equations import CompiledStep, Equation, Replacement, Stepper
+from swashplate.equations import CompiledStep, Equation, Machine, Replacement, Stepper
 from swashplate.equations.marching import SOURCE_RATE, Interpolation, Start, check_rate, stored_of
 from swashplate.errors import InputError
 from swashplate.maneuvers import Maneuver
@@ -315,6 +315,11 @@ class Drive(Result, Mapping[str, Parameter]):
         if title is None:
             title = self.parameters.title
         return Drive(replace(self.parameters, name=name, title=title))
+
+    @property
+    def machine(self) -> Machine:
+        """Its model with its numbers, from the voltage to the shaft: what is joined with others."""
+        return drive_instance(self.parameters, by_voltage=True)
 
     @property
     def plain(self) -> Drive:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, overload
 
+from swashplate.equations.marching.run import Machine, PartNumbers
 from swashplate.equations.model import (
     Equation,
     Link,
@@ -24,24 +25,43 @@ Wire = str | Equation | tuple[Any, ...]
 equation and the paths of its signals."""
 
 
+@overload
 def join(
     name: str,
     *models: Model | Mapping[str, Model],
     links: Mapping[str, Wire] | None = None,
     **changes: Any,
-) -> Model:
-    """Models as one: in series, or as named members.
+) -> Model: ...
+
+
+@overload
+def join(
+    name: str,
+    *machines: Mapping[str, Machine],
+    links: Mapping[str, Wire] | None = None,
+    **changes: Any,
+) -> Machine: ...
+
+
+def join(
+    name: str,
+    *models: Any,
+    links: Mapping[str, Wire] | None = None,
+    **changes: Any,
+) -> Model | Machine:
+    """Models, or machines, as one: in series, or as named members.
 
     Parameters
     ----------
     name : str
         Name of the whole.
-    *models : Model, or one mapping of str to Model
+    *models : Model, or one mapping of str to Model or to Machine
         In the order of the flow. In series an input takes the signal of that name of a model before
         it. Members of a mapping know nothing of each other: their inputs are wired by `links`, or
         come from outside, and their parameters, states and signals stand at paths such as
         ``hoist.pump.Z9``, ``hoist.shaft_speed``. The last words of a path are enough where they are
-        unique. Members may be joined models themselves, and several may be one model.
+        unique. Members may be joined models themselves, and several may be one model. Of machines
+        the whole is a machine with their numbers.
     links : mapping of str, optional
         What an input takes, by its path, such as ``{"load.pull": "winch.shaft_torque"}``: a signal,
         an equation over the signals that its arguments name, or a tuple of an equation and the
@@ -51,7 +71,7 @@ def join(
 
     Returns
     -------
-    Model
+    Model or Machine
         The whole; `Model.parts` are the single models that it consists of.
 
     Raises
@@ -76,7 +96,7 @@ def join(
     >>> tug.external[0], len(tug.parts)
     ('port.voltage', 4)
     """
-    members = [*_members(name, models)]
+    members, numbers = _members(name, models)
     parts = [part for key, model in members for part in _placed(key, model)]
     places = [part.path for part in parts]
     if len(set(places)) != len(places):
@@ -105,25 +125,34 @@ def join(
     model = Model(name, step=parts[0].step, parts=tuple(parts), links=linked, **kinds, **changes)
     for wrong in _too_late(model):
         raise InputError(wrong)
-    return model
+    return model if numbers is None else Machine.of_parts(model, numbers, name)
 
 
 # --- members --------------------------------------------------------------------------------------
 
 
-def _members(name: str, models: Sequence[Any]) -> Iterator[tuple[str, Model]]:
-    """The models with their names, which are empty in series."""
+Members = list[tuple[str, Model]]
+"""Models with their names, which are empty in series."""
+
+
+def _members(name: str, models: Sequence[Any]) -> tuple[Members, tuple[PartNumbers, ...] | None]:
+    """The members, and of machines their numbers."""
     named = models[0] if len(models) == 1 and isinstance(models[0], Mapping) else {}
-    for key, model in named.items() or (("", each) for each in models):
+    given = [*named.items()] or [("", each) for each in models]
+    machines = [each for _, each in given if isinstance(each, Machine)]
+    if machines and len(machines) == len(given) and named:
+        given = [(key, each.model) for key, each in given]
+    for key, model in given:
         if not isinstance(model, Model):
             what = f"{key} is {model!r}" if key else repr(model)
             raise InputError(
-                f"Model {name} is joined from models, or from one mapping of names to models, and "
-                f"{what} is none."
+                f"Model {name} is joined from models, or from one mapping of names to models or to "
+                f"machines, and {what} is no model."
             )
         if named and not str(key).isidentifier():
             raise InputError(f"Model {name}: a member's name is one word, not {key!r}.")
-        yield key, model
+    numbers = tuple(part for machine in machines for part in machine.parts)
+    return given, numbers if machines else None
 
 
 def _path(*words: str) -> str:
@@ -145,7 +174,7 @@ def _placed(key: str, model: Model) -> Iterator[Model]:
         )
 
 
-def _links_within(members: Sequence[tuple[str, Model]]) -> Iterator[tuple[str, Link]]:
+def _links_within(members: Members) -> Iterator[tuple[str, Link]]:
     """Links that named models have already."""
     first = 0
     for key, model in members:
@@ -155,7 +184,7 @@ def _links_within(members: Sequence[tuple[str, Model]]) -> Iterator[tuple[str, L
         first += len(model.parts)
 
 
-def _carried(members: Sequence[tuple[str, Model]], word: str) -> Iterator[tuple[Any, Any]]:
+def _carried(members: Members, word: str) -> Iterator[tuple[Any, Any]]:
     """Integrals or replacements that named models have already."""
     for key, model in members:
         for name, value in getattr(model, word).items() if key else ():

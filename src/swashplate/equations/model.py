@@ -266,6 +266,12 @@ class Model:
         signals = floats_of(self.signals) if self.signals is not None else ()
         return tuple(dict.fromkeys((*signals, *floats_of(self.state))))
 
+    @property
+    def last_signals(self) -> tuple[str, ...]:
+        """Signals of the last part, integrals apart."""
+        last = self.parts[-1]
+        return tuple(map(last.full, last.signal_names))
+
     @cached_property
     def every_signal(self) -> tuple[str, ...]:
         """Signals of all parts, numbers of their states, and links; integrals apart."""

@@ -111,9 +111,10 @@ def linearize(
     if states is None:
         states = _settled_states(instance, at, h)
     initial = instance.start(at, h, "steady", states)
-    usual = tuple(model.outputs) or tuple(model.parts[-1].outputs)
+    last = model.parts[-1]
+    usual = tuple(model.outputs) or tuple(map(last.full, last.outputs))
     usual = tuple(signal for signal in usual if signal not in model.integrals)
-    requested = tuple(outputs) if outputs is not None else usual or model.parts[-1].signal_names
+    requested = tuple(outputs) if outputs is not None else usual or model.last_signals
     if not requested:
         raise InputError(f"{instance.name}: a linear model needs an output.")
     return _linear_model(instance, initial, rate, moving, requested)

@@ -87,7 +87,8 @@ def vectorisation_report(model: Model, output: str | None = None, *, options: An
         if own_options is None and part.options is not None:
             own_options = part.options()
         options_of_parts.append(own_options)
-    names = (*model.outputs, *model.parts[-1].outputs) or model.parts[-1].signal_names
+    last = model.parts[-1]
+    names = (*model.outputs, *map(last.full, last.outputs)) or model.last_signals
     signal, _ = output_of(model, output or names[-1])
     sample_code = SampleCode(model, CodeForm(tuple(signals), tuple(options_of_parts)), [signal])
     for used in sample_code.used:
