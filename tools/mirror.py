@@ -64,7 +64,7 @@ TRIPS = {
 EQUATION = """
 from typing import NamedTuple
 
-from swashplate.equations import Model, discretised, equation, simulate
+from swashplate.equations import Machine, Model, discretised, equation, simulate
 
 
 class Numbers(NamedTuple):
@@ -82,7 +82,7 @@ def rates(state: State, u: float, p: Numbers) -> State:
 
 def main() -> None:
     valve = Model("valve", Numbers, State, discretised(rates, "midpoint"))
-    simulate(valve, Numbers(), {"u": [0.0] * 10 + [1.0] * 90}, 1000.0)
+    simulate(Machine(valve, Numbers()), {"u": [0.0] * 10 + [1.0] * 90}, 1000.0)
 """
 """A program that simulates an equation of a user, counted likewise."""
 

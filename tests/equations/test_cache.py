@@ -203,8 +203,8 @@ MARCH = """
 import sys
 sys.path.insert(0, sys.argv[1])
 import lag
-from swashplate.equations import simulate
-run = simulate(lag.rod, lag.Lag(0.5), {"command": [1.0, 1.0, 1.0]}, 100.0)
+from swashplate.equations import Machine, simulate
+run = simulate(Machine(lag.rod, lag.Lag(0.5)), {"command": [1.0, 1.0, 1.0]}, 100.0)
 print(run["position"].tolist())
 """
 

@@ -79,12 +79,12 @@ def counted(*arguments):
 
 tracing.Trace.call = counted
 import machine
-from swashplate.equations import sensitivities, simulate, stepper
+from swashplate.equations import Machine, sensitivities, simulate, stepper
 
 p, command = machine.Lag(0.5), np.ones(4)
-end = simulate(machine.rod, p, {"command": command}, 100.0)["position"][-1]
-slope = sensitivities(machine.rod, p, {"command": command}, 100.0)["position"][-1, 0]
-stepper(machine.rod, p, ["command"], rate=100.0)
+end = simulate(Machine(machine.rod, p), {"command": command}, 100.0)["position"][-1]
+slope = sensitivities(Machine(machine.rod, p), {"command": command}, 100.0)["position"][-1, 0]
+stepper(Machine(machine.rod, p), ["command"], rate=100.0)
 print(end, slope, count[0])
 """
 
@@ -276,8 +276,8 @@ import sys
 sys.path.insert(0, sys.argv[1])
 import numpy as np
 import machine
-from swashplate.equations import simulate
-run = simulate(machine.rod, machine.Gain(0.0), {"command": np.ones(2)}, 100.0)
+from swashplate.equations import Machine, simulate
+run = simulate(Machine(machine.rod, machine.Gain(0.0)), {"command": np.ones(2)}, 100.0)
 print(run["position"][-1])
 """
 

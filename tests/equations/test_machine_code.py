@@ -47,11 +47,11 @@ def counted(name, text, **how):
 
 machine_code._compiled = counted
 import machine
-from swashplate.equations import sensitivities, simulate
+from swashplate.equations import Machine, sensitivities, simulate
 
 p, command = machine.Lag(0.5), np.ones(4)
-end = simulate(machine.rod, p, {"command": command}, 100.0)["position"][-1]
-slope = sensitivities(machine.rod, p, {"command": command}, 100.0)["position"][-1, 0]
+end = simulate(Machine(machine.rod, p), {"command": command}, 100.0)["position"][-1]
+slope = sensitivities(Machine(machine.rod, p), {"command": command}, 100.0)["position"][-1, 0]
 print(end, slope, len(compiled))
 """
 END, SLOPE = 1.0 - 0.5**3, 3.0 * 0.5**2

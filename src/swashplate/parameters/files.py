@@ -165,9 +165,9 @@ def fitted_drive(folder: str | Path) -> Path:
     if (Path(folder) / FITTED_NUMBERS).is_file():
         raise MissingFileError(
             f"{folder} is the fit of a user-defined model: give its file by --model if the command "
-            "has that option. In Python swashplate.equations.simulate(model, ...) runs it, "
-            'and swashplate.export.fmu(model, "model.fmu", parameters=..., step=...) writes an FMU '
-            f"of it, with the numbers in {Path(folder) / FITTED_NUMBERS}."
+            "has that option. In Python swashplate.equations.simulate(machine, ...) runs it and "
+            'swashplate.export.fmu(machine, "model.fmu", step=...) writes an FMU of it, with '
+            f"machine = Machine(model, ...) of the numbers in {Path(folder) / FITTED_NUMBERS}."
         )
     raise MissingFileError(
         f"There is no {FITTED_DRIVE} in {folder}: give a folder that 'swashplate fit' or "

@@ -492,7 +492,8 @@ def simulate(
     >>> from swashplate.models.full_order import Substeps, plant
     >>> numbers = FullOrderDrive.preset("hoist").plant
     >>> current = {"current": np.full(1024, 0.7)}
-    >>> run = equations.simulate(plant, numbers, current, 512.0, given=Substeps(8.0))
+    >>> machine = equations.Machine(plant, numbers, given=Substeps(8.0))
+    >>> run = equations.simulate(machine, current, 512.0)
     >>> run["shaft_speed"].shape
     (1024,)
     """
@@ -727,17 +728,16 @@ def stepper(
     Raises
     ------
     InputError
-        For numbers, names or options that do not fit the model.
+        For names that do not fit the model.
 
     Examples
     --------
     >>> from swashplate import FullOrderDrive, equations
     >>> from swashplate.models.full_order import Substeps, plant
     >>> numbers = FullOrderDrive.preset("hoist").plant
-    >>> machine = equations.stepper(
-    ...     plant, numbers, ["current"], ["shaft_speed"], rate=512.0, given=Substeps(8.0)
-    ... )
-    >>> machine.step(0.0)
+    >>> machine = equations.Machine(plant, numbers, given=Substeps(8.0))
+    >>> stepper = equations.stepper(machine, ["current"], ["shaft_speed"], rate=512.0)
+    >>> stepper.step(0.0)
     {'current': 0.0, 'shaft_speed': 0.0}
     """
     model = machine.model
