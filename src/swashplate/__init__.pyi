@@ -27,6 +27,7 @@ from .drive import LinearDrive as LinearDrive
 from .drive import OperatingPoint as OperatingPoint
 from .drive import Sample as Sample
 from .drive import Simulation as Simulation
+from .equations import Machine as Machine
 from .equations import Sensitivities as Sensitivities
 from .equations import Stepper as Stepper
 from .errors import DomainError as DomainError

@@ -2,7 +2,8 @@
 
 Examples
 --------
->>> valve = compiled_step(model, Valve(0.05, 0.1), ("command",), ("position",), rate=512.0)
+>>> machine = Machine(model, Valve(0.05, 0.1))
+>>> valve = compiled_step(machine, ("command",), ("position",), rate=512.0)
 >>> @kernel
 ... def positioned(context, target, path):
 ...     worst = inf
