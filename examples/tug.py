@@ -13,8 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swashplate import Drive, export
-from swashplate.equations import Machine, Model, equation, join, simulate
+from swashplate import Drive, Machine, export
+from swashplate.equations import Model, equation, join, simulate
 from swashplate.linear import linearize
 
 parser = argparse.ArgumentParser(description="Two winches pull a barge.")
