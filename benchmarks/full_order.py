@@ -56,7 +56,7 @@ def derivatives() -> Iterator[str]:
     record = record_of(CASES["sine 6.5 V, 0.1 Hz"].sample(512.0), 512.0, what="voltage")
     speed = Observation("shaft_speed", record.time, np.zeros(record.time.size))
     observed = ObservedRecord(record, [speed])
-    instance = hoist.instance(record.step)
+    instance = hoist
     columns = tuple(f"plant.machine.{each}" for each in hoist.physical.numbers)
     plain = _best(lambda: residuals(instance, observed))
     for count in (2, 6, 12, len(columns)):

@@ -86,7 +86,7 @@ winch = Drive.preset("hoist")
 narrow = winch.scale(Z16_plus=0.5, Z16_minus=0.5)
 tug = join(
     "tug",
-    {"port": winch.machine, "starboard": narrow.machine, "barge": Machine(barge, Barge())},
+    {"port": winch, "starboard": narrow, "barge": Machine(barge, Barge())},
     links={"barge.port": "port.shaft_speed", "barge.starboard": "starboard.shaft_speed"},
 )
 

@@ -6,7 +6,7 @@ Of each set its output, in memory or streamed to files, or only its cost.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -19,21 +19,30 @@ from swashplate.equations import (
     Definition,
     Machine,
     Model,
+    arguments_of,
     check_mapping,
+    derive,
+    floats_of,
+    nested_from,
     parameter_paths,
     state_paths,
+    tuple_from,
+    value_at,
 )
 from swashplate.equations.marching import (
     LANES,
     CodeForm,
     Command,
     Observation,
+    PartNumbers,
     Record,
     Sampling,
+    called,
     inputs_of,
     lanes_of,
     output_of,
     outside,
+    unstable_step,
 )
 from swashplate.errors import FileError, InputError
 from swashplate.executors import Executor, Threads
@@ -169,14 +178,12 @@ def simulate_many(
             )
     if cost is None and not output:
         raise InputError(f"{model.name}: name the output of the sets to return, or give a cost.")
-    numbers = {path: np.full(count, number) for path, number in _numbers_of(machine).items()}
     return march_sets(
-        model,
-        numbers | values,
+        machine,
+        values,
+        count,
         records,
-        name=model.name,
         rules=_rules(model, values),
-        groups=[OptionGroup(np.ones(count, dtype=np.bool_), machine.options)],
         output=output,
         cost=cost,
         to=to,
@@ -246,36 +253,33 @@ class OptionGroup(NamedTuple):
 
 
 def march_sets(
-    model: Model,
-    numbers: Mapping[str, Array],
+    machine: Machine,
+    values: Mapping[str, Array],
+    count: int,
     records: Mapping[str, Record],
     *,
-    name: str,
     rules: Iterable[Broken],
-    groups: Sequence[OptionGroup],
     output: str = "",
     cost: SquaredError | None = None,
     to: str | Path | None = None,
     executor: Executor | None = None,
 ) -> Batch:
-    """March sets of a model's numbers over one record, wherever the executor runs them.
+    """March sets of a machine's numbers over one record, wherever the executor runs them.
 
     Parameters
     ----------
-    model : Model
-        The model that all sets have in common.
-    numbers : mapping of str to (m,) array
-        Every parameter by path, every given by ``"given "`` and its path, and states at the first
-        sample by ``"start."`` and theirs, one number a set.
+    machine : Machine
+        The model that all sets have in common, and the numbers that do not change.
+    values : mapping of str to (m,) array
+        Parameters that change, by path, and states at the first sample by ``"start."`` and theirs,
+        one number a set.
+    count : int
+        Number of sets, m.
     records : mapping of str to Record
         External signals on the march's grid; what drives the model comes first.
-    name : str
-        Of the machine, for sentences.
     rules : iterable of Broken
         What the numbers must satisfy: a set that breaks one is not marched, and its failure is the
         sentence of the first.
-    groups : sequence of OptionGroup
-        Every set with its options.
     output, cost, to, executor :
         As in `simulate_many`.
 
@@ -284,8 +288,13 @@ def march_sets(
     InputError, FileError
         As in `simulate_many`.
     """
+    model, name = machine.model, machine.name
+    numbers = {path: np.full(count, number) for path, number in _numbers_of(machine).items()}
+    numbers |= values
+    step = next(iter(records.values())).step
+    groups = _option_groups(machine, numbers, values, count)
     failures: dict[int, str] = {}
-    for mask, sentence in rules:
+    for mask, sentence in (*rules, *_step_rules(machine, numbers, groups, step)):
         for number in np.flatnonzero(mask):
             failures.setdefault(int(number), f"{name}: {sentence(int(number))}")
     blocks: list[Block] = []
@@ -301,8 +310,82 @@ def march_sets(
         cost=cost,
         to=to,
     )
-    count = groups[0].sets.size
     return _march_all(sets, blocks, count, failures, name, executor)
+
+
+# --- options and steps of sets --------------------------------------------------------------------
+
+
+def _option_groups(
+    machine: Machine, numbers: Mapping[str, Array], changed: Collection[str], count: int
+) -> list[OptionGroup]:
+    """Sets by the options that they share, those that follow from their numbers.
+
+    An option that parameters switch on is on in the sets in which one of them is not 0, if a number
+    of it changes; else it is as in the machine.
+    """
+    model = machine.model
+    masks = dict[tuple[int, str], Mask]()
+    for (index, option), paths in model.switches.items():
+        full = [f"{model.prefix(index)}{path}" for path in paths]
+        if any(path in changed for path in full):
+            masks[index, option] = np.any([numbers[path] for path in full], axis=0)
+    for index, part in enumerate(model.parts):
+        for option, equation in part.follows.items():
+            arguments = {"p": _numbers_of_part(model, index, numbers)}
+            masks[index, option] = _over_sets(part, equation, arguments, count) != 0.0
+    if not masks:
+        return [OptionGroup(np.ones(count, dtype=np.bool_), machine.options)]
+    kinds = np.stack(list(masks.values()), axis=1)
+    groups = []
+    for kind in np.unique(kinds, axis=0):
+        options = list(machine.options)
+        for (index, option), acts in zip(masks, kind, strict=True):
+            options[index] = options[index]._replace(**{option: True if acts else None})
+        groups.append(OptionGroup((kinds == kind).all(axis=1), tuple(options)))
+    return groups
+
+
+def _step_rules(
+    machine: Machine, numbers: Mapping[str, Array], groups: Sequence[OptionGroup], step: float
+) -> Iterator[Broken]:
+    """Sets at which a part does not bear the step [s]."""
+    model = machine.model
+    for index, part in enumerate(model.parts):
+        for group in groups if part.stable is not None else ():
+            p = _numbers_of_part(model, index, numbers)
+            options = group.options[index]
+            arguments = {"p": p, "h": step, "options": options}
+            margins = _over_sets(part, part.stable, arguments, group.sets.size)
+
+            def sentence(number: int, index: int = index, options: Any = options) -> str:
+                part = model.parts[index]
+                of_set = {path: values[number] for path, values in numbers.items()}
+                p = _numbers_of_part(model, index, of_set)
+                return unstable_step(part, PartNumbers(p, options), step)
+
+            yield group.sets & ~(margins > 0.0), sentence
+
+
+def _numbers_of_part(model: Model, index: int, numbers: Mapping[str, Any]) -> Any:
+    """Parameters of a part from numbers, or columns of them, by the whole model's paths."""
+    return nested_from(model.parts[index].parameters, numbers, model.prefix(index))
+
+
+def _over_sets(
+    part: Model, equation: Any, arguments: Mapping[str, Any], count: int
+) -> NDArray[np.float64]:
+    """(m,) what an equation of a part gives for columns of parameters."""
+    names = arguments_of(equation)
+    if part.replacements:  # a user-defined equation may stand for one that this one calls
+        kind = part.parameters
+        columns = {path: value_at(arguments["p"], path) for path in floats_of(kind)}
+        sets = [{path: values[i] for path, values in columns.items()} for i in range(count)]
+        results = [called(part, equation, {**arguments, "p": tuple_from(kind, of)}) for of in sets]
+        return np.array(results, dtype=np.float64)
+    decided = {"options": arguments["options"]} if "options" in names else {}
+    (result,) = derive(equation, (), decided).over(*(arguments[name] for name in names))
+    return np.broadcast_to(np.asarray(result, dtype=np.float64), (count,))
 
 
 # --- blocks of sets -------------------------------------------------------------------------------

@@ -110,7 +110,7 @@ def test_limits_of_one_s_own_are_those_of_march_and_analysis() -> None:
     run = relieved.simulate(np.full(1500, 10.0))
     assert run.shaft_speed.max() == pytest.approx(speed_limits(relieved)[1], rel=1e-12)
     assert run.shaft_speed.max() < 0.6 * speed_limits(PLAIN)[1]
-    records, beyond = drive_records("voltage", COMMAND, RATE), 1.5 * run.stroker_pressure.max()
+    records, beyond = drive_records(PLAIN, COMMAND, RATE), 1.5 * run.stroker_pressure.max()
     simulate_drive(PLAIN.parameters, records, "rest", beyond)
     with pytest.raises(DomainError, match="pressure at the start"):
         simulate_drive(relieved.parameters, records, "rest", beyond)

@@ -147,7 +147,7 @@ def test_outputs_say_what_they_follow_at_once(files, fmi):
 
 
 def test_outputs_follow_the_voltage_at_once_without_a_delay(tmp_path, fmi):
-    with pytest.warns(UserWarning, match=r"neutral: tau .* 0 s, .* 1.5 steps"):
+    with pytest.warns(UserWarning, match=r"neutral: the delay of the voltage is 0 s, .* 1.5 steps"):
         path = export.fmu(Drive.preset("neutral"), tmp_path / "n.fmu", fmi=fmi)
     read = fmpy.read_model_description(str(path))
     follow = {
@@ -400,7 +400,7 @@ def test_refuses_another_ending_and_a_folder_that_is_not_there(hoist, tmp_path):
 
 def test_a_recursion_for_another_rate_is_converted_or_refused(hoist, tmp_path):
     recursion = Drive(replace(hoist.parameters, rate=512.0))
-    with pytest.warns(UserWarning, match="512 Hz"):
+    with pytest.warns(UserWarning, match="for another rate"):
         path = export.fmu(recursion, tmp_path / "a.fmu", step=1e-3, platforms=["linux64"])
     if LINUX:
         assert export.compare(path, recursion, np.full(400, 7.0)).equal

@@ -342,7 +342,7 @@ def test_feedthrough_is_what_a_jump_of_an_input_moves_at_once(
     """Of the form that is exported: what moves is declared, and what is declared can move."""
     drive = Drive.preset("hoist").replace(**changes)
     content = content_of(drive, H)
-    said = feedthrough(content.exported, content.instance, H)
+    said = feedthrough(content.exported, content.machine, H)
     jumps = {"load_torque": 3e4, "pump_speed": 1.2, "supply_pressure": 1.2e7}
     moved: dict[str, set[str]] = {name: set() for name in said}
     model = in_c(drive)

@@ -24,7 +24,7 @@ def solved(full: FullOrderDrive, run: Simulation, tolerance: float = 1e-8) -> np
     open, the plate at a stop. Stops are inelastic.
     """
     m, current = full.plant.machine, run.fine("current")
-    instance = full.instance(run.record.step, card=False)
+    instance = full.by_current
     options = instance.options[1]
     started = instance.start({"current": float(current[0])}, run.record.step, "rest")
     state = np.array(started.states[1].motion)

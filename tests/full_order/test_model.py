@@ -1,7 +1,6 @@
 """The five-state drive as a model of the engine: derivatives of its discrete map, and fits."""
 
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -17,7 +16,6 @@ from swashplate.equations.marching import (
     residuals,
 )
 from swashplate.models.displacement_control import Solenoids
-from swashplate.models.full_order import Substeps
 from swashplate.models.machine import ATMOSPHERE, Hydrostat, mixture_modulus, oil_modulus
 
 Array = np.ndarray
@@ -38,7 +36,7 @@ def hoist() -> FullOrderDrive:
     full = FullOrderDrive.preset("hoist").replace(
         load_torque=2e3, motor_leakage=1e-6, piston_leakage=2e-12, air_fraction=0.01
     )
-    return replace(full, drive=full.drive.replace(Z20=2.0, Z21=1.5, Z22=1.0))
+    return FullOrderDrive(full.drive.replace(Z20=2.0, Z21=1.5, Z22=1.0), full.physical)
 
 
 @pytest.fixture(scope="module")
@@ -63,7 +61,7 @@ def test_behind_a_voltage_it_is_the_same_to_the_last_bit(hoist: FullOrderDrive) 
     """Card and machine in one march, and the machine over the card's current."""
     record = record_of(STOPS, 512.0, what="voltage")
     speed = Observation("shaft_speed", record.time, np.zeros(STOPS.size))
-    joined = residuals(hoist.instance(record.step, substeps=STEPS), ObservedRecord(record, [speed]))
+    joined = residuals(hoist.at_substeps(STEPS), ObservedRecord(record, [speed]))
     assert np.array_equal(joined, simulated(hoist, STOPS))
 
 
@@ -160,9 +158,9 @@ def changed(full: FullOrderDrive, name: str, by: float) -> FullOrderDrive:
 
 def test_masses_that_make_the_march_unstable_are_told(hoist: FullOrderDrive) -> None:
     """Sub-steps are fixed over a fit: a step of it to a lighter plate is taken back."""
-    instance = hoist.instance(1.0 / 512.0, substeps=8)
+    instance = hoist.at_substeps(8)
     light = hoist.replace(swash_inertia=2e-3, piston_mass=0.1)
-    parts = (instance.parts[0], light.instance(1.0 / 512.0).parts[1]._replace(given=Substeps(8.0)))
+    parts = (instance.parts[0], light.at_substeps(8).parts[1])
     record = record_of(CALM, 512.0, what="voltage")
     observed = ObservedRecord(record, [Observation("shaft_speed", TIME, np.zeros(TIME.size))])
     with pytest.raises(DomainError, match=r"2\.\d+ rad in a sub-step, .* 2"):

@@ -12,7 +12,6 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from swashplate import Drive
-from swashplate.drive import filter_step_limit
 from swashplate.equations import Window
 from swashplate.models import amplifier
 from swashplate.models.amplifier import CardChannel, Filter
@@ -106,7 +105,7 @@ def test_it_is_stable_and_sticks_at_any_rate(zeta: float) -> None:
     """After a step it comes to rest within C/ω² of I_ss, and stays there exactly."""
     p = CardChannel(0.1, 0.1, 0.1, 0.0, 0.0, zeta, 98.377, 4.8368, inf, inf, inf, 0.0, inf)
     for rate in (50.0, *RATES):
-        assert p.omega / rate < filter_step_limit(zeta, exact=True)
+        assert p.omega / rate < amplifier.step_limit(zeta, True)
         found = marched(p, np.r_[0.0, np.full(round(3.0 * rate), 0.5)], 1.0 / rate)
         assert abs(found[-1] - 0.5) <= p.C / p.omega**2 * (1.0 + 1e-9)
         assert found[-1] == pytest.approx(found[-5], abs=1e-15)

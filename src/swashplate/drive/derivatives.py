@@ -10,7 +10,6 @@ from typing import NamedTuple
 from swashplate.drive.instance import (
     PRESSURE_PATH,
     START,
-    check_filter_stability,
     drive_instance,
 )
 from swashplate.drive.march import start_states
@@ -89,13 +88,12 @@ def _bound(
     run_values: RunValues = NO_RUN_VALUES,
 ) -> BoundModel:
     """The model with numbers for some columns, under a command between two extremes."""
-    if by_voltage:
-        check_filter_stability(parameters, step)
     # a refinement whose parameter is a column is switched on even if the parameter is 0;
     # the equations of "leaky" and "loaded" have derivatives while they are off
     switches = frozenset(SWITCHES[name] for name in names if name in SWITCHES)
     switched = _switched_on(parameters, switches - {"leaky", "loaded"})
     instance = drive_instance(switched, by_voltage=by_voltage)
+    instance.check_step(step)
     start = dict(run_values.start)
     if PRESSURE_PATH in start:
         start |= start_states(instance, start[PRESSURE_PATH])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple, Unpack, overload
 
@@ -11,17 +11,19 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.drive.equilibrium import steady_states
-from swashplate.drive.instance import (
-    at_every_rate,
-    check_filter_stability,
-    drive_instance,
-    with_equation,
-)
+from swashplate.drive.instance import at_every_rate, drive_instance, with_equation
 from swashplate.drive.march import Sample, drive_stepper, simulate_drive
 from swashplate.drive.records import RunKeywords, drive_records
 from swashplate.drive.simulation import Simulation
-from swashplate.equations import CompiledStep, Equation, Machine, Replacement, Stepper
-from swashplate.equations.marching import SOURCE_RATE, Interpolation, Start, check_rate, stored_of
+from swashplate.equations import (
+    CompiledStep,
+    Equation,
+    Machine,
+    Replacement,
+    Stepper,
+    compiled_step,
+)
+from swashplate.equations.marching import SOURCE_RATE, Interpolation, Start
 from swashplate.errors import InputError
 from swashplate.maneuvers import Maneuver
 from swashplate.parameters import (
@@ -49,11 +51,12 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class Drive(Result, Mapping[str, Parameter]):
+class Drive(Result, Machine, Mapping[str, Parameter]):
     """A hydrostatic drive from joystick voltage to shaft speed. Immutable.
 
-    It is a mapping of its parameters by symbol: ``drive["Z16"]``, or ``drive["Z16_plus"]`` for one
+    It is a `Machine`, which all verbs take: `swashplate.equations.join` joins drives with a load,
+    `swashplate.export` writes them, `swashplate.linear` linearises them. And it is a mapping of its
+    parameters by symbol: ``drive["Z16"]``, or ``drive["Z16_plus"]`` for one
     direction.
 
     Examples
@@ -68,17 +71,21 @@ class Drive(Result, Mapping[str, Parameter]):
     parameters: ParameterSet
     """Value, unit, bounds, source and status of every parameter, by symbol."""
 
-    def __post_init__(self) -> None:
-        """Refuse what is not a parameter set, with the call that takes it."""
-        parameters: object = self.parameters
-        if isinstance(parameters, ParameterSet):
-            return
-        way = "Drive(parameters) takes a ParameterSet"
-        if isinstance(parameters, str) and parameters in preset_names():
-            way = f'the packaged drive is Drive.preset("{parameters}")'
-        elif isinstance(parameters, str | Path):
-            way = f'a parameter file is read with Drive.from_toml("{parameters}")'
-        raise InputError(f"A Drive cannot be made from {parameters!r}: {way}.")
+    def __init__(self, parameters: ParameterSet) -> None:
+        if not isinstance(parameters, ParameterSet):
+            raise InputError(f"A Drive cannot be made from {parameters!r}: {_way(parameters)}.")
+        machine = drive_instance(parameters, by_voltage=True)
+        self._set(machine.model, machine.parts, machine.name)
+        object.__setattr__(self, "parameters", parameters)
+
+    def __reduce__(self) -> tuple[type[Drive], tuple[ParameterSet]]:
+        return Drive, (self.parameters,)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Drive) and self.parameters == other.parameters
+
+    def __hash__(self) -> int:
+        return hash(self.parameters)
 
     @classmethod
     def preset(cls, name: str) -> Drive:
@@ -172,9 +179,9 @@ class Drive(Result, Mapping[str, Parameter]):
         return f"Drive({self.name!r}, card {self.parameters.card!r})"
 
     @property
-    def name(self) -> str:
-        """Name of the parameter set."""
-        return self.parameters.name
+    def title(self) -> str:
+        """Title of the parameter set."""
+        return self.parameters.title
 
     def __getitem__(self, name: str) -> Parameter:
         """A parameter by its symbol, ``drive["Z16"].value.plus``, or ``drive["Z16_plus"].value``.
@@ -195,12 +202,14 @@ class Drive(Result, Mapping[str, Parameter]):
     def __len__(self) -> int:
         return len(self.parameters)
 
-    def replace(self, **changes: Change) -> Drive:
+    def replace(self, changes: Mapping[str, Change] | None = None, /, **by_name: Change) -> Drive:
         """A drive with other values.
 
         Parameters
         ----------
-        **changes : float, Pint quantity, or a pair of them
+        changes : mapping, optional
+            The same as keywords, also by path: ``{"pump.Z16_plus": 1.2e-4}``.
+        **by_name : float, Pint quantity, or a pair of them
             By symbol (``Z16=1.2e-4`` both ways, ``Z16=(1.2e-4, 1.5e-4)`` plus and minus) or by one
             direction (``Z16_plus=1.2e-4``), in SI or with a unit (``Z16=0.12 * ureg.mm``).
 
@@ -222,7 +231,10 @@ class Drive(Result, Mapping[str, Parameter]):
         >>> wider["Z16"].value
         Pair(plus=0.00012, minus=0.00016)
         """
-        return Drive(self.parameters.replace(changes))
+        columns = {path: column for column, path in self.parameters.definitions.paths.items()}
+        given = {**(changes or {}), **by_name}
+        named = {columns.get(name, name): change for name, change in given.items()}
+        return Drive(self.parameters.replace(named))
 
     def scale(self, **factors: Change) -> Drive:
         """A drive with values multiplied.
@@ -317,15 +329,20 @@ class Drive(Result, Mapping[str, Parameter]):
         return Drive(replace(self.parameters, name=name, title=title))
 
     @property
-    def machine(self) -> Machine:
-        """Its model with its numbers, from the voltage to the shaft: what is joined with others."""
-        return drive_instance(self.parameters, by_voltage=True)
+    def by_current(self) -> Machine:
+        """Pump and motor alone, behind a signed current in place of the card."""
+        return drive_instance(self.parameters, by_voltage=False)
 
     @property
     def plain(self) -> Drive:
         """The drive without refinements, itself if it has none."""
         plain = self.parameters.plain
         return self if plain is self.parameters else Drive(plain)
+
+    def at_step(self, h: float) -> Drive:
+        """The drive whose filter means the same at a step [s]: itself, or `at_every_rate`."""
+        rate = self.parameters.rate
+        return self if rate is None or abs(rate * h - 1.0) <= 1e-9 else self.at_every_rate()
 
     def at_every_rate(self) -> Drive:
         """The drive with a card's filter that means the same at every rate.
@@ -397,7 +414,7 @@ class Drive(Result, Mapping[str, Parameter]):
         >>> round(float(run.shaft_speed.max()), 2)
         3.42
         """
-        records = drive_records("voltage", voltage, rate, **keywords)
+        records = drive_records(self, voltage, rate, **keywords)
         return simulate_drive(self.parameters, records, start)
 
     def simulate_current(
@@ -437,7 +454,7 @@ class Drive(Result, Mapping[str, Parameter]):
         >>> run.voltage is None
         True
         """
-        records = drive_records("current", current, rate, **keywords)
+        records = drive_records(self.by_current, current, rate, **keywords)
         return simulate_drive(self.parameters, records, start)
 
     def sensitivities(
@@ -484,7 +501,7 @@ class Drive(Result, Mapping[str, Parameter]):
         """
         from swashplate.drive.derivatives import drive_sensitivities
 
-        records = drive_records("voltage", voltage, rate, **keywords)
+        records = drive_records(self, voltage, rate, **keywords)
         return drive_sensitivities(self.parameters, records, start, parameters)
 
     def sensitivities_current(
@@ -517,7 +534,7 @@ class Drive(Result, Mapping[str, Parameter]):
         """
         from swashplate.drive.derivatives import drive_sensitivities
 
-        records = drive_records("current", current, rate, **keywords)
+        records = drive_records(self.by_current, current, rate, **keywords)
         return drive_sensitivities(self.parameters, records, start, parameters)
 
     def simulate_many(
@@ -575,7 +592,8 @@ class Drive(Result, Mapping[str, Parameter]):
         if len(given) != 1:
             raise InputError("A batch needs either a voltage or a current.")
         ((driver, command),) = given.items()
-        records = drive_records(driver, command, rate, **keywords)
+        machine = self if driver == "voltage" else self.by_current
+        records = drive_records(machine, command, rate, **keywords)
         return simulate_drives(self.parameters, changes, records, output, cost, to, executor)
 
     def stepper(
@@ -651,11 +669,7 @@ class Drive(Result, Mapping[str, Parameter]):
         InputError
             For signals that a drive does not have, and a rate too low for the card's filter.
         """
-        rate = in_si(rate, "Hz", "The rate")
-        check_rate(rate)
-        check_filter_stability(self.parameters, 1.0 / rate)
-        instance = drive_instance(self.parameters, by_voltage=True)
-        return CompiledStep(instance, inputs, stored_of(instance.model, outputs), 1.0 / rate)
+        return compiled_step(self, inputs, outputs, in_si(rate, "Hz", "The rate"))
 
     def linearize(
         self,
@@ -867,3 +881,12 @@ class Drive(Result, Mapping[str, Parameter]):
         if np.ndim(voltage) == 0:
             return float(current[0]), float(speed[0])
         return current.reshape(voltages.shape), speed.reshape(voltages.shape)
+
+
+def _way(parameters: object) -> str:
+    """The call that makes a drive of what is not a parameter set."""
+    if isinstance(parameters, str) and parameters in preset_names():
+        return f'the packaged drive is Drive.preset("{parameters}")'
+    if isinstance(parameters, str | Path):
+        return f'a parameter file is read with Drive.from_toml("{parameters}")'
+    return "Drive(parameters) takes a ParameterSet"

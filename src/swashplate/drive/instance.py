@@ -3,13 +3,9 @@
 from __future__ import annotations
 
 from cmath import log, sqrt
-from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from functools import lru_cache
 from typing import Any, NamedTuple
-
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
 from swashplate.equations import (
     Machine,
@@ -22,7 +18,6 @@ from swashplate.equations import (
 from swashplate.equations.marching import PartNumbers
 from swashplate.errors import InputError
 from swashplate.models.amplifier import Card, CardChannel, CardOptions
-from swashplate.models.amplifier import step_limit as filter_limit
 from swashplate.models.displacement_control import Pump, PumpOptions, steep_stops
 from swashplate.models.drive import Source as CurrentSource
 from swashplate.models.drive import (
@@ -33,13 +28,7 @@ from swashplate.models.drive import (
     settled_drive,
 )
 from swashplate.models.pump import searched_pressure, settled_pressure
-from swashplate.parameters import SIDES, CheckedRule, ParameterRule, ParameterSet, apply_rule
-
-Array = NDArray[np.float64]
-
-MOST_SUBSTEPS = 1000
-"""Steps a sample that anyone would wait for."""
-
+from swashplate.parameters import SIDES, ParameterSet
 
 START = "start."
 """What the column of a number of the state at the first sample begins with, before its path."""
@@ -162,59 +151,6 @@ def without_ripple(instance: Machine) -> Machine:
     card, pump = instance.parts
     smooth = pump._replace(options=pump.options._replace(ripple=None))
     return Machine.of_parts(instance.model, (card, smooth), instance.name)
-
-
-def filter_step_limit(zeta: ArrayLike, exact: bool) -> Array:
-    """Largest ωh that the card's filter bears, for each ζ; see the equation of that name."""
-    damping = np.asarray(zeta, dtype=np.float64)
-    limit = filter_limit
-    form = True if exact else None
-    limits = [limit(value, form) for value in damping.reshape(-1).tolist()]
-    return np.array(limits).reshape(damping.shape)
-
-
-def unstable_filters(
-    numbers: Mapping[str, Array], step: float, exact: bool
-) -> Iterator[CheckedRule]:
-    """For each rule the sets whose filter gives wrong values at this step; see `check_rules`."""
-    finding = (
-        "the current filter of the {side} channel (zeta = {zeta:g}, omega = {omega:g} rad/s) "
-        f"{'swings too fast for' if exact else 'is unstable at'} a step of 1/{1.0 / step:g} s; "
-        "simulate with "
-    )
-    rules: tuple[ParameterRule, ...] = (
-        ParameterRule(
-            lambda values: ~(values["steps"] < MOST_SUBSTEPS),
-            f"{finding}a zeta nearer to 1 or a lower omega.",
-        ),
-        ParameterRule(
-            lambda values: ~(values["steps"] < 1.0),
-            f"{finding}substeps={{least:.0f}} or more, a higher rate or a lower omega.",
-        ),
-    )
-    for side in SIDES:
-        zeta = numbers[f"zeta_{side}"]
-        omega = numbers[f"omega_{side}"]
-        steps = omega * step / filter_step_limit(zeta, exact)
-        values = {
-            "side": side,
-            "zeta": zeta,
-            "omega": omega,
-            "steps": steps,
-            "least": steps // 1.0 + 1.0,
-        }
-        for rule in rules:
-            yield apply_rule(rule, values)
-
-
-@lru_cache(maxsize=256)
-def check_filter_stability(parameters: ParameterSet, step: float) -> None:
-    """Refuse a step at which the filter would give wrong values."""
-    names = [f"{name}_{side}" for name in ("zeta", "omega") for side in SIDES]
-    numbers = {name: np.array([parameters.numbers[name]]) for name in names}
-    for broken, sentence in unstable_filters(numbers, step, parameters.rate is None):
-        if broken[0]:
-            raise InputError(f"{parameters.name}: {sentence(0)}")
 
 
 def at_every_rate(parameters: ParameterSet) -> ParameterSet:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from swashplate.drive.equilibrium import OperatingPoint
-from swashplate.drive.instance import check_filter_stability
+from swashplate.drive.instance import drive_instance
 from swashplate.drive.signals import UNITS
 from swashplate.drive.small_motion import Coulomb, lifted, small_motion_model
 from swashplate.equations.marching import Interpolation, least_substeps
@@ -105,7 +105,8 @@ class LinearDrive(LinearModel, Result):
         rate = in_si(rate, "Hz", "The rate")
         substeps = least_substeps(rate)
         if self.input == "voltage":
-            check_filter_stability(self.parameters, 1.0 / (rate * substeps))
+            machine = drive_instance(self.parameters, by_voltage=True)
+            machine.check_step(1.0 / (rate * substeps))
         fine = small_motion_model(
             self.parameters,
             self.operating_point,

@@ -8,14 +8,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from swashplate.drive.instance import check_filter_stability, drive_instance
-from swashplate.drive.records import INPUT_RANGES
+from swashplate.drive.instance import drive_instance
 from swashplate.drive.simulation import Simulation
 from swashplate.equations import Machine, Stepper, with_replacements
-from swashplate.equations.marching import Interpolation, Record, Start, least_substeps
+from swashplate.equations.marching import Interpolation, Record, Start
 from swashplate.errors import DomainError, InputError
 from swashplate.models.displacement_control import pressure_limits
-from swashplate.parameters import FULL_VOLTAGE, ParameterSet
+from swashplate.parameters import ParameterSet
 
 
 def simulate_drive(
@@ -29,10 +28,9 @@ def simulate_drive(
     With `start_pressure` [Pa] the pump begins at that pressure; `start` then sets only the card's
     state.
     """
-    driver, record = next(iter(records.items()))
-    if driver == "voltage":
-        check_filter_stability(parameters, record.step)
-    run = Simulation(drive_instance(parameters, by_voltage=driver == "voltage"), records, start)
+    driver = next(iter(records))
+    machine = drive_instance(parameters, by_voltage=driver == "voltage")
+    run = Simulation(machine, records, start)
     if start_pressure is not None:
         run = replace(run, begin=start_states(run.instance, start_pressure))
     return run.marched()
@@ -80,8 +78,6 @@ def drive_stepper(
 
     `measured` are the inputs other than the voltage.
     """
-    substeps = least_substeps(rate)
-    check_filter_stability(parameters, 1.0 / (rate * substeps))
 
     def sample_of(values: Sequence[float]) -> Sample:
         """Inputs come first in the stepper's values; of these a sample shows only the voltage."""
@@ -99,6 +95,4 @@ def drive_stepper(
         sample_of,
         start,
         interpolation=interpolation_of,
-        substeps=substeps,
-        ranges={"voltage": (-FULL_VOLTAGE, FULL_VOLTAGE), **INPUT_RANGES},
     )

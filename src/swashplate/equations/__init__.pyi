@@ -21,6 +21,7 @@ from .fields import defaults_of as defaults_of
 from .fields import definition_of as definition_of
 from .fields import floats_of as floats_of
 from .fields import is_real as is_real
+from .fields import nested_from as nested_from
 from .fields import tuple_from as tuple_from
 from .fields import value_at as value_at
 from .joining import join as join
@@ -58,6 +59,7 @@ from .model import arguments_of as arguments_of
 from .model import discretised as discretised
 from .model import parameter_paths as parameter_paths
 from .model import state_paths as state_paths
+from .plausible import check_plausible as check_plausible
 from .replacement import Replacement as Replacement
 from .replacement import check_members as check_members
 from .replacement import replaced as replaced

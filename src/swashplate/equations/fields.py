@@ -112,6 +112,17 @@ class Definition:
         return text + (", or inf for none" if self.can_be_off else "")
 
     @property
+    def span(self) -> str:
+        """The range of an input in words, both ends included: ``within ±10``."""
+        if self.lower == -self.upper:
+            return f"within ±{self.upper:g}"
+        if self.upper == inf:
+            return f"at least {self.lower:g}"
+        if self.lower == -inf:
+            return f"at most {self.upper:g}"
+        return f"from {self.lower:g} to {self.upper:g}"
+
+    @property
     def plausible_range(self) -> str:
         """The plausible sizes as words, e.g. ``at most 100``; empty if there is no such range."""
         if self.plausible is None:
@@ -144,7 +155,7 @@ def declared_by(parameters: Any) -> Iterator[Definition]:
     both = hints.get("plus") if hints.get("plus") is hints.get("minus") else None
     for name in parameters._fields:
         hint = hints[name]
-        if hasattr(hint, "_fields"):
+        if is_named_tuple(hint):
             directed = name in ("plus", "minus") and both is not None
             prefixes = ("plus", "minus") if directed else (name,)
             if prefixes[0] != name:
@@ -266,15 +277,16 @@ def defaults_of(kind: Any) -> dict[str, float]:
 def tuple_from(kind: Any, numbers: Mapping[str, float]) -> Any:
     """A nested named tuple from numbers by path; others keep their defaults."""
     given = {path: float(number) for path, number in numbers.items()}
-    return _built(kind, defaults_of(kind) | given, "")
+    return nested_from(kind, defaults_of(kind) | given)
 
 
-def _built(kind: Any, numbers: Mapping[str, float], prefix: str) -> Any:
+def nested_from(kind: Any, values_by_path: Mapping[str, Any], prefix: str = "") -> Any:
+    """A nested named tuple from values by path, numbers or arrays; `prefix` is left out of it."""
     hints = get_type_hints(kind)
     values = [
-        _built(hints[name], numbers, f"{prefix}{name}.")
+        nested_from(hints[name], values_by_path, f"{prefix}{name}.")
         if is_named_tuple(hints[name])
-        else numbers[f"{prefix}{name}"]
+        else values_by_path[f"{prefix}{name}"]
         for name in kind._fields
     ]
     return kind(*values)

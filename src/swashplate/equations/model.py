@@ -30,6 +30,7 @@ from dataclasses import dataclass, field
 from difflib import get_close_matches
 from functools import cached_property
 from importlib import import_module
+from math import inf
 from operator import attrgetter
 from types import FunctionType, ModuleType
 from typing import Any, Literal, NamedTuple, get_args, get_type_hints
@@ -37,6 +38,7 @@ from typing import Any, Literal, NamedTuple, get_args, get_type_hints
 from swashplate.equations.declaration import Replacements, equation, equation_of_text
 from swashplate.equations.fields import (
     Definition,
+    declared_by,
     definition_of,
     definitions_of,
     floats_of,
@@ -184,6 +186,17 @@ class Model:
     """Margin that is above 0 if the equations hold."""
     outside: str | Callable[[float, str], str] = "the model's equations do not hold"
     """What has happened if the margin is not above 0, for the message."""
+    stable: Equation | None = None
+    """Margin, of ``p, h, options``, that is above 0 if the equations bear a step of h."""
+    unstable: Callable[[Any, float, Any], str] | None = None
+    """What is wrong with such a step and what would be right, of ``p, h, options``."""
+    longest_step: float = inf
+    """Longest step of the grid; so many steps a sample are taken by default. [s]"""
+    any_step: str = ""
+    """Option without which the equations are for one step only; none if empty."""
+    follows: Mapping[str, Equation] = field(default_factory=dict)
+    """Options that follow from the parameters: whether each is on, of ``p``. Those that a
+    parameter's `Definition` names as its switch are not listed."""
     outputs: Sequence[str] = ()
     """Signals of most use; by default all."""
     integrals: Mapping[str, str] = field(default_factory=dict)
@@ -342,6 +355,15 @@ class Model:
 
         An input declares its own on the argument of an equation, or on the field of `inputs`.
         """
+        declared = dict(self.input_definitions)
+        for part in self.parts:
+            for kind in filter(None, (part.state, part.signals)):
+                declared |= {part.full(name): each for name, each in definitions_of(kind).items()}
+        return declared
+
+    @cached_property
+    def input_definitions(self) -> dict[str, Definition]:
+        """Definitions of the signals that the inputs of its parts take, by name."""
         declared = dict[str, Definition]()
         for part in self.parts:
             for name in part.input_types:
@@ -352,9 +374,67 @@ class Model:
                     definition = definition_of(kind)
                     if definition is not None:
                         declared.setdefault(part.tap(name).signal, definition)
-            for kind in filter(None, (part.state, part.signals)):
-                declared |= {part.full(name): each for name, each in definitions_of(kind).items()}
         return declared
+
+    @cached_property
+    def input_ranges(self) -> dict[str, tuple[float, float]]:
+        """Least and largest value of the external signals that have a range, by name."""
+        definitions = self.input_definitions
+        stated = {name: definitions[name] for name in self.external if name in definitions}
+        ranges = {name: (each.lower, each.upper) for name, each in stated.items()}
+        return {name: ends for name, ends in ranges.items() if ends != (-inf, inf)}
+
+    @cached_property
+    def parameter_names(self) -> dict[str, tuple[str, ...]]:
+        """Paths of the parameters that each name stands for, in the whole model.
+
+        A path stands for itself. A parameter with a value for each direction has its symbol for
+        both, ``hoist.pump.Z16``, and a name for each, ``hoist.card.J_plus`` for
+        ``hoist.card.plus.J``.
+        """
+        names: dict[str, tuple[str, ...]] = {path: (path,) for path in parameter_paths(self)}
+        for index, part in enumerate(self.parts):
+            prefix = self.prefix(index)
+            for definition in declared_by(part.parameters):
+                paths = tuple(f"{prefix}{path}" for path in definition.fields)
+                names.setdefault(f"{prefix}{definition.symbol}", paths)
+                for column, path in zip(definition.columns, paths, strict=True):
+                    names.setdefault(f"{prefix}{column}", (path,))
+        return names
+
+    def parameters_named(self, name: str) -> tuple[str, ...]:
+        """Paths of the parameters that a name stands for; its last word is enough if it is unique.
+
+        Raises
+        ------
+        InputError
+            If there is none; the sentence has the names that are near.
+        """
+        names = self.parameter_names
+        full = full_name(name, names)
+        if full not in names:
+            raise InputError(f"{self.name} has no parameter {near_names(name, names)}.")
+        return names[full]
+
+    @cached_property
+    def switches(self) -> dict[tuple[int, str], tuple[str, ...]]:
+        """Paths, within the part, of the parameters that switch an option on unless all are 0.
+
+        By part and option, as the parameters' definitions state it.
+        """
+        paths = dict[tuple[int, str], tuple[str, ...]]()
+        for index, part in enumerate(self.parts):
+            for definition in declared_by(part.parameters) if part.options else ():
+                option = definition.switch
+                if option in getattr(part.options, "_fields", ()):
+                    key = index, option
+                    paths[key] = (*paths.get(key, ()), *definition.fields)
+        return paths
+
+    @cached_property
+    def longest(self) -> float:
+        """Longest step that all parts allow. [s]"""
+        return min(part.longest_step for part in self.parts)
 
     def tap(self, name: str) -> Tap:
         """How an input is looked at."""
@@ -383,7 +463,7 @@ def _wrong(model: Model) -> Iterator[str]:
         for field_, kind in _no_floats(type_) if type_ is not None else ():
             must = "but must be a float or a named tuple of floats"
             yield f"{prefix}{field_} is of type {kind}, {must}."
-    for word in ("step", "sample", "rest", "settled", "limits", "domain"):
+    for word in ("step", "sample", "rest", "settled", "limits", "domain", "stable"):
         member = getattr(model, word)
         is_left_out = member is None and word != "step"
         if not isinstance(member, FunctionType) and not is_left_out:

@@ -16,11 +16,8 @@ from numpy.typing import NDArray
 
 from swashplate.__about__ import __version__
 from swashplate.drive import (
-    INPUT_RANGES,
     Drive,
     Sample,
-    check_filter_stability,
-    drive_instance,
     models_of,
 )
 from swashplate.equations import Machine, Model, declared_by
@@ -42,9 +39,8 @@ from swashplate.export.variable_list import (
     References,
     descriptions_of,
 )
-from swashplate.models.amplifier import stable_step
-from swashplate.models.displacement_control import steep_stops
-from swashplate.parameters import FULL_VOLTAGE, ParameterSet
+from swashplate.models.drive import drive as drive_model
+from swashplate.parameters import ParameterSet
 from swashplate.tables import write_text
 
 Array = NDArray[np.float64]
@@ -77,13 +73,7 @@ def _exported(equations: tuple[Any, ...]) -> Exported:
         "A hydrostatic drive from joystick voltage to shaft speed.",
         parameters=columns,
         outputs=(*Sample._fields[1:], "motor_torque", "motor_pressure_drop"),
-        bounds={"voltage": FULL_VOLTAGE},
-        ranges=INPUT_RANGES,
         notes={"voltage": "joystick voltage, positive towards positive speed [V]"},
-        stable={0: stable_step},
-        follows={(1, "steep"): steep_stops},
-        longest=LONGEST_STEP,
-        free_step="exact",
     )
 
 
@@ -123,11 +113,9 @@ class Content:
     """A drive, or a user-defined model, with its numbers, as it is exported."""
 
     exported: Exported
-    instance: Machine
+    machine: Machine
     values: Array
     """Numbers that its ``init`` takes."""
-    name: str
-    title: str
     packaged: bool
     """Whether the package's libraries have its equations."""
     references: References
@@ -136,6 +124,17 @@ class Content:
 
     def __repr__(self) -> str:
         return f"Content({self.name!r}, {self.values.size} values)"
+
+    @property
+    def name(self) -> str:
+        """Name of the machine."""
+        return self.machine.name
+
+    @property
+    def shown(self) -> str:
+        """The output that an example prints: the shaft's speed, or the last one."""
+        names = self.exported.names
+        return "shaft_speed" if "shaft_speed" in names else names[-1]
 
     @property
     def step(self) -> float:
@@ -161,45 +160,35 @@ def content_of(what: Drive | Machine, step: float, *, prefix: str = "swp") -> Co
         If the step is none, the filter of a drive is unstable at it, or numbers are none.
     """
     check_rate(step, "step", "s")
-    if isinstance(what, Drive):
-        if not step <= LONGEST_STEP:
-            raise InputError(
-                f"The step is {step:g} s, but must be above 0 and at most 1/{SOURCE_RATE:g} s: an "
-                "FMU's master may use longer steps; in C, call swp_step several times per sample."
-            )
-        rate = what.parameters.rate
-        if rate is not None and abs(rate * step - 1.0) > 1e-9:
-            what = what.at_every_rate()
-            warnings.warn(
-                f"{what.name}: the card's filter is a recursion for {rate:g} Hz; for a step of "
-                f"{step:g} s the differential equation with the same poles is used instead.",
-                stacklevel=3,
-            )
-        check_filter_stability(what.parameters, step)
-        exported = exported_drive(what)
-        instance = drive_instance(what.parameters, by_voltage=True)
-        title = what.parameters.title
-        references = DRIVE
-        descriptions = DRIVE_DESCRIPTIONS
+    if not isinstance(what, Machine):
+        raise InputTypeError(
+            f"{what!r} cannot be exported: give a Drive or a Machine{_nearest(what)}."
+        )
+    longest = what.model.longest
+    if not step <= longest:
+        raise InputError(
+            f"The step is {step:g} s, but must be above 0 and at most 1/{1.0 / longest:g} s: an "
+            f"FMU's master may use longer steps; in C, call {prefix}_step several times per sample."
+        )
+    machine = what.at_step(step)
+    if machine is not what:
+        warnings.warn(
+            f"{what.name}: the card's filter is a recursion for another rate; for a step of "
+            f"{step:g} s the differential equation with the same poles is used instead.",
+            stacklevel=3,
+        )
+    machine.check_step(step)
+    if isinstance(machine, Drive):  # its names and value references never change
+        exported = exported_drive(machine)
+        references, descriptions = DRIVE, DRIVE_DESCRIPTIONS
     else:
-        if not isinstance(what, Machine):
-            raise InputTypeError(
-                f"{what!r} cannot be exported: give a Drive or a Machine{_nearest(what)}."
-            )
-        instance = what
-        exported = Exported(what.model, prefix)
-        title = f"Model {what.name}"
-        references = OWN
-        descriptions = descriptions_of(exported)
-    values = numbers(exported, instance, step)
-    packaged = isinstance(what, Drive) and not what.parameters.equations
+        exported = Exported(machine.model, prefix)
+        references, descriptions = OWN, descriptions_of(exported)
     return Content(
         exported=exported,
-        instance=instance,
-        values=values,
-        name=what.name,
-        title=title,
-        packaged=packaged,
+        machine=machine,
+        values=numbers(exported, machine, step),
+        packaged=machine.model is drive_model,
         references=references,
         descriptions=descriptions,
     )
@@ -273,8 +262,7 @@ def c(what: Drive | Machine, folder: str | Path, step: float = LONGEST_STEP) -> 
     >>> sorted(path.name for path in export.c(Drive.preset("hoist"), "source"))[3:]
     ['hoist_values.h', 'main.c', 'swashplate_drive.c', 'swashplate_drive.h']
     """
-    prefix = c_name(what.name) if isinstance(what, Machine) else "swp"
-    content = content_of(what, step, prefix=prefix)
+    content = content_of(what, step, prefix=c_name(getattr(what, "name", "model")))
     exported, values, name = content.exported, content.values, content.identifier
     texts = interface(exported)
     placeholders = {
@@ -283,15 +271,12 @@ def c(what: Drive | Machine, folder: str | Path, step: float = LONGEST_STEP) -> 
         "type": exported.type,
         "p": exported.prefix,
         "P": exported.prefix.upper(),
-        "output": exported.constants[""][
-            exported.names[-1 if isinstance(what, Machine) else _SPEED]
-        ],
+        "output": exported.constants[""][content.shown],
         "commands": "".join(", 9.0" if s == "voltage" else ", 1.0" for s in exported.signals),
         "step": c_literal(step),
         "version": __version__,
     }
-    title = what.parameters.title if isinstance(what, Drive) else ""
-    texts[f"{name}_values.h"] = _initialiser(exported, values, name, title)
+    texts[f"{name}_values.h"] = _initialiser(exported, values, name, content.machine.title)
     for file in FURTHER:
         texts[file] = filled(source_text(f"folder/{file}"), placeholders)
     # source alone: nothing of others is linked into it
@@ -304,9 +289,6 @@ def c(what: Drive | Machine, folder: str | Path, step: float = LONGEST_STEP) -> 
     for file, text in texts.items():
         write_text(text, to / file)
     return [to / file for file in texts]
-
-
-_SPEED = Sample._fields[1:].index("shaft_speed")
 
 
 def _initialiser(exported: Exported, values: Array, name: str, title: str) -> str:

@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from swashplate.__about__ import __version__
 from swashplate.drive import Drive
-from swashplate.equations import Machine, value_at
+from swashplate.equations import Machine, simulate, value_at
 from swashplate.errors import FileError, InputError
 from swashplate.export.c_folder import (
     LONGEST_STEP,
@@ -139,23 +139,22 @@ def exportable(what: Drive | Machine, step: float) -> Content:
     """What runs at a step, its delays checked; see `content_of`."""
     content = content_of(what, step)
     for part_index, _, _, tap in content.exported.taps:
-        delay = value_at(content.instance.parts[part_index].p, tap.delay) if tap.delay else 0.0
+        delay = value_at(content.machine.parts[part_index].p, tap.delay) if tap.delay else 0.0
         if delay > LONGEST_LINE * step:
             raise InputError(
                 f"{what.name}: {tap.delay} is {delay:g} s, but the library's line holds "
                 f"{LONGEST_LINE} steps, {LONGEST_LINE * step:g} s; choose a step of "
                 f"{delay / LONGEST_LINE:.3g} s or more."
             )
-    for signal, (delay, steps) in newest(content.exported, content.instance, step).items():
+    for signal, (delay, steps) in newest(content.exported, content.machine, step).items():
         enough = delay / steps
         advice = "a master that sets inputs before it reads outputs gets them exactly"
         if enough >= SHORTEST_STEP_INSTEAD * step:
             advice = f"choose a step of {enough:.3g} s or less"
-        delay_name = "tau" if isinstance(what, Drive) else f"the delay of {signal}"
         warnings.warn(
-            f"{what.name}: {delay_name} is {delay:g} s, below {steps:g} steps of {step:g} s, so "
-            f"that outputs depend on the {signal} at the same instant and may be one sample late; "
-            f"{advice}.",
+            f"{what.name}: the delay of the {signal} is {delay:g} s, below {steps:g} steps of "
+            f"{step:g} s, so that outputs depend on the {signal} at the same instant and may be "
+            f"one sample late; {advice}.",
             stacklevel=3,
         )
     return content
@@ -196,7 +195,7 @@ def packed(content: Content, fmi: Version, platforms: Collection[Platform]) -> b
 
 def table_of(content: Content) -> tuple[Variable, ...]:
     """Every variable of what is exported."""
-    direct = feedthrough(content.exported, content.instance, content.step)
+    direct = feedthrough(content.exported, content.machine, content.step)
     values = content.values.tolist()
     return variables(content.exported, values, direct, content.descriptions, content.references)
 
@@ -284,7 +283,8 @@ def description(content: Content, table: Sequence[Variable], fmi: Version, token
 
 
 def _head(content: Content, table: Sequence[Variable], fmi: Version, token: str) -> dict[str, str]:
-    description = f"{content.title}. Own steps of {content.step:g} s."
+    title = content.machine.title or f"Model {content.name}"
+    description = f"{title}. Own steps of {content.step:g} s."
     read = sorted({name for variable in table for name in variable.feedthrough})
     if read:
         description += (
@@ -378,10 +378,10 @@ def _add_units(root: ET.Element, table: Sequence[Variable]) -> None:
 
 @dataclass(frozen=True)
 class FmuComparison(Result):
-    """An FMU's outputs and those of the drive, sample by sample."""
+    """An FMU's outputs and those of its machine, sample by sample."""
 
     name: str
-    """Name of the drive."""
+    """Name of the machine."""
     samples: int
     differences: Mapping[str, float]
     """Largest difference of each output, SI."""
@@ -396,65 +396,64 @@ class FmuComparison(Result):
     def tables(self) -> list[Table]:
         """Largest difference of each output."""
         columns = (Column("output"), Column("largest difference", ".3g"), UNIT)
-        table = Table(f"FMU of {self.name} against the drive, {self.samples} samples", columns)
+        table = Table(f"FMU of {self.name} against the machine, {self.samples} samples", columns)
         for name, difference in self.differences.items():
             table.add(name, difference, unit=self.units[name], look=difference != 0.0)
         return [table]
 
 
-def compare(path: str | Path, drive: Drive, voltage: ArrayLike) -> FmuComparison:
-    """Run an FMU with FMPy and compare it with the drive, at the FMU's own step.
+def compare(
+    path: str | Path, machine: Machine, inputs: ArrayLike | Mapping[str, ArrayLike]
+) -> FmuComparison:
+    """Run an FMU with FMPy and compare it with its machine, at the FMU's own step.
 
     Parameters
     ----------
     path : path
         The FMU.
-    drive : Drive
-        That it was made of.
-    voltage : (n,) array_like
-        Command at each step of the FMU. [V]
+    machine : Machine
+        That it was made of, a `Drive` for example.
+    inputs : (n,) array_like, or mapping of str to (n,) array_like
+        The first input, a drive's voltage, at each step of the FMU; or several by name. SI.
 
     Returns
     -------
     FmuComparison
-        Largest differences, 0 if the FMU's numbers are the drive's.
+        Largest differences, 0 if the FMU's numbers are the machine's.
 
     Raises
     ------
     InputError
-        For a user-defined model, or if FMPy is not installed, the command is none, or the FMU
-        fails.
+        If FMPy is not installed, inputs do not fit, or the FMU fails.
     FileError
         If the file is no FMU.
     """
-    if not isinstance(drive, Drive):
-        raise InputError(
-            f"An FMU is compared with a drive, not with {drive!r}; run that of a user-defined "
-            "model with FMPy, and compare it with simulate."
-        )
+    if not isinstance(machine, Machine):
+        raise InputError(f"An FMU is compared with a Drive or a Machine, not with {machine!r}.")
     try:
         import fmpy
     except ImportError:
         raise InputError(
             "Comparing needs FMPy: install the extra fmu (pip install 'swashplate[fmu]')."
         ) from None
-    command = np.asarray(voltage, dtype=np.float64)
-    if command.ndim != 1 or command.size < 2:
-        raise InputError("A command to compare by needs at least two samples.")
     step = _step_of(Path(path), fmpy)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # said when it was exported
-        content = exportable(drive, step)
-    fits = content.instance.parts[0].options.exact is None  # a recursion for this step
-    marched = drive if fits else drive.at_every_rate()
-    run = marched.simulate(command, 1.0 / step, interpolation="previous")
+        content = exportable(machine, step)
+    if not isinstance(inputs, Mapping):
+        inputs = {content.machine.model.external[0]: inputs}
+    run = simulate(content.machine, inputs, 1.0 / step, interpolation="previous")
+    samples = run.time.size
+    if samples < 2:
+        raise InputError("Inputs to compare by need at least two samples.")
     table = table_of(content)
-    inputs = {variable.name: variable.start for variable in table if variable.causality == "input"}
-    columns = {"time": np.arange(command.size) * step, **inputs, "voltage": command}
-    signals = np.empty(command.size, [(name, np.float64) for name in columns])
+    starts = {variable.name: variable.start for variable in table if variable.causality == "input"}
+    records = {name: record.values for name, record in run.records.items()}
+    columns = {"time": np.arange(samples) * step, **starts, **records}
+    signals = np.empty(samples, [(name, np.float64) for name in columns])
     for name, values in columns.items():
         signals[name] = values
-    names = [name for name in run.names if name not in ("time", "voltage")]
+    names = [variable.name for variable in table if variable.causality == "output"]
     try:
         outputs = fmpy.simulate_fmu(
             str(path),
@@ -466,11 +465,11 @@ def compare(path: str | Path, drive: Drive, voltage: ArrayLike) -> FmuComparison
         )
     except Exception as error:
         raise InputError(f"{path} fails: {error}") from None
-    if len(outputs) != command.size:
-        raise InputError(f"{path} gave {len(outputs)} samples for a command of {command.size}.")
+    if len(outputs) != samples:
+        raise InputError(f"{path} gave {len(outputs)} samples for inputs of {samples}.")
     differences = {name: float(np.abs(outputs[name] - run[name]).max()) for name in names}
     units = {variable.name: variable.unit for variable in table}
-    return FmuComparison(marched.name, command.size, differences, units)
+    return FmuComparison(run.name, samples, differences, units)
 
 
 def _step_of(path: Path, fmpy: Any) -> float:

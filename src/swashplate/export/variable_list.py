@@ -172,7 +172,7 @@ def variables(
             most = LONGEST_LINE * values[0]
             variable = replace(variable, upper=min(variable.upper or most, most))
         listed.append(variable)
-    longest = exported.longest if isfinite(exported.longest) else None
+    longest = exported.model.longest if isfinite(exported.model.longest) else None
     meaning = "step of the model's own grid, whatever the master's steps are"
     listed.append(
         Variable(
@@ -191,7 +191,7 @@ def variables(
         zip(exported.option_names, exported.settable, strict=True)
     ):
         option_description = descriptions.get(option[1], Description(f"option {option[1]}"))
-        if option[1] != exported.free_step:
+        if option not in exported.any_step:
             on = values[first_option + exported.options.index(option)] != 0.0
             settings.append(
                 (
@@ -250,7 +250,12 @@ def c_header(exported: Exported, layout: int, references: References) -> str:
     bounds = ", ".join(c_literal(exported.bounds.get(name, 0.0)) for name in signals)
     pairs = [exported.ranges.get(name, (-inf, inf)) for name in (*signals, *exported.measured)]
     ranges = ", ".join(f"{{{c_literal(low)}, {c_literal(high)}}}" for low, high in pairs)
-    free = f"swp_get_option(m, SWP_OPTION_{exported.free_step})" if exported.free_step else "1"
+    options = exported.constants["OPTION_"]
+    free = " && ".join(
+        f"swp_get_option(m, {options[full]})"
+        for full, option in zip(exported.option_names, exported.settable, strict=True)
+        if option in exported.any_step
+    )
     return f"""\
 /* Made by swashplate: the model, value references and what goes with them. */
 #ifndef SWASHPLATE_VARIABLES_H
@@ -265,7 +270,7 @@ typedef {exported.type} swp_model;
 #define SWP_FMI_SIGNALS {len(signals)} /* inputs of a step; the others follow them */
 #define SWP_FMI_CALL(f, m, u) f(m{arguments})
 #define SWP_FMI_SETTLES {int(exported.settles)}
-#define SWP_FMI_FREE_STEP(m) {free}
+#define SWP_FMI_FREE_STEP(m) {f"({free})" if " && " in free else free or "1"}
 #define SWP_FMI_BOUNDS {{{bounds or "0.0"}}} /* largest magnitudes of inputs, 0 for none */
 #define SWP_FMI_INPUT_RANGES {{{ranges or "{0.0, 0.0}"}}} /* of all inputs, lowest and highest */
 #define SWP_FMI_INPUT_NAMES {{{names or "NULL"}}}

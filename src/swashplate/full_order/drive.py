@@ -5,7 +5,7 @@ A physical set is downstream of the card and solenoids of a drive.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import ceil, floor
@@ -20,7 +20,6 @@ from swashplate.drive import (
     Drive,
     card_of,
     card_options,
-    check_filter_stability,
     drive_records,
 )
 from swashplate.equations import BoundModel, Machine, Run, Sensitivities
@@ -38,7 +37,7 @@ from swashplate.linear import linearize
 from swashplate.models import full_order as model
 from swashplate.models.displacement_control import Solenoids
 from swashplate.models.drive import Source as CurrentSource
-from swashplate.models.full_order import PlantOptions, PlantSignals
+from swashplate.models.full_order import MOST_SUBSTEPS, STABLE, PlantOptions, enough_substeps
 from swashplate.models.machine import fastest_rate, relief_pressures
 from swashplate.parameters import CATALOGUE, DEFINITIONS, Change, Definition, Definitions
 from swashplate.results import Named, Result, Tabular, figures
@@ -54,11 +53,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.int8]
-
-RESOLUTION = 1.0  # Largest product of a sub-step and the fastest natural frequency.
-STABLE = 2.0  # The same if the march is not stable any longer.
-LEAST_SUBSTEPS = 8  # Sub-steps a sample that kinks of the flow, at the orifices' limits, are worth.
-MOST_SUBSTEPS = 20_000  # Sub-steps a sample, beyond which the machine is too stiff for the march.
 
 
 def _definitions() -> Definitions:
@@ -90,7 +84,6 @@ class FullOrderSimulation(Run, Tabular):
     pressure drop is positive where the load resists positive speed.
     """
 
-    kept = PlantSignals._fields
     shown = (
         "current",
         "spool_position",
@@ -189,11 +182,11 @@ def _beyond(values: Array, lower: float, upper: float) -> Flags:
     return (values >= upper).astype(np.int8) - (values <= lower).astype(np.int8)
 
 
-@dataclass(frozen=True)
-class FullOrderDrive:
+class FullOrderDrive(Machine):
     """A drive whose spool and swash plate have mass. Immutable.
 
-    One with refinements, which the five states do not know, is refused in an `InputError`.
+    It is a `Machine`, which all verbs take. Refinements, which the five states do not know, are
+    refused in an `InputError`.
 
     Examples
     --------
@@ -208,13 +201,33 @@ class FullOrderDrive:
     physical: PhysicalSet
     """Everything downstream of the solenoids."""
 
-    def __post_init__(self) -> None:
-        if self.drive.parameters.refinements:
-            listed = ", ".join(self.drive.parameters.refinements)
+    def __init__(self, drive: Drive, physical: PhysicalSet) -> None:
+        if drive.parameters.refinements:
+            listed = ", ".join(drive.parameters.refinements)
             raise InputError(
-                f"{self.drive.name}: the five-state model has no refinements, but this drive has "
+                f"{drive.name}: the five-state model has no refinements, but this drive has "
                 f"{listed}; use it without them (its .plain)."
             )
+        object.__setattr__(self, "drive", drive)
+        object.__setattr__(self, "physical", physical)
+        front = PartNumbers(card_of(drive.parameters), card_options(drive.parameters))
+        self._set(model.full_drive, (front, self._plant_numbers(None)), physical.name)
+
+    def __reduce__(self) -> tuple[type[FullOrderDrive], tuple[Drive, PhysicalSet]]:
+        return FullOrderDrive, (self.drive, self.physical)
+
+    def __eq__(self, other: object) -> bool:
+        return (
+            isinstance(other, FullOrderDrive)
+            and self.drive == other.drive
+            and self.physical == other.physical
+        )
+
+    def __hash__(self) -> int:
+        return hash((self.drive, self.name))
+
+    def __repr__(self) -> str:
+        return f"FullOrderDrive({self.drive!r}, {self.physical!r})"
 
     @classmethod
     def preset(cls, name: str) -> FullOrderDrive:
@@ -261,12 +274,16 @@ class FullOrderDrive:
         """
         return cls(drive, from_lumped(drive.parameters, like, **quantities))
 
-    def replace(self, **changes: Change) -> FullOrderDrive:
+    def replace(
+        self, changes: Mapping[str, Change] | None = None, /, **by_name: Change
+    ) -> FullOrderDrive:
         """A drive with other physical values.
 
         Parameters
         ----------
-        **changes : float, Pint quantity, or a pair of them
+        changes : mapping, optional
+            The same as keywords.
+        **by_name : float, Pint quantity, or a pair of them
             By name of the quantity, in SI or with a unit: ``load_torque=2e3``.
 
         Returns
@@ -288,7 +305,7 @@ class FullOrderDrive:
         >>> loaded.physical["load_torque"].value
         2000.0
         """
-        return replace(self, physical=self.physical.replace(**changes))
+        return FullOrderDrive(self.drive, self.physical.replace(**(changes or {}), **by_name))
 
     @property
     def reduced(self) -> Drive:
@@ -304,22 +321,27 @@ class FullOrderDrive:
             self.physical.machine, Solenoids(*(numbers[name] for name in Solenoids._fields))
         )
 
-    def instance(self, step: float, *, substeps: int | None = None, card: bool = True) -> Machine:
-        """The model with numbers, for the engine; a voltage drives it, or a current without `card`.
+    @property
+    def by_current(self) -> Machine:
+        """The machine alone, behind a signed current in place of the card."""
+        return self.at_substeps(None, card=False)
 
-        `step` is the distance of the samples [s]; `substeps` as in `follow`.
-        """
-        parameters = self.drive.parameters
-        symmetric = parameters.pressure_root == "symmetric"
+    def _plant_numbers(self, substeps: int | None) -> PartNumbers:
+        """Numbers of the machine and its solenoids."""
+        symmetric = self.drive.parameters.pressure_root == "symmetric"
         options = PlantOptions(symmetric or None, self.physical.air)
-        substep_count = model.Substeps(float(self.substeps(step, substeps)))
-        plant = PartNumbers(self.plant, options, substep_count)
-        if not card:
-            source = PartNumbers(CurrentSource())
-            return Machine.of_parts(model.full_machine, (source, plant), self.physical.name)
-        check_filter_stability(parameters, step)
-        front = PartNumbers(card_of(parameters), card_options(parameters))
-        return Machine.of_parts(model.full_drive, (front, plant), self.physical.name)
+        return PartNumbers(self.plant, options, model.Substeps(float(substeps or 0)))
+
+    def at_substeps(self, substeps: int | None, *, card: bool = True) -> Machine:
+        """The machine with so many sub-steps a sample, by voltage or, without `card`, current.
+
+        None takes as many as the fastest mode needs.
+        """
+        plant = self._plant_numbers(substeps)
+        if card:
+            return Machine.of_parts(self.model, (self.parts[0], plant), self.name)
+        source = PartNumbers(CurrentSource())
+        return Machine.of_parts(model.full_machine, (source, plant), self.name)
 
     def substeps(self, step: float, requested: int | None = None) -> int:
         """Sub-steps that a step [s] of the record takes.
@@ -334,7 +356,7 @@ class FullOrderDrive:
             If so few are requested that the march would be unstable.
         """
         fastest = float(fastest_rate(self.physical.machine))
-        needed = max(ceil(fastest * step / RESOLUTION), LEAST_SUBSTEPS)
+        needed = int(enough_substeps(self.physical.machine, step))
         if requested is not None:
             least = floor(fastest * step / STABLE) + 1
             if requested < least:
@@ -346,7 +368,7 @@ class FullOrderDrive:
         if needed > MOST_SUBSTEPS:
             raise DomainError(
                 f"{self.physical.name}: the fastest mode, at {fastest:.3g} rad/s, would take "
-                f"{needed} steps a sample, more than {MOST_SUBSTEPS}; use a larger mass or "
+                f"{needed} steps a sample, more than {MOST_SUBSTEPS:.0f}; use a larger mass or "
                 "oil_volume."
             )
         return needed
@@ -399,10 +421,11 @@ class FullOrderDrive:
         >>> run.shaft_speed.shape
         (5121,)
         """
-        run = self.drive.simulate(
-            voltage, rate, time=time, interpolation=interpolation, start=start, clip=clip
+        records = drive_records(
+            self, voltage, rate, time=time, interpolation=interpolation, clip=clip
         )
-        return self.follow(run, start=start, substeps=substeps)
+        self.substeps(records["voltage"].step, substeps)  # refuses too few, or a stiff machine
+        return FullOrderSimulation(self.at_substeps(substeps), records, start).marched()
 
     def follow(
         self, run: Simulation, *, start: Start = "rest", substeps: int | None = None
@@ -433,8 +456,9 @@ class FullOrderDrive:
             If the machine is too stiff for the march.
         """
         record = replace(run.record, values=run.fine("current"))
-        instance = self.instance(record.step, substeps=substeps, card=False)
-        return FullOrderSimulation(instance, {"current": record}, start).marched()
+        self.substeps(record.step, substeps)
+        machine = self.at_substeps(substeps, card=False)
+        return FullOrderSimulation(machine, {"current": record}, start).marched()
 
     def modes(self, current: float = 0.0) -> Modes:
         """Natural modes about the equilibrium under a constant signed current, no limit holding.
@@ -466,10 +490,9 @@ class FullOrderDrive:
         """
         if not np.isfinite(current):
             raise InputError(f"The current is {current}, but must be a finite number of amperes.")
-        step = 1.0 / SOURCE_RATE
-        instance = self.instance(step, card=False)
+        instance = self.by_current
         at = {"current": float(current)}
-        motion = instance.start(at, step, "steady").states[1].motion
+        motion = instance.start(at, 1.0 / SOURCE_RATE, "steady").states[1].motion
         flowing = Machine.of_parts(
             model.flowing_plant, (PartNumbers(self.plant, instance.options[1]),), self.physical.name
         )
@@ -520,8 +543,9 @@ class FullOrderDrive:
         InputError
             As in `simulate`.
         """
-        records = drive_records("voltage", voltage, rate)
-        instance = self.instance(records["voltage"].step, substeps=substeps)
+        records = drive_records(self, voltage, rate)
+        self.substeps(records["voltage"].step, substeps)
+        instance = self.at_substeps(substeps)
         names = tuple(FULL_ORDER_DEFINITIONS.columns_of(parameters))
         paths = [FULL_ORDER_DEFINITIONS.path_of(name) for name in names]
         bound = BoundModel(instance, paths=paths)

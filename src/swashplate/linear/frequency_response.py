@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from math import ceil
+from math import ceil, inf
 from typing import TYPE_CHECKING, cast, overload
 
 import numpy as np
@@ -290,6 +290,7 @@ def sweep(
         raise InputError(f"The tolerance is {tolerance!r}, but must be between 0 and 1.")
     if not is_real(bias) or not np.isfinite(bias):
         raise InputError(f"The bias is {bias}, but must be a finite number.")
+    _check_swing(instance, input, bias, float(a.max()))
     if units is None:
         definitions = instance.model.definitions
         units = {name: definitions[name].unit for name in (input, output) if name in definitions}
@@ -299,6 +300,7 @@ def sweep(
     for j, frequency in enumerate(f.tolist()):
         steps = steps_of(frequency, rate)
         step = 1.0 / (frequency * steps)
+        instance.check_step(step)
         wave = np.sin(2.0 * np.pi * np.arange(steps) / steps)
         for i, amplitude in enumerate(a.tolist()):
             cycle = bias + amplitude * wave
@@ -335,6 +337,19 @@ def sweep(
         distortion=distortion,
         mean=mean,
         units=units,
+    )
+
+
+def _check_swing(instance: Machine, input: str, bias: float, largest: float) -> None:
+    """Refuse a sine that swings beyond the range of its input."""
+    least, most = instance.model.input_ranges.get(input, (-inf, inf))
+    if least <= bias - largest and bias + largest <= most:
+        return
+    definition = instance.model.input_definitions[input]
+    reached = bias - largest if bias - largest < least else bias + largest
+    raise InputError(
+        f"{instance.name}: bias and amplitude reach {reached:g} {definition.unit}, but the {input} "
+        f"must be {definition.span} {definition.unit}."
     )
 
 

@@ -69,7 +69,7 @@ def linearize(
     Examples
     --------
     >>> from swashplate import FullOrderDrive, linear
-    >>> machine = FullOrderDrive.preset("hoist").instance(1.0 / 512.0, card=False)
+    >>> machine = FullOrderDrive.preset("hoist").by_current
     >>> linear.linearize(machine, {"current": 0.5}, 512.0)
     LinearModel('hoist', current to shaft_speed, sampled at 512 Hz)
     """

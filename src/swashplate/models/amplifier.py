@@ -33,6 +33,10 @@ from swashplate.equations import (
 
 COULOMB_WIDTH = 0.01
 """Rate of current below which the smooth Coulomb sign is proportional to it. [A/s]"""
+LONGEST_STEP = 1.0 / 512.0
+"""A sample of Kruse's logs, at which the card and the pump are marched. [s]"""
+MOST_SUBSTEPS = 1000
+"""Steps a sample that anyone would wait for."""
 BEYOND = "a command beyond the dead zone"
 CHANGING = "a current that changes"
 
@@ -76,11 +80,15 @@ class CardChannel(NamedTuple):
     # fmt: on
 
 
+Command = Annotated[Window, Definition("command of the card", "V", lower=-10.0, upper=10.0)]
+"""Beyond its range the card takes no voltage."""
+
+
 class CardInputs(NamedTuple):
     """The command as the card looks at it. [V]"""
 
-    at: Window  # Three samples around t - τ, two from there and one before.
-    span: Window  # Three samples around the end of the sample interval about t - τ, t - τ + h/2.
+    at: Command  # Three samples around t - τ, two from there and one before.
+    span: Command  # Three samples around the end of the sample interval about t - τ, t - τ + h/2.
 
 
 class Filter(NamedTuple):
@@ -495,6 +503,26 @@ def stable_step(p: Card, h: float, options: CardOptions) -> float:
     return 1.0 - max(plus, minus)
 
 
+def unstable_filter(p: Card, h: float, options: CardOptions) -> str:
+    """What is wrong with a step [s] at which a filter is unstable, for a sentence."""
+    channels = {"plus": p.plus, "minus": p.minus}
+    steps_of = {
+        side: channel.omega * h / step_limit(channel.zeta, options.exact)
+        for side, channel in channels.items()
+    }
+    side = max(steps_of, key=steps_of.__getitem__)
+    channel, steps = channels[side], steps_of[side]
+    enough = f"substeps={steps // 1.0 + 1.0:.0f} or more, a higher rate"
+    if not steps < MOST_SUBSTEPS:
+        enough = "a zeta nearer to 1"
+    wrong = "is unstable at" if options.exact is None else "swings too fast for"
+    return (
+        f"the current filter of the {side} channel (zeta = {channel.zeta:g}, omega = "
+        f"{channel.omega:g} rad/s) {wrong} a step of 1/{1.0 / h:g} s; simulate with {enough} or a "
+        "lower omega."
+    )
+
+
 @equation
 def card_sample(
     state: CardState, inputs: CardInputs, p: Card, h: float, options: CardOptions
@@ -608,6 +636,10 @@ card = Model(
     },
     options=CardOptions,
     limits=card_limits,
+    stable=stable_step,
+    unstable=unstable_filter,
+    longest_step=LONGEST_STEP,
+    any_step="exact",
 )
 
 flowing_card = Model(

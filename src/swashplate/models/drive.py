@@ -1,6 +1,7 @@
 """The drive: card and pump in series, and the pump alone behind a given current."""
 
 from dataclasses import replace
+from math import inf
 from typing import NamedTuple
 
 from swashplate.equations import Model, equation, join
@@ -61,7 +62,7 @@ pump_drive = join("pump_drive", source, pump, links=AMMETER, integrals=POSITION)
 """Pump and motor behind a signed current."""
 
 
-flowing_pump = replace(pump, step=pump_rates, parts=())
+flowing_pump = replace(pump, step=pump_rates, parts=(), longest_step=inf)
 flowing_drive, flowing_pump_drive = (
     join(name, before, flowing_pump, links=AMMETER)
     for name, before in (("drive", flowing_card), ("pump_drive", source))

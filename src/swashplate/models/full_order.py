@@ -11,7 +11,7 @@ rule. It is of second order and stable while the fastest natural frequency times
 below 2. Limits are projections: what is beyond a stop is put back on it and stops there.
 """
 
-from math import atan, tan
+from math import atan, floor, tan
 from typing import NamedTuple
 
 from swashplate.equations import OFF, Flag, Model, clipped, equation, join, repeated, root
@@ -65,7 +65,7 @@ class PlantOptions(NamedTuple):
 class Substeps(NamedTuple):
     """How a run is integrated: the same for all runs that are compared."""
 
-    substeps: float  # Sub-steps between two samples.
+    substeps: float = 0.0  # Sub-steps between two samples; 0 for `enough_substeps`.
 
 
 class Motion(NamedTuple):
@@ -231,6 +231,29 @@ def plant_signals(motion: Motion, current: float, p: Plant, options: PlantOption
     )
 
 
+RESOLUTION = 1.0
+"""Largest product of a sub-step and the fastest natural frequency."""
+STABLE = 2.0
+"""The same if the march is not stable any longer."""
+LEAST_SUBSTEPS = 8.0
+"""Sub-steps a sample that kinks of the flow, at the orifices' limits, are worth."""
+MOST_SUBSTEPS = 20_000.0
+"""Sub-steps a sample, beyond which the machine is too stiff for the march."""
+
+
+@equation
+def enough_substeps(p: Hydrostat, h: float) -> float:
+    """Sub-steps a sample that the fastest mode needs, six a turn, and at least 8."""
+    return max(-floor(-fastest_rate(p) * h / RESOLUTION), LEAST_SUBSTEPS)
+
+
+@equation
+def substeps_of(p: Hydrostat, h: float, given: Substeps) -> float:
+    """Sub-steps of a sample: those given, else as many as needed."""
+    needed = min(enough_substeps(p, h), MOST_SUBSTEPS)
+    return given.substeps if given.substeps > 0.0 else needed
+
+
 @equation
 def plant_sample(
     state: PlantState,
@@ -245,7 +268,7 @@ def plant_sample(
     The current of this sample must be known for the straight line to it, so what is remembered is
     one sample old; the first sample has no time before it.
     """
-    count = given.substeps
+    count = substeps_of(p.machine, h, given)
     rise = (current - state.current) / count
     span = Span(state.initialised * h / count, state.current, rise)
     relief = relief_pressures(p.machine)
@@ -292,7 +315,7 @@ def plant_settled(current: float, p: Plant, options: PlantOptions) -> PlantState
 @equation
 def plant_domain(p: Plant, h: float, given: Substeps) -> float:
     """2 less the fastest rate times a sub-step: above 0 where the scheme is stable. [1]"""
-    return 2.0 - fastest_rate(p.machine) * h / given.substeps
+    return STABLE - fastest_rate(p.machine) * h / substeps_of(p.machine, h, given)
 
 
 def too_fast(margin: float, cause: str) -> str:

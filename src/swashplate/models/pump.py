@@ -6,9 +6,10 @@ stand in the same sample and the same step; an option that is off leaves nothing
 """
 
 from math import sqrt
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
-from swashplate.equations import Model, equation, root
+from swashplate.equations import Definition, Model, equation, root
+from swashplate.models.amplifier import LONGEST_STEP
 from swashplate.models.displacement_control import (
     Pump,
     PumpOptions,
@@ -26,6 +27,7 @@ from swashplate.models.displacement_control import (
     pressure_rate,
     solenoid_force,
     spool_balance,
+    steep_stops,
     stopped_spool,
     swash_angle,
     swash_tangent,
@@ -48,14 +50,47 @@ from swashplate.models.refinements import (
     unloaded_leakage,
 )
 
+# Ranges lie beyond any machine: a sample outside is in another unit, or no measurement. What is
+# plausible is the largest size in a record.
+PumpSpeed = Annotated[
+    float,
+    Definition(
+        "speed of the prime mover, relative to that of Z10",
+        "1",
+        lower=0.0,
+        upper=10.0,
+        plausible=(0.0, 10.0),
+    ),
+]
+LoadTorque = Annotated[
+    float,
+    Definition(
+        "static torque of the load, positive against positive speed",
+        "N m",
+        lower=-1e12,
+        upper=1e12,
+        plausible=(0.0, 1e10),
+    ),
+]
+SupplyPressure = Annotated[
+    float,
+    Definition(
+        "supply pressure less static pressure",
+        "Pa",
+        lower=1.0,
+        upper=1e9,
+        plausible=(1e4, 1e9),
+    ),
+]
+
 
 class PumpInputs(NamedTuple):
     """What drives the pump at a sample; the parameter's value if nothing was measured."""
 
     current: float  # Signed, that of the positive channel less that of the negative one. [A]
-    pump_speed: float  # Speed of the prime mover, relative to that of Z10. [1]
-    load_torque: float  # C_g of gravity at the shaft, positive against positive speed. [N m]
-    supply_pressure: float  # Supply pressure less static pressure, in place of Z9. [Pa]
+    pump_speed: PumpSpeed  # Speed of the prime mover, relative to that of Z10. [1]
+    load_torque: LoadTorque  # C_g of gravity at the shaft, positive against positive speed. [N m]
+    supply_pressure: SupplyPressure  # Supply pressure less static pressure, in place of Z9. [Pa]
 
 
 class PumpState(NamedTuple):
@@ -449,4 +484,6 @@ pump = Model(
     integrals={"shaft_position": "shaft_speed"},
     free_start={"pressure": ("pressure", "plate_pressure")},
     outside=overpowered,
+    longest_step=LONGEST_STEP,
+    follows={"steep": steep_stops},
 )

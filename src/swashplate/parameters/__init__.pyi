@@ -34,7 +34,6 @@ from .parameter_set import Status as Status
 from .parameter_set import Value as Value
 from .parameter_set import meant_value as meant_value
 from .parameter_set import set_of as set_of
-from .plausible import check_plausible as check_plausible
 from .rules import FULL_VOLTAGE as FULL_VOLTAGE
 from .rules import SIDES as SIDES
 from .rules import CheckedRule as CheckedRule

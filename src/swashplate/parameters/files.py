@@ -18,7 +18,13 @@ from swashplate.entries import (
     Number,
     Positive,
 )
-from swashplate.equations import Replacement, replaced_once, replacement_at, uses_equation
+from swashplate.equations import (
+    Replacement,
+    check_plausible,
+    replaced_once,
+    replacement_at,
+    uses_equation,
+)
 from swashplate.errors import InputError, MissingFileError, ParameterError, meant
 from swashplate.parameters.definitions import Block, Definition, definitions_of, options_of
 from swashplate.parameters.parameter_set import (
@@ -33,7 +39,6 @@ from swashplate.parameters.parameter_set import (
     Status,
     meant_value,
 )
-from swashplate.parameters.plausible import check_plausible
 from swashplate.units import to_si
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from typing import Any, Literal, NamedTuple, Protocol, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from swashplate.equations import Replacement, is_real
+from swashplate.equations import Replacement, check_plausible, is_real
 from swashplate.errors import InputError, ParameterError
 from swashplate.parameters.definitions import (
     CATALOGUE,
@@ -23,7 +23,6 @@ from swashplate.parameters.definitions import (
     definitions_of,
     options_of,
 )
-from swashplate.parameters.plausible import check_plausible
 from swashplate.parameters.rules import check_options, check_rules, refuse
 from swashplate.results import Result
 from swashplate.tables import UNIT, Column, Table, listed

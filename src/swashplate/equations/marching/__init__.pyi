@@ -1,6 +1,10 @@
 from .derivatives import NO_RUN_VALUES as NO_RUN_VALUES
 from .derivatives import jacobian as jacobian
 from .derivatives import residuals as residuals
+from .inputs import Command as Command
+from .inputs import inputs_of as inputs_of
+from .inputs import substeps_of as substeps_of
+from .inputs import within_range as within_range
 from .lanes import LANES as LANES
 from .lanes import lanes_of as lanes_of
 from .observation import Observation as Observation
@@ -29,11 +33,10 @@ from .run import Start as Start
 from .run import called as called
 from .run import marched as marched
 from .run import outside as outside
+from .run import unstable_step as unstable_step
 from .sample_code import CodeForm as CodeForm
 from .sample_code import SampleCode as SampleCode
 from .sample_code import output_of as output_of
-from .simulation import Command as Command
-from .simulation import inputs_of as inputs_of
 from .simulation import read_only as read_only
 from .start_code import started_by as started_by
 from .stepping import stored_of as stored_of

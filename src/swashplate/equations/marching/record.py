@@ -134,18 +134,20 @@ def record_of(
     return records[what]
 
 
-def least_substeps(rate: float, requested: int | None = None) -> int:
-    """Steps a sample that keep a drive's h at or below 1/512 s, or those that are requested."""
+def least_substeps(
+    rate: float, requested: int | None = None, longest: float = 1.0 / SOURCE_RATE
+) -> int:
+    """Steps a sample that keep h at or below the longest step [s], or those that are requested."""
     if not is_real(rate) or not SLOWEST <= rate <= FASTEST:
         text = f"{rate:g}" if is_real(rate) else repr(rate)
         raise InputError(
             f"The rate is {text} Hz, but must be between {SLOWEST:g} and {FASTEST:g} Hz."
         )
-    least = max(ceil(SOURCE_RATE / rate - 1e-9), 1)
+    least = max(ceil(1.0 / (rate * longest) - 1e-9), 1)
     if is_real(requested) and requested < least:
         raise InputError(
             f"substeps is {requested}, but at {rate:g} Hz at least {least} are needed to keep the "
-            "step at or below 1/512 s."
+            f"step at or below 1/{1.0 / longest:g} s."
         )
     return least if requested is None else requested
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence, Set
 from dataclasses import dataclass, fields
 from functools import cached_property
 from itertools import count
@@ -22,6 +22,7 @@ from swashplate.equations.fields import (
     floats_of,
     is_real,
     member_at,
+    nested_from,
     numbers_of,
     tuple_from,
     value_at,
@@ -43,6 +44,7 @@ from swashplate.equations.model import (
 )
 from swashplate.equations.renewal import renew
 from swashplate.errors import DomainError, InputError, ParameterError
+from swashplate.units import in_si
 
 Array = NDArray[np.float64]
 Start = Literal["rest", "steady"]
@@ -138,6 +140,82 @@ class Machine:
         for word, value in (("model", model), ("parts", parts), ("name", name)):
             object.__setattr__(self, word, value)
 
+    def replace(self, changes: Mapping[str, Any] | None = None, /, **by_name: Any) -> Machine:
+        """A machine with other numbers; this one stays as it is.
+
+        Parameters
+        ----------
+        changes : mapping, optional
+            Numbers by path, ``{"hoist.pump.Z16_plus": 1.2e-4}``; the last word is enough where it
+            is unique. The symbol of a parameter with a value for each direction takes one number
+            for both, or a pair, plus and minus.
+        **by_name : float, Pint quantity, or a pair of them
+            The same by last words alone. In SI, or with a unit.
+
+        Returns
+        -------
+        Machine
+            Terms that a parameter switches on are on unless it is 0.
+
+        Raises
+        ------
+        InputError
+            For a name that no parameter has; the sentence names the near ones.
+        ParameterError
+            For a number beyond the range of its `Definition`.
+
+        Examples
+        --------
+        >>> from swashplate import Drive
+        >>> from swashplate.equations import join
+        >>> hoist = Drive.preset("hoist")
+        >>> pair = join("pair", {"left": hoist, "right": hoist})
+        >>> wider = pair.replace({"left.pump.Z16": 2e-4})
+        >>> [part.p.Z16_plus for part in wider.parts if part.p._fields[0] == "Z1"]
+        [0.0002, 0.00011634]
+        """
+        numbers = dict(zip(parameter_paths(self.model), self.params.tolist(), strict=True))
+        changed = dict[str, float]()
+        for name, change in {**(changes or {}), **by_name}.items():
+            changed |= self._changes(name, change)
+        numbers |= changed
+        parts = list(self.parts)
+        for index, part in enumerate(self.model.parts):
+            prefix = self.model.prefix(index)
+            touched = {path.removeprefix(prefix) for path in changed if path.startswith(prefix)}
+            p = nested_from(part.parameters, numbers, prefix)
+            if touched:
+                options = options_of(part, p, parts[index].options, touched)
+                parts[index] = parts[index]._replace(p=p, options=options)
+        return Machine.of_parts(self.model, tuple(parts), self.name)
+
+    def _changes(self, name: str, change: Any) -> dict[str, float]:
+        """Numbers in SI by path, for a name and its change; refused beyond their range."""
+        paths = self.model.parameters_named(name)
+        values = change if isinstance(change, tuple) else (change,) * len(paths)
+        if len(values) != len(paths):
+            raise InputError(f"{self.name}: {name} takes {len(paths)} numbers, not {len(values)}.")
+        changed = dict[str, float]()
+        for path, value in zip(paths, values, strict=True):
+            definition = self.model.ranges.get(path)
+            number = value if definition is None else in_si(value, definition.unit, name)
+            if not is_real(number):
+                raise InputError(f"{self.name}: {path} is {value!r}, but must be a number.")
+            if definition is not None and not definition.holds(number):
+                raise ParameterError(f"{self.name}: {definition.broken(path, number)}.")
+            changed[path] = float(number)
+        return changed
+
+    @property
+    def title(self) -> str:
+        """What it is, in words; empty unless its numbers say it."""
+        return ""
+
+    def at_step(self, h: float) -> Machine:
+        """The machine whose numbers mean the same at a step [s], itself if they do."""
+        del h
+        return self
+
     @cached_property
     def options(self) -> tuple[Any, ...]:
         """Options of each part."""
@@ -224,6 +302,18 @@ class Machine:
                 outside = self.model.link_of(index, name) is None and name not in part.defaults
                 if outside and signal not in signals:
                     raise InputError(f"{self.name}: {part.name} needs the signal '{signal}'.")
+
+    def check_step(self, h: float) -> None:
+        """Refuse a step [s] at which the equations of a part are not stable."""
+        self._cached(("stable", h), lambda: self._check_step(h))
+
+    def _check_step(self, h: float) -> None:
+        for part, numbers in zip(self.model.parts, self.parts, strict=True):
+            if part.stable is None:
+                continue
+            arguments = {"p": numbers.p, "h": h, "options": numbers.options}
+            if not called(part, part.stable, arguments) > 0.0:
+                raise InputError(f"{self.name}: {unstable_step(part, numbers, h)}")
 
     def start(
         self,
@@ -318,6 +408,31 @@ class Machine:
             ) from None
 
 
+def options_of(part: Model, p: Any, options: Any, touched: Set[str] | None = None) -> Any:
+    """Options of a part as its parameters have them.
+
+    What a parameter switches on is on if one of its parameters is not 0; with `touched`, paths of
+    changed parameters, only of those.
+    """
+    on = dict[str, Any]()
+    for (_, option), paths in part.switches.items():
+        if touched is None or not touched.isdisjoint(paths):
+            on[option] = any(value_at(p, path) != 0.0 for path in paths)
+    for option, equation in part.follows.items():
+        on[option] = bool(called(part, equation, {"p": p}))
+    return options._replace(**{name: acts or None for name, acts in on.items()}) if on else options
+
+
+def unstable_step(part: Model, numbers: PartNumbers, h: float) -> str:
+    """What is wrong with a step [s] that a part does not bear, as a sentence."""
+    if part.unstable is not None:
+        return part.unstable(numbers.p, h, numbers.options)
+    return (
+        f"{part.path} is unstable at a step of 1/{1.0 / h:g} s; simulate with more substeps or a "
+        "higher rate."
+    )
+
+
 def called(part: Model, equation: Callable[..., Any], arguments: Mapping[str, Any]) -> Any:
     """What an equation of a part returns; it takes those of the arguments that it names."""
     values = (arguments[name] for name in arguments_of(equation))
@@ -352,7 +467,8 @@ def _checked_parts(model: Model, p: Any, options: Any, given: Any) -> tuple[Part
                 options=member_at(options, part.path),
                 given=member_at(given, part.path),
             )
-        if numbers.options is None and part.options is not None:
+        stated = numbers.options is not None
+        if part.options is not None and not stated:
             numbers = numbers._replace(options=part.options())
         kinds = {"parameters": part.parameters, "options": part.options, "given": part.given}
         for (what, kind), value in zip(kinds.items(), numbers, strict=True):
@@ -381,7 +497,9 @@ def _checked_parts(model: Model, p: Any, options: Any, given: Any) -> tuple[Part
                     )
         if numbers.options is not None:  # off is None, so that code is made for one form of it
             forms = [option or None for option in numbers.options]
-            numbers = numbers._replace(options=type(numbers.options)(*forms))
+            chosen = type(numbers.options)(*forms)
+            touched = frozenset[str]() if stated else None
+            numbers = numbers._replace(options=options_of(part, numbers.p, chosen, touched))
         parts.append(numbers)
     return tuple(parts)
 

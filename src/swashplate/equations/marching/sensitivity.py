@@ -11,10 +11,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swashplate.equations.marching.derivatives import BoundModel
+from swashplate.equations.marching.inputs import Command, inputs_of
 from swashplate.equations.marching.observation import RunValues, every_sample
 from swashplate.equations.marching.record import Sampling
 from swashplate.equations.marching.run import Machine, Start, initial_states
-from swashplate.equations.marching.simulation import Command, Run, inputs_of
+from swashplate.equations.marching.simulation import Run
 from swashplate.equations.model import full_name, parameter_paths
 from swashplate.errors import DomainError, InputError
 
@@ -118,6 +119,7 @@ def sensitivities(
     model = machine.model
     records = inputs_of(machine, inputs, rate, **sampling)
     run = Run(machine, records, start, begin or {})
+    machine.check_step(run.record.step)
     initial_states(machine, run.initial, run.begin)  # refuses what does not fit
     selectable = (*parameter_paths(model), *(f"start.{path}" for path in run.begin))
     columns = parameter_paths(model)

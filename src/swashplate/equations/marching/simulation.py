@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 from difflib import get_close_matches
 from functools import cached_property, lru_cache
 from math import isfinite
-from types import MappingProxyType
 from typing import (
     TYPE_CHECKING,
     Any,
@@ -16,27 +15,18 @@ from typing import (
     Generic,
     Literal,
     NamedTuple,
-    Protocol,
     Self,
     TypeVar,
-    Unpack,
     cast,
     overload,
-    runtime_checkable,
 )
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swashplate.equations.fields import check_mapping
+from swashplate.equations.marching.inputs import Command, inputs_of, substeps_of
 from swashplate.equations.marching.part_code import SignalId
-from swashplate.equations.marching.record import (
-    Between,
-    Record,
-    Sampling,
-    checked_sampling,
-    on_grid,
-)
+from swashplate.equations.marching.record import Between, Record, checked_sampling
 from swashplate.equations.marching.run import (
     InitialStates,
     Machine,
@@ -49,6 +39,7 @@ from swashplate.equations.marching.stepping import CompiledStep, StepContext, bo
 from swashplate.equations.model import Model, full_name
 from swashplate.errors import DomainError, InputError, UnknownNameError
 from swashplate.results import GivenAxes, Tabular, figures, pandas_frame
+from swashplate.units import in_si
 
 if TYPE_CHECKING:
     import polars
@@ -133,6 +124,7 @@ class Run(Tabular):
 
     def _march(self, *, everything: bool = False) -> None:
         """Compute the signals of the first march, or all of them and the limits."""
+        self.instance.check_step(self.record.step)
         outputs = march_outputs(self.instance.model, self.first_signals, states=self.has_states)
         records = {name: record.values for name, record in self.records.items()}
         table = marched(
@@ -393,51 +385,6 @@ class Run(Tabular):
         return np.asarray(acts != 0)
 
 
-@runtime_checkable
-class Command(Protocol):
-    """An input as a function of time, such as a `swashplate.maneuvers.Maneuver`."""
-
-    # more than is used here, as columns of pandas and polars have a name and draw samples, too
-
-    @property
-    def name(self) -> str:
-        """What a figure calls it."""
-        ...
-
-    @property
-    def length(self) -> float:
-        """Duration. [s]"""
-        ...
-
-    def sample(self, rate: float) -> Array:
-        """Samples at a rate [Hz], from 0 s on."""
-        ...
-
-    def __call__(self, time: Any) -> Array:
-        """Values at some instants. [s]"""
-        ...
-
-
-def inputs_of(
-    instance: Machine,
-    inputs: Mapping[str, ArrayLike | Command],
-    rate: float,
-    **sampling: Unpack[Sampling],
-) -> dict[str, Record]:
-    """External signals of a model on its grid, checked; see `on_grid`."""
-    check_mapping("inputs", inputs)
-    inputs = {full_name(name, instance.model.external): each for name, each in inputs.items()}
-    instance.check_inputs(inputs)
-    samples: dict[str, ArrayLike] = {
-        name: signal.sample(rate) if isinstance(signal, Command) else signal
-        for name, signal in inputs.items()
-    }
-    if not inputs:
-        needed = ", ".join(instance.model.external) or "an input, but its equations take none"
-        raise InputError(f"{instance.name} needs a record of {needed}.")
-    return on_grid(samples, rate, **sampling)
-
-
 def simulate(
     machine: Machine,
     inputs: Mapping[str, ArrayLike | Command],
@@ -446,6 +393,7 @@ def simulate(
     time: ArrayLike | None = None,
     interpolation: Between = None,
     substeps: int | None = None,
+    clip: bool = False,
     start: Start = "rest",
     begin: Mapping[str, float] | None = None,
 ) -> Run:
@@ -467,7 +415,9 @@ def simulate(
         What the inputs, or each of them by its name, are between samples: a straight line (default)
         or held.
     substeps : int, optional
-        Steps of the model a sample; by default one.
+        Steps of the model a sample; by default one, or so many as its longest step demands.
+    clip : bool
+        Clip inputs to the range of their `Definition`; by default what lies beyond it is refused.
     start : {"rest", "steady"}
         See `Machine.start`.
     begin : mapping of str to float, optional
@@ -481,7 +431,8 @@ def simulate(
     Raises
     ------
     InputError
-        For inputs that do not fit the model.
+        For inputs that do not fit the model or lie beyond their range, and a step at which the
+        equations are unstable.
     DomainError
         If the model leaves its domain, or a number overflows.
 
@@ -498,7 +449,13 @@ def simulate(
     (1024,)
     """
     records = inputs_of(
-        machine, inputs, rate, time=time, interpolation=interpolation, substeps=substeps
+        machine,
+        inputs,
+        rate,
+        time=time,
+        interpolation=interpolation,
+        substeps=substeps,
+        clip=clip,
     )
     maneuver = ", ".join(
         command.name for command in inputs.values() if isinstance(command, Command)
@@ -548,15 +505,17 @@ class Stepper(Generic[S]):
         *,
         interpolation: Between = None,
         substeps: int | None = None,
-        ranges: Mapping[str, tuple[float, float]] = MappingProxyType({}),
     ) -> None:
         check_start(start)
+        rate = in_si(rate, "Hz", "The rate")
+        substeps = substeps_of(instance.model, rate, substeps)
         if len(set(inputs)) < len(inputs):
             raise InputError(f"A step takes each input once, not {', '.join(inputs)}.")
         between, self._substeps = checked_sampling(inputs, rate, interpolation, substeps)
         self._start = start
         self._sample = sample
         self._name = instance.name
+        ranges = instance.model.input_ranges
         self._ranges = [ranges.get(name, (-LARGEST, LARGEST)) for name in inputs]
         self.inputs = tuple(inputs)
         limits = instance.model.limit_bits

@@ -211,6 +211,7 @@ class CompiledStep:
     def __init__(
         self, instance: Machine, inputs: Sequence[str], stored: Sequence[SignalId], h: float
     ) -> None:
+        instance.check_step(h)
         self._instance = instance
         self._h = h
         self._stored = tuple(stored)
@@ -303,7 +304,7 @@ def compiled_step(
     Raises
     ------
     InputError
-        For signals that the model does not have.
+        For signals that the model does not have, and a rate at which its equations are unstable.
     """
     check_rate(rate)
     return CompiledStep(machine, inputs, stored_of(machine.model, outputs), 1.0 / rate)

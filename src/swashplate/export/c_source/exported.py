@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from math import inf
 from typing import NamedTuple
 
-from swashplate.equations import Equation, Model, declared_by, floats_of
+from swashplate.equations import Equation, Model, floats_of
 from swashplate.equations.code_generation import ascii_name, c_name, fresh_name
 from swashplate.equations.marching import TapOf, taps_of
 from swashplate.export.c_source.names import (
@@ -45,20 +44,8 @@ class Exported:
     """Names of parameters by path; by default the paths, with ``_`` for dots."""
     outputs: tuple[str, ...] = ()
     """Signals that can be read; by default all."""
-    bounds: Mapping[str, float] = field(default_factory=dict)
-    """Largest magnitude of an input."""
-    ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    """Least and largest value of a measured input."""
     notes: Mapping[str, str] = field(default_factory=dict)
     """What an external signal is, if no named tuple of inputs says it."""
-    stable: Mapping[int, Equation] = field(default_factory=dict)
-    """By part: margin above 0 if its equations bear the step, of ``p, h, options``."""
-    follows: Mapping[tuple[int, str], Equation] = field(default_factory=dict)
-    """By part and option: whether it is on, of ``p``; it cannot be set."""
-    longest: float = inf
-    """Longest step. [s]"""
-    free_step: str = ""
-    """Option without which the equations are for one step only; none if empty."""
 
     @property
     def file(self) -> str:
@@ -74,6 +61,45 @@ class Exported:
         name = c_name(self.model.name)
         is_free = name != self.prefix and f"{self.prefix}_{name}" not in self.public
         return f"{self.prefix}_{name if is_free else 'model'}"
+
+    # -- what the model says of inputs, options and steps ------------------------------------------
+
+    @cached_property
+    def bounds(self) -> dict[str, float]:
+        """Largest magnitude of the inputs that have one: they can be clipped to it."""
+        ranges = self.model.input_ranges
+        return {
+            name: ranges[name][1]
+            for name in self.signals
+            if name in ranges and -ranges[name][0] == ranges[name][1]
+        }
+
+    @cached_property
+    def ranges(self) -> dict[str, tuple[float, float]]:
+        """Least and largest value of the other inputs that have a range."""
+        ranges = self.model.input_ranges
+        return {name: ends for name, ends in ranges.items() if name not in self.bounds}
+
+    @cached_property
+    def follows(self) -> dict[tuple[int, str], Equation]:
+        """By part and option: whether it is on, of ``p``; it cannot be set."""
+        return {
+            (part_index, name): equation
+            for part_index, part in enumerate(self.model.parts)
+            for name, equation in part.follows.items()
+        }
+
+    @cached_property
+    def stable(self) -> dict[int, Equation]:
+        """By part: margin above 0 if its equations bear the step, of ``p, h, options``."""
+        stable = {part_index: part.stable for part_index, part in enumerate(self.model.parts)}
+        return {part_index: equation for part_index, equation in stable.items() if equation}
+
+    @cached_property
+    def any_step(self) -> list[tuple[int, str]]:
+        """Options, by part and name, without which the equations are for one step only."""
+        parts = enumerate(self.model.parts)
+        return [(part_index, part.any_step) for part_index, part in parts if part.any_step]
 
     # -- names -------------------------------------------------------------------------------------
 
@@ -154,21 +180,9 @@ class Exported:
         ]
 
     @cached_property
-    def switches(self) -> dict[tuple[int, str], list[str]]:
-        """By part and option: paths of the parameters that switch it on."""
-        paths_of: dict[tuple[int, str], list[str]] = {}
-        for part_index, part in enumerate(self.model.parts):
-            for definition in declared_by(part.parameters):
-                if definition.switch:
-                    paths_of.setdefault((part_index, definition.switch), []).extend(
-                        definition.fields
-                    )
-        return {key: paths for key, paths in paths_of.items() if key in self.options}
-
-    @cached_property
     def settable(self) -> list[tuple[int, str]]:
         """Options that do not follow from parameters."""
-        follows = {*self.switches, *self.follows}
+        follows = {*self.model.switches, *self.follows}
         return [option for option in self.options if option not in follows]
 
     @property

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import inf
+from math import inf, isfinite
 
 from swashplate.equations import Definition
 from swashplate.equations.code_generation import (
@@ -64,7 +64,7 @@ class _Interface:
             "zeros": ", 0.0" * len(self.arguments),
             "checked": len(self.numbers) + 1,
             "count": len(self.numbers) + len(self.writer.constant_names()) + 1,
-            "longest": c_literal(exported.longest),
+            "longest": c_literal(exported.model.longest),
         }
         return filled(text, {**placeholders, **further})
 
@@ -123,6 +123,8 @@ class _Interface:
             note = self.writer.input_note(name)
             bound = self.exported.bounds.get(name)
             limits = "" if bound is None else f"within ±{bound:g}"
+            if name in self.exported.ranges:
+                limits = "{:g} to {:g}".format(*self.exported.ranges[name])
             description = comment_line(", ".join(filter(None, (note, limits))))
             if description:
                 lines += f" * `{argument}`: {description}\n"
@@ -246,11 +248,16 @@ class _Interface:
     def bounds(self) -> str:
         tests = []
         for name, argument in zip(self.exported.signals, self.arguments, strict=True):
-            bound = self.exported.bounds.get(name)
-            tests.append(
-                f"is_finite({argument})" if bound is None
-                else f"{argument} >= -{c_literal(bound)} && {argument} <= {c_literal(bound)}"
-            )  # fmt: skip
+            if name in self.exported.bounds:
+                bound = c_literal(self.exported.bounds[name])
+                tests.append(f"{argument} >= -{bound} && {argument} <= {bound}")
+                continue
+            tests.append(f"is_finite({argument})")
+            least, most = self.exported.ranges.get(name, (-inf, inf))
+            if isfinite(least):
+                tests.append(f"{argument} >= {c_literal(least)}")
+            if isfinite(most):
+                tests.append(f"{argument} <= {c_literal(most)}")
         return " && ".join(tests) or "true"
 
     def pushed(self) -> str:
@@ -328,7 +335,7 @@ class _Interface:
         """Terms that come on and go off with their parameters."""
         cases: dict[str, list[str]] = {}
         name_of = {member: name for name, member, _ in self.rows}
-        for (part, option), paths in self.exported.switches.items():
+        for (part, option), paths in self.model.switches.items():
             member = self.exported.members[part]
             members = [f"{member}.{path_of(path)}" for path in paths]
             test = " || ".join(f"m->{member} != 0.0" for member in members)

@@ -31,7 +31,6 @@ from swashplate.drive import (
     Simulation,
     at_every_rate,
     bound_drive,
-    check_voltage,
     simulate_drive,
 )
 from swashplate.equations import BoundModel
@@ -45,12 +44,14 @@ from swashplate.equations.marching import (
     RunValues,
     even_rate,
     record_of,
+    within_range,
 )
 from swashplate.errors import DomainError, InputError, ParameterError
 from swashplate.identification.estimation.model import EquationModel, SimulationRequest
 from swashplate.identification.estimation.problem import Problem
 from swashplate.identification.estimation.setup import Forces
 from swashplate.identification.estimation.unknowns import Prior, Unknown, Unknowns, zero_name
+from swashplate.models.drive import drive as drive_equations
 from swashplate.parameters import ParameterSet
 from swashplate.results import Result
 
@@ -146,7 +147,7 @@ def voltage_record(experiment: Experiment) -> Record:
             f"{experiment.name} is driven by a {experiment.input.kind}, not by a voltage: fit the "
             "pump alone."
         )
-    return check_voltage(_gridded(experiment.input), clip=False)
+    return within_range(drive_equations, "voltage", _gridded(experiment.input))
 
 
 def measured_current(experiment: Experiment, scale: float = 1.0) -> Record:

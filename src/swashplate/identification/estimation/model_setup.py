@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from swashplate.campaign import Channel, Experiment
 from swashplate.documents import validated
 from swashplate.equations import Model as Equations
-from swashplate.equations import check_mapping, is_real, parameter_paths
+from swashplate.equations import check_mapping, check_plausible, is_real, parameter_paths
 from swashplate.errors import (
     FileError,
     InputError,
@@ -38,7 +38,6 @@ from swashplate.identification.estimation.setup import (
 )
 from swashplate.identification.estimation.solving import solve
 from swashplate.identification.estimation.unknowns import Unknown, Unknowns, zero_name
-from swashplate.parameters import check_plausible
 from swashplate.results import Result
 from swashplate.tables import listed
 

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from swashplate.campaign import Campaign, Experiment, applying, inside
 from swashplate.documents import validated
 from swashplate.drive import Drive
+from swashplate.equations import check_plausible
 from swashplate.equations.marching import Record
 from swashplate.errors import InputError, UnknownParameterError
 from swashplate.executors import available_cores
@@ -54,7 +55,6 @@ from swashplate.parameters import (
     Definition,
     Definitions,
     ParameterSet,
-    check_plausible,
 )
 
 Array = NDArray[np.float64]

@@ -6,7 +6,7 @@ search, a draw or another number leads to is not judged by it.
 
 from math import inf
 
-from swashplate.equations import Definition
+from swashplate.equations.fields import Definition
 from swashplate.errors import ParameterError
 from swashplate.units import scaling
 
