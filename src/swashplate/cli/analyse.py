@@ -3,15 +3,23 @@
 from __future__ import annotations
 
 import shlex
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from math import degrees, isfinite, radians
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple, get_args
 
 import typer
 
 from swashplate.cli import parsing, trials
 from swashplate.cli.commands import command
+from swashplate.cli.machines import OwnMachine, limits_table, without_empty
+from swashplate.cli.operating_points import (
+    linear_model,
+    linear_tables,
+    operating_point,
+    outputs_named,
+)
 from swashplate.cli.options import (
     NO_VALUE,
     CommandSampling,
@@ -20,10 +28,13 @@ from swashplate.cli.options import (
     FigureFile,
     Force,
     Interpolation,
+    MachineChoice,
     ManeuverOrLog,
     OptionalCommand,
+    OutputOption,
     SetFile,
     Simulating,
+    StepRate,
     TableFile,
     VariablesOption,
 )
@@ -39,6 +50,13 @@ from swashplate.cli.terminal import (
 )
 from swashplate.errors import InputError
 from swashplate.tables import joined, quantity
+from swashplate.units import unit_text
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from swashplate.linear import FrequencyResponse, LinearModel
 
 LEVEL, SPAN = 0.95, (0.9, 1.1)
 """Level of the bands, and the usual factors of a design variable."""
@@ -66,10 +84,11 @@ app = typer.Typer(rich_markup_mode="rich")
         swashplate limits hoist --plot envelope.png
         swashplate limits luff sine:9,0.1 --plot timeline.png
         swashplate limits mine.toml log.csv --interpolation previous --out shares.csv
+        swashplate limits valve.py step:2 --measured supply=100
     """,
 )
 def limits(
-    drive: DriveChoice,
+    machine: MachineChoice,
     maneuver: OptionalCommand = None,
     *,
     out: TableFile = None,
@@ -77,39 +96,76 @@ def limits(
     sampling: Simulating,
     force: Force = False,
 ) -> None:
-    """Show the limits of a drive, or those that act under a command.
+    """Show the limits of a machine, or those that act under a command.
 
-    Without a command: dead zone, gain, limits of speed and acceleration, rise
-    times ('swashplate bode' shows the frequency response). With a command: how
-    often each limit acts and by how much the error falls without it, which tells
-    which component to change first. The error is the RMS difference of the speed
-    from that of a drive without limits. The shares need not add up to 100 %.
+    Of a drive without a command: dead zone, gain, limits of speed and
+    acceleration, rise times ('swashplate bode' shows the frequency response).
+    With a command: how often each limit acts and by how much the error falls
+    without it, which tells which component to change first. The error is the RMS
+    difference of the speed from that of a drive without limits. The shares need
+    not add up to 100 %. Of a machine of your own: the limits that its model
+    declares and the ranges of its signals, with a command how long each acts.
     """
+    if machine.own is not None:
+        _own_limits(machine, machine.own, maneuver, sampling, out=out, plot=plot)
+        return
     from swashplate.analysis import envelope, shares_of
 
+    drive = machine.loaded_drive
     if maneuver is None:
         with spinner("Measuring"):
-            capability = envelope(drive.loaded_drive)
+            capability = envelope(drive)
         save(out, "Envelope, in SI", capability.write)
         draw_figure(plot, "plot_envelope", capability)
-        drive.note(f"{drive.title}: performance envelope")
+        machine.note(f"{machine.title}: performance envelope")
         show(capability.table())
         return
     with spinner("Simulating"):
-        marched = trials.at_rate(drive.loaded_drive, sampling.rate)
+        marched = trials.at_rate(drive, sampling.rate)
         name, run = trials.simulated_as(marched, maneuver, sampling)
         shares = shares_of(marched, run)
-    title = f"{drive.title}, {name}"
+    title = f"{machine.title}, {name}"
     save(out, "Shares of each limit, in SI", shares.write)
     draw_figure(plot, "plot_limit_timeline", run, reference=shares.reference, title=title)
     error = quantity(shares.error, "rad/s", spec=".3f")
     # the sentences of the result name the limits that act here and that no test reached
-    drive.note(f"{title}: {error} rms from a drive without limits", unreached=False)
+    machine.note(f"{title}: {error} rms from a drive without limits", unreached=False)
     acting = shares.table(acting=True)
     if acting.rows:
         show(acting)
     for sentence in shares.sentences():
         say(sentence)
+
+
+def _own_limits(
+    machine: MachineChoice,
+    own: OwnMachine,
+    maneuver: str | None,
+    sampling: Simulating,
+    *,
+    out: Path | None,
+    plot: Path | None,
+) -> None:
+    """Show the limits that a model declares; with a command how long each acts."""
+    if maneuver is None:
+        machine.refuse_without("a command", plot=plot)
+        table = limits_table(own)
+        title = machine.title
+    else:
+        with spinner("Simulating"):
+            name, run = trials.run_of(machine, maneuver, sampling)
+            table = limits_table(own, run)
+        title = f"{machine.title}, {name}"
+        if plot is not None:
+            draw_figure(plot, run.plot(title=title))
+    if not table.rows:
+        raise InputError(
+            f"{machine.title}: {own.model.name} declares no limits: give its Model limits=..., an "
+            "equation that returns a named tuple of bool, or its signals a range by a Definition."
+        )
+    save(out, "Limits", table.write)
+    machine.note(f"{title}: limits")
+    show(without_empty(table))
 
 
 def _list_variables(requested: bool) -> None:
@@ -438,22 +494,39 @@ def compensate(
         swashplate linearize hoist --at -2 --loop-gain 0.1
         swashplate linearize slew --at 2 --sample-time 0.01 --out slew.toml
         swashplate linearize luff --current 0 --input solenoid_force
+        swashplate linearize valve.py --at valve=2 --at supply=100 --output rod
     """,
 )
 def linearize(
-    drive: DriveChoice,
+    machine: MachineChoice,
     *,
     at: Annotated[
-        float | None, typer.Option(metavar="V", help="Constant voltage of the operating point.")
+        list[str] | None,
+        typer.Option(
+            metavar="V|INPUT=VALUE",
+            help=(
+                "Constant voltage of the operating point; of a machine of your own a constant "
+                "input, such as supply=100, may be repeated."
+            ),
+        ),
     ] = None,
     current: Annotated[
         float | None,
         typer.Option(metavar="A", help="Constant signed current of the operating point."),
     ] = None,
     input: Annotated[
-        Input | None,
-        typer.Option(help="Input of the model (default: voltage, or current with --current)."),
+        list[str] | None,
+        typer.Option(
+            metavar="NAME",
+            help=(
+                "Input of the model: voltage, current or solenoid_force (default: voltage, or "
+                "current with --current); of a machine of your own any, may be repeated (default: "
+                "all)."
+            ),
+        ),
     ] = None,
+    outputs: OutputOption = None,
+    rate: StepRate = None,
     sample_time: Annotated[
         float | None,
         typer.Option(
@@ -479,24 +552,52 @@ def linearize(
     ] = None,
     force: Force = False,
 ) -> None:
-    """Linearise a drive at a voltage or a current.
+    """Linearise a drive at a voltage or a current, or a machine of your own.
 
     Prints the operating point, the gain, the lag of the pump, the poles, the
     bandwidth and the largest gain of a speed loop closed over the drive. The
-    model is exact for small motions; 'swashplate bode' shows large ones.
+    model is exact for small motions; 'swashplate bode' shows large ones. Of a
+    machine of your own: operating point, gains and poles of its step. It settles
+    by its model's equation, or by a march under the constant inputs; --set
+    start.PATH=VALUE gives its states instead.
     """
-    from swashplate.drive import model_tables
     from swashplate.linear import LINEAR_MODEL
 
     check_writable(out, LINEAR_MODEL, force=force)
-    if (at is None) == (current is None):
+    if machine.own is not None:
+        machine.refuse(current=current, sample_time=sample_time, loop_gain=loop_gain)
+        own = machine.own
+        with spinner("Linearising"):
+            inputs = own.constants("--at", at or ())
+            own.check_needed([*inputs], "--at")
+            steps = own.steps_a_second(rate)
+            point = operating_point(own, inputs, steps)
+            small = linear_model(
+                own,
+                inputs,
+                steps,
+                point,
+                inputs=[own.input_named(name) for name in input] if input else None,
+                outputs=outputs_named(own, outputs),
+            )
+            tables = linear_tables(own, inputs, point, small, frequency)
+        save(out, "Model, in SI", small.write)
+        machine.note(f"{machine.title}, small motions, in steps of 1/{steps:g} s")
+        show(*tables)
+        return
+    machine.refuse(output=outputs, rate=rate)
+    volts = _number_of_drive("--at", at)
+    kind = _input_of_drive(input)
+    if (volts is None) == (current is None):
         raise InputError(
             "A drive is linearised at a voltage or a current: give one of --at and --current."
         )
-    if current is not None and input == "voltage":
+    if current is not None and kind == "voltage":
         raise InputError("--input voltage needs --at, not --current.")
+    from swashplate.drive import model_tables
+
     with spinner("Linearising"):
-        model = drive.loaded_drive.linearize(at, current=current, input=input)
+        model = machine.loaded_drive.linearize(volts, current=current, input=kind)
         if sample_time is not None:
             if not sample_time > 0.0:
                 raise InputError(f"--sample-time is {sample_time:g} s, but must be above 0.")
@@ -506,13 +607,40 @@ def linearize(
         tables = model_tables(model, frequency, gain)
     save(out, "Model, in SI", model.write)
     sampled = "" if sample_time is None else f", sampled at {sample_time:g} s"
-    drive.note(f"{drive.title}, small motions of the {model.input.replace('_', ' ')}{sampled}")
+    motions = f"small motions of the {model.input.replace('_', ' ')}{sampled}"
+    machine.note(f"{machine.title}, {motions}")
     for switch in model.operating_point.one_sided:
         note(f"One-sided at the {switch}.")
-    coulomb_term = "C_plus" if (at or 0.0) >= 0.0 else "C_minus"
+    coulomb_term = "C_plus" if (volts or 0.0) >= 0.0 else "C_minus"
     if model.input == "voltage" and model.parameters.numbers[coulomb_term] > 0.0:
         note("The card's Coulomb term C is left out: it acts only on motions below 0.01 A/s.")
     show(*tables)
+
+
+def _number_of_drive(option: str, words: Sequence[str] | None) -> float | None:
+    """The one number of an option of a drive; None if it is not given."""
+    if not words:
+        return None
+    try:
+        (number,) = map(float, words)
+    except ValueError:
+        raise InputError(
+            f"{option} {' '.join(words)}: of a drive it is one number, such as {option} 4."
+        ) from None
+    return number
+
+
+def _input_of_drive(words: Sequence[str] | None) -> Input | None:
+    """The one input of a drive that --input names; None if it is not given."""
+    if not words:
+        return None
+    for name in get_args(Input):
+        if [name] == [*words]:
+            chosen: Input = name
+            return chosen
+    raise InputError(
+        f"--input {' '.join(words)}: of a drive it is one of {', '.join(get_args(Input))}."
+    )
 
 
 @command(
@@ -522,20 +650,46 @@ def linearize(
         swashplate bode hoist
         swashplate bode hoist --amplitude 1 --amplitude 9 --plot bode.png
         swashplate bode slew --bias 3 --amplitude 0.1 --linear-at 3 --out bode.csv
+        swashplate bode valve.py --at supply=100 --amplitude 2 --output opening
     """,
 )
 def bode(
-    drive: DriveChoice,
+    machine: MachineChoice,
     *,
     amplitudes: Annotated[
         list[float] | None,
         typer.Option(
             "--amplitude",
             metavar="V",
-            help="Amplitude of the sine; may be repeated (default: 1, 4, 6.5 and 9).",
+            help=(
+                "Amplitude of the sine; may be repeated (default: 1, 4, 6.5 and 9; of a machine of "
+                "your own 1)."
+            ),
         ),
     ] = None,
     bias: Annotated[float, typer.Option(metavar="V", help="Mean of the sine.")] = 0.0,
+    at: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="INPUT=VALUE",
+            help="Constant further input of a machine of your own; may be repeated.",
+        ),
+    ] = None,
+    input: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="Input of a machine of your own that is moved (default: the first).",
+        ),
+    ] = None,
+    output: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME",
+            help="Signal of a machine of your own that answers (default: its first output).",
+        ),
+    ] = None,
+    rate: StepRate = None,
     lowest: Annotated[float, typer.Option("--from", metavar="HZ", help="Lowest frequency.")] = 0.02,
     highest: Annotated[float, typer.Option("--to", metavar="HZ", help="Highest frequency.")] = 5.0,
     points: Annotated[
@@ -549,13 +703,13 @@ def bode(
     ] = 0.3,
     linear_at: Annotated[
         float | None,
-        typer.Option(metavar="V", help="Also draw the linear model at this voltage."),
+        typer.Option(metavar="V", help="Also draw the linear model at this input."),
     ] = None,
     plot: FigureFile = None,
     out: TableFile = None,
     force: Force = False,
 ) -> None:
-    """Measure the frequency response of a drive by simulated sines.
+    """Measure the frequency response of a machine by simulated sines.
 
     Each sine is simulated until the response is periodic. Gain and phase are
     those of its first harmonic, the distortion is the rest. Prints the gain, the
@@ -572,19 +726,86 @@ def bode(
         raise InputError(
             f"--from and --to must rise from above 0 Hz, not {lowest:g} to {highest:g}."
         )
+    grid = np.union1d(np.geomspace(lowest, highest, points), [frequency])
+    linear: LinearModel | None = None
     with spinner("Sweeping"):
-        linear = None if linear_at is None else drive.loaded_drive.linearize(linear_at)
-        grid = np.union1d(np.geomspace(lowest, highest, points), [frequency])
-        response = drive.loaded_drive.frequency_response(grid, amplitudes or AMPLITUDES, bias=bias)
-        table = response_table(response, frequency)
+        if machine.own is not None:
+            response, linear = _own_response(
+                machine.own,
+                grid,
+                Sine(amplitudes or [1.0], bias, linear_at),
+                _ends(machine.own, input, output),
+                machine.own.constants("--at", at or ()),
+                machine.own.steps_a_second(rate),
+            )
+            table = response.table()
+        else:
+            machine.refuse(at=at, input=input, output=output, rate=rate)
+            drive = machine.loaded_drive
+            linear = None if linear_at is None else drive.linearize(linear_at)
+            response = drive.frequency_response(grid, amplitudes or AMPLITUDES, bias=bias)
+            table = response_table(response, frequency)
     save(out, "Gain, phase and distortion, in SI", response.write)
     draw_figure(plot, "plot_bode", response, linear=linear, mark=frequency)
     span = f"{grid.size} frequencies from {grid[0]:g} to {grid[-1]:g} Hz"
-    drive.note(f"{drive.title}, sines about {bias:g} V: {span}")
-    note(f"At {frequency:g} Hz:")
+    about = f"{bias:g} {unit_text(response.units.get(response.input, ''))}".rstrip()
+    moved = "" if machine.own is None else f" of {response.input} to {response.output}"
+    machine.note(f"{machine.title}, sines{moved} about {about}: {span}")
+    if machine.own is None:
+        note(f"At {frequency:g} Hz:")
     show(table)
-    for output in response.sentences_on_no_motion():
-        say(f"{output}.")
+    for sentence in response.sentences_on_no_motion():
+        say(f"{sentence}.")
+
+
+class Sine(NamedTuple):
+    """What moves the input of a frequency response."""
+
+    amplitudes: Sequence[float]
+    bias: float
+    linear_at: float | None
+    """Where the linear model is taken; None for no such model."""
+
+
+def _ends(own: OwnMachine, input: str | None, output: str | None) -> tuple[str, str]:
+    """Input and output of a frequency response, by their full names."""
+    moved = own.driven if input is None else own.input_named(input)
+    named = outputs_named(own, None if output is None else [output])
+    usual = [name for name in own.model.outputs if name not in own.model.integrals]
+    return moved, (named or usual or own.model.last_signals)[0]
+
+
+def _own_response(
+    own: OwnMachine,
+    grid: NDArray[np.float64],
+    sine: Sine,
+    ends: tuple[str, str],
+    at: Mapping[str, float],
+    rate: float,
+) -> tuple[FrequencyResponse, LinearModel | None]:
+    """Frequency response of a machine of a user's own, and its linear model."""
+    from swashplate.linear import sweep
+
+    input, output = ends
+    if input in at:
+        raise InputError(f"--at gives {input}, which is moved: its mean is --bias.")
+    own.check_needed([input, *at], "--at")
+    response = sweep(
+        own.machine,
+        grid,
+        sine.amplitudes,
+        rate,
+        input=input,
+        output=output,
+        bias=sine.bias,
+        at=at,
+    )
+    if sine.linear_at is None:
+        return response, None
+    inputs = {input: sine.linear_at, **at}
+    point = operating_point(own, inputs, rate)
+    linear = linear_model(own, inputs, rate, point, inputs=[input], outputs=[output])
+    return response, linear
 
 
 @command(

@@ -1,4 +1,4 @@
-"""``swashplate export`` and ``live``: a drive outside Python."""
+"""``swashplate export`` and ``live``: a drive, or a machine of one's own, outside Python."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from swashplate.cli.commands import command
 from swashplate.cli.options import (
     NO_VALUE,
     AxisOption,
-    DriveChoice,
     Force,
+    MachineChoice,
     new_file,
     new_folder,
 )
@@ -27,6 +27,7 @@ from swashplate.tables import PAGE, Form, check_folder
 
 if TYPE_CHECKING:
     from swashplate.drive import Drive
+    from swashplate.equations import Machine
 
 FMU = Form("an FMU", (".fmu",))
 WASM = Form("WebAssembly", (".wasm",))
@@ -44,19 +45,20 @@ app = typer.Typer(rich_markup_mode="rich")
         swashplate export mine.toml --c folder
         swashplate export hoist --set tau=10ms --step 0.001 --fmu hoist.fmu
         swashplate export hoist --wasm hoist.wasm
+        swashplate export valve.py --fmu valve.fmu --set gain=0.03
     """,
 )
 def export(
-    drive: DriveChoice,
+    machine: MachineChoice,
     *,
     fmu: Annotated[Path | None, new_file(FMU, "FMU for co-simulation.", metavar="FILE.fmu")] = None,
     c: Annotated[
         Path | None,
-        new_folder("New or empty folder for C source with the drive's numbers.", "*"),
+        new_folder("New or empty folder for C source with the machine's numbers.", "*"),
     ] = None,
     wasm: Annotated[
         Path | None,
-        new_file(WASM, "WebAssembly with the drive's numbers.", metavar="FILE.wasm"),
+        new_file(WASM, "WebAssembly with the machine's numbers.", metavar="FILE.wasm"),
     ] = None,
     fmi: Annotated[
         Literal["2", "2.0", "3", "3.0"], typer.Option(help="FMI version of the FMU.")
@@ -65,7 +67,10 @@ def export(
         float | None,
         typer.Option(
             metavar="S",
-            help="Internal step, at most 1/512 s; independent of the communication step.",
+            help=(
+                "Internal step, of a drive at most 1/512 s; independent of the communication step "
+                "(default: 1/512 s, or the step that 'swashplate simulate' takes)."
+            ),
         ),
     ] = None,
     platforms: Annotated[
@@ -83,10 +88,11 @@ def export(
     ] = False,
     force: Force = False,
 ) -> None:
-    """Export a drive as FMU, C source or WebAssembly.
+    """Export a drive, or a machine of your own, as FMU, C source or WebAssembly.
 
-    An FMU needs no Python and no compiler, neither to write it nor to run it:
-    the package contains its libraries.
+    An FMU of a drive needs no Python and no compiler, neither to write it nor to
+    run it: the package contains its libraries. A machine of your own is compiled
+    when it is exported.
     """
     if fmu is None and c is None and wasm is None:
         raise InputError("Choose what to export: --fmu FILE.fmu, --c DIR or --wasm FILE.wasm.")
@@ -100,8 +106,10 @@ def export(
     with spinner("Exporting"):
         from swashplate import export as exporting
 
-        exported = drive.loaded_drive
-    longest_step = exporting.LONGEST_STEP if step is None else step
+        own = machine.own
+        exported = machine.loaded_drive if own is None else own.machine
+    usual_step = exporting.LONGEST_STEP if own is None else 1.0 / own.steps_a_second()
+    longest_step = usual_step if step is None else step
     names = None if platforms is None else [part.strip() for part in platforms.split(",")]
     with texts_of_warnings():
         if fmu is not None:
@@ -119,19 +127,22 @@ def export(
             save(
                 wasm, "WebAssembly", lambda path: exporting.wasm(exported, path, step=longest_step)
             )
-    drive.warn()
-    for line in drive.changes:
+    machine.warn()
+    for line in machine.changes:
         note(line)
+    if own is not None and own.stated:
+        note(f"What is exported starts at rest: {', '.join(sorted(own.stated))} left out.")
 
 
-def _export_c(drive: Drive, folder: Path, step: float, *, compile: bool) -> None:
-    """Write the C source of a drive, compile it if it is asked for, and name the files."""
+def _export_c(drive: Drive | Machine, folder: Path, step: float, *, compile: bool) -> None:
+    """Write the C source of a machine, compile it if it is asked for, and name the files."""
     from swashplate import export as exporting
 
     with spinner(f"Writing {folder}"):
         files = exporting.c(drive, folder, step)
         if compile:
-            (header,) = (file.name for file in files if file.name.endswith("drive.h"))
+            headers = [file.name for file in files if file.suffix == ".h"]
+            (header,) = (name for name in headers if not name.endswith("_values.h"))
             files.append(exporting.compiled_c(folder, header))
     for file in files:
         note(f"C: {file}")
@@ -157,7 +168,7 @@ def texts_of_warnings() -> Iterator[None]:
     """,
 )
 def live(
-    drive: DriveChoice,
+    drive: MachineChoice,
     path: Annotated[
         Path | None,
         typer.Argument(
@@ -179,6 +190,12 @@ def live(
     the simulated curves, their errors and the limits follow. Changed values are
     listed as lines for the drive's parameter file.
     """
+    if drive.own is not None:
+        raise InputError(
+            f"{drive.title}: a live page has the sliders of a drive; see other numbers of a "
+            f"machine of your own with 'swashplate simulate {drive.drive} ... --set NAME=VALUE "
+            "--plot FILE', or give it away as an FMU with 'swashplate export'."
+        )
     if (path is None) == (maneuver is None):
         raise InputError("Name either a campaign, or a maneuver with --maneuver.")
     with spinner("Writing the page"):

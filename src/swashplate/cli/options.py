@@ -15,10 +15,12 @@ import typer
 
 from swashplate.cli.commands import Output
 from swashplate.cli.terminal import check_writable, note
+from swashplate.errors import InputError
 from swashplate.tables import FIGURE, TABLE, Form
 from swashplate.units import show_rod
 
 if TYPE_CHECKING:
+    from swashplate.cli.machines import OwnMachine
     from swashplate.drive import Drive
 
 Interpolation = Literal["linear", "previous"]
@@ -26,6 +28,10 @@ Start = Literal["rest", "steady"]
 
 NO_VALUE = " "
 """Metavar of a switch; without one, its help shows <bool>."""
+STANDARD_RATE = 512.0
+"""Samples a second unless others are asked for. [Hz]"""
+VOLTAGE = "voltage"
+"""Column of a drive's command in a log, by default."""
 CAMPAIGN = Path("campaign.toml")
 LOG_FORMATS = ".csv and other text, .parquet, .mat, .h5, .tdms or .mf4"
 
@@ -87,6 +93,17 @@ DriveArgument = Annotated[
         help="Packaged drive (listed by 'swashplate show'), parameter file, or folder of a fit.",
     ),
 ]
+MachineArgument = Annotated[
+    str,
+    typer.Argument(
+        metavar="AXIS|SET.toml|FILE.py",
+        help=(
+            "Packaged drive (listed by 'swashplate show'), parameter file, folder of a fit, or a "
+            "machine of your own: valve.py, or valve.py:NAME for one of several. That file is "
+            "executed."
+        ),
+    ),
+]
 SetOption = Annotated[
     list[str] | None,
     typer.Option(
@@ -94,7 +111,7 @@ SetOption = Annotated[
         metavar="NAME=VALUE",
         help=(
             "Value of a parameter: Z16=1.2e-4 in SI units, Z16=1.2e-4/1.5e-4 for plus and minus, "
-            "Z16_plus=0.12mm with a unit; may be repeated."
+            "Z16_plus=0.12mm with a unit; of a machine of your own by path; may be repeated."
         ),
     ),
 ]
@@ -186,6 +203,20 @@ VariablesOption = Annotated[
         ),
     ),
 ]
+OutputOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--output",
+        metavar="NAME",
+        help="Signal of a machine of your own (default: its outputs); may be repeated.",
+    ),
+]
+StepRate = Annotated[
+    float | None,
+    typer.Option(
+        metavar="HZ", help="Steps a second of a machine of your own (default: as simulated)."
+    ),
+]
 RateOption = Annotated[float, typer.Option(metavar="HZ", help="Sampling rate, 10 to 100000 Hz.")]
 
 
@@ -198,11 +229,18 @@ class DriveChoice:
     factors: ScaleOption = None
 
     @cached_property
-    def loaded_drive(self) -> Drive:
-        """The drive."""
+    def named_drive(self) -> Drive:
+        """The drive as it is named."""
         from swashplate.cli.parsing import drive_of
 
-        drive = drive_of(self.drive, self.values or (), self.factors or ())
+        return drive_of(self.drive)
+
+    @cached_property
+    def loaded_drive(self) -> Drive:
+        """The drive."""
+        from swashplate.cli.parsing import changed_drive
+
+        drive = changed_drive(self.named_drive, self.values or (), self.factors or ())
         if drive.parameters.motion == "rod":
             show_rod()
         return drive
@@ -217,9 +255,9 @@ class DriveChoice:
     @property
     def changes(self) -> list[str]:
         """A line for each parameter that is not as its file has it."""
-        from swashplate.cli.parsing import changes_between, parameters_of
+        from swashplate.cli.parsing import changes_between
 
-        return changes_between(parameters_of(self.drive), self.loaded_drive.parameters)
+        return changes_between(self.named_drive.parameters, self.loaded_drive.parameters)
 
     def warn(self) -> None:
         """Say it if the drive's fit calls it not usable, as its title does, or left limits open."""
@@ -242,22 +280,113 @@ class DriveChoice:
 
 
 @dataclass(frozen=True)
+class MachineChoice(DriveChoice):
+    """A drive, or a machine of a user's own, as the command line names it, with values changed."""
+
+    drive: MachineArgument
+    model: ModelFile = None
+
+    @cached_property
+    def _named(self) -> OwnMachine | Drive:
+        """What is named, as its file has it."""
+        from swashplate.cli.machines import machine_in
+        from swashplate.cli.parsing import drive_of, machine_word
+
+        word = machine_word(self.drive, self.model)
+        return drive_of(self.drive) if word is None else machine_in(word)
+
+    @cached_property
+    def own(self) -> OwnMachine | None:
+        """The machine of a user's own; None if a drive is named, which has more to say."""
+        from swashplate.cli.machines import OwnMachine, changed
+
+        named = self._named
+        if not isinstance(named, OwnMachine):
+            return None
+        return changed(named, self.values or (), self.factors or ())
+
+    @cached_property
+    def named_drive(self) -> Drive:
+        """The drive as it is named."""
+        from swashplate.cli.machines import OwnMachine
+
+        named = self._named
+        assert not isinstance(named, OwnMachine)
+        return named
+
+    @property
+    def title(self) -> str:
+        """Its name for a heading."""
+        return super().title if self.own is None else self.own.title
+
+    @property
+    def changes(self) -> list[str]:
+        """A line for each number that is not as its file has it."""
+        return super().changes if self.own is None else [*self.own.changes]
+
+    def _warn_unreached(self) -> None:
+        if self.own is None:
+            super()._warn_unreached()
+
+    def warn(self) -> None:
+        """Say what speaks against a drive; nothing is known of a machine of a user's own."""
+        if self.own is None:
+            super().warn()
+
+    def refuse_without(self, lacking: str, **options: object) -> None:
+        """Refuse options that are given, by name, as something lacks that they need."""
+        for name, value in options.items():
+            if value:
+                raise InputError(f"--{name.replace('_', '-')} needs {lacking}.")
+
+    def refuse(self, **options: object) -> None:
+        """Refuse options that are given, by name, as they have no meaning for this machine."""
+        other = "a machine of your own" if self.own is None else "a drive"
+        for name, value in options.items():
+            if value:
+                option = f"--{name.replace('_', '-')}"
+                raise InputError(f"{option} is for {other}; leave it out for {self.title}.")
+
+
+@dataclass(frozen=True)
 class CommandSampling:
     """Options for sampling a command, and for reading it if it is a file."""
 
-    rate: RateOption = 512.0
+    stated_rate: Annotated[
+        float | None,
+        typer.Option(
+            "--rate",
+            metavar="HZ",
+            help="Sampling rate, 10 to 100000 Hz.",
+            show_default=f"{STANDARD_RATE:g} for a drive",
+        ),
+    ] = None
     interpolation: Annotated[
         Interpolation | None,
-        typer.Option(
-            help="Voltage between rows: linear, or zero-order hold. Required with a FILE."
-        ),
+        typer.Option(help="Input between rows: linear, or zero-order hold. Required with a FILE."),
     ] = None
     time_column: Annotated[
         str, typer.Option(metavar="NAME", help="Column of the time in FILE.")
     ] = "time"
-    column: Annotated[str, typer.Option(metavar="NAME", help="Column of the voltage in FILE.")] = (
-        "voltage"
-    )
+    stated_column: Annotated[
+        str | None,
+        typer.Option(
+            "--column",
+            metavar="NAME",
+            help="Column in FILE of the voltage, or of the first input.",
+            show_default=VOLTAGE,
+        ),
+    ] = None
+
+    @property
+    def rate(self) -> float:
+        """Samples a second. [Hz]"""
+        return STANDARD_RATE if self.stated_rate is None else self.stated_rate
+
+    @property
+    def column(self) -> str:
+        """Column of the voltage."""
+        return self.stated_column or VOLTAGE
 
     def __post_init__(self) -> None:
         """Refuse a rate out of range, before anything is sampled."""
@@ -284,8 +413,9 @@ class Simulating(CommandSampling):
         typer.Option(
             metavar="NAME=COLUMN",
             help=(
-                "Column of FILE, or number in SI units, for pump_speed (1 at the speed of Z10), "
-                "load_torque or supply_pressure; may be repeated."
+                "Further input as a column of FILE, or as a number in SI units: pump_speed (1 at "
+                "the speed of Z10), load_torque or supply_pressure of a drive, any of a machine "
+                "of your own; may be repeated."
             ),
         ),
     ] = None

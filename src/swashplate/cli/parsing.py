@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 _NUMBER = r"[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|inf\b|nan\b)"
 _VALUE = re.compile(rf"\s*({_NUMBER})(?:/({_NUMBER}))?\s*((?:1/)?[^\W\d_].*|°.*)?")
+_MACHINE_WORD = re.compile(r"(.+\.py)(?::(\w*))?")
 SETUP_FILE, NUMBERS, FIT_FILE = "setup.toml", "parameters.toml", "fit.json"
 """In a folder that a fit wrote: its fit setup, the numbers of a user-defined model, the fit."""
 LOAD = "load_torque"
@@ -38,6 +39,7 @@ KIND_NAMES = {
     "campaign": "a campaign",
     "drive": "a drive",
     "setup": "a fit setup",
+    "model": "a model file",
 }
 _MARKS = {"runs": "campaign", "stages": "setup", "control_card": "drive", "pump_motor": "drive"}
 _INSTEAD = {
@@ -47,13 +49,20 @@ _INSTEAD = {
     ("setup", "campaign"): "name the campaign first, and this file with --setup",
     ("campaign", "drive"): "name a drive here, and the campaign in place of CAMPAIGN.toml",
     ("setup", "drive"): "name a drive here, and this file with --setup",
+    (
+        "model",
+        "drive",
+    ): "simulate, show, limits, linearize, bode and export take it, this one does not",
+    ("model", "campaign"): "name the campaign first, and this file with --model",
 }
 
 
 def file_kind(path: Path) -> str:
-    """Kind of a file: ``"log"``, ``"campaign"``, ``"drive"``, ``"setup"``, or empty."""
+    """Kind of a file: ``"log"``, ``"model"`` and others of `KIND_NAMES`, or empty."""
     from swashplate.logs import SUFFIXES
 
+    if path.suffix == ".py":
+        return "model"
     if path.name.lower().endswith((*SUFFIXES, ".xlsx", ".xls")):
         return "log"
     try:
@@ -71,6 +80,32 @@ def check_file_kind(path: Path, expected: str) -> None:
         raise InputError(
             f"{path} is {KIND_NAMES[kind]}, not {KIND_NAMES[expected]}: {instead.format(path)}."
         )
+
+
+class MachineWord(NamedTuple):
+    """Where a machine of a user's own is found."""
+
+    file: Path
+    """Python file."""
+    name: str = ""
+    """Name in it; empty for its machine."""
+    fitted: str = ""
+    """Folder of the fit whose numbers it has; empty for nominal ones."""
+
+
+def machine_word(word: str, model: Path | None = None) -> MachineWord | None:
+    """What a word such as ``valve.py:loop`` names; None if it names a drive.
+
+    With the file of a model the word is the folder of a fit of it.
+    """
+    match = _MACHINE_WORD.fullmatch(word)
+    if model is not None:
+        if match is not None:
+            raise InputError(
+                f"{word} is a model file itself: leave out --model, or name the folder of a fit."
+            )
+        return MachineWord(model, fitted=word)
+    return None if match is None else MachineWord(Path(match[1]), match[2] or "")
 
 
 def title_of(campaign: Campaign) -> str:
@@ -131,6 +166,9 @@ def drive_file(word: str) -> Path | None:
     """
     from swashplate.parameters import set_file
 
+    own = machine_word(word)
+    if own is not None:
+        check_file_kind(own.file, "drive")
     file = set_file(word)
     if file is not None:
         check_file_kind(file, "drive")
@@ -228,11 +266,15 @@ def assignments_of(
     return values
 
 
-def drive_of(word: str, values: Sequence[str] = (), factors: Sequence[str] = ()) -> Drive:
-    """The drive of a name or file, with values set and then scaled."""
+def drive_of(word: str) -> Drive:
+    """The drive of a name or file."""
     from swashplate.drive import Drive
 
-    drive = Drive(parameters_of(word))
+    return Drive(parameters_of(word))
+
+
+def changed_drive(drive: Drive, values: Sequence[str] = (), factors: Sequence[str] = ()) -> Drive:
+    """A drive with values set and then scaled."""
     definitions = drive.parameters.definitions
 
     def definition_to_set(name: str) -> Any:

@@ -10,12 +10,14 @@ import typer
 
 from swashplate.cli import parsing, trials
 from swashplate.cli.commands import command
+from swashplate.cli.machines import run_tables
 from swashplate.cli.options import (
     NO_VALUE,
     CommandArgument,
-    DriveChoice,
     FigureFile,
     Force,
+    MachineChoice,
+    ModelFile,
     RateOption,
     ScaleOption,
     SetOption,
@@ -38,10 +40,11 @@ app = typer.Typer(rich_markup_mode="rich")
         swashplate simulate hoist "step +9 V" --plot step.png --units rpm
         swashplate simulate hoist sine:6.5,0.1 --set Z16_plus=0.12mm --out sine.csv
         swashplate simulate mine.toml log.csv --interpolation previous --out run.csv
+        swashplate simulate valve.py step:2 --measured supply=100 --set gain=0.03
     """,
 )
 def simulate(
-    drive: DriveChoice,
+    machine: MachineChoice,
     maneuver: CommandArgument,
     *,
     sampling: Simulating,
@@ -53,23 +56,24 @@ def simulate(
     end: Annotated[float | None, typer.Option("--to", metavar="S", help="End of the plot.")] = None,
     force: Force = False,
 ) -> None:
-    """Simulate a drive over a maneuver or a measured voltage.
+    """Simulate a drive, or a machine of your own, over a maneuver or a log.
 
-    Prints the largest speeds and currents, the distance travelled, and how long
-    each limit acted (the dead zone only while the command is not 0 V). --out
-    writes all signals, --plot draws them. 'swashplate --help' lists the
-    maneuvers.
+    Of a drive: the largest speeds and currents, the distance travelled, and how
+    long each limit acted (the dead zone only while the command is not 0 V). Of a
+    machine of your own: lowest, highest and last value of each signal, and how
+    long each limit acted. --out writes all signals, --plot draws them.
+    'swashplate --help' lists the maneuvers.
     """
     with spinner("Simulating"):
-        marched = trials.at_rate(drive.loaded_drive, sampling.rate)
-        name, run = trials.simulated_as(marched, maneuver, sampling)
-        tables = run.tables()
-        title = f"{drive.title}, {name}"
+        name, run = trials.run_of(machine, maneuver, sampling)
+        tables = run_tables(machine.own, run)
+        title = f"{machine.title}, {name}"
     save(out, "All signals, in SI", run.write)
     window = trials.window_of(run.time, begin, end)
-    draw_figure(plot, "plot_simulation", run, window=window, title=title)
+    if plot is not None:
+        draw_figure(plot, run.plot(window=window, title=title))
     duration = f"{run.time[-1] - run.time[0]:.6g} s"
-    drive.note(f"{title}: {run.time.size} samples at {sampling.rate:g} Hz, {duration}")
+    machine.note(f"{title}: {run.time.size} samples at {run.record.rate:g} Hz, {duration}")
     show(*tables)
 
 
@@ -136,19 +140,24 @@ def compare(
         swashplate show
         swashplate show hoist
         swashplate show hoist --toml > mine.toml    (a file to edit)
+        swashplate show valve.py
     """,
 )
 def show_parameters(
     drive: Annotated[
         str | None,
         typer.Argument(
-            metavar="AXIS|SET.toml",
-            help="Packaged drive, parameter file, or folder of a fit; without one, a list.",
+            metavar="AXIS|SET.toml|FILE.py",
+            help=(
+                "Packaged drive, parameter file, folder of a fit, or a machine of your own; "
+                "without one, a list."
+            ),
         ),
     ] = None,
     *,
     values: SetOption = None,
     factors: ScaleOption = None,
+    model: ModelFile = None,
     toml: Annotated[
         bool,
         typer.Option(
@@ -156,7 +165,7 @@ def show_parameters(
         ),
     ] = False,
 ) -> None:
-    """Show every parameter of a drive, or list the packaged drives.
+    """Show every parameter of a drive or a machine of your own, or list the packaged drives.
 
     Each parameter is shown with its unit and its source. A parameter with a plus
     and a minus value has one for each direction; both are magnitudes. Units are
@@ -167,15 +176,21 @@ def show_parameters(
             raise InputError("Name the drive to show: 'swashplate show' lists the packaged ones.")
         show(packaged_drives())
         return
+    machine = MachineChoice(drive, values, factors, model)
+    if machine.own is not None:
+        machine.refuse(toml=toml)
+        machine.note(machine.title)
+        show(machine.own.table(), machine.own.signals_table())
+        return
     # in SI: a rod's drive has angles inside, which chosen units of its motion would change
-    parameters = parsing.drive_of(drive, values or (), factors or ()).parameters
+    parameters = parsing.changed_drive(machine.named_drive, values or (), factors or ()).parameters
     if toml:
         from swashplate.parameters import dump_set
 
         typer.echo(dump_set(parameters), nl=False)
         return
     say(f"{parameters.name}: {parameters.title}")
-    for line in parsing.changes_between(parsing.parameters_of(drive), parameters):
+    for line in parsing.changes_between(machine.named_drive.parameters, parameters):
         note(line)
     show(*parameters.tables())
     rate = "any rate" if parameters.rate is None else f"{parameters.rate:g} Hz"

@@ -1,4 +1,4 @@
-"""Commands that a drive gets, named maneuvers or logs, and its runs under them."""
+"""Commands that a machine gets, named maneuvers or logs, and its runs under them."""
 
 from __future__ import annotations
 
@@ -16,8 +16,10 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from swashplate.analysis import Trial
-    from swashplate.cli.options import CommandSampling, Simulating, Start
+    from swashplate.cli.machines import OwnMachine
+    from swashplate.cli.options import CommandSampling, MachineChoice, Simulating, Start
     from swashplate.drive import Drive, Simulation
+    from swashplate.equations import Run
     from swashplate.logs import Log, Series
     from swashplate.maneuvers import Maneuver
 
@@ -64,6 +66,14 @@ def at_rate(drive: Drive, rate: float) -> Drive:
     return drive.at_every_rate()
 
 
+def run_of(machine: MachineChoice, command: str, options: Simulating) -> tuple[str, Run]:
+    """Simulate a drive, or a machine of a user's own; return the command's name and the run."""
+    if machine.own is not None:
+        machine.refuse(clip=options.clip)
+        return own_run(machine.own, command, options)
+    return simulated_as(at_rate(machine.loaded_drive, options.rate), command, options)
+
+
 def simulated_as(drive: Drive, command: str, options: Simulating) -> tuple[str, Simulation]:
     """As `simulated_run`, with the start and the measured inputs of the options."""
     return simulated_run(
@@ -86,9 +96,7 @@ def simulated_run(
     measured: Sequence[str] = (),
 ) -> tuple[str, Simulation]:
     """Simulate a drive over a maneuver or the command in a file; return its name and the run."""
-    name_or_file = command.partition(":")[0]  # stairs:2/4/0 is not a path
-    is_path = "/" in name_or_file or _ENDING.search(name_or_file) is not None
-    if is_path or Path(command).is_file():
+    if _is_file(command):
         name = Path(command).name
         log = command
         error_prefix = f"{command}: "
@@ -117,6 +125,35 @@ def simulated_run(
         raise InputError(f"{error_prefix}{error}") from None
 
 
+def _is_file(command: str) -> bool:
+    """Whether a command is a log, not a maneuver."""
+    name_or_file = command.partition(":")[0]  # stairs:2/4/0 is not a path
+    is_path = "/" in name_or_file or _ENDING.search(name_or_file) is not None
+    return is_path or Path(command).is_file()
+
+
+def _checked_log(command: str) -> Log:
+    """The log that a command names; another kind of file is refused."""
+    from swashplate.logs import open_log
+
+    kind = file_kind(Path(command))
+    if kind not in ("log", ""):
+        raise InputError(
+            f"{command} is {KIND_NAMES[kind]}, not a command: name a maneuver such as step:9, or a "
+            "log."
+        )
+    return open_log(command)
+
+
+def _check_interpolation(command: str, options: CommandSampling) -> None:
+    """Refuse a log without a word on what its input is between rows."""
+    if options.interpolation is None:
+        raise InputError(
+            f"{command} needs --interpolation linear (a straight line from row to row) or "
+            "--interpolation previous (each row held until the next)."
+        )
+
+
 def _command_series(drive: Drive, command: str, options: CommandSampling) -> Series:
     """Read the voltage of a command from a log; refuses another kind of file.
 
@@ -126,15 +163,9 @@ def _command_series(drive: Drive, command: str, options: CommandSampling) -> Ser
 
     from swashplate.cli.terminal import note
     from swashplate.errors import FileError
-    from swashplate.logs import open_log, read_series, unit_of
+    from swashplate.logs import read_series, unit_of
 
-    kind = file_kind(Path(command))
-    if kind not in ("log", ""):
-        raise InputError(
-            f"{command} is {KIND_NAMES[kind]}, not a command: name a maneuver such as step:9, or a "
-            "log."
-        )
-    log = open_log(command)
+    log = _checked_log(command)
     columns = (("--time-column", options.time_column), ("--column", options.column))
     for option, column in columns:
         try:
@@ -161,11 +192,7 @@ def _command_series(drive: Drive, command: str, options: CommandSampling) -> Ser
                 f"'{options.column}' is taken as volts at the card; the fit's own command is "
                 f"'{logged.column}'."
             )
-    if options.interpolation is None:
-        raise InputError(
-            f"{command} needs --interpolation linear (a straight line from row to row) or "
-            "--interpolation previous (each row held until the next)."
-        )
+    _check_interpolation(command, options)
     return series
 
 
@@ -199,6 +226,112 @@ def _measured_inputs(assignments: Sequence[str], log: str, time_column: str) -> 
                 ) from None
             unit = MEASURED[name][0]
             inputs[name] = read_series(log, text, unit, time_column=time_column).values
+    return inputs
+
+
+# --- machines of a user's own ---------------------------------------------------------------------
+
+
+def own_run(own: OwnMachine, command: str, options: Simulating) -> tuple[str, Run]:
+    """Simulate a machine of a user's own over a maneuver, or over the columns of a log.
+
+    A maneuver drives the first input that is not given otherwise; columns of a log are taken by
+    the names of the inputs.
+    """
+    from swashplate.equations import simulate
+    from swashplate.equations.marching import even_rate
+    from swashplate.maneuvers import parse
+
+    is_log = _is_file(command)
+    log = _checked_log(command) if is_log else None
+    others = _other_inputs(own, options.measured or (), command if is_log else "", options)
+    rate = options.stated_rate or own.rate
+    time = None
+    inputs = dict[str, Any](others)
+    if log is None:
+        driven = next((name for name in own.needed if name not in others), own.driven)
+        if driven in others:
+            raise InputError(f"--measured gives {driven}, which {command} drives: leave one out.")
+        maneuver = parse(command)
+        inputs = {driven: maneuver, **others}
+        name = maneuver.name
+    else:
+        name = Path(command).name
+        columns = _columns_of_inputs(own, log, options)
+        series = {each: _series(own, command, each, columns[each], options) for each in columns}
+        inputs = {**{each: read.values for each, read in series.items()}, **others}
+        if not series:
+            raise InputError(
+                f"{command} has no column of an input of {own.machine.name}: call one "
+                f"{' or '.join(own.model.external)}, or name it by --measured {own.driven}=COLUMN."
+            )
+        _check_interpolation(command, options)
+        time = next(iter(series.values())).time
+        rate = rate or even_rate(time)
+    own.check_needed([*inputs], "--measured")
+    run = simulate(
+        own.machine,
+        inputs,
+        rate or options.rate,
+        time=time,
+        interpolation=options.interpolation,
+        substeps=own.substeps,
+        start=options.start,
+        begin=own.begin,
+    )
+    return name, run
+
+
+def _columns_of_inputs(own: OwnMachine, log: Log, options: CommandSampling) -> dict[str, str]:
+    """Column of a log for each input that has one, by its name or the last word of it."""
+    columns = dict[str, str]()
+    for name in own.model.external:
+        requested = name
+        if options.stated_column is not None and name == own.driven:
+            requested = options.stated_column
+        last = requested.rpartition(".")[2]
+        is_only = [each.rpartition(".")[2] for each in own.model.external].count(last) == 1
+        for column in (requested, last) if is_only else (requested,):
+            if name not in columns and _has(log, column):
+                columns[name] = column
+    if options.stated_column is not None and own.driven not in columns:
+        log.find(options.stated_column)
+    return columns
+
+
+def _has(log: Log, column: str) -> bool:
+    try:
+        log.find(column)
+    except InputError:
+        return False
+    return True
+
+
+def _series(own: OwnMachine, file: str, name: str, column: str, options: CommandSampling) -> Series:
+    """A column of a log in the unit of an input; as it stands if the model states none."""
+    from swashplate.logs import open_log, read_series, unit_of
+
+    unit = own.unit(name) or unit_of(open_log(file).find(column), column, "1")
+    return read_series(file, column, unit, time_column=options.time_column)
+
+
+def _other_inputs(
+    own: OwnMachine, assignments: Sequence[str], log: str, options: CommandSampling
+) -> dict[str, Any]:
+    """Inputs that are given by name: a number, a maneuver or a column of a log."""
+    from swashplate.cli.parsing import pairs_of
+    from swashplate.maneuvers import parse
+
+    inputs = dict[str, Any]()
+    for name, text in pairs_of("--measured", assignments, "supply=100"):
+        full = own.input_named(name.strip())
+        word = text.strip()
+        if word[:1].isdigit() or word[:1] in ("+", "-", "."):
+            inputs |= own.constants("--measured", [f"{full}={word}"])
+        elif log:
+            inputs[full] = _series(own, log, full, word, options).values
+        else:
+            inputs[full] = parse(word)
     return inputs
 
 

@@ -57,6 +57,8 @@ from .model import Tap as Tap
 from .model import Window as Window
 from .model import arguments_of as arguments_of
 from .model import discretised as discretised
+from .model import full_name as full_name
+from .model import near_names as near_names
 from .model import parameter_paths as parameter_paths
 from .model import state_paths as state_paths
 from .plausible import check_plausible as check_plausible

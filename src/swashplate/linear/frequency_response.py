@@ -8,12 +8,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import ceil, inf
+from types import MappingProxyType
 from typing import TYPE_CHECKING, cast, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swashplate.equations import Machine, is_real
+from swashplate.equations import Machine, floats_of, is_real
 from swashplate.equations.marching import check_rate, marched, output_of
 from swashplate.errors import DomainError, InputError
 from swashplate.linear.model import LinearModel
@@ -240,6 +241,7 @@ def sweep(
     input: str,
     output: str,
     bias: float = 0.0,
+    at: Mapping[str, float] = MappingProxyType({}),
     tolerance: float = 1e-4,
     size: float = 0.0,
     units: Mapping[str, str] | None = None,
@@ -249,8 +251,8 @@ def sweep(
     Parameters
     ----------
     instance : Machine
-        The model with its numbers, see `swashplate.equations.Machine`. It must be able to start
-        settled.
+        The model with its numbers, see `swashplate.equations.Machine`. One that has no equation for
+        its steady state starts at rest.
     frequencies : (f,) array_like
         Rising, from 1 mHz to an eighth of the rate. [Hz]
     amplitudes : (a,) array_like
@@ -262,6 +264,8 @@ def sweep(
         External signal that moves the model, and the signal that answers.
     bias : float
         Mean of the input.
+    at : mapping of str to float
+        Constant values of its other inputs.
     tolerance : float
         Relative change of the first harmonic, from the middle of a march to its end, below which
         the answer repeats itself.
@@ -307,7 +311,7 @@ def sweep(
             # twice as long until the middle and the last cycle agree: what lasts is then smaller
             count = least = 2 * ceil(frequency * SHORTEST)
             while True:
-                answer = _cycles(instance, input, output, np.tile(cycle, count), step, steps)
+                answer = _cycles(instance, {input: np.tile(cycle, count)}, at, output, step, steps)
                 middle, _, _ = _harmonic(answer[count // 2 - 1], size)
                 last, distortion[i, j], mean[i, j] = _harmonic(answer[-1], size)
                 if abs(last - middle) <= tolerance * abs(last):
@@ -354,12 +358,21 @@ def _check_swing(instance: Machine, input: str, bias: float, largest: float) -> 
 
 
 def _cycles(
-    instance: Machine, input: str, output: str, record: Array, step: float, steps: int
+    instance: Machine,
+    moving: Mapping[str, Array],
+    at: Mapping[str, float],
+    output: str,
+    step: float,
+    steps: int,
 ) -> Array:
-    """Answer from the steady state under the first sample, a row for each cycle."""
-    initial = instance.start({input: float(record[0])}, step, "steady")
+    """Answer to a moving input from its first sample on, a row for each cycle."""
+    ((input, record),) = moving.items()
+    records = {**moving, **{name: np.full(record.size, value) for name, value in at.items()}}
+    settles = all(part.settled or not floats_of(part.state) for part in instance.model.parts)
+    first = {name: float(values[0]) for name, values in records.items()}
+    initial = instance.start(first, step, "steady" if settles else "rest")
     stored, _ = output_of(instance.model, output)
-    (signal,) = marched(instance, {input: record}, step, initial, (stored,), input)
+    (signal,) = marched(instance, records, step, initial, (stored,), input)
     return np.asarray(signal.reshape(-1, steps))
 
 

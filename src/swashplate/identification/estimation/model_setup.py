@@ -9,6 +9,7 @@ from importlib import import_module
 from math import inf
 from pathlib import Path
 from traceback import extract_tb
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -137,30 +138,7 @@ class ModelSetup(Result):
         InputError
             If it lacks one of the names.
         """
-        file = Path(path).resolve()
-        if not file.exists():
-            raise MissingFileError(f"There is no file {path}: name a Python file with a model.")
-        if not file.is_file() or file.suffix != ".py" or not file.stem.isidentifier():
-            raise FileError(f"{path} is not a Python file with a model, such as valve.py.")
-        if str(file.parent) not in sys.path:
-            sys.path.insert(0, str(file.parent))
-        try:
-            module = import_module(file.stem)
-        except SystemExit as error:
-            sys.modules.pop(file.stem, None)
-            raise FileError(
-                f"{path} ended Python with sys.exit({error.code!r}) when it was loaded: guard the "
-                "part of the file that runs as a script by if __name__ == '__main__'."
-            ) from None
-        except Exception as error:  # the user's own code, which can raise anything
-            sys.modules.pop(file.stem, None)
-            trace = extract_tb(error.__traceback__)
-            lines = [entry.lineno for entry in trace if entry.filename == str(file)]
-            line = getattr(error, "lineno", None) or (lines[-1] if lines else None)
-            where = f"{path}, line {line}" if line else f"{path}"
-            raise FileError(f"{where}: {type(error).__name__}: {error}.") from None
-        if module.__file__ is None or Path(module.__file__).resolve() != file:
-            raise FileError(f"{path}: another module is called {file.stem}; rename the file.")
+        module = loaded_module(path)
         for name in ("model", "free"):
             if not hasattr(module, name):
                 raise InputError(
@@ -315,6 +293,47 @@ class ModelSetup(Result):
             zeros=zeros,
         )
         return problem.outputs(solve(problem).vector, 0)
+
+
+def loaded_module(path: str | Path) -> ModuleType:
+    """A Python file, executed as a module that worker processes import as well.
+
+    A script that reads its arguments finds none.
+
+    Raises
+    ------
+    FileError
+        If there is no such file, or it cannot be executed, or a module of its name is another one.
+    """
+    file = Path(path).resolve()
+    if not file.exists():
+        raise MissingFileError(f"There is no file {path}: name a Python file with a model.")
+    if not file.is_file() or file.suffix != ".py" or not file.stem.isidentifier():
+        raise FileError(f"{path} is not a Python file with a model, such as valve.py.")
+    if str(file.parent) not in sys.path:
+        sys.path.insert(0, str(file.parent))
+    arguments = sys.argv
+    sys.argv = [str(path)]
+    try:
+        module = import_module(file.stem)
+    except SystemExit as error:
+        sys.modules.pop(file.stem, None)
+        raise FileError(
+            f"{path} ended Python with sys.exit({error.code!r}) when it was loaded: guard the "
+            "part of the file that runs as a script by if __name__ == '__main__'."
+        ) from None
+    except Exception as error:  # the user's own code, which can raise anything
+        sys.modules.pop(file.stem, None)
+        trace = extract_tb(error.__traceback__)
+        lines = [entry.lineno for entry in trace if entry.filename == str(file)]
+        line = getattr(error, "lineno", None) or (lines[-1] if lines else None)
+        where = f"{path}, line {line}" if line else f"{path}"
+        raise FileError(f"{where}: {type(error).__name__}: {error}.") from None
+    finally:
+        sys.argv = arguments
+    if module.__file__ is None or Path(module.__file__).resolve() != file:
+        raise FileError(f"{path}: another module is called {file.stem}; rename the file.")
+    return module
 
 
 class _ReadChannels(Mapping[str, Channel]):

@@ -1,0 +1,457 @@
+"""Machines of a user's own: from a word of the command line to a model with its numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple, get_type_hints
+
+from swashplate.cli.parsing import NUMBERS, MachineWord, assignments_of
+from swashplate.documents import parse_toml, read_text
+from swashplate.errors import InputError, ParameterError, UnknownNameError
+from swashplate.tables import UNIT, Column, Table, share_cell
+from swashplate.units import unit_text
+
+if TYPE_CHECKING:
+    from types import ModuleType
+
+    from swashplate.drive import Drive
+    from swashplate.equations import Machine, Model, Run
+    from swashplate.identification import ModelSetup, UserModel
+
+MACHINE, MODEL = "machine", "model"
+"""Names that stand for a file's machine if none is named, in this order."""
+ROUNDING = 1e-12
+"""Part of a signal's size below which a value of it is rounding. [1]"""
+EXAMPLE = "gain=0.03, hoist.pump.Z9=0.2 or lag=50ms"
+INPUT_EXAMPLE = "supply=100 or supply=9.5MPa"
+
+
+class NumberDefinition(NamedTuple):
+    """What a number of a machine is."""
+
+    name: str
+    """In words."""
+    unit: str
+
+
+@dataclass(frozen=True)
+class OwnMachine:
+    """A machine of a user's own, and what its file says of how it is run."""
+
+    machine: Machine
+    title: str
+    """For a heading."""
+    begin: Mapping[str, float] = field(default_factory=dict)
+    """States at the first sample that differ from those at rest, by path."""
+    units: Mapping[str, str] = field(default_factory=dict)
+    """Units of parameters that the file states beside their bounds, by path."""
+    rate: float | None = None
+    """Samples a second that the model is made for. [Hz]"""
+    substeps: int | None = None
+    """Steps a sample."""
+    changes: tuple[str, ...] = ()
+    """A line for each number that is not as its file has it."""
+    stated: frozenset[str] = frozenset()
+    """States that the command line sets, by path."""
+
+    @property
+    def model(self) -> Model:
+        """Its equations."""
+        return self.machine.model
+
+    @property
+    def needed(self) -> tuple[str, ...]:
+        """Inputs without which it cannot run, in their order."""
+        model = self.model
+        defaults = {part.tap(name).signal for part in model.parts for name in part.defaults}
+        return tuple(name for name in model.external if name not in defaults)
+
+    @property
+    def driven(self) -> str:
+        """Its first input, which drives it if none is named."""
+        inputs = self.needed or self.model.external
+        if not inputs:
+            raise InputError(f"{self.title}: the equations of {self.machine.name} take no input.")
+        return inputs[0]
+
+    def named(self, name: str, names: Sequence[str], what: str) -> str:
+        """The full name of an input, an output or a signal; a wrong one is refused."""
+        from swashplate.equations import full_name, near_names
+
+        full = full_name(name, names)
+        if full not in names:
+            raise UnknownNameError(f"{self.machine.name} has no {what} {near_names(name, names)}.")
+        return full
+
+    def input_named(self, name: str) -> str:
+        """The full name of an input."""
+        return self.named(name, self.model.external, "input")
+
+    def unit(self, signal: str) -> str:
+        """Unit of an input or a signal; empty if the model states none."""
+        definition = self.model.definitions.get(signal)
+        return definition.unit if definition else ""
+
+    def meaning(self, signal: str) -> str:
+        """What an input or a signal is, in words; empty if the model does not say it."""
+        definition = self.model.definitions.get(signal)
+        return definition.name if definition else ""
+
+    def constants(self, option: str, assignments: Sequence[str]) -> dict[str, float]:
+        """Constant inputs of assignments such as ``supply=100``; a number alone is the first."""
+        written = [each if "=" in each else f"{self.driven}={each}" for each in assignments]
+
+        def definition(name: str) -> NumberDefinition:
+            full = self.input_named(name)
+            return NumberDefinition(self.meaning(full) or full, self.unit(full))
+
+        values = assignments_of(option, written, INPUT_EXAMPLE, definition, (1,), units=True)
+        return {self.input_named(name): value for name, value in values.items()}
+
+    def check_needed(self, given: Sequence[str], option: str) -> None:
+        """Refuse the lack of an input."""
+        lacking = [name for name in self.needed if name not in given]
+        if lacking:
+            units = [
+                f" [{unit_text(self.unit(name))}]" if self.unit(name) else "" for name in lacking
+            ]
+            listed = ", ".join(f"{name}{unit}" for name, unit in zip(lacking, units, strict=True))
+            raise InputError(
+                f"{self.machine.name} needs {listed} as well: write {option} {lacking[0]}=NUMBER."
+            )
+
+    def steps_a_second(self, stated: float | None = None) -> float:
+        """Steps of its equations, as many as `simulate` takes, unless others are stated. [Hz]"""
+        from swashplate.equations.marching import SOURCE_RATE
+
+        return stated or (self.rate or SOURCE_RATE) * (self.substeps or 1)
+
+    def table(self) -> Table:
+        """Its parameters with their units."""
+        columns = (Column("parameter"), Column("meaning", wrap=True), Column("", ".6g"), UNIT)
+        table = Table("", columns, si=True)
+        numbers = numbers_of(self.machine)
+        definitions = parameter_definitions(self)
+        for path, value in numbers.items():
+            definition = definitions[path]
+            table.add(path, definition.name, value, unit=definition.unit)
+        return without_empty(table)
+
+    def signals_table(self) -> Table:
+        """Its inputs, states and signals."""
+        from swashplate.equations import floats_of
+
+        table = Table("", (Column("signal"), Column("is"), Column("meaning", wrap=True), UNIT))
+        model = self.model
+        states = {part.full(path) for part in model.parts for path in floats_of(part.state)}
+        for name in dict.fromkeys((*model.external, *model.every_signal, *model.integrals)):
+            is_input = name in model.external
+            what = "input" if is_input else "state" if name in states else "signal"
+            table.add(name, what, self.meaning(name), unit=self.unit(name))
+        return without_empty(table)
+
+
+# --- from a file ----------------------------------------------------------------------------------
+
+
+def machine_in(word: MachineWord) -> OwnMachine | Drive:
+    """The machine, or the drive, that a word names."""
+    from swashplate.drive import Drive
+    from swashplate.equations import Machine, Model
+    from swashplate.identification import UserModel
+    from swashplate.identification.estimation import loaded_module
+
+    module = loaded_module(word.file)
+    name = word.name or (MODEL if word.fitted or not hasattr(module, MACHINE) else MACHINE)
+    if not hasattr(module, name):
+        raise UnknownNameError(_lacks(word, module))
+    found = getattr(module, name)
+    title = str(word.file) if name in (MACHINE, MODEL) else f"{word.file}:{name}"
+    if word.fitted:
+        title = f"{word.fitted} ({word.file})"
+    if isinstance(found, Drive):
+        return found
+    if isinstance(found, Machine):
+        return OwnMachine(found, title)
+    if isinstance(found, Model):
+        found = UserModel(found)
+    if not isinstance(found, UserModel):
+        raise InputError(
+            f"{word.file}: {name} is a {type(found).__name__}, which has no equations to run: give "
+            "a Machine, or a Model of equations."
+        )
+    return _of_model(found, word, module, title)
+
+
+def _lacks(word: MachineWord, module: ModuleType) -> str:
+    """That a file has no machine of a name, and which it has."""
+    from swashplate.drive import Drive
+    from swashplate.equations import Machine
+
+    has = [key for key, value in vars(module).items() if isinstance(value, Drive | Machine)]
+    lacks = f"'{word.name}'" if word.name else "machine: it needs machine = Machine(model, ...)"
+    listed = f"; there are {', '.join(has)}" if has else ""
+    if has and not word.name:
+        return f"{word.file} has several machines: write {word.file}:{has[0]}, of {', '.join(has)}."
+    return f"{word.file} has no {lacks}{listed}."
+
+
+def _of_model(found: UserModel, word: MachineWord, module: ModuleType, title: str) -> OwnMachine:
+    """A model with the numbers of its file, or of a fit to it."""
+    from swashplate.equations import Machine, defaults_of, parameter_paths, tuple_from
+    from swashplate.identification import ModelSetup
+    from swashplate.identification.estimation import states_started_by
+
+    model = found.model
+    numbers, units = dict[str, float](), dict[str, str]()
+    setup = None
+    if hasattr(module, "free"):
+        setup = ModelSetup.from_file(word.file)
+        if setup.model is found or setup.model.model is model:
+            numbers = dict(setup.fixed)
+            for unknown in setup.free.values():
+                numbers |= dict.fromkeys(unknown.targets, unknown.start)
+                units |= dict.fromkeys(unknown.targets, unknown.unit)
+    paths = parameter_paths(model)
+    if word.fitted:
+        if setup is None:
+            raise InputError(f"{word.file} has no 'free', so that {word.fitted} is no fit of it.")
+        numbers |= fitted_numbers(word, setup, [name for name in numbers if name in paths])
+    begin = dict[str, float]()
+    for name, value in numbers.items():
+        begin |= dict.fromkeys(states_started_by(model, name), value)
+    of_model = {name: value for name, value in numbers.items() if name in paths}
+    lacking = [name for name in paths if name not in {**defaults_of(model.parameters), **of_model}]
+    if lacking:
+        raise InputError(
+            f"{word.file} states no value of {', '.join(lacking)}: name it in free or fixed, or "
+            f"write machine = Machine({model.name}, ...) there."
+        )
+    if isinstance(found.given, Mapping):
+        raise InputError(
+            f"{word.file}: what is given of {model.name} depends on the run: write machine = "
+            "Machine(model, ..., given=...) there."
+        )
+    p = tuple_from(model.parameters, of_model)
+    return OwnMachine(
+        machine=Machine(model, p, options=found.options, given=found.given),
+        title=title,
+        begin=begin,
+        units=units,
+        rate=found.rate,
+        substeps=found.substeps,
+    )
+
+
+def fitted_numbers(word: MachineWord, setup: ModelSetup, needed: Sequence[str]) -> dict[str, float]:
+    """Numbers in the folder of a fit, those of single runs apart."""
+    from swashplate.equations import is_real
+
+    folder = Path(word.fitted)
+    file = folder / NUMBERS if folder.is_dir() else folder
+    table = parse_toml(read_text(file), str(file)).get(setup.name)
+    if not isinstance(table, dict) or not set(needed) <= table.keys():
+        raise InputError(
+            f"{file} has no table [{setup.name}] with {', '.join(needed)}: give the folder that "
+            f"'swashplate fit --model {word.file}' wrote."
+        )
+    for name, value in table.items():
+        if isinstance(value, bool) or not is_real(value):
+            raise InputError(
+                f"{file}: {name} under [{setup.name}] is {value!r:.60}, which is not a number."
+            )
+    return {name: float(value) for name, value in table.items()}
+
+
+# --- changes --------------------------------------------------------------------------------------
+
+
+def numbers_of(machine: Machine) -> dict[str, float]:
+    """Parameters of a machine by path."""
+    from swashplate.equations import parameter_paths
+
+    return dict(zip(parameter_paths(machine.model), machine.params.tolist(), strict=True))
+
+
+def parameter_definitions(own: OwnMachine) -> dict[str, NumberDefinition]:
+    """Meaning and unit of each parameter, by path."""
+    from swashplate.equations import declared_by
+
+    definitions = {
+        f"{own.model.prefix(index)}{path}": NumberDefinition(
+            "" if definition.name == path else definition.name, definition.unit
+        )
+        for index, part in enumerate(own.model.parts)
+        for definition in declared_by(part.parameters)
+        for path in definition.fields
+    }
+    for path, unit in own.units.items():
+        if path in definitions and unit:
+            definitions[path] = definitions[path]._replace(unit=unit)
+    return definitions
+
+
+def changed(own: OwnMachine, values: Sequence[str] = (), factors: Sequence[str] = ()) -> OwnMachine:
+    """A machine with values set and then scaled; ``start.PATH`` is a state at the first sample."""
+    from swashplate.equations import full_name, near_names
+    from swashplate.identification.estimation import states_started_by
+
+    if not values and not factors:
+        return own
+    model = own.model
+    numbers = numbers_of(own.machine)
+    parameters = parameter_definitions(own)
+    starts = dict(_starts(own))
+    names = [*parameters, *starts]
+
+    def full(name: str) -> str:
+        known = full_name(name, names)
+        if known.startswith("start.") and known not in names:
+            known = f"start.{full_name(name.removeprefix('start.'), [s[6:] for s in starts])}"
+        if known not in names:
+            raise UnknownNameError(
+                f"{own.machine.name} has no parameter {near_names(name, names)}."
+            )
+        return known
+
+    def definition(name: str) -> NumberDefinition:
+        found = {**parameters, **starts}[full(name)]
+        return found._replace(name=found.name or name)
+
+    to_set = assignments_of("--set", values, EXAMPLE, definition, (1,), units=True)
+    to_scale = assignments_of("--scale", factors, "gain=1.5", definition, (1,))
+    begin, stated = dict(own.begin), set(own.stated)
+    lines = list[str]()
+    for name, value in {full(each): number for each, number in to_set.items()}.items():
+        if name in starts:
+            paths = states_started_by(model, name)
+            begin |= dict.fromkeys(paths, value)
+            stated |= set(paths)
+            lines.append(f"{name}: {value:g} {unit_text(starts[name].unit)}".rstrip())
+        else:
+            numbers[name] = value
+    for name, factor in {full(each): number for each, number in to_scale.items()}.items():
+        if name in starts:
+            raise InputError(f"--scale {name}: the start of a state is set, by --set {name}=VALUE.")
+        numbers[name] *= factor
+    for name, old in numbers_of(own.machine).items():
+        if numbers[name] != old:
+            unit = unit_text(parameters[name].unit)
+            lines.append(f"{name}: {old:g} -> {numbers[name]:g} {unit}".rstrip())
+    return replace(
+        own,
+        machine=with_numbers(own.machine, numbers),
+        begin=begin,
+        changes=tuple(lines),
+        stated=frozenset(stated),
+    )
+
+
+def _starts(own: OwnMachine) -> Iterator[tuple[str, NumberDefinition]]:
+    """What can be set of the state at the first sample, by name."""
+    from swashplate.equations import floats_of
+
+    for index, part in enumerate(own.model.parts):
+        prefix = own.model.prefix(index)
+        for path in (*floats_of(part.state), *part.free_start):
+            signal = part.full(path)
+            yield (
+                f"start.{prefix}{path}",
+                NumberDefinition(own.meaning(signal) or path, own.unit(signal)),
+            )
+
+
+def with_numbers(machine: Machine, numbers: Mapping[str, float]) -> Machine:
+    """A machine with other parameters, by path; those beyond their range are refused."""
+    from swashplate.equations import Machine as MachineType
+    from swashplate.equations import floats_of, tuple_from
+
+    model = machine.model
+    for path, definition in model.ranges.items():
+        if not definition.holds(numbers[path]):
+            raise ParameterError(f"{machine.name}: {definition.broken(path, numbers[path])}.")
+    parts = tuple(
+        part._replace(
+            p=tuple_from(
+                each.parameters,
+                {path: numbers[f"{model.prefix(k)}{path}"] for path in floats_of(each.parameters)},
+            )
+        )
+        for k, (each, part) in enumerate(zip(model.parts, machine.parts, strict=True))
+    )
+    return MachineType.of_parts(model, parts, machine.name)
+
+
+# --- runs -----------------------------------------------------------------------------------------
+
+
+def run_tables(own: OwnMachine | None, run: Run) -> list[Table]:
+    """Lowest, highest and last value of each signal, and the share of time of each limit.
+
+    A run that has tables of its own, as that of a drive, shows these.
+    """
+    if own is None:
+        tables: list[Table] = [*run.tables()]  # type: ignore[attr-defined]  # of a Simulation
+        return tables
+    columns = (
+        Column("signal"),
+        Column("meaning", wrap=True),
+        *(Column(name, ".4g") for name in ("lowest", "highest", "last")),
+        UNIT,
+    )
+    signals = Table("", columns)
+    outputs = own.model.outputs
+    for name in dict.fromkeys((*run.records, *outputs) if outputs else run.names[1:]):
+        values = run[name]
+        ends = [float(values.min()), float(values.max()), float(values[-1])]
+        rounding = ROUNDING * max(map(abs, ends))
+        shown = [0.0 if abs(value) <= rounding else value for value in ends]
+        signals.add(name, own.meaning(name), *shown, unit=own.unit(name))
+    tables = [signals, limits_table(own, run)]
+    return [without_empty(table) for table in tables if table.rows]
+
+
+def without_empty(table: Table) -> Table:
+    """A table without the columns in which nothing is said."""
+    kept = [
+        k
+        for k, column in enumerate(table.columns)
+        if column.spec or any(row.cells[k] for row in table.rows)
+    ]
+    rows = [row._replace(cells=tuple(row.cells[k] for k in kept)) for row in table.rows]
+    return replace(table, columns=[table.columns[k] for k in kept], rows=rows)
+
+
+def limits_table(own: OwnMachine, run: Run | None = None) -> Table:
+    """Limits that the model declares and ranges of its signals; with a run the time of each."""
+    of_run = (Column("share of time", ".1%"),) if run is not None else ()
+    table = Table("", (Column("limit"), Column("meaning", wrap=True), *of_run))
+    for name, meaning in limit_meanings(own.model).items():
+        share = [share_cell(float(run.active(name).mean()))] if run is not None else []
+        table.add(name, meaning, *share)
+    for name, definition in own.model.definitions.items():
+        if definition.range == "any finite number":
+            continue
+        share = []
+        if run is not None:
+            if name not in run.names:
+                continue
+            share = [share_cell(float((~definition.holds(run[name])).mean()))]
+        unit = f" {unit_text(definition.unit)}" if unit_text(definition.unit) else ""
+        table.add(f"range of {name}", f"{definition.name}: {definition.range}{unit}", *share)
+    return table
+
+
+def limit_meanings(model: Model) -> dict[str, str]:
+    """What each limit of a model means, by its name; empty where the model does not say it."""
+    from swashplate.equations import definition_of
+
+    meanings = dict[str, str]()
+    for name, (index, _) in model.limit_bits.items():
+        part = model.parts[index]
+        hints = get_type_hints(get_type_hints(part.limits)["return"], include_extras=True)
+        definition = definition_of(hints[name.rpartition(".")[2]])
+        meanings[name] = definition.name if definition else ""
+    return meanings

@@ -1,0 +1,239 @@
+"""Where a machine of a user's own is linearised, and what its linear model says."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from math import inf, pi
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swashplate.cli.machines import OwnMachine, without_empty
+from swashplate.errors import DomainError, InputError
+from swashplate.tables import Cell, Column, Table, count
+from swashplate.units import unit_text
+
+if TYPE_CHECKING:
+    from swashplate.linear import LinearModel
+
+Array = NDArray[np.float64]
+FIRST, LONGEST = 1.0, 1024.0
+"""Time after which a machine may have settled, and must have. [s]"""
+SETTLED, STEADY = 1e-9, 1e-6
+"""Change of a state over its size that counts as none, and change of its rate over the rate. [1]"""
+AT_ZERO = 1e-9
+"""Size of a sampled pole, or distance of it from 1, that counts as 0. [1]"""
+
+
+class OperatingPoint(NamedTuple):
+    """States under constant inputs."""
+
+    states: Array
+    """All states in the order of `state_paths`."""
+    rates: Array
+    """By which those change that go on, as a position under a constant speed does; else 0. [1/s]"""
+    by_equation: bool = False
+    """Whether the model's own equation gives them."""
+
+
+def operating_point(own: OwnMachine, at: Mapping[str, float], rate: float) -> OperatingPoint:
+    """States that a machine settles at under constant inputs, in steps of a rate [Hz].
+
+    Those that the command line sets, if it sets any; else those of the model's own equation, or
+    where a march from the start ends once nothing changes but at a constant rate.
+    """
+    from swashplate.equations import floats_of, state_paths
+
+    machine = own.machine
+    settles = all(part.settled or not floats_of(part.state) for part in machine.model.parts)
+    if settles and not own.stated:
+        states = machine.start(at, 1.0 / rate, "steady").flat
+        return OperatingPoint(states, np.zeros(states.size), by_equation=True)
+    states = machine.start(at, 1.0 / rate, "rest").flat
+    for path, value in own.begin.items():
+        states[state_paths(machine.model).index(path)] = value
+    if own.stated:
+        return OperatingPoint(states, np.zeros(states.size))
+    return _marched_point(own, at, rate, states)
+
+
+def _marched_point(
+    own: OwnMachine, at: Mapping[str, float], rate: float, begin: Array
+) -> OperatingPoint:
+    """Where a march under constant inputs ends."""
+    from swashplate.equations import stepper
+
+    model = own.machine.model
+    walker = stepper(own.machine, [*at], model.every_signal[:1], rate=rate)
+
+    def put(states: Array) -> None:
+        kept = walker.state
+        kept.context.states[:] = states
+        walker.state = kept
+
+    def gone(steps: int) -> tuple[Array, Array]:
+        """States after some steps, and their change in the next one."""
+        for _ in range(steps):
+            walker.step(*at.values())
+        before = walker.state.context.states.copy()
+        walker.step(*at.values())
+        return before, walker.state.context.states - before
+
+    put(begin)
+    steps = round(FIRST * rate)
+    states, change = gone(steps)
+    while steps < LONGEST * rate:
+        earlier, earlier_change = states, change
+        states, change = gone(steps)
+        still = np.abs(states - earlier) <= SETTLED * np.maximum(np.abs(states), 1e-30)
+        steady = np.abs(change - earlier_change) <= STEADY * np.abs(change)
+        if (still | steady).all():
+            break
+        steps *= 2
+    else:
+        raise DomainError(
+            f"{own.machine.name} does not settle within {LONGEST:g} s under these inputs: give the "
+            "states of the operating point by --set start.PATH=VALUE."
+        )
+    rates = np.where(still, 0.0, change * rate)
+    # a position goes on from where it begins, unless another state goes on with it
+    from_start = np.where(still, states, begin)
+    put(from_start)
+    _, again = gone(0)
+    if np.abs(again - np.where(still, 0.0, change)).max(initial=0.0) <= STEADY * np.abs(change).max(
+        initial=0.0
+    ) + SETTLED * np.abs(states).max(initial=0.0):
+        states = from_start
+    return OperatingPoint(states, rates)
+
+
+def linear_model(
+    own: OwnMachine,
+    at: Mapping[str, float],
+    rate: float,
+    point: OperatingPoint,
+    *,
+    inputs: Sequence[str] | None = None,
+    outputs: Sequence[str] | None = None,
+) -> LinearModel:
+    """A machine's step, linearised at an operating point."""
+    from swashplate.equations import floats_of, tuple_from
+    from swashplate.linear import linearize
+
+    states: list[Any] | None = None
+    if not point.by_equation:
+        numbers = iter(point.states.tolist())
+        states = [
+            tuple_from(part.state, {path: next(numbers) for path in floats_of(part.state)})
+            for part in own.model.parts
+        ]
+    return linearize(own.machine, at, rate, states=states, inputs=inputs, outputs=outputs)
+
+
+def outputs_named(own: OwnMachine, names: Sequence[str] | None) -> list[str] | None:
+    """Full names of outputs; None if none is named."""
+    known = [*own.model.every_signal, *own.model.integrals]
+    return [own.named(name, known, "signal") for name in names] if names else None
+
+
+# --- tables ---------------------------------------------------------------------------------------
+
+
+def linear_tables(
+    own: OwnMachine,
+    at: Mapping[str, float],
+    point: OperatingPoint,
+    model: LinearModel,
+    frequency: float,
+) -> list[Table]:
+    """Operating point, gains at 0 Hz and at a frequency [Hz], and poles."""
+    return [_point_table(own, at, point), _gains_table(own, model, frequency), poles_table(model)]
+
+
+def _point_table(own: OwnMachine, at: Mapping[str, float], point: OperatingPoint) -> Table:
+    from swashplate.equations import state_paths
+
+    columns = (Column("Operating point"), Column("is"), Column("", ".5g"), Column("unit"))
+    table = Table("", (*columns, Column("changes", "s")))
+    for name, value in at.items():
+        table.add(name, "input", value, unit_text(own.unit(name)), "")
+    signals = [
+        part.full(path)
+        for k, part in enumerate(own.model.parts)
+        for index, path in own.model.places("state")
+        if index == k
+    ]
+    rows = zip(state_paths(own.model), signals, point.states, point.rates, strict=True)
+    for path, signal, value, rate in rows:
+        unit = unit_text(own.unit(signal))
+        goes_on = f"by {rate:.5g} {unit}/s".replace(" /s", " 1/s") if rate else ""
+        table.add(path, "state", float(value), unit, goes_on)
+    return without_empty(table)
+
+
+def _gains_table(own: OwnMachine, model: LinearModel, frequency: float) -> Table:
+    at = f"at {frequency:g} Hz"
+    columns = (
+        Column("from"),
+        Column("to"),
+        Column("steady gain", ".5g", none="integrates"),
+        Column(f"gain {at}", ".5g"),
+        Column("unit"),
+        Column(f"phase {at}", ".2f", "rad"),
+    )
+    table = Table("", columns)
+    if model.rate is not None and not 0.0 <= frequency <= 0.5 * model.rate:
+        raise InputError(
+            f"--frequency is {frequency:g} Hz, but must be from 0 to half the rate, "
+            f"{0.5 * model.rate:g} Hz."
+        )
+    for name in model.inputs:
+        steady = model.response([0.0], name)[:, 0].real
+        answers = model.response([frequency], name)[:, 0]
+        for output, gain, answer in zip(model.outputs, steady, answers, strict=True):
+            table.add(
+                name,
+                output,
+                float(gain) if abs(gain) < inf else None,
+                float(abs(answer)),
+                _gain_unit(own.unit(output), own.unit(name)),
+                float(np.angle(answer)) if abs(answer) > 0.0 else None,
+            )
+    return without_empty(table)
+
+
+def _gain_unit(output: str, input: str) -> str:
+    """Unit of an output by an input."""
+    below = f"({input})" if "/" in input or " " in input else input
+    if not input or input == "1":
+        return unit_text(output)
+    if output == input:
+        return ""
+    return f"{unit_text(output) or '1'}/{unit_text(below)}"
+
+
+def poles_table(model: LinearModel) -> Table:
+    """Poles in the s-plane, of two conjugate ones the upper; those of delays are left out."""
+    columns = (
+        Column("Poles"),
+        Column("real", ".5g"),
+        Column("imaginary", "s"),
+        Column("Hz", ".4g"),
+        Column("damping", ".3f"),
+    )
+    table = Table("", columns)
+    sampled = model.rate is not None
+    ended = np.abs(model.poles) < AT_ZERO if sampled else np.zeros(model.poles.size, dtype=bool)
+    for pole in model.poles[~ended & (model.poles.imag >= 0.0)]:
+        s = pole if model.rate is None else np.log(pole) * model.rate
+        size = float(abs(s))
+        if size == 0.0 or (sampled and abs(pole - 1.0) < AT_ZERO):
+            table.add("rad/s", 0.0, "", 0.0, Cell(None, "integrates"))
+            continue
+        real = float(s.real) if abs(s.real) > AT_ZERO * size else 0.0
+        imaginary = f"±{s.imag:.5g}" if s.imag else ""
+        table.add("rad/s", real, imaginary, size / (2.0 * pi), (0.0 - real) / size)
+    if ended.any():
+        table.caption = f"{count(int(ended.sum()), 'pole')} more at z = 0: gone after one step"
+    return table
